@@ -225,9 +225,10 @@ def eye_image_quality(phenotype: Phenotype, config: EyeConfig) -> float:
 
     eye = phenotype.eyes(config).eye()
     if eye.pupil is None:
-        return max(1 - noise_of(eye), 0.0)
+        return max(1 - noise_of(eye, eye.white_signal), 0.0)
     white = polychromatic(eye, eye.psf())
-    return float(optics.image_quality(white, 1 / (2 * eye.receptor_pitch), eye.white_signal, noise_of(eye))[0])
+    light, nyquist = eye.white_signal, 1 / (2 * eye.receptor_pitch)
+    return float(optics.image_quality(white, nyquist, light, noise_of(eye, light))[0])
 
 
 def bootstrap_interval(

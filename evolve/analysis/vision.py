@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from contextlib import closing
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,12 +11,12 @@ from numpy.typing import NDArray
 
 import optics
 import sim
-from evolve.analysis.filmed_episode import moments
 from evolve.analysis.statistics import eye_image_quality, polychromatic, psnr
-from evolve.config.run_config import RunConfig, WorldConfig
+from evolve.config.run_config import RunConfig
 from evolve.genome.phenotype import Phenotype
 from evolve.learning.animal_task import animal_task
 from sim.envs.prepared_task import PreparedTask
+from sim.tasks.simulation import Simulation
 
 __all__ = ["Vision", "ssim", "vision"]
 
@@ -46,42 +47,26 @@ def vision(animal: Phenotype, config: RunConfig) -> Vision:
     eyes = animal.eyes(config.eye)
     try:
         quality, contrast = eye_image_quality(animal, config.eye), _contrast(eyes.eye())
-        seen, perfect = (
-            _own_views(animal, config) if config.card.has_file else seen_and_perfect(eyes, config.task, config.world)
-        )
+        seen, perfect = seen_and_perfect(animal, config)
     except optics.AccuracyError:
         return Vision(math.nan, math.nan, math.nan, math.nan)
     gain = 1 / float(eyes.eye().white_signal)
     return Vision(quality, contrast, psnr(seen, perfect, gain), ssim(gain * seen, perfect))
 
 
-def seen_and_perfect(eyes: sim.Eyes, task: str, world: WorldConfig | None = None) -> tuple[Floats, Floats]:
-    """Signals without noise of the eyes, and of the same behind a perfect lens, (scene, eye, channel, height, width);
-    the scenes are the same for all eyes."""
-    perfect = replace(eyes, optics=None, waveguide=None)
-    where = (world or WorldConfig()).evaluation
-    worlds = sim.make_vec_env(task, perfect, SCENES, 0, mode="evaluation", **where)
-    try:
+def seen_and_perfect(animal: Phenotype, config: RunConfig) -> tuple[Floats, Floats]:
+    """Signals without noise of an animal's eyes, and of the same behind a perfect lens, (scene, eye, channel, height,
+    width); the scenes are the same for all eyes of a task."""
+    eyes, task = animal.eyes(config.eye), animal_task(animal, config)
+    if (light := task.compared_light) is None:
+        fidelity = replace(PreparedTask(task).fidelity, rays_per_receptor=RAYS)
+    else:
+        fidelity = sim.Fidelity(RAYS, eyes.bands, light=light)
+    perfect = animal_task(animal, config, eyes=replace(eyes, optics=None, waveguide=None))
+    with closing(Simulation(task, SCENES, 0)) as worlds:
         worlds.reset()
-        built, states = worlds.worlds.world, worlds.state
-    finally:
-        worlds.close()
-    seen, sharp = (
-        sim.BatchedRenderer(built, e, SCENES, sim.Fidelity(RAYS, e.bands)).signals(states) for e in (eyes, perfect)
-    )
-    return np.asarray(seen), np.asarray(sharp)
-
-
-def _own_views(animal: Phenotype, config: RunConfig) -> tuple[Floats, Floats]:
-    """The same in a task of somebody's own."""
-    task = PreparedTask(animal_task(animal, config))
-    model, how, poses = moments(task, SCENES, 0)
-    (kind,) = task.task.agents()[0].kinds
-    fidelity = replace(task.fidelity, rays_per_receptor=RAYS)
-    seen, sharp = (
-        sim.ModelRenderer(model, eye, kind.mounts, SCENES, fidelity, **how).signals(poses)
-        for eye in (kind.eye, replace(kind.eye, pupil=None, waveguide=None))
-    )
+        poses = worlds.poses()
+        seen, sharp = (PreparedTask(each, fidelity).renderer(worlds).signals(poses) for each in (task, perfect))
     return np.asarray(seen), np.asarray(sharp)
 
 

@@ -26,7 +26,7 @@ from evolve.store.evaluation import Evaluation
 __all__ = ["RunPlan", "steps_each"]
 
 REPORT_BYTES = 5_000_000  # chosen: an allowance for pages; the report of eight candidates has 0.6 MB (`evolve report`)
-# The exported episode as evolve.analysis.episode records it, which would load torch; tests hold these to it.
+# The exported episode as evolve.analysis.recorder records it, which would load torch; tests hold these to it.
 EPISODE_ACTIONS, EXR_EVERY, EXR_PIXELS = 256, 8, 60
 
 

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from evolve.genome.eye_config import AUTO
 from evolve.genome.genes import Gene, GeneConfig
 from evolve.genome.interval import Interval
 from optics.numerics.arguments import close_match, shown
@@ -26,7 +27,6 @@ __all__ = [
 
 SHOWN = 200  # letters of a value that a message quotes
 MOST_LISTED = 36  # of known words: all genes and tasks, and not all settings
-AUTO = "auto"  # in place of a number: chosen when it is needed
 
 
 class ConfigError(ValueError):

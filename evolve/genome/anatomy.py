@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Protocol
 
+from evolve.genome.eye_config import EyeConfig
 from evolve.genome.genes import ALL_GENES, RHABDOM, SIDE, SIDES, GeneConfig
 
 __all__ = ["contradiction", "fitted", "retina_width", "sides"]
@@ -22,20 +22,7 @@ Contradiction = tuple[str, tuple[str, ...]]
 SLACK = 1e-9  # of rounding: eyes that just touch do not overlap
 
 
-class Sizes(Protocol):
-    """What takes room, all in metres."""
-
-    @property
-    def sensor_width(self) -> float: ...
-    @property
-    def head_radius(self) -> float: ...
-    @property
-    def receptor_width(self) -> float: ...
-    @property
-    def receptor_pitch(self) -> float: ...
-
-
-def retina_width(receptors: float, sizes: Sizes) -> float:
+def retina_width(receptors: float, sizes: EyeConfig) -> float:
     """Width of a retina with so many receptors side by side [m]: an eye's on the head."""
     return receptors * sizes.receptor_pitch if sizes.receptor_pitch > 0 else sizes.sensor_width
 
@@ -46,7 +33,7 @@ def sides(values: Values) -> tuple[int, int]:
     return int(values[height]), int(values[width])
 
 
-def fitted(values: Values, uses: Uses, sizes: Sizes) -> Values:
+def fitted(values: Values, uses: Uses, sizes: EyeConfig) -> Values:
     """`values` of an animal in which nothing overlaps; genes stay within their searched ranges.
 
     Receptors too narrow are fewer, and rhabdoms wider than receptors narrower. Eyes too close are spread; where the
@@ -68,7 +55,7 @@ def fitted(values: Values, uses: Uses, sizes: Sizes) -> Values:
     return fits
 
 
-def _thinned(asked: Pair, least: Pair, range_deg: float, sizes: Sizes) -> Pair:
+def _thinned(asked: Pair, least: Pair, range_deg: float, sizes: EyeConfig) -> Pair:
     """The eyes and their receptors that are most like those asked for, of those that fit and are not below the least.
 
     Likeness is by ratios: the least sum of squared logarithms halves both rather than quarter one. Were one of them
@@ -86,12 +73,12 @@ def _ratio(one: float, other: float) -> float:
     return math.log(one / other)
 
 
-def contradiction(uses: Uses, sizes: Sizes) -> Contradiction | None:
+def contradiction(uses: Uses, sizes: EyeConfig) -> Contradiction | None:
     """Why no animal with these genes fits together, and the settings to blame; None if every genome can be repaired."""
     return _crowded_retina(uses, sizes) or _crowded_head(uses, sizes)
 
 
-def _crowded_retina(uses: Uses, sizes: Sizes) -> Contradiction | None:
+def _crowded_retina(uses: Uses, sizes: EyeConfig) -> Contradiction | None:
     if 0 < sizes.receptor_pitch < sizes.receptor_width:
         return (
             f"eye.receptor_pitch = {sizes.receptor_pitch:g}: must be 0 or at least eye.receptor_width = "
@@ -109,7 +96,7 @@ def _crowded_retina(uses: Uses, sizes: Sizes) -> Contradiction | None:
     return None
 
 
-def _crowded_head(uses: Uses, sizes: Sizes) -> Contradiction | None:
+def _crowded_head(uses: Uses, sizes: EyeConfig) -> Contradiction | None:
     width = _width_gene(uses)
     eyes, receptors = _lowest("n_eyes", uses), _lowest(width, uses)
     widest = _highest("placement_range_deg", uses)
@@ -129,17 +116,17 @@ def _width_gene(uses: Uses) -> str:
     return SIDE if SIDE in uses else SIDES[1]
 
 
-def _most_receptors(sizes: Sizes) -> float:
+def _most_receptors(sizes: EyeConfig) -> float:
     if sizes.receptor_pitch > 0:
         return math.inf
     return int(sizes.sensor_width / sizes.receptor_width * (1 + SLACK))
 
 
-def _least_range_deg(eyes: float, receptors: float, sizes: Sizes) -> float:
+def _least_range_deg(eyes: float, receptors: float, sizes: EyeConfig) -> float:
     return math.degrees((eyes - 1) * retina_width(receptors, sizes) / sizes.head_radius)
 
 
-def _most_eyes(range_deg: float, receptors: float, sizes: Sizes) -> int:
+def _most_eyes(range_deg: float, receptors: float, sizes: EyeConfig) -> int:
     return 1 + int(math.radians(range_deg) * sizes.head_radius / retina_width(receptors, sizes) * (1 + SLACK))
 
 

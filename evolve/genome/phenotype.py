@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from evolve.genome.anatomy import Sizes, fitted, retina_width, sides
+from evolve.genome.anatomy import fitted, retina_width, sides
+from evolve.genome.eye_config import EyeConfig
 from evolve.genome.genes import APERTURE_SHAPES, INHERITED, LAMBDA_MAX, RHABDOM, TILT, GeneConfig
 from evolve.genome.genotype import Genotype
 from evolve.genome.phenotype_on_record import checked_fields
@@ -30,44 +31,13 @@ NEURONS_PER_FEATURE = 4
 FORMER_ENCODER = 16  # of animals and policies on record that do not say: whatever their neurons
 
 
-class EyeSettings(Sizes, Protocol):
-    """What a run's eyes have in common, whatever their genes: see `evolve.EyeConfig`."""
-
-    @property
-    def optics(self) -> bool: ...
-    @property
-    def noise_sigma(self) -> float: ...
-    @property
-    def illuminance(self) -> float: ...
-    @property
-    def integration_time(self) -> float: ...
-    @property
-    def bands(self) -> int: ...
-    @property
-    def receptors(self) -> str: ...
-    @property
-    def relief_height(self) -> float: ...
-    @property
-    def relief_points(self) -> int: ...
-    @property
-    def relief_symmetric(self) -> bool: ...
-    @property
-    def rhabdom_index(self) -> float: ...
-    @property
-    def rhabdom_surround(self) -> float: ...
-    @property
-    def rhabdom_length(self) -> float: ...
-    @property
-    def rhabdom_absorption(self) -> float: ...
-
-
 class Settings(Protocol):
     """Of a run's settings, those that shape its animals."""
 
     @property
     def genome(self) -> Mapping[str, GeneConfig]: ...
     @property
-    def eye(self) -> EyeSettings: ...
+    def eye(self) -> EyeConfig: ...
 
 
 @dataclass(frozen=True)
@@ -101,7 +71,7 @@ class Phenotype:
     elevation_deg: float | None = None
     rhabdom_diameter_um: float | None = None
 
-    def waveguide(self, eye: EyeSettings) -> optics.Waveguide | None:
+    def waveguide(self, eye: EyeConfig) -> optics.Waveguide | None:
         """Each receptor, no wider than its place; None for squares."""
         import optics
 
@@ -116,7 +86,7 @@ class Phenotype:
             absorption=eye.rhabdom_absorption,
         )
 
-    def pupil(self, eye: EyeSettings) -> optics.Pupil | None:
+    def pupil(self, eye: EyeConfig) -> optics.Pupil | None:
         """Pupil of each of the eyes; None for the perfect lens."""
         import optics
 
@@ -132,7 +102,7 @@ class Phenotype:
             aperture=_aperture(APERTURE_SHAPES[self.aperture_shape]),
         )
 
-    def eyes(self, eye: EyeSettings) -> sim.Eyes:
+    def eyes(self, eye: EyeConfig) -> sim.Eyes:
         """The eyes as the simulation wants them."""
         import optics
         import sim

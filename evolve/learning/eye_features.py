@@ -1,8 +1,8 @@
 """What an eye's signals become before actor and critic see them: an MLP per eye over a memory of frames.
 
 Every eye has weights of its own, and one encoder serves all its remembered frames: signals -> w -> w -> w per frame,
-then `memory` x w -> w over the frames. The eyes' features are joined with what else is known: contact or, in a task of
-one's own, what the animal feels, and the previous action.
+then `memory` x w -> w over the frames. The eyes' features are joined with the other entries of the observation: what
+the animal feels, and its previous action.
 Units are leaky rectifiers: tanh learnt detection from a third more samples, at ten times the cost per unit.
 Receptors adapt: the first layer sees signals less their running mean, in units of their spread, as learning has met
 them.
@@ -12,15 +12,17 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Mapping
 
 import torch
 from gymnasium import spaces
 from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
 from torch import Tensor, nn
 
+from evolve.learning.observed import entries_of, known_beside_eyes
 from evolve.learning.per_eye_layers import DARK, AdaptedLinear, MemoryLinear, PerEyeLinear
 
-__all__ = ["UNITS", "EyeFeatures", "known_beside_eyes"]
+__all__ = ["UNITS", "EyeFeatures"]
 
 ENCODER_LAYERS = 3  # hidden, hidden, code of one frame
 FARTHEST = 10.0  # spreads off the mean that anything felt counts, at most
@@ -51,11 +53,6 @@ class Felt(nn.Module):
         self.seen.add_(x.shape[0])
 
 
-def known_beside_eyes(space: spaces.Dict) -> dict[str, int]:
-    """What an observation holds beside "eyes", and how many numbers each, in the order in which brains see them."""
-    return {name: math.prod(part.shape or (1,)) for name, part in sorted(space.spaces.items()) if name != "eyes"}
-
-
 class EyeFeatures(BaseFeaturesExtractor):
     """Features of an observation: `width` per eye, as wide as each layer below, then what is known beside them.
 
@@ -78,7 +75,10 @@ class EyeFeatures(BaseFeaturesExtractor):
             layers += [PerEyeLinear(self.n_eyes, inputs, outputs), UNITS(inplace=True)]
         self.encoder = nn.Sequential(*layers)
         self.temporal = nn.Sequential(MemoryLinear(self.n_eyes, self.memory, width, width), UNITS(inplace=True))
-        self.felt = Felt(beside["feels"]) if "feels" in beside else None
+        self.normalised = tuple(entry.name for entry in entries_of(observation_space) if entry.normalised)
+        sizes = [beside[name] for name in self.normalised]
+        self.felt = Felt(sum(sizes)) if sizes else None
+        self._sizes = sizes
 
     def forward(self, observation: dict[str, Tensor]) -> Tensor:
         if "frames" in observation:
@@ -86,8 +86,15 @@ class EyeFeatures(BaseFeaturesExtractor):
         else:
             features = self.temporal(self._encode(observation["eyes"]).transpose(2, 3))
         features = features.permute(2, 0, 1).flatten(1)
-        beside = [self.felt(observation[n]) if n == "feels" and self.felt else observation[n] for n in self.beside]
-        return torch.cat([features, *beside], dim=1)
+        known = {**observation, **self._less_mean(observation)}
+        return torch.cat([features, *(known[name] for name in self.beside)], dim=1)
+
+    def _less_mean(self, observation: Mapping[str, Tensor]) -> dict[str, Tensor]:
+        """Entries that are normalised."""
+        if self.felt is None:
+            return {}
+        joined = self.felt(torch.cat([observation[name] for name in self.normalised], dim=-1))
+        return dict(zip(self.normalised, joined.split(self._sizes, dim=-1), strict=True))
 
     def _encode(self, frames: Tensor) -> Tensor:
         """(a, b, eye, channel, height, width) -> codes (eye, code, a, b)."""
@@ -98,12 +105,13 @@ class EyeFeatures(BaseFeaturesExtractor):
         """(..., eye, channel, height, width) -> (eye, receptors, sample)."""
         return frames.reshape(-1, self.n_eyes, self.n_receptors).permute(1, 2, 0)
 
-    def adapt(self, frames: Tensor, feels: Tensor | None = None) -> None:
-        """Adapt the receptors to more frames (..., eye, channel, height, width), and the rest to what was felt
+    def adapt(self, frames: Tensor, beside: Mapping[str, Tensor] | None = None) -> None:
+        """Adapt the receptors to more frames (..., eye, channel, height, width), and normalised entries to theirs
         (..., number)."""
         self.encoder[0].adapt(self._signals(frames))
-        if self.felt is not None and feels is not None:
-            self.felt.adapt(feels.reshape(-1, feels.shape[-1]))
+        if self.felt is not None and beside is not None:
+            felt = torch.cat([beside[name] for name in self.normalised], dim=-1)
+            self.felt.adapt(felt.reshape(-1, felt.shape[-1]))
 
     def _at_each_step(self, codes: Tensor, age: Tensor) -> Tensor:
         """Codes (eye, code, memory - 1 + step, segment) -> features (eye, feature, sample)."""

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -24,13 +24,15 @@ from torch import Tensor
 
 from evolve.genome.phenotype import FORMER_ENCODER
 from evolve.learning.adam import Adam
-from evolve.learning.eye_features import UNITS, EyeFeatures, known_beside_eyes
+from evolve.learning.eye_features import UNITS, EyeFeatures
+from evolve.learning.observed import CONTACT, Entry, entries_of, known_beside_eyes
 from evolve.learning.tensor_file import read_tensors
 from evolve.store.atomic_files import write_whole
 
+FEELS = "feels"  # the entry of tasks of one world at a time
 LARGEST_COUNT = 4096  # of anything in a policy's shape; genes allow 512
 MOST_SIGNALS = 2**24  # in what a policy remembers at once; genes allow half as many
-FIRST_TURN = 0.5  # standard deviation of the first turns: with 1, a third of them are clipped
+FIRST_SPREAD = 0.5  # standard deviation of the first actions: with 1, a third of them are clipped
 
 
 class TrainingDiverged(FloatingPointError):
@@ -53,7 +55,7 @@ class PolicyConfig:
 
     eyes: shape of the observation's `eyes` (memory, eye, channel, height, width)
     neurons, layers, encoder: see `Brain`
-    actions: numbers in an action · feels: in what the animal feels; None for rhabdom's own agents, who know contact
+    actions: numbers in an action · beside: entries of the observation beside the eyes and the previous action
     """
 
     eyes: tuple[int, ...]
@@ -61,14 +63,13 @@ class PolicyConfig:
     layers: int = 2
     encoder: int = FORMER_ENCODER
     actions: int = 2
-    feels: int | None = None
+    beside: tuple[Entry, ...] = (CONTACT,)
 
     @classmethod
     def of(cls, space: spaces.Dict, neurons: int, layers: int, encoder: int) -> PolicyConfig:
         """For these observations."""
-        beside = known_beside_eyes(space)
-        feels = None if "contact" in beside else beside.get("feels", 0)
-        return cls(tuple(space["eyes"].shape), neurons, layers, encoder, beside["previous_action"], feels)
+        actions = known_beside_eyes(space)["previous_action"]
+        return cls(tuple(space["eyes"].shape), neurons, layers, encoder, actions, entries_of(space))
 
     def observation_space(self) -> spaces.Dict:
         """The observation that sim's environments give with these eyes."""
@@ -76,16 +77,19 @@ class PolicyConfig:
             "eyes": spaces.Box(-np.inf, np.inf, self.eyes, np.float32),
             "previous_action": spaces.Box(-1.0, 1.0, (self.actions,), np.float32),
         }
-        if self.feels is None:
-            known["contact"] = spaces.Box(0.0, 1.0, (1,), np.float32)
-        elif self.feels:
-            known["feels"] = spaces.Box(-np.inf, np.inf, (self.feels,), np.float32)
-        return spaces.Dict(known)
+        return spaces.Dict(known | {entry.name: entry.space for entry in self.beside})
 
     def record(self) -> dict[str, Any]:
-        """Plain values; what rhabdom's own agents all have alike is left out."""
-        values = asdict(self)
-        return values if self.feels is not None else {k: v for k, v in values.items() if k not in ("actions", "feels")}
+        """Plain values. Same values, same bytes: policies are hashed, so files keep the entries that they had before
+        there was `beside`."""
+        values = {name: value for name, value in asdict(self).items() if name != "beside"}
+        if self.beside == (CONTACT,) and self.actions == 2:
+            del values["actions"]
+            return values
+        size = sum(entry.size for entry in self.beside)
+        if self.beside == ((Entry(FEELS, size),) if size else ()):
+            return {**values, FEELS: size}
+        return {**values, "beside": [entry.record() for entry in self.beside]}
 
     @classmethod
     def from_record(cls, stored: Mapping[str, Any]) -> PolicyConfig:
@@ -102,8 +106,17 @@ class PolicyConfig:
             layers=int(stored.get("layers", 2)),
             encoder=int(stored.get("encoder", FORMER_ENCODER)),
             actions=int(stored.get("actions", 2)),
-            feels=int(stored["feels"]) if "feels" in stored else None,
+            beside=_entries(stored),
         )
+
+
+def _entries(stored: Mapping[str, Any]) -> tuple[Entry, ...]:
+    if "beside" in stored:
+        return tuple(Entry.from_record(entry) for entry in stored["beside"])
+    if FEELS in stored:
+        size = int(stored[FEELS])
+        return (Entry(FEELS, size),) if size else ()
+    return (CONTACT,)
 
 
 class _Within(torch.autograd.Function):
@@ -129,8 +142,7 @@ class EyePolicy(MultiInputActorCriticPolicy):
     """SB3's actor-critic over EyeFeatures of width `encoder`, with `layers` hidden layers of `neurons` each for actor
     and critic.
 
-    first_speed: of rhabdom's own agents: mean of the untrained policy's speeds, and twice their standard deviation, as
-        a part of the highest; all actions of others begin around 0.
+    first_actions: mean and standard deviation of each number of the untrained policy's actions; None: 0, FIRST_SPREAD
     """
 
     def __init__(
@@ -142,7 +154,7 @@ class EyePolicy(MultiInputActorCriticPolicy):
         neurons: int,
         layers: int = 2,
         encoder: int = FORMER_ENCODER,
-        first_speed: float = 0.5,
+        first_actions: Sequence[tuple[float, float]] | None = None,
         **kwargs: Any,
     ) -> None:
         kwargs |= {
@@ -155,11 +167,9 @@ class EyePolicy(MultiInputActorCriticPolicy):
         super().__init__(observation_space, action_space, lr_schedule, **kwargs)
         self.config = PolicyConfig.of(observation_space, neurons, layers, encoder)
         with torch.no_grad():
-            if self.config.feels is None:
-                self.action_net.bias.copy_(torch.tensor([2 * first_speed - 1, 0.0]))
-                self.log_std.copy_(torch.tensor([first_speed, FIRST_TURN]).log())
-            else:
-                self.log_std.fill_(math.log(FIRST_TURN))
+            means, spreads = zip(*(first_actions or [(0.0, FIRST_SPREAD)] * self.config.actions), strict=True)
+            self.action_net.bias.copy_(torch.tensor(means))
+            self.log_std.copy_(torch.tensor(spreads).log())
 
     def extract_features(
         self, obs: dict[str, Tensor], features_extractor: BaseFeaturesExtractor | None = None
@@ -177,7 +187,7 @@ class EyePolicy(MultiInputActorCriticPolicy):
 def build_policy(config: PolicyConfig, learning_rate: float = 1e-3) -> EyePolicy:
     """An untrained policy, drawn from torch's random state."""
     action_space = spaces.Box(-1.0, 1.0, (config.actions,), np.float32)
-    shape = {"neurons": config.neurons, "layers": config.layers, "encoder": config.encoder}
+    shape: dict[str, Any] = {"neurons": config.neurons, "layers": config.layers, "encoder": config.encoder}
     return EyePolicy(config.observation_space(), action_space, lambda _: learning_rate, **shape)
 
 
@@ -240,8 +250,8 @@ def set_learnt(policy: EyePolicy, tensors: Mapping[str, Tensor]) -> None:
 
 def _require_shape(config: PolicyConfig, tensors: Mapping[str, Tensor]) -> None:
     """Whether a policy of this shape has these tensors, found out before anything of its size is built."""
-    feels = config.feels or 0
-    counts = [*config.eyes, config.neurons, config.layers, config.encoder, config.actions, feels + 1]
+    known = sum(entry.size for entry in config.beside)
+    counts = [*config.eyes, config.neurons, config.layers, config.encoder, config.actions, known + 1]
     if min(counts) < 1 or max(counts) > LARGEST_COUNT or math.prod(config.eyes) > MOST_SIGNALS:
         raise ValueError(f"its shape is impossible: {config}")
     if config.layers > len(tensors):

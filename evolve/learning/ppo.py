@@ -8,7 +8,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
-from typing import Any
 
 import numpy as np
 import torch
@@ -21,12 +20,15 @@ from stable_baselines3.common.vec_env import VecEnv
 from evolve.config.run_config import LearningConfig
 from evolve.learning.adam import Adam
 from evolve.learning.checkpoint import Checkpoint
-from evolve.learning.policy import Brain, EyePolicy, TrainingDiverged, learnt, set_learnt
+from evolve.learning.policy import FIRST_SPREAD, Brain, EyePolicy, TrainingDiverged, learnt, set_learnt
 from evolve.learning.rollout_buffer import FrameRolloutBuffer
 from evolve.learning.schedule import first_step_size, schedule
-from evolve.learning.training_rewards import RewardsInUnits, contact_share, terms_of
+from evolve.learning.training_rewards import RewardsInUnits, ramped_share
+from sim.tasks.batch_task import BatchTask
 
 UNIT_RATE = 0.2  # of the way to the spread of the last returns, per rollout
+SPEED = "speed"  # the command that `learning.first_speed` is for
+VERDICTS = {True: 1, False: -1, None: 0}
 FLAT = 1e-6  # spread of returns that all are the same
 
 Progress = Callable[[int, int], None]  # (steps trained, steps planned)
@@ -52,14 +54,16 @@ class Training:
 class Episodes:
     """One whole episode of each world.
 
-    returns (world,) · successes (world,) bool: where the goal was reached, and before any adversary; in a task of one's
-    own, where what is to be done was done at the end
-    first_events (world,): what was reached first, +1 the goal, -1 an adversary, 0 nothing; zeros in tasks of one's own
+    returns (world,) · verdicts (world,): +1 solved, -1 not solved, 0 undecided, see `BatchTask.solved`
     """
 
     returns: np.ndarray
-    successes: np.ndarray
-    first_events: np.ndarray
+    verdicts: np.ndarray
+
+    @property
+    def successes(self) -> np.ndarray:
+        """Worlds whose episode was solved, (world,) bool."""
+        return self.verdicts > 0
 
 
 class AdaptingPPO(PPO):
@@ -74,7 +78,7 @@ class AdaptingPPO(PPO):
     policy: EyePolicy
 
     def __init__(self, worlds: VecEnv, brain: Brain, config: LearningConfig, seed: int) -> None:
-        self.config = config
+        self.config, self.task = config, batch_task_of(worlds)
         torch.set_num_threads(1)
         seed = int(np.random.SeedSequence(seed).generate_state(1)[0])  # SB3 takes 32 bits
         super().__init__(
@@ -89,7 +93,7 @@ class AdaptingPPO(PPO):
             vf_coef=config.value_weight,
             seed=seed,
             device="cpu",
-            policy_kwargs={**asdict(brain), "first_speed": config.first_speed},
+            policy_kwargs={**asdict(brain), "first_actions": first_actions(self.task, config)},
             rollout_buffer_class=FrameRolloutBuffer,
             rollout_buffer_kwargs={"seed": seed},
         )
@@ -106,7 +110,8 @@ class AdaptingPPO(PPO):
     ) -> bool:
         if self.num_timesteps == 0:
             self._adapt(self._last_obs["eyes"][:, -1], self._last_obs)
-        self.env.contact_share = contact_share(self.num_timesteps, self.config.contact_ramp)
+        share = ramped_share(self.num_timesteps, self.config.contact_ramp)
+        self.env.shares = dict.fromkeys(self.task.ramped, share)
         return super().collect_rollouts(env, callback, rollout_buffer, n_rollout_steps)
 
     def train(self) -> None:
@@ -122,8 +127,9 @@ class AdaptingPPO(PPO):
         self._adapt_unit()
 
     def _adapt(self, frames: np.ndarray, beside: Mapping[str, np.ndarray]) -> None:
-        feels = torch.from_numpy(beside["feels"]) if "feels" in beside else None
-        self.policy.features_extractor.adapt(torch.from_numpy(frames), feels)
+        features = self.policy.features_extractor
+        felt = {name: torch.from_numpy(beside[name]) for name in features.normalised}
+        features.adapt(torch.from_numpy(frames), felt)
 
     @torch.no_grad()
     def _adapt_unit(self) -> None:
@@ -230,23 +236,28 @@ def play(policy: EyePolicy, worlds: VecEnv, seed: int) -> Episodes:
     observation = worlds.reset()
     returns = np.zeros(worlds.num_envs)
     playing = np.ones(worlds.num_envs, bool)
-    first_event, done_at_end = np.zeros(worlds.num_envs), np.zeros(worlds.num_envs, bool)
-    ours = "contact" in worlds.observation_space.spaces
+    task = batch_task_of(worlds)
+    verdicts: list[bool | None] = [None] * worlds.num_envs
     while playing.any():
         action, _ = policy.predict(observation, deterministic=True)
         observation, reward, done, infos = worlds.step(action)
         returns[playing] += reward[playing]
-        if ours:
-            events = np.array([_event(info) for info in infos])
-            first_event = np.where(playing & (first_event == 0), events, first_event)
-        else:
-            done_at_end = np.where(playing, [bool(info["is_success"]) for info in infos], done_at_end)
+        for world in np.flatnonzero(playing):
+            verdicts[world] = task.solved(verdicts[world], infos[world])
         playing &= ~done
     if not math.isfinite(returns.sum()):
         raise TrainingDiverged("returns of the evaluation episodes not finite")
-    return Episodes(returns, first_event > 0 if ours else done_at_end, first_event)
+    return Episodes(returns, np.array([VERDICTS[verdict] for verdict in verdicts]))
 
 
-def _event(info: dict[str, Any]) -> int:
-    """What an action reached first: one may reach a goal and an adversary."""
-    return -1 if info.get("adversary_first") else int(terms_of(info)["goal"] > 0)
+def batch_task_of(worlds: VecEnv) -> BatchTask:
+    """The task of these worlds."""
+    task: BatchTask = worlds.get_attr("batch_task")[0]
+    return task
+
+
+def first_actions(task: BatchTask, config: LearningConfig) -> list[tuple[float, float]]:
+    """Mean and standard deviation of each number of the untrained policy's actions: a speed's are those of
+    `learning.first_speed`."""
+    speed = (2 * config.first_speed - 1, config.first_speed)
+    return [speed if command.name == SPEED else (0.0, FIRST_SPREAD) for command in task.commands()]

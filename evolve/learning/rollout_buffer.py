@@ -17,7 +17,7 @@ from stable_baselines3.common.buffers import RolloutBuffer
 from stable_baselines3.common.type_aliases import DictRolloutBufferSamples
 from torch import Tensor
 
-from evolve.learning.eye_features import known_beside_eyes
+from evolve.learning.observed import known_beside_eyes
 
 SEGMENT_STEPS = 8  # at most: longer ones share more frames, shorter ones mix better (docs/measurements/learning.md)
 

@@ -1,4 +1,4 @@
-"""Rewards as a learner meets them: in units of its own, and with contact at a share of its price."""
+"""Rewards as a learner meets them: in units of its own, and with some terms at a share of their price."""
 
 from __future__ import annotations
 
@@ -8,20 +8,22 @@ import numpy as np
 from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvStepReturn
 
-__all__ = ["RewardsInUnits", "contact_share", "terms_of"]
+__all__ = ["RewardsInUnits", "ramped_share", "terms_of"]
 
-CONTACT_FIRST = 0.1  # of what contact costs in the end; with a third, agents turned on the spot
+FIRST_SHARE = 0.1  # of what contact costs in the end; with a third, agents turned on the spot
 
 
 class RewardsInUnits(VecEnvWrapper):
-    """Worlds whose rewards come in units that the learner sets, and in which contact costs a share of its price.
+    """Worlds whose rewards come in units that the learner sets, and in which some terms count in part.
 
+    shares: of reward terms, by name; others count in full
     paid: whether there was any reward but 0 since it was last set to False
     """
 
     def __init__(self, worlds: VecEnv) -> None:
         super().__init__(worlds)
-        self.unit = self.contact_share = 1.0
+        self.unit = 1.0
+        self.shares: dict[str, float] = {}
         self.paid = False
 
     def reset(self) -> dict[str, np.ndarray]:
@@ -30,22 +32,23 @@ class RewardsInUnits(VecEnvWrapper):
 
     def step_wait(self) -> VecEnvStepReturn:
         observation, reward, done, infos = self.venv.step_wait()
-        if self.contact_share < 1:
-            price = np.array([terms["contact"] for terms in map(terms_of, infos)], np.float32)
-            reward = reward - np.float32(1 - self.contact_share) * price
+        for name, share in self.shares.items():
+            if share < 1:
+                price = np.array([terms.get(name, 0.0) for terms in map(terms_of, infos)], np.float32)
+                reward = reward - np.float32(1 - share) * price
         self.paid |= bool(reward.any())
         return observation, reward / np.float32(self.unit), done, infos
 
 
-def contact_share(steps: int, ramp: int) -> float:
-    """Of its whole price, what contact costs after so many steps: CONTACT_FIRST for a third of the ramp, then more by
-    the same factor each step.
+def ramped_share(steps: int, ramp: int) -> float:
+    """The share of a term's whole price after so many steps: FIRST_SHARE for a third of the ramp, then more by the same
+    factor each step.
 
     Agents that pay for contact before they can steer learn to stand still, which costs nothing, and never steer.
     """
     if steps >= ramp:
         return 1.0
-    return float(CONTACT_FIRST ** min(1.0, 1.5 * (1 - steps / ramp)))
+    return float(FIRST_SHARE ** min(1.0, 1.5 * (1 - steps / ramp)))
 
 
 def terms_of(info: dict[str, Any]) -> dict[str, float]:

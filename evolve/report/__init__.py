@@ -8,8 +8,7 @@ lineup           first and best animal, and those between
 agent_figure     an animal's head and eyes
 figures          figures of a whole run
 eye_figures      figures of one eye's optics
-ground_plan      where an episode plays
-footage          the same in a task of somebody's own
+picture_sheet    pictures of an episode, on a page
 views            one moment, through a perfect lens and through the evolved one
 player           an episode to play
 picture          signals as pictures
@@ -23,8 +22,7 @@ moving_picture   an episode as a GIF or film
 replay           an episode once more
 exr_export       what an agent saw, as EXR files
 rerun_recording  an episode for rerun
-rerun_plan       where one of rhabdom's own tasks plays, for rerun
-rerun_bodies     the model of somebody's own task, for rerun
+rerun_bodies     a task's model, for rerun
 rerun_layout     what a recording opens with
 rerun_stream     what these are written with
 """

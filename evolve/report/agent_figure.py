@@ -19,14 +19,14 @@ AHEAD = math.radians(205)  # direction that the head is seen from: a little to i
 LARGEST_EYE = math.radians(24)  # half angle of the head that an eye's disk takes, at most
 
 
-def agent_figure(eyes: sim.Eyes, name: str, placed: Sequence[float] | None = None) -> Html:
+def agent_figure(eyes: sim.Eyes, name: str, placed: Sequence[float] | np.ndarray) -> Html:
     """A drawing of the head, seen from in front and above; eyes as disks, as wide as their room on the head allows.
 
     name: keeps the ids in the drawing apart from those of others on the page
-    placed: azimuths [rad] of eyes that are elsewhere than evenly over their range
+    placed: azimuths of the eyes [rad]
     """
-    azimuths = [float(azimuth) for azimuth in (eyes.azimuths() if placed is None else placed)]
-    between = math.radians(eyes.placement_range_deg) / max(eyes.n_eyes - 1, 1) if placed is None else _closest(azimuths)
+    azimuths = [float(azimuth) for azimuth in placed]
+    between = _closest(azimuths)
     half = min(LARGEST_EYE, 0.45 * between) if eyes.n_eyes > 1 and between > 0 else LARGEST_EYE
     fields = joined(_field(azimuth, math.radians(eyes.fov_deg)) for azimuth in azimuths)
     behind = joined(_eye(azimuth, half) for azimuth in azimuths if not _faces(azimuth))

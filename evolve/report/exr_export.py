@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 import sim
-from evolve.analysis.episode import Episode, record
-from evolve.analysis.filmed_episode import FilmedEpisode
+from evolve.analysis.episode import Episode
+from evolve.analysis.recorder import record
 from evolve.report.doing import Doing, in_silence
 from evolve.store.directory import Run
 from evolve.store.regular_files import folder, require_regular
@@ -34,7 +34,7 @@ def export_run(
     return export_episode(record(run, candidate_id, seed), out or run.path / "exr", doing)
 
 
-def export_episode(episode: Episode | FilmedEpisode, directory: Path, doing: Doing = in_silence) -> list[Path]:
+def export_episode(episode: Episode, directory: Path, doing: Doing = in_silence) -> list[Path]:
     """One file per time at which radiance was kept; in it, per eye, one part with the spectral radiance before it
     and one with what its receptors signalled (`left.spectral`, `left.receptors`, ...).
 
@@ -51,7 +51,7 @@ def export_episode(episode: Episode | FilmedEpisode, directory: Path, doing: Doi
     return files
 
 
-def _views(episode: Episode | FilmedEpisode, frame: int) -> list[sim.View]:
+def _views(episode: Episode, frame: int) -> list[sim.View]:
     """What each eye saw at one kept time."""
     t, lens = int(episode.radiance_frames[frame]), episode.eyes.eye()
     peaks = None if lens.mosaic is not None else [kind.peak_nm for kind in lens.receptors.types]
@@ -68,18 +68,17 @@ def _views(episode: Episode | FilmedEpisode, frame: int) -> list[sim.View]:
     ]
 
 
-def _attributes(episode: Episode | FilmedEpisode, t: int, eye: int) -> dict[str, Any]:
+def _attributes(episode: Episode, t: int, eye: int) -> dict[str, Any]:
     """Where and when a view was seen."""
-    facts = {"task": episode.task, "candidate": episode.candidate_id, "seed": episode.seed, "time": t}
-    if isinstance(episode, FilmedEpisode):
-        return facts | {
-            "eye_azimuth_deg": float(episode.azimuths_deg[eye]),
-            "eye_elevation_deg": float(episode.elevations_deg[eye]),
-            "fov_deg": episode.eyes.fov_deg,
-        }
-    return facts | {
+    up = float(episode.elevations_deg[eye])
+    return {
+        "task": episode.task,
+        "candidate": episode.candidate_id,
+        "seed": episode.seed,
+        "time": t,
         "position_m": episode.position[t].tolist(),
         "heading_rad": float(episode.heading[t]),
-        "eye_azimuth_deg": float(np.degrees(episode.eyes.azimuths()[eye])),
+        "eye_azimuth_deg": float(np.degrees(episode.azimuths[eye])),
+        **({} if episode.phenotype.elevation_deg is None else {"eye_elevation_deg": up}),
         "fov_deg": episode.eyes.fov_deg,
     }

@@ -214,7 +214,7 @@ def _mtf(light: WhiteLight) -> Html:
     green = int(np.argmin(np.abs(light.psf.wavelengths - 550e-9)))
     strehl = optics.strehl_ratio(light.psf)[green]
     of_whom = "" if _is_round(eye.pupil) else " of a circle as wide"
-    quality = optics.image_quality(light.white, nyquist, eye.white_signal, noise_of(eye))[0]
+    quality = optics.image_quality(light.white, nyquist, eye.white_signal, noise_of(eye, eye.white_signal))[0]
     caption = html(
         "<b>{}</b> in white daylight, mean of all orientations ({}), and the diffraction "
         "limit{} (dashed). Dotted: the receptors' Nyquist frequency, {} cycles per degree; contrast there {}. {} "

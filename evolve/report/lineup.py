@@ -2,20 +2,14 @@
 
 from __future__ import annotations
 
-import math
-
 from evolve.analysis.statistics import acuity_cpd, champions
-from evolve.config.run_config import RunConfig
-from evolve.genome.phenotype import Phenotype
-from evolve.learning.animal_task import embodied
-from evolve.learning.task_module import executed_task
+from evolve.learning.animal_task import azimuths
 from evolve.report.agent_figure import agent_figure
 from evolve.report.markup import Html, html, joined, rounded
 from evolve.store.candidate import Candidate
 from evolve.store.directory import Run
-from sim.tasks.eye_kinds import kinds_of
 
-__all__ = ["azimuths", "lineup"]
+__all__ = ["lineup"]
 
 MOST = 60  # animals: a page of thousands of generations shows as many of them, evenly spread
 
@@ -48,15 +42,6 @@ def _thinned(best: list[tuple[int, Candidate]]) -> list[tuple[int, Candidate]]:
     if len(best) <= MOST:
         return best
     return [best[round(i * (len(best) - 1) / (MOST - 1))] for i in range(MOST)]
-
-
-def azimuths(animal: Phenotype, config: RunConfig) -> list[float] | None:
-    """Where a task of somebody's own places the animal's eyes [rad]; None: as rhabdom's own tasks do."""
-    own = config.choice.named_code
-    if own is None:
-        return None
-    (kind,) = kinds_of(embodied(executed_task(own), animal, config))
-    return [math.radians(mount.azimuth_deg) for mount in kind.mounts]
 
 
 def _card(run: Run, generation: int, candidate: Candidate, name: str) -> Html:

@@ -13,13 +13,11 @@ import numpy as np
 from PIL import Image, ImageDraw
 
 from evolve.analysis.episode import Episode
-from evolve.analysis.filmed_episode import FilmedEpisode
 from evolve.config.run_config import ConfigError
-from evolve.report.footage import AnyEpisode, Stage, stage_of
-from evolve.report.ground_plan import GroundPlan
 from evolve.report.picture import display
 from evolve.report.theme import ACCENT, GREEN, INK, MUTED, PANEL, PAPER, VERMILLION
 from evolve.store.atomic_files import unfinished, write_whole
+from sim.worlds.ground_plan import GroundPlan
 
 __all__ = ["require_ffmpeg", "write_gif", "write_mp4"]
 
@@ -32,13 +30,13 @@ OWN = (INK, MUTED, PAPER, PANEL, ACCENT, VERMILLION, GREEN, FIELD)
 LEVELS = (0, 51, 102, 153, 204, 255)  # of red, green and blue that eyes' pictures are shown with
 
 
-def write_gif(episode: AnyEpisode, path: Path) -> Path:
+def write_gif(episode: Episode, path: Path) -> Path:
     """Write an episode as an animated GIF that repeats, whole or not at all; returns its path."""
     stride = max(1, -(-len(episode) // LONGEST))
     palette = _palette()
     first, *rest = (picture.quantize(palette=palette, dither=Image.Dither.NONE) for picture in _frames(episode, stride))
     content = io.BytesIO()
-    pause = round(1000 * stride * stage_of(episode).seconds / SPEED)
+    pause = round(1000 * stride * episode.seconds / SPEED)
     first.save(content, "GIF", save_all=True, append_images=rest, duration=pause, loop=0, optimize=True)
     write_whole(path, content.getvalue())
     return path
@@ -59,7 +57,7 @@ def require_ffmpeg() -> Any:
     return imageio_ffmpeg
 
 
-def write_mp4(episode: AnyEpisode, path: Path) -> Path:
+def write_mp4(episode: Episode, path: Path) -> Path:
     """Write an episode as an H.264 film with a frame for each action, whole or not at all; returns its path.
 
     Raises:
@@ -73,7 +71,7 @@ def write_mp4(episode: AnyEpisode, path: Path) -> Path:
         film = require_ffmpeg().write_frames(
             str(neighbour),
             (width, height),
-            fps=SPEED / stage_of(episode).seconds,
+            fps=SPEED / episode.seconds,
             quality=8,
             codec="libx264",
             macro_block_size=2,
@@ -86,11 +84,10 @@ def write_mp4(episode: AnyEpisode, path: Path) -> Path:
     return path
 
 
-def _frames(episode: AnyEpisode, stride: int) -> Iterator[Image.Image]:
+def _frames(episode: Episode, stride: int) -> Iterator[Image.Image]:
     """Every stride-th moment."""
-    plan = stage_of(episode)
-    eyes = display(episode.signals, plan.gain)
-    return (_frame(_world(episode, plan, time), eyes[time]) for time in range(0, len(episode), stride))
+    eyes = display(episode.signals, episode.gain)
+    return (_frame(_world(episode, time), eyes[time]) for time in range(0, len(episode), stride))
 
 
 def _palette() -> Image.Image:
@@ -102,13 +99,14 @@ def _palette() -> Image.Image:
     return palette
 
 
-def _world(episode: AnyEpisode, plan: Stage, time: int) -> Image.Image:
-    """One moment from above; of a task of somebody's own, the picture that was taken last."""
-    if isinstance(episode, FilmedEpisode):
-        taken = int(np.searchsorted(episode.picture_times, time, side="right")) - 1
-        picture = Image.fromarray(episode.pictures[taken])
+def _world(episode: Episode, time: int) -> Image.Image:
+    """One moment from above; without a ground plan, the picture that was taken last, or nothing."""
+    plan, pictures = episode.plan, episode.pictures
+    if plan is None:
+        if pictures is None:
+            return Image.new("RGB", (0, HEIGHT))
+        picture = Image.fromarray(pictures.pixels[int(np.searchsorted(pictures.times, time, side="right")) - 1])
         return picture.resize((round(picture.width * HEIGHT / picture.height), HEIGHT), Image.Resampling.LANCZOS)
-    assert isinstance(plan, GroundPlan)
     x0, y0, x1, y1 = plan.bounds
     scale = SMOOTH * HEIGHT / (y1 - y0)
     width = round((x1 - x0) * scale / SMOOTH)
@@ -143,9 +141,9 @@ def _draw_world(draw: ImageDraw.ImageDraw, episode: Episode, plan: GroundPlan, t
         low_x, low_y, high_x, high_y = plan.goal_region
         draw.rectangle((*place(low_x, high_y), *place(high_x, low_y)), outline=GREEN, width=3 * SMOOTH)
     here = place(*episode.position[time])
-    for azimuth in plan.eyes.azimuths():
+    for azimuth in episode.azimuths:
         towards = math.degrees(float(episode.heading[time]) + float(azimuth))
-        half, reach = plan.eyes.fov_deg / 2, 0.22 * HEIGHT * SMOOTH
+        half, reach = episode.eyes.fov_deg / 2, 0.22 * HEIGHT * SMOOTH
         box = (here[0] - reach, here[1] - reach, here[0] + reach, here[1] + reach)
         draw.pieslice(box, -towards - half, -towards + half, fill=FIELD, outline=ACCENT)
     draw.line([place(*at) for at in episode.position[: time + 1]] or [here], fill=INK, width=SMOOTH)

@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Iterator
 from functools import partial
 
+from evolve.analysis.episode import Episode
 from evolve.analysis.genealogy import descent
 from evolve.analysis.statistics import acuity_cpd, champions, gene_values, generation_statistics, trajectory
 from evolve.analysis.vision import SCENES, Vision, vision
@@ -22,7 +23,6 @@ from evolve.report.figures import (
     success_figure,
     vision_figure,
 )
-from evolve.report.footage import AnyEpisode, stage_of
 from evolve.report.hints import hint
 from evolve.report.lineup import lineup
 from evolve.report.markup import Html, contents, document, figure, html, joined, key, rounded, section
@@ -206,23 +206,23 @@ def facts_section(run: Run) -> Html:
     return section("facts", "Facts of the run", tables.run_facts(run))
 
 
-def best_section(run: Run, best: Candidate, episode: AnyEpisode) -> Html:
+def best_section(run: Run, best: Candidate, episode: Episode) -> Html:
     """The best candidate: its eye, what it sees, and its genes."""
     content = html(
         "<p>{} {} of {} {}, {} {}.</p>\n{}<h3>What it sees</h3>\n{}<h3>Its genes</h3>\n{}",
         *(hint("candidate", "Candidate"), best.id, hint("generation"), best.generation),
         *(hint("fitness"), rounded(best.fitness, 4), eye_figures(best.phenotype, run.config.eye)),
-        *(what_it_sees(episode, stage_of(episode)), tables.best_genes(run, best)),
+        *(what_it_sees(episode), tables.best_genes(run, best)),
     )
     return section("best", "The best eye", content)
 
 
-def episode_section(run: Run, episode: AnyEpisode) -> Html:
-    content = html("<p>{}</p>\n{}", episode_sentence(episode), player(episode, stage_of(episode)))
+def episode_section(run: Run, episode: Episode) -> Html:
+    content = html("<p>{}</p>\n{}", episode_sentence(episode), player(episode))
     return section("episode", "The best animal at its task", content)
 
 
-def _makers(run: Run, episode: AnyEpisode | None) -> Iterator[tuple[str, Callable[[Doing], Html]]]:
+def _makers(run: Run, episode: Episode | None) -> Iterator[tuple[str, Callable[[Doing], Html]]]:
     """The page's sections in their order: what is made, and how."""
     if (best := run.best) is not None and episode is not None:
         yield "the episode's player", lambda doing: episode_section(run, episode)
@@ -244,7 +244,7 @@ def _within(doing: Doing, done: int, of: int, what: str, share: float) -> None:
     doing(what, (done + share) / of)
 
 
-def render(run: Run, episode: AnyEpisode | None, doing: Doing = in_silence) -> bytes:
+def render(run: Run, episode: Episode | None, doing: Doing = in_silence) -> bytes:
     """The whole page; without an episode where no candidate has succeeded.
 
     doing: is told what is being made, and how much of the page has been, [0, 1]

@@ -8,47 +8,43 @@ from typing import Any
 import numpy as np
 
 from evolve.analysis.episode import Episode
-from evolve.analysis.filmed_episode import FilmedEpisode
-from evolve.report.footage import AnyEpisode, Footage, Stage, stage_of
-from evolve.report.ground_plan import GroundPlan
 from evolve.report.markup import Html, document, exact, html, joined, json_script, key, look, rounded
 from evolve.report.picture import data_uri, display, film_sheet
+from evolve.report.picture_sheet import figure_of_pictures, film_of_pictures
 from evolve.store.atomic_files import write_whole
-from sim.physics.sliding_agents import MAX_TURN
-from sim.worlds.world import MAX_SPEED
+from sim.worlds.ground_plan import GroundPlan
 
 __all__ = ["episode_sentence", "player", "write_player"]
 
 LARGEST_FILM = 1_500_000  # bytes of pixels per sheet; noise hardly compresses, and the page should stay small
+EVENTS = ("goal", "adversary")  # reward terms that player.js marks where they are not 0
 TERM_COLOURS = ("accent", "green", "vermillion", "purple")  # as in player.js
 
 
-def write_player(episode: AnyEpisode, path: Path) -> Path:
+def write_player(episode: Episode, path: Path) -> Path:
     """Write the playable episode as a page of its own; returns its path."""
     name = f"{episode.title}: candidate {episode.candidate_id} plays"
     body = html(
         '<header><p class="kicker">rhabdom · replay</p>\n<h1>{}</h1>\n<p>{}</p></header>\n{}',
-        *(name, episode_sentence(episode), player(episode, stage_of(episode))),
+        *(name, episode_sentence(episode), player(episode)),
     )
     write_whole(Path(path), document(name, body, ["player.js"]))
     return Path(path)
 
 
-def episode_sentence(episode: AnyEpisode) -> str:
+def episode_sentence(episode: Episode) -> str:
     """One sentence on how the episode went."""
     total = rounded(float(episode.reward.sum(dtype=np.float64)), 4)
     terms = ", ".join(f"{name} {rounded(float(term.sum()))}" for name, term in episode.reward_terms.items())
     parts = f" ({terms})" if terms else ""
-    failed = episode.failure if isinstance(episode, FilmedEpisode) else None
-    end = "" if failed is None else f" It ended because the task failed: {failed}."
+    end = "" if episode.failure is None else f" It ended because the task failed: {episode.failure}."
     return f"Evaluation episode with seed {episode.seed}: {len(episode)} actions, return {total}{parts}.{end}"
 
 
-def player(episode: AnyEpisode, stage: Stage) -> Html:
+def player(episode: Episode) -> Html:
     """The player's element; the page that holds it needs player.js."""
-    film = json_script(_film(episode, stage), "film")
-    world = stage.figure() if isinstance(stage, Footage) else _world(stage)
-    left, right = world + _controls(episode), _sights(stage) + _score(episode)
+    film = json_script(_film(episode), "film")
+    left, right = _world(episode) + _controls(episode), _sights(episode) + _score(episode)
     return html(
         '<div class="player" tabindex="0" role="group" aria-label="Replay"><div>{}</div><div>{}</div>{}</div>\n',
         left,
@@ -57,14 +53,21 @@ def player(episode: AnyEpisode, stage: Stage) -> Html:
     )
 
 
-def _world(stage: GroundPlan) -> Html:
-    x0, y0, x1, y1 = stage.bounds
+def _world(episode: Episode) -> Html:
+    """From above, or pictures."""
+    if episode.plan is not None:
+        return _from_above(episode.plan)
+    return Html() if episode.pictures is None else figure_of_pictures(episode.pictures)
+
+
+def _from_above(plan: GroundPlan) -> Html:
+    x0, y0, x1, y1 = plan.bounds
     legend = Html()
-    if stage.object_radius:
+    if plan.object_radius:
         legend = html(
             ' <b class="green">G</b> goal, <b class="vermillion">A</b> adversary; a ring marks where one was reached.'
         )
-    if stage.goal_region is not None:
+    if plan.goal_region is not None:
         legend = html(' The <b class="green">tinted</b> area is the goal.')
     caption = html(
         "<b>From above</b>, {} m × {} m: the path so far, the agent (its tip points where it heads) and the "
@@ -78,18 +81,16 @@ def _world(stage: GroundPlan) -> Html:
     )
 
 
-def _sights(stage: Stage) -> Html:
+def _sights(episode: Episode) -> Html:
     """A pair of canvases per eye: what it signals, and what it would signal behind a perfect lens."""
-    eyes = stage.eyes
+    eyes, gain = episode.eyes, episode.gain
     height, width = eyes.resolution
     room = 140 if eyes.n_eyes <= 2 else 88 if eyes.n_eyes <= 6 else 60
     scale = room / max(height, width)
     shape = look(f"width:{scale * width:.4g}px;aspect-ratio:{width}/{height}")
     size = html('width="{}" height="{}" {}', width, height, shape)
     pairs = [_pair(eye, name, size) for eye, name in enumerate(eyes.names())]
-    brighter = (
-        "" if stage.gain == 1 else f", brightened {rounded(stage.gain)} times (1/a², the light the pupil leaves out)"
-    )
+    brighter = "" if gain == 1 else f", brightened {rounded(gain)} times (1/a², the light the pupil leaves out)"
     note = html(
         "<b>What the eyes see</b>, left to right: receptor signals shown as linear red, green and blue, noise "
         "included{}; beside them the same receptors behind a perfect lens, without noise.",
@@ -112,7 +113,7 @@ def _pair(eye: int, name: str, size: Html) -> Html:
     return html('<div class="sight"><span class="name">{}</span><div class="pair">{}</div></div>', name, canvases)
 
 
-def _controls(episode: AnyEpisode) -> Html:
+def _controls(episode: Episode) -> Html:
     return html(
         '<div class="controls"><input type="range" min="0" max="{}" value="0" step="1" '
         'aria-label="Time in the episode"><button type="button" class="play" aria-pressed="false">Play</button>'
@@ -122,7 +123,7 @@ def _controls(episode: AnyEpisode) -> Html:
     )
 
 
-def _score(episode: AnyEpisode) -> Html:
+def _score(episode: Episode) -> Html:
     """Cumulated reward, term by term."""
     names = [*episode.reward_terms, "total"]
     colours = [TERM_COLOURS[i % len(TERM_COLOURS)] for i in range(len(names) - 1)] + ["ink"]
@@ -139,21 +140,16 @@ def _score(episode: AnyEpisode) -> Html:
     )
 
 
-def _film(episode: AnyEpisode, stage: Stage) -> dict[str, Any]:
+def _film(episode: Episode) -> dict[str, Any]:
     """What player.js reads; everything over the frames that are kept."""
-    kept = _kept(episode)
+    kept, eyes = _kept(episode), episode.eyes
     terms = {name: np.cumsum(term, dtype=np.float64)[kept] for name, term in episode.reward_terms.items()}
-    seen, columns = film_sheet(display(episode.signals[kept], stage.gain))
+    seen, columns = film_sheet(display(episode.signals[kept], episode.gain))
     perfect, _ = film_sheet(display(episode.perfect_signals[kept]))
-    if isinstance(episode, FilmedEpisode):
-        assert isinstance(stage, Footage)
-        part = stage.film(episode, kept)
-    else:
-        assert isinstance(stage, GroundPlan)
-        part = _from_above(episode, stage, kept)
+    part = _film_of_world(episode, kept)
     return {
-        "times": _rounded(kept * stage.seconds),
-        "eyes": {"count": stage.eyes.n_eyes, "resolution": stage.eyes.resolution},
+        "times": _rounded(kept * episode.seconds),
+        "eyes": {"count": eyes.n_eyes, "resolution": eyes.resolution},
         "terms": {name: _rounded(values) for name, values in terms.items()},
         "total": _rounded(sum(terms.values(), np.zeros(len(kept)))),
         "sheet_columns": columns,
@@ -162,27 +158,40 @@ def _film(episode: AnyEpisode, stage: Stage) -> dict[str, Any]:
     }
 
 
-def _from_above(episode: Episode, stage: GroundPlan, kept: np.ndarray) -> dict[str, Any]:
-    """The world's part of it: positions [m], angles [rad], commands [m/s] and [°]."""
+def _film_of_world(episode: Episode, kept: np.ndarray) -> dict[str, Any]:
+    """The world's part of it: positions [m], angles [rad], quantities that were commanded; or pictures."""
+    plan, commands = episode.plan, _commands(episode, kept)
+    if plan is None:
+        return commands | ({} if episode.pictures is None else film_of_pictures(episode.pictures, kept))
     return {
-        "bounds": stage.bounds,
-        "walls": _rounded(stage.walls),
-        "goal_region": stage.goal_region,
-        "body_radius": stage.body_radius,
-        "azimuths": _rounded(stage.eyes.azimuths(), 5),
-        "fov": float(np.radians(stage.eyes.fov_deg)),
+        "bounds": plan.bounds,
+        "walls": _rounded(plan.walls),
+        "goal_region": plan.goal_region,
+        "body_radius": plan.body_radius,
+        "azimuths": _rounded(episode.azimuths, 5),
+        "fov": float(np.radians(episode.eyes.fov_deg)),
         "position": _rounded(episode.position[kept]),
         "heading": _rounded(episode.heading[kept], 4),
-        "speed": _rounded(MAX_SPEED * (np.clip(episode.action[kept, 0], -1, 1) + 1) / 2),
-        "turn_deg": _rounded(np.degrees(MAX_TURN) * np.clip(episode.action[kept, 1], -1, 1)),
+        **commands,
         "objects": _rounded(episode.objects[kept][..., :2]),
-        "object_names": stage.object_names,
-        "object_radius": stage.object_radius,
+        "object_names": plan.object_names,
+        "object_radius": plan.object_radius,
         "events": _events(episode, kept),
     }
 
 
-def _kept(episode: AnyEpisode) -> np.ndarray:
+def _commands(episode: Episode, kept: np.ndarray) -> dict[str, Any]:
+    """Speed [m/s] and turn [°], of which player.js makes a sentence, or the numbers of other actions."""
+    action = episode.action[kept]
+    found = {
+        command.name: command.quantity(numbers) for command, numbers in zip(episode.commands, action.T, strict=True)
+    }
+    if found.keys() == {"speed", "turn"}:
+        return {"speed": _rounded(found["speed"]), "turn_deg": _rounded(found["turn"])}
+    return {"action": _rounded(action, 2)}
+
+
+def _kept(episode: Episode) -> np.ndarray:
     """Frames that are kept: all, but for eyes so many and fine that the page would grow too large. The last action
     always is: with it come the whole return, and what ended the episode."""
     pixels = episode.signals[0, :, 0].size * 3
@@ -194,8 +203,8 @@ def _events(episode: Episode, kept: np.ndarray) -> list[tuple[int, str]]:
     """(frame, "goal" or "adversary"): what was reached since the frame before."""
     found = [
         (int(np.searchsorted(kept, time)), name)
-        for name in ("goal", "adversary")
-        for time in np.flatnonzero(episode.reward_terms[name])
+        for name in EVENTS
+        for time in np.flatnonzero(episode.reward_terms.get(name, 0.0))
     ]
     return sorted((min(frame, len(kept) - 1), name) for frame, name in found)
 

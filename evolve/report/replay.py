@@ -6,10 +6,9 @@ from collections.abc import Callable, Collection, Mapping
 from pathlib import Path
 from typing import Any
 
-from evolve.analysis.episode import Episode, record
-from evolve.analysis.filmed_episode import FilmedEpisode
+from evolve.analysis.episode import Episode
+from evolve.analysis.recorder import record
 from evolve.config.checks import ConfigError
-from evolve.report.footage import AnyEpisode
 from evolve.report.moving_picture import require_ffmpeg, write_gif, write_mp4
 from evolve.report.player import write_player
 from evolve.report.rerun_recording import write_recording
@@ -24,7 +23,7 @@ BESIDE: Mapping[str, Callable[[Any, Path], Path]] = {"rrd": write_recording, "gi
 
 def write_replay(
     run: Run, candidate_id: int | None = None, seed: int = 0, also: Collection[str] = (), out: Path | None = None
-) -> tuple[AnyEpisode, list[Path]]:
+) -> tuple[Episode, list[Path]]:
     """Record an episode (default: of the best candidate) and write a page that plays it.
 
     also: of BESIDE, beside the page: "rrd", a recording for rerun, and the moving pictures "gif" and "mp4"
@@ -55,7 +54,7 @@ def _require_page(out: Path) -> None:
         raise ConfigError(f"out = {out}: names the page, such as {page}; with --{form}, {out.name} lies beside it")
 
 
-def write_page(run: Run, episode: AnyEpisode, out: Path | None = None) -> Path:
+def write_page(run: Run, episode: Episode, out: Path | None = None) -> Path:
     """Write the page that plays an episode of a run, to `out` or into the run directory; returns its path."""
     path = out or run.path / f"replay_candidate{episode.candidate_id:06d}_seed{episode.seed}.html"
     if out is not None:  # a run that was deleted meanwhile stays so
@@ -63,30 +62,22 @@ def write_page(run: Run, episode: AnyEpisode, out: Path | None = None) -> Path:
     return write_player(episode, path)
 
 
-def episode_facts(episode: AnyEpisode) -> dict[str, Any]:
+def episode_facts(episode: Episode) -> dict[str, Any]:
     """How an episode went: return, what it is made of, and what was reached."""
-    terms = episode.reward_terms
-    facts = {
+    return {
         "task": episode.task,
         "candidate": episode.candidate_id,
         "episode seed": episode.seed,
         "actions": len(episode),
         "return": float(episode.reward.sum()),
-        "terms": {name: float(term.sum()) for name, term in terms.items()},
-    }
-    if isinstance(episode, FilmedEpisode):
-        failed = {} if episode.failure is None else {"failure": episode.failure}
-        return {**facts, "solved": episode.solved, **failed}
-    return {
-        **facts,
-        "goals reached": int((terms["goal"] != 0).sum()),
-        "adversaries reached": int((terms["adversary"] != 0).sum()),
-        "actions in contact": int(episode.contact.sum()),
-        "solved": solved(episode),
+        "terms": {name: float(term.sum()) for name, term in episode.reward_terms.items()},
+        **{title: episode.count(term) for term, title in episode.counted.items()},
+        "solved": episode.solved,
+        **({} if episode.failure is None else {"failure": episode.failure}),
     }
 
 
-def episode_table(episode: AnyEpisode) -> str:
+def episode_table(episode: Episode) -> str:
     """The same, one line each."""
     rows: list[tuple[str, str]] = []
     for name, value in episode_facts(episode).items():
@@ -98,10 +89,3 @@ def episode_table(episode: AnyEpisode) -> str:
             rows.append((name, f"{value:.2f}" if isinstance(value, float) else str(value)))
     width = max(len(name) for name, _ in rows)
     return "\n".join(f"{name:<{width}}  {value}" for name, value in rows)
-
-
-def solved(episode: Episode) -> bool:
-    """Whether the goal was reached, and before any adversary."""
-    goal, adversary = (episode.reward_terms[name] != 0 for name in ("goal", "adversary"))
-    first = goal if episode.adversary_first is None else goal & ~episode.adversary_first
-    return bool(first[goal | adversary][:1].any())

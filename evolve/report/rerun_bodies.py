@@ -1,4 +1,4 @@
-"""The model of a task of somebody's own for rerun: its bodies with all that is seen of them, and the eyes."""
+"""A task's model for rerun: its bodies with all that eyes see of them, and the eyes."""
 
 from __future__ import annotations
 
@@ -7,16 +7,18 @@ from typing import Any
 import numpy as np
 
 import sim
-from evolve.analysis.filmed_scene import FilmedScene
+from evolve.analysis.episode_scene import EpisodeScene
 from evolve.report.rerun_stream import RerunStream, camera_frames
 from sim.scene.solids import Solid
+from sim.worlds.ground_plan import GroundPlan
 
-__all__ = ["EYES", "draw_bodies"]
+__all__ = ["EYES", "draw_bodies", "draw_goal_region"]
 
 BODIES, EYES = ("world", "bodies"), ("world", "eyes")
+GOAL, GOAL_HEIGHT = (0, 158, 115), 0.01  # green, [m] half of it
 
 
-def draw_bodies(to: RerunStream, scene: FilmedScene, eyes: sim.Eyes) -> None:
+def draw_bodies(to: RerunStream, scene: EpisodeScene, eyes: sim.Eyes) -> None:
     """What there is, and where it is before each action."""
     for body in sorted({solid.body for solid in scene.solids}):
         _place(to, (*BODIES, scene.bodies[body]), scene.positions[:, body], scene.rotations[:, body])
@@ -28,6 +30,17 @@ def draw_bodies(to: RerunStream, scene: FilmedScene, eyes: sim.Eyes) -> None:
         to.camera((*EYES, name), eyes)
         _place(to, (*EYES, name), scene.eye_positions[:, eye], camera_frames(scene.eye_rotations[:, eye]))
     to.path(scene.path)
+
+
+def draw_goal_region(to: RerunStream, plan: GroundPlan) -> None:
+    """The area on the floor that is the goal, if the task has one."""
+    if plan.goal_region is None:
+        return
+    (x0, y0, x1, y1), z = plan.goal_region, GOAL_HEIGHT
+    box = to.rr.Boxes3D(
+        centers=[[(x0 + x1) / 2, (y0 + y1) / 2, z]], half_sizes=[[(x1 - x0) / 2, (y1 - y0) / 2, z]], colors=GOAL
+    )
+    to.always(("world", "goal_region"), box)
 
 
 def _place(to: RerunStream, entity: tuple[str, ...], positions: np.ndarray, rotations: np.ndarray) -> None:

@@ -4,22 +4,22 @@ from __future__ import annotations
 
 from typing import Any
 
-from evolve.analysis.filmed_episode import FilmedEpisode
-from evolve.report.footage import AnyEpisode, Stage
+from evolve.analysis.episode import Episode
+from evolve.report.rerun_bodies import EYES
 
 __all__ = ["layout"]
 
 ACROSS = 4  # eyes side by side
 
 
-def layout(rr: Any, episode: AnyEpisode, stage: Stage, eyes: tuple[str, ...]) -> Any:
+def layout(rr: Any, episode: Episode) -> Any:
     """A blueprint for `rerun_recording`'s entities; without one the viewer lays several eyes' pictures on each other.
 
-    rr: the package rerun · eyes: the entity above the eyes
+    rr: the package rerun
     """
     import rerun.blueprint as views
 
-    names = stage.eyes.names()
+    names = episode.eyes.names()
 
     def grid(name: str, above: tuple[str, ...], kind: Any = views.Spatial2DView) -> Any:
         shown = [kind(origin=rr.new_entity_path([*above, eye]), name=eye) for eye in names]
@@ -28,14 +28,14 @@ def layout(rr: Any, episode: AnyEpisode, stage: Stage, eyes: tuple[str, ...]) ->
     as_numbers = grid("the same as numbers", ("signals",), views.TensorView)
     scenes = grid(f"the scene, at the latest of {len(episode.radiance_frames)} moments", ("scene",))
     seen = views.Vertical(
-        views.Tabs(grid("what the eyes signal", eyes), as_numbers),
+        views.Tabs(grid("what the eyes signal", EYES), as_numbers),
         views.Tabs(grid("behind perfect lenses", ("perfect_lens",)), scenes),
     )
     world = views.Spatial3DView(origin="/world", name="world")
-    numbers = [views.TimeSeriesView(origin=f"/{entity}", name=entity) for entity in ("reward", "action")]
-    last = views.TextLogView if isinstance(episode, FilmedEpisode) else views.TimeSeriesView
-    ended = "outcome" if isinstance(episode, FilmedEpisode) else "contact"
-    done = views.Vertical(world, views.Tabs(*numbers, last(origin=f"/{ended}", name=ended)), row_shares=[2, 1])
+    over_time = ("reward", "action", *episode.beside)
+    numbers = [views.TimeSeriesView(origin=rr.new_entity_path([entity]), name=entity) for entity in over_time]
+    ended = views.TextLogView(origin="/outcome", name="outcome")
+    done = views.Vertical(world, views.Tabs(*numbers, ended), row_shares=[2, 1])
     return views.Blueprint(
         views.Horizontal(done, seen),
         views.TimePanel(timeline="time", state="collapsed"),

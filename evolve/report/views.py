@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 import optics
+from evolve.analysis.episode import Episode
 from evolve.analysis.statistics import psnr
-from evolve.report.footage import AnyEpisode, Stage
 from evolve.report.hints import hint
 from evolve.report.markup import Html, html, joined, look, rounded
 from evolve.report.picture import data_uri, display
@@ -17,35 +17,34 @@ WIDTH = 120  # CSS pixels of one picture, where there are few eyes
 MOST_EYES = 6
 
 
-def what_it_sees(episode: AnyEpisode, stage: Stage) -> Html:
+def what_it_sees(episode: Episode) -> Html:
     """Pictures and their caption."""
     frame = _busiest(episode)
     time = int(episode.radiance_frames[frame])
-    lens = stage.eyes.eye()
-    names = stage.eyes.names()
+    lens, names, gain = episode.eyes.eye(), episode.eyes.names(), episode.gain
     shown = range(min(len(names), MOST_EYES))
     rows = joined(_row(episode, eye, names[eye], frame, lens) for eye in shown)
-    brighter = f", brightened {rounded(stage.gain)} times (1/a²)" if stage.gain != 1 else ""
+    brighter = f", brightened {rounded(gain)} times (1/a²)" if gain != 1 else ""
     rest = f" The first {MOST_EYES} of {len(names)} eyes." if len(names) > MOST_EYES else ""
-    quality = psnr(episode.signals, episode.perfect_signals, stage.gain)
+    quality = psnr(episode.signals, episode.perfect_signals, gain)
     caption = html(
         "<b>What it sees</b> at {} s of the episode above, left to right: the scene's {}, finely sampled; what its "
         "{} would {} behind a perfect lens; what its own optics make of it{}; and the same with the "
         "receptors' noise, as the brain gets it.{} Over the whole episode the signals have a PSNR of {} dB against "
         "the perfect lens.",
-        *(rounded(time * stage.seconds), hint("radiance"), hint("receptor", "receptors"), hint("signal")),
+        *(rounded(time * episode.seconds), hint("radiance"), hint("receptor", "receptors"), hint("signal")),
         *(brighter, rest, rounded(quality)),
     )
     return html('<figure class="views"><div class="eyes">{}</div><figcaption>{}</figcaption></figure>\n', rows, caption)
 
 
-def _busiest(episode: AnyEpisode) -> int:
+def _busiest(episode: Episode) -> int:
     """The kept frame in which the eyes have most to look at: the largest variance along the horizon (sky above floor
     is there in all of them)."""
     return int(np.argmax(episode.radiance.mean(axis=2).var(axis=-1).mean(axis=(1, 2))))
 
 
-def _row(episode: AnyEpisode, eye: int, name: str, frame: int, lens: optics.Eye) -> Html:
+def _row(episode: Episode, eye: int, name: str, frame: int, lens: optics.Eye) -> Html:
     time = episode.radiance_frames[frame]
     scene = np.einsum("cb,byx->cyx", lens.spectral_bands.weights, episode.radiance[frame, eye])
     gain = 1 / lens.white_signal

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from evolve.report.doing import Doing, in_silence
 
 if TYPE_CHECKING:
-    from evolve.report.footage import AnyEpisode
+    from evolve.analysis.episode import Episode
     from evolve.store.directory import Run
 
 __all__ = ["FILE", "write"]
@@ -16,7 +16,7 @@ __all__ = ["FILE", "write"]
 FILE = "report.html"
 
 
-def write(run: Run, episode: AnyEpisode | None = None, out: Path | None = None, doing: Doing = in_silence) -> Path:
+def write(run: Run, episode: Episode | None = None, out: Path | None = None, doing: Doing = in_silence) -> Path:
     """Write `report.html` of a run, whole or not at all, with an episode of the best candidate (default: played now).
 
     out: another file to write to
@@ -28,7 +28,7 @@ def write(run: Run, episode: AnyEpisode | None = None, out: Path | None = None, 
         ValueError: the best candidate's policy is missing or damaged.
         StrangeFileError: `out` is a directory, say.
     """
-    from evolve.analysis.episode import record
+    from evolve.analysis.recorder import record
     from evolve.report.page import render
     from evolve.store.atomic_files import require_file_name, write_whole
 

@@ -1,6 +1,7 @@
 """Eyes: a pupil before a retina of photoreceptors.
 
 eye                   Eye
+eye_spec              EyeSpec: what an eye is, for all that is computed of it
 geometry              lengths and directions, and how wide the pupil may be
 cell_integrals        integrals over cells of what is known at samples
 receptive_field       which directions a receptor sees: the kernel

@@ -3,30 +3,25 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
-from functools import cached_property
+from dataclasses import dataclass
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
 
-from optics.elements.pupil import Pupil
-from optics.eye.geometry import behind_pupil, check_pupil, direction, etendue, focal_length, tangents
-from optics.eye.guided_field import check_guide
+from optics.eye.eye_spec import EyeSpec
+from optics.eye.geometry import direction, tangents
 from optics.eye.kernel_bank import KernelBank, prepare
-from optics.eye.photoreceptor import throughput
-from optics.eye.polarization import check_rays, microvilli_of, taken_by
+from optics.eye.polarization import taken_by
 from optics.eye.receptive_field import Retina, perfect_psf, retinal_psf
 from optics.eye.receptor_kernel import CELLS_FOR_BANDS, bands_for, receptor_kernel, white_share
 from optics.eye.retinal_image import centred, with_centre
 from optics.eye.signals import signals, with_noise
 from optics.eye.summary import Description, describe
-from optics.numerics.arguments import in_range, of_kind, one_of, positive, radiance_cube, shape_2d, whole
+from optics.numerics.arguments import in_range, of_kind, one_of, positive, radiance_cube, whole
 from optics.numerics.autodiff import Array, Scalar, number, plain, to_user
-from optics.ommatidia.waveguide import Waveguide
 from optics.point_spread.psf_result import PSFResult
 from optics.spectra.bands import SpectralBands
-from optics.spectra.photon_budget import PhotonBudget
-from optics.spectra.receptors import receptors_of
 
 __all__ = ["Eye"]
 
@@ -34,7 +29,7 @@ LIGHT_FROM = ("cells", "centres")  # of the scene
 
 
 @dataclass(frozen=True)
-class Eye:
+class Eye(EyeSpec):
     """Pupil, retina and noise. Arrays are in visual-field orientation, row 0 at the top, column 0 on the left.
 
     pupil: None is the perfect lens: no blur, full throughput.
@@ -67,80 +62,6 @@ class Eye:
         AccuracyError: microvilli behind a pupil whose rays are too steep for them to the tolerance.
     """
 
-    pupil: Pupil | None = None
-    resolution: tuple[int, int] = (15, 15)
-    fov_deg: Scalar = 45.0
-    sensor_width: float = 200e-6
-    bands: Any = 4
-    noise_sigma: float = 0.01
-    tolerance: float = 1e-2
-    dtype: str = "float32"
-    photon_budget: PhotonBudget | None = None
-    receptors: Any = "rgb"
-    full_aperture: float | None = None
-    eccentricity_deg: tuple[float, float] = (0.0, 0.0)
-    waveguide: Waveguide | None = None
-    microvilli: Any = None
-    spectral_bands: SpectralBands = field(init=False, repr=False, compare=False)
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "resolution", shape_2d("resolution", self.resolution))
-        in_range("fov_deg", self.fov_deg, 1e-3, 170, carried=True)
-        positive("sensor_width", self.sensor_width)
-        object.__setattr__(self, "eccentricity_deg", direction("eccentricity_deg", self.eccentricity_deg))
-        in_range("noise_sigma", self.noise_sigma, 0, 1e6)
-        in_range("tolerance", self.tolerance, 1e-6, 0.5)
-        if self.dtype not in ("float32", "float64"):
-            raise ValueError(f"dtype = {self.dtype!r}: must be 'float32' or 'float64'")
-        check_pupil(self.pupil, self.sensor_width, self.full_aperture)
-        check_guide(self.waveguide, self.pupil, self.receptor_pitch)
-        object.__setattr__(self, "microvilli", microvilli_of(self.microvilli))
-        if self.microvilli is not None:
-            check_rays(self.pupil, number(self.retina_distance), self.tolerance)
-        if self.photon_budget is not None:
-            of_kind("photon_budget", self.photon_budget, PhotonBudget, "PhotonBudget(), or None")
-        object.__setattr__(self, "receptors", receptors_of(self.receptors))
-        auto = str(self.bands) == "auto"
-        spectral = self._chosen_bands() if auto else SpectralBands.uniform(self.bands, self.receptors)
-        object.__setattr__(self, "spectral_bands", spectral)
-        object.__setattr__(self, "bands", len(spectral.wavelengths))
-
-    @property
-    def sensor_distance(self) -> Scalar:
-        """f [m], by which receptors see angles: a distance x on the retina is x/f. From pupil to retina, where the
-        media before and behind the pupil are the same."""
-        return focal_length(self.sensor_width, self.fov_deg)
-
-    @property
-    def retina_distance(self) -> Scalar:
-        """[m] from pupil to retina: f n/n₀, at 550 nm."""
-        return behind_pupil(self.pupil, self.sensor_distance)
-
-    @property
-    def widest_pupil(self) -> float:
-        """Diameter [m] that gathers a throughput of 1."""
-        return self.sensor_width if self.full_aperture is None else self.full_aperture
-
-    @property
-    def receptor_pitch(self) -> float:
-        """[m]"""
-        return self.sensor_width / self.resolution[1]
-
-    @property
-    def relative_aperture(self) -> Scalar:
-        """a = 2 R / L, or over `full_aperture`; 1 for the perfect lens."""
-        return 1.0 if self.pupil is None else 2 * self.pupil.aperture_radius / self.widest_pupil
-
-    @property
-    def throughput(self) -> Scalar:
-        """a², times the share of the aperture's disk that is open, and of that light what a mask lets through."""
-        return self.aperture_throughput * (1.0 if self.pupil is None else self.pupil.transmission)
-
-    @property
-    def aperture_throughput(self) -> Scalar:
-        """The same without the mask: kernels, which are multiplied by it, hold what a mask lets through."""
-        return throughput(self.relative_aperture, 1.0 if self.pupil is None else self.pupil.aperture.area / math.pi)
-
     @property
     def white_signal(self) -> Scalar:
         """Of a receptor that sees white everywhere: the throughput, or what waveguides take of it, mean of types."""
@@ -151,24 +72,6 @@ class Eye:
     @cached_property
     def _guided_share(self) -> float:
         return white_share(plain(self.kernel(1)), self.spectral_bands)
-
-    @property
-    def channels(self) -> int:
-        """Signals at each place of the retina: as many as types of receptor, or one in a mosaic."""
-        return self.receptors.channels
-
-    @property
-    def mosaic(self) -> np.ndarray | None:
-        """Type of every receptor, (h, w) int; None where every receptor has all types."""
-        return self.receptors.layout(self.resolution)
-
-    @property
-    def photons(self) -> np.ndarray | None:
-        """Photons that a signal of 1 stands for, per type of receptor (type,); None without a photon budget."""
-        if self.photon_budget is None:
-            return None
-        light = etendue(self.widest_pupil, self.receptor_pitch, number(self.sensor_distance))
-        return self.photon_budget.photons(self.spectral_bands, light)
 
     def psf(self, z: Scalar = math.inf) -> PSFResult:
         """PSF on the retina (sensor orientation) of a point at distance z [m] along the axis, in the direction that the
@@ -210,7 +113,8 @@ class Eye:
         cell = self.receptor_pitch / samples_per_receptor
         return Retina(self.retina_distance, self.spectral_bands.wavelengths, cell, self.tolerance, self.dtype)
 
-    def _chosen_bands(self) -> SpectralBands:
+    def chosen_bands(self) -> SpectralBands:
+        """As few as keep a receptor's predicted error within the tolerance."""
         large = self.receptor_pitch / CELLS_FOR_BANDS
         retina = Retina(self.retina_distance, np.empty(0), large, self.tolerance, self.dtype)
         return bands_for(self, retina, tangents(self.eccentricity_deg))
@@ -297,4 +201,4 @@ class Eye:
 
     def describe(self, z: Scalar = math.inf) -> Description:
         """What limits the eye, as a table: see `summary.Description`."""
-        return describe(self, z)
+        return describe(self, number(self.white_signal), self.psf(z), partial(self.kernel, z=z))

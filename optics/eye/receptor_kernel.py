@@ -3,51 +3,25 @@
 from __future__ import annotations
 
 import math
-from typing import Any, Protocol
 
 import numpy as np
 
-from optics.elements.pupil import Pupil
 from optics.eye.band_choice import choose_bands
+from optics.eye.eye_spec import EyeSpec
 from optics.eye.guided_field import Guide, guided_kernel
 from optics.eye.receptive_field import Retina, visual_kernel
 from optics.numerics.arguments import without_derivative
 from optics.numerics.autodiff import Array, Scalar, number, plain
 from optics.numerics.precision import precision
-from optics.ommatidia.waveguide import Waveguide
 from optics.spectra.bands import SpectralBands
 from optics.spectra.spectrum import daylight
 
-__all__ = ["EyeOfReceptors", "bands_for", "receptor_kernel", "white_share"]
+__all__ = ["bands_for", "receptor_kernel", "white_share"]
 
 CELLS_FOR_BANDS = 2  # per receptor, along an axis
 
 
-class EyeOfReceptors(Protocol):
-    """What is read of an eye: see `optics.Eye`, which is one."""
-
-    @property
-    def pupil(self) -> Pupil | None: ...
-
-    @property
-    def waveguide(self) -> Waveguide | None: ...
-
-    @property
-    def receptors(self) -> Any: ...
-
-    @property
-    def tolerance(self) -> float: ...
-
-    @property
-    def sensor_distance(self) -> Scalar: ...
-
-    @property
-    def receptor_pitch(self) -> float: ...
-
-
-def receptor_kernel(
-    eye: EyeOfReceptors, retina: Retina, z: Scalar, direction: tuple[float, float], from_cell: bool
-) -> Array:
+def receptor_kernel(eye: EyeSpec, retina: Retina, z: Scalar, direction: tuple[float, float], from_cell: bool) -> Array:
     """See `Eye.kernel`; direction: (right, down), tangents; from_cell: of light from all over a cell of the scene."""
     if eye.pupil is None:
         return precision(retina.dtype).Tensor(np.ones((len(retina.wavelengths), 1, 1)))
@@ -65,7 +39,7 @@ def white_share(kernels: np.ndarray, bands: SpectralBands) -> float:
     return float((bands.weights @ seen).mean())
 
 
-def bands_for(eye: EyeOfReceptors, retina: Retina, direction: tuple[float, float]) -> SpectralBands:
+def bands_for(eye: EyeSpec, retina: Retina, direction: tuple[float, float]) -> SpectralBands:
     """As few as the eye's tolerance allows, see `choose_bands`; retina: without wavelengths, of large cells."""
     if eye.pupil is None:
         return choose_bands(eye.tolerance, eye.receptors)

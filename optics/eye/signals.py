@@ -3,50 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
+from optics.eye.eye_spec import EyeSpec
 from optics.eye.kernel_bank import KernelBank
 from optics.eye.photoreceptor import noise_on, own_type, quantum_catch
 from optics.eye.retinal_image import at_receptors, blur, receptor_average
-from optics.numerics.autodiff import Array, Scalar, plain
+from optics.numerics.autodiff import Array, plain
 from optics.numerics.precision import Precision, precision
-from optics.ommatidia.waveguide import Waveguide
-from optics.spectra.bands import SpectralBands
 
-__all__ = ["SeeingEye", "signals", "with_noise"]
+__all__ = ["signals", "with_noise"]
 
 
-class SeeingEye(Protocol):
-    """What is read of an eye: see `optics.Eye`, which is one."""
-
-    @property
-    def resolution(self) -> tuple[int, int]: ...
-
-    @property
-    def dtype(self) -> str: ...
-
-    @property
-    def spectral_bands(self) -> SpectralBands: ...
-
-    @property
-    def aperture_throughput(self) -> Scalar: ...
-
-    @property
-    def waveguide(self) -> Waveguide | None: ...
-
-    @property
-    def mosaic(self) -> np.ndarray | None: ...
-
-    @property
-    def photons(self) -> np.ndarray | None: ...
-
-    @property
-    def noise_sigma(self) -> float: ...
-
-
-def signals(eye: SeeingEye, parts: Sequence[tuple[np.ndarray, Any]], bank: KernelBank, s: int, z: Any) -> Array:
+def signals(eye: EyeSpec, parts: Sequence[tuple[np.ndarray, Any]], bank: KernelBank, s: int, z: Any) -> Array:
     """Signals (channel, h, w) without noise. s: samples_per_receptor; z: see `Eye.see`.
 
     parts: of the light, (band, Y, X), each with how receptors take it, a number or (h, w).
@@ -61,14 +32,14 @@ def signals(eye: SeeingEye, parts: Sequence[tuple[np.ndarray, Any]], bank: Kerne
     return total if eye.mosaic is None else own_type(total, eye.mosaic, types)
 
 
-def _caught(eye: SeeingEye, scenes: list[np.ndarray], bank: KernelBank, s: int, types: Precision) -> Array:
+def _caught(eye: EyeSpec, scenes: list[np.ndarray], bank: KernelBank, s: int, types: Precision) -> Array:
     shape = eye.resolution[0] * s, eye.resolution[1] * s
     image = blur(scenes, list(bank.kernels.values()), shape, types)
     irradiance = (receptor_average if eye.waveguide is None else at_receptors)(image, s, types)
     return quantum_catch(irradiance, eye.spectral_bands.weights, eye.aperture_throughput, types)
 
 
-def with_noise(eye: SeeingEye, signal: Array, rng: np.random.Generator) -> Array:
+def with_noise(eye: EyeSpec, signal: Array, rng: np.random.Generator) -> Array:
     """With shot noise, if there is a photon budget, and Gaussian noise; neither carries a derivative."""
     noise = noise_on(plain(signal), eye.photons, eye.mosaic, eye.noise_sigma, rng)
     return signal + precision(eye.dtype).Tensor(noise)

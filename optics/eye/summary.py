@@ -5,21 +5,18 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Protocol
 
 import numpy as np
 
-from optics.elements.pupil import Pupil
+from optics.eye.eye_spec import EyeSpec
 from optics.numerics.accuracy import AccuracyError, Plan
-from optics.numerics.autodiff import Scalar, number, plain
-from optics.ommatidia.waveguide import Waveguide
+from optics.numerics.autodiff import Array, Scalar, number, plain
 from optics.point_spread.concentration import strehl_ratio
 from optics.point_spread.contrast import image_quality, mtf
 from optics.point_spread.psf_result import PSFResult
-from optics.spectra.bands import SpectralBands
 from optics.spectra.spectrum import daylight
 
-__all__ = ["DescribedEye", "Description", "describe", "noise_of"]
+__all__ = ["Description", "describe", "noise_of"]
 
 LIMITS = ("diffraction", "sampling", "noise")  # of acuity
 FREQUENCIES = 513  # choice: between 0 and the cut-off, at which the MTF is held against the noise
@@ -27,45 +24,7 @@ CELLS_ACROSS, MOST_CELLS = 8, 64  # choice: of a kernel, across a waveguide; alo
 FINER = 16  # choice: steps per sample of the PSF, where a receptor's angular sensitivity is measured
 
 
-class DescribedEye(Protocol):
-    """What a description reads of an eye: see `optics.Eye`, which is one."""
-
-    @property
-    def pupil(self) -> Pupil | None: ...
-
-    @property
-    def noise_sigma(self) -> float: ...
-
-    @property
-    def spectral_bands(self) -> SpectralBands: ...
-
-    @property
-    def sensor_distance(self) -> Scalar: ...
-
-    @property
-    def retina_distance(self) -> Scalar: ...
-
-    @property
-    def receptor_pitch(self) -> float: ...
-
-    @property
-    def relative_aperture(self) -> Scalar: ...
-
-    @property
-    def throughput(self) -> Scalar: ...
-
-    @property
-    def waveguide(self) -> Waveguide | None: ...
-
-    @property
-    def white_signal(self) -> Scalar: ...
-
-    @property
-    def photons(self) -> np.ndarray | None: ...
-
-    def psf(self, z: Scalar) -> PSFResult: ...
-
-    def kernel(self, samples_per_receptor: int, z: Scalar) -> Any: ...
+Kernels = Callable[[int], Array | np.ndarray]  # cells per receptor -> kernel (band, y, x)
 
 
 @dataclass(frozen=True)
@@ -142,25 +101,24 @@ class Description:
         return self.acceptance_angle_deg / self.interommatidial_angle_deg
 
 
-def noise_of(eye: DescribedEye) -> float:
+def noise_of(eye: EyeSpec, white_signal: Scalar) -> float:
     """Standard deviation of a receptor's signal where it sees white in daylight: its own noise, and that of photons."""
     if eye.photons is None:
         return float(eye.noise_sigma)
-    light = number(eye.white_signal)
+    light = number(white_signal)
     return math.hypot(eye.noise_sigma, light / math.sqrt(float(eye.photons.mean()) * light))
 
 
-def describe(eye: DescribedEye, z: Scalar) -> Description:
-    """The eye's limits for a scene at distance z [m]. A measure that the light cannot tell well enough is NaN and has a
+def describe(eye: EyeSpec, light: float, result: PSFResult, kernel: Kernels) -> Description:
+    """The eye's limits for a scene at one distance. A measure that the light cannot tell well enough is NaN and has a
     line in `Description.unknown`.
 
-    Raises:
-        AccuracyError: the PSF cannot be computed: see `optics.psf`.
+    light: the signal of white · result: PSF for this distance · kernel: of so many cells per receptor, for the same
     """
-    distance, light, result = number(eye.sensor_distance), number(eye.white_signal), eye.psf(z)
+    distance = number(eye.sensor_distance)
     white, wavelength = _white(eye, result)
     unknown: list[str] = []
-    photons, noise = None if eye.photons is None else float(eye.photons.mean()) * light, noise_of(eye)
+    photons, noise = None if eye.photons is None else float(eye.photons.mean()) * light, noise_of(eye, light)
     if eye.pupil is None:
         diffraction, strehl, quality = math.inf, 1.0, max(1 - noise, 0.0)
         noise_limit = math.inf if noise < 1 else 0.0
@@ -187,7 +145,7 @@ def describe(eye: DescribedEye, z: Scalar) -> Description:
         image_quality=quality,
         noise=noise,
         photons=photons,
-        acceptance_angle_deg=_acceptance(eye, white, z) / per_degree,
+        acceptance_angle_deg=_acceptance(eye, white, kernel) / per_degree,
         interommatidial_angle_deg=eye.receptor_pitch / per_degree,
         plan=result.plan,
         unknown=tuple(unknown),
@@ -205,7 +163,7 @@ def _known(name: str, measure: Callable[[], float], unknown: list[str]) -> float
         return math.nan
 
 
-def _white(eye: DescribedEye, result: PSFResult) -> tuple[PSFResult, float]:
+def _white(eye: EyeSpec, result: PSFResult) -> tuple[PSFResult, float]:
     """The PSF of white daylight as the mean of the channels weighs it, and its mean wavelength [m]."""
     worth = eye.spectral_bands.weights.mean(axis=0) * daylight(eye.spectral_bands.wavelengths)
     white = result.mean(worth / worth.sum())
@@ -226,13 +184,13 @@ def _noise_limit(white: PSFResult, cutoff: float, floor: float) -> float:
     return float(frequency[at - 1] + share * (frequency[at] - frequency[at - 1]))
 
 
-def _acceptance(eye: DescribedEye, white: PSFResult, z: Scalar) -> float:
+def _acceptance(eye: EyeSpec, white: PSFResult, kernel: Kernels) -> float:
     """Full width [m] at half height, along x through its peak, of what a receptor sees in white daylight: PSF ⊗
     receptor aperture, or what a waveguide takes."""
     if eye.pupil is None:
         return eye.receptor_pitch
     if eye.waveguide is not None:
-        return _guided_acceptance(eye, eye.waveguide.diameter, z)
+        return _guided_acceptance(eye, eye.waveguide.diameter, kernel)
     half = eye.receptor_pitch / 2
     rows = _within(white.y, white.psf[0], white.y, half)
     peak = int(np.argmax(_within(white.x, rows.T, white.x, half).max(axis=0)))
@@ -244,12 +202,12 @@ def _acceptance(eye: DescribedEye, white: PSFResult, z: Scalar) -> float:
     return float(last + right - first + left) * white.dx / FINER
 
 
-def _guided_acceptance(eye: DescribedEye, diameter: float, z: Scalar) -> float:
+def _guided_acceptance(eye: EyeSpec, diameter: float, kernel: Kernels) -> float:
     """The same of a waveguide of a diameter [m], from its kernel, by a spline through cells."""
     from scipy.interpolate import CubicSpline
 
     cells = min(max(4, math.ceil(CELLS_ACROSS * eye.receptor_pitch / diameter)), MOST_CELLS)
-    seen = eye.spectral_bands.white_light(plain(eye.kernel(cells, z))).mean(axis=0)
+    seen = eye.spectral_bands.white_light(plain(kernel(cells))).mean(axis=0)
     row = seen[int(np.argmax(seen.max(axis=1)))]
     curve = CubicSpline(np.arange(len(row)), row)
     at = np.linspace(0, len(row) - 1, FINER * len(row))

@@ -34,7 +34,8 @@ class EncounterEnv(ParallelEnv[str, dict[str, np.ndarray], np.ndarray]):
         self.render_mode = render_mode
         task = batched(encounter)
         simulation = Simulation(task, 1, seed)
-        self._animals = Animals(simulation, renderers_for(simulation, PreparedTask(task).fidelities, None), memory)
+        renderers = renderers_for(simulation, simulation.agents, PreparedTask(task).fidelities, None)
+        self._animals = Animals(simulation, renderers, memory)
         self._pictures = WorldPictures(self._animals, render_mode)
         self._begun = False
         self.observation_spaces = self._named([senses.observation_space for senses in self._animals.learners])

@@ -11,6 +11,7 @@ import drjit as dr
 from sim.envs.renderers import renderers_for, scenes_for
 from sim.envs.vec_env import EyesVecEnv
 from sim.render.edge_rays import FIRST
+from sim.render.eye_renderer import EyeRenderer
 from sim.render.fidelity import EDGES, RAYS, Fidelity
 from sim.render.world_fidelity import chosen_fidelity
 from sim.scene.variation import Variation
@@ -27,22 +28,25 @@ Fidelities = Mapping[str, Fidelity]  # by kind of eyes
 class PreparedTask:
     """A task, its scenes, and the fidelity of all eyes.
 
-    task: what is done · fidelities: of every agent's eyes by kind; None for agents that look at nothing
+    task: what is done · fidelity: of the learners' eyes, in the place of the task's own
+    fidelities: of every agent's eyes by kind; None for agents that look at nothing
 
     Raises:
         ValueError: what the task's settings, model and eyes raise.
     """
 
-    def __init__(self, task: BatchTask) -> None:
+    def __init__(self, task: BatchTask, fidelity: Fidelity | None = None) -> None:
         self.task, agents = task, task.agents()
         layout = isinstance(task, AgentTask) and not (task.vary and Variation(task.vary).of_looks)
         self._scenes = scenes_for(task) if layout and isinstance(task, AgentTask) else None
         self.fidelities: list[Fidelities | None] = [
-            self._fidelities(number, agent) if agent.learns or agent.policy is not None else None
+            self._fidelities(number, agent, fidelity) if agent.learns or agent.policy is not None else None
             for number, agent in enumerate(agents)
         ]
 
-    def _fidelities(self, number: int, agent: Agent) -> Fidelities:
+    def _fidelities(self, number: int, agent: Agent, fidelity: Fidelity | None) -> Fidelities:
+        if agent.learns and fidelity is not None:
+            return dict.fromkeys((kind.name for kind in agent.kinds), fidelity)
         if self._scenes is None:
             return fidelities_among(self.task, number)
         return {
@@ -96,7 +100,14 @@ class PreparedTask:
         """A batched environment; arguments as `sim.make_vec_env` has them."""
         threads = min(dr.thread_count(), n_envs)
         simulation = Simulation(self.task, n_envs, seed, threads, least_return, episode_steps)
-        return EyesVecEnv(simulation, renderers_for(simulation, self.fidelities, self._scenes), memory, render_mode)
+        renderers = renderers_for(simulation, simulation.agents, self.fidelities, self._scenes)
+        return EyesVecEnv(simulation, renderers, memory, render_mode)
+
+    def renderer(self, simulation: Simulation) -> EyeRenderer:
+        """Of the first agent's eyes in these worlds, which may be of the same task with other eyes."""
+        (first,) = renderers_for(simulation, self.task.agents()[:1], self.fidelities[:1], self._scenes)
+        assert first is not None
+        return next(iter(first.eyes.values()))
 
 
 def _at_most(fidelity: Fidelity, rays_per_receptor: float) -> Fidelity:

@@ -35,16 +35,18 @@ def scenes_for(task: AgentTask) -> dict[str, WorldScene]:
 
 def renderers_for(
     simulation: Simulation,
+    agents: Sequence[Agent],
     fidelities: Sequence[Mapping[str, Fidelity] | None],
     scenes: Mapping[str, WorldScene] | None,
 ) -> list[AgentRenderers | None]:
     """Of all agents; None for those that look at nothing.
 
+    agents: of the simulation, maybe with other eyes
     fidelities: of every agent's eyes by kind · scenes: of a built-in layout by kind of eyes; None: of other models
     """
     return [
         None if of is None else _of_agent(simulation, agent, of, scenes)
-        for agent, of in zip(simulation.agents, fidelities, strict=True)
+        for agent, of in zip(agents, fidelities, strict=True)
     ]
 
 

@@ -16,6 +16,7 @@ from sim.envs.renderers import AgentRenderers
 from sim.envs.senses import Arrays, Senses
 from sim.envs.world_pictures import WorldPictures
 from sim.render.eye_renderer import EyeRenderer
+from sim.tasks.batch_task import BatchTask
 from sim.tasks.encounter import Encounter
 from sim.tasks.outcome import Step
 from sim.tasks.simulation import LEAST_RETURN, Simulation
@@ -65,6 +66,11 @@ class EyesVecEnv(OneEnvironment):
             RuntimeError: before the first reset.
         """
         return self.simulation.state
+
+    @property
+    def batch_task(self) -> BatchTask:
+        """The task, for arrays of all worlds."""
+        return self.simulation.task
 
     @property
     def eyes(self) -> Any:

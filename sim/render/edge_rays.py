@@ -21,6 +21,7 @@ from optics.numerics.autodiff import Array
 from sim.eyes.sampling import BoxSampling, beyond_rim_of
 from sim.render.ray_kernel import Frame, KernelInputs, RayKernel
 from sim.scene.device_arrays import as_whole_numbers
+from sim.scene.frozen_kernels import FrozenKernel
 
 Launch = Callable[[Any, KernelInputs], Callable[[], np.ndarray]]  # starts a frozen kernel; that waits for it
 FIRST = 4  # rays through every receptor's square
@@ -42,8 +43,7 @@ class EdgeRays:
         self._kernel, self._rays, self._noticed = kernel, fine.rays_per_receptor, noticed
         self._beyond = beyond_rim_of(sampling.eye.resolution)
         self._signals = [[float(worth) for worth in channel] for channel in signals]
-        self._coarse: Any = dr.freeze(lambda *args: self._look_once(*args))
-        self._fine: Any = dr.freeze(lambda *args: self._look_again(*args))
+        self._coarse, self._fine = FrozenKernel(self._look_once), FrozenKernel(self._look_again)
         first = np.concatenate([sampling.sensor(FIRST).directions, sampling.beyond_rim(FIRST)])
         self._first, self._along = kernel.inputs(first), kernel.inputs(fine.directions)
 
@@ -57,7 +57,7 @@ class EdgeRays:
     @property
     def recordings(self) -> int:
         """How often the kernels were recorded."""
-        return int(self._coarse.n_recordings + self._fine.n_recordings)
+        return self._coarse.n_recordings + self._fine.n_recordings
 
     def _refined(self, found: np.ndarray, launch: Launch) -> np.ndarray:
         cells = found.reshape(len(found), -1, self._beyond.size)  # (component or spread, view, receptor or beyond)

@@ -11,7 +11,6 @@ from collections.abc import Callable, Mapping
 from functools import cached_property
 from typing import Any, Self
 
-import drjit as dr
 import numpy as np
 
 import optics
@@ -31,6 +30,7 @@ from sim.render.prepared_scene import Placed, PreparedScene
 from sim.render.ray_kernel import KernelInputs, Moving, RayKernel, launched
 from sim.render.receptor_noise import FEW
 from sim.render.renderable import check_renderable
+from sim.scene.frozen_kernels import FrozenKernel
 from sim.scene.variant import variant
 from sim.tracing.areas.area_tracer import AreaTracer
 from sim.tracing.eye_places import EyeFrames
@@ -108,8 +108,8 @@ class EyeRenderer:
                 kernel = RayKernel(self.tracer, eyes, self.n_envs, n_eyes, self.sensor.depth)
             self._inputs = kernel.inputs(self.sensor.directions, self.sensor.bounce_samples)
             lanes, reduced = self.n_envs * n_eyes * len(self.sensor.directions), self.sensor.rays_per_receptor
-            self._rays: Any = dr.freeze(lambda scenes, frame, given: kernel.sums(scenes, frame, given, lanes, 1))
-            self._sums: Any = dr.freeze(lambda scenes, frame, given: kernel.sums(scenes, frame, given, lanes, reduced))
+            self._rays = FrozenKernel(lambda scenes, frame, given: kernel.sums(scenes, frame, given, lanes, 1))
+            self._sums = FrozenKernel(lambda scenes, frame, given: kernel.sums(scenes, frame, given, lanes, reduced))
             self._edges = self._at_edges(kernel) if self.fidelity.samples == EDGES else None
 
     def _at_edges(self, kernel: RayKernel) -> EdgeRays:
@@ -218,7 +218,7 @@ class EyeRenderer:
         """How often the kernels were recorded: once per kernel in use, up to three times where meshes move."""
         edges = 0 if self._edges is None else self._edges.recordings
         labels = vars(self).get("labels")
-        recorded = int(self._rays.n_recordings + self._sums.n_recordings) + edges
+        recorded = self._rays.n_recordings + self._sums.n_recordings + edges
         return recorded + (0 if labels is None else labels.recordings)
 
     # --- kernels
@@ -232,8 +232,7 @@ class EyeRenderer:
             return launched(kernel, self.tracer.scene, self._moving.frame, inputs, self.scene.variant)
 
         def launch() -> Callable[[], np.ndarray]:
-            with variant(self.scene.variant):
-                self._moving.fill(placed)
+            self._moving.fill(placed)
             if frozen is None and self._edges is not None:
                 return self._edges.launch(start)
             return start(self._sums if frozen is None else frozen, self._inputs)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-import drjit as dr
 import numpy as np
 
 from optics.numerics.autodiff import Array
@@ -16,6 +15,7 @@ from sim.render.optic_flow import flow_between, receptor_centres
 from sim.render.pending_frame import FrameSlot
 from sim.render.prepared_scene import Placed, PreparedScene
 from sim.render.ray_kernel import Frame, KernelInputs, Moving, RayKernel, launched
+from sim.scene.frozen_kernels import FrozenKernel
 from sim.scene.variant import variant
 from sim.tracing.eye_places import EyeFrames
 from sim.tracing.model_tracer import ModelTracer, Scenes
@@ -45,8 +45,7 @@ class Labels:
             seen, there = kernel.seen(scenes, frame, inputs, kernel.lane(inputs))
             return tracer.which(seen.ray, there)
 
-        self._distances: Any = dr.freeze(distances)
-        self._hits: Any = dr.freeze(hits)
+        self._distances, self._hits = FrozenKernel(distances), FrozenKernel(hits)
 
     def depth(self, poses: Placed) -> np.ndarray:
         """How far what each receptor's centre looks at is, along the eye's axis [m], (env, eye, height, width) float32;
@@ -76,15 +75,14 @@ class Labels:
     @property
     def recordings(self) -> int:
         """How often the kernels were recorded."""
-        return int(self._distances.n_recordings + self._hits.n_recordings)
+        return self._distances.n_recordings + self._hits.n_recordings
 
     def _seen(self, kernel: Any, scenes: Scenes, poses: Placed) -> np.ndarray:
         placed = self.scene.placed(poses)
         self.scene.check_poses(placed, self.n_envs)
 
         def launch() -> Callable[[], np.ndarray]:
-            with variant(self.scene.variant):
-                self._moving.fill(placed)
+            self._moving.fill(placed)
             return launched(kernel, scenes, self._moving.frame, self._inputs, self.scene.variant)
 
         found = self._slot.begin(launch).wait()

@@ -29,17 +29,23 @@ def aligned(n: int, dtype: type) -> np.ndarray:
 
 
 class SharedBuffer:
-    """Numbers of NumPy's that kernels read where they are. Dr.Jit gets them once: to hand them over at every launch
-    takes longer than to render a small world.
+    """Numbers of NumPy's that kernels read where they are. LLVM's kernels get them once: to hand them over at every
+    launch takes longer than to render a small world. A GPU has memory of its own, and gets a copy whenever it is asked
+    for.
 
-    values: flat; to be written only while no kernel that reads them is under way · array: the same, on the device
+    values: flat; to be written only while no kernel that reads them is under way
     """
 
     def __init__(self, n: int, kind: Any = None) -> None:
         kind = mi.Float if kind is None else kind
         dtypes = {dr.VarType.Float32: np.float32, dr.VarType.UInt32: np.uint32, dr.VarType.UInt64: np.uint64}
         self.values = aligned(n, dtypes[dr.type_v(kind)])
-        self.array: Array = kind(self.values)
+        self._kind, self._array = kind, kind(self.values)
+
+    @property
+    def array(self) -> Array:
+        """The same, on the device."""
+        return self._array if dr.backend_v(self._kind) == dr.JitBackend.LLVM else self._kind(self.values)
 
 
 def floats(values: np.ndarray) -> Array:

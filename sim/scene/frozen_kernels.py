@@ -1,10 +1,74 @@
-"""What has to hold while Dr.Jit records a frozen function or replays one."""
+"""Frozen kernels with typed inputs, and what has to hold while Dr.Jit records one or replays it."""
 
 from __future__ import annotations
 
 import gc
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import fields, is_dataclass
+from functools import cache
+from typing import Any
+
+import drjit as dr
+
+from optics.numerics.autodiff import Array
+
+
+class FrozenKernel:
+    """A kernel that is recorded once and replayed, whose inputs are dataclasses.
+
+    Dr.Jit is handed their arrays alone: it would look through every dataclass again at every launch.
+
+    body: (scenes, moving, fixed) -> arrays; scenes: Mitsuba's · moving: what changes from launch to launch
+        fixed: what hardly does
+    """
+
+    def __init__(self, body: Callable[[Any, Any, Any], Any]) -> None:
+        self._body, self._moving, self._fixed = body, None, None
+        self._arrays: list[Array] = []
+
+        def recorded(scenes: Any, arrays: list[Array]) -> Any:
+            rest = iter(arrays)
+            moving = _with_arrays(self._moving, rest)
+            return self._body(scenes, moving, _with_arrays(self._fixed, rest))
+
+        self._frozen: Any = dr.freeze(recorded)
+
+    def __call__(self, scenes: Any, moving: Any, fixed: Any) -> Any:
+        """Launch it."""
+        if fixed is not self._fixed:
+            self._fixed, self._arrays = fixed, _arrays_of(fixed)
+        self._moving = moving
+        return self._frozen(scenes, _arrays_of(moving) + self._arrays)
+
+    @property
+    def n_recordings(self) -> int:
+        """How often it was recorded."""
+        return int(self._frozen.n_recordings)
+
+
+@cache
+def _names(kind: Any) -> tuple[str, ...]:
+    """Of a dataclass's fields; of another type, none."""
+    return tuple(field.name for field in fields(kind)) if is_dataclass(kind) else ()
+
+
+def _arrays_of(inputs: Any) -> list[Array]:
+    """All arrays in dataclasses and lists of them, in order."""
+    if names := _names(inputs.__class__):
+        return [array for name in names for array in _arrays_of(getattr(inputs, name))]
+    if isinstance(inputs, list):
+        return [array for one in inputs for array in _arrays_of(one)]
+    return [] if inputs is None else [inputs]
+
+
+def _with_arrays(inputs: Any, arrays: Iterator[Array]) -> Any:
+    """The same dataclasses and lists, with these arrays in them."""
+    if names := _names(inputs.__class__):
+        return type(inputs)(*(_with_arrays(getattr(inputs, name), arrays) for name in names))
+    if isinstance(inputs, list):
+        return [_with_arrays(one, arrays) for one in inputs]
+    return None if inputs is None else next(arrays)
 
 
 @contextmanager

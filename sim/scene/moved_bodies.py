@@ -36,7 +36,7 @@ class ReferencePose:
 
     def slots(self, geoms: Sequence[int] | np.ndarray) -> np.ndarray | None:
         """Places, in `bodies`, of bodies whose frames these geoms have; None if any has another. Most have."""
-        key = tuple(map(int, geoms))
+        key = tuple(geoms)
         if key not in self._slots:
             bodies = [int(self.body_of["geom"][geom]) for geom in key]
             local = [self._local.get(("geom", geom)) for geom in key]

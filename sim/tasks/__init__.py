@@ -11,6 +11,7 @@ built_in        what these share: the sliding agent, its senses and its reward
 find_goal       detection, foraging and tracking
 find_way        navigation and maze
 simulation      Simulation: worlds of a task in motion, unseen
+command         Command: the meaning of a number in an action
 outcome         Outcome of an action, Step
 batch_arrays    arrays that tasks return, checked
 reward          the built-in reward's named terms and their weights

@@ -15,10 +15,12 @@ from sim.physics.controls import controls_of
 from sim.physics.physics import Physics
 from sim.scene.variation import Variation
 from sim.tasks.batch_arrays import columns, mapping, not_finite, rows
+from sim.tasks.command import Command
 from sim.tasks.eye_kinds import EyeKind, auxiliary_of, kinds_of
 from sim.tasks.outcome import Outcome, RewardTerms
 from sim.tasks.random_streams import RandomStreams, StreamsByWorld
 from sim.tasks.task_settings import TaskSettings, compiled
+from sim.worlds.ground_plan import GroundPlan
 
 __all__ = ["Agent", "BatchTask"]
 
@@ -52,10 +54,16 @@ class BatchTask(TaskSettings):
     renders_early: whether rendering may begin before an action is judged, which is faster; `rewards`, `terminated`,
         `succeeded` and `feels` must then move nothing, unless `judge` names the worlds in `Outcome.changed`
     feel_ranges: (lowest, highest) of what `feels` returns, by name; without an entry there is no limit
+    ramped: terms of the reward that may count less while a learner begins, if `evolve` is told so
+    counted: titles of rows in tables, by reward term: the number of actions in which the term is not 0
+    compared_light: light in which `evolve` compares eyes, "direct" for example; None: as `fidelity` has it
     """
 
     renders_early: bool = True
     feel_ranges: Mapping[str, tuple[float, float]] = {}
+    ramped: Sequence[str] = ()
+    counted: Mapping[str, str] = {}
+    compared_light: str | None = None
 
     def reset(self, worlds: Any, chosen: np.ndarray, rngs: Sequence[np.random.Generator]) -> None:
         """Start episodes in the chosen worlds, (k,) int, each with its own generator; here: as mj_resetData has it."""
@@ -114,6 +122,23 @@ class BatchTask(TaskSettings):
 
     def first_info(self, worlds: Any, chosen: np.ndarray) -> Sequence[Mapping[str, Any]] | None:
         """More entries of `info` at the beginning of an episode, for each chosen world; None: no more."""
+        return None
+
+    def commands(self) -> tuple[Command, ...]:
+        """The meaning of each number in the first agent's action; here: numbered, without units."""
+        return tuple(Command(str(number)) for number in range(self.agents()[0].n_actions))
+
+    def solved(self, before: bool | None, info: Mapping[str, Any]) -> bool | None:
+        """Whether an episode counts as solved after one more action with this `info`; before: the same without this
+        action; None: undecided. Here: as `succeeded` says after the last action."""
+        return bool(info["is_success"])
+
+    def azimuths(self) -> np.ndarray:
+        """Directions of the first agent's first kind of eyes [rad], (eye,), in the frame of what they are on."""
+        return np.radians([mount.azimuth_deg for mount in self.agents()[0].kinds[0].mounts])
+
+    def ground_plan(self, place: np.ndarray) -> GroundPlan | None:
+        """The surroundings of this place (2,) [m] from above; None: pictures show the task instead."""
         return None
 
     # What follows is needed only by tasks with a physics, agents or random streams of their own.

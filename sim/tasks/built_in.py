@@ -11,15 +11,18 @@ import numpy as np
 
 from sim.eyes.eyes import BODY_RADIUS, Eyes
 from sim.eyes.mounts import Mount, ring
-from sim.physics.sliding_agents import SlidingAgents
+from sim.physics.sliding_agents import MAX_TURN, SlidingAgents
 from sim.render.fidelity import Fidelity
 from sim.scene.variation import Variation
 from sim.tasks.batch_task import Agent, BatchTask
+from sim.tasks.command import Command
 from sim.tasks.outcome import NOWHERE, Outcome, RewardTerms
 from sim.tasks.random_streams import StreamsByPurpose
 from sim.tasks.reward import MODES, TERMS, RewardWeights, reward_terms
+from sim.tracing.lighting import DIRECT
 from sim.worlds.catalog import EPISODE_STEPS
-from sim.worlds.world import World
+from sim.worlds.ground_plan import GroundPlan
+from sim.worlds.world import MAX_SPEED, World
 
 __all__ = ["STANDING", "AgentEvents", "AgentTask", "mounts_of_agent"]
 
@@ -69,6 +72,13 @@ class AgentTask(BatchTask):
     """
 
     feel_ranges: Mapping[str, tuple[float, float]] = {"contact": (0.0, 1.0)}
+    ramped = ("contact",)
+    counted: Mapping[str, str] = {
+        "goal": "goals reached",
+        "adversary": "adversaries reached",
+        "contact": "actions in contact",
+    }
+    compared_light = DIRECT
 
     def __init__(
         self,
@@ -94,6 +104,23 @@ class AgentTask(BatchTask):
     def n_actions(self, model: mujoco.MjModel) -> int:
         """Forward speed, and change of heading."""
         return 2
+
+    def commands(self) -> tuple[Command, ...]:
+        return (Command("speed", "m/s", MAX_SPEED / 2, 1.0), Command("turn", "°", np.degrees(MAX_TURN)))
+
+    def solved(self, before: bool | None, info: Mapping[str, Any]) -> bool | None:
+        """Decided by what is reached first: a goal solves the task, an adversary does not."""
+        if before is not None:
+            return before
+        if info.get("adversary_first"):
+            return False
+        return True if info["reward_terms"]["goal"] > 0 else None
+
+    def azimuths(self) -> np.ndarray:
+        return self.eyes.azimuths() if isinstance(self.eyes, Eyes) else super().azimuths()
+
+    def ground_plan(self, place: np.ndarray) -> GroundPlan:
+        return GroundPlan.of(self.world, place)
 
     def physics(self, n: int, threads: int, variation: Variation | None) -> SlidingAgents:
         return SlidingAgents(self.world, n, threads, variation)

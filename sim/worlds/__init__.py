@@ -11,5 +11,6 @@ striped_walls  cells as boxes with stripes
 layout       cells, walls, a floor
 materials    reflectances, stripes, daylight
 agent_model  a world's agent by itself
+ground_plan  GroundPlan: a world from above
 state        WorldState: where everything is
 """

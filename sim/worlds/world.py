@@ -51,6 +51,7 @@ class World:
     alone: the model's agent by itself; without, agents that may touch something are stepped in the whole model
     training_starts: of the agent in training; None: the same
     episode_steps: actions, then an episode is truncated; None: as many as everywhere
+    mazes: that lie north of each other; 1 in tasks without mazes
     """
 
     task: str
@@ -63,6 +64,7 @@ class World:
     alone: AgentModel | None = None
     training_starts: Starts | None = None
     episode_steps: int | None = None
+    mazes: int = 1
 
     @property
     def agent_spawn(self) -> np.ndarray:
@@ -122,6 +124,7 @@ def build_world(
         alone=AgentModel.of(spec, model),
         training_starts=layout.training_starts,
         episode_steps=layout.episode_steps,
+        mazes=mazes,
     )
 
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from evolve.analysis.episode import record
+from evolve.analysis.recorder import record
 from evolve.cli.main import main
 from evolve.search.local_executor import LocalExecutor
 from evolve.search.loop import evolve as carry_on

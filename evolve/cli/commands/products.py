@@ -46,12 +46,12 @@ def finished_products(run: Run, shown: bool, replay: bool = False) -> Products:
     if `shown`. The report comes last: where it is, all is there."""
     with Waiting(3 + replay, shown) as wait:
         wait.step("the best agent plays an episode")
-        from evolve.analysis import episode
+        from evolve.analysis import recorder
         from evolve.report import exr_export
         from evolve.report.replay import write_page
         from evolve.report.write import write
 
-        best, played = episode.record(run), None
+        best, played = recorder.record(run), None
         (run.path / REPORT).unlink(missing_ok=True)  # the former one, which is kept where no episode can be played
         if replay:
             wait.step("writing the replay")

@@ -4,7 +4,8 @@ statistics: test_statistics.py, test_genealogy.py
 vision: test_vision.py
 mishaps: test_mishaps.py
 genealogy: test_genealogy.py
-episode: test_episode.py
-filmed_episode: test_filmed_episode.py
-filmed_scene: report/test_rerun_bodies.py
+recorder: test_recorder.py, test_episode.py
+episode: test_episode.py, test_recorder.py
+episode_scene: report/test_rerun_bodies.py
+episode_file: test_episode.py, config/test_formats.py
 """

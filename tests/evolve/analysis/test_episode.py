@@ -1,5 +1,6 @@
 """A recorded episode: what it holds agrees with the worlds it was played in, and with its file."""
 
+import contextlib
 import dataclasses
 import io
 import json
@@ -14,13 +15,27 @@ import torch
 
 import evolve
 import sim
-from evolve.analysis import episode as episode_module
-from evolve.analysis.episode import Episode, _perfect_views, record
+from evolve.analysis import episode_file
+from evolve.analysis.episode_file import load_episode, save_episode
+from evolve.analysis.recorder import Recorder, record
 from evolve.config.run_config import WorldConfig
+from evolve.learning.animal_task import animal_task
 from evolve.learning.policy import PolicyConfig, build_policy, load_policy, save_policy
 from evolve.report import exr_export, replay
-from evolve.report.ground_plan import GroundPlan
 from evolve.store.directory import RunError
+from sim.envs.prepared_task import PreparedTask
+from tests.evolve.analysis.compared import assert_same
+from tests.evolve.first_form import of_first_form
+from tests.evolve.small_run import PHENOTYPE, small_config
+
+
+def cut(episode, n):
+    """Its first n actions."""
+    arrays = {k: v[:n] for k, v in vars(episode).items() if isinstance(v, np.ndarray) and len(v) == len(episode)}
+    terms, beside = ({name: a[:n] for name, a in of.items()} for of in (episode.reward_terms, episode.beside))
+    scene = {k: v[:n] for k, v in vars(episode.scene).items() if isinstance(v, np.ndarray)}
+    moved = dataclasses.replace(episode.scene, **scene)
+    return dataclasses.replace(episode, **arrays, reward_terms=terms, beside=beside, scene=moved)
 
 
 def test_shapes(episode):
@@ -35,7 +50,7 @@ def test_shapes(episode):
 
 def test_what_happens_in_it_is_consistent(episode):
     np.testing.assert_allclose(sum(episode.reward_terms.values()), episode.reward, rtol=1e-6)
-    np.testing.assert_array_equal(episode.contact, episode.reward_terms["contact"] < 0)
+    np.testing.assert_array_equal(episode.beside["contact"][:, 0] > 0, episode.reward_terms["contact"] < 0)
     turns = np.diff(np.unwrap(episode.heading))
     np.testing.assert_allclose(turns, np.pi / 4 * episode.action[:-1, 1], atol=1e-6)
     calm = (episode.reward_terms["goal"] == 0)[:-1]  # where the goal stays where it is
@@ -58,14 +73,14 @@ def test_signals_are_the_scene_at_the_recorded_pose_plus_noise(episode):
 
 def test_same_seed_same_episode(run, episode):
     again, other = record(run, 0, seed=3, radiance_every=64), record(run, 0, seed=4, radiance_every=64)
-    np.testing.assert_equal(vars(again), vars(episode))
+    assert_same(again, episode)
     assert not np.array_equal(episode.position, other.position)
 
 
 def test_file_holds_the_episode(episode, tmp_path):
-    episode.save(tmp_path / "episode.npz")
-    stored = Episode.load(tmp_path / "episode.npz")
-    np.testing.assert_equal(vars(stored), vars(episode))
+    save_episode(episode, tmp_path / "episode.npz")
+    stored = load_episode(tmp_path / "episode.npz")
+    assert_same(stored, episode)
     assert [path.name for path in tmp_path.iterdir()] == ["episode.npz"]
 
 
@@ -81,23 +96,23 @@ def test_a_file_holds_nothing_else_with_the_first_numpy_2(episode, tmp_path, mon
                 archive.writestr(f"{name}.npy", content.getvalue())
 
     monkeypatch.setattr(np, "savez_compressed", of_2_0)
-    episode.save(tmp_path / "then.npz")
+    save_episode(episode, tmp_path / "then.npz")
     monkeypatch.setattr(np, "savez_compressed", save)
-    episode.save(tmp_path / "now.npz")
+    save_episode(episode, tmp_path / "now.npz")
     with np.load(tmp_path / "then.npz") as then, np.load(tmp_path / "now.npz") as now:
         assert set(then) == set(now)
-    assert Episode.load(tmp_path / "then.npz").seed == episode.seed
+    assert load_episode(tmp_path / "then.npz").seed == episode.seed
 
 
 def test_a_file_that_is_no_episode_is_refused(episode, tmp_path):
     path = tmp_path / "episode.npz"
-    episode.save(path)
+    save_episode(episode, path)
     whole = path.read_bytes()
     np.savez(tmp_path / "pickled.npz", rest=np.array([{}], dtype=object))
     for content in (b"", whole[: len(whole) // 2], pickle.dumps({}), (tmp_path / "pickled.npz").read_bytes()):
         path.write_bytes(content)
         with pytest.raises(ValueError, match=r"episode\.npz holds no episode"):
-            Episode.load(path)
+            load_episode(path)
 
 
 def test_candidates_that_are_not_there_are_named(run, tmp_path):
@@ -155,14 +170,19 @@ def test_policies_of_another_animal_or_damaged_are_named(run):
 def test_perfect_eyes_are_shown_the_same_light():
     """On the course a tenth of the light has been reflected more than once: a dusk eye sees it, and so do its
     pictures."""
-    eyes = sim.Eyes(n_eyes=2, resolution=(4, 6), fov_deg=60, noise_sigma=0.02)
-    worlds = sim.make_vec_env("navigation", eyes, 1, seed=0)
-    worlds.reset()
-    assert worlds.renderer.fidelity.light == "all"
-    views = _perfect_views(worlds, eyes, worlds.state, 1)
-    exact = worlds.renderer.signals(worlds.state)
+    config = small_config("navigation", noise_sigma=0.02)
+    config = dataclasses.replace(config, eye=dataclasses.replace(config.eye, rays_per_receptor="auto"))
+    animal = dataclasses.replace(PHENOTYPE, resolution=(4, 6), fov_deg=60.0)
+    recorder = Recorder(animal, config, build_policy(PolicyConfig((3, 2, 3, 4, 6), 16)), radiance_every=1)
+    prepared = PreparedTask(animal_task(animal, config))
+    with contextlib.closing(prepared.vec_env(1, 0)) as worlds:
+        worlds.reset()
+        assert worlds.renderer.fidelity.light == "all"
+        poses, ones = worlds.simulation.poses(), np.ones((1, worlds.renderer.eye.bands), np.float32)
+        views = recorder._perfect_views(prepared, worlds.simulation, [poses], ones)
+        exact = worlds.renderer.signals(poses)
     assert views["perfect_signals"].mean() == pytest.approx(exact.mean(), rel=0.04)
-    weights = worlds.renderer.bands.weights
+    weights = worlds.renderer.eye.spectral_bands.weights
     seen = np.tensordot(weights, views["radiance"].mean(axis=(0, 1, 3, 4)), axes=1).mean()
     assert seen == pytest.approx(exact.mean(), rel=0.04)
 
@@ -197,36 +217,42 @@ def test_replay_sums_up_and_writes_a_page(run, episode):
 def test_a_maze_is_that_which_was_walked_through(episode, tmp_path):
     """In the file, and in the ground plan; files from before there was a choice are of the first maze."""
     world = WorldConfig(mazes=2, unseen=True)
-    walked = dataclasses.replace(episode, task="maze", world=world)
-    walked.save(tmp_path / "walked.npz")
-    again = Episode.load(tmp_path / "walked.npz")
+    columns, rest = of_first_form(dataclasses.replace(episode, task="maze", world=world))
+    columns["objects"] = columns["objects"][:, :0]
+    np.savez(tmp_path / "walked.npz", rest=np.array(json.dumps(rest)), **columns)
+    again = load_episode(tmp_path / "walked.npz")
     assert again.world == world
     model = sim.build_world("maze", seed=1, mazes=2).model
     walls = [i for i in range(model.ngeom) if model.geom(i).name.startswith("wall")]
-    shown, y = GroundPlan.of(again), model.geom_pos[walls, 1]
+    shown, y = again.plan, model.geom_pos[walls, 1]
     north = y[y > 0] if again.position[0, 1] > 0 else y[y < 0]
     np.testing.assert_array_equal(shown.walls[:, 1], north)
     assert shown.bounds[3] - shown.bounds[1] == pytest.approx(26.0)
     (x_min, low, _, high), alone = shown.goal_region, sim.build_world("maze").goal_region
     assert (x_min, high - low) == pytest.approx((alone[0], alone[3] - alone[1]))
-    with np.load(tmp_path / "walked.npz") as file:
-        columns = dict(file)
-    rest = json.loads(str(columns.pop("rest")))
     del rest["world"]
     np.savez(tmp_path / "old.npz", rest=np.array(json.dumps(rest)), **columns)
-    assert Episode.load(tmp_path / "old.npz").world == WorldConfig()
+    assert load_episode(tmp_path / "old.npz").world == WorldConfig()
+
+
+def test_files_of_worlds_out_of_range_are_refused(episode, tmp_path):
+    """By the setting's name, before anything is built."""
+    columns, rest = of_first_form(dataclasses.replace(episode, task="maze", world=WorldConfig(mazes=10**9)))
+    np.savez(tmp_path / "large.npz", rest=np.array(json.dumps(rest)), **columns)
+    with pytest.raises(ValueError, match=r"large\.npz holds no episode: world\.mazes = 1000000000: must be"):
+        load_episode(tmp_path / "large.npz")
 
 
 def test_archives_that_would_fill_the_memory_are_refused(tmp_path, monkeypatch):
     """By their directory, before anything is unpacked; and what is no file at all."""
     bomb = tmp_path / "bomb.npz"
     np.savez_compressed(bomb, returns=np.zeros(2**22))
-    monkeypatch.setattr(episode_module, "MOST_BYTES", 2**20)
+    monkeypatch.setattr(episode_file, "MOST_BYTES", 2**20)
     with pytest.raises(ValueError, match=r"bomb.npz holds no episode: it would unpack to 33,554,\d+ bytes"):
-        Episode.load(bomb)
+        load_episode(bomb)
     os.mkfifo(tmp_path / "pipe.npz")
     with pytest.raises(ValueError, match=r"pipe.npz holds no episode"):
-        Episode.load(tmp_path / "pipe.npz")
+        load_episode(tmp_path / "pipe.npz")
 
 
 def test_an_episode_of_a_run_in_little_light_is_dark_throughout(run):
@@ -238,3 +264,23 @@ def test_an_episode_of_a_run_in_little_light_is_dark_throughout(run):
     assert 1e-3 <= level < 0.9
     assert dim.radiance[0].mean() / plain.radiance[0].mean() == pytest.approx(level, rel=1e-5)
     assert np.sqrt(np.square(dim.signals - dim.perfect_signals).mean()) < 0.08
+
+
+@pytest.mark.parametrize(
+    ("goal", "adversary", "after", "expected"),
+    [
+        ([0, 10, 0], [0, 0, -10], [False] * 3, True),
+        ([0, 0, 10], [0, -10, 0], [False, True, False], False),
+        ([0, 10, 10], [0, -10, 0], [False, True, False], False),
+        ([0, 10, 0], [0, -10, -10], [False, False, True], True),
+        ([0, 10, 0], [0, -10, -10], None, True),
+        ([0, 0, 0], [0, 0, 0], [False] * 3, False),
+    ],
+)
+def test_an_episode_is_solved_if_the_first_thing_reached_is_a_goal(episode, tmp_path, goal, adversary, after, expected):
+    """Of the first form of files, also where one action reaches both."""
+    episode = cut(episode, len(goal))
+    told = {"goal": np.array(goal), "adversary": np.array(adversary)}
+    arrays, rest = of_first_form(dataclasses.replace(episode, reward_terms=episode.reward_terms | told), after)
+    np.savez(tmp_path / "then.npz", **arrays, rest=np.array(json.dumps(rest)))
+    assert load_episode(tmp_path / "then.npz").solved is expected

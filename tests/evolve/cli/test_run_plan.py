@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 import evolve.cli.run_plan
-from evolve.analysis.episode import FINE_PIXELS, record
+from evolve.analysis.recorder import FINE_PIXELS, record
 from evolve.cli.main import main
 from evolve.cli.pace import Pace
 from evolve.cli.run_plan import RunPlan

@@ -4,6 +4,7 @@ genes: test_genotype.py, test_rhabdoms.py
 genotype: test_genotype.py
 phenotype: test_genotype.py, test_anatomy.py
 anatomy: test_anatomy.py
+eye_config: test_anatomy.py, config/test_odd_arguments.py
 relief_genes: config/test_relief_starts.py
 interval: test_interval.py
 phenotype_on_record: test_phenotype_on_record.py, cli/test_hostile_runs.py

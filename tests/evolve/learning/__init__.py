@@ -6,6 +6,7 @@ task_module: test_task_module.py, test_animals_in_turn.py
 task_trial: test_task_module.py
 ppo: test_ppo.py, test_learning.py, search/test_successive_halving.py
 policy: test_policy.py
+observed: test_policy.py, test_task_module.py
 eye_features: test_eye_features.py, test_policy.py, test_learning.py
 per_eye_layers: test_eye_features.py, test_policy.py
 schedule: test_schedule.py, test_ppo.py

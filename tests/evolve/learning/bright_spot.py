@@ -7,6 +7,7 @@ from gymnasium import spaces
 from stable_baselines3.common.vec_env import VecEnv
 
 from evolve.learning.policy import PolicyConfig
+from sim.tasks.find_goal import FindGoal
 
 
 class BrightSpot(VecEnv):
@@ -16,6 +17,7 @@ class BrightSpot(VecEnv):
     """
 
     reach, limit, spread = 0.5, 40, 0.15
+    batch_task = FindGoal.__new__(FindGoal)  # actions, ramped terms and verdicts are those of detection
 
     def __init__(self, n_envs=16, n_eyes=2, width=7, memory=1, blind=False):
         config = PolicyConfig((memory, n_eyes, 1, 1, width), neurons=1)

@@ -239,7 +239,9 @@ def test_means_come_back_from_beyond_the_bounds_and_go_no_further():
 def test_first_actions_are_as_fast_as_asked():
     torch.manual_seed(0)
     space = CONFIG.observation_space()
-    slow = EyePolicy(space, spaces.Box(-1.0, 1.0, (2,)), lambda _: 1e-3, neurons=8, first_speed=0.25)
+    slow = EyePolicy(
+        space, spaces.Box(-1.0, 1.0, (2,)), lambda _: 1e-3, neurons=8, first_actions=[(-0.5, 0.25), (0.0, 0.5)]
+    )
     n = 4000
     blank = {name: torch.zeros(n, *box.shape) for name, box in space.spaces.items()}
     speed, turn = ((slow(blank)[0] + torch.tensor([1.0, 0.0])) * torch.tensor([0.5, 1.0])).detach().T

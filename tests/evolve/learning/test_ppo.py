@@ -10,7 +10,7 @@ import torch
 from evolve.config.run_config import LearningConfig
 from evolve.learning.policy import Brain, TrainingDiverged, learnt
 from evolve.learning.ppo import AdaptingPPO, Worlds, play, stuck, train
-from evolve.learning.training_rewards import contact_share
+from evolve.learning.training_rewards import ramped_share
 from tests.evolve.learning.bright_spot import BrightSpot
 
 QUICK = LearningConfig(total_steps=8192, n_envs=16, n_steps=32, batch_size=128, eval_interval=2048, patience=100)
@@ -136,7 +136,7 @@ def test_the_unit_stays_where_nothing_is_paid_and_is_that_of_the_first_rewards()
     [(0, 0, 1.0), (0, 900, 0.1), (300, 900, 0.1), (600, 900, 0.1**0.5), (900, 900, 1.0), (5000, 900, 1.0)],
 )
 def test_contact_costs_a_tenth_at_first_and_its_whole_price_at_the_end_of_the_ramp(steps, ramp, share):
-    assert contact_share(steps, ramp) == pytest.approx(share)
+    assert ramped_share(steps, ramp) == pytest.approx(share)
 
 
 PACED = LearningConfig(n_epochs=10, least_epochs=6, decay_after=640)
@@ -260,5 +260,5 @@ def test_of_a_goal_and_an_adversary_in_one_action_the_first_counts():
     worlds = Both(4)
     policy = AdaptingPPO(worlds, SMALL, QUICK, 0).policy
     found = play(policy, worlds, 0)
-    assert found.first_events.tolist() == [1, -1, 1, -1]
+    assert found.verdicts.tolist() == [1, -1, 1, -1]
     assert found.successes.tolist() == [True, False, True, False]

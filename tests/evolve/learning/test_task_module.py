@@ -17,6 +17,7 @@ from evolve.genome.genotype import Genotype
 from evolve.genome.phenotype import develop
 from evolve.learning.animal_task import animal_task
 from evolve.learning.fitness import evaluate
+from evolve.learning.observed import Entry
 from evolve.learning.policy import TrainingDiverged, load_policy
 from evolve.learning.task_module import executed_task
 from evolve.learning.task_trial import try_task
@@ -61,7 +62,7 @@ def test_an_animal_lives_in_it_twice_alike(tmp_path):
     assert first.steps == 256
     assert (tmp_path / "first").read_bytes() == (tmp_path / "second").read_bytes()
     policy = load_policy(tmp_path / "first")
-    assert (policy.config.actions, policy.config.feels) == (1, 1)
+    assert (policy.config.actions, policy.config.beside) == (1, (Entry("feels", 1),))
     # The first observation, and all that was felt until the best of two evaluations.
     assert policy.features_extractor.felt.seen.item() in (8 + 128, 8 + 256)
 

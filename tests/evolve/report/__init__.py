@@ -15,12 +15,10 @@ eye_figures: test_eye_figures.py
 views: test_eye_figures.py
 picture: test_picture.py
 player: test_player.py
-ground_plan: test_player.py, analysis/test_episode.py
-footage: analysis/test_filmed_episode.py
+picture_sheet: analysis/test_recorder.py
 moving_picture: test_moving_picture.py
 replay: analysis/test_episode.py, test_rerun_recording.py
 rerun_recording: test_rerun_recording.py, test_rerun_bodies.py
-rerun_plan: test_rerun_recording.py
 rerun_bodies: test_rerun_bodies.py
 rerun_layout: test_rerun_recording.py, test_rerun_bodies.py
 rerun_stream: test_rerun_recording.py, test_rerun_bodies.py

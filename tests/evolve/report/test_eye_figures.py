@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import optics
-from evolve.analysis.episode import record
+from evolve.analysis.recorder import record
 from evolve.report import eye_figures
 from evolve.report.eye_figures import WhiteLight, diffraction_limit, relief_heights
 from evolve.report.markup import html

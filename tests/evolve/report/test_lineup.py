@@ -9,6 +9,7 @@ import pytest
 import sim
 from evolve.analysis.statistics import champions
 from evolve.config.run_config import RunConfig
+from evolve.learning.animal_task import azimuths
 from evolve.report import lineup as cards
 from evolve.report.agent_figure import agent_figure
 from evolve.report.markup import duration
@@ -69,17 +70,18 @@ def test_a_long_run_shows_its_first_and_its_last(run):
 @pytest.mark.parametrize("n_eyes", [1, 2, 8])
 def test_every_eye_is_drawn_with_its_field(n_eyes):
     eyes = sim.Eyes(n_eyes=n_eyes, resolution=(4, 4), fov_deg=30, placement_range_deg=90)
-    drawn = agent_figure(eyes, "it")
+    drawn = agent_figure(eyes, "it", eyes.azimuths())
     fields, disks = polygons(drawn, "<polygon"), polygons(drawn, 'class="eye"')
     assert len(fields) == len(disks) == n_eyes
-    wide = agent_figure(replace(eyes, fov_deg=60), "it")
+    wide = agent_figure(replace(eyes, fov_deg=60), "it", eyes.azimuths())
     for narrow, wider in zip(fields, polygons(wide, "<polygon"), strict=True):
         assert 1.5 < area(wider) / area(narrow) < 2.5
 
 
 def test_eyes_in_front_hide_those_behind():
     """Eyes all around: those on the far side are drawn before the head, which covers them."""
-    drawn = agent_figure(sim.Eyes(n_eyes=8, resolution=(1, 1), fov_deg=20, placement_range_deg=180), "it")
+    eyes = sim.Eyes(n_eyes=8, resolution=(1, 1), fov_deg=20, placement_range_deg=180)
+    drawn = agent_figure(eyes, "it", eyes.azimuths())
     before, after = drawn.markup.split("<circle r=")
     assert before.count('class="eye"') > 0
     assert after.count('class="eye"') > before.count('class="eye"'), "the animal looks at the reader"
@@ -106,15 +108,18 @@ def test_eyes_are_drawn_where_a_task_of_ones_own_has_them(tmp_path):
     drawn = []
     for named in (f"{BALL}:FindBall", written(tmp_path, "    def succeeded", f"{place}    def succeeded")):
         config, animal = small("genome.n_eyes.start=2", named=named)
-        found, eyes = cards.azimuths(animal, config), animal.eyes(config.eye)
+        found, eyes = azimuths(animal, config), animal.eyes(config.eye)
         drawn.append(polygons(agent_figure(eyes, "a", found), 'class="eye"'))
         if not drawn[1:]:
             np.testing.assert_allclose(found, eyes.azimuths(), atol=1e-9)
-            np.testing.assert_allclose(drawn[0], polygons(agent_figure(eyes, "a"), 'class="eye"'), atol=0.11)
+            np.testing.assert_allclose(
+                drawn[0], polygons(agent_figure(eyes, "a", eyes.azimuths()), 'class="eye"'), atol=0.11
+            )
     assert found == pytest.approx(np.radians([90, -170]))
     lone = polygons(agent_figure(replace(eyes, n_eyes=1), "a", [np.pi / 2]), 'class="eye"')
     assert any(np.allclose(lone[0], one, atol=0.11) for one in drawn[1])
-    assert cards.azimuths(animal, RunConfig("detection")) is None
+    built_in = RunConfig("detection")
+    np.testing.assert_array_equal(azimuths(animal, built_in), animal.eyes(built_in.eye).azimuths())
 
 
 def test_eyes_that_are_close_are_drawn_small():

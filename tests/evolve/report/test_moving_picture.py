@@ -9,7 +9,6 @@ import pytest
 from PIL import Image, ImageSequence
 
 from evolve.config.run_config import ConfigError
-from evolve.report.ground_plan import GroundPlan
 from evolve.report.moving_picture import ASIDE, HEIGHT, LONGEST, SPEED, write_gif, write_mp4
 from evolve.report.theme import INK
 
@@ -20,8 +19,8 @@ def short(episode):
     cut = {
         name: value[:24] for name, value in vars(episode).items() if isinstance(value, np.ndarray) and len(value) == 256
     }
-    terms = {name: term[:24] for name, term in episode.reward_terms.items()}
-    return dataclasses.replace(episode, **cut, reward_terms=terms)
+    terms, beside = ({name: term[:24] for name, term in of.items()} for of in (episode.reward_terms, episode.beside))
+    return dataclasses.replace(episode, **cut, reward_terms=terms, beside=beside)
 
 
 @pytest.fixture(scope="module")
@@ -33,14 +32,13 @@ def frames(short, tmp_path_factory):
 
 
 def test_it_lasts_as_long_as_the_episode(short, frames):
-    seconds = GroundPlan.of(short).seconds
-    assert sum(pause for _, pause in frames) == pytest.approx(1000 * len(short) * seconds / SPEED, rel=0.01)
+    assert sum(pause for _, pause in frames) == pytest.approx(1000 * len(short) * short.seconds / SPEED, rel=0.01)
     assert len(frames) == 24 < LONGEST
 
 
 def test_the_agent_is_where_it_was(short, frames):
     """The darkest spot of the world is its body."""
-    x0, _, _, y1 = (plan := GroundPlan.of(short)).bounds
+    x0, _, _, y1 = (plan := short.plan).bounds
     scale = HEIGHT / (y1 - plan.bounds[1])
     dark = tuple(int(INK[i : i + 2], 16) for i in (1, 3, 5))
     assert len(frames) == len(short)
@@ -68,7 +66,7 @@ def test_a_film_has_a_frame_for_every_action(short, frames, tmp_path):
     assert told["pix_fmt"].startswith("yuv420p"), "players know no other"
     shown = [np.frombuffer(frame, np.uint8).reshape(height, width, 3) for frame in film]
     assert len(shown) == len(short)
-    assert told["duration"] == pytest.approx(len(short) * GroundPlan.of(short).seconds / SPEED, rel=0.02)
+    assert told["duration"] == pytest.approx(len(short) * short.seconds / SPEED, rel=0.02)
     for time in (0, 12, 23):
         still = np.asarray(frames[time][0])[:height, :width].astype(float)
         other = np.asarray(frames[23 - time][0])[:height, :width].astype(float)

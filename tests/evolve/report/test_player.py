@@ -2,19 +2,17 @@
 
 import re
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import sim
-from evolve.analysis.filmed_episode import film as filmed
+from evolve.analysis.recorder import Recorder
 from evolve.learning.fitness import evaluate
 from evolve.learning.policy import load_policy
-from evolve.report.ground_plan import GroundPlan
 from evolve.report.picture import display
 from evolve.report.player import write_player
-from evolve.report.replay import solved
+from sim.worlds.ground_plan import GroundPlan
 from tests.evolve.learning.test_task_module import small, written
 from tests.evolve.report.reported import Page, film_of, picture
 
@@ -87,7 +85,7 @@ def test_a_task_may_name_no_reward(tmp_path):
     """One of somebody's own; what it earned is then nothing, at every moment."""
     config, animal = small("genome.placement_range_deg.start=40", named=written(tmp_path, NEAR, "{}"))
     assert evaluate(animal, config, 3, tmp_path / "policy").failure is None
-    episode = filmed(animal, config, load_policy(tmp_path / "policy"), 0, 1, 8)
+    episode = Recorder(animal, config, load_policy(tmp_path / "policy")).play(0, 1)
     assert episode.reward_terms == {}
     text = write_player(episode, tmp_path / "replay.html").read_text()
     shown = film_of(text)
@@ -96,36 +94,18 @@ def test_a_task_may_name_no_reward(tmp_path):
     assert "20 actions, return 0." in text
 
 
-def test_stage_is_the_world(episode):
-    stage = GroundPlan.of(episode)
-    assert stage.bounds == pytest.approx((-13, -11, 13, 11))  # 11 x 9 cells of 2 m and walls of 2 m
-    assert stage.object_radius == (0.5, 0.5, 0.5)
-    assert stage.gain == pytest.approx(1 / 0.3**2)
-    assert stage.seconds == pytest.approx(0.2)
+def test_the_plan_is_the_world(episode):
+    assert episode.plan.bounds == pytest.approx((-13, -11, 13, 11))  # 11 x 9 cells of 2 m and walls of 2 m
+    assert episode.plan.object_radius == (0.5, 0.5, 0.5)
+    assert episode.gain == pytest.approx(1 / 0.3**2)
+    assert episode.seconds == pytest.approx(0.2)
 
 
-def test_ground_plan_of_the_maze_leaves_free_cells_free(episode):
-    stage = GroundPlan.of(replace(episode, task="navigation"))
-    spots = sim.build_world("navigation").agent_spawn
-    gap = np.abs(spots[:, None] - stage.walls[None, :, :2]) - stage.walls[None, :, 2:]
+def test_ground_plan_of_the_maze_leaves_free_cells_free():
+    world = sim.build_world("navigation")
+    spots, plan = world.agent_spawn, GroundPlan.of(world, np.zeros(2))
+    gap = np.abs(spots[:, None] - plan.walls[None, :, :2]) - plan.walls[None, :, 2:]
     assert (gap.max(axis=-1) > 0.5).all()  # a cell's centre is 1 m from the next wall
-    x0, y0, x1, y1 = stage.bounds
-    walls = 4 * stage.walls[:, 2:].prod(axis=1).sum()
+    x0, y0, x1, y1 = plan.bounds
+    walls = 4 * plan.walls[:, 2:].prod(axis=1).sum()
     assert 0.3 < walls / ((x1 - x0) * (y1 - y0)) < 0.7
-
-
-@pytest.mark.parametrize(
-    ("goal", "adversary", "after", "expected"),
-    [
-        ([0, 10, 0], [0, 0, -10], [False] * 3, True),
-        ([0, 0, 10], [0, -10, 0], [False, True, False], False),
-        ([0, 10, 10], [0, -10, 0], [False, True, False], False),
-        ([0, 10, 0], [0, -10, -10], [False, False, True], True),
-        ([0, 10, 0], [0, -10, -10], None, True),
-        ([0, 0, 0], [0, 0, 0], [False] * 3, False),
-    ],
-)
-def test_an_episode_is_solved_if_the_first_thing_reached_is_a_goal(goal, adversary, after, expected):
-    """Also where one action reaches both."""
-    told = {"reward_terms": {"goal": np.array(goal), "adversary": np.array(adversary)}}
-    assert solved(SimpleNamespace(**told, adversary_first=None if after is None else np.array(after))) is expected

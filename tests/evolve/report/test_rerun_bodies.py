@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from evolve.analysis.filmed_episode import film
+from evolve.analysis.recorder import Recorder
 from evolve.learning.animal_task import animal_task
 from evolve.learning.fitness import evaluate
 from evolve.learning.policy import load_policy
@@ -57,7 +57,7 @@ def life(tmp_path_factory):
 @pytest.fixture(scope="module")
 def episode(life):
     config, animal, policy = life
-    return film(animal, config, policy, 0, SEED, 8)
+    return Recorder(animal, config, policy).play(0, SEED)
 
 
 @pytest.fixture(scope="module")
@@ -203,7 +203,7 @@ def test_it_opens_with_the_world_the_eyes_and_how_it_ended(columns, episode, tmp
     shown = views(episode, tmp_path)
     there = {entity for entity, _ in columns}
     elsewhere = {origin for origins in shown.values() for origin in origins} - there
-    assert elsewhere <= {"/world", "/action"}, "or what is below them"
+    assert elsewhere <= {"/world", "/action", "/feels"}, "or what is below them"
     assert shown["TextLog"] == {"/outcome"}
     eyes = {entity for entity, _ in columns if entity.startswith("/world/eyes/")}
     assert eyes

@@ -7,7 +7,6 @@ import pytest
 
 from evolve.cli.main import main
 from evolve.report import replay
-from evolve.report.ground_plan import GroundPlan
 from tests.evolve.report.read_back import frames, read_back, vectors, views
 
 
@@ -21,23 +20,22 @@ def test_actions_rewards_and_contact_are_numbers_over_time(columns, episode):
         "action/speed": episode.action[:, 0],
         "action/turn": episode.action[:, 1],
         "reward": episode.reward,
-        "contact": episode.contact,
+        "contact": episode.beside["contact"][:, 0],
         **{f"reward/{name}": term for name, term in episode.reward_terms.items()},
     }.items():
         assert vectors(columns, f"/{name}", "Scalars:scalars").tolist() == values.astype(float).tolist(), name
 
 
 def test_agent_and_objects_move_as_they_did(columns, episode):
-    place = vectors(columns, "/world/agent", "Transform3D:translation")
+    place = vectors(columns, "/world/bodies/agent", "Transform3D:translation")
     np.testing.assert_allclose(place[:, :2], episode.position, atol=1e-5)
     (path,) = vectors(columns, "/world/path", "LineStrips3D:strips")
     np.testing.assert_array_equal(path, place)
-    x, y, z, w = vectors(columns, "/world/agent", "Transform3D:quaternion").T
-    assert not x.any()
-    assert not y.any()
-    np.testing.assert_allclose(np.cos(2 * np.arctan2(z, w) - episode.heading), 1, atol=1e-6)
+    ahead = frames(columns, "/world/bodies/agent")[:, :, 0]
+    cosine, sine = np.cos(episode.heading), np.sin(episode.heading)
+    np.testing.assert_allclose(ahead, np.stack([cosine, sine, 0 * sine], axis=1), atol=1e-6)
     for i, name in enumerate(("goal", "adversary_0", "adversary_1")):
-        place = vectors(columns, f"/world/{name}", "Transform3D:translation")
+        place = vectors(columns, f"/world/bodies/{name}", "Transform3D:translation")
         np.testing.assert_allclose(place, episode.objects[:, i], atol=1e-5)
 
 
@@ -51,26 +49,27 @@ def test_signals_are_those_that_the_brain_got(columns, episode):
 
 def test_pictures_are_there_of_every_eye_at_every_time(columns, episode):
     for name in ("left", "right"):
-        for entity, times in (("world/agent/eyes", 256), ("perfect_lens", 256), ("scene", 4)):
+        for entity, times in (("world/eyes", 256), ("perfect_lens", 256), ("scene", 4)):
             pictures = columns[f"/{entity}/{name}", "Image:buffer"]
             assert len(pictures) == times
         assert len(pictures[0][0]) == 48 * 60 * 3
 
 
 def test_eyes_are_cameras_that_look_where_the_eyes_look(columns, episode):
-    """A point straight ahead of an eye is on its camera's axis: R (0, 0, 1) = (cos azimuth, sin azimuth, 0)."""
+    """A point straight ahead of an eye is on its camera's axis: R (0, 0, 1) = (cos, sin, 0) of heading + azimuth."""
     for name, azimuth in zip(("left", "right"), np.radians([30, -30]), strict=True):
-        (frame,) = frames(columns, f"/world/agent/eyes/{name}")
-        np.testing.assert_allclose(frame @ [0, 0, 1], [np.cos(azimuth), np.sin(azimuth), 0], atol=1e-6)
-        np.testing.assert_allclose(frame @ [0, -1, 0], [0, 0, 1], atol=1e-6, err_msg="up")
-        assert np.linalg.det(frame) == pytest.approx(1, abs=1e-6)
-        camera = columns[f"/world/agent/eyes/{name}", "Pinhole:image_from_camera"][0][0]
+        turned, angle = frames(columns, f"/world/eyes/{name}"), episode.heading + azimuth
+        ahead = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
+        np.testing.assert_allclose(turned @ [0, 0, 1], ahead, atol=1e-6)
+        np.testing.assert_allclose(turned @ [0, -1, 0], [[0, 0, 1]] * len(turned), atol=1e-6, err_msg="up")
+        np.testing.assert_allclose(np.linalg.det(turned), 1, atol=1e-5)
+        camera = columns[f"/world/eyes/{name}", "Pinhole:image_from_camera"][0][0]
         assert camera[0] == pytest.approx(5 / (2 * np.tan(np.radians(33) / 2)), rel=1e-6)
 
 
 def test_time_is_the_worlds(columns, episode):
     seconds = np.array([value.total_seconds() for value in columns["/contact", "time"]])
-    np.testing.assert_allclose(seconds, np.arange(256) * GroundPlan.of(episode).seconds, atol=1e-6)
+    np.testing.assert_allclose(seconds, np.arange(256) * episode.seconds, atol=1e-6)
 
 
 def test_replay_writes_page_and_recording(run, columns, capsys):
@@ -87,10 +86,10 @@ def test_without_the_extra_one_line_says_so(run, monkeypatch, capsys):
 
 
 def test_agent_and_objects_are_balls_of_their_size(columns, episode):
-    stage = GroundPlan.of(episode)
-    sizes = {"agent/body": stage.body_radius, **dict(zip(stage.object_names, stage.object_radius, strict=True))}
+    plan = episode.plan
+    sizes = {"agent": plan.body_radius, **dict(zip(plan.object_names, plan.object_radius, strict=True))}
     for name, radius in sizes.items():
-        (half,) = columns[f"/world/{name}", "Ellipsoids3D:half_sizes"]
+        (half,) = columns[f"/world/bodies/{name}/{name}", "Ellipsoids3D:half_sizes"]
         np.testing.assert_allclose(half, [[radius] * 3], rtol=1e-6)
 
 
@@ -98,7 +97,7 @@ def test_it_opens_with_the_world_numbers_over_time_and_every_eye(columns, episod
     shown = views(episode, tmp_path)
     assert shown["3D"] == {"/world"}
     assert shown["TimeSeries"] == {"/reward", "/action", "/contact"}
-    above = ("world/agent/eyes", "perfect_lens", "scene")
+    above = ("world/eyes", "perfect_lens", "scene")
     assert shown["2D"] == {f"/{entity}/{eye}" for entity in above for eye in ("left", "right")}
     assert shown["Tensor"] == {"/signals/left", "/signals/right"}
     there = {entity for entity, _ in columns}

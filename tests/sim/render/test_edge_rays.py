@@ -5,7 +5,6 @@ import gc
 import mujoco
 import numpy as np
 import pytest
-from sim.render.model_wavefront import ModelWavefront
 
 import optics
 import sim
@@ -28,14 +27,17 @@ def renderer(n, samples="edges", one=SHARP, tolerance=None, rays=FINE):
 
 @pytest.fixture
 def traced(monkeypatch):
-    """Numbers of receptors that were looked at again."""
-    found, again = [], ModelWavefront.again
+    """How many rays each launch traced."""
+    found, launch = [], EdgeRays.launch
 
-    def counted(self, kernel, look):
-        found.append(len(look["lanes"]))
-        return again(self, kernel, look)
+    def counted(self, start):
+        def noted(kernel, inputs):
+            found.append(len(inputs.lanes))
+            return start(kernel, inputs)
 
-    monkeypatch.setattr(ModelWavefront, "again", counted)
+        return launch(self, noted)
+
+    monkeypatch.setattr(EdgeRays, "launch", counted)
     return found
 
 

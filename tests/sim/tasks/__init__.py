@@ -15,6 +15,7 @@ built_in: test_task.py
 find_goal: test_task.py
 find_way: test_task.py, worlds/test_course.py
 simulation: test_task.py, envs/test_features.py
+command: evolve/report/test_player.py
 outcome: test_task.py, envs/test_task_vec_env.py
 batch_arrays: envs/test_batch_task.py
 reach: test_task.py

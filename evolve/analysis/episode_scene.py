@@ -1,0 +1,65 @@
+"""Where bodies and eyes were during an episode."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import mujoco
+import numpy as np
+
+from sim.eyes.mounts import Mount
+from sim.scene.poses import Poses
+from sim.scene.solids import Solid
+
+__all__ = ["EpisodeScene"]
+
+
+@dataclass(frozen=True)
+class EpisodeScene:
+    """Lengths [m] and rotations in the world, before each action.
+
+    solids: all geoms that are seen, in the frames of their bodies, as they were at the episode's beginning
+    bodies: names, or "body_<id>" of those that have none
+    positions (t, body, 3), rotations (t, body, 3, 3)
+    eye_positions (t, eye, 3): pupils · eye_rotations (t, eye, 3, 3), columns (right, up, ahead)
+    path (t, 3): of the animal, where the first eye's body, site or camera is
+    headings (t,): of the same, from the world's x axis [rad]
+    """
+
+    solids: tuple[Solid, ...]
+    bodies: tuple[str, ...]
+    positions: np.ndarray
+    rotations: np.ndarray
+    eye_positions: np.ndarray
+    eye_rotations: np.ndarray
+    path: np.ndarray
+    headings: np.ndarray
+
+    @classmethod
+    def of(
+        cls, model: mujoco.MjModel, solids: tuple[Solid, ...], poses: Poses, mounts: Sequence[Mount]
+    ) -> EpisodeScene:
+        """poses: of every time, in the place of worlds"""
+        places, frames = zip(*(_eye(model, mount, poses) for mount in mounts), strict=True)
+        kind, index = mounts[0].found_in(model)
+        path, turned = poses.frames(kind, index)
+        ahead = turned @ replace(mounts[0], azimuth_deg=0.0, elevation_deg=0.0, roll_deg=0.0).local(kind)[1][:, 2]
+        return cls(
+            solids=solids,
+            bodies=tuple(model.body(i).name or f"body_{i}" for i in range(model.nbody)),
+            positions=poses.xpos,
+            rotations=poses.xmat,
+            eye_positions=np.stack(places, axis=1),
+            eye_rotations=np.stack(frames, axis=1),
+            path=path,
+            headings=np.arctan2(ahead[:, 1], ahead[:, 0]),
+        )
+
+
+def _eye(model: mujoco.MjModel, mount: Mount, poses: Poses) -> tuple[np.ndarray, np.ndarray]:
+    """Pupil (t, 3) and frame (t, 3, 3) of an eye."""
+    kind, index = mount.found_in(model)
+    origin, turned = poses.frames(kind, index)
+    place, frame = mount.local(kind)
+    return origin + turned @ place, turned @ frame

@@ -1,0 +1,215 @@
+"""Episodes recorded: a candidate plays, and the same scenes are seen through a perfect lens."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from evolve.analysis.episode import Episode, Pictures
+from evolve.analysis.episode_scene import EpisodeScene
+from evolve.config.run_config import RunConfig
+from evolve.genome.phenotype import Phenotype
+from evolve.learning.animal_task import animal_task
+from evolve.learning.policy import EyePolicy, TrainingDiverged, load_policy
+from evolve.store.directory import Run, RunError
+from evolve.store.policies import require_policy
+from sim.envs.prepared_task import PreparedTask
+from sim.envs.vec_env import EyesVecEnv
+from sim.scene.poses import Poses
+from sim.scene.solids import Solid, solids_of
+from sim.tasks.simulation import Simulation
+from sim.worlds.ground_plan import GroundPlan
+
+__all__ = ["FINE_PIXELS", "Recorder", "record"]
+
+FINE_PIXELS = 60  # least pixels along the longer side of the radiance pictures
+FINE = {"rays": 16, "areas": 4, "edges": 16}  # samples per receptor and pixel, where speed does not matter
+MOST_PICTURES = 128  # for people: they are kept at even times
+ELSEWHERE = ("eyes", "previous_action")  # entries of an observation that an episode has under other names
+
+
+class UnfitPolicy(ValueError):
+    """The policy is that of an animal with other eyes."""
+
+
+def record(
+    run: Run, candidate_id: int | None = None, seed: int = 0, radiance_every: int = 8, pictures: bool = False
+) -> Episode:
+    """Let a candidate (default: the best) play one evaluation episode; same arguments, same episode, bit for bit.
+
+    radiance_every: actions between two pictures of the scene's radiance
+    pictures: whether to take pictures for people; they are always taken if the task has no ground plan
+
+    Raises:
+        RunError: there is no such candidate, or its policy is missing or no policy.
+        ConfigError: the task is a user's, and has not been named.
+    """
+    candidate = run.candidate(candidate_id)
+    path = run.policy_path(candidate.id)
+    require_policy(candidate, path)
+    _ = run.config.choice.named_code  # before the policy is read
+    try:
+        policy = load_policy(path)
+    except ValueError as error:
+        raise RunError(str(error)) from error
+    recorder = Recorder(candidate.phenotype, run.config, policy, radiance_every, pictures)
+    try:
+        return recorder.play(candidate.id, seed)
+    except UnfitPolicy as error:
+        raise RunError(f"{path} is another animal's: {error}") from error
+    except TrainingDiverged as error:
+        raise RunError(f"{path} is damaged: {error}") from error
+
+
+@dataclass(frozen=True)
+class Recorder:
+    """phenotype, config, policy: who plays · radiance_every, pictures: see `record`"""
+
+    phenotype: Phenotype
+    config: RunConfig
+    policy: EyePolicy
+    radiance_every: int = 8
+    pictures: bool = False
+
+    def play(self, candidate_id: int, seed: int) -> Episode:
+        """One episode; same arguments, same episode.
+
+        Raises:
+            UnfitPolicy: the policy takes what other eyes see.
+            TrainingDiverged: its actions are not finite.
+        """
+        animal, config = self.phenotype, self.config
+        prepared = PreparedTask(animal_task(animal, config))
+        task, mounts = prepared.task, prepared.task.agents()[0].kinds[0].mounts
+        with contextlib.closing(prepared.vec_env(1, seed, animal.memory_frames, render_mode="rgb_array")) as worlds:
+            _require_fit(self.policy, worlds)
+            begun = _Beginning.of(worlds)
+            taken = self.pictures or begun.plan is None
+            poses, columns = _play(self.policy, worlds, begun, taken)
+            views = self._perfect_views(prepared, worlds.simulation, poses, begun.light)
+            scene = EpisodeScene.of(worlds.worlds.model, begun.solids, Poses.joined(*poses), mounts)
+            seconds = float(worlds.worlds.seconds)
+        return Episode(
+            task=config.task,
+            candidate_id=candidate_id,
+            seed=seed,
+            phenotype=animal,
+            eye=config.eye,
+            world=config.world,
+            commands=task.commands(),
+            counted=dict(task.counted),
+            seconds=seconds,
+            azimuths=task.azimuths(),
+            elevations_deg=np.array([mount.elevation_deg for mount in mounts]),
+            scene=scene,
+            plan=begun.plan,
+            **{"position": scene.path[:, :2], "heading": scene.headings, **columns},
+            **views,
+        )
+
+    def _perfect_views(
+        self, prepared: PreparedTask, simulation: Simulation, poses: list[Poses], light: np.ndarray
+    ) -> dict[str, Any]:
+        """The same scenes in the same light through a perfect lens: by the same receptors, and as radiance on a finer
+        grid."""
+        perfect = replace(self.phenotype.eyes(self.config.eye), optics=None, waveguide=None)
+        height, width = perfect.resolution
+        factor = max(1, -(-FINE_PIXELS // max(height, width)))
+        fine = replace(perfect, resolution=(factor * height, factor * width))
+        fidelity = replace(prepared.fidelity, rays_per_receptor=FINE[prepared.fidelity.samples])
+        receptors, pictures = (
+            PreparedTask(animal_task(self.phenotype, self.config, eyes=eyes), fidelity).renderer(simulation)
+            for eyes in (perfect, fine)
+        )
+        frames, lit = np.arange(0, len(poses), self.radiance_every), light[0, :, None, None, None, None]
+        radiance = [np.moveaxis(pictures.receptor_radiance(poses[t]) * lit, 0, 2) for t in frames]
+        return {
+            "perfect_signals": np.concatenate([receptors.signals(moment, light) for moment in poses]),
+            "wavelengths_nm": 1e9 * np.asarray(receptors.eye.spectral_bands.wavelengths),
+            "radiance_frames": frames,
+            "radiance": np.concatenate(radiance),
+        }
+
+
+@dataclass(frozen=True)
+class _Beginning:
+    """What must be read before an episode ends, since the next one begins at once.
+
+    observation, info: the first ones · light: factors of the lights, (1, band) float32
+    """
+
+    observation: dict[str, np.ndarray]
+    info: Mapping[str, Any]
+    light: np.ndarray
+    solids: tuple[Solid, ...]
+    plan: GroundPlan | None
+
+    @classmethod
+    def of(cls, worlds: EyesVecEnv) -> _Beginning:
+        observation, info = worlds.reset(), worlds.reset_infos[0]
+        wavelengths = np.asarray(worlds.renderer.eye.spectral_bands.wavelengths)
+        light = worlds.simulation.light(wavelengths)
+        solids = solids_of(_model(worlds.worlds))
+        plan = worlds.batch_task.ground_plan(np.asarray(info.get("position", (0.0, 0.0))))
+        return cls(
+            observation, info, np.ones((1, len(wavelengths)), np.float32) if light is None else light, solids, plan
+        )
+
+
+def _model(physics: Any) -> mujoco.MjModel:
+    """Of the only world as it is in this episode."""
+    model: mujoco.MjModel = physics.datas[0].model if hasattr(physics, "datas") else physics.model
+    return model
+
+
+def _require_fit(policy: EyePolicy, worlds: EyesVecEnv) -> None:
+    own, here = (space["eyes"].shape for space in (policy.observation_space, worlds.observation_space))
+    if own != here:
+        raise UnfitPolicy(f"it sees {own}, this one {here} (memory, eye, channel, y, x)")
+
+
+def _play(
+    policy: EyePolicy, worlds: EyesVecEnv, begun: _Beginning, pictures: bool
+) -> tuple[list[Poses], dict[str, Any]]:
+    """Where everything was before each action, and the columns that playing fills."""
+    poses, rows, taken = list[Poses](), list[tuple[Any, ...]](), list[np.ndarray]()
+    observation, infos, done, solved = begun.observation, [begun.info], False, None
+    every = max(1, -(-worlds.simulation.episode_steps // MOST_PICTURES))
+    while not done:
+        if pictures and len(rows) % every == 0:
+            taken.append(worlds.get_images()[0])
+        poses.append(worlds.simulation.poses())
+        seen = observation["eyes"][0, -1]
+        action = policy.predict(observation, deterministic=True)[0]
+        observation, reward, dones, (info,) = worlds.step(action)
+        done, solved = bool(dones[0]), worlds.batch_task.solved(solved, info)
+        known = info["terminal_observation"] if done else {name: array[0] for name, array in observation.items()}
+        beside = {name: array for name, array in known.items() if name not in ELSEWHERE}
+        rows.append((np.clip(action[0], -1, 1), reward[0], info["reward_terms"], seen, beside))
+        infos.append(info)
+    action, reward, terms, signals, known_after = zip(*rows, strict=True)
+    names = list(dict.fromkeys(name for of_step in terms for name in of_step))
+    return poses, {
+        "action": np.array(action),
+        "reward": np.array(reward),
+        "reward_terms": {name: np.array([of_step.get(name, 0.0) for of_step in terms]) for name in names},
+        "signals": np.array(signals),
+        "beside": {name: np.array([of_step[name] for of_step in known_after]) for name in known_after[0]},
+        "pictures": Pictures(np.arange(0, len(rows), every), np.array(taken)) if pictures else None,
+        "solved": bool(solved),
+        "failure": infos[-1].get("failure"),
+        **_on_ground(infos[:-1]),
+    }
+
+
+def _on_ground(infos: list[Mapping[str, Any]]) -> dict[str, np.ndarray]:
+    """Places [m] and headings [rad] before each action, where a task's `info` has them: exact, unlike those that follow
+    from rotations."""
+    if not all(np.shape(info.get("position", ())) == (2,) and "heading" in info for info in infos):
+        return {}
+    return {name: np.array([info[name] for info in infos]) for name in ("position", "heading")}

@@ -1,0 +1,73 @@
+"""Entries of an observation beside the eyes: their names, sizes and limits."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from gymnasium import spaces
+
+__all__ = ["CONTACT", "Entry", "entries_of", "known_beside_eyes"]
+
+EYES, LAST = "eyes", "previous_action"
+
+
+@dataclass(frozen=True)
+class Entry:
+    """name: in the observation · size: count of its numbers
+    low, high: limits of each of them; a policy normalises an entry that has none
+    """
+
+    name: str
+    size: int
+    low: float = -math.inf
+    high: float = math.inf
+
+    @property
+    def normalised(self) -> bool:
+        """Whether a policy sees it less its running mean, in units of its running spread."""
+        return math.isinf(self.low) and math.isinf(self.high)
+
+    @property
+    def space(self) -> spaces.Box:
+        return spaces.Box(self.low, self.high, (self.size,), np.float32)
+
+    def record(self) -> list[Any]:
+        """As JSON; None: no limit."""
+        limits = (None if math.isinf(limit) else limit for limit in (self.low, self.high))
+        return [self.name, self.size, *limits]
+
+    @classmethod
+    def from_record(cls, stored: Sequence[Any]) -> Entry:
+        """Inverse of `record`.
+
+        Raises:
+            TypeError: it is no list.
+            ValueError: it is no such entry.
+        """
+        name, size, low, high = stored
+        if not isinstance(name, str):
+            raise ValueError(f"{name!r} is no name of an entry")
+        return cls(name, int(size), -math.inf if low is None else float(low), math.inf if high is None else float(high))
+
+
+CONTACT = Entry("contact", 1, 0.0, 1.0)
+
+
+def known_beside_eyes(space: spaces.Dict) -> dict[str, int]:
+    """Entries beside "eyes", and the count of numbers in each, in the order in which brains see them."""
+    return {name: math.prod(part.shape or (1,)) for name, part in sorted(space.spaces.items()) if name != EYES}
+
+
+def entries_of(space: spaces.Dict) -> tuple[Entry, ...]:
+    """Entries beside the eyes and the previous action, in the same order."""
+    sizes = known_beside_eyes(space)
+    limits = {name: part for name, part in space.spaces.items() if isinstance(part, spaces.Box)}
+    return tuple(
+        Entry(name, size, float(np.min(limits[name].low)), float(np.max(limits[name].high)))
+        for name, size in sizes.items()
+        if name != LAST
+    )

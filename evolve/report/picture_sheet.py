@@ -1,0 +1,66 @@
+"""Pictures of an episode on a page: where they are shown, and what its player needs of them."""
+
+from __future__ import annotations
+
+import base64
+import io
+from typing import Any
+
+import numpy as np
+from PIL import Image
+
+from evolve.analysis.episode import Pictures
+from evolve.report.markup import Html, html, look
+from evolve.report.picture import SHEET_WIDTH
+
+__all__ = ["figure_of_pictures", "film_of_pictures"]
+
+WIDTH = 320  # pixels of a picture on a page
+QUALITY = 80  # of JPEG: what is left of them is not seen at this size
+
+
+def figure_of_pictures(pictures: Pictures) -> Html:
+    """Where player.js shows them."""
+    height, width = _size(pictures)
+    caption = html(
+        "<b>The animal at its task</b>, as the task's camera sees it. Dots mark its eyes, lines the rims of their "
+        "fields of view; a colour is an eye."
+    )
+    return html(
+        '<figure><canvas class="world" role="img" aria-label="The animal at its task, with its eyes and '
+        'the rims of their fields of view" {}></canvas><figcaption>{}</figcaption></figure>\n',
+        *(look(f"aspect-ratio:{width}/{height}"), caption),
+    )
+
+
+def film_of_pictures(pictures: Pictures, kept: np.ndarray) -> dict[str, Any]:
+    """What player.js reads beside what all films have; over the frames that are kept."""
+    size = _size(pictures)
+    columns = max(1, min(len(pictures.pixels), SHEET_WIDTH // size[1]))
+    shown = np.searchsorted(pictures.times, kept, side="right") - 1
+    return {
+        "pictures": {"size": size, "columns": columns, "shown": shown.tolist()},
+        "sheets": {"pictures": _jpeg(_sheet(pictures.pixels, size, columns))},
+    }
+
+
+def _size(pictures: Pictures) -> tuple[int, int]:
+    """Of the pictures on a page (height, width) [pixels]."""
+    height, width = pictures.pixels.shape[1:3]
+    return round(WIDTH * height / width), WIDTH
+
+
+def _sheet(pictures: np.ndarray, size: tuple[int, int], columns: int) -> Image.Image:
+    """All pictures, as words stand on a page."""
+    height, width = size
+    sheet = Image.new("RGB", (columns * width, -(-len(pictures) // columns) * height))
+    for number, picture in enumerate(pictures):
+        small = Image.fromarray(picture).resize((width, height), Image.Resampling.LANCZOS)
+        sheet.paste(small, (number % columns * width, number // columns * height))
+    return sheet
+
+
+def _jpeg(picture: Image.Image) -> str:
+    content = io.BytesIO()
+    picture.save(content, "JPEG", quality=QUALITY)
+    return "data:image/jpeg;base64," + base64.b64encode(content.getvalue()).decode("ascii")

@@ -1,0 +1,130 @@
+"""The description of an eye, from which kernels and signals are computed."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from optics.elements.pupil import Pupil
+from optics.eye.geometry import behind_pupil, check_pupil, direction, etendue, focal_length
+from optics.eye.guided_field import check_guide
+from optics.eye.photoreceptor import throughput
+from optics.eye.polarization import check_rays, microvilli_of
+from optics.numerics.arguments import in_range, of_kind, positive, shape_2d
+from optics.numerics.autodiff import Scalar, number
+from optics.ommatidia.waveguide import Waveguide
+from optics.spectra.bands import SpectralBands
+from optics.spectra.photon_budget import PhotonBudget
+from optics.spectra.receptors import receptors_of
+
+__all__ = ["EyeSpec"]
+
+
+@dataclass(frozen=True)
+class EyeSpec:
+    """Pupil, retina and noise, and the lengths and throughputs that follow from them without a PSF. `optics.Eye`
+    documents the fields and adds PSFs, kernels and signals.
+
+    Raises:
+        ValueError: names argument, value and valid range.
+        AccuracyError: microvilli behind a pupil whose rays are too steep for them to the tolerance.
+    """
+
+    pupil: Pupil | None = None
+    resolution: tuple[int, int] = (15, 15)
+    fov_deg: Scalar = 45.0
+    sensor_width: float = 200e-6
+    bands: Any = 4
+    noise_sigma: float = 0.01
+    tolerance: float = 1e-2
+    dtype: str = "float32"
+    photon_budget: PhotonBudget | None = None
+    receptors: Any = "rgb"
+    full_aperture: float | None = None
+    eccentricity_deg: tuple[float, float] = (0.0, 0.0)
+    waveguide: Waveguide | None = None
+    microvilli: Any = None
+    spectral_bands: SpectralBands = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "resolution", shape_2d("resolution", self.resolution))
+        in_range("fov_deg", self.fov_deg, 1e-3, 170, carried=True)
+        positive("sensor_width", self.sensor_width)
+        object.__setattr__(self, "eccentricity_deg", direction("eccentricity_deg", self.eccentricity_deg))
+        in_range("noise_sigma", self.noise_sigma, 0, 1e6)
+        in_range("tolerance", self.tolerance, 1e-6, 0.5)
+        if self.dtype not in ("float32", "float64"):
+            raise ValueError(f"dtype = {self.dtype!r}: must be 'float32' or 'float64'")
+        check_pupil(self.pupil, self.sensor_width, self.full_aperture)
+        check_guide(self.waveguide, self.pupil, self.receptor_pitch)
+        object.__setattr__(self, "microvilli", microvilli_of(self.microvilli))
+        if self.microvilli is not None:
+            check_rays(self.pupil, number(self.retina_distance), self.tolerance)
+        if self.photon_budget is not None:
+            of_kind("photon_budget", self.photon_budget, PhotonBudget, "PhotonBudget(), or None")
+        object.__setattr__(self, "receptors", receptors_of(self.receptors))
+        auto = str(self.bands) == "auto"
+        spectral = self.chosen_bands() if auto else SpectralBands.uniform(self.bands, self.receptors)
+        object.__setattr__(self, "spectral_bands", spectral)
+        object.__setattr__(self, "bands", len(spectral.wavelengths))
+
+    @property
+    def sensor_distance(self) -> Scalar:
+        """f [m], by which receptors see angles: a distance x on the retina is x/f. From pupil to retina, where the
+        media before and behind the pupil are the same."""
+        return focal_length(self.sensor_width, self.fov_deg)
+
+    @property
+    def retina_distance(self) -> Scalar:
+        """[m] from pupil to retina: f n/n₀, at 550 nm."""
+        return behind_pupil(self.pupil, self.sensor_distance)
+
+    @property
+    def widest_pupil(self) -> float:
+        """Diameter [m] that gathers a throughput of 1."""
+        return self.sensor_width if self.full_aperture is None else self.full_aperture
+
+    @property
+    def receptor_pitch(self) -> float:
+        """[m]"""
+        return self.sensor_width / self.resolution[1]
+
+    @property
+    def relative_aperture(self) -> Scalar:
+        """a = 2 R / L, or over `full_aperture`; 1 for the perfect lens."""
+        return 1.0 if self.pupil is None else 2 * self.pupil.aperture_radius / self.widest_pupil
+
+    @property
+    def throughput(self) -> Scalar:
+        """a², times the share of the aperture's disk that is open, and of that light what a mask lets through."""
+        return self.aperture_throughput * (1.0 if self.pupil is None else self.pupil.transmission)
+
+    @property
+    def aperture_throughput(self) -> Scalar:
+        """The same without the mask: kernels, which are multiplied by it, hold what a mask lets through."""
+        return throughput(self.relative_aperture, 1.0 if self.pupil is None else self.pupil.aperture.area / math.pi)
+
+    @property
+    def channels(self) -> int:
+        """Signals at each place of the retina: as many as types of receptor, or one in a mosaic."""
+        return self.receptors.channels
+
+    @property
+    def mosaic(self) -> np.ndarray | None:
+        """Type of every receptor, (h, w) int; None where every receptor has all types."""
+        return self.receptors.layout(self.resolution)
+
+    @property
+    def photons(self) -> np.ndarray | None:
+        """Photons that a signal of 1 stands for, per type of receptor (type,); None without a photon budget."""
+        if self.photon_budget is None:
+            return None
+        light = etendue(self.widest_pupil, self.receptor_pitch, number(self.sensor_distance))
+        return self.photon_budget.photons(self.spectral_bands, light)
+
+    def chosen_bands(self) -> SpectralBands:
+        """Spectral bands for `bands="auto"`. The choice needs kernels, so `Eye` makes it."""
+        raise ValueError("bands = 'auto': must be a number of bands, except in an Eye")
