@@ -15,7 +15,7 @@ SHARING = {
     "contrasts of the standard observer": ("tests/optics/elements/test_human_eye.py::test_standard_observer",),
     "a run, an episode and its page": ("tests/evolve/report/",),
     "a run and an episode": ("tests/evolve/analysis/test_episode.py", "tests/evolve/cli/test_products.py"),
-    "a run in a user task": ("tests/evolve/analysis/test_filmed_episode.py",),
+    "a run in a user task": ("tests/evolve/analysis/test_recorder.py",),
     "five stages of an eye": ("tests/experiments/test_five_eyes.py",),
     "lives behind lenses": ("tests/experiments/test_sharp_lenses.py",),
     "a wheel": ("tests/rhabdom/test_wheel.py",),
