@@ -9,6 +9,7 @@ import subprocess
 import sys
 from pathlib import Path
 from typing import Any
+from unittest.mock import patch
 
 from evolve.search.successive_halving import finished
 from evolve.store.atomic_files import write_whole
@@ -81,10 +82,16 @@ def _main() -> int:
     """`evolve`, with an evaluation that takes no time and without report."""
     import validation.evolve.hostile_unfinished as here
     from evolve.cli import main
-    from evolve.cli.commands import run as commands
+    from evolve.cli.commands import run as command
+    from evolve.runs import carry_on
 
-    vars(commands).update(evaluate_candidate=getattr(here, sys.argv[1]), prepare_device=None, _finish=lambda *_: 0)
-    return main.main(sys.argv[2:])
+    evaluate = getattr(here, sys.argv[1])
+    with (
+        patch.object(carry_on, "evaluate_candidate", evaluate),
+        patch.object(carry_on, "prepare_device", None),
+        patch.object(command, "_finish", lambda *_: 0),
+    ):
+        return main.main(sys.argv[2:])
 
 
 if __name__ == "__main__":
