@@ -117,6 +117,16 @@ def table(init: Path) -> list[str]:
     return [line for line in text.split("\n")[1:] if line and not line.startswith(" ")]
 
 
+def test_names_of_modules_are_unique_within_a_package():
+    """So that a name in a traceback, or in a search, means one file."""
+    places: dict[tuple[str, str], list[str]] = {}
+    for path in SOURCES:
+        inside = path.relative_to(ROOT)
+        if path.name != "__init__.py":
+            places.setdefault((inside.parts[0], path.stem), []).append(str(inside))
+    assert not {name: found for name, found in places.items() if len(found) > 1}
+
+
 def test_files_are_small():
     """A file longer than 300 lines holds two nouns."""
     long = {str(path.relative_to(ROOT)): n for path in SOURCES if (n := len(path.read_text().splitlines())) > 300}

@@ -241,16 +241,18 @@ def _add_voice(command: argparse.ArgumentParser) -> None:
 
 def _add_tables(commands: Commands) -> None:
     """Commands that say what there is, and whether it works."""
-    validate = _command(commands, "validate", "checks.validate", "run the proofs of a checkout, which assert and draw")
+    validate = _command(
+        commands, "validate", "validate.validate", "run the proofs of a checkout, which assert and draw"
+    )
     validate.add_argument("proofs", nargs="*", metavar="NAME", help="proofs to run (default: all)")
     validate.add_argument("--list", action="store_true", help="list the proofs by name, and run none")
-    doctor = _command(commands, "doctor", "checks.doctor", "say what is installed and whether it works")
-    tasks = _command(commands, "tasks", "tables.tasks", "list the tasks")
-    presets = _command(commands, "presets", "tables.presets", "list the presets")
-    genes = _command(commands, "genes", "tables.genes", "list the genes")
+    doctor = _command(commands, "doctor", "validate.doctor", "say what is installed and whether it works")
+    tasks = _command(commands, "tasks", "listings.tasks", "list the tasks")
+    presets = _command(commands, "presets", "listings.presets", "list the presets")
+    genes = _command(commands, "genes", "listings.genes", "list the genes")
     for command in (doctor, tasks, presets, genes):
         command.add_argument("--json", action="store_true", help="print JSON")
-    config = _command(commands, "config", "settings.config", "show settings: all of a run's, or the schema of them")
+    config = _command(commands, "config", "show_config.config", "show settings: all of a run's, or the schema of them")
     config.add_argument("what", choices=("show", "schema"), help="show: as TOML, for --config; schema: as JSON schema")
     _add_settings(config)
     completion = _command(commands, "completion", "completion.completion", "print a shell's completion of this command")

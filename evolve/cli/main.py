@@ -34,7 +34,7 @@ def _outcome(arguments: Sequence[str]) -> int:
     """The exit code of a command; what is the user's to mend is said in one line."""
     try:
         parsed = parse(arguments)
-        if parsed.module != "checks":
+        if parsed.module != "validate":
             _require_system()
         # Numerical libraries read this as they load. More threads than one sum in another order, and a run must repeat.
         os.environ.update(dict.fromkeys(("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1"))

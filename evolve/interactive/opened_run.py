@@ -119,7 +119,7 @@ class OpenedRun(Run):
             ValueError: fewer than two searches.
         """
         from evolve.interactive.table import drift_table
-        from evolve.report.drift import drift_of
+        from evolve.report.gene_drift import drift_of
 
         return drift_table(drift_of([self], searches))
 

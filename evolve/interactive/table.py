@@ -11,7 +11,7 @@ from evolve.store.candidate import Candidate
 if TYPE_CHECKING:
     import pandas as pd
 
-    from evolve.report.drift import Drift
+    from evolve.report.gene_drift import Drift
 
 __all__ = ["candidate_table", "drift_table"]
 

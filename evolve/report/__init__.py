@@ -17,7 +17,7 @@ svg              figures that follow the page's theme
 theme            its colours
 markup           pieces of HTML
 comparison       runs side by side
-drift            runs beside the null model of their search
+gene_drift       runs beside the null model of their search
 moving_picture   an episode as a GIF or film
 replay           an episode once more
 exr_export       what an agent saw, as EXR files

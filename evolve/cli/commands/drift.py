@@ -6,7 +6,7 @@ import json
 from argparse import Namespace
 
 from evolve.cli.waiting import Waiting
-from evolve.report.drift import drift_of
+from evolve.report.gene_drift import drift_of
 from evolve.store.directory import Run
 
 __all__ = ["drift"]

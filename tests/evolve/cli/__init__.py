@@ -10,12 +10,12 @@ tensorboard: test_tensorboard.py
 doctor: test_doctor.py
 commands.run: test_commands.py, test_run_plan.py, search/test_kill.py, runs/test_two_faces.py
 commands.status: test_main.py, test_status_and_compare.py, test_commands.py, test_hostile_runs.py
-commands.tables: test_main.py
+commands.listings: test_main.py
 commands.products: test_products.py, test_commands.py, test_main.py
-commands.settings: test_main.py
+commands.show_config: test_main.py
 commands.demo: test_demo.py
 commands.completion: test_main.py
-commands.checks: test_checks.py
+commands.validate: test_validate.py
 commands.compare: test_status_and_compare.py
-commands.drift: report/test_drift.py
+commands.drift: report/test_gene_drift.py
 """

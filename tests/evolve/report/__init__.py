@@ -23,6 +23,6 @@ rerun_bodies: test_rerun_bodies.py
 rerun_layout: test_rerun_recording.py, test_rerun_bodies.py
 rerun_stream: test_rerun_recording.py, test_rerun_bodies.py
 exr_export: analysis/test_episode.py
-drift: test_drift.py
+gene_drift: test_gene_drift.py
 comparison: cli/test_status_and_compare.py
 """

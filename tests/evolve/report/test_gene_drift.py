@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import evolve
-from evolve.report.drift import drift_of
+from evolve.report.gene_drift import drift_of
 from evolve.search.null_model import null_model
 from evolve.store.directory import Run, RunError
 from evolve.store.evaluation import Evaluation

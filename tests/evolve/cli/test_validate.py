@@ -7,7 +7,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from evolve.cli.commands import checks
+from evolve.cli.commands import validate
 
 ROOT = Path(__file__).parents[3]
 PROOFS = tomllib.loads((ROOT / "validation/proofs.toml").read_text())["proofs"]
@@ -24,8 +24,8 @@ def ran(monkeypatch):
         modules.append(command[-1])
         return SimpleNamespace(returncode=int(command[-1] in failing))
 
-    monkeypatch.setattr(checks.backend, "require", lambda: None)
-    monkeypatch.setattr(checks.subprocess, "run", run)
+    monkeypatch.setattr(validate.backend, "require", lambda: None)
+    monkeypatch.setattr(validate.subprocess, "run", run)
     return SimpleNamespace(modules=modules, failing=failing)
 
 
@@ -75,7 +75,7 @@ def test_an_unknown_proof_ends_in_one_line(call, ran):
 
 
 def test_validate_needs_a_checkout(call, monkeypatch, tmp_path):
-    monkeypatch.setattr(checks, "CHECKOUT", tmp_path)
+    monkeypatch.setattr(validate, "CHECKOUT", tmp_path)
     code, _, err = call("validate")
     assert code == 2
     assert "needs a checkout" in err
