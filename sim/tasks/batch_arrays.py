@@ -66,16 +66,12 @@ def require_outcome(outcome: Outcome, n: int, learners: int) -> None:
         ValueError: another shape, a reward that is not finite, or worlds that do not exist.
     """
     size = n * learners
-    shapes = {
-        "terms": outcome.terms.terms.shape[1:],
-        "terminated": outcome.terminated.shape,
-        "success": outcome.success.shape,
-        **({} if outcome.over is None else {"over": outcome.over.shape}),
-    }
-    for name, shape in shapes.items():
-        wanted = (n,) if name == "over" else (size,)
-        if shape != wanted:
-            raise ValueError(f"judge: {name} has shape {shape}: must be {wanted}, one entry for each row")
+    shapes = outcome.terms.terms.shape[1:], outcome.terminated.shape, outcome.success.shape
+    for name, shape in zip(("terms", "terminated", "success"), shapes, strict=True):
+        if shape != (size,):
+            raise ValueError(f"judge: {name} has shape {shape}: must be {(size,)}, one entry for each row")
+    if outcome.over is not None and outcome.over.shape != (n,):
+        raise ValueError(f"judge: over has shape {outcome.over.shape}: must be {(n,)}, one entry for each row")
     if not np.isfinite(outcome.terms.terms).all():
         place, row = (int(i) for i in np.argwhere(~np.isfinite(outcome.terms.terms))[0])
         value = outcome.terms.terms[place, row]
