@@ -1,7 +1,8 @@
 """Reliefs: height maps of the pupil's glass, over the square that holds the pupil.
 
 A relief is a function of (x, y) in units of the aperture radius; inside the pupil both lie in [-1, 1].
-Row index and y grow together, as do column index and x.
+Row index and y grow together, as do column index and x. `Pupil.path` makes an optical path of it, and `Beam.waves` a
+phase.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The kernel of all renderers: lanes become worlds, eyes and samples, these become rays, rays become light, and light
+"""The kernel of `EyeRenderer`: lanes become worlds, eyes and samples, these become rays, rays become light, and light
 is shared out among depth layers and added up."""
 
 from __future__ import annotations

@@ -2,7 +2,8 @@
 
 Moving a shape of a Mitsuba scene rebuilds its acceleration structure; a few spheres per world are cheaper solved
 by hand. Their texture coordinates are Mitsuba's and MuJoCo's for a sphere: u = azimuth / 2π, v = polar angle / π
-from +z, both in the sphere's own frame.
+from +z, both in the sphere's own frame. These serve scenes in closed form, and an eye may be inside one;
+`primitives` has the shapes of all other models, which are met from outside alone.
 """
 
 from __future__ import annotations
