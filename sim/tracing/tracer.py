@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import Any, Protocol
 
 import numpy as np
@@ -77,11 +78,20 @@ class Tracers:
     ) -> None:
         if name not in TRACERS:
             raise ValueError(f"tracer = {name!r}: must be one of {', '.join(map(repr, TRACERS))}")
-        self._scene, self._name = scene, name
+        self._scene, self._name, self._places, self._stand = scene, name, places, stand
         self._known: dict[str, Tracer] = {}
         self._areas: dict[str, AreaTracer] = {}
-        self.upright: UprightScene | NoClosedForm = _upright(scene, places, stand)
         self.of(lighting.DIRECT)
+
+    @cached_property
+    def upright(self) -> UprightScene | NoClosedForm:
+        """The closed form of the scene, or why there is none."""
+        try:
+            return upright_scene(self._scene, self._places.stand() if self._stand is None else self._stand)
+        except NoClosedForm as reason:
+            return reason
+        except NotLevelError as reason:
+            return NoClosedForm(str(reason))
 
     @property
     def is_upright(self) -> bool:
@@ -131,13 +141,3 @@ class Tracers:
             except NoClosedForm as reason:
                 raise ValueError(f"samples = 'areas': this world has no closed form: {reason}") from reason
         return self._areas[light]
-
-
-def _upright(scene: ModelScene, places: EyePlaces, stand: LevelStand | None) -> UprightScene | NoClosedForm:
-    """Or why there is none."""
-    try:
-        return upright_scene(scene, places.stand() if stand is None else stand)
-    except NoClosedForm as reason:
-        return reason
-    except NotLevelError as reason:
-        return NoClosedForm(str(reason))

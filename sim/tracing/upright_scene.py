@@ -60,6 +60,9 @@ def upright_scene(scene: ModelScene, stand: LevelStand) -> UprightScene:
     """
     _refuse_what_shines(scene)
     model = scene.model
+    for geom in scene.geoms:
+        if bsdfs.mirror_share(model, geom) > 0:
+            raise NoClosedForm(f"geom {_name(model, geom)} is a mirror")
     for geom, materials in scene.varied.items():
         what = "materials" if materials else "sizes or colours"
         raise NoClosedForm(f"{what} of geom {model.geom(geom).name!r} differ between worlds")

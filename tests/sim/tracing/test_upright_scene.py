@@ -108,6 +108,8 @@ REASONS = {
     '<geom name="cart" type="box" size=".1 .1 .1"/></body>',
     "geom 'odd' is neither a plane nor a box": WALL.format("cylinder", 'pos="0 2 .5" size=".1 .5"'),
     "box 'odd' is not aligned with the axes": WALL.format("box", 'pos="0 2 .5" size=".1 .1 .5" euler="0 0 20"'),
+    "geom 'odd' is a mirror": '</worldbody><asset><material name="shiny" reflectance=".5"/></asset><worldbody>'
+    + WALL.format("box", 'pos="0 2 .5" size=".1 .1 .5" material="shiny"'),
     "ends below the eyes": WALL.format("box", 'pos="0 2 .1" size=".1 .1 .1"'),
     "light 'lamp' shines from a place nearby": '<light name="lamp" pos="0 0 2" dir="0 0 -1"/>',
     "light 'low' shines from below": '<light name="low" type="directional" dir="0 .2 .9"/>',
