@@ -45,6 +45,14 @@ class Samples:
 
 
 @dataclass(frozen=True)
+class Allowed:
+    """Error allowed to the samples (root mean square), and where no light is left out."""
+
+    error: float
+    without_light: float
+
+
+@dataclass(frozen=True)
 class Shares:
     """Of the tolerance, what the stages before the samples may use up. Errors add up as squares, and samples may use
     what is left."""
@@ -53,11 +61,11 @@ class Shares:
     depth: float
     light: float
 
-    def left(self, has_layers: bool, light: float) -> tuple[float, float]:
-        """Share that is left to samples, and where no light is left out; light: what leaving it out has used up."""
+    def left(self, allowed: float, has_layers: bool, light: float) -> Allowed:
+        """What is left to samples of an allowed error; light: error of the light that is left out."""
         spent = self.bands**2 + (self.depth**2 if has_layers else 0)
-        for_light = min(light, self.light) ** 2
-        return math.sqrt(1 - (spent + for_light)), math.sqrt(1 - spent)
+        for_light = min(light / allowed, self.light) ** 2
+        return Allowed(allowed * math.sqrt(1 - (spent + for_light)), allowed * math.sqrt(1 - spent))
 
 
 class Stages(Protocol):
@@ -80,8 +88,8 @@ class Stages(Protocol):
     def light(self, depth: DepthLayers, allowed: float) -> Level:
         """What of it is followed."""
 
-    def samples(self, depth: DepthLayers, light: Level, allowed: tuple[float, float]) -> Samples:
-        """How many; allowed: their error, and their error where no light is left out."""
+    def samples(self, depth: DepthLayers, light: Level, allowed: Allowed) -> Samples:
+        """How many."""
 
 
 def cheapest(stages: Stages) -> Fidelity:
@@ -89,10 +97,10 @@ def cheapest(stages: Stages) -> Fidelity:
     allowed, shares = stages.allowed, stages.shares
     depth, depth_level = stages.depth(allowed * (shares.depth if shares else 1))
     light = stages.light(depth, allowed * (shares.light if shares else 1))
-    left = (1.0, 1.0)
+    left = Allowed(allowed, allowed)
     if shares:
-        left = shares.left(stages.eye.pupil is not None, (light.predicted_error or 0) / allowed)
-    samples = stages.samples(depth, light, (allowed * left[0], allowed * left[1]))
+        left = shares.left(allowed, stages.eye.pupil is not None, light.predicted_error or 0)
+    samples = stages.samples(depth, light, left)
     levels = [level for level in (stages.bands(), depth_level, samples.light, samples.level) if level is not None]
     bands = stages.eye.bands
     found = Fidelity(samples.number, bands, depth, allowed, tuple(levels), samples.light.level, samples.kind)

@@ -23,7 +23,7 @@ from sim.eyes.mounts import Mount, mounts_of
 from sim.render.edge_rays import edges_pay
 from sim.render.eye_renderer import EyeRenderer
 from sim.render.fidelity import EDGES, RAYS, Fidelity, Level
-from sim.render.fidelity_choice import Samples, Shares, cheapest
+from sim.render.fidelity_choice import Allowed, Samples, Shares, cheapest
 from sim.render.prepared_scene import Placed, PreparedScene
 from sim.scene import source
 from sim.scene.appearances import Varied
@@ -125,9 +125,9 @@ class ModelStages:
         """See `Stages`."""
         return _light(self._light, lambda light: self._seen(_truth(self.eye), light), allowed)
 
-    def samples(self, depth: DepthLayers, light: Level, allowed: tuple[float, float]) -> Samples:
+    def samples(self, depth: DepthLayers, light: Level, allowed: Allowed) -> Samples:
         """See `Stages`."""
-        ladder, most = PERFECT if self.eye.pupil is None else SHARED, allowed[0]
+        ladder, most = PERFECT if self.eye.pupil is None else SHARED, allowed.error
         trials = tried(lambda rays: self._seen(rays, light.level), ladder, _truth(self.eye), most)
         rays = next((n for n, error in trials.errors.items() if error <= most), max(trials.errors))
         enough = trials.errors[rays] <= most

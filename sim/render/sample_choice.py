@@ -9,7 +9,7 @@ from functools import cache
 from sim.eyes.receptive_fields import NoRaysError
 from sim.eyes.sampling import BoxSampling, EyeSampling
 from sim.render.fidelity import AREAS, RAYS, Level
-from sim.render.fidelity_choice import Samples
+from sim.render.fidelity_choice import Allowed, Samples
 from sim.render.fidelity_stages import CAUTION
 from sim.render.fidelity_trials import FidelityTrials
 from sim.tracing.lighting import ALL, BOUNCE
@@ -27,12 +27,10 @@ PUPIL_AREA_IN_ALL_LIGHT = 2  # in rays with a bounce
 HARDLY_MORE = 1.1  # times an error that cannot be lessened: not worth several times the samples
 
 
-def fewest_samples(
-    trials: FidelityTrials, sampling: EyeSampling, light: Level, allowed: float, without_light: float
-) -> Samples:
+def fewest_samples(trials: FidelityTrials, sampling: EyeSampling, light: Level, allowed: Allowed) -> Samples:
     """The cheapest that err by no more than allowed; the best there are where none do.
 
-    light: what rays would follow of it · without_light: allowed, where no light is left out
+    light: what rays would follow of it
     """
     errors = cache(trials.errors(sampling, light.level))
     perfect = isinstance(sampling, BoxSampling)
@@ -44,11 +42,11 @@ def fewest_samples(
         return (PERFECT_LENS_AREA if perfect else of_pupil) * trials.areas_seen(sampling, number)
 
     def rays(most: float = math.inf) -> Samples:
-        return Samples(RAYS, light, *_fewest(errors, tuple(n for n in numbers if n <= most), allowed, RAYS))
+        return Samples(RAYS, light, *_fewest(errors, tuple(n for n in numbers if n <= most), allowed.error, RAYS))
 
     if (few := rays(max(FEW_RAYS, cost(min(shared, default=1))))).enough:
         return few
-    areas = _areas(trials, sampling, light, shared, (allowed, without_light))
+    areas = _areas(trials, sampling, light, shared, allowed)
     if areas is None:
         return rays()
     if not areas.enough:
@@ -62,18 +60,17 @@ def _areas(
     sampling: EyeSampling,
     light: Level,
     shared: tuple[float, ...],
-    allowed: tuple[float, float],
+    allowed: Allowed,
 ) -> Samples | None:
     """None where they cannot see the world.
 
     shared: numbers below one, falling, to be tried where one is enough
-    allowed: errors; the second holds where no light is left out
     """
     if not trials.have_areas(*((BOUNCE, ALL) if light.level == BOUNCE else (light.level,))):
         return None
-    errors, most = trials.area_errors(sampling, light.level), allowed[0]
+    errors, most = trials.area_errors(sampling, light.level), allowed.error
     if light.level == BOUNCE:
-        more, most = trials.reflected_more_often(sampling), allowed[1]
+        more, most = trials.reflected_more_often(sampling), allowed.without_light
         light = Level("light", ALL, None, f"light that is reflected more than twice is worth {more:.1e}; in tables")
     found = _fewest(errors, NUMBERS_OF_AREAS, most, AREAS)
     for number in shared if found[2] and found[0] == 1 else ():

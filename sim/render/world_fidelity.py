@@ -10,7 +10,7 @@ from sim.eyes.depth_layers import DepthLayers
 from sim.eyes.eyes import Eyes
 from sim.render import fidelity_stages as stages
 from sim.render.fidelity import Fidelity, Level
-from sim.render.fidelity_choice import Samples, Shares, cheapest
+from sim.render.fidelity_choice import Allowed, Samples, Shares, cheapest
 from sim.render.fidelity_trials import FidelityTrials
 from sim.render.sample_choice import fewest_samples
 from sim.render.world_scene import WorldScene
@@ -71,6 +71,6 @@ class WorldStages:
         """See `Stages`."""
         return stages.light(self._trials, self._scene.sampling(depth, self.allowed), allowed)
 
-    def samples(self, depth: DepthLayers, light: Level, allowed: tuple[float, float]) -> Samples:
+    def samples(self, depth: DepthLayers, light: Level, allowed: Allowed) -> Samples:
         """See `Stages`."""
-        return fewest_samples(self._trials, self._scene.sampling(depth, self.allowed), light, *allowed)
+        return fewest_samples(self._trials, self._scene.sampling(depth, self.allowed), light, allowed)

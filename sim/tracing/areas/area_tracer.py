@@ -7,6 +7,7 @@ and each light is shut off by the shares that lie in shadow. Colours and compone
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import partial
 
 import drjit as dr
@@ -33,6 +34,17 @@ from sim.tracing.walls import ALIGNED, NoClosedForm
 LEAST_DIP = 1e-4  # of directions that meet the floor
 BANDS = 2
 STRETCHES = 2  # of a wall's texture, each averaged by itself: what is near fills more of an area than what is far
+
+
+@dataclass(frozen=True)
+class _LitSphere:
+    """A sphere as an area sees it. number: of the body · light: on it · depth: layers that its light is shared among"""
+
+    number: int
+    view: SphereView
+    light: BodyLight
+    now: Moment
+    depth: DepthLayers
 
 
 class AreaTracer:
@@ -199,12 +211,13 @@ class AreaTracer:
         times its share; without what is hidden by nearer spheres."""
         view = SphereView(area, now.bodies[k], self._radii[k])
         light = BodyLight.of(self._illumination, self._reflected, k, view.whole().patch, now)
+        sphere = _LitSphere(k, view, light, now, depth)
 
         def add(number: Array, hidden: list[Array], total: list[Array]) -> tuple[Array, ...]:
             strip = view.strip(number)
             behind = [self._columns.behind(area, piece, strip.part) for piece in pieces]
             found = behind[0].beside, behind[1].beside, behind[0].below + behind[1].below
-            bare, *sent_on = self._strip(area, k, view, strip, (light, now, depth))
+            bare, *sent_on = self._strip(area, sphere, strip)
             hidden = [dr.fma(own, bare, sum_) for own, sum_ in zip(found, hidden, strict=True)]
             return number + 1, hidden, _sum(sent_on, total)
 
@@ -212,19 +225,18 @@ class AreaTracer:
         _, hidden, total = dr.while_loop(start, lambda number, *_: number < view.sides, add, label="strips")
         return [*hidden, *total]
 
-    def _strip(
-        self, area: Area, k: int, view: SphereView, strip: Strip, how: tuple[BodyLight, Moment, DepthLayers]
-    ) -> list[Array]:
+    def _strip(self, area: Area, sphere: _LitSphere, strip: Strip) -> list[Array]:
         """Share of a strip of a sphere before which no other stands, and light that comes from it, per component, times
         its share of the area."""
-        (light, now, depth), texture = how, self._sphere_textures[k]
+        k, view, now, depth = sphere.number, sphere.view, sphere.now, sphere.depth
+        texture = self._sphere_textures[k]
 
         def add(number: Array, total: list[Array]) -> tuple[Array, list[Array]]:
             slice_ = view.slice(strip, number)
             bare = self._not_hidden(area, k, slice_, now)
             column, sides = sphere_areas.columns_of(texture, slice_.patch, self._radii[k])
             reflectance = self._stripes.mean_over(texture.texture, column, sides, now.inputs.stripes)
-            layers = _in_layers(depth, slice_.vergence(area), light.on(slice_.patch.normal))
+            layers = _in_layers(depth, slice_.vergence(area), sphere.light.on(slice_.patch.normal))
             sent_on = [bare / mi.Float(view.sides)]
             sent_on += [slice_.share * bare * r * e for r, e in zip(reflectance * depth.count, layers, strict=True)]
             return number + 1, _sum(sent_on, total)
