@@ -1,8 +1,7 @@
 """Reliefs: height maps of the pupil's glass, over the square that holds the pupil.
 
 A relief is a function of (x, y) in units of the aperture radius; inside the pupil both lie in [-1, 1].
-Row index and y grow together, as do column index and x. `Pupil.path` makes an optical path of it, and `Beam.waves` a
-phase.
+Row index and y grow together, as do column index and x. `Pupil.path` makes it a path, and `Beam.waves` a phase.
 """
 
 from __future__ import annotations

@@ -11,39 +11,17 @@ from sim.tasks.outcome import Outcome, RewardTerms
 from sim.tasks.per_world import PerWorld
 from sim.tasks.registry import task_of
 
-FILE = Path(__file__).parents[3] / "examples/find_ball.py"
+EXAMPLES = Path(__file__).parents[3] / "examples"
 
 
-def _example():
-    specification = importlib.util.spec_from_file_location("find_ball", FILE)
+def _example(name):
+    specification = importlib.util.spec_from_file_location(name, EXAMPLES / f"{name}.py")
     module = importlib.util.module_from_spec(specification)
     specification.loader.exec_module(module)
-    return module.FindBall
+    return module
 
 
-FindBall = _example()
-
-
-class FindBalls(sim.BatchTask):
-    """`examples/find_ball.py`, for arrays of worlds."""
-
-    model, mounts, fidelity = FindBall.model, FindBall.mounts, FindBall.fidelity
-    episode_steps = FindBall.episode_steps
-
-    def reset(self, worlds, chosen, rngs):
-        worlds.mocap_pos[chosen, 0, 1] = [rng.uniform(-2, 2) for rng in rngs]
-
-    def rewards(self, worlds):
-        return {"near": -self.off(worlds) / 10}
-
-    def succeeded(self, worlds):
-        return self.off(worlds) < 0.3
-
-    def feels(self, worlds):
-        return worlds.qvel
-
-    def off(self, worlds):
-        return np.abs(worlds.mocap_pos[:, 0, 1] - worlds.qpos[:, 0])
+FindBall, FindBalls = _example("find_ball").FindBall, _example("find_balls").FindBalls
 
 
 def test_it_is_the_same_task_bit_for_bit():
@@ -132,7 +110,7 @@ class Crowd(FindBalls):
     """A world's reward depends on the others."""
 
     def rewards(self, worlds):
-        return {"near": -self.off(worlds) + self.off(worlds).mean()}
+        return {"near": -self.distance(worlds) + self.distance(worlds).mean()}
 
 
 class Mover(FindBalls):
