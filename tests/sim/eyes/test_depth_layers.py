@@ -67,7 +67,8 @@ def test_areas_share_their_light_among_layers_as_rays_do(close_by, monkeypatch):
         renderer = sim.BatchedRenderer(world, eyes, 7, sim.Fidelity(samples, 1, depth, samples=kind))
         renderer.sensor = dataclasses.replace(renderer.sensor, depth=depth)
         renderer._set_width(7)
-        return renderer._components(renderer._sums, states).reshape(3, 14, -1).mean(axis=-1) / samples
+        found = renderer._components(renderer._launched(states).wait())
+        return found.reshape(3, 14, -1).mean(axis=-1) / samples
 
     along_rays = layers(sharp, 256, "rays")
 
