@@ -35,7 +35,7 @@ def columns(where: str, returned: Any, n: int) -> np.ndarray:
         raise ValueError(f"{where} has shape {array.shape}: must be ({n}, k), one row for each world")
     if not np.isfinite(array).all():
         world = int(np.flatnonzero(~np.isfinite(array).all(axis=1))[0])
-        raise ValueError(f"{where} is {array[world]} in world {world}: must be finite")
+        raise ValueError(f"{where} is {array[world].tolist()} in world {world}: must be finite")
     return array
 
 
