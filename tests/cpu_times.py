@@ -3,6 +3,7 @@
     ./with-env pytest -n auto --cpu-times cpu.csv
     ./with-env python -m tests.cpu_times cpu.csv                # seconds of each file, most expensive first
     ./with-env python -m tests.cpu_times cpu.csv --by test
+    ./with-env python -m tests.cpu_times cpu.csv --over 1.2     # names of the tests that took longer, for tests/slow_tests.txt
 
 The time of a test includes its fixtures, all threads, and child processes that have ended. A shared fixture counts
 for the first test that needs it. The row `<start>` holds the imports and the collection of all workers. CPU time,
@@ -102,11 +103,17 @@ def main() -> None:
     parser.add_argument("file", type=Path, help="written by pytest --cpu-times")
     parser.add_argument("--by", choices=("folder", "file", "function", "test"), default="file")
     parser.add_argument("--rows", type=int, default=40, help="rows to print")
+    parser.add_argument(
+        "--over", type=float, metavar="SECONDS", help="print the names of tests that took longer, alone"
+    )
     arguments = parser.parse_args()
     sums: defaultdict[str, float] = defaultdict(float)
     with arguments.file.open(newline="") as file:
         for row in csv.DictReader(file):
-            sums[part(row["test"], arguments.by)] += float(row["cpu_seconds"])
+            sums[part(row["test"], "test" if arguments.over else arguments.by)] += float(row["cpu_seconds"])
+    if arguments.over is not None:
+        print("\n".join(sorted(name for name, seconds in sums.items() if seconds > arguments.over and name != START)))
+        return
     print(f"{sum(sums.values()):9.1f}  all")
     for name, seconds in sorted(sums.items(), key=lambda entry: -entry[1])[: arguments.rows]:
         print(f"{seconds:9.1f}  {name}")

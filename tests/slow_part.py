@@ -3,6 +3,8 @@
 Slow are
 
 - tests with the mark `slow`;
+- tests that `tests/slow_tests.txt` lists, one to a line: those that took more than 1.2 s of CPU time when all were measured
+  (`python -m tests.cpu_times cpu.csv --over 1.2`), but for what no faster test of their file holds;
 - of a test with the mark `fast_cases(n)`, all cases but n, chosen so that they cover the values of the parameters: of 3
   shapes and 4 methods, `fast_cases(4)` runs each shape and each method at least once;
 - random examples (hypothesis) beyond the first few, in tests with `@sweep(count)`.
@@ -14,11 +16,13 @@ Slow are
 from __future__ import annotations
 
 from collections import defaultdict
+from pathlib import Path
 from typing import Any
 
 import pytest
 from hypothesis import HealthCheck, settings
 
+LISTED = Path(__file__).with_name("slow_tests.txt")
 FAST_EXAMPLES = 5
 FAST, ALL = "fast", "all"  # profiles of hypothesis
 settings.register_profile(FAST)
@@ -54,7 +58,10 @@ def slow(*values: object) -> Any:
 @pytest.hookimpl(tryfirst=True)  # before pytest leaves out what is marked
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     cases: defaultdict[str, list[Any]] = defaultdict(list)
+    listed = set(LISTED.read_text().splitlines())
     for item in items:
+        if item.nodeid in listed:
+            item.add_marker(pytest.mark.slow)
         if item.get_closest_marker("fast_cases"):
             cases[item.nodeid.split("[")[0]].append(item)
     for same_test in cases.values():
