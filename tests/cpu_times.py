@@ -3,7 +3,7 @@
     ./with-env pytest -n auto --cpu-times cpu.csv
     ./with-env python -m tests.cpu_times cpu.csv                # seconds of each file, most expensive first
     ./with-env python -m tests.cpu_times cpu.csv --by test
-    ./with-env python -m tests.cpu_times cpu.csv --over 1.2     # names of the tests that took longer, for tests/slow_tests.txt
+    ./with-env python -m tests.cpu_times cpu.csv --over 1.2     # tests that took longer, for tests/slow_tests.txt
 
 The time of a test includes its fixtures, all threads, and child processes that have ended. A shared fixture counts
 for the first test that needs it. The row `<start>` holds the imports and the collection of all workers. CPU time,

@@ -3,8 +3,8 @@
 Slow are
 
 - tests with the mark `slow`;
-- tests that `tests/slow_tests.txt` lists, one to a line: those that took more than 1.2 s of CPU time when all were measured
-  (`python -m tests.cpu_times cpu.csv --over 1.2`), but for what no faster test of their file holds;
+- tests that `tests/slow_tests.txt` lists: all took more than 1.2 s of CPU time (`python -m tests.cpu_times cpu.csv
+  --over 1.2`). Some that take longer are not listed, because no faster test does their work;
 - of a test with the mark `fast_cases(n)`, all cases but n, chosen so that they cover the values of the parameters: of 3
   shapes and 4 methods, `fast_cases(4)` runs each shape and each method at least once;
 - random examples (hypothesis) beyond the first few, in tests with `@sweep(count)`.
