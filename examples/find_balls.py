@@ -1,4 +1,4 @@
-"""The task of `find_ball.py` on arrays of all worlds, which is faster.
+"""The task of `find_ball.py` on arrays of all worlds, which is faster for 16 worlds or more.
 
     evolve run examples/find_balls.py:FindBalls --preset quick
 

@@ -58,7 +58,7 @@ class RayLight:
 
 @dataclass(frozen=True)
 class CameraInputs:
-    """What kernels read of a mirror, the same for every picture.
+    """Inputs of kernels that are the same for every picture of a mirror.
 
     samples: of a pixel, in twos [pixels] · weights: of the suns, in fours · closed: of each shape, whether a
     camera within looks out of it · bsdfs: unused; BSDFs among the inputs make the recording collect their textures

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -26,7 +25,7 @@ class FidelityWarning(UserWarning):
 
 @dataclass(frozen=True)
 class Samples:
-    """What eyes look along, as it was chosen.
+    """The choice of rays or areas.
 
     kind: "rays", "areas" or "edges" · light, level: what was chosen, and why · number: for each receptor
     enough: whether they err by no more than was allowed
@@ -54,22 +53,22 @@ class Allowed:
 
 @dataclass(frozen=True)
 class Shares:
-    """Of the tolerance, what the stages before the samples may use up. Errors add up as squares, and samples may use
-    what is left."""
+    """Parts of the tolerance that the stages before the samples may use up. Errors add up as squares, and samples may
+    use the rest."""
 
     bands: float
     depth: float
     light: float
 
     def left(self, allowed: float, has_layers: bool, light: float) -> Allowed:
-        """What is left to samples of an allowed error; light: error of the light that is left out."""
+        """Divide an allowed error: the rest for samples; light: error of the light that is left out."""
         spent = self.bands**2 + (self.depth**2 if has_layers else 0)
         for_light = min(light / allowed, self.light) ** 2
         return Allowed(allowed * math.sqrt(1 - (spent + for_light)), allowed * math.sqrt(1 - spent))
 
 
 class Stages(Protocol):
-    """What a scene offers to choose from.
+    """Levels of fidelity that a scene offers, and their errors.
 
     eye: whose receptors' noise decides · allowed: error of a signal, all stages together (root mean square)
     shares: of it; None: stages are judged one by one, and each may use all of it
@@ -86,7 +85,7 @@ class Stages(Protocol):
         """Layers that the eye has a PSF for; no level where there is nothing to choose."""
 
     def light(self, depth: DepthLayers, allowed: float) -> Level:
-        """What of it is followed."""
+        """The light that is followed."""
 
     def samples(self, depth: DepthLayers, light: Level, allowed: Allowed) -> Samples:
         """How many."""
@@ -105,13 +104,13 @@ def cheapest(stages: Stages) -> Fidelity:
     bands = stages.eye.bands
     found = Fidelity(samples.number, bands, depth, allowed, tuple(levels), samples.light.level, samples.kind)
     # Of the bands' error only a bound is known, which may be far above it.
-    _warn_if_worse(levels[1:], allowed, math.hypot if shares else max)
+    _warn_if_worse(levels[1:], allowed, together=shares is not None)
     return found
 
 
-def _warn_if_worse(levels: list[Level], allowed: float, together: Callable[..., float]) -> None:
+def _warn_if_worse(levels: list[Level], allowed: float, together: bool) -> None:
     errors = [level.predicted_error or 0 for level in levels]
-    worst = together(*errors)
+    worst = math.hypot(*errors) if together else max(errors)
     if worst > allowed * (1 + 1e-9):
         lead = max(levels, key=lambda level: level.predicted_error or 0)
         warnings.warn(

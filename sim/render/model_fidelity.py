@@ -93,7 +93,7 @@ def choose_model_fidelity(
 
 
 class ModelStages:
-    """What a model offers to choose from, tried at moments of its worlds; see `Stages`.
+    """Levels that a model offers, tried at moments of its worlds; see `Stages`.
 
     light: as `choose_model_fidelity` has it
     """
@@ -106,7 +106,7 @@ class ModelStages:
         self._seen = cache(self._signals)
 
     def _signals(self, rays: float, light: str) -> np.ndarray:
-        """What is seen of the moments."""
+        """Signals at the moments, without noise."""
         fidelity = _with(rays, self.eye, self.allowed, light)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", MirrorWarning)  # whoever renders in earnest is told

@@ -46,12 +46,12 @@ def choose_fidelity(
 
 
 def chosen_fidelity(scene: WorldScene, tolerance: float | None = None) -> Fidelity:
-    """What `choose_fidelity` gives for a scene that has been prepared, with the bands that it has."""
+    """Choose as `choose_fidelity` does, for a prepared scene with its own bands."""
     return cheapest(WorldStages(scene, tolerance))
 
 
 class WorldStages:
-    """What a world offers to choose from; see `Stages`."""
+    """Levels that a built-in world offers, tried at random views; see `Stages`."""
 
     shares: Shares | None = SHARES
 

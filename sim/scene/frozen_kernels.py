@@ -49,7 +49,7 @@ class FrozenKernel:
 
 @cache
 def _names(kind: Any) -> tuple[str, ...]:
-    """Of a dataclass's fields; of another type, none."""
+    """Names of a dataclass's fields; none for another type."""
     return tuple(field.name for field in fields(kind)) if is_dataclass(kind) else ()
 
 

@@ -57,16 +57,6 @@ def fidelities_of(task: BatchTask | Task) -> dict[str, Fidelity]:
     return found
 
 
-def fidelity_of(task: Task) -> Fidelity:
-    """Of a task with eyes of one kind.
-
-    Raises:
-        ValueError: see `fidelities_of`.
-    """
-    (found,) = fidelities_of(task).values()
-    return found
-
-
 def fidelities_among(task: BatchTask, number: int) -> dict[str, Fidelity]:
     """Of one of the agents, by what it sees of the others.
 

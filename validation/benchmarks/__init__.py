@@ -1,6 +1,7 @@
 """Times and rates on this machine.
 
 batch_task_throughput  one task for one world at a time and on arrays of all
+two_checkouts          whole steps here and in another checkout
 steps_per_second       steps per CPU second of worlds and models; a proof, with bounds on ratios
 sim_throughput         renderer and environment against MuJoCo's renderer
 learning_throughput    training with PPO against MuJoCo's renderer

@@ -2,10 +2,17 @@
 
 import subprocess
 import sys
+from dataclasses import dataclass
+from typing import Any
 
+import drjit as dr
+import mitsuba as mi
 import numpy as np
+import pytest
 
-from sim.scene.device_arrays import ALIGNMENT, PACKET, aligned
+from sim.scene.device_arrays import ALIGNMENT, PACKET, SharedBuffer, aligned, floats
+from sim.scene.frozen_kernels import FrozenKernel
+from sim.scene.variant import variant
 
 # A first environment becomes garbage; collection falls due in the middle of the second one's recording.
 PROGRAM = """
@@ -53,3 +60,57 @@ def test_aligned_arrays_are_whole_and_a_packet_may_be_read_beyond_their_end():
         assert array.shape == (n,)
         assert array.ctypes.data % ALIGNMENT == 0
         assert whole.ctypes.data + whole.nbytes >= array.ctypes.data + array.nbytes + PACKET
+
+
+@dataclass(frozen=True)
+class Weights:
+    """Nested as kernels' inputs are: lists of arrays, and parts that may be missing."""
+
+    each: list[Any]
+    offset: Any = None
+
+
+@dataclass(frozen=True)
+class Inputs:
+    x: Any
+    weights: Weights
+
+
+def weighted(scenes, x, inputs):
+    first, second = inputs.weights.each
+    total = x * first + inputs.x * second
+    return total if inputs.weights.offset is None else total + inputs.weights.offset
+
+
+def test_typed_inputs_keep_their_places_when_a_kernel_is_replayed():
+    """With other arrays in the same places, a recording is used again; with other places, there is another one."""
+    with variant():
+        kernel = FrozenKernel(weighted)
+
+        def of(number):
+            return floats(np.full(100, number))  # of its own: Dr.Jit records anew if one array has two places
+
+        fixed = Inputs(of(5), Weights([of(2), of(3)]))
+        for moving, given, expected in (
+            (of(7), fixed, 7 * 2 + 5 * 3),
+            (of(4), fixed, 4 * 2 + 5 * 3),
+            (of(7), Inputs(of(2), Weights([of(5), of(6)])), 7 * 5 + 2 * 6),
+        ):
+            np.testing.assert_array_equal(kernel(None, moving, given).numpy(), expected)
+        assert kernel.n_recordings == 1
+        shifted = Inputs(of(5), Weights([of(2), of(3)], offset=of(9)))
+        np.testing.assert_array_equal(kernel(None, of(7), shifted).numpy(), 7 * 2 + 5 * 3 + 9)
+        assert kernel.n_recordings == 2
+
+
+@pytest.mark.parametrize("backend", [dr.JitBackend.LLVM, dr.JitBackend.CUDA])
+def test_a_shared_buffer_says_what_was_written_last(backend, monkeypatch):
+    """A GPU does not see NumPy's memory, and gets a copy each time; that is done here on the processor."""
+    with variant():
+        buffer = SharedBuffer(64)
+        if backend != dr.JitBackend.LLVM:
+            buffer._array = mi.Float(np.full(64, -1.0))  # stale, as on a GPU
+            monkeypatch.setattr(dr, "backend_v", lambda kind: backend)
+        for number in (1.0, 2.0):
+            buffer.values[:] = number
+            np.testing.assert_array_equal(buffer.array.numpy(), number)
