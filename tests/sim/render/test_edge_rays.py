@@ -111,3 +111,21 @@ def test_who_cannot_look_at_edges_says_so():
         renderer(1, one=blurred)
     with pytest.raises(ValueError, match="tolerance = -1: must be positive"):
         renderer(1, tolerance=-1)
+
+
+def test_built_in_worlds_are_seen_at_edges_in_closed_form(traced):
+    """As rays everywhere see them, with half of the rays: there are stripes on all walls."""
+    world, eyes, worlds = sim.build_world("detection"), sim.Eyes(n_eyes=2, resolution=(12, 15)), 4
+    env = sim.make_vec_env("detection", eyes, worlds, seed=1, rays_per_receptor=1)
+    env.reset()
+    seen, everywhere = (
+        sim.BatchedRenderer(world, eyes, worlds, sim.Fidelity(FINE, 4, tolerance=0.005, samples=samples))
+        for samples in ("edges", "rays")
+    )
+    assert seen.tracer.name == everywhere.tracer.name == "closed_form"
+    right, found = everywhere.signals(env.state), seen.signals(env.state)
+    coarse = sim.BatchedRenderer(world, eyes, worlds, sim.Fidelity(FIRST, 4)).signals(env.state)
+    assert sum(traced) < 0.6 * FINE * worlds * 2 * 12 * 15
+    # What is missed lies within the tolerance; the first rays alone err by ten times as much somewhere.
+    assert np.abs(found - right).max() < 0.005
+    assert np.abs(coarse - right).max() > 0.05
