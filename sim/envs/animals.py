@@ -63,7 +63,8 @@ class Animals:
     def advance(self, actions: Sequence[np.ndarray]) -> Advanced:
         """One action further; actions (world, number) of each that learns."""
         simulation = self.simulation
-        failed = simulation.move(np.concatenate(self._everyones(actions), axis=1))
+        everyones = self._everyones(actions)
+        failed = simulation.move(np.concatenate(everyones, axis=1) if len(everyones) > 1 else everyones[0])
         first = 0
         for agent, senses in zip(simulation.agents, self._of_agents, strict=True):
             if senses is not None:

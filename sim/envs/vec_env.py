@@ -171,7 +171,8 @@ class EyesVecEnv(OneEnvironment):
             RuntimeError: before the first reset.
         """
         self._require_begun()
-        return self.animals.advance(np.split(self._commanded, len(self._learners)))
+        learners = len(self._learners)
+        return self.animals.advance(np.split(self._commanded, learners) if learners > 1 else [self._commanded])
 
     def _begin_again(self, ended: np.ndarray) -> Any:
         """Start new episodes in these worlds, and begin to render them."""

@@ -61,6 +61,7 @@ class Simulation:
         self.learners = sum(agent.learns for agent in self.agents)
         self.rows = self.learners * n
         self.steps, self._returns = np.zeros(n, int), np.zeros(self.rows)
+        self._everyone = np.arange(n)
         self.physics: Physics = task.physics(n, threads, self.variation)
         self.seed(seed)
         self._rehearse()
@@ -99,7 +100,7 @@ class Simulation:
 
     def reset(self) -> Any:
         """Start all episodes."""
-        self.restart(np.arange(self.n))
+        self.restart(self._everyone)
         return self.state
 
     def restart(self, worlds: np.ndarray) -> None:
@@ -142,8 +143,7 @@ class Simulation:
         """The second half: what it led to. The task may put bodies elsewhere."""
         outcome = self.task.judge(self.physics, failed)
         require_outcome(outcome, self.n, self.learners)
-        everyone = np.arange(self.n)
-        self._feel(outcome.feels or self.task.all_feel(self.physics, everyone), everyone)
+        self._feel(outcome.feels or self.task.all_feel(self.physics, self._everyone), slice(None))
         self.physics.check(self.task_name)
         reward = outcome.terms.total
         self._returns += reward
@@ -237,13 +237,13 @@ class Simulation:
                 first += agent.n_actions
         return np.minimum(np.maximum(actions, -1.0), 1.0), failed
 
-    def _feel(self, felt: Sequence[Mapping[str, np.ndarray]], worlds: np.ndarray) -> None:
+    def _feel(self, felt: Sequence[Mapping[str, np.ndarray]], worlds: np.ndarray | slice) -> None:
         for known, now in zip(self.felt, felt, strict=True):
             for name, array in now.items():
                 unknown = np.isnan(array)
                 if unknown.any():
                     fresh = ~unknown.any(axis=1)
-                    known[name][worlds[fresh]] = array[fresh]
+                    known[name][self._everyone[worlds][fresh]] = array[fresh]
                 else:
                     known[name][worlds] = array
 

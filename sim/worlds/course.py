@@ -1,7 +1,7 @@
 """A course: a way through a grid of cells on which an agent that keeps getting farther from its start arrives.
 
 Navigation rewards distance from the start. Where the way falls back towards the start, that reward has a local optimum,
-and nobody ever leaves it (docs/decisions/028). On a course it nowhere falls back by more than MOST_FALL.
+and nobody ever leaves it (docs/concepts/physics.md). On a course it nowhere falls back by more than MOST_FALL.
 """
 
 from __future__ import annotations

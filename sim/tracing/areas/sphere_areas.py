@@ -18,7 +18,7 @@ from sim.tracing.areas.patch import Area, Patch, Rectangle
 from sim.tracing.areas.stripes import Texture
 
 # Chosen: strips across what an area sees of a sphere, and parts of each. Wide areas take more: else they would have to
-# be two (docs/measurements/rendering.md#areas).
+# be two (docs/measurements/rendering.md#area-sampling).
 SIDES, SIDES_OF_WIDE = 3, 4
 WIDE = 0.0555  # on the plane at distance 1: 3.2 degrees
 # Cosine below which a surface does not slope further away from the eye: beyond, its patch would be longer than the
