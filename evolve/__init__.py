@@ -1,14 +1,14 @@
-"""evolve: eyes and brains that evolve in the worlds of `sim`.
+"""evolve: evolution of eyes and brains in the worlds of `sim`.
 
-Table of contents; everything loads on first use.
+This module is a table of contents. Each name is imported on first use.
 """
 
 from __future__ import annotations
 
-import rhabdom  # noqa: F401 (finds rhabdom's own optics and sim, whoever else has installed packages of these names)
+import rhabdom  # noqa: F401 (finds rhabdom's own optics and sim, even if other packages with these names are installed)
 
 TYPE_CHECKING = False
-if TYPE_CHECKING:  # Ctrl-C while this loads is not looked after yet, and `typing` takes milliseconds
+if TYPE_CHECKING:  # importing `typing` takes milliseconds, during which Ctrl-C is not yet handled
     from typing import Any
 
 _HOME = {

@@ -1,15 +1,15 @@
-"""`evolve`, and python -m evolve. Nothing else is loaded before Ctrl-C is looked after."""
+"""Entry point of `evolve` and `python -m evolve`; nothing else is imported before Ctrl-C is handled."""
 
 import sys
 
 
 def main() -> int:
-    """Load the command and run it; returns the exit code."""
+    """Import the command, run it, and return the exit code."""
     try:
         from evolve.cli.main import main as command
 
         return command()
-    except KeyboardInterrupt:  # while it was being loaded
+    except KeyboardInterrupt:  # during the import
         print("evolve: interrupted", file=sys.stderr)
         return 130
 

@@ -1,4 +1,4 @@
-"""The PSF of an ideal f/4 lens as small as an insect's eye, beside the Airy pattern.
+"""PSF of an ideal f/4 lens as small as an insect's eye, compared with the Airy pattern.
 
 python examples/01_airy_disk.py [--out airy_disk.png]
 """
@@ -24,7 +24,7 @@ print(f"first dark ring     {result.x[dark] * 1e6:.2f} µm (Airy: {first_zero * 
 print(f"energy inside it    {optics.encircled_energy(result, [first_zero])[0, 0]:.4f} (Airy: 0.8378)")
 
 parser = argparse.ArgumentParser()
-parser.add_argument("--out", help="draw the PSF into this file")
+parser.add_argument("--out", help="save a figure of the PSF to this file")
 out = parser.parse_args().out
 if out:
     import matplotlib

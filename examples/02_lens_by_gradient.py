@@ -1,7 +1,8 @@
-"""A lens found by gradient: from a flat relief to a focus, in seconds.
+"""A lens found by gradient descent: from a flat relief to a focus, in seconds.
 
-The relief is the gene of rhabdom's eyes: 4 x 4 control points of one bicubic B-spline patch. Light on the axis is
-gathered into ever smaller spots; the derivative of the PSF with respect to every control point comes from Dr.Jit.
+The relief is the one in the genome of rhabdom's eyes: 4 x 4 control points of one bicubic B-spline patch. The objective
+is the light within a spot on the axis, which shrinks from stage to stage. Dr.Jit computes the derivative of the PSF
+with respect to every control point.
 
     python examples/02_lens_by_gradient.py
 """
@@ -18,12 +19,12 @@ import optics
 
 WAVELENGTH, FOCAL_LENGTH, F_NUMBER, INDEX = 550e-9, 240e-6, 4, 1.5
 RADIUS = FOCAL_LENGTH / (2 * F_NUMBER)
-SPOTS = (16e-6, 6e-6, 2e-6)  # standard deviations of the spot that the light is gathered into [m]
+SPOTS = (16e-6, 6e-6, 2e-6)  # standard deviations of the target spot [m]
 UNIT = 1e-6  # the optimiser works in µm
 
 
 def gathered(points: np.ndarray, spot: float) -> tuple[float, np.ndarray]:
-    """-log of the light within a Gaussian spot, and its gradient over the control points [per µm]."""
+    """Negative log of the light within a Gaussian spot, and its gradient over the control points [per µm]."""
     import drjit as dr
     from drjit.llvm.ad import Float64, TensorXf64
 
@@ -40,7 +41,7 @@ def gathered(points: np.ndarray, spot: float) -> tuple[float, np.ndarray]:
 
 
 def find() -> tuple[np.ndarray, list[tuple[float, float, int]]]:
-    """Control points [m], and (spot, Strehl ratio, evaluations) after each stage."""
+    """Return control points [m], and (spot, Strehl ratio, evaluations) after each stage."""
     points, stages, calls = np.zeros(16), [], 0
     for spot in SPOTS:
         found = minimize(gathered, points, args=(spot,), jac=True, method="L-BFGS-B", options={"maxiter": 25})
@@ -55,7 +56,7 @@ def strehl(control_points: np.ndarray) -> float:
 
 
 def paraboloid() -> np.ndarray:
-    """The thin lens of the same focal length: curvature 1 / ((n - 1) f)."""
+    """Control points of the thin lens of the same focal length: curvature 1 / ((n - 1) f)."""
     return optics.BSplineRelief.paraboloid(0.0, 1 / ((INDEX - 1) * FOCAL_LENGTH), RADIUS).control_points
 
 

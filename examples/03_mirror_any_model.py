@@ -1,4 +1,4 @@
-"""Any MuJoCo model as a spectral picture: a model's own camera, its materials and sky in Mitsuba 3.
+"""Spectral rendering of any MuJoCo model: its camera, materials and sky in Mitsuba 3.
 
 python examples/03_mirror_any_model.py [MODEL.xml] [--camera NAME] [--out picture.png]
 """
@@ -40,9 +40,9 @@ MODEL = """
 """
 
 parser = argparse.ArgumentParser()
-parser.add_argument("model", nargs="?", help="an MJCF, URDF or MJB file; left out: a small still life")
-parser.add_argument("--camera", help="a camera of the model; left out: its first, or a view of the whole")
-parser.add_argument("--out", help="draw into this file")
+parser.add_argument("model", nargs="?", help="an MJCF, URDF or MJB file; default: a small still life")
+parser.add_argument("--camera", help="a camera of the model; default: its first, or a view of the whole model")
+parser.add_argument("--out", help="save the image to this file")
 options = parser.parse_args()
 
 with warnings.catch_warnings(record=True) as said:
@@ -67,7 +67,7 @@ radiance = mirror.render(camera, width, height, "path", spp=64 if options.out el
 for geom in np.unique(ids[ids >= 0]):
     name = mirror.model.geom(geom).name or f"geom {geom}"
     spectrum = radiance[:, ids == geom].mean(axis=1)
-    print(f"{name:<16} {np.mean(ids == geom):6.1%} of the picture, radiance " + " ".join(f"{r:.3f}" for r in spectrum))
+    print(f"{name:<16} {np.mean(ids == geom):6.1%} of the image, radiance " + " ".join(f"{r:.3f}" for r in spectrum))
 
 if options.out:
     from matplotlib.image import imsave

@@ -1,4 +1,4 @@
-"""A fly's ommatidium: the modes of its rhabdom, and the directions from which each of them takes light.
+"""A fly's ommatidium: modes of its rhabdom, and the angular sensitivity of each mode.
 
 python examples/04_rhabdom.py [--out rhabdom.png]
 """
@@ -23,11 +23,11 @@ gaussian = np.degrees(optics.snyder_acceptance(25e-6, facet.object_focal_length(
 print(f"V = {rhabdom.v_number(WAVELENGTH):.2f} at {WAVELENGTH * 1e9:.0f} nm")
 for mode, power in zip(modes, powers, strict=True):
     if not mode.sine:
-        print(f"LP{mode.l}{mode.m}: {mode.core_share:.2f} in the core, takes {power.max():.2f} of the light at most")
-print(f"acceptance angle {acceptance:.2f}°, as if all were Gaussian {gaussian:.2f}°")
+        print(f"LP{mode.l}{mode.m}: {mode.core_share:.2f} in the core, accepts at most {power.max():.2f} of the light")
+print(f"acceptance angle {acceptance:.2f}°, all Gaussian {gaussian:.2f}°")
 
 parser = argparse.ArgumentParser()
-parser.add_argument("--out", help="draw modes and sensitivity into this file")
+parser.add_argument("--out", help="save a figure of modes and sensitivity to this file")
 out = parser.parse_args().out
 if out:
     import matplotlib
@@ -51,7 +51,7 @@ if out:
         axes.plot(np.degrees(angles), power, lw=1.2, label=f"LP$_{{{mode.l}{mode.m}}}$")
     axes.plot(np.degrees(angles), sensitivity, "k", lw=2, label="absorbed")
     half = np.degrees(angles) / gaussian
-    axes.plot(np.degrees(angles), sensitivity.max() * 0.5 ** (4 * half**2), ":", color="0.4", label="as if Gaussian")
+    axes.plot(np.degrees(angles), sensitivity.max() * 0.5 ** (4 * half**2), ":", color="0.4", label="all Gaussian")
     axes.set(xlabel="angle off the axis [°]", ylabel="share of the light on the facet", ylim=(0, None))
     axes.set_title(f"facet 25 µm, rhabdom 2 µm, {WAVELENGTH * 1e9:.0f} nm: Δρ = {acceptance:.2f}°", fontsize=10)
     axes.legend(fontsize=8)

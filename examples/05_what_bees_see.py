@@ -1,4 +1,4 @@
-"""Two flowers that no camera tells apart, as receptors of a camera, of people, of goldfish and of bees report them.
+"""Signals of a camera, a human, a goldfish and a bee for two flowers that a camera cannot distinguish.
 
 python examples/05_what_bees_see.py [--out eyes.png]   (--out: the task `foraging` through the eyes of each)
 """
@@ -25,7 +25,7 @@ for name in SHOWN:
     print(f"{name:<9} receptors of {peaks:<19} nm differ by {contrast:5.1f} standard deviations of their noise")
 
 parser = argparse.ArgumentParser()
-parser.add_argument("--out", help="draw what the eyes see into this file")
+parser.add_argument("--out", help="save a figure of the eyes' signals to this file")
 out = parser.parse_args().out
 if out:
     from matplotlib import pyplot
@@ -34,7 +34,7 @@ if out:
     for row, (name, who) in zip(rows, SHOWN.items(), strict=True):
         eyes = sim.Eyes(n_eyes=1, resolution=(30, 60), fov_deg=45, receptors=name, bands=8)
         world = sim.make_env("foraging", eyes, render_mode="eyes")
-        world.reset(seed=2429)  # goal and adversary ahead
+        world.reset(seed=2429)  # goal and adversary are in front
         row.imshow(world.render(), interpolation="nearest")
         row.set(xticks=[], yticks=[])
         row.set_ylabel(who, fontsize=13)

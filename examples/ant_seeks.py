@@ -1,12 +1,13 @@
-"""An ant with eyes that evolve, and that goes by sight to a red ball somewhere around it.
+"""An ant with evolving eyes that walks by sight to a red ball at a random position around it.
 
     evolve run examples/ant_seeks.py:AntSeeks --preset quick
 
-The body is Gymnasium's ant, as it is installed with it. What is learnt is where to go. How its legs take it there is
-written down here: a trot of diagonal legs, whose phase the task keeps in mjData's `userdata`. The animal knows what its
-eyes see and what it did last, and nothing of its legs.
+The body is Gymnasium's ant, from the installed package. The ant learns where to go. Its gait is programmed: a trot of
+diagonal legs, whose phase the task stores in mjData's `userdata`. Observations are the eyes' signals and the last
+action, without the state of the legs.
 
-Run as a script, the file shows how fast the ant walks and turns, and how often it comes to a ball that it cannot see.
+Run as a script, the file prints how fast the ant walks and turns, and how often a randomly walking ant reaches the
+ball.
 """
 
 from pathlib import Path
@@ -18,15 +19,15 @@ import numpy as np
 import sim
 
 ANT = Path(gymnasium.__file__).parent / "envs/mujoco/assets/ant.xml"
-SIDES = np.array([1, 1, -1, -1])  # left or right, of the legs as the model numbers them
+SIDES = np.array([1, 1, -1, -1])  # left or right, in the model's order of legs
 OUTWARDS = np.array([1, -1, -1, 1])  # sign of the knee that bends a leg down
 TROT = np.array([0.0, np.pi, 0.0, np.pi])  # diagonal legs step together
-STRIDE, LIFT, STANCE = 0.52, 0.3, 1.1  # [rad] of the hip to either side; of the knee in the air, and on the ground
+STRIDE, LIFT, STANCE = 0.52, 0.3, 1.1  # [rad]: swing of the hip, lift of the knee, knee on the ground
 NEAR = 1.0  # [m] from the ball's centre: the ant's feet touch it
 
 
 def ant_and_ball(seen: bool = True) -> mujoco.MjSpec:
-    """Gymnasium's ant with joints that are led to angles, on a plain floor, and a ball."""
+    """Gymnasium's ant with position-controlled joints, on a plain floor, and a ball."""
     spec = mujoco.MjSpec.from_file(str(ANT))
     spec.nuserdata, spec.option.timestep = 2, 0.02
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
@@ -50,21 +51,24 @@ def ant_and_ball(seen: bool = True) -> mujoco.MjSpec:
 
 
 class AntSeeks(sim.Task):
-    """A ball is 2 to 3 m away, anywhere around. The ant says how fast it walks, and how it turns."""
+    """A ball is 2 to 3 m away in any direction. The action sets the ant's speed and its turn."""
 
     model = ant_and_ball()
     mounts = (sim.Mount("torso", offset=(0.27, 0, 0.1)),)
     fidelity = sim.Fidelity(2, bands=4)
-    camera = "watch"  # of pictures for people
-    substeps, episode_steps = 10, 45  # of 0.02 s, and of 0.2 s
+    camera = "watch"  # for rendered images
+    substeps, episode_steps = 10, 45  # of 0.02 s and of 0.2 s
 
     def n_actions(self, model):
         return 2
 
     def act(self, data, action):
-        """Speed, -1 standing and 1 full, and turning, to the left above 0; who turns strides less."""
+        """Move the legs for a speed, from -1 (standing) to 1 (full), and a turn, positive to the left.
+
+        Strides shorten as the ant turns.
+        """
         speed, turn = (action[0] + 1) / 2, action[1]
-        data.userdata[0] += 2 * np.pi * self.substeps * data.model.opt.timestep  # a stride in a second
+        data.userdata[0] += 2 * np.pi * self.substeps * data.model.opt.timestep  # one stride per second
         phase = data.userdata[0] + TROT
         stride = STRIDE * (speed * (1 - abs(turn)) * SIDES - turn)
         lift = LIFT * max(speed, abs(turn)) * np.clip(-np.sin(phase), 0, None)
@@ -87,18 +91,18 @@ class AntSeeks(sim.Task):
         return self.terminated(data)
 
     def apart(self, data):
-        """How far the ball is [m]."""
+        """Distance to the ball [m]."""
         return float(np.linalg.norm(data.mocap_pos[0, :2] - data.qpos[:2]))
 
 
 class Blindfold(AntSeeks):
-    """The null model: the same ant and the same ball, which cannot be seen."""
+    """Null model: the same ant and the same ball, which is invisible."""
 
     model = ant_and_ball(seen=False)
 
 
 def walk(speed: float, turn: float, seconds: float = 6.0) -> tuple[float, float]:
-    """How fast an ant that does this gets ahead [m/s], and turns [rad/s]."""
+    """Speed [m/s] and turning rate [rad/s] of an ant with a constant action."""
     task = AntSeeks()
     model = task.model.compile()
     data, headings = mujoco.MjData(model), []
@@ -123,4 +127,4 @@ if __name__ == "__main__":
         _, _, ended, infos = worlds.step(way)
         found |= ~done & [info["is_success"] for info in infos]
         done |= ended
-    print(f"ants that stroll about come to the ball in {found.mean():.0%} of their episodes")
+    print(f"ants that walk at random reach the ball in {found.mean():.0%} of their episodes")

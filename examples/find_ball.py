@@ -1,9 +1,9 @@
-"""A task of your own, whose eyes evolve: a cart on a rail moves to where it sees a ball.
+"""A user task with evolving eyes: a cart on a rail moves to the ball that it sees.
 
     evolve run examples/find_ball.py:FindBall --preset quick
 
-The eyes come from the genome. By default `place` fans them out from the first mount; a method of your own may put them
-anywhere. Run as a script, the file shows how far carts come that roll about at random.
+The genome determines the eyes. By default `place` fans them out from the first mount; override it for another
+arrangement. Run as a script, the file prints how often carts with random actions find the ball.
 """
 
 import numpy as np
@@ -12,7 +12,7 @@ import sim
 
 
 class FindBall(sim.Task):
-    """A ball stands before a rail. The cart on it sees, and feels how fast it is."""
+    """A ball stands in front of a rail. The cart on the rail sees the ball and senses its own speed."""
 
     model = """
     <mujoco>
@@ -42,7 +42,7 @@ class FindBall(sim.Task):
     def succeeded(self, data):
         return abs(data.mocap_pos[0, 1] - data.qpos[0]) < 0.3
 
-    def feels(self, data):
+    def proprioception(self, data):
         return data.qvel
 
 
@@ -53,4 +53,4 @@ if __name__ == "__main__":
     for _ in range(FindBall.episode_steps):
         _, _, _, infos = worlds.step(random.uniform(-1, 1, (32, 1)))
     found = np.mean([info["is_success"] for info in infos])
-    print(f"carts that roll about at random end before the ball in {found:.0%} of their episodes")
+    print(f"carts with random actions end in front of the ball in {found:.0%} of their episodes")

@@ -1,8 +1,9 @@
-"""The task of `find_ball.py` on arrays of all worlds, which is faster for 16 worlds or more.
+"""Vectorised form of the task in `find_ball.py`, which is faster for 16 worlds or more.
 
     evolve run examples/find_balls.py:FindBalls --preset quick
 
-Both classes give the same episodes, rewards and animals, bit for bit. docs/tutorial/batch_task.md explains the methods.
+Both classes produce the same episodes, rewards and animals, bit for bit. docs/tutorial/batch_task.md explains the
+methods.
 """
 
 import numpy as np
@@ -11,7 +12,7 @@ import sim
 
 
 class FindBalls(sim.BatchTask):
-    """A ball stands before a rail. The cart on it sees, and feels how fast it is."""
+    """A ball stands in front of a rail. The cart on the rail sees the ball and senses its own speed."""
 
     model = """
     <mujoco>
@@ -41,7 +42,7 @@ class FindBalls(sim.BatchTask):
     def succeeded(self, worlds):
         return self.distance(worlds) < 0.3
 
-    def feels(self, worlds):
+    def proprioception(self, worlds):
         return worlds.qvel
 
     def distance(self, worlds):
@@ -50,4 +51,4 @@ class FindBalls(sim.BatchTask):
 
 if __name__ == "__main__":
     sim.check_batch_task(FindBalls())
-    print("the task keeps the protocol of sim.BatchTask")
+    print("the task follows the protocol of sim.BatchTask")

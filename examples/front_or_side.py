@@ -1,12 +1,12 @@
-"""Eyes in front or at the sides? Prey that has two of them evolves where, before a predator that hunts by sight.
+"""Eyes in front or at the sides? Prey with two eyes evolves their placement under a predator that hunts by sight.
 
     evolve run examples/front_or_side.py:Prey --config examples/front_or_side.toml
 
-The predator is frozen: it has eyes, too, and a rule instead of a brain that learns. It comes from anywhere or, in every
-second episode, not at all, so that prey that sees nothing does not know whether nothing is there. `Blindfold` is the
-null model: the prey sees everything but the predator, which sees the prey. Run as a script, the file shows how prey
-fares that always runs ahead; `--trainings 3` lets prey with eyes in front and at the sides learn three times each, in
-both worlds, as it would within a run.
+The predator is frozen: it has eyes and a fixed rule instead of a learned policy. It comes from a random direction or,
+in half of the episodes, not at all. An empty view therefore does not reveal whether a predator is present. In
+`Blindfold`, the null model, the prey does not see the predator, while the predator sees the prey. Run as a script, the
+file prints the results of prey that always runs ahead. `--trainings 3` trains prey with eyes in front and at the sides
+three times each, in both worlds, as within a run.
 """
 
 import argparse
@@ -19,8 +19,8 @@ import optics
 import sim
 
 PREY_SPEED, PREDATOR_SPEED, TURN = 0.6, 1.0, 2.0  # m/s, m/s, rad/s
-NEAR, AWAY, CAUGHT = 2.0, 30.0, 0.4  # m: where the predator begins, if it comes; if not; from middle to middle
-EFFORT = 0.3  # of what running from a predator is worth, running costs
+NEAR, AWAY, CAUGHT = 2.0, 30.0, 0.4  # [m] initial distance of the predator if it comes, if not; distance of capture
+EFFORT = 0.3  # cost of running, relative to the reward of running from a predator
 
 FIELD = """
 <mujoco>
@@ -45,7 +45,7 @@ FIELD = """
 
 
 class Predator(sim.Task):
-    """Runs ahead at full speed; its action is where to turn."""
+    """Runs ahead at full speed; its action is the turning rate."""
 
     model = FIELD
     eye = optics.Eye(resolution=(1, 15), fov_deg=100, bands=4)
@@ -67,7 +67,7 @@ class Predator(sim.Task):
 
 
 def chase(observation):
-    """Turn to where things are blue: the middle of what is, left positive, over the half width of the field."""
+    """Turn towards blue areas: towards their mean position, left positive, over the half width of the field."""
     red, _, blue = np.moveaxis(observation["eyes"][:, -1, 0, :, 0], 1, 0)
     prey = np.clip(blue - red - 0.05, 0, None)
     leftwards = np.linspace(1, -1, prey.shape[1])
@@ -75,8 +75,10 @@ def chase(observation):
 
 
 class Prey(sim.Task):
-    """Runs in any direction without turning: its action is its velocity. Running from a predator pays as long as it
-    lives; running costs."""
+    """Runs in any direction without turning: its action is its velocity.
+
+    Running from a predator is rewarded until the prey is caught; all running has a cost.
+    """
 
     model = FIELD
     mounts = (sim.Mount("prey", offset=(0.21, 0, 0)),)
@@ -104,7 +106,7 @@ class Prey(sim.Task):
 
 
 class Blindfold(Prey):
-    """The null model: the predator is of a group of geoms that are drawn for nobody, and it sees the prey."""
+    """Null model: the predator belongs to a group of geoms that eyes do not render, and it sees the prey."""
 
     model = FIELD.replace('group="0"', 'group="3"')
 
@@ -119,7 +121,7 @@ def from_predator(data):
 
 
 def always_ahead(episodes=256):
-    """Mean return and its standard error, and the share that is not caught, of prey that runs ahead all the time."""
+    """Mean return with its standard error, and share that is not caught, of prey that always runs ahead."""
     worlds = sim.make_vec_env(seeing(Prey()), n_envs=episodes, seed=0)
     worlds.reset()
     returns, alive = np.full(episodes, np.nan), np.zeros(episodes)
@@ -131,14 +133,14 @@ def always_ahead(episodes=256):
 
 
 def seeing(task):
-    """With two eyes, though it looks at nothing."""
+    """Give the task two eyes, although the policy ignores them."""
     task.eye = optics.Eye(resolution=(1, 12), fov_deg=100, bands=4)
     task.mounts = sim.fan(task.mounts[0], 2, 60)
     return task
 
 
 def lived(world, placement_range_deg, seed):
-    """The same, of prey that has learnt as it does in a run, with its eyes so far apart."""
+    """Results, as in `always_ahead`, of prey trained as in a run, with this angle between its eyes."""
     import evolve
     from evolve.config.assemble import assemble
     from evolve.learning.fitness import evaluate
@@ -154,7 +156,7 @@ def lived(world, placement_range_deg, seed):
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser()
-    parser.add_argument("--trainings", type=int, default=0, help="of each kind of eyes in each world")
+    parser.add_argument("--trainings", type=int, default=0, help="trainings for each placement of eyes in each world")
     told = "{}: fitness {:.3f} ± {:.3f}, {:.0%} not caught".format
     print(told("always ahead", *always_ahead()))
     for number in range(parser.parse_args().trainings):

@@ -1,4 +1,4 @@
-"""What came out: an experiment per module, run once and stored in docs/results, drawn and tabled from the store.
+"""Experiments, one per module: each was run once, and its page in docs/results is made from the stored numbers.
 
-Records of the runs that they rest on are in experiments/records.
+Records of the underlying runs are in experiments/records.
 """

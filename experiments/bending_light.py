@@ -1,4 +1,4 @@
-"""Eyes learn to bend light: first the pupil evolves, then relief and index join it
+"""Evolution of pupils and lenses: first the pupil evolves, then relief and refractive index as well
 
 python -m experiments.bending_light [--runs VARIANT=DIR ...] [--answer TEXT] [--docs DIR]
 """
@@ -27,13 +27,13 @@ __all__ = ["page"]
 
 NAME = "bending_light"
 MEASURES = ("contrast", "stripes_1", "stripes_2", "stripes_4")
-MOST_POWER = 2.0  # what counts of it: behind a narrow pupil glass of any power does little
+MOST_POWER = 2.0  # limit, because a high power has little effect behind a narrow pupil
 QUANTITIES: dict[str, Callable[[Row], float]] = {
     "relative aperture a": lambda row: row.relative_aperture,
     "refractive index": lambda row: row.refractive_index,
     "contrast above the noise": lambda row: row.above_noise,
-    "what its glass adds to it": lambda row: row.above_noise - row.above_noise_of_hole,
-    "power of its glass": lambda row: min(max(row.glass_power, -MOST_POWER), MOST_POWER),
+    "contribution of the glass": lambda row: row.above_noise - row.above_noise_of_hole,
+    "power of the glass": lambda row: min(max(row.glass_power, -MOST_POWER), MOST_POWER),
     "Strehl ratio": lambda row: row.strehl,
     "image quality": lambda row: row.image_quality,
     "PSNR [dB]": lambda row: row.psnr_db,
@@ -44,7 +44,11 @@ QUANTITIES: dict[str, Callable[[Row], float]] = {
 
 
 def page(store: Store) -> Page:
-    """The page of stored runs. Raises ValueError with more groups than there are colours."""
+    """Return the page of stored runs.
+
+    Raises:
+        ValueError: there are more groups than colours.
+    """
     return Page(
         name=NAME,
         command=(
@@ -75,13 +79,15 @@ def page(store: Store) -> Page:
 
 
 def joining(store: Store) -> int | None:
-    """The first generation of phase II: that of the groups that have one; None where none has."""
+    """Return the first generation of phase II; None if no group has a phase II."""
     return min((row.generation for row in store.rows if row.phase > 0), default=None)
 
 
 def of_phase(store: Store, group: str, phase: int) -> list[Row]:
-    """Rows of a group up to the end of phase I, or from there on. A group whose genes are all open from the beginning
-    is compared at the same generations."""
+    """Return the rows of a group in phase I or in phase II.
+
+    For a group whose genes are all open from the start, the same generations are used.
+    """
     start = joining(store)
     rows = store.group(group)
     if start is None:
@@ -90,7 +96,7 @@ def of_phase(store: Store, group: str, phase: int) -> list[Row]:
 
 
 def table(store: Store, phase: int) -> str:
-    """A row per quantity, two columns per variant."""
+    """Return a table with a row per quantity and two columns per variant."""
     header = ["", *(f"{group}{what}" for group in store.groups for what in ("", ", null model"))]
     lines = []
     for name, value in QUANTITIES.items():
@@ -105,7 +111,7 @@ def table(store: Store, phase: int) -> str:
 
 
 def prediction(store: Store) -> str:
-    """Where pupils that evolve alone end, and the best holes by each measure."""
+    """Return a table of the pupils at the end of phase I and the best pinholes by each measure."""
     lines = []
     for group in store.groups:
         sigma = store.noise_sigma(group)
@@ -119,7 +125,7 @@ def prediction(store: Store) -> str:
 
 
 def draw(store: Store, path: Path) -> None:
-    """A panel per quantity, a line per seed; the last panel is the key."""
+    """Draw a panel per quantity with a line per seed; the last panel is the legend."""
     figure, axes = new_figure(15, 5.6, columns=(len(QUANTITIES) + 2) // 2, rows=2, sharex=True)
     for place, (name, value) in zip(axes.flat, QUANTITIES.items(), strict=False):
         for group, color in store.colors.items():
@@ -139,41 +145,43 @@ def draw(store: Store, path: Path) -> None:
         place.set_xlabel("generation")
     axes[-1, -1].set_axis_off()
     for group, color in store.colors.items():
-        control = "" if group in lenses(store) else ": no lens is possible"
+        control = "" if group in lenses(store) else ": no lens possible"
         axes[-1, -1].plot([], [], color=color, lw=2, label=f"{group}{control}")
     axes[-1, -1].fill_between([], [], [], color="#777777", alpha=0.2, label="null model")
-    axes[-1, -1].plot([], [], color="#777777", ls="--", label="best hole for stripes")
-    axes[-1, -1].plot([], [], color="#777777", ls=":", label="from here glass may change")
+    axes[-1, -1].plot([], [], color="#777777", ls="--", label="best pinhole for stripes")
+    axes[-1, -1].plot([], [], color="#777777", ls=":", label="start of phase II")
     axes[-1, -1].legend(loc="center", frameon=False)
     figure.suptitle(message(store))
     save(figure, path)
 
 
 def message(store: Store) -> str:
-    """How many pupils closed alone, and how many opened again with glass that may bend light and without."""
+    """Return the figure's title: the numbers of pupils that close in phase I and that reopen in phase II."""
     found = [(group in lenses(store), pupils(store, group, seed)) for group, seed in searches(store)]
     closed = sum(alone < begun for _, (begun, alone, _) in found)
     opened = {may: [end > alone for its, (_, alone, end) in found if its == may] for may in (True, False)}
     with_, without = (f"{sum(of)} of {len(of)}" for of in opened.values())
     return (
-        f"Alone, {closed} of {len(found)} pupils close; where glass may become a lens {with_} open again, "
-        f"where it may not {without}"
+        f"In phase I, {closed} of {len(found)} pupils close; in phase II, {with_} reopen if a lens is possible, "
+        f"and {without} if not"
     )
 
 
 def searches(store: Store) -> list[tuple[str, int]]:
-    """Group and seed of each."""
+    """Return the group and seed of each search."""
     return [(group, seed) for group in store.groups for seed in sorted({row.seed for row in store.group(group)})]
 
 
 def lenses(store: Store) -> set[str]:
-    """Groups whose glass may bend light."""
+    """Return the groups in which a lens is possible."""
     return {row.group for row in store.rows if row.refractive_index != 1}
 
 
 def pupils(store: Store, group: str, seed: int) -> tuple[float, float, float]:
-    """Mean relative aperture in a search's first generation, in the last ones of phase I, and in its last ones; NaN
-    where it has not come so far."""
+    """Return a search's mean relative aperture in the first generation, at the end of phase I, and at the end.
+
+    NaN stands for a phase that the search has not reached.
+    """
     phases = ([row for row in of_phase(store, group, phase) if row.seed == seed] for phase in (0, 1))
     alone, joined = (of_generation(rows, QUANTITIES["relative aperture a"])[1] for rows in phases)
     begun, closed, end = (
@@ -183,8 +191,10 @@ def pupils(store: Store, group: str, seed: int) -> tuple[float, float, float]:
 
 
 def extremes(rows: Sequence[Row]) -> tuple[Row, Row] | tuple[()]:
-    """The fittest and the least fit of the last generations, of the last phase if that was shorter; () where none of
-    them succeeded."""
+    """Return the fittest and the least fit animal of the last generations within the last phase.
+
+    The result is () if no animal succeeded.
+    """
     first = max(row.generation for row in rows) - LAST + 1
     late = [r for r in rows if r.generation >= first and r.phase == max(row.phase for row in rows)]
     done = sorted((row for row in late if row.relief and not row.failed), key=lambda row: row.fitness)
@@ -192,7 +202,7 @@ def extremes(rows: Sequence[Row]) -> tuple[Row, Row] | tuple[()]:
 
 
 def draw_reliefs(store: Store, path: Path) -> None:
-    """Height maps, two per seed, all on one scale."""
+    """Draw height maps, two per seed, with a common colour scale."""
     runs = searches(store)
     figure, axes = new_figure(max(4.0, 1.7 * len(runs)), 4.2, columns=len(runs), rows=2)
     chosen = {run: extremes([row for row in store.group(run[0]) if row.seed == run[1]]) for run in runs}
@@ -212,28 +222,26 @@ def draw_reliefs(store: Store, path: Path) -> None:
 
 
 def message_of_reliefs(store: Store) -> str:
-    """How many of the last animals whose glass may bend light have one that gathers it."""
+    """Return the figure's title: the number of animals with converging glass in the last generations."""
     late = [
         power
         for group in store.groups if group in lenses(store)
-        for powers in last_values(of_phase(store, group, 1), QUANTITIES["power of its glass"])
+        for powers in last_values(of_phase(store, group, 1), QUANTITIES["power of the glass"])
         for power in powers
     ]  # fmt: skip
-    return (
-        f"Where glass may become a lens, it gathers light in {sum(p > 0 for p in late)} of the last {len(late)} animals"
-    )
+    return f"If a lens is possible, glass converges light in {sum(p > 0 for p in late)} of the last {len(late)} animals"
 
 
 def longer(row: Row, store: Store) -> np.ndarray:
-    """Optical path through the relief less the least, over the pupil's square [µm]; NaN outside the pupil."""
-    unit = next((one.relief_height for one in store.conduct if one.group == row.group), 0.0)
+    """Return the optical path through the relief minus its minimum, over the pupil's square [µm]; NaN outside."""
+    unit = next((one.relief_height for one in store.run_metadata if one.group == row.group), 0.0)
     heights, inside = relief_heights(optics.Pupil(1.0, relief_of(np.array(row.relief.split(), float))))
     path = 1e6 * unit * (row.refractive_index - 1) * heights
     return np.where(inside, path - path[inside].min(), np.nan)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Collect runs if asked, and make the page."""
+    """Collect runs if requested, and make the page."""
     return evolved.main(NAME, __doc__ or "", page, arguments, QUANTITIES)
 
 

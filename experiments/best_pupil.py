@@ -1,4 +1,4 @@
-"""The best pupil: sharpness against light
+"""The best pupil width: sharpness against light
 
 python -m experiments.best_pupil [--compute] [--docs DIR]
 """
@@ -18,14 +18,14 @@ from numpy.typing import NDArray
 
 import optics
 from evolve.analysis.statistics import polychromatic
-from experiments.page import Figure, Page, markdown_table, new_figure, parser, save, told
+from experiments.page import Figure, Page, exit_code, markdown_table, new_figure, parser, save
 from experiments.store import DATA, Origin, read_rows, write_rows
 from sim.worlds import materials
 
 __all__ = ["Row", "best", "computed", "measures"]
 
 Floats = NDArray[np.float64]
-STRIPES = (1, 2, 4)  # receptors that one is wide
+STRIPES = (1, 2, 4)  # width of a stripe in receptors
 MEASURES = {
     "contrast": "contrast",
     **{f"stripes_{width}": f"stripes {width} receptor{'s' * (width > 1)} wide" for width in STRIPES},
@@ -39,14 +39,14 @@ NOISES = (0.0003, 0.001, 0.003, 0.005, 0.01, 0.02, 0.05)
 RESOLUTION, FOV_DEG = 15, 45.0
 SCENE = (materials.WHITE - materials.BLACK) / 2  # standard deviation of the signal of black and white stripes
 GREEN = 550e-9
-ZERO = 0.25  # an MTF that dips below it has one there: averaged over directions, its dips do not reach 0
-STRENGTHS = (0.35, 0.65, 1.0)  # of lines, by noise
+ZERO = 0.25  # a minimum of the MTF below this counts as a zero; the mean over directions does not reach 0
+STRENGTHS = (0.35, 0.65, 1.0)  # opacity of lines, by noise
 COLORS = {"hole": "#D55E00", "lens": "#0072B2"}
 
 
 @dataclass(frozen=True)
 class Row:
-    """What an eye is worth by three measures; see the page."""
+    """Measures of an eye; see the page."""
 
     pupil: str
     relative_aperture: float
@@ -60,7 +60,7 @@ class Row:
 
 
 def eye(pupil: str, aperture: float) -> optics.Eye:
-    """An eye of default size behind an open hole or an ideal lens in focus."""
+    """Return an eye of default size with a pinhole or an ideal lens in focus."""
     plain = optics.Eye(resolution=(RESOLUTION, RESOLUTION), fov_deg=FOV_DEG)
     focus = plain.sensor_distance if pupil == "lens" else None
     radius = aperture * plain.sensor_width / 2
@@ -68,15 +68,15 @@ def eye(pupil: str, aperture: float) -> optics.Eye:
 
 
 def measures(contrasts: Floats, throughput: float, noise_sigma: float) -> tuple[float, float, float]:
-    """(image quality, contrast above the noise, bits per receptor) of an MTF at even steps from 0 to Nyquist.
+    """Return (image quality, contrast above the noise, bits per receptor) of an MTF at even steps from 0 to Nyquist.
 
-    With f in units of Nyquist's frequency, T the throughput and c the scene's contrast,
+    With f in units of the Nyquist frequency, T the throughput and c the scene's contrast,
 
         Q = T ∫ max(MTF - σ/T, 0) df,    C = Q / T,    B = (π/2) ∫ ½ log2(1 + (c T MTF / σ)²) f df
 
-    B is the information that white noise of σ per receptor leaves of a scene whose structures are all equally strong
-    (Shannon; for eyes Snyder, Laughlin and Stavenga 1977): (π/2) f df is the ring 2π f df of frequencies in all
-    directions over the square [-1, 1]² of those that the receptors' lattice tells apart.
+    B is the information per receptor about a scene of equal contrast at all frequencies, with white noise of σ per
+    receptor (Shannon; for eyes Snyder, Laughlin and Stavenga 1977). (π/2) f df is the ring 2π f df of frequencies in
+    all directions, divided by the square [-1, 1]² of frequencies that the receptors' lattice resolves.
     """
     f = np.linspace(0, 1, contrasts.size)
     above = float(np.trapezoid(np.maximum(contrasts - noise_sigma / throughput, 0), f))
@@ -86,8 +86,11 @@ def measures(contrasts: Floats, throughput: float, noise_sigma: float) -> tuple[
 
 
 def stripes(contrasts: Floats, throughput: float, width: int) -> float:
-    """T MTF where stripes are so many receptors wide, at Nyquist's frequency over the width: what they leave in the
-    signals, whatever the noise; 0 beyond the MTF's first zero, where they are seen reversed or not at all."""
+    """Return T MTF for stripes of a width in receptors, that is, at the Nyquist frequency divided by the width.
+
+    This is the amplitude of the stripes in the signals, independent of noise. It is 0 beyond the first zero of the MTF,
+    where stripes are reversed or invisible.
+    """
     falls, rises = np.diff(contrasts)[:-1] < 0, np.diff(contrasts)[1:] >= 0
     zeros = np.flatnonzero(falls & rises & (contrasts[1:-1] < ZERO)) + 1
     place = (contrasts.size - 1) // width
@@ -95,14 +98,14 @@ def stripes(contrasts: Floats, throughput: float, width: int) -> float:
 
 
 def contrast_of(seen: optics.Eye) -> Floats:
-    """MTF in white daylight at 257 frequencies up to the retina's Nyquist frequency."""
+    """Return the MTF in white daylight at 257 frequencies up to the retina's Nyquist frequency."""
     white = polychromatic(seen, seen.psf())
     frequencies = np.linspace(0, 1 / (2 * seen.receptor_pitch), 257)
     return np.asarray(optics.mtf(white).profile(frequencies)[0], np.float64)
 
 
 def computed(apertures: Sequence[float] = APERTURES, noises: Sequence[float] = NOISES) -> list[Row]:
-    """All pupils at all noises."""
+    """Compute the measures of all pupils at all noises."""
     rows = []
     for pupil in PUPILS:
         for aperture in apertures:
@@ -114,7 +117,7 @@ def computed(apertures: Sequence[float] = APERTURES, noises: Sequence[float] = N
 
 
 def best(rows: Iterable[Row], pupil: str, noise_sigma: float, measure: str) -> float:
-    """The relative aperture at which a measure peaks: of the parabola, in log a, through the three best samples."""
+    """Return the relative aperture at the peak of a measure: of a parabola in log a through the three best samples."""
     chosen = [row for row in rows if row.pupil == pupil and math.isclose(row.noise_sigma, noise_sigma)]
     place = np.log([row.relative_aperture for row in chosen])
     value = np.array([getattr(row, measure) for row in chosen])
@@ -127,20 +130,20 @@ def best(rows: Iterable[Row], pupil: str, noise_sigma: float, measure: str) -> f
 
 
 def predicted(noise_sigma: float, measures: Sequence[str]) -> list[str]:
-    """The stored best hole by each of MEASURES, as pages show it; "-" where this noise was not computed."""
+    """Return the stored best pinhole by each measure as text; "-" if this noise was not computed."""
     rows = read_rows(Row, STORED)
     known = any(math.isclose(row.noise_sigma, noise_sigma) for row in rows)
     return [_shown(best(rows, "hole", noise_sigma, measure)) if known else "-" for measure in measures]
 
 
 def rayleigh() -> float:
-    """Relative aperture of the sharpest pinhole for a distant point, diameter 1.9 √(λf) (Rayleigh 1891)."""
+    """Return the relative aperture of the sharpest pinhole for a distant point, diameter 1.9 √(λf) (Rayleigh 1891)."""
     plain = optics.Eye(fov_deg=FOV_DEG)
     return 1.9 * math.sqrt(GREEN * float(plain.sensor_distance)) / plain.sensor_width
 
 
 def page(rows: Sequence[Row], origin: Origin) -> Page:
-    """The page of the stored numbers."""
+    """Return the page of the stored numbers."""
     noises = sorted({row.noise_sigma for row in rows})
     cells = [
         [
@@ -151,7 +154,7 @@ def page(rows: Sequence[Row], origin: Origin) -> Page:
         for s in noises
     ]
     widths = [best(rows, "hole", noises[0], f"stripes_{width}") for width in STRIPES]
-    header = ["noise σ", *(f"hole: {name}" for name in MEASURES.values()), "lens: every measure"]
+    header = ["noise σ", *(f"pinhole: {name}" for name in MEASURES.values()), "lens: every measure"]
     widths = [best(rows, "hole", noises[0], f"stripes_{width}") for width in STRIPES]
     return Page(
         name="best_pupil",
@@ -188,12 +191,12 @@ def _range(apertures: Sequence[float]) -> str:
 
 
 def shades(noises: Sequence[float]) -> tuple[float, float, float]:
-    """Three noises that are drawn."""
+    """Return the three noises in the figure."""
     return noises[1], noises[len(noises) // 2], noises[-2]
 
 
 def draw(rows: Sequence[Row], path: Path) -> None:
-    """Contrast and bits over the pupil's width, and the best width over noise."""
+    """Draw contrast and bits over the pupil's width, and the best width over noise."""
     figure, axes = new_figure(11, 3.9, columns=3)
     noises = sorted({row.noise_sigma for row in rows})
     for place, measure in zip(axes[0], ("contrast", "bits"), strict=False):
@@ -207,26 +210,26 @@ def draw(rows: Sequence[Row], path: Path) -> None:
     left.set(xlabel="relative aperture a", ylabel="contrast above the noise, C", ylim=(0, 1.02))
     middle.set(xlabel="relative aperture a", ylabel="information, B [bits per receptor]", ylim=(0, None))
     middle.text(0.03, 0.93, "lens in focus", color=COLORS["lens"], transform=middle.transAxes)
-    middle.text(0.03, 0.86, "hole", color=COLORS["hole"], transform=middle.transAxes)
+    middle.text(0.03, 0.86, "pinhole", color=COLORS["hole"], transform=middle.transAxes)
     for pupil in PUPILS:
         found = [best(rows, pupil, sigma, "contrast") for sigma in noises]
         right.loglog(noises, found, color=COLORS[pupil], marker="o", ms=4)
     right.axhline(rayleigh(), color="#777777", ls=":", lw=1)
     right.text(noises[-1], rayleigh() * 0.93, "Rayleigh's pinhole", color="#777777", ha="right", va="top")
-    right.set(xlabel="noise σ of a receptor", ylabel="a of most contrast", ylim=(0.06, 1.2))
+    right.set(xlabel="noise σ of a receptor", ylabel="a of highest contrast", ylim=(0.06, 1.2))
     for sigma, strength in zip(shades(noises), STRENGTHS, strict=True):
         left.plot([], [], color="#222222", alpha=strength, label=f"σ = {sigma:g}")
     left.legend(frameon=False, fontsize=8, loc="center right")
-    figure.suptitle("Less light asks for a wider hole; behind a lens the widest pupil is best in any light")
+    figure.suptitle("Less light requires a wider pinhole; with a lens the widest pupil is best in any light")
     save(figure, path)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Compute and store if asked; make the page from the store."""
+    """Compute and store the numbers if requested; make the page from the stored numbers."""
     options = parser(__doc__ or "")
-    options.add_argument("--compute", action="store_true", help="compute the stored numbers anew")
+    options.add_argument("--compute", action="store_true", help="compute the stored numbers again")
     chosen = options.parse_args(arguments)
-    return told("best_pupil", lambda: _made(chosen))
+    return exit_code("best_pupil", lambda: _made(chosen))
 
 
 def _made(chosen: Namespace) -> None:

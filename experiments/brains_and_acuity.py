@@ -1,4 +1,4 @@
-"""Brains and acuity: error against what eyes resolve and brains hold
+"""Error over acuity and brain size, with short training
 
 python -m experiments.brains_and_acuity [--runs TASK=DIR ...] [--answer TEXT] [--docs DIR]
 """
@@ -24,10 +24,10 @@ __all__ = ["error", "factors", "fitted", "page"]
 NAME = "brains_and_acuity"
 COLORS = {"navigation": "#D55E00", "detection": "#0072B2", "tracking": "#009E73"}
 PUBLISHED = {"navigation": 0.69, "detection": 0.74, "tracking": 0.59}
-CLASSES = 4  # of acuity
-TICKS = (1.0, 2.0, 3.0, 5.0, 7.0)  # of a decade
-FEW = (1.0, 3.0)  # where there are many decades
-MANY = 30.0  # from the lowest to the highest number
+CLASSES = 4  # number of acuity classes
+TICKS = (1.0, 2.0, 3.0, 5.0, 7.0)  # ticks in a decade
+FEW = (1.0, 3.0)  # ticks in a decade on longer axes
+MANY = 30.0  # ratio of the ends of an axis above which it counts as longer
 Size = Callable[[Row], float]
 FACTORS: dict[str, Size] = {
     "acuity": lambda row: row.cpd,
@@ -37,20 +37,23 @@ FACTORS: dict[str, Size] = {
 
 
 def error(row: Row) -> float:
-    """Share of episodes in which the goal did not come first, (k + 1/2) / (n + 1), so that no error has no logarithm
-    (Jeffreys' mean). In a maze, whose goal nobody reaches: the share of a full return that was missed."""
+    """Return the share of episodes in which the goal did not come first, as (k + 1/2) / (n + 1) (Jeffreys' mean).
+
+    The mean is never 0, so that it has a logarithm. In a maze, whose goal no animal reaches, the error is the missing
+    share of a full return.
+    """
     if math.isfinite(row.full_return):
         return 1 - row.fitness / row.full_return
     return ((1 - row.success_rate) * row.episodes + 0.5) / (row.episodes + 1)
 
 
 def size(row: Row) -> float:
-    """Acuity x parameters x memory [cycles/degree · frames]."""
+    """Return acuity x parameters x memory [cycles/degree · frames]."""
     return row.cpd * row.parameters * row.memory_frames
 
 
 def fitted(rows: Sequence[Row], *sizes: Size) -> PowerLaw | None:
-    """The power law of candidates' errors; None where there is none."""
+    """Return the power law of candidates' errors; None if it cannot be fitted."""
     try:
         return power_law(np.array([error(row) for row in rows]), *(np.array([f(row) for row in rows]) for f in sizes))
     except ValueError:
@@ -58,12 +61,12 @@ def fitted(rows: Sequence[Row], *sizes: Size) -> PowerLaw | None:
 
 
 def trained(store: Store, group: str) -> list[Row]:
-    """Candidates that have a policy."""
+    """Return the candidates with a policy."""
     return [row for row in store.group(group) if not row.failed and row.parameters]
 
 
 def page(store: Store) -> Page:
-    """The page of stored runs."""
+    """Return the page of stored runs."""
     return Page(
         name=NAME,
         command=(
@@ -86,7 +89,7 @@ def page(store: Store) -> Page:
 
 
 def exponents(store: Store) -> str:
-    """A row per task."""
+    """Return a table of exponents of the product, with a row per task."""
     lines = []
     for group in store.groups:
         rows = trained(store, group)
@@ -97,7 +100,7 @@ def exponents(store: Store) -> str:
 
 
 def factors(store: Store) -> str:
-    """Exponents of each factor on its own, fitted together: a row per task."""
+    """Return a table of exponents of the three factors, fitted together, with a row per task."""
     header = ["task", *(f"exponent of {name}" for name in FACTORS), "variance explained"]
     lines = []
     for group in store.groups:
@@ -110,20 +113,20 @@ def factors(store: Store) -> str:
 
 
 def classes(rows: Sequence[Row]) -> list[list[Row]]:
-    """Candidates in CLASSES parts of equal size, from coarse acuity to fine; fewer of fewer candidates."""
+    """Return candidates in CLASSES parts of equal size, from coarse to fine acuity, or in fewer non-empty parts."""
     ordered = sorted(rows, key=lambda row: row.cpd)
     parts = [[ordered[i] for i in part] for part in np.array_split(np.arange(len(ordered)), CLASSES)]
     return [part for part in parts if part]
 
 
 def best_quarter(rows: Sequence[Row]) -> float:
-    """Mean error of the best quarter."""
+    """Return the mean error of the best quarter."""
     errors = np.sort([error(row) for row in rows])
     return float(errors[: max(1, len(errors) // 4)].mean())
 
 
 def ceilings(store: Store) -> str:
-    """Mean error and that of the best quarter, by class of acuity."""
+    """Return a table of mean errors and mean errors of the best quarter, by acuity class."""
     lines = []
     for group in store.groups:
         for mine in classes(trained(store, group)):
@@ -134,7 +137,7 @@ def ceilings(store: Store) -> str:
 
 
 def draw(store: Store, path: Path) -> None:
-    """A column per task: error against the product, and against acuity alone."""
+    """Draw a column per task: error over the product, and over acuity alone."""
     count = len(store.groups)
     figure, axes = new_figure(3.4 * count + 0.5, 6.2, columns=count, rows=2, sharey=True)
     for column, group in zip(axes.T, store.groups, strict=True):
@@ -164,19 +167,19 @@ def draw(store: Store, path: Path) -> None:
 
 
 def _key() -> list[Any]:
-    """What dots, shades and lines mean."""
+    """Return the legend of dots, shades and lines."""
     from matplotlib.lines import Line2D
 
     dots = {"marker": "o", "ls": "", "color": "#555555"}
     return [
-        Line2D([], [], alpha=0.3, label="an animal, small in the other size", **dots),
-        Line2D([], [], alpha=0.95, label="one that is large in it", **dots),
-        Line2D([], [], color="#222222", label="above: power law; below: best quarter of a class"),
+        Line2D([], [], alpha=0.3, label="animal with a small value of the other quantity", **dots),
+        Line2D([], [], alpha=0.95, label="animal with a large value", **dots),
+        Line2D([], [], color="#222222", label="top: power law; bottom: best quarter of a class"),
     ]
 
 
 def label(axis: Any, ends: tuple[float, float]) -> None:
-    """Plain numbers on a logarithmic axis."""
+    """Label a logarithmic axis with plain numbers."""
     of_decade = TICKS if ends[1] < MANY * ends[0] else FEW
     decades = range(math.floor(math.log10(ends[0])), math.ceil(math.log10(ends[1])))
     ticks = [tick for n in decades for k in of_decade if ends[0] <= (tick := k * 10.0**n) <= ends[1]]
@@ -185,12 +188,12 @@ def label(axis: Any, ends: tuple[float, float]) -> None:
 
 
 def brain(row: Row) -> float:
-    """Parameters x memory."""
+    """Return parameters x memory."""
     return row.parameters * row.memory_frames
 
 
 def dots(place: Any, rows: Sequence[Row], sizes: tuple[Size, Size], color: str) -> None:
-    """A candidate each: where by the first size, how dark by its rank in the second."""
+    """Draw a dot per candidate, at its first size, with a darkness by its rank in the second."""
     across, shade = sizes
     ranks = np.argsort(np.argsort([shade(row) for row in rows])) / max(len(rows) - 1, 1)
     for row, rank in zip(rows, ranks, strict=True):
@@ -198,7 +201,7 @@ def dots(place: Any, rows: Sequence[Row], sizes: tuple[Size, Size], color: str) 
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Collect runs if asked, and make the page."""
+    """Collect runs if requested, and make the page."""
     return evolved.main(NAME, __doc__ or "", page, arguments)
 
 

@@ -1,4 +1,4 @@
-"""Brains for eyes: every width of eye with every size of brain, in three tasks
+"""Brains for eyes: training of all combinations of eye width and brain size in three tasks
 
 python -m experiments.brains_for_eyes [--compute] [--workers N] [--docs DIR]
 """
@@ -37,30 +37,30 @@ __all__ = [
 
 NAME = "brains_for_eyes"
 WIDTHS = (1, 2, 4, 8, 16, 24)
-BRAINS = (1, 4, 16, 64, 256)  # units of a hidden layer; encoders are a quarter as wide
+BRAINS = (1, 4, 16, 64, 256)  # units of a hidden layer; encoders have a quarter of them
 SEEDS = range(3)
 SIGMA = 0.01
-# Eyes and the arc over which they are spread: who cannot do a task at all tells nothing of brains.
+# Number of eyes and the arc over which they are spread, chosen so that each task can be learnt.
 EYES = {"detection": (2, 45.0), "tracking": (2, 45.0), "navigation": (10, 135.0)}
 PUBLISHED = {"navigation": 0.69, "detection": 0.74, "tracking": 0.59}
-# One evaluation on the way: of 320 episodes each takes a sixth of the training's steps. All lives make ten passes
-# throughout, as the first ones did, which are older than fewer passes.
+# There is one evaluation during training, because its 320 episodes have a sixth of the steps of the training itself.
+# All training runs make ten passes throughout, as the first ones did before the schedule with fewer passes.
 SETTINGS = (
     *("learning.total_steps=500000", "learning.eval_interval=500000", "learning.least_epochs=10"),
     "evaluation.episodes=320",
 )
-# Navigators' rows are the lower the finer they are; the control's eyes are as wide and 45 degrees high.
+# The rows of navigators are lower if they are finer; eyes of the control have the same width and are 45 degrees high.
 CONTROL_WIDTHS, CONTROL_BRAIN, CONTROL_SEEDS = (4, 8), 64, range(1)
-IN_VAIN = {"navigation": "one row, the finer the lower"}
-GAIN = 0.5  # choice: of the coarsest eyes' errors, below which finer eyes pay
-SHADES = ("#c6dbef", "#9ecae1", "#6baed6", "#2171b5", "#08306b")  # of brains, small to large
+IN_VAIN = {"navigation": "one row: finer eyes are lower"}
+GAIN = 0.5  # chosen share of the coarsest eyes' error below which finer eyes count as better
+SHADES = ("#c6dbef", "#9ecae1", "#6baed6", "#2171b5", "#08306b")  # brains from small to large
 D = TypeVar("D", bound=Design)
 Errors = dict[tuple[int, int], float]  # by width and brain
 Definition = Callable[[Sequence[Trained]], Errors]
 
 
 def designs() -> list[Design]:
-    """All trainings, one life of every animal first, then the control."""
+    """Return all training runs, sorted by seed, with the control last."""
     n_eyes, arc = EYES["navigation"]
     control = [
         Design("navigation", n_eyes, w, w, arc, SIGMA, seed, neurons=CONTROL_BRAIN)
@@ -78,7 +78,7 @@ def designs() -> list[Design]:
 
 
 def _lives(rows: Iterable[Trained], value: Callable[[Trained], float]) -> dict[tuple[int, int], list[float]]:
-    """Of all lives of each animal."""
+    """Return the values of all training runs of each animal."""
     found: dict[tuple[int, int], list[float]] = {}
     for row in rows:
         if not row.failed:
@@ -87,15 +87,16 @@ def _lives(rows: Iterable[Trained], value: Callable[[Trained], float]) -> dict[t
 
 
 def missed(rows: Sequence[Trained]) -> Errors:
-    """Share of episodes in which the goal did not come first, (k + 1/2) / (n + 1), so that no error has no logarithm
-    (Jeffreys' mean)."""
+    """Return the share of episodes in which the goal did not come first, (k + 1/2) / (n + 1) (Jeffreys), never 0."""
     shares = _lives(rows, lambda row: ((1 - row.success_rate) * row.episodes + 0.5) / (row.episodes + 1))
     return {animal: float(np.mean(values)) for animal, values in shares.items()}
 
 
 def shortfall(rows: Sequence[Trained]) -> Errors:
-    """Share of what separates the worst from the best life that an animal's lives are short of, with half a life more
-    and (n + 1) in the place of n, as in `missed`."""
+    """Return each animal's distance from the best training run, relative to the distance from the best to the worst.
+
+    As in `missed`, half a run is added, and n + 1 replaces n.
+    """
     fitness = [row.fitness for row in rows if not row.failed]
     high = max(fitness, default=0.0)
     scale = max(high - min(fitness, default=0.0), 1e-9)
@@ -107,7 +108,7 @@ DEFINITIONS: dict[str, Definition] = {"episodes missed": missed, "fitness missed
 
 
 def best_brains(errors: Errors) -> dict[int, tuple[int, float]]:
-    """Of each width, the brain that errs least, and its error: how far that acuity carries."""
+    """Return, for each width, the brain with the least error, and this error."""
     found = {}
     for width in sorted({w for w, _ in errors}):
         brain = min((b for w, b in errors if w == width), key=lambda b: errors[width, b])
@@ -116,13 +117,13 @@ def best_brains(errors: Errors) -> dict[int, tuple[int, float]]:
 
 
 def frontier(rows: Sequence[Trained], definition: Definition) -> PowerLaw | None:
-    """Power law of the least error over acuity; None where there is none."""
+    """Return the power law of the least error over acuity; None if it cannot be fitted."""
     least = best_brains(definition(rows))
     return _law([error for _, error in least.values()], [_acuities(rows)[width] for width in least])
 
 
 def over_both(rows: Sequence[Trained], definition: Definition) -> PowerLaw | None:
-    """Power law of every animal's error over acuity and the units of its brain; None where there is none."""
+    """Return the power law of all errors over acuity and units of the brain; None if it cannot be fitted."""
     errors, acuity = definition(rows), _acuities(rows)
     return _law(list(errors.values()), [acuity[w] for w, _ in errors], [float(b) for _, b in errors])
 
@@ -135,12 +136,12 @@ def _law(errors: Sequence[float], *sizes: Sequence[float]) -> PowerLaw | None:
 
 
 def _acuities(rows: Iterable[Trained]) -> dict[int, float]:
-    """Of each width [cycles/degree]."""
+    """Return the acuity of each width [cycles/degree]."""
     return {row.width: acuity_cpd(row.animal) for row in rows}
 
 
 def page(rows: Sequence[Trained], origin: Origin, answer: str) -> Page:
-    """The page of stored rows."""
+    """Return the page of stored rows."""
     return Page(
         name=NAME,
         command=f"python -m experiments.{NAME} --compute",
@@ -158,12 +159,12 @@ def page(rows: Sequence[Trained], origin: Origin, answer: str) -> Page:
 
 
 def designed_for(rows: Iterable[D], task: str) -> list[D]:
-    """Rows of the experiment as it was designed: without the control."""
+    """Return the rows of a task without the control."""
     return [row for row in rows if row.task == task and (task != "navigation" or row.height == 1)]
 
 
 def control_of(rows: Iterable[D]) -> list[D]:
-    """Navigators whose eyes are 45 degrees high at any width."""
+    """Return the rows of the control: navigators whose eyes are 45 degrees high at any width."""
     return [row for row in rows if row.task == "navigation" and row.height == row.width > 1]
 
 
@@ -172,7 +173,7 @@ def _tasks(rows: Iterable[Trained]) -> list[str]:
 
 
 def _errors_table(rows: Sequence[Trained]) -> str:
-    """A row per task and brain, a column per width."""
+    """Return a table with a row per task and brain and a column per width."""
     lines = []
     for task in _tasks(rows):
         errors = missed(designed_for(rows, task))
@@ -186,7 +187,7 @@ def _errors_table(rows: Sequence[Trained]) -> str:
 
 
 def _exponents(rows: Sequence[Trained]) -> str:
-    """A row per task and definition of the error."""
+    """Return a table with a row per task and definition of the error."""
     lines = []
     for task in _tasks(rows):
         for name, definition in DEFINITIONS.items():
@@ -202,14 +203,14 @@ def _exponents(rows: Sequence[Trained]) -> str:
 
 
 def _over_runs(rows: Sequence[Trained], definition: Definition) -> str:
-    """The best brains' exponent of acuity, fitted to each seed's training runs alone: mean and Student's interval."""
+    """Return the best brains' exponent of acuity, fitted to each seed separately: mean and Student's interval."""
     laws = [frontier([row for row in rows if row.seed == seed], definition) for seed in sorted({r.seed for r in rows})]
     found = np.array([law.exponents[0].mean for law in laws if law is not None])
     return str(mean_of(found)) if found.size > 1 else "-"
 
 
 def draw(rows: Sequence[Trained], path: Path) -> None:
-    """A panel per task: error over acuity, a line per brain, and what the best brains come to."""
+    """Draw a panel per task: error over acuity with a line per brain, and the power law of the best brains."""
     tasks = _tasks(rows)
     figure, axes = new_figure(3.6 * len(tasks) + 0.5, 4.2, columns=len(tasks), sharey=True)
     for place, task in zip(axes[0], tasks, strict=True):
@@ -234,8 +235,11 @@ def draw(rows: Sequence[Trained], path: Path) -> None:
 
 
 def needed(rows: Sequence[Trained]) -> int | None:
-    """Smallest brain from which on, in every larger one too, the finest eyes miss less than half of what the coarsest
-    do with the best of brains; None: there is none."""
+    """Return the smallest brain for which finer eyes are better; None if there is none.
+
+    With this brain and all larger ones, the finest eyes miss less than half of the episodes that the coarsest eyes miss
+    with their best brain.
+    """
     errors, found = missed(rows), None
     _, coarsest = min(best_brains(errors).items())[1]
     for brain in sorted({b for _, b in errors}, reverse=True):
@@ -249,9 +253,9 @@ def needed(rows: Sequence[Trained]) -> int | None:
 def _of_task(task: str, rows: Sequence[Trained]) -> str:
     brain = needed(rows)
     return (
-        f"{task}: {IN_VAIN.get(task, 'acuity pays for no brain')}"
+        f"{task}\n{IN_VAIN.get(task, 'finer eyes are not better')}"
         if brain is None
-        else f"{task}: acuity pays from {brain} units on"
+        else f"{task}\nfiner eyes better with ≥ {brain} units"
     )
 
 
@@ -260,14 +264,14 @@ def _message(rows: Sequence[Trained]) -> str:
     brains = {task: needed(designed_for(rows, task)) for task in _tasks(rows)}
     in_vain = [task for task, brain in brains.items() if brain is None]
     if len(in_vain) == len(brains) or least in brains.values():
-        return "What acuity is worth to brains of each size"
+        return "Error over acuity for brains of each size"
     besides = f"; not in {' and '.join(in_vain)}" if in_vain else ""
     besides += ", where finer eyes are lower" if "navigation" in in_vain else ""
-    return f"Fine eyes pay only for brains that are large enough{besides}"
+    return f"Finer eyes are better only with a sufficiently large brain{besides}"
 
 
 def _draw_frontier(place: Any, rows: Sequence[Trained]) -> None:
-    """Where error does fall with acuity."""
+    """Draw the power law of the best brains, if error falls with acuity."""
     law, acuity = frontier(rows, missed), np.array(sorted(_acuities(rows).values()))
     if law is not None and law.exponents[0].low > 0:
         place.loglog(acuity, law.error(acuity), color="#D55E00", lw=1.4, ls="--")
@@ -286,7 +290,7 @@ def _key() -> list[Any]:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Train what is missing if asked; make the page from the store."""
+    """Train missing animals if requested; make the page from the stored rows."""
     return designed.main(designed.Experiment(NAME, __doc__ or "", designs, SETTINGS, page), arguments)
 
 

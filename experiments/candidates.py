@@ -1,4 +1,4 @@
-"""What runs of evolution came to: a row per candidate."""
+"""Results of runs of evolution, with a row per candidate."""
 
 from __future__ import annotations
 
@@ -31,17 +31,18 @@ NO_NUMBER = math.nan
 
 @dataclass(frozen=True)
 class Row:
-    """A candidate of a run. Optical measures are those of the best of each generation; elsewhere they are NaN.
+    """A candidate of a run; optical measures are NaN except for the best candidate of each generation.
 
-    group        what the run stands for: a task, or a variant of an experiment
-    phase        how many times genes have been opened, 0 in the first generation
-    episodes     played after training; fitness and success rate are their means
-    parameters   of its trained policy, critic included
-    full_return  of an episode straight to the goal without any contact; NaN where there is always another goal
-    above_noise  contrast above the noise; see experiments.best_pupil. of_hole: of the same pupil without its relief
-    relief       heights in [0, 1], row by row, of an eye with optics
-    glass_power  of that which brings far objects to focus; see experiments.glass
-    peaks_nm     of the pigments, of an eye that inherits them
+    group: task, or variant of an experiment, that the run belongs to
+    phase: number of times that genes have opened, 0 in the first generation
+    episodes: number of evaluation episodes; fitness and success rate are means over them
+    parameters: number of parameters of the trained policy, critic included
+    full_return: return of an episode straight to the goal without any contact; NaN if a new goal follows each goal
+    above_noise: contrast above the noise; see experiments.best_pupil
+    above_noise_of_hole: contrast above the noise of the same pupil without its relief
+    relief: heights in [0, 1] of an eye with optics, row by row
+    glass_power: power relative to that in focus; see experiments.glass
+    peaks_nm: peaks of inherited pigments
     """
 
     group: str
@@ -77,8 +78,10 @@ class Row:
 
 
 def rows_of(run: Run, group: str) -> list[Row]:
-    """A run's candidates, in order of their ids; those of a generation that is not complete are left out, unless
-    candidates come one by one and generations mean nothing."""
+    """Return the rows of a run's candidates in order of their ids.
+
+    Incomplete generations are omitted, except in the steady state, in which generations have no meaning.
+    """
     chosen = range(run.config.search.generations) if run.config.search.steady_state else complete(run)
     generations = {generation: run.generation(generation) for generation in chosen}
     champions = set()
@@ -89,7 +92,7 @@ def rows_of(run: Run, group: str) -> list[Row]:
 
 
 def complete(run: Run) -> list[int]:
-    """Generations of which all candidates are on record, through all stages of their budget."""
+    """Return the generations with all candidates on record, through all rungs."""
     return [g for g in range(run.config.search.generations) if successive_halving.complete(run, g)]
 
 
@@ -117,8 +120,10 @@ def _row(run: Run, group: str, candidate: Candidate, champion: bool) -> Row:
 
 @cache
 def full_return(task: str, course: str = "short") -> float:
-    """Fitness of who goes from start to goal in a straight line, on average over the starts; NaN where a goal that was
-    reached is followed by another one."""
+    """Return the fitness of a straight path from start to goal, averaged over the starts.
+
+    NaN is returned if each reached goal is followed by another one.
+    """
     world = build_world(task, course=course)
     if world.goal_region is None:
         return NO_NUMBER
@@ -129,7 +134,7 @@ def full_return(task: str, course: str = "short") -> float:
 
 
 def anatomy(animal: Phenotype, eye: EyeConfig) -> dict[str, Any]:
-    """Those fields of a row that are the animal's own."""
+    """Return the fields of a row that describe the animal."""
     has_optics = animal.relative_aperture is not None
     return {
         "n_eyes": animal.n_eyes,
@@ -149,7 +154,7 @@ def anatomy(animal: Phenotype, eye: EyeConfig) -> dict[str, Any]:
 
 
 def _seen(config: RunConfig, animal: Phenotype) -> dict[str, Any]:
-    """Measures of an eye's optics; {} where they cannot be computed."""
+    """Return measures of an eye's optics; {} if they cannot be computed."""
     eye = animal.eyes(config.eye).eye()
     try:
         strehl = white_strehl(eye, eye.psf())
@@ -172,6 +177,6 @@ def _seen(config: RunConfig, animal: Phenotype) -> dict[str, Any]:
 
 @cache
 def parameters(shape: PolicyConfig) -> int:
-    """Numbers in a policy of this shape: what training would leave, also where its file is elsewhere."""
-    with torch.device("meta"):  # shapes alone: drawing the weights would take a hundred times as long
+    """Return the number of parameters of a policy of this shape, without its file."""
+    with torch.device("meta"):  # shapes only, because drawing the weights would take a hundred times longer
         return sum(tensor.numel() for tensor in learnt(build_policy(shape)).values())

@@ -1,4 +1,4 @@
-"""Whether the better eyes of one task are the worse ones of another: differences and their interaction."""
+"""Interaction of eyes and tasks: differences between two kinds of eyes in two tasks."""
 
 from __future__ import annotations
 
@@ -17,21 +17,22 @@ from experiments.means import Interval, difference
 
 __all__ = ["Crossing", "by_light", "crossing"]
 
-FEWEST_LIVES = 2  # of any eyes: of one there is no spread
+FEWEST_LIVES = 2  # minimum number of training runs for an estimate of their spread
 RESAMPLES = 10_000
 ROUNDING = 1e-9
-NORMAL = 1.96  # standard deviations to either side that hold 95 %
+NORMAL = 1.96  # half width of the central 95 %, in standard deviations
 Floats = NDArray[np.float64]
-Both: TypeAlias = tuple[Floats, Floats]  # of compound eyes and of cameras
+Both: TypeAlias = tuple[Floats, Floats]  # values of compound eyes and of camera eyes
 
 
 @dataclass(frozen=True)
 class Crossing:
-    """Fitness of cameras less that of compound eyes in each task, and the interaction of eye and task.
+    """Fitness of camera eyes minus that of compound eyes in each task, and the interaction of eyes and task.
 
-    interaction: of the difference, in standard deviations of lives with one kind of eyes; in detection less navigation
-    p: of as large an interaction where it does not matter who has which eyes (permutations within each task, in
-        standard deviations of all its lives: those are the same whoever has which)
+    interaction: difference in detection minus that in navigation, in standard deviations of training runs with one
+        kind of eyes
+    p: share of permutations with an interaction of at least this size. Permutations assign the eyes at random within
+        each task. Here the unit is the standard deviation of all runs of a task, which permutations do not change.
     """
 
     differences: dict[str, Interval]
@@ -40,37 +41,40 @@ class Crossing:
 
 
 def crossing(rows: Sequence[Trained], chance: np.random.Generator) -> Crossing:
-    """Of the trainings in one light.
+    """Return the comparison of the training runs in one light.
 
     Raises:
-        ValueError: fewer than two lives of some eyes in a task.
+        ValueError: there are fewer than two training runs of some eyes in a task.
     """
     fitness = {task: (_of(rows, task, COMPOUND), _of(rows, task, CAMERA)) for task in TASKS}
     if min(one.size for both in fitness.values() for one in both) < FEWEST_LIVES:
-        raise ValueError(f"a crossing takes {FEWEST_LIVES} lives of each kind of eyes in each task, or more")
+        raise ValueError(f"a comparison needs at least {FEWEST_LIVES} training runs of each kind of eyes in each task")
     dealt = {task: _permuted(*both, chance) for task, both in fitness.items()}
     differences = {task: difference(camera, compound) for task, (compound, camera) in fitness.items()}
     null = np.abs(_joint(dealt))
-    # Some permutations have the same lives in another order, and sums of theirs round otherwise.
+    # Some permutations only change the order of the runs, and their sums differ by rounding.
     p = (1 + int((null >= abs(_joint(fitness)) * (1 - ROUNDING)).sum())) / (1 + null.size)
     return Crossing(differences, _interaction(fitness), p)
 
 
 def _of(rows: Sequence[Trained], task: str, eyes: tuple[int, int]) -> Floats:
-    """Fitness of all animals with so many eyes and receptors across that did not fail, wherever the eyes sit."""
+    """Return the fitness of all animals with these numbers of eyes and receptors across, except failed ones."""
     mine = [row for row in rows if not row.failed and row.task == task and (row.n_eyes, row.width) == eyes]
     return np.array([row.fitness for row in mine])
 
 
 def _permuted(compound: Floats, camera: Floats, chance: np.random.Generator) -> Both:
-    """Animals that have been dealt their eyes at random, (RESAMPLES, lives) of each kind."""
+    """Return fitness values with randomly assigned eyes, (RESAMPLES, runs) of each kind."""
     mixed = chance.permuted(np.tile(np.concatenate([compound, camera]), (RESAMPLES, 1)), axis=1)
     return mixed[:, : compound.size], mixed[:, compound.size :]
 
 
 def _interaction(fitness: Mapping[str, Both]) -> Interval:
-    """By how much cameras are ahead in detection, less in navigation, in standard deviations of lives with one kind of
-    eyes (Hedges and Olkin 1985, §5.B and E): a bootstrap of so few lives finds them too much alike."""
+    """Return the advantage of camera eyes in detection minus that in navigation (Hedges and Olkin 1985, §5.B and E).
+
+    The unit is the standard deviation of training runs with one kind of eyes. With a small number of runs, a bootstrap
+    would underestimate this deviation.
+    """
     mean, variance = 0.0, 0.0
     for sign, (compound, camera) in ((1, fitness["detection"]), (-1, fitness["navigation"])):
         lives = compound.size + camera.size
@@ -83,7 +87,7 @@ def _interaction(fitness: Mapping[str, Both]) -> Interval:
 
 
 def _joint(fitness: Mapping[str, Both]) -> Floats:
-    """The interaction in standard deviations of all lives of a task, which are the same whoever has which eyes."""
+    """Return the interaction in standard deviations of all runs of a task, which permutations do not change."""
     apart = {task: _ahead(*both) / np.concatenate(both, axis=-1).std(axis=-1, ddof=1) for task, both in fitness.items()}
     return np.asarray(apart["detection"] - apart["navigation"])
 
@@ -93,7 +97,7 @@ def _ahead(compound: Floats, camera: Floats) -> Floats:
 
 
 def by_light(rows: Sequence[Trained]) -> dict[float, Crossing]:
-    """Of those lights in which enough lives have been lived."""
+    """Return the comparisons in all lights with a sufficient number of training runs."""
     found = {}
     for sigma in lights(rows):
         with suppress(ValueError):

@@ -1,4 +1,4 @@
-"""Designed experiments: animals that nobody searched for, trained for several tasks, several times each."""
+"""Designed experiments: animals without evolution, trained several times for several tasks."""
 
 from __future__ import annotations
 
@@ -20,21 +20,21 @@ from evolve.search.worker import evaluate_candidate, prepare_device
 from evolve.store.atomic_files import write_whole
 from evolve.store.evaluation import Evaluation
 from experiments.glass import paraboloid
-from experiments.page import Page, parser, told
+from experiments.page import Page, exit_code, parser
 from experiments.store import Origin, read_rows, write_rows
 
 __all__ = ["Design", "Experiment", "Trained", "crossed", "main", "train_all"]
 
 
-INDEX = 1.9  # of glass: high, so that reliefs of the greatest height reach far
+INDEX = 1.9  # refractive index of glass, high enough for large powers within the limit of height
 
 
 @dataclass(frozen=True)
 class Design:
-    """An animal, what it is to learn and in which light, and the seed of its life.
+    """An animal, its task and light, and the seed of its training run.
 
-    relative_aperture: of pupils with a paraboloid of glass in them; 0: perfect lenses
-    glass_power: of that glass, 1 in focus (see experiments.glass)
+    relative_aperture: width of pupils with a paraboloid of glass; 0: perfect lenses
+    glass_power: power of the glass, 1 in focus (see experiments.glass)
     """
 
     task: str
@@ -70,14 +70,14 @@ class Design:
         return {"relative_aperture": self.relative_aperture, "relief": relief, "refractive_index": INDEX}
 
     def config(self, settings: Sequence[str]) -> RunConfig:
-        """Of a run of which it could be a candidate."""
+        """Return the configuration of a run in which this animal could be a candidate."""
         own = (f"eye.optics={str(self.relative_aperture > 0).lower()}", f"eye.noise_sigma={self.noise_sigma}")
         return assemble(self.task, assignments=(*own, *settings))
 
 
 @dataclass(frozen=True)
 class Trained(Design):
-    """What became of a design: means over its evaluation episodes, steps trained and seconds of a worker."""
+    """Result of a design: means over evaluation episodes, number of steps, and seconds of a worker."""
 
     failed: int = 0
     fitness: float = 0.0
@@ -91,7 +91,7 @@ class Trained(Design):
         return Design(**{f.name: getattr(self, f.name) for f in fields(Design)})
 
     @classmethod
-    def of(cls, design: Design, outcome: Evaluation) -> Trained:
+    def from_outcome(cls, design: Design, outcome: Evaluation) -> Trained:
         return cls(
             **asdict(design),
             failed=int(outcome.failure is not None),
@@ -104,11 +104,13 @@ class Trained(Design):
 
 
 def train_all(designs: Iterable[Design], settings: Sequence[str], path: Path, workers: int = 0) -> list[Trained]:
-    """Rows of all designs, in their order. Those that the file has are taken from it, the others are trained, and each
-    is written down as soon as it is done: whoever is stopped goes on later. Hours are added up beside the file.
+    """Return the rows of all designs in their order, after training the missing ones.
 
-    settings: "section.name=value" of all of them, beside the tasks' own
-    workers: processes; 0: one per core
+    Each row is written as soon as it is complete, so an interrupted call can be repeated. The total hours are stored in
+    a JSON file of the same name.
+
+    settings: "section.name=value" for all designs, in addition to the tasks' settings
+    workers: number of processes; 0: one per core
     """
     designs = list(designs)
     known = {row.design: row for row in read_rows(Trained, path)}
@@ -121,7 +123,7 @@ def train_all(designs: Iterable[Design], settings: Sequence[str], path: Path, wo
             for number, design in waiting.items()
         ]
         for job, outcome in executor.run(jobs):
-            row = Trained.of(waiting[job.id], outcome)
+            row = Trained.from_outcome(waiting[job.id], outcome)
             known[row.design] = row
             hours = sum(each.seconds for each in known.values()) / 3600
             made, here = path.with_suffix(".json"), Origin.here(hours, "worker")
@@ -135,7 +137,7 @@ def train_all(designs: Iterable[Design], settings: Sequence[str], path: Path, wo
 def crossed(
     animals: Iterable[Design], tasks: Iterable[str], noises: Iterable[float], seeds: Iterable[int]
 ) -> list[Design]:
-    """Every animal in every task, light and life; in navigation an eye is one row of receptors."""
+    """Return all combinations of animals, tasks, noises and seeds; in navigation an eye is one row of receptors."""
     return [
         replace(animal, task=task, height=animal.width if task != "navigation" else 1, noise_sigma=sigma, seed=seed)
         for seed, sigma, task, animal in itertools.product(seeds, noises, tasks, animals)
@@ -144,8 +146,11 @@ def crossed(
 
 @dataclass(frozen=True)
 class Experiment:
-    """name: of page and data · text: for help · designs: all trainings · settings: of all of them
-    page: of stored rows, their origin and the answer that a person has given"""
+    """A designed experiment.
+
+    name: name of page and data · text: help text · designs: all training runs · settings: settings of all of them
+    page: function of the stored rows, their origin and the written answer
+    """
 
     name: str
     text: str
@@ -155,13 +160,13 @@ class Experiment:
 
 
 def main(experiment: Experiment, arguments: Sequence[str] | None = None) -> int:
-    """Train what is missing if asked; make the page from the store."""
+    """Train missing animals if requested; make the page from the stored rows."""
     options = parser(experiment.text)
     options.add_argument("--compute", action="store_true", help="train the animals that the stored numbers lack")
     options.add_argument("--workers", type=int, default=0, help="processes; 0: one per core")
-    options.add_argument("--answer", help="the page's answer; kept from now on")
+    options.add_argument("--answer", help="answer on the page; stored for later calls")
     chosen = options.parse_args(arguments)
-    return told(experiment.name, lambda: _made(experiment, chosen))
+    return exit_code(experiment.name, lambda: _made(experiment, chosen))
 
 
 def _made(experiment: Experiment, chosen: Namespace) -> None:

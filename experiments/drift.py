@@ -1,4 +1,4 @@
-"""The null model of the searches on a page, as it is stored."""
+"""Stored null model of the searches on a page."""
 
 from __future__ import annotations
 
@@ -21,8 +21,11 @@ SEEDS = 1000
 
 @dataclass(frozen=True)
 class Drift:
-    """Mean of a quantity over the candidates of a generation: median over searches, and the range of 95 % of them. At
-    the end of a phase another row, of its last LAST generations together, with what every search came to (`ends`)."""
+    """Mean of a quantity over the candidates of a generation: median over searches, and the range of 95 % of them.
+
+    The end of a phase has an additional row for its last LAST generations together, with the results of all searches
+    (`ends`).
+    """
 
     group: str
     quantity: str
@@ -34,22 +37,24 @@ class Drift:
 
     @property
     def held(self) -> bool:
-        """Nothing moves it: its gene is closed."""
+        """True if the quantity is constant because its gene is frozen."""
         return self.low == self.high
 
     def p(self, *values: float) -> float:
-        """Two-sided p of a run's value, or of several runs' values together."""
+        """Return the two-sided p-value of a run's value, or of several runs' values together."""
         return p_value(values, np.array(self.ends.split(), float))
 
     def __str__(self) -> str:
-        return f"held at {self.median:.3g}" if self.held else f"{self.median:.3g} [{self.low:.3g}, {self.high:.3g}]"
+        return f"fixed at {self.median:.3g}" if self.held else f"{self.median:.3g} [{self.low:.3g}, {self.high:.3g}]"
 
 
 def drifted(
     config: RunConfig, group: str, quantities: Mapping[str, Callable[[Row], float]], generations: int
 ) -> list[Drift]:
-    """Of SEEDS searches with these settings and so many generations; quantities that are no numbers without a life are
-    left out."""
+    """Return the null model of SEEDS searches with these settings and this number of generations.
+
+    Quantities that need a training run are omitted.
+    """
 
     def measure(animal: Phenotype) -> dict[str, float]:
         row = _row(animal, config.eye)
@@ -60,19 +65,19 @@ def drifted(
         if np.isfinite(means).any(axis=0).all():
             rows += [_drift(group, name, generation, means[:, generation]) for generation in range(generations)]
             for last in last_generations(config, generations):
-                ends = model.ends(name, last)  # as `last_values`
+                ends = model.ends(name, last)  # computed like `last_values`
                 told = " ".join(f"{one:.6g}" for one in ends)
                 rows.append(replace(_drift(group, name, last[-1], ends), ends=told))
     return rows
 
 
 def of_the_end(drift: list[Drift], generation: int) -> Drift | None:
-    """That of the phase that ends with a generation; None where none does."""
+    """Return the row of the phase that ends with a generation; None if no phase ends there."""
     return next((one for one in drift if one.ends and one.generation == generation), None)
 
 
 def shade(axes: Any, drift: list[Drift], color: str) -> None:
-    """Shade the range of the null model over generations; nothing where a gene is held."""
+    """Shade the range of the null model over generations, unless the gene is frozen."""
     rows = [one for one in drift if not one.ends and not one.held]
     if rows:
         x, low, high = ([getattr(one, name) for one in rows] for name in ("generation", "low", "high"))
@@ -87,7 +92,7 @@ def _drift(group: str, quantity: str, generation: int, means: NDArray[np.float64
 
 
 def _row(animal: Phenotype, eye: EyeConfig) -> Row:
-    """Of an animal that has not lived."""
+    """Return the row of an untrained animal."""
     none: dict[str, Any] = {
         "failed": 0,
         "fitness": NO_NUMBER,

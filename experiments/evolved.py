@@ -1,4 +1,4 @@
-"""Runs of evolution become a store, and the store a page."""
+"""Storage of runs of evolution, and pages from the stored rows."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from evolve.store.versions import commits, recorded
 from experiments.candidates import Row, complete, rows_of
 from experiments.drift import Drift, drifted, of_the_end
 from experiments.means import last_mean
-from experiments.page import Page, markdown_table, parser, told
+from experiments.page import Page, exit_code, markdown_table, parser
 from experiments.store import Origin, read_rows, write_rows
 
-__all__ = ["Conduct", "Quantities", "Store", "conduct_table", "main", "null_model", "null_table", "stored"]
+__all__ = ["Quantities", "RunMetadata", "Store", "conduct_table", "main", "null_model", "null_table", "stored"]
 
-Quantities = Mapping[str, Callable[[Row], float]]  # that are compared with the null model
+Quantities = Mapping[str, Callable[[Row], float]]  # quantities that are compared with the null model
 NOT_JUDGED = "Not judged yet."
 COLORS = {
     "blue": "#0072B2",
@@ -33,13 +33,14 @@ COLORS = {
 
 
 @dataclass(frozen=True)
-class Conduct:
-    """How a run was conducted.
+class RunMetadata:
+    """Conditions of a run.
 
-    generations, planned  complete ones, and how many there were to be
-    commits               of rhabdom, with which it was begun and continued, first digits; +: with changes
-    worker_hours          by the clock: other work on the machine lengthens them
-    noise_sigma           of its receptors · relief_height [m]: what a relief gene of 1 means
+    generations, planned: numbers of complete and of planned generations
+    worker_hours: wall time, which other work on the machine increases
+    commits: first digits of rhabdom's commits at the starts of the run; +: with changes
+    noise_sigma: noise of the receptors
+    relief_height: height of a relief with gene value 1 [m]
     """
 
     group: str
@@ -53,7 +54,7 @@ class Conduct:
     relief_height: float
 
     @classmethod
-    def of(cls, run: Run, group: str) -> Conduct:
+    def from_run(cls, run: Run, group: str) -> RunMetadata:
         done, hours = complete(run), sum(candidate.seconds for candidate in run.candidates) / 3600
         by = ", ".join(commit[:7] + "+" * commit.endswith("+") for commit in commits(run.path))
         config, eye = run.config, run.config.eye
@@ -63,62 +64,67 @@ class Conduct:
 
 @dataclass(frozen=True)
 class Store:
-    """What a page is made from: rows, how their runs were conducted, the drift of the null model, their origin, and the
-    answer that a person has given to the question."""
+    """Contents of a page: rows, conditions of their runs, drift of the null model, origin, and the written answer."""
 
     rows: list[Row]
-    conduct: list[Conduct]
+    run_metadata: list[RunMetadata]
     drift: list[Drift]
     origin: Origin
     answer: str
 
     def group(self, name: str) -> list[Row]:
-        """Rows of one group."""
+        """Return the rows of one group."""
         return [row for row in self.rows if row.group == name]
 
     @property
     def groups(self) -> list[str]:
-        """Names of the groups, in the order in which they were given."""
+        """Names of the groups, in order of their first rows."""
         return list(dict.fromkeys(row.group for row in self.rows))
 
     @property
     def colors(self) -> dict[str, str]:
-        """Of each group. Raises ValueError with more groups than there are colours."""
+        """Colour of each group.
+
+        Raises:
+            ValueError: there are more groups than colours.
+        """
         if len(self.groups) > len(COLORS):
-            raise ValueError(f"{len(self.groups)} groups of runs, must be at most {len(COLORS)}: one colour each")
+            raise ValueError(f"{len(self.groups)} groups of runs: must be at most {len(COLORS)}, with one colour each")
         return dict(zip(self.groups, COLORS.values(), strict=False))
 
     @property
     def legend(self) -> str:
-        """The same in words."""
+        """Colours of the groups as text."""
         names = {value: name for name, value in COLORS.items()}
         return ", ".join(f"{group} {names[color]}" for group, color in self.colors.items())
 
     def noise_sigma(self, group: str) -> float:
-        """Of the receptors in a group's runs."""
-        return next(one.noise_sigma for one in self.conduct if one.group == group)
+        """Return the noise of the receptors in a group's runs."""
+        return next(one.noise_sigma for one in self.run_metadata if one.group == group)
 
     def drift_of(self, group: str, quantity: str) -> list[Drift]:
-        """A quantity under the null model, by generation; [] where it was not computed."""
+        """Return a quantity under the null model, by generation; [] if it was not computed."""
         return [one for one in self.drift if (one.group, one.quantity) == (group, quantity)]
 
 
 def conduct_table(store: Store) -> str:
-    """A row per run."""
+    """Return a table with a row per run."""
     header = ["run", "candidates", "generations", "worker hours", "rhabdom at"]
     lines = [
         [
             *(f"{one.group}, seed {one.seed}", str(one.candidates), f"{one.generations} of {one.planned}"),
             *(f"{one.worker_hours:.1f}", one.commits),
         ]
-        for one in store.conduct
+        for one in store.run_metadata
     ]
     return markdown_table(header, lines)
 
 
 def null_table(store: Store, quantities: Quantities, phase: int | None = None) -> str:
-    """A row per run, and one for the runs of a group together: the p of what they came to under the null model, at the
-    end of a phase or of the run."""
+    """Return a table of p-values under the null model, at the end of a phase or of the run.
+
+    Each run has a row, and the runs of a group together have another one.
+    """
     names = [n for n in quantities if any(not one.held for g in store.groups for one in store.drift_of(g, n))]
     lines = []
     for group in store.groups:
@@ -132,7 +138,10 @@ def null_table(store: Store, quantities: Quantities, phase: int | None = None) -
 
 
 def _ps(store: Store, runs: Sequence[list[Row]], quantities: Quantities, names: Sequence[str]) -> list[str]:
-    """Of each quantity: p of these runs' mean; "-" where nothing moves it, or a run did not get as far as others."""
+    """Return the p-value of these runs' mean for each quantity.
+
+    "-" stands for a constant quantity, or for runs that ended in different generations.
+    """
     shown = []
     for name in names:
         found = [last_mean(run, quantities[name]) for run in runs]
@@ -144,7 +153,7 @@ def _ps(store: Store, runs: Sequence[list[Row]], quantities: Quantities, names: 
 
 
 def null_model(store: Store, group: str, quantity: str, rows: Sequence[Row]) -> Drift | None:
-    """A quantity under the null model at the last generation of these rows; None where no phase ends there."""
+    """Return a quantity under the null model at the last generation of these rows; None if no phase ends there."""
     return of_the_end(store.drift_of(group, quantity), max((row.generation for row in rows), default=-1))
 
 
@@ -155,10 +164,10 @@ def main(
     arguments: Sequence[str] | None = None,
     quantities: Quantities | None = None,
 ) -> int:
-    """Collect runs if asked, and the null model of the quantities; make the page from the store."""
+    """Collect runs and the null model of the quantities if requested; make the page from the stored rows."""
     options = parser(text)
-    options.add_argument("--runs", nargs="+", metavar="GROUP=DIR", help="collect these run directories anew")
-    options.add_argument("--answer", help="what came out, in Markdown; kept until another is given or numbers change")
+    options.add_argument("--runs", nargs="+", metavar="GROUP=DIR", help="collect these run directories")
+    options.add_argument("--answer", help="answer on the page, in Markdown; stored until the numbers change")
     chosen = options.parse_args(arguments)
     stem = chosen.docs / "data" / name
 
@@ -166,7 +175,7 @@ def main(
         _collect(chosen, stem, quantities or {})
         page(stored(stem)).publish(chosen.docs)
 
-    return told(name, work)
+    return exit_code(name, work)
 
 
 def _beside(stem: Path, what: str) -> Path:
@@ -179,25 +188,29 @@ def _collect(chosen: Namespace, stem: Path, quantities: Quantities) -> None:
         runs = _named(chosen.runs)
         before = _text(stem.with_suffix(".csv"))
         rows = [row for group, run in runs for row in rows_of(run, group)]
-        conduct = [Conduct.of(run, group) for group, run in runs]
-        furthest = {one.group: max(o.generations for o in conduct if o.group == one.group) for one in conduct}
+        metadata = [RunMetadata.from_run(run, group) for group, run in runs]
+        furthest = {one.group: max(o.generations for o in metadata if o.group == one.group) for one in metadata}
         configs = {group: run.config for group, run in runs if quantities and furthest[group] > 0}
         found = [row for g, config in configs.items() for row in drifted(config, g, quantities, furthest[g])]
-        here = Origin.here(sum(one.worker_hours for one in conduct), "worker")
-        # All that takes time is done: what is stored goes together, also where somebody stops it here.
+        here = Origin.here(sum(one.worker_hours for one in metadata), "worker")
+        # All computations are complete here, so that an interruption is unlikely to leave inconsistent files.
         if quantities:
             write_rows(found, _beside(stem, "drift"))
-        write_rows(conduct, _beside(stem, "runs"))
+        write_rows(metadata, _beside(stem, "runs"))
         replace(here, versions=recorded(runs[0][1].path) or here.versions).write(stem.with_suffix(".json"))
         write_rows(rows, stem.with_suffix(".csv"))
         if _text(stem.with_suffix(".csv")) != before:
-            answer.unlink(missing_ok=True)  # it was given to other numbers
+            answer.unlink(missing_ok=True)  # the answer refers to the former numbers
     if chosen.answer:
         write_whole(answer, f"{chosen.answer}\n".encode())
 
 
 def _named(texts: Sequence[str]) -> list[tuple[str, Run]]:
-    """Runs and the groups that they belong to. Raises ValueError where those of a group differ in more than seeds."""
+    """Return runs with the names of their groups.
+
+    Raises:
+        ValueError: runs of a group differ in more than their seeds.
+    """
     named = [text.partition("=") for text in texts]
     if not all(equals for _, equals, _ in named):
         raise ValueError("--runs: must be GROUP=DIR ...")
@@ -214,10 +227,14 @@ def _text(path: Path) -> str:
 
 
 def stored(stem: Path) -> Store:
-    """What is stored under this name (path without an ending). Raises ValueError where there are no rows."""
+    """Return the stored contents under this path without a file ending.
+
+    Raises:
+        ValueError: the file contains no rows.
+    """
     rows = read_rows(Row, stem.with_suffix(".csv"))
     if not rows:
         raise ValueError(f"{stem.with_suffix('.csv')} holds no runs; collect some with --runs GROUP=DIR ...")
-    conduct, drift = read_rows(Conduct, _beside(stem, "runs")), read_rows(Drift, _beside(stem, "drift"))
+    metadata, drift = read_rows(RunMetadata, _beside(stem, "runs")), read_rows(Drift, _beside(stem, "drift"))
     said = _text(stem.with_suffix(".txt")).strip() or NOT_JUDGED
-    return Store(rows, conduct, drift, Origin.read(stem.with_suffix(".json")), said)
+    return Store(rows, metadata, drift, Origin.read(stem.with_suffix(".json")), said)

@@ -1,4 +1,4 @@
-"""The animals of the experiment on eyes for tasks, and the controls that separate fineness from height."""
+"""Animals of the experiment on eyes for tasks, with controls that separate the effects of fineness and height."""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ COLORS = {"navigation": "#D55E00", "detection": "#0072B2"}
 BRIGHT, DIM = 0.01, (0.05, 0.15)
 SEEDS, SEEDS_IN_DIM_LIGHT = range(6), range(3)
 FOV_DEG = 45.0
-# Eyes, receptors across each, and the arc over which they are spread: from a compound eye to a camera.
+# Number of eyes, receptors across each, and the arc over which eyes are spread: from compound eyes to a camera eye.
 SHAPES = ((10, 4, 135.0), (5, 8, 90.0), (2, 15, 45.0), (2, 15, 30.0), (1, 15, 0.0))
 COMPOUND, CAMERA = (10, 4), (2, 15)
-# Controls in navigation: eyes, receptors (up, across) and arc. A row of square receptors is the lower the finer it is;
-# most of these eyes are 45 degrees high instead, as the published ones are at any resolution.
+# Controls in navigation: number of eyes, receptors (up, across) and arc. Finer rows of square receptors are lower. Most
+# of these eyes are 45 degrees high instead, like the published ones at any resolution.
 CONTROLS = (
     (10, 4, 4, 135.0),
     (5, 8, 8, 90.0),
@@ -46,7 +46,7 @@ CONTROLS = (
 
 
 def designs() -> list[Design]:
-    """All trainings: every animal in both tasks in bright light, then in less, then the controls in navigation."""
+    """Return all training runs: every animal in both tasks in bright light, in dimmer light, and the controls."""
     animals = [Design(TASKS[0], n, w, w, arc, BRIGHT, 0) for n, w, arc in SHAPES]
     return [
         *crossed(animals, TASKS, (BRIGHT,), SEEDS),
@@ -56,7 +56,7 @@ def designs() -> list[Design]:
 
 
 def with_rows(rows: Sequence[Trained]) -> list[Trained]:
-    """Animals of the experiment as it was designed: navigators' eyes are one row of receptors."""
+    """Return the rows of the original design, in which navigators' eyes are one row of receptors."""
     return [
         row
         for row in rows
@@ -65,12 +65,12 @@ def with_rows(rows: Sequence[Trained]) -> list[Trained]:
 
 
 def with_squares(rows: Sequence[Trained]) -> list[Trained]:
-    """Animals in bright light whose eyes are 45 degrees high in both tasks: the comparison without the confound."""
+    """Return the rows in bright light with eyes 45 degrees high in both tasks: the comparison without confound."""
     return [row for row in rows if row.height == row.width and row.noise_sigma == BRIGHT]
 
 
 def eyes_of(rows: Sequence[Trained], task: str, shape: tuple[int, int, int, float]) -> list[Trained]:
-    """Animals with these eyes, (eyes, receptors up, across, arc), that did not fail, in bright light."""
+    """Return the rows in bright light with these eyes (number, receptors up, across, arc), except failed animals."""
     return [
         row
         for row in rows

@@ -1,4 +1,4 @@
-"""Eyes for tasks: the same animals in both tasks, and in less and less light
+"""Eyes for tasks: training of the same animals in two tasks, in bright and dim light
 
 python -m experiments.eyes_for_tasks [--compute] [--workers N] [--docs DIR]
 """
@@ -37,7 +37,7 @@ SETTINGS = ("learning.total_steps=150000", "learning.eval_interval=50000")
 
 
 def page(rows: Sequence[Trained], origin: Origin, answer: str) -> Page:
-    """The page of stored rows."""
+    """Return the page of stored rows."""
     designed_rows = with_rows(rows)
     return Page(
         name=NAME,
@@ -59,14 +59,14 @@ def page(rows: Sequence[Trained], origin: Origin, answer: str) -> Page:
 
 
 def _lives(rows: Sequence[Trained], sigma: float) -> str:
-    """How many lives each animal has lived in this light, of those that have lived in it."""
+    """Return the number of training runs per animal in this light as text, for animals that have any."""
     counts = [len(_cell(rows, task, sigma, shape)) for task in TASKS for shape in SHAPES]
     least, most = min(filter(None, counts)), max(counts)
     return f"{least}{f' to {most}' if most > least else ''} at σ = {sigma:g}"
 
 
 def _table(rows: Sequence[Trained], value: Callable[[Trained], float]) -> str:
-    """A row per animal: mean and range over seeds in each task and light."""
+    """Return a table with a row per animal: mean and range over seeds in each task and light."""
     found_lights = lights(rows)
     header = ["eyes", *(f"{task}, σ = {sigma:g}" for task in TASKS for sigma in found_lights)]
     lines = []
@@ -96,12 +96,12 @@ def _named(n: int, w: int, arc: float) -> str:
 
 
 def crossings_table(rows: Sequence[Trained]) -> str:
-    """The primary comparison first, then the confounded ones by light."""
+    """Return the table of differences: the primary comparison first, then the confounded ones by light."""
     square = by_light(with_squares(rows)).get(BRIGHT)
     lines = [[f"σ = {BRIGHT:g}, square eyes in both tasks", *_cells(square)]]
     crossings = by_light(with_rows(rows))
     lines += [[f"σ = {sigma:g}, navigators with rows", *_cells(crossings.get(sigma))] for sigma in lights(rows)]
-    header = ["light and eyes", *(f"{task}: two of 15 less ten of 4" for task in TASKS), "interaction", "p"]
+    header = ["light and eyes", *(f"{task}: two of 15 minus ten of 4" for task in TASKS), "interaction", "p"]
     return markdown_table(header, lines)
 
 
@@ -112,7 +112,7 @@ def _cells(found: Crossing | None) -> list[str]:
 
 
 def controls_table(rows: Sequence[Trained]) -> str:
-    """Navigation in bright light: every height of eye that was tried, the heights of rows among them."""
+    """Return a table of navigation in bright light with all tested heights of eyes, including rows."""
     lines = []
     for n, h, w, arc in sorted(
         {(n, 1, w, arc) for n, w, arc in SHAPES} | set(CONTROLS), key=lambda one: (-one[1] / one[2], -one[0], one)
@@ -127,12 +127,12 @@ def controls_table(rows: Sequence[Trained]) -> str:
         lines.append(
             [shape_name(n, h, w, arc), f"{h * receptor:.3g}", f"{receptor:.3g}", str(len(found)), fitness, success]
         )
-    header = ["eyes", "height of an eye [°]", "of a receptor [°]", "training runs", "fitness", "reach the goal"]
+    header = ["eyes", "height of an eye [°]", "of a receptor [°]", "training runs", "fitness", "goal reached"]
     return markdown_table(header, lines)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Train what is missing if asked; make the page from the store."""
+    """Train missing animals if requested; make the page from the stored rows."""
     return designed.main(designed.Experiment(NAME, __doc__ or "", designs, SETTINGS, page), arguments)
 
 

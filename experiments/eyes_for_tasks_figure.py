@@ -1,4 +1,4 @@
-"""The figure of eyes for tasks: the experiment above, the controls below."""
+"""Figure of eyes for tasks: the original design in the upper row, the controls in the lower row."""
 
 from __future__ import annotations
 
@@ -28,18 +28,18 @@ from experiments.page import new_figure, save
 
 __all__ = ["draw", "height_message", "light_message"]
 
-MATTERS = 0.1  # choice: of the fitness of the straight way, below which a difference is not worth a title
+MATTERS = 0.1  # chosen minimum difference for a title, relative to the fitness of a straight path
 
 
 def draw(rows: Sequence[Trained], path: Path) -> None:
-    """Above, the experiment as it was designed, and who is ahead in which light; below, the controls."""
+    """Draw the original design and the difference in each light above, and the controls below."""
     figure, axes = new_figure(12, 8.6, columns=3, rows=2, width_ratios=(1.2, 1.2, 1))
     first = with_rows(rows)
     rows_of = {"navigation": lambda w: 1, "detection": lambda w: w}
     for place, task in zip(axes[0], TASKS, strict=False):
         shapes = [(n, rows_of[task](w), w, arc) for n, w, arc in SHAPES]
         _draw_fitness(place, rows, task, shapes)
-        confounded = "\n(eyes of one row: the finer, the lower)" if task == "navigation" else "\n(square eyes)"
+        confounded = "\n(eyes of one row; finer eyes are lower)" if task == "navigation" else "\n(square eyes)"
         place.set_title(f"{task}{confounded}", fontsize=11)
     _draw_lights(axes[0, 2], first)
     squares = [(n, w, w, arc) for n, w, arc in SHAPES]
@@ -49,7 +49,7 @@ def draw(rows: Sequence[Trained], path: Path) -> None:
     _draw_difference(axes[1, 2], rows)
     for place in (axes[0, 0], axes[1, 0], axes[1, 1]):
         place.axhline(
-            full_return("navigation"), color="#444444", lw=0.9, ls="--", label="ceiling: straight to the goal"
+            full_return("navigation"), color="#444444", lw=0.9, ls="--", label="ceiling: straight path to the goal"
         )
         place.set_ylim(top=140)
         place.legend(
@@ -63,24 +63,26 @@ def draw(rows: Sequence[Trained], path: Path) -> None:
 
 
 def height_message(rows: Sequence[Trained]) -> str:
-    """Title: do fine eyes fall behind in navigation if they are low, and if they are high? Only a difference beyond
-    chance and above MATTERS counts."""
+    """Return the title: whether fine eyes are worse in navigation if they are low, and if they are high.
+
+    Only a difference beyond chance and above MATTERS counts.
+    """
     behind = []
     for mine in (with_rows(rows), with_squares(rows)):
         found = by_light(mine).get(BRIGHT)
         if found is None:
-            return "What eyes earn in each task"
+            return "Fitness of eyes in each task"
         difference = found.differences["navigation"]
         behind.append(difference.high < 0 and difference.mean < -MATTERS * full_return("navigation"))
     if behind == [True, False]:
-        return "Fine eyes fall behind in navigation if they are low, and not if they are 45° high"
-    return "Fine eyes fall behind in navigation at any height" if all(behind) else "What eyes earn in each task"
+        return "Fine eyes are worse in navigation if they are low, but not if they are 45° high"
+    return "Fine eyes are worse in navigation at any height" if all(behind) else "Fitness of eyes in each task"
 
 
 def _draw_fitness(
     place: Any, rows: Sequence[Trained], task: str, shapes: Sequence[tuple[int, int, int, float]]
 ) -> None:
-    """A bar per animal, a dot per training run."""
+    """Draw a bar per animal and a dot per training run."""
     for x, shape in enumerate(shapes):
         found = [row.fitness for row in eyes_of(rows, task, shape)]
         label = ("mean", "one training run") if x == 0 else (None, None)
@@ -94,7 +96,7 @@ def _draw_fitness(
 
 
 def _draw_lights(place: Any, rows: Sequence[Trained]) -> None:
-    """Who is ahead in which light, in the experiment as it was designed."""
+    """Draw the difference between the two kinds of eyes in each light, for the original design."""
     crossings = by_light(rows)
     for task in TASKS:
         ahead = [found.differences[task] for found in crossings.values()]
@@ -102,26 +104,26 @@ def _draw_lights(place: Any, rows: Sequence[Trained]) -> None:
         error = [[one.mean - one.low for one in ahead], [one.high - one.mean for one in ahead]]
         place.errorbar(list(crossings), y, error, color=COLORS[task], marker="o", capsize=3, label=task)
     place.axhline(0, color="#777777", lw=0.6)
-    place.set(xscale="log", xlabel="noise σ of a receptor (less light: →)", ylabel="two of 15 less ten of 4")
+    place.set(xscale="log", xlabel="noise σ of a receptor (dimmer light: →)", ylabel="two of 15 minus ten of 4")
     place.set_title(f"navigators with rows:\n{light_message(crossings)}", fontsize=11)
     place.legend(fontsize=8, frameon=False)
 
 
 def light_message(crossings: Mapping[float, Crossing]) -> str:
-    """Whether eyes that are ahead in bright light fall behind in less, by more than chance."""
+    """Return a title: whether the better eyes in bright light are worse in dimmer light, by more than chance."""
     if len(crossings) < 2:
-        return "in less and less light"
+        return "in dim light"
     bright, *dim = (crossings[sigma].differences for sigma in sorted(crossings))
     turned = any(
         (one[task].high < 0 < bright[task].mean) or (bright[task].mean < 0 < one[task].low)
         for one in dim
         for task in TASKS
     )
-    return "less light turns the order" if turned else "less light does not turn the order"
+    return "dim light reverses the order" if turned else "dim light does not reverse the order"
 
 
 def _draw_heights(place: Any, rows: Sequence[Trained]) -> None:
-    """Fitness of every navigator over the height of its eyes."""
+    """Draw the fitness of every navigator over the height of its eyes."""
     shapes = sorted({(n, 1, w, arc) for n, w, arc in SHAPES} | set(CONTROLS))
     for fine, marker in ((True, "s"), (False, "o")):
         mine = [shape for shape in shapes if (shape[2] == CAMERA[1]) == fine]
@@ -145,7 +147,7 @@ def _draw_heights(place: Any, rows: Sequence[Trained]) -> None:
 
 
 def _draw_difference(place: Any, rows: Sequence[Trained]) -> None:
-    """Two of 15 less ten of 4 in bright light, with rows and with square eyes."""
+    """Draw the difference of two of 15 minus ten of 4 in bright light, with rows and with square eyes."""
     kinds = {"navigators\nwith rows": with_rows(rows), "square eyes\nin both": with_squares(rows)}
     for task, aside in zip(TASKS, (-0.08, 0.08), strict=True):
         found = [(x, by_light(mine).get(BRIGHT)) for x, mine in enumerate(kinds.values())]
@@ -156,6 +158,6 @@ def _draw_difference(place: Any, rows: Sequence[Trained]) -> None:
         )
     place.axhline(0, color="#777777", lw=0.6)
     place.set_xticks(range(len(kinds)), list(kinds), fontsize=9)
-    place.set(ylabel="two of 15 less ten of 4", xlim=(-0.5, len(kinds) - 0.5))
+    place.set(ylabel="two of 15 minus ten of 4", xlim=(-0.5, len(kinds) - 0.5))
     place.set_title("bright light:\nthe difference in both designs", fontsize=11)
     place.legend(fontsize=8, frameon=False)

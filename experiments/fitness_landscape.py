@@ -1,4 +1,4 @@
-"""What fitness is to be expected of an eye behind a pupil: a landscape through lives that were lived."""
+"""Surrogate fitness of an animal with a pupil and a lens, fitted to training runs."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ from experiments.glass import blur
 __all__ = ["SPREAD", "WIDE", "Landscape", "Life", "behind_glass", "fitted", "holes", "lenses", "opening"]
 
 Floats = NDArray[np.float64]
-# Standard deviation of a life's fitness: at 0, and how it grows with fitness. `Landscape.misfit` says how well.
+# Standard deviation of a training run's fitness: its value at 0, and its slope. `Landscape.misfit` measures the fit.
 SPREAD = 5.0, 0.17
 
 
 @dataclass(frozen=True)
 class Life:
-    """What an animal saw through, and came to. blur: see experiments.glass"""
+    """A training run: aperture and blur of the eyes (see experiments.glass), and fitness."""
 
     aperture: float
     blur: float
@@ -35,11 +35,11 @@ class Life:
 
 @dataclass(frozen=True)
 class Landscape:
-    """Fitness of an animal behind a pupil, as a product: light, which narrow pupils lack, by sharpness.
+    """Surrogate fitness of an animal: a product of a factor for light, which is low for narrow pupils, and sharpness.
 
-    low: of who sees nothing · high: what the sharpest and brightest have more
-    aperture, light: width below which light is wanting, and how steeply · width, fall: blur that is too much, and so on
-    misfit: root mean square of what lives differ from it, by SPREAD
+    low: fitness without any useful signal · high: additional fitness with the sharpest and brightest image
+    aperture, light: scale and exponent of the factor for light · width, fall: scale and exponent of the blur
+    misfit: root mean square deviation of training runs from the surrogate, in units of SPREAD
     """
 
     low: float
@@ -51,12 +51,12 @@ class Landscape:
     misfit: float = math.nan
 
     def fitness(self, aperture: Floats | float, blur: Floats | float) -> Floats:
-        """Expected, of animals with these eyes."""
+        """Return the expected fitness of animals with these eyes."""
         bright = np.exp(-((self.aperture / np.asarray(aperture)) ** self.light))
         return np.asarray(self.low + self.high * bright * np.exp(-((np.asarray(blur) / self.width) ** self.fall)))
 
     def lived(self, animals: Sequence[Phenotype], config: EyeConfig, chance: np.random.Generator) -> Floats:
-        """Of one life of each."""
+        """Return a random fitness for one training run of each animal."""
         apertures = [animal.relative_aperture or math.nan for animal in animals]
         expected = self.fitness(np.array(apertures), np.array([blur(animal, config) for animal in animals]))
         return np.asarray(expected + chance.normal(size=expected.size) * _spread(expected))
@@ -66,28 +66,28 @@ def _spread(fitness: Floats) -> Floats:
     return np.asarray(SPREAD[0] + SPREAD[1] * np.maximum(fitness, 0))
 
 
-# Wider than those of experiments.sharp_lenses: docs/measurements/learning.md#lenses-in-less-and-less-light.
+# Runs with wider lenses than in sharp_lenses: docs/measurements/learning.md#lenses-at-different-noise-levels.
 WIDE = (Life(0.5, 0.0, 230.0), Life(0.5, 0.0, 203.0))
 
 
 def lenses(rows: Sequence[Trained]) -> list[Life]:
-    """Lives of experiments.sharp_lenses."""
+    """Return the training runs of experiments.sharp_lenses."""
     eye = EyeConfig()
     return [Life(row.relative_aperture, blur(row.animal, eye), row.fitness) for row in rows if not row.failed]
 
 
 def holes(run: Run) -> list[Life]:
-    """Lives of a search for lenses while its pupil alone may change."""
+    """Return the training runs of a search for lenses while only its pupil may change."""
     return [_life(c, run.config.eye) for c in run.candidates if succeeded(c) and c.generation < opening(run.config)]
 
 
 def behind_glass(run: Run) -> list[Life]:
-    """Lives of the same search from there on."""
+    """Return the training runs of the same search after glass may change."""
     return [_life(c, run.config.eye) for c in run.candidates if succeeded(c) and c.generation >= opening(run.config)]
 
 
 def opening(config: RunConfig) -> int:
-    """The generation from which glass may change."""
+    """Return the first generation in which glass may change."""
     return config.genome["refractive_index"].opens_at
 
 
@@ -97,7 +97,7 @@ def _life(candidate: Candidate, eye: EyeConfig) -> Life:
 
 
 def fitted(lives: Sequence[Life]) -> Landscape:
-    """The landscape nearest to these lives (least squares, in units of their spread)."""
+    """Return the surrogate fitted to these training runs by least squares, in units of their spread."""
     from scipy.optimize import least_squares
 
     apertures, blurs, fitness = np.array([astuple(life) for life in lives]).T

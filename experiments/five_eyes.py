@@ -1,4 +1,4 @@
-"""What the eye sees, at five stages on the way to a lens
+"""Image of one scene by five eyes, from an open aperture to a focused lens
 
 python -m experiments.five_eyes [--docs DIR]
 """
@@ -28,20 +28,23 @@ __all__ = ["STAGES", "Stage", "View", "scene", "view"]
 Floats = NDArray[np.floating]
 FINE, COARSE, CELLS = 90, 30, 180  # receptors along a side of either retina, and cells of the scene
 SENSOR_WIDTH, FOV_DEG, NOISE, INDEX = 200e-6, 45.0, 0.003, 1.5
-WIDE = 0.38  # relative aperture of cup and lenses: the widest of which a focused lens is in the genes' reach
+WIDE = 0.38  # relative aperture of cup and lenses, the maximum for a focused lens within the genes' range
 SPP = 128
 
 
 @dataclass(frozen=True)
 class Stage:
-    """A pupil. power: of its glass, in units of what focuses; 0: none."""
+    """A pupil.
+
+    power: power of its glass, 1 in focus; 0: no glass
+    """
 
     name: str
     relative_aperture: float
     power: float = 0.0
 
     def pupil(self) -> optics.Pupil:
-        """The pupil, of glass with n = 1.5 where it has any."""
+        """Return the pupil; its glass has n = 1.5."""
         radius = self.relative_aperture * SENSOR_WIDTH / 2
         if not self.power:
             return optics.Pupil(radius)
@@ -61,8 +64,10 @@ STAGES = (
 
 @dataclass(frozen=True)
 class View:
-    """What a stage makes of the scene: signals (channel, y, x) brought to the perfect lens's brightness, on the fine
-    retina without noise and on the coarse one with it; and how like the perfect lens's they are."""
+    """Signals of one eye (channel, y, x), scaled to the brightness of a perfect lens, and their quality.
+
+    The fine retina has no noise, and the coarse retina has noise. PSNR and SSIM are relative to the perfect lens.
+    """
 
     fine: Floats
     coarse: Floats
@@ -73,8 +78,11 @@ class View:
 
 
 def scene() -> Floats:
-    """Spectral radiance (band, y, x) before the eye on the tangent plane, cells of retina / 180, path-traced: the goal
-    left, an adversary right, as far around as light can come from through the widest pupil."""
+    """Return the path-traced spectral radiance (band, y, x) in front of the eye on the tangent plane.
+
+    Cells are retina / 180 wide. The goal is on the left and an adversary on the right. The scene extends to all
+    directions from which light reaches the retina through the widest pupil.
+    """
     world = sim.build_world("detection")
     place, none = np.zeros((1, 2)), np.zeros(1, int)
     objects = np.array([[[2.3, 0.46, 0.5], [2.9, -0.62, 0.5], [6.0, 0.25, 0.5]]])
@@ -85,12 +93,12 @@ def scene() -> Floats:
 
 
 def eye(pupil: optics.Pupil | None, side: int) -> optics.Eye:
-    """An eye with a square retina."""
+    """Return an eye with a square retina."""
     return optics.Eye(pupil, (side, side), FOV_DEG, SENSOR_WIDTH, noise_sigma=NOISE)
 
 
 def view(pupil: optics.Pupil | None, radiance: Floats, seed: int = 0) -> View:
-    """What an eye sees of the scene; None: a perfect lens, with noise as well."""
+    """Return the signals of an eye; None: a perfect lens, also with noise on the coarse retina."""
     fine, coarse = eye(pupil, FINE), eye(pupil, COARSE)
     gain = 1 / float(fine.throughput)
     sharp, blocks = (eye(None, side).see(radiance, CELLS // side) for side in (FINE, COARSE))
@@ -103,7 +111,7 @@ def view(pupil: optics.Pupil | None, radiance: Floats, seed: int = 0) -> View:
 
 
 def page(views: Sequence[View], perfect: View, origin: Origin) -> Page:
-    """The page."""
+    """Return the page."""
     rows = [
         [
             s.name,
@@ -139,7 +147,7 @@ def page(views: Sequence[View], perfect: View, origin: Origin) -> Page:
 
 
 def draw(views: Sequence[View], perfect: View, path: Path) -> None:
-    """A column per stage, the perfect lens last."""
+    """Draw a column per eye, with the perfect lens last."""
     names = [
         *(f"{s.name}\na = {s.relative_aperture:g}, SSIM {v.ssim:.2f}" for s, v in zip(STAGES, views, strict=True)),
         "perfect lens\n",
@@ -152,12 +160,12 @@ def draw(views: Sequence[View], perfect: View, path: Path) -> None:
         axes[0, column].set_title(name, fontsize=11)
     for place, name in zip(axes[:, 0], ("90 x 90 receptors", "30 x 30, with noise"), strict=True):
         place.text(-0.06, 0.5, name, rotation=90, ha="right", va="center", transform=place.transAxes)
-    figure.suptitle("A hole is sharp and dark, a lens is sharp and bright")
+    figure.suptitle("A pinhole is sharp and dark; a focused lens is sharp and bright")
     save(figure, path)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Render, look, and make the page."""
+    """Render the scene, compute the signals, and make the page."""
     options = parser(__doc__ or "").parse_args(arguments)
     began = time.process_time()
     radiance = scene()

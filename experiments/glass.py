@@ -1,4 +1,4 @@
-"""What a relief is as a lens."""
+"""Power and blur of a relief as a lens."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ __all__ = ["blur", "paraboloid", "power", "relief_of"]
 
 
 def power(animal: Phenotype, config: EyeConfig) -> float:
-    """Power of an eye's glass, of that which brings far objects to focus on its retina: 1 in focus, 0 no lens, less
-    than 0 a diverging one; NaN for the perfect lens, which has no glass.
+    """Return the power of an eye's glass relative to the power that focuses distant objects on its retina.
 
-    It is that of the paraboloid nearest to the relief over the pupil's disk (least squares: Zernike's defocus). Where
-    the way through glass falls by d from middle to rim, P = 2 d / R² (paraxial; Goodman, Introduction to Fourier
-    Optics, §5.1), and the retina lies at f = L / (2 tan(fov/2)): P f = d / (a² L tan(fov/2) / 4).
+    1 is in focus, 0 means no lens, and a negative power diverges light. The power of a perfect lens is NaN.
+    It is the power of the paraboloid nearest to the relief over the pupil's disk (least squares: Zernike defocus). If
+    the optical path falls by d from the centre to the rim, P = 2 d / R² (paraxial; Goodman, Introduction to Fourier
+    Optics, §5.1). The retina is at f = L / (2 tan(fov/2)), so that P f = d / (a² L tan(fov/2) / 4).
     """
     if animal.relief is None or animal.relative_aperture is None or animal.refractive_index is None:
         return math.nan
@@ -36,11 +36,11 @@ def power(animal: Phenotype, config: EyeConfig) -> float:
 
 
 def blur(animal: Phenotype, config: EyeConfig) -> float:
-    """Width of a far point's image by rays, in receptors: root mean square distance from its middle; that of the hole
-    where there is no glass, NaN for the perfect lens.
+    """Return the blur of a distant point in receptors: the root mean square distance of rays from their centroid.
 
-    A ray through the pupil at r lands at r + f (n - 1) grad h (paraxial; Goodman, §5.1), f from pupil to retina. Light
-    that is diffracted is left out.
+    A ray through the pupil at r reaches the retina at r + f (n - 1) grad h (paraxial; Goodman, §5.1), where f is the
+    distance from pupil to retina. Diffraction is ignored. Without glass this is the blur of the pinhole; for a perfect
+    lens it is NaN.
     """
     if animal.relief is None or animal.relative_aperture is None or animal.refractive_index is None:
         return math.nan
@@ -55,10 +55,10 @@ def blur(animal: Phenotype, config: EyeConfig) -> float:
 def paraboloid(
     power: float, relative_aperture: float, fov_deg: float, index: float, eye: EyeConfig
 ) -> tuple[float, ...]:
-    """Sixteen heights in [0, 1] of glass of this power, thinnest where it is 0.
+    """Return sixteen heights in [0, 1] of glass of this power, with a minimum of 0.
 
     Raises:
-        ValueError: it would be thicker than reliefs can be.
+        ValueError: the glass exceeds the maximum height of reliefs.
     """
     radius = relative_aperture * eye.sensor_width / 2
     curvature = power / ((index - 1) * focal_length(eye.sensor_width, fov_deg))
@@ -72,14 +72,14 @@ def paraboloid(
 
 
 def relief_of(heights: NDArray[np.float64]) -> optics.BSplineRelief | NDArray[np.float64]:
-    """N² heights as a pupil takes them: one patch of 4 x 4 genes, or the heights that more genes are."""
+    """Return N² heights in the form for a pupil: a patch for 4 x 4 genes, or an array of heights for more."""
     side = math.isqrt(heights.size)
     return optics.BSplineRelief(heights.reshape(side, side)) if side == 4 else heights.reshape(side, side)
 
 
 @cache
 def _fall(side: int) -> NDArray[np.float64]:
-    """How much the nearest paraboloid falls from middle to rim, per height: a relief is linear in its side² genes."""
+    """Return the fall of the nearest paraboloid from centre to rim per height; a relief is linear in its genes."""
     reliefs = [relief_heights(optics.Pupil(1.0, relief_of(gene))) for gene in np.eye(side * side)]
     inside = reliefs[0][1]
     centre = (np.array(inside.shape) - 1) / 2
@@ -91,7 +91,7 @@ def _fall(side: int) -> NDArray[np.float64]:
 
 @cache
 def _slopes(side: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Places in the pupil of radius 1, (n, 2), and the slopes there per height, (side², n, 2)."""
+    """Return points in a pupil of radius 1, (n, 2), and the slopes there per height, (side², n, 2)."""
     reliefs = [relief_heights(optics.Pupil(1.0, relief_of(gene))) for gene in np.eye(side * side)]
     inside, pixels = reliefs[0][1], len(reliefs[0][1])
     places = (np.argwhere(inside) + 0.5) * 2 / pixels - 1

@@ -1,4 +1,4 @@
-"""Goals shape eyes: evolution from one photoreceptor, for navigation and for detection
+"""Goals shape eyes: evolution from one photoreceptor for navigation and for detection
 
 python -m experiments.goals_shape_eyes [--runs navigation=DIR ... detection=DIR ...] [--answer TEXT] [--docs DIR]
 """
@@ -28,7 +28,7 @@ __all__ = ["contrast", "page"]
 
 NAME = "goals_shape_eyes"
 COLORS = {"navigation": "#D55E00", "detection": "#0072B2"}
-TOGETHER = "ln(width / eyes)"  # chosen before the runs: fine eyes have much of it, many eyes little
+TOGETHER = "ln(width / eyes)"  # chosen before the runs; large for fine eyes, small for many eyes
 QUANTITIES: dict[str, Callable[[Row], float]] = {
     TOGETHER: lambda row: math.log(row.width / row.n_eyes),
     "eyes": lambda row: row.n_eyes,
@@ -40,14 +40,14 @@ QUANTITIES: dict[str, Callable[[Row], float]] = {
     "fitness": lambda row: row.fitness,
     "success rate": lambda row: row.success_rate,
 }
-COLUMNS = 4  # of panels
+COLUMNS = 4  # columns of panels
 CONTRASTED = ("navigation", "detection")
-# Of navigation: straight from start to the goal region. An animal that overshoots earns a little more.
+# Ceiling of navigation: a straight path to the goal region. An animal that overshoots earns a little more.
 CEILINGS: dict[str, Callable[[], float]] = {
     "fitness": lambda: full_return("navigation"),
     "success rate": lambda: 1.0,
 }
-# Published eyes, 10 of 4 x 4 around the head and 2 of 15 x 15 ahead, trained as they are by experiments.eyes_for_tasks.
+# Published eyes, 10 of 4 x 4 around the head and 2 of 15 x 15 ahead, trained by experiments.eyes_for_tasks.
 CONTROL = Path(__file__).parents[1] / "docs/results/data/eyes_for_tasks.csv"
 CONTROL_EYES = ((10, 4, 135.0), (2, 15, 45.0))
 QUANTITIES_OF_TRAININGS: dict[str, Callable[[Trained], float]] = {
@@ -61,7 +61,7 @@ PUBLISHED = {
 
 
 def page(store: Store) -> Page:
-    """The page of stored runs."""
+    """Return the page of stored runs."""
     return Page(
         name=NAME,
         command=(
@@ -87,9 +87,12 @@ def page(store: Store) -> Page:
 
 
 def contrast(store: Store, less: str, more: str) -> str:
-    """TOGETHER in one group less that in the other, and as much under the null model, in words; seeds are drawn from
-    the null model's searches as often as there were runs of each group, and p is no less than that of one run alone
-    can be. "-" where that was not computed, or runs of a group ended in different generations."""
+    """Return the difference of TOGETHER between two groups, and its distribution under the null model, as text.
+
+    Each draw from the null model has the same number of searches per group as there were runs, and p has the lower
+    limit of a single run. The text is "-" if the null model was not computed, or if runs of a group ended in different
+    generations.
+    """
     found = {group: list(last_values(store.group(group), QUANTITIES[TOGETHER])) for group in (less, more)}
     null = {group: null_model(store, group, TOGETHER, store.group(group)) for group in (less, more)}
     together = all(len(ends) == 1 for ends in (_ends(store, group) for group in found))
@@ -110,7 +113,7 @@ def contrast(store: Store, less: str, more: str) -> str:
 
 
 def _ends(store: Store, group: str) -> set[int]:
-    """Generations in which a group's runs ended."""
+    """Return the generations in which a group's runs ended."""
     last: dict[int, int] = {}
     for row in store.group(group):
         last[row.seed] = max(row.generation, last.get(row.seed, 0))
@@ -123,7 +126,7 @@ def _legend(store: Store) -> str:
 
 
 def table(store: Store) -> str:
-    """A row per quantity: what came out, the null model, and what was published, group by group."""
+    """Return a table with a row per quantity: results, null model and published values of each group."""
     kinds = ("", ", null model", ", published")
     header = ["mean of the last generations", *(f"{g}{what}" for g in store.groups for what in kinds)]
     lines = []
@@ -137,7 +140,7 @@ def table(store: Store) -> str:
 
 
 def seeds_table(store: Store) -> str:
-    """A row per run."""
+    """Return a table with a row per run."""
     lines = []
     for group in store.groups:
         for seed in sorted({row.seed for row in store.group(group)}):
@@ -153,17 +156,17 @@ def _shown(rows: Sequence[Row], value: Callable[[Row], float]) -> str:
 
 
 def message(store: Store) -> str:
-    """The figure's title: what all seeds agree on, if they do."""
+    """Return the figure's title: a result that all seeds have in common, if there is one."""
     ends = {
         group: [float(v.mean()) for v in last_values(store.group(group), QUANTITIES[TOGETHER])] for group in CONTRASTED
     }
     if all(ends.values()) and max(ends["navigation"]) < min(ends["detection"]):
-        return "Detection makes fine eyes; navigation makes coarse ones, where fine eyes are low (control: lower row)"
-    return "What each task makes of one photoreceptor, generation by generation"
+        return "Fine eyes evolve for detection, coarse eyes for navigation if fine eyes are low (control: lower row)"
+    return "Evolution from one photoreceptor in each task"
 
 
 def draw(store: Store, path: Path) -> None:
-    """A panel per quantity that is not the same in all animals, a line per seed."""
+    """Draw a panel per quantity that differs between animals, with a line per seed."""
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
     from matplotlib.ticker import MaxNLocator
@@ -203,7 +206,7 @@ def draw(store: Store, path: Path) -> None:
 
 
 def _draw_control(axes: Any) -> None:
-    """Published and other eyes in both tasks, as they are and not evolved: fitness and success of each training."""
+    """Draw fitness and success of all training runs with the published eyes and others, without evolution."""
     rows = read_rows(Trained, CONTROL)
     panels = [(task, what) for task in CONTRASTED for what in CEILINGS]
     for place, (task, what) in zip(axes, panels, strict=True):
@@ -230,7 +233,7 @@ def _draw_control(axes: Any) -> None:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Collect runs if asked, and make the page."""
+    """Collect runs if requested, and make the page."""
     return evolved.main(NAME, __doc__ or "", page, arguments, QUANTITIES)
 
 

@@ -1,4 +1,4 @@
-"""Imitated searches for lenses: where would they end, and how sharp would their lenses be?
+"""Searches for lenses with surrogate fitness: their end, and the sharpness of their lenses
 
 python -m experiments.imitated_lenses [--compute] [--docs DIR]
 """
@@ -37,14 +37,14 @@ from experiments.fitness_landscape import (
 )
 from experiments.glass import blur, power
 from experiments.means import LAST
-from experiments.page import Figure, Page, markdown_table, new_figure, parser, save, told
+from experiments.page import Figure, Page, exit_code, markdown_table, new_figure, parser, save
 from experiments.store import RECORDS, Origin, read_rows, write_rows
 
 __all__ = ["CASES", "Check", "Searched", "Told", "page", "searched"]
 
 Floats = NDArray[np.float64]
 NAME = "imitated_lenses"
-RECORD = "lens-003-0"  # of a real search: holes for the landscape, and lenses that it is held against
+RECORD = "lens-003-0"  # a real search: pinholes for the fit of the surrogate, and lenses for its test
 SETTINGS = ("eye.noise_sigma=0.003", "search.population=16")
 ALL_GENES, ACTIVE = "eye.relief_symmetric=false", "search.active=true"
 CASES = {
@@ -56,14 +56,17 @@ CASES = {
     "3 genes, 50 generations, active": ("search.generations=50", ACTIVE),
 }
 SEEDS = range(16)
-FIRST_SEED = 20_000  # none that anybody takes for a run
+FIRST_SEED = 20_000  # above the usual seeds of runs
 COLORS = {0.3: "#0072B2", 0.45: "#D55E00"}
 
 
 @dataclass(frozen=True)
 class Searched:
-    """How a search ended: means over its last generations' animals, the fitness that is expected of them, and the
-    Strehl ratio of the one with the median blur of the last; closed: width of the pupil before glass may change."""
+    """End of a search: means over the animals of its last generations, and their expected fitness.
+
+    closed: width of the pupil before glass may change
+    strehl: Strehl ratio of the animal with the median blur in the last generation
+    """
 
     case: str
     seed: int
@@ -76,7 +79,7 @@ class Searched:
 
 
 def searched(case: str, seed: int, landscape: Landscape) -> Searched:
-    """A search with this landscape's lives in the place of trainings."""
+    """Run a search with the surrogate's fitness instead of training runs."""
     config = assemble("detection", "lens", assignments=[*SETTINGS, *CASES[case], f"seed={FIRST_SEED + seed}"])
     search, chance, animals = Search(config), np.random.default_rng(FIRST_SEED + seed), []
     for _ in range(config.search.generations):
@@ -104,7 +107,7 @@ def _apertures(animals: Sequence[Phenotype]) -> Floats:
 
 
 def _strehl(animals: Sequence[Phenotype], config: EyeConfig) -> float:
-    """Of the one nearest to the median blur whose light has its peak on the retina; NaN where none has."""
+    """Return the Strehl ratio of the animal nearest to the median blur whose light peaks on the retina, or NaN."""
     blurs = np.array([blur(animal, config) for animal in animals])
     for place in np.argsort(np.abs(blurs - np.median(blurs)), kind="stable"):
         eye = animals[place].eyes(config).eye()
@@ -115,13 +118,13 @@ def _strehl(animals: Sequence[Phenotype], config: EyeConfig) -> float:
 
 @dataclass(frozen=True)
 class Check:
-    """What lives came to, and the landscape expects of the same animals."""
+    """Fitness of training runs, and the surrogate's expectation for the same animals."""
 
     expected: Floats
     lived: Floats
 
     @classmethod
-    def of(cls, lives: Sequence[Life], landscape: Landscape) -> Check:
+    def from_runs(cls, lives: Sequence[Life], landscape: Landscape) -> Check:
         apertures, blurs, fitness = np.array([(x.aperture, x.blur, x.fitness) for x in lives]).T
         return cls(landscape.fitness(apertures, blurs), fitness)
 
@@ -132,7 +135,10 @@ class Check:
 
 @dataclass(frozen=True)
 class Told:
-    """All that the page is made from. lives: that the landscape goes through · check: of others"""
+    """Contents of the page.
+
+    lives: training runs of the surrogate's fit · check: test with other training runs
+    """
 
     rows: Sequence[Searched]
     lives: Sequence[Life]
@@ -143,7 +149,7 @@ class Told:
 
 
 def page(told_: Told) -> Page:
-    """The page of stored searches."""
+    """Return the page of stored searches."""
     land, check = told_.landscape, told_.check
     return Page(
         name=NAME,
@@ -171,7 +177,7 @@ def _cases(rows: Sequence[Searched]) -> list[str]:
 
 
 def _table(rows: Sequence[Searched]) -> str:
-    """A row per case: medians over searches, and the range of all but one in ten at either end."""
+    """Return a table with a row per case: medians over searches, with the 10 % and 90 % quantiles."""
     quantities = ("closed", "aperture", "power", "blur", "fitness", "strehl")
     lines = []
     for case in _cases(rows):
@@ -187,14 +193,14 @@ def _range(values: Sequence[float]) -> str:
 
 
 def _agrees(check: Check) -> str:
-    """By quarters of what is expected."""
+    """Return a table of expected and actual fitness by quarters of the expected fitness."""
     order = np.array_split(np.argsort(check.expected), 4)
     lines = [[f"{check.expected[part].mean():.0f}", f"{check.lived[part].mean():.0f}"] for part in order]
-    return markdown_table(["fitness expected", "lived"], lines)
+    return markdown_table(["expected fitness", "fitness of training runs"], lines)
 
 
 def draw(told_: Told, path: Path) -> None:
-    """The landscape with its lives, and how sharp lenses are in the end."""
+    """Draw the surrogate with its training runs, and the Strehl ratios at the end of the searches."""
     figure, axes = new_figure(11.0, 4.4, columns=2)
     blurs = np.linspace(0, 2.6, 120)
     for aperture, color in COLORS.items():
@@ -203,7 +209,7 @@ def draw(told_: Told, path: Path) -> None:
             [x.blur for x in mine], [x.fitness for x in mine], "o", color=color, ms=4, alpha=0.5, mec="none"
         )
         axes[0, 0].plot(blurs, told_.landscape.fitness(aperture, blurs), color=color, lw=1.5, label=f"a = {aperture:g}")
-    axes[0, 0].set(xlabel="blur [receptors]", ylabel="fitness", title="lives (dots), and the landscape through them")
+    axes[0, 0].set(xlabel="blur [receptors]", ylabel="fitness", title="training runs (dots) and surrogate (lines)")
     axes[0, 0].legend(frameon=False)
     cases = _cases(told_.rows)
     for place, case in enumerate(reversed(cases)):
@@ -212,9 +218,9 @@ def draw(told_: Told, path: Path) -> None:
     axes[0, 1].axvline(sharp_lenses.SHARP, color="#777777", ls=":", lw=1)
     axes[0, 1].set_yticks(range(len(cases)), cases[::-1])
     axes[0, 1].set(
-        xlabel=f"Strehl ratio in the end (dotted: {sharp_lenses.SHARP:g})",
+        xlabel=f"Strehl ratio at the end (dotted: {sharp_lenses.SHARP:g})",
         xlim=(1e-4, 1),
-        title="imitated searches, a dot each",
+        title="searches with surrogate fitness (dots)",
     )
     figure.suptitle(_message(told_.rows))
     save(figure, path)
@@ -226,16 +232,16 @@ def _message(rows: Sequence[Searched]) -> str:
     }
     found = [case for case, share in sharp.items() if share >= 0.5]
     if not found:
-        return "Few imitated searches find sharp lenses"
-    return f"Half of the imitated searches or more find sharp lenses with {' or '.join(found)}, not otherwise"
+        return "Few searches with surrogate fitness find sharp lenses"
+    return f"At least half of the searches find sharp lenses with {' or '.join(found)}, not otherwise"
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Search if asked, store, and make the page from the store."""
+    """Run and store the searches if requested; make the page from the stored rows."""
     options = parser(__doc__ or "")
-    options.add_argument("--compute", action="store_true", help="imitate the searches anew")
+    options.add_argument("--compute", action="store_true", help="run the searches again")
     chosen = options.parse_args(arguments)
-    return told(NAME, lambda: _made(chosen))
+    return exit_code(NAME, lambda: _made(chosen))
 
 
 def _made(chosen: Namespace) -> None:
@@ -255,7 +261,7 @@ def _made(chosen: Namespace) -> None:
         rows=read_rows(Searched, stored),
         lives=lives,
         landscape=landscape,
-        check=Check.of(behind_glass(run), landscape),
+        check=Check.from_runs(behind_glass(run), landscape),
         origin=Origin.read(stored.with_suffix(".json")),
         answer=answer.read_text(encoding="utf-8").strip() if answer.exists() else "(not written yet)",
     )

@@ -1,4 +1,4 @@
-"""Learning through holes: how wide a pupil do animals learn best behind, and does light move it as optics predicts?
+"""Learning behind pinholes: the best width for learning, and its dependence on light
 
 python -m experiments.learning_through_holes [--runs NOISE=DIR ...] [--answer TEXT] [--docs DIR]
 """
@@ -25,17 +25,21 @@ __all__ = ["best_width", "page", "smoothed"]
 NAME = "learning_through_holes"
 MEASURES = ("contrast", "stripes_1", "stripes_2", "stripes_4")
 DRAWN = {"contrast": ":", "stripes_2": "--"}
-BANDWIDTH = 0.2  # of the smooth curve, in log a: a fifth of the width
-STEPS = 105  # of a curve
+BANDWIDTH = 0.2  # bandwidth of the smooth curve in log a: a fifth of the width
+STEPS = 105  # number of points of a curve
 RESAMPLES = 2000
-SURE = 0.05  # p below which a best width is one
+SURE = 0.05  # p-value below which a best width is reported
 BINS = (0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.65)
 CHANCE = 1 / 3
 Floats = NDArray[np.float64]
 
 
 def page(store: Store) -> Page:
-    """The page of stored runs. Raises ValueError with more groups than there are colours."""
+    """Return the page of stored runs.
+
+    Raises:
+        ValueError: there are more groups than colours.
+    """
     return Page(
         name=NAME,
         command=(
@@ -59,14 +63,16 @@ def page(store: Store) -> Page:
 
 
 def _samples(rows: Sequence[Row]) -> tuple[Floats, Floats]:
-    """Log widths and success rates of those that did not fail."""
+    """Return log widths and success rates of the animals that did not fail."""
     done = [row for row in rows if not row.failed]
     return np.log([row.relative_aperture for row in done]), np.array([row.success_rate for row in done])
 
 
 def smoothed(place: Floats, value: Floats, at: Floats) -> Floats:
-    """Local lines (Fan 1992) through values at log widths `place`, at others: a kernel's mean alone leans to where
-    there are more animals."""
+    """Return the local linear fit (Fan 1992) to values at log widths `place`, evaluated at `at`.
+
+    A kernel mean would be biased towards widths with more animals.
+    """
     away = place - at[:, None]
     weight = np.exp(-0.5 * (away / BANDWIDTH) ** 2)
     first, second = (weight * away).sum(axis=1, keepdims=True), (weight * away**2).sum(axis=1, keepdims=True)
@@ -76,17 +82,23 @@ def smoothed(place: Floats, value: Floats, at: Floats) -> Floats:
 
 
 def best_width(rows: Sequence[Row], seed: int = 0) -> tuple[Interval, float]:
-    """Where the smooth curve of success peaks, with a bootstrap over animals; and the p of a curve that explains as
-    much, were success the same behind all widths (permutations). Raises ValueError for less than three animals."""
+    """Return the peak of the smooth curve of success, with a bootstrap over animals, and a p-value.
+
+    p is the probability of a curve that explains the same variance or more if success does not depend on the width,
+    from permutations.
+
+    Raises:
+        ValueError: there are fewer than three animals.
+    """
     place, value = _samples(rows)
     if len(place) < 3:
-        raise ValueError("a best width needs three animals at least")
+        raise ValueError("a best width needs at least three animals")
     chance, at, peaks, as_much = np.random.default_rng(seed), _tried(place), [], 1
     explained = smoothed(place, value, place).var()
     for _ in range(RESAMPLES):
         chosen = chance.integers(len(place), size=len(place))
         if np.unique(place[chosen]).size > 1:
-            among = _tried(place[chosen])  # a local line runs away where there are no animals
+            among = _tried(place[chosen])  # a local line diverges outside the range of the animals
             peaks.append(among[smoothed(place[chosen], value[chosen], among).argmax()])
         as_much += bool(smoothed(place, chance.permutation(value), place).var() >= explained)
     best, low, high = np.exp([at[smoothed(place, value, at).argmax()], *np.quantile(peaks, [0.025, 0.975])])
@@ -94,26 +106,26 @@ def best_width(rows: Sequence[Row], seed: int = 0) -> tuple[Interval, float]:
 
 
 def _tried(place: Floats) -> Floats:
-    """Log widths between the least and the greatest that was tried."""
+    """Return log widths between the smallest and the largest tested width."""
     return np.linspace(place.min(), place.max(), STEPS)
 
 
 def table(store: Store) -> str:
-    """A row per noise: the best hole for animals, and those that optics predicts."""
+    """Return a table with a row per noise: the best pinhole for learning, and the optical predictions."""
     lines = []
     for group in store.groups:
         sigma = store.noise_sigma(group)
         predicted = best_pupil.predicted(sigma, MEASURES)
         found, p = best_width(store.group(group))
-        shown = str(found) if p < SURE else "nowhere better"
+        shown = str(found) if p < SURE else "no best width"
         lines.append([f"{sigma:g}", str(len(_samples(store.group(group))[0])), shown, f"{p:.2g}", *predicted])
     return markdown_table(
-        ["noise σ", "animals", "learnt best at", "p", *(f"best by {best_pupil.MEASURES[m]}" for m in MEASURES)], lines
+        ["noise σ", "animals", "best learning at", "p", *(f"best by {best_pupil.MEASURES[m]}" for m in MEASURES)], lines
     )
 
 
 def by_width(store: Store) -> str:
-    """A row per range of widths, a column per noise: mean success and its standard error."""
+    """Return a table with a row per range of widths and a column per noise: mean success and standard error."""
     lines = []
     for low, high in itertools.pairwise(BINS):
         line = [f"{low:g} to {high:g}"]
@@ -127,7 +139,7 @@ def by_width(store: Store) -> str:
 
 
 def draw(store: Store, path: Path) -> None:
-    """Success over the pupil's width."""
+    """Draw success over the pupil's width."""
     from matplotlib.lines import Line2D
 
     figure, axes = new_figure(6.4, 4.3)
@@ -150,12 +162,12 @@ def draw(store: Store, path: Path) -> None:
     lines.append(Line2D([], [], color="#999999", lw=0.8, ls="-.", label="chance"))
     figure.legend(handles=lines, frameon=False, fontsize=8, loc="outside lower center", ncols=3)
     place.set(xlabel="relative aperture a", ylabel="goal reached before any adversary", ylim=(0, 1))
-    figure.suptitle("More light: animals learn best behind narrower holes")
+    figure.suptitle("In brighter light, animals learn best behind narrower pinholes")
     save(figure, path)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Collect runs if asked, and make the page."""
+    """Collect runs if requested, and make the page."""
     return evolved.main(NAME, __doc__ or "", page, arguments)
 
 

@@ -1,4 +1,4 @@
-"""Searches for a lens, by gradient and by CMA-ES: experiments.lens_search compares them."""
+"""Searches for a lens by gradient and by CMA-ES, which experiments.lens_search compares."""
 
 from __future__ import annotations
 
@@ -35,21 +35,21 @@ __all__ = [
 
 Floats = NDArray[np.float64]
 WAVELENGTH, RADIUS, RELIEF_HEIGHT = 550e-9, 25e-6, 100e-6
-RETINA = 200e-6 / (2 * math.tan(math.radians(45) / 2))  # of the default eye, which this pupil covers to a quarter
-SPOTS = (16e-6, 6e-6, 2e-6)  # standard deviations of the spot that light is gathered into, one after the other [m]
-SPREAD = 0.1  # standard deviation of the genes where searches begin, around flat glass of n = 1.5
+RETINA = 200e-6 / (2 * math.tan(math.radians(45) / 2))  # distance in the default eye; the pupil has a = 0.25
+SPOTS = (16e-6, 6e-6, 2e-6)  # successive standard deviations of the spot in which light is maximised [m]
+SPREAD = 0.1  # standard deviation of the genes at the start of searches, around flat glass of n = 1.5
 POPULATION, GENERATIONS, STEP = 16, 126, 0.2
 MOST_GRADIENTS = 300
-FIRST_STEP = 0.05  # of L-BFGS, over all genes; with 1, its default, some searches begin and end in a corner
+FIRST_STEP = 0.05  # first step of L-BFGS over all genes; with 1, its default, some searches jump to a corner and stop
 RECORDED = tuple(sorted({round(1.15**i) for i in range(80)}))
 TOLERANCE = 1e-2
-BOUNDS = ("paraboloid", "paraboloid, then gradient")  # what the genes can hold
+BOUNDS = ("paraboloid", "paraboloid, then gradient")  # best lenses within the genes' ranges
 GENE_NAMES = (*(f"doe_{i}{j}" for i in range(4) for j in range(4)), "refractive_index")
 
 
 @dataclass(frozen=True)
 class Row:
-    """Strehl ratio of the best lens after so many PSFs and so much time of one thread; gradients count as one PSF."""
+    """Strehl ratio of the best lens after a number of PSFs and a time of one thread; a gradient counts as one PSF."""
 
     method: str
     seed: int
@@ -59,7 +59,7 @@ class Row:
 
 
 def lens(genome: Any) -> optics.Pupil:
-    """The pupil of a genome (17,), NumPy's or a Dr.Jit array that carries derivatives."""
+    """Return the pupil of a genome (17,), a NumPy array or a Dr.Jit array with derivatives."""
     if isinstance(genome, np.ndarray):
         return optics.Pupil(RADIUS, optics.BSplineRelief(RELIEF_HEIGHT * genome[:16].reshape(4, 4)), n=1 + genome[16])
     import drjit as dr
@@ -70,7 +70,7 @@ def lens(genome: Any) -> optics.Pupil:
 
 
 def loss(genome: Any, spot: float | None) -> Any:
-    """-log of the Strehl ratio near the axis (spot None) or of the light in a Gaussian spot on it."""
+    """Return -log of the Strehl ratio near the axis (spot None), or of the light in a Gaussian spot on the axis."""
     import drjit as dr
     from drjit.llvm.ad import Float64
 
@@ -90,7 +90,7 @@ def _side(spot: float) -> int:
 
 
 def gradient(genome: Floats, spot: float | None) -> tuple[float, Floats]:
-    """Loss and its derivative by every gene."""
+    """Return the loss and its derivatives by all genes."""
     import drjit as dr
     from drjit.llvm.ad import Float64
 
@@ -102,19 +102,19 @@ def gradient(genome: Floats, spot: float | None) -> tuple[float, Floats]:
 
 
 def strehl(genome: Floats) -> float:
-    """Strehl ratio, wherever within 12 µm of the axis the light has its peak."""
+    """Return the Strehl ratio, with the peak anywhere within 12 µm of the axis."""
     result = optics.psf(lens(genome), [WAVELENGTH], RETINA, dx=0.25e-6, shape=(97, 97), tolerance=1e-3)
     return float(optics.strehl_ratio(result)[0])
 
 
 def start(seed: int) -> Floats:
-    """Where a search begins: rough glass of an index near 1.5."""
+    """Return the start of a search: rough glass with an index near 1.5."""
     return np.clip(0.5 + SPREAD * np.random.default_rng(seed).standard_normal(17), 0.0, 1.0)
 
 
 @dataclass
 class Watch:
-    """Counts PSFs and time of a search, and measures its best lens now and then, off the clock."""
+    """Counter of PSFs and time of a search, which records the best lens at intervals, outside the measured time."""
 
     method: str
     seed: int
@@ -126,11 +126,11 @@ class Watch:
     _since: float = field(default_factory=time.process_time)
 
     def begin_stage(self) -> None:
-        """Losses of another stage are not comparable."""
+        """Start a stage, whose losses are not comparable with earlier losses."""
         self.best = math.inf
 
     def saw(self, genome: Floats, value: float) -> None:
-        """A search tried a genome."""
+        """Count a genome that a search has evaluated."""
         self.seconds += time.process_time() - self._since
         self.evaluations += 1
         if value < self.best:
@@ -140,7 +140,7 @@ class Watch:
         self._since = time.process_time()
 
     def record(self) -> None:
-        """Write down how far the search has come."""
+        """Record the present best lens."""
         assert self.genome is not None
         done = (self.method, self.seed, self.evaluations)
         if not self.rows or self.rows[-1].evaluations != self.evaluations:
@@ -148,7 +148,7 @@ class Watch:
 
 
 def by_gradient(watch: Watch, spots: Sequence[float | None]) -> None:
-    """L-BFGS-B within the genes' bounds, stage after stage."""
+    """Search with L-BFGS-B within the genes' bounds, stage by stage."""
     genome = start(watch.seed)
     for spot in spots:
         watch.begin_stage()
@@ -164,7 +164,7 @@ def by_gradient(watch: Watch, spots: Sequence[float | None]) -> None:
 
 
 def _descend(tried: Callable[[Floats], tuple[float, Floats]], genome: Floats, most: int) -> Floats:
-    """L-BFGS-B, in units of its first step."""
+    """Minimise with L-BFGS-B, in units of its first step."""
 
     def scaled(v: Floats) -> tuple[float, Floats]:
         value, slope = tried(np.clip(FIRST_STEP * v, 0.0, 1.0))
@@ -177,7 +177,7 @@ def _descend(tried: Callable[[Floats], tuple[float, Floats]], genome: Floats, mo
 
 
 def by_cma(watch: Watch, spots: Sequence[float | None]) -> None:
-    """CMA-ES as evolution used it when this was stored, active; stages share its generations evenly."""
+    """Search with active CMA-ES; stages have equal numbers of generations."""
     genes = [(GENES[name], GENES[name].default) for name in GENE_NAMES]
     search = SearchConfig(population=POPULATION, generations=GENERATIONS, sigma=STEP, active=True)
     optimizer = build_optimizer(Space(genes, start(watch.seed), (watch.seed,)), search)
@@ -204,7 +204,7 @@ METHODS: dict[str, tuple[Callable[[Watch, Sequence[float | None]], None], Sequen
 
 
 def searched(method: str, seed: int) -> list[Row]:
-    """One search from its start to its end."""
+    """Run one search and return its records."""
     watch = Watch(method, seed)
     run, spots = METHODS[method]
     run(watch, spots)
@@ -213,7 +213,7 @@ def searched(method: str, seed: int) -> list[Row]:
 
 
 def best_lens(index: float = 1.5) -> tuple[float, float]:
-    """Strehl ratios of the paraboloid in focus, and of what a gradient makes of it within the gene space."""
+    """Return the Strehl ratios of the paraboloid in focus, and of its refinement by gradient within the gene space."""
     curvature = 1 / ((index - 1) * RETINA)
     points = optics.BSplineRelief.paraboloid(0.0, curvature, RADIUS).control_points / RELIEF_HEIGHT
     genome = np.append(points.ravel() - points.mean() + 0.5, index - 1)

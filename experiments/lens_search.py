@@ -1,4 +1,4 @@
-"""A lens found by gradient, and one found by evolution strategy
+"""Search for a lens by gradient and by CMA-ES
 
 python -m experiments.lens_search [--run SEED ...] [--methods METHOD ...] [--docs DIR]
 """
@@ -26,7 +26,7 @@ from experiments.lens_optimizers import (
     best_lens,
     searched,
 )
-from experiments.page import Figure, Page, markdown_table, new_figure, parser, save, told
+from experiments.page import Figure, Page, exit_code, markdown_table, new_figure, parser, save
 from experiments.store import Origin, read_rows, write_rows
 
 __all__ = ["found_after", "page"]
@@ -37,13 +37,13 @@ COLORS = ("#0072B2", "#56B4E9", "#D55E00", "#E69F00")
 
 
 def searches(rows: Sequence[Row], method: str) -> list[list[Row]]:
-    """A method's searches, seed by seed, in the order in which they went."""
+    """Return a method's searches, one per seed, with rows in order of evaluations."""
     seeds = sorted({row.seed for row in rows if row.method == method})
     return [sorted((r for r in rows if (r.method, r.seed) == (method, s)), key=lambda r: r.evaluations) for s in seeds]
 
 
 def found_after(search: Sequence[Row]) -> Row | None:
-    """Where on the record a search has a good lens and keeps it; None if it has none in the end."""
+    """Return the row from which a search has a good lens until its end; None if its last lens is not good."""
     kept = None
     for row in reversed(search):
         if row.strehl < GOOD:
@@ -53,7 +53,7 @@ def found_after(search: Sequence[Row]) -> Row | None:
 
 
 def page(rows: Sequence[Row], origin: Origin) -> Page:
-    """The page of stored searches."""
+    """Return the page of stored searches."""
     paraboloid, refined = (next(row.strehl for row in rows if row.method == bound) for bound in BOUNDS)
     ours, direct, theirs = (searches(rows, method) for method in COMPARED)
     (pictures, seconds), (their_pictures, their_seconds) = (_medians(runs) for runs in (ours, theirs))
@@ -84,7 +84,7 @@ def page(rows: Sequence[Row], origin: Origin) -> Page:
 
 
 def _medians(runs: Sequence[Sequence[Row]]) -> tuple[float, float]:
-    """Evaluations and seconds to a good lens, over the searches that found one."""
+    """Return the median evaluations and seconds to a good lens, over the searches that found one."""
     found = [row for search in runs if (row := found_after(search))]
     if not found:
         return float("nan"), float("nan")
@@ -92,7 +92,7 @@ def _medians(runs: Sequence[Sequence[Row]]) -> tuple[float, float]:
 
 
 def table(rows: Sequence[Row]) -> str:
-    """A row per method."""
+    """Return a table with a row per method."""
     lines = []
     for method in METHODS:
         runs = searches(rows, method)
@@ -103,12 +103,12 @@ def table(rows: Sequence[Row]) -> str:
         of = "" if good == len(runs) else f" (of the {good})"
         ends = ", ".join(f"{search[-1].strehl:.3f}" for search in runs)
         lines.append([method, f"{good} of {len(runs)}", f"{evaluations:.0f}{of}", f"{seconds:.1f}{of}", ends])
-    header = ["method", f"above {GOOD:g}", "pictures until then", "core seconds", "Strehl ratio in the end, all seeds"]
+    header = ["method", f"above {GOOD:g}", "PSFs until then", "core seconds", "Strehl ratio at the end, all seeds"]
     return markdown_table(header, lines)
 
 
 def draw(rows: Sequence[Row], path: Path) -> None:
-    """Strehl ratio over pictures and over time."""
+    """Draw the Strehl ratio over the number of PSFs and over time."""
     figure, axes = new_figure(10, 4.1, columns=2, sharey=True)
     for method, color in zip(METHODS, COLORS, strict=True):
         for number, search in enumerate(searches(rows, method)):
@@ -118,20 +118,20 @@ def draw(rows: Sequence[Row], path: Path) -> None:
                 place.semilogx(spent, strehl, color=color, lw=1.3, label=method if number == 0 else None)
     for place in axes[0]:
         place.axhline(GOOD, color="#777777", ls=":", lw=1)
-    axes[0, 0].set(xlabel="pictures computed", ylabel="Strehl ratio", ylim=(0, 1.03))
+    axes[0, 0].set(xlabel="PSFs computed", ylabel="Strehl ratio", ylim=(0, 1.03))
     axes[0, 1].set(xlabel="time of one core [s]", xlim=(0.3, None))
     axes[0, 0].legend(frameon=False, fontsize=9, loc="upper left", bbox_to_anchor=(0.0, 0.77))
-    figure.suptitle("A gradient finds a lens with a fraction of the pictures, where it has a slope to follow")
+    figure.suptitle("A gradient finds a lens with a fraction of the PSFs if the loss has a slope")
     save(figure, path)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Search, store, and make the page from the store."""
+    """Run and store searches if requested; make the page from the stored rows."""
     options = parser(__doc__ or "")
-    options.add_argument("--run", type=int, nargs="+", metavar="SEED", help="search anew from these seeds")
-    options.add_argument("--methods", nargs="+", choices=METHODS, default=list(METHODS), help="by these (default: all)")
+    options.add_argument("--run", type=int, nargs="+", metavar="SEED", help="run searches from these seeds")
+    options.add_argument("--methods", nargs="+", choices=METHODS, default=list(METHODS), help="methods (default: all)")
     chosen = options.parse_args(arguments)
-    return told("lens_search", lambda: _made(chosen))
+    return exit_code("lens_search", lambda: _made(chosen))
 
 
 def _made(chosen: Namespace) -> None:

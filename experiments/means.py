@@ -20,7 +20,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Interval:
-    """A mean and its 95 % interval; `low` and `high` are NaN where there is none."""
+    """A mean and its 95 % interval; `low` and `high` are NaN without an interval."""
 
     mean: float
     low: float
@@ -31,20 +31,20 @@ class Interval:
 
 
 def mean_of(values: Floats) -> Interval:
-    """Mean of independent values and Student's 95 % interval of it; one value alone has no interval."""
+    """Return the mean of independent values with Student's 95 % interval; a single value has no interval."""
     n = values.size
     half = t.ppf(0.975, n - 1) * values.std(ddof=1) / math.sqrt(n) if n > 1 else math.nan
     return Interval(float(values.mean()), float(values.mean() - half), float(values.mean() + half))
 
 
 def difference(of: Floats, less: Floats) -> Interval:
-    """Difference of two samples' means with Welch's 95 % interval, which lets their variances differ (Welch 1947).
+    """Return the difference of two samples' means with Welch's 95 % interval for unequal variances (Welch 1947).
 
     Raises:
-        ValueError: a sample of fewer than two values.
+        ValueError: a sample has fewer than two values.
     """
     if min(of.size, less.size) < 2:
-        raise ValueError("an interval of a difference needs two values or more in each sample")
+        raise ValueError("an interval of a difference needs at least two values in each sample")
     mean = float(of.mean() - less.mean())
     parts = [one.var(ddof=1) / one.size for one in (of, less)]
     variance = sum(parts)
@@ -56,7 +56,7 @@ def difference(of: Floats, less: Floats) -> Interval:
 
 
 def of_generation(rows: Iterable[Row], value: Callable[[Row], float]) -> tuple[Floats, Floats]:
-    """Generations, and the mean of a finite value over the candidates of each that succeeded."""
+    """Return generations, and the mean of finite values over the successful candidates of each."""
     found: dict[int, list[float]] = {}
     for row in rows:
         if not row.failed and math.isfinite(value(row)):
@@ -66,17 +66,17 @@ def of_generation(rows: Iterable[Row], value: Callable[[Row], float]) -> tuple[F
 
 
 def last_mean(rows: Sequence[Row], value: Callable[[Row], float]) -> Interval | None:
-    """Mean over the seeds of the mean over each seed's last LAST generations, with Student's interval over the seeds;
-    None where there is no finite value.
+    """Return the mean over seeds of the mean over each seed's last LAST generations; None without finite values.
 
-    Candidates of one search descend from one another and are not independent, so each seed counts once.
+    The interval is Student's over the seeds. Candidates of one search descend from one another and are not independent,
+    so each seed counts once.
     """
     means = [values.mean() for values in last_values(rows, value)]
     return mean_of(np.array(means)) if means else None
 
 
 def last_values(rows: Sequence[Row], value: Callable[[Row], float]) -> Iterator[Floats]:
-    """Finite values of each seed's last generations."""
+    """Yield the finite values of each seed's last generations."""
     for seed in sorted({row.seed for row in rows}):
         mine = [row for row in rows if row.seed == seed]
         first = max(row.generation for row in mine) - LAST + 1

@@ -1,4 +1,4 @@
-"""A page of docs/results: a template of prose, filled in with what an experiment computed."""
+"""Pages of docs/results: templates of prose, filled with the numbers of an experiment."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from evolve.store.atomic_files import write_whole
 from evolve.store.directory import RunError
 from experiments.store import Origin
 
-__all__ = ["Figure", "Page", "markdown_table", "new_figure", "parser", "save", "told"]
+__all__ = ["Figure", "Page", "exit_code", "markdown_table", "new_figure", "parser", "save"]
 
 DPI = 130
 TEMPLATES = Path(__file__).parent / "pages"
@@ -24,7 +24,10 @@ TEMPLATES = Path(__file__).parent / "pages"
 
 @dataclass(frozen=True)
 class Figure:
-    """name: of its file, without ".png". draw: writes it."""
+    """A figure of a page.
+
+    name: name of its file without ".png" · draw: function that writes the file
+    """
 
     name: str
     draw: Callable[[Path], None]
@@ -34,11 +37,11 @@ class Figure:
 class Page:
     """A page of results, made from the template of the same name in experiments/pages.
 
-    name      of the template and of the page's file
-    command   makes numbers and page anew: the template's $command
-    values    numbers, tables and other text, by the template's placeholders
-    figures   drawn beside the page; the template shows each of them and holds its caption
-    origin    of the numbers: the template's $origin
+    name: name of the template and of the page's file
+    command: command that computes numbers and page; the template's $command
+    values: numbers, tables and other text, by the template's placeholders
+    figures: figures of the page; the template shows each of them with its caption
+    origin: origin of the numbers; the template's $origin
     """
 
     name: str
@@ -49,8 +52,12 @@ class Page:
 
     @property
     def markdown(self) -> str:
-        """The template filled in. Raises KeyError where a placeholder has no value, and ValueError where a value or a
-        figure has no place: a number that nobody shows is a mistake in one or the other."""
+        """Text of the page.
+
+        Raises:
+            KeyError: a placeholder of the template has no value.
+            ValueError: a value or a figure has no place in the template.
+        """
         template = Template((TEMPLATES / f"{self.name}.md").read_text(encoding="utf-8"))
         values = {**self.values, "command": self.command, "origin": self.origin.sentence()}
         places = {*template.get_identifiers(), *re.findall(r"\(figures/(\w+)\.png\)", template.template)}
@@ -60,7 +67,7 @@ class Page:
         return template.substitute(values)
 
     def publish(self, folder: Path) -> None:
-        """Draws the figures and writes the page, each whole or not at all."""
+        """Draw the figures and write the page, each completely or not at all."""
         (folder / "figures").mkdir(parents=True, exist_ok=True)
         for figure in self.figures:
             figure.draw(folder / "figures" / f"{figure.name}.png")
@@ -69,20 +76,20 @@ class Page:
 
 
 def parser(text: str) -> argparse.ArgumentParser:
-    """The option that every experiment has; help is the module's docstring."""
+    """Return a parser with the option that every experiment has; its help is the module's docstring."""
     found = argparse.ArgumentParser(description=text.split("\n")[0])
     found.add_argument("--docs", type=Path, default=Path("docs/results"), help="directory of page, figures and data")
     return found
 
 
 def markdown_table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """A table; the first column is flush left, the others right."""
+    """Return a table with the first column aligned left and the others right."""
     lines = [header, ["---", *("---:" for _ in header[1:])], *rows]
     return "\n".join("| " + " | ".join(line) + " |" for line in lines)
 
 
-def told(name: str, work: Callable[[], None]) -> int:
-    """0 once the work is done; 2, and one line, where it cannot be."""
+def exit_code(name: str, work: Callable[[], None]) -> int:
+    """Do the work and return 0; after an error, print one line and return 2."""
     try:
         work()
     except (RunError, ExecutorError, ValueError, OSError) as error:
@@ -92,7 +99,7 @@ def told(name: str, work: Callable[[], None]) -> int:
 
 
 def new_figure(width: float, height: float, columns: int = 1, rows: int = 1, **options: Any) -> tuple[Any, Any]:
-    """A figure [inches] and its axes, without frame above and to the right."""
+    """Return a figure [inches] and its axes, without frame lines at the top and on the right."""
     import matplotlib
 
     matplotlib.use("agg")
@@ -107,7 +114,7 @@ def new_figure(width: float, height: float, columns: int = 1, rows: int = 1, **o
 
 
 def save(figure: Any, path: Path) -> None:
-    """Write the figure and forget it."""
+    """Write the figure and close it."""
     from matplotlib import pyplot
 
     unfinished = path.with_suffix(".tmp.png")

@@ -1,4 +1,4 @@
-"""Portraits: an animal for each task, side by side, and what it sees of its world
+"""Portraits: an animal for each task, with the image of its world
 
 python -m experiments.portraits [--runs TASK=DIR ...] [--out FILE]
 """
@@ -17,7 +17,7 @@ import numpy as np
 
 import sim
 from evolve.store.directory import Run
-from experiments.page import new_figure, save, told
+from experiments.page import exit_code, new_figure, save
 from optics.numerics.arguments import one_of
 from sim.envs.retina_images import side_by_side
 from sim.worlds.state import WorldState
@@ -26,15 +26,15 @@ from sim.worlds.world import World
 __all__ = ["designed", "draw", "draw_head"]
 
 PURPOSE = {"navigation": "navigation, eyes of one row", "detection": "detection, square eyes"}
-RAYS = 256  # per receptor, of the pictures
-REACH = 2.4  # head radii that fields of view are drawn
-RECEPTOR_DEG = 3.0  # of the head that a receptor takes, as in the presets "bifurcation-..."
+RAYS = 256  # rays per receptor of the images
+REACH = 2.4  # length of the drawn fields of view, in head radii
+RECEPTOR_DEG = 3.0  # angle of a receptor on the head, as in the presets "bifurcation-..."
 SKIN, PUPIL = "#C9B79C", "#222222"
 COLORS = {"navigation": "#D55E00", "detection": "#0072B2"}
 
 
 def designed() -> dict[str, sim.Eyes]:
-    """The two published kinds of eyes; a navigator's are rows, as in `experiments.eyes_for_tasks`."""
+    """Return the two published kinds of eyes; a navigator's eyes are rows, as in `experiments.eyes_for_tasks`."""
     return {
         "navigation": sim.Eyes(n_eyes=10, resolution=(1, 4), fov_deg=45, placement_range_deg=135),
         "detection": sim.Eyes(n_eyes=2, resolution=(15, 15), fov_deg=45, placement_range_deg=45),
@@ -42,7 +42,8 @@ def designed() -> dict[str, sim.Eyes]:
 
 
 def moment(world: World) -> WorldState:
-    """One world worth looking at: before the first fork of a course; or a goal to the left, its double to the right."""
+    """Return an illustrative state: before the first fork of a course, or a goal on the left and a distractor on the
+    right."""
     none = np.zeros(1, int)
     if not world.objects:
         place, heading = np.array([[-34.0, 4.0]]), np.array([math.radians(35.0)])
@@ -55,14 +56,14 @@ def moment(world: World) -> WorldState:
 
 
 def seen(task: str, eyes: sim.Eyes) -> np.ndarray:
-    """What the eyes report of a moment in the task's world, noise left out: an sRGB picture (y, x, 3) uint8."""
+    """Return the eyes' signals at one time in the task's world, without noise, as an sRGB image (y, x, 3) uint8."""
     world = sim.build_world(task)
     renderer = sim.BatchedRenderer(world, eyes, 1, sim.Fidelity(RAYS, eyes.bands, light="bounce"))
     return side_by_side(renderer.signals(moment(world))[0], renderer.eye)
 
 
 def draw_head(place: Any, eyes: sim.Eyes, color: str = "#777777") -> None:
-    """A head from above, looking up, with its eyes and what they look at."""
+    """Draw a head from above, with its heading upwards, its eyes and their fields of view."""
     from matplotlib.patches import Circle, Wedge
 
     place.set(xlim=(-REACH - 1, REACH + 1), ylim=(-1.2, REACH + 1), aspect="equal")
@@ -81,7 +82,10 @@ def draw_head(place: Any, eyes: sim.Eyes, color: str = "#777777") -> None:
 
 
 def draw(animals: Mapping[str, sim.Eyes], path: Path, made: str) -> None:
-    """A column per task: the head above, what it sees below. made: by whom, in the title."""
+    """Draw a column per task: the head above, the image of its eyes below.
+
+    made: origin of the animals, for the title
+    """
     figure, axes = new_figure(9.6, 5.4, columns=len(animals), rows=2, height_ratios=(3, 1.1))
     for (head, view), (task, eyes) in zip(axes.T, animals.items(), strict=True):
         draw_head(head, eyes, COLORS[task])
@@ -89,7 +93,7 @@ def draw(animals: Mapping[str, sim.Eyes], path: Path, made: str) -> None:
         head.set_title(f"{PURPOSE[task]}:\n{fine}", fontsize=14)
         view.imshow(seen(task, eyes), interpolation="nearest", aspect="auto" if eyes.resolution[0] == 1 else "equal")
         view.set_axis_off()
-        view.set_title("what they see, left to right", fontsize=9)
+        view.set_title("images of the eyes, left to right", fontsize=9)
     figure.suptitle(f"Goals shape eyes ({made})", fontsize=10, color="#555555")
     save(figure, path)
 
@@ -100,7 +104,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options.add_argument("--runs", nargs="+", default=[], metavar="TASK=DIR", help="draw the fittest of these runs")
     options.add_argument("--out", type=Path, default=Path("docs/images/portraits.png"), help="file to draw into")
     chosen = options.parse_args(arguments)
-    return told("portraits", lambda: _drawn(chosen))
+    return exit_code("portraits", lambda: _drawn(chosen))
 
 
 def _drawn(chosen: argparse.Namespace) -> None:

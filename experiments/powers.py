@@ -1,4 +1,4 @@
-"""Errors as powers of what they depend on."""
+"""Power laws of errors."""
 
 from __future__ import annotations
 
@@ -24,35 +24,38 @@ class PowerLaw:
     explained: float
 
     def error(self, *sizes: Floats) -> Floats:
-        """Of as many sizes as there are exponents, arrays of one shape."""
+        """Return the error at these sizes: arrays of equal shape, one for each exponent."""
         pairs = zip(sizes, self.exponents, strict=True)
         return self.scale * np.prod([size**-exponent.mean for size, exponent in pairs], axis=0)
 
 
 def power_law(errors: Floats, *sizes: Floats, seed: int = 0) -> PowerLaw:
-    """Least squares in logarithms, with 95 % intervals by a bootstrap over the n candidates.
+    """Return a power law fitted by least squares in logarithms, with 95 % intervals by a bootstrap over candidates.
 
-    errors, sizes: (n,), above 0. Raises ValueError where one is not, where the errors are all the same, or the sizes
-    leave an exponent open: too few of them, or one that follows from the others.
+    errors, sizes: (n,), positive
+
+    Raises:
+        ValueError: a value is not positive, all errors are equal, or the sizes do not determine the exponents because
+            there are too few of them or because one follows from the others.
     """
     if min(map(np.min, (errors, *sizes))) <= 0:
-        raise ValueError("errors and sizes must be above 0: they have no logarithms")
+        raise ValueError("errors, sizes: must be positive, because others have no logarithms")
     y = np.log(errors)
     x = np.log(np.stack(sizes, axis=1))
-    middle = x.mean(axis=0)  # without which sizes of one order of magnitude look like the constant
+    middle = x.mean(axis=0)  # centring separates the constant from sizes of one order of magnitude
     design = np.column_stack([np.ones(len(y)), x - middle])
     least = len(sizes) + 2
     if len(np.unique(x, axis=0)) < least or np.linalg.matrix_rank(design) < design.shape[1]:
         raise ValueError(
-            f"sizes leave exponents open: must be at least {least} different ones, none following from others"
+            f"sizes do not determine the exponents: must be at least {least} different ones, none following from others"
         )
     if np.ptp(y) < 1e-9:
-        raise ValueError("errors that are all the same have no power law")
+        raise ValueError("errors that are all equal have no power law")
     found = np.linalg.lstsq(design, y, rcond=None)[0]
     chance = np.random.default_rng(seed)
     drawn = chance.integers(len(y), size=(RESAMPLES, len(y)))
     solved = [np.linalg.lstsq(design[one], y[one], rcond=None) for one in drawn]
-    # Of few candidates, some resamples leave an exponent open.
+    # With few candidates, some resamples do not determine an exponent.
     slopes = [slope[1:] for slope, _, rank, _ in solved if rank == design.shape[1]]
     low, high = np.quantile(slopes, [0.025, 0.975], axis=0)
     exponents = tuple(Interval(-float(m), -float(h), -float(b)) for m, b, h in zip(found[1:], low, high, strict=True))

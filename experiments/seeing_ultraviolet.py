@@ -1,4 +1,4 @@
-"""Seeing ultraviolet: do pigments move to where goal and adversary differ?
+"""Ultraviolet vision: evolution of pigments if goal and adversary differ only in the ultraviolet
 
 python -m experiments.seeing_ultraviolet [--runs foraging=DIR ...] [--answer TEXT] [--docs DIR]
 """
@@ -27,14 +27,16 @@ __all__ = ["contrast", "difference", "page"]
 
 NAME = "seeing_ultraviolet"
 BANDS = 16
-RANGES = (330, 365, 400, 435, 470, 650)  # of the shortest peak [nm]
+RANGES = (330, 365, 400, 435, 470, 650)  # ranges of the shortest peak [nm]
 FITNESS = "#0072B2"
 
 
-@cache  # peaks are known to a tenth of a nanometre
+@cache  # peaks are stored to a tenth of a nanometre, so that values repeat
 def difference(peak_nm: float) -> float:
-    """What a receptor with a pigment of this peak makes of goal and adversary in daylight: the difference of its
-    signals, white being 1."""
+    """Return the difference of a receptor's signals for goal and adversary in daylight, relative to white.
+
+    peak_nm: peak of the receptor's pigment
+    """
     eye = optics.Eye(resolution=(1, 1), bands=BANDS, receptors=(peak_nm,))
     wavelengths = eye.spectral_bands.wavelengths
     daylight = optics.illuminant("D65").at(wavelengths)
@@ -45,27 +47,27 @@ def difference(peak_nm: float) -> float:
 
 
 def contrast(row: Row) -> float:
-    """Difference of goal and adversary to a candidate's best type of receptor."""
+    """Return the difference of goal and adversary for a candidate's best receptor type."""
     return max((difference(peak) for peak in peaks(row)), default=NO_NUMBER)
 
 
 def peaks(row: Row) -> list[float]:
-    """Of its types of receptor [nm], shortest first."""
+    """Return the peaks of a candidate's receptor types [nm], shortest first."""
     return sorted(float(text) for text in row.peaks_nm.split())
 
 
 def shortest(row: Row) -> float:
-    """Peak [nm] of the type that sees most of the ultraviolet."""
+    """Return the shortest peak [nm]."""
     return min(peaks(row), default=NO_NUMBER)
 
 
 def middle(row: Row) -> float:
-    """Peak [nm] of the type between the two: the median."""
+    """Return the median peak [nm]."""
     return float(np.median(peaks(row))) if row.peaks_nm else NO_NUMBER
 
 
 def longest(row: Row) -> float:
-    """Peak [nm] of the type that sees least of it."""
+    """Return the longest peak [nm]."""
     return max(peaks(row), default=NO_NUMBER)
 
 
@@ -77,12 +79,12 @@ QUANTITIES = {
     "longest peak [nm]": longest,
     "difference of goal and adversary": contrast,
     "fitness": lambda row: row.fitness,
-    "goal first": lambda row: row.success_rate,
+    "goal reached first": lambda row: row.success_rate,
 }
 
 
 def page(store: Store) -> Page:
-    """The page of stored runs."""
+    """Return the page of stored runs."""
     return Page(
         name=NAME,
         command=(
@@ -105,7 +107,7 @@ def page(store: Store) -> Page:
 
 
 def table(store: Store) -> str:
-    """The first generation, the last ones, and the null model of these."""
+    """Return a table of the first generation, the last generations, and the null model of the last ones."""
     first = [row for row in store.rows if row.generation == 0]
     header = ["mean", "first generation", f"last {LAST} generations", "null model"]
     lines = []
@@ -116,24 +118,24 @@ def table(store: Store) -> str:
 
 
 def rank_correlation(rows: Sequence[Row]) -> float:
-    """Spearman's, of shortest peak and fitness."""
+    """Return Spearman's rank correlation of shortest peak and fitness."""
     done = [row for row in rows if not row.failed]
     return float(scipy.stats.spearmanr([shortest(row) for row in done], [row.fitness for row in done]).statistic)
 
 
 def table_by_peak(rows: Sequence[Row]) -> str:
-    """A row per range of the shortest peak."""
+    """Return a table with a row per range of the shortest peak."""
     lines = []
     for low, high in itertools.pairwise(RANGES):
         mine = [row for row in rows if not row.failed and low <= shortest(row) < high]
         if mine:
             means = (np.mean([value(row) for row in mine]) for value in (lambda r: r.success_rate, lambda r: r.fitness))
             lines.append([f"{low} to {high} nm", str(len(mine)), *(f"{mean:.3g}" for mean in means)])
-    return markdown_table(["shortest peak", "candidates", "goal first", "fitness"], lines)
+    return markdown_table(["shortest peak", "candidates", "goal reached first", "fitness"], lines)
 
 
 def draw(store: Store, path: Path) -> None:
-    """What can be seen where, where the pigments went, and what it was good for."""
+    """Draw the signal difference over the peak, and peaks and success over the generations."""
     rows = store.rows
     figure, axes = new_figure(11, 4.0, columns=3)
     seen, moved, worth = axes[0]
@@ -156,12 +158,12 @@ def draw(store: Store, path: Path) -> None:
     worth.set(xlabel="generation", title="goal reached before any adversary", ylim=(0, 1))
     lines = [moved.plot([], [], color=color, label=name)[0] for name, color in zip(NAMES, COLORS.values(), strict=True)]
     figure.legend(handles=lines, loc="outside lower center", ncols=3, frameon=False)
-    figure.suptitle("The shortest peak moves into the ultraviolet, where goal and adversary differ")
+    figure.suptitle("The shortest peak evolves into the ultraviolet, in which goal and adversary differ")
     save(figure, path)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Collect runs if asked, and make the page."""
+    """Collect runs if requested, and make the page."""
     return evolved.main(NAME, __doc__ or "", page, arguments, QUANTITIES)
 
 

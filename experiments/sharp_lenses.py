@@ -1,4 +1,4 @@
-"""Sharp lenses: how near to focus must glass be, for animals that tell a goal from its doubles?
+"""Sharp lenses: fitness over the power of the glass, for animals that distinguish a goal from distractors
 
 python -m experiments.sharp_lenses [--compute] [--workers N] [--docs DIR]
 """
@@ -27,25 +27,28 @@ __all__ = ["Lens", "designs", "lens_of", "page", "worth"]
 
 NAME = "sharp_lenses"
 SIGMA = 0.003
-APERTURES = (0.3, 0.45)  # about where evolving pupils end while they are holes, and when they are lenses
+APERTURES = (0.3, 0.45)  # approximate ends of evolving pupils as pinholes and as lenses
 POWERS = (0.0, 0.5, 0.7, 0.8, 0.9, 0.95, 1.0, 1.05, 1.1, 1.2, 1.3)
 SEEDS = range(4)
-SETTINGS = ("learning.total_steps=130000", "learning.eval_interval=65000")  # as the preset `lens` trains
+SETTINGS = ("learning.total_steps=130000", "learning.eval_interval=65000")  # as in the preset `lens`
 SHARP = 0.3  # Strehl ratio
-NEARLY = 0.1  # contrast that a lens is short of the best one's, at most, to be nearly as good
+NEARLY = 0.1  # maximum difference of a nearly sharp lens's contrast from the best, relative to the best
 COLOR = "#0072B2"
 
 
 @dataclass(frozen=True)
 class Lens:
-    """strehl: in white daylight · contrast: above the noise, see experiments.best_pupil."""
+    """Quality of a lens.
+
+    strehl: Strehl ratio in white daylight · contrast: contrast above the noise, see experiments.best_pupil
+    """
 
     strehl: float
     contrast: float
 
 
 def designs() -> list[Design]:
-    """All trainings, one life of every animal first: two eyes of 15 x 15, as the preset `lens` has them."""
+    """Return all training runs, sorted by seed: two eyes of 15 x 15 receptors, as in the preset `lens`."""
     return [
         Design("detection", 2, 15, 15, 45.0, SIGMA, seed, relative_aperture=a, glass_power=power)
         for seed in SEEDS
@@ -56,7 +59,7 @@ def designs() -> list[Design]:
 
 @cache
 def lens_of(aperture: float, power: float) -> Lens:
-    """What glass of this power does in such a pupil."""
+    """Return the quality of glass of this power in a pupil."""
     design = Design("detection", 2, 15, 15, 45.0, SIGMA, 0, relative_aperture=aperture, glass_power=power)
     eye = design.animal.eyes(EyeConfig(noise_sigma=SIGMA)).eye()
     return Lens(white_strehl(eye, eye.psf()), measures(contrast_of(eye), float(eye.throughput), SIGMA)[1])
@@ -71,8 +74,11 @@ def _powers(rows: Sequence[Trained], aperture: float) -> list[float]:
 
 
 def worth(rows: Sequence[Trained], aperture: float) -> Interval | None:
-    """Mean fitness behind sharp lenses, less that behind lenses that are not, but have nearly the contrast of the best,
-    with Welch's interval over lives; None where there are fewer than two of either."""
+    """Return the mean fitness behind sharp lenses minus that behind nearly sharp ones, with Welch's interval.
+
+    A nearly sharp lens is not sharp, but has nearly the contrast of the best lens. The result is None with fewer than
+    two training runs of either kind.
+    """
     lenses = {power: lens_of(aperture, power) for power in _powers(rows, aperture)}
     best = max((lens.contrast for lens in lenses.values()), default=math.nan)
     good = {power: lens for power, lens in lenses.items() if lens.contrast >= (1 - NEARLY) * best}
@@ -88,7 +94,7 @@ def _is_sharp(lens: Lens) -> bool:
 
 
 def page(rows: Sequence[Trained], origin: Origin, answer: str) -> Page:
-    """The page of stored rows."""
+    """Return the page of stored rows."""
     lives = [len(_lives(rows, a, p)) for a in APERTURES for p in _powers(rows, a)]
     return Page(
         name=NAME,
@@ -109,7 +115,7 @@ def page(rows: Sequence[Trained], origin: Origin, answer: str) -> Page:
 
 
 def _table(rows: Sequence[Trained]) -> str:
-    """A row per lens."""
+    """Return a table with a row per lens."""
     lines = []
     for aperture in APERTURES:
         for power in _powers(rows, aperture):
@@ -122,18 +128,18 @@ def _table(rows: Sequence[Trained]) -> str:
                     f"{np.mean([row.success_rate for row in mine]):.2f}",
                 ]
             )
-    header = ["a", "power of the glass", "Strehl ratio", "contrast above the noise", "fitness", "goal first"]
+    header = ["a", "power of the glass", "Strehl ratio", "contrast above the noise", "fitness", "goal reached first"]
     return markdown_table(header, lines)
 
 
 def _worths(rows: Sequence[Trained]) -> str:
-    """A row per pupil."""
+    """Return a table with a row per pupil."""
     lines = [[f"{a:g}", str(worth(rows, a) or "-")] for a in APERTURES]
-    return markdown_table(["a", "fitness of sharp lenses, less that of nearly sharp ones"], lines)
+    return markdown_table(["a", "fitness of sharp lenses minus that of nearly sharp ones"], lines)
 
 
 def draw(rows: Sequence[Trained], path: Path) -> None:
-    """Fitness and Strehl ratio over the power of the glass, a panel per pupil."""
+    """Draw fitness and Strehl ratio over the power of the glass, with a panel per pupil."""
     figure, axes = new_figure(9.0, 4.2, columns=len(APERTURES), sharey=True)
     for place, aperture in zip(axes[0], APERTURES, strict=True):
         powers, color = _powers(rows, aperture), COLOR
@@ -141,7 +147,7 @@ def draw(rows: Sequence[Trained], path: Path) -> None:
             mine = [row.fitness for row in _lives(rows, aperture, power)]
             place.plot([power] * len(mine), mine, "o", color=color, ms=4, alpha=0.5, mec="none")
         means = [float(np.mean([row.fitness for row in _lives(rows, aperture, p)])) for p in powers]
-        place.plot(powers, means, color=color, lw=1.5, label="fitness: lives and their mean")
+        place.plot(powers, means, color=color, lw=1.5, label="fitness: training runs and their mean")
         sharpness = place.twinx()
         sharpness.plot(powers, [lens_of(aperture, p).strehl for p in powers], color="#777777", ls="--", lw=1)
         sharpness.set(ylim=(0, 1.05), ylabel="Strehl ratio" if aperture == APERTURES[-1] else "")
@@ -158,14 +164,14 @@ def draw(rows: Sequence[Trained], path: Path) -> None:
 def _message(rows: Sequence[Trained]) -> str:
     found = [worth(rows, a) for a in APERTURES]
     if any(one is None for one in found):
-        return "What the power of glass is worth"
+        return "Fitness over the power of the glass"
     if all(one.low <= 0 <= one.high for one in found if one):
-        return "Glass pays long before it is sharp, and what sharpness adds is lost in the lives' chance"
-    return "Sharp lenses are worth more than nearly sharp ones"
+        return "Glass raises fitness long before it is sharp; further sharpness has no significant effect"
+    return "Sharp lenses give higher fitness than nearly sharp ones"
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Train what is missing if asked; make the page from the store."""
+    """Train missing animals if requested; make the page from the stored rows."""
     return designed.main(designed.Experiment(NAME, __doc__ or "", designs, SETTINGS, page), arguments)
 
 

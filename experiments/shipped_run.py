@@ -1,10 +1,10 @@
-"""Make the run that `evolve demo` shows of a finished run of the quick preset:
+"""Make the run that `evolve demo` shows from a finished run of the quick preset:
 
     evolve run detection --preset quick --seed N --out runs/shipped
     python -m experiments.shipped_run runs/shipped
 
-Its record is kept whole, and its best animal's policy, which replay, report and EXR files need. The others would take
-megabytes; the record then says that none was kept.
+The whole record is copied, with the policy of the best animal, which replay, report and EXR files need. The other
+policies would take megabytes; their hashes are removed from the record.
 """
 
 from __future__ import annotations
@@ -23,10 +23,10 @@ FOLDER = Path(evolve.__file__).parent / "demo"
 
 
 def ship(source: Path, folder: Path = FOLDER) -> Run:
-    """Write a finished run, without the policies of all but the best, as the one that ships.
+    """Write a finished run with only the best animal's policy as the shipped run.
 
     Raises:
-        ValueError: it has not been finished, or nobody in it has succeeded.
+        ValueError: the run is not finished, or no candidate has succeeded.
     """
     run = Run.open(source)
     if not finished(run) or run.best is None:
@@ -43,7 +43,7 @@ def ship(source: Path, folder: Path = FOLDER) -> Run:
 
 
 def main() -> None:
-    """Ship the run that the command line names."""
+    """Make the shipped run from the run that the command line names."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("run", type=Path, help="directory of a finished run of the quick preset")
     print(ship(parser.parse_args().run))

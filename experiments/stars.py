@@ -1,4 +1,4 @@
-"""A star, as different pupils make it: white light, in colour
+"""Images of a star by different pupils: white light, in colour
 
 python -m experiments.stars [--out FILE]
 """
@@ -22,12 +22,12 @@ __all__ = ["picture", "pupils"]
 
 RADIUS, DISTANCE = 30e-6, 241.4e-6
 WAVELENGTHS = np.linspace(420e-9, 670e-9, 11)
-SIDE, DX, NEAR_DX = 161, 0.5e-6, 0.2e-6  # NEAR_DX: where light is focused
+SIDE, DX, NEAR_DX = 161, 0.5e-6, 0.2e-6  # NEAR_DX: for focused light
 DECADES = 3.0
 
 
 def pupils() -> dict[str, optics.Pupil]:
-    """Pupils by name; the first four spread the light, the others focus it."""
+    """Return pupils by name; the first four spread the light, the others focus it."""
     lens = {"thin_lens_focal_length": DISTANCE}
     curvature = 1 / (0.5 * DISTANCE)
     glass = optics.RefractiveIndex.from_abbe(1.5, 20)
@@ -46,14 +46,14 @@ def pupils() -> dict[str, optics.Pupil]:
 
 
 def coma() -> NDArray[np.float64]:
-    """Control points [m] of a relief that rises like y (x² + y²), less what shifts the picture."""
+    """Return control points [m] of a relief proportional to y (x² + y²), minus the tilt that shifts the image."""
     place = np.arange(4) - 1.5
     square = place[:, None] ** 2 + place[None, :] ** 2
     return 4e-6 * place[:, None] * (square - 2.0)
 
 
 def picture(pupil: optics.Pupil, dx: float = DX) -> NDArray[np.float64]:
-    """sRGB in [0, 1], (y, x, 3), of the light of a white star on the sensor; brightness is logarithmic."""
+    """Return the image of a white star on the sensor as sRGB in [0, 1], (y, x, 3), with logarithmic brightness."""
     psf = optics.psf(pupil, WAVELENGTHS.tolist(), DISTANCE, dx=dx, shape=(SIDE, SIDE), tolerance=1e-2).psf
     linear = np.maximum(preview(psf * daylight(WAVELENGTHS)[:, None, None], WAVELENGTHS * 1e9), 0.0)
     brightness = linear.max(axis=-1, keepdims=True)
@@ -62,7 +62,7 @@ def picture(pupil: optics.Pupil, dx: float = DX) -> NDArray[np.float64]:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Draw all of them."""
+    """Draw the images of all pupils."""
     options = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
     options.add_argument("--out", type=Path, default=Path("docs/images/stars.png"), help="file to draw into")
     out = options.parse_args(arguments).out

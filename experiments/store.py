@@ -1,4 +1,4 @@
-"""Numbers of experiments, stored beside their pages: rows of plain CSV, and with what they were made."""
+"""Stored numbers of experiments: rows in CSV files, and their origin."""
 
 from __future__ import annotations
 
@@ -18,12 +18,15 @@ from evolve.store.versions import present
 __all__ = ["DATA", "RECORDS", "Origin", "read_rows", "write_rows"]
 
 DATA = Path("docs/results/data")
-RECORDS = Path(__file__).parent / "records"  # of runs: their settings, and a line per candidate
+RECORDS = Path(__file__).parent / "records"  # settings of runs, and a line per candidate
 Row = TypeVar("Row")
 
 
 def read_rows(kind: type[Row], path: Path) -> list[Row]:
-    """Rows of a CSV file as instances of a dataclass whose fields are str, int or float; [] if there is no file."""
+    """Return the rows of a CSV file as instances of a dataclass with fields of type str, int or float.
+
+    The result is [] if the file does not exist.
+    """
     if not path.exists():
         return []
     types = get_type_hints(kind)
@@ -32,10 +35,14 @@ def read_rows(kind: type[Row], path: Path) -> list[Row]:
 
 
 def write_rows(rows: Iterable[Any], path: Path) -> None:
-    """The file anew, whole or not at all; numbers are written with six digits. Raises ValueError without rows."""
+    """Write a CSV file, completely or not at all, with numbers of six digits.
+
+    Raises:
+        ValueError: the rows are empty.
+    """
     lines = [asdict(row) for row in rows]
     if not lines:
-        raise ValueError(f"{path}: there are no rows to write")
+        raise ValueError(f"{path}: cannot write an empty table")
     text = io.StringIO()
     table = csv.writer(text, lineterminator="\n")
     table.writerow(lines[0])
@@ -46,13 +53,13 @@ def write_rows(rows: Iterable[Any], path: Path) -> None:
 
 @dataclass(frozen=True)
 class Origin:
-    """How stored numbers were made.
+    """Origin of stored numbers.
 
-    hours     of one core's time, or of one worker's by the clock
-    machine   processor and cores
-    versions  of what decides the numbers
-    whose     "core" or "worker"
-    earlier   commits that made other rows before
+    hours: processor time of one core, or wall time of one worker
+    machine: processor and number of cores
+    versions: versions of the software that influences the numbers
+    whose: "core" or "worker"
+    earlier: commits that made some of the rows earlier
     """
 
     hours: float
@@ -63,17 +70,17 @@ class Origin:
 
     @classmethod
     def here(cls, hours: float, whose: str = "core") -> Origin:
-        """Made by this process."""
+        """Return the origin of numbers that this process computes."""
         return cls(hours, f"{_processor()}, {os.cpu_count()} cores", present(), whose)
 
     @classmethod
     def read(cls, path: Path) -> Origin:
-        """As `write` left it."""
+        """Read an origin that `write` has stored."""
         found = json.loads(path.read_text(encoding="utf-8"))
         return cls(**{**found, "earlier": tuple(found.get("earlier", ()))})
 
     def after(self, path: Path) -> Origin:
-        """The same, with the commits of what the file says was made before."""
+        """Return this origin with the commits of the earlier origin in a file."""
         if not path.exists():
             return self
         former = Origin.read(path)
@@ -81,11 +88,11 @@ class Origin:
         return replace(self, earlier=tuple(commit for commit in commits if commit != self.versions["commit"]))
 
     def write(self, path: Path) -> None:
-        """JSON, whole or not at all."""
+        """Write the origin as JSON, completely or not at all."""
         write_whole(path, (json.dumps(asdict(self), indent=1) + "\n").encode())
 
     def sentence(self) -> str:
-        """Hours, machine and versions, for a page's end."""
+        """Return hours, machine and versions as a sentence for the end of a page."""
         names = {"rhabdom", "commit", "machine", "python"}
         packages = ", ".join(f"{name} {self.versions[name]}" for name in self.versions if name not in names)
         units = ((1, "hours"), (1 / 60, "minutes"), (0, "seconds"))
@@ -101,7 +108,7 @@ def _short(commit: str) -> str:
 
 
 def _processor() -> str:
-    """The processor's name, as far as the system tells it."""
+    """Return the processor's name if the system provides it."""
     try:
         for line in Path("/proc/cpuinfo").read_text().splitlines():
             if line.startswith("model name"):

@@ -1,18 +1,18 @@
 """Light to photoreceptor signal by wave optics. SI units; arrays are (wavelength, y, x).
 
-Begin with `optics.psf`, the image of a point behind a `Pupil`, and `optics.Eye`, a pupil before receptors. The folders,
-each of which imports only what stands above it:
+Start with `optics.psf`, the image of a point behind a `Pupil`, and `optics.Eye`, a pupil before receptors. Each folder
+imports only from the folders listed above it:
 
-numerics      arrays, transforms, interpolation: nothing about light
-apertures     shapes of a pupil's opening
-spectra       light and receptors over wavelength
+numerics      arrays, transforms and interpolation, independent of optics
+apertures     shapes of the pupil's opening
+spectra       spectra of light and of receptors
 elements      source, pupil and relief
-methods       the diffraction integral, evaluated in ten ways (methods/textbook.py is the one to read first)
-point_spread  psf and plan: which method, and whether it was right
-propagation   sampled fields from plane to plane
-eye           Eye: what its receptors see
-ommatidia     Ommatidium: facets before rhabdoms that are waveguides
-torch         psf inside a PyTorch graph
+methods       ten ways to evaluate the diffraction integral (read methods/textbook.py first)
+point_spread  psf and plan: choice of the method and check of its result
+propagation   propagation of sampled fields between planes
+eye           Eye: signals of its receptors
+ommatidia     Ommatidium: facet lenses and rhabdoms as waveguides
+torch         psf as a function in a PyTorch graph
 """
 
 from importlib import import_module

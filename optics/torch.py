@@ -27,25 +27,26 @@ __all__ = ["PointSpread", "psf"]
 def psf(
     heights: torch.Tensor, *, radius: Any, n: Any = 1.5, pupil: dict[str, Any] | None = None, **view: Any
 ) -> torch.Tensor:
-    """`optics.psf` of a relief, as a differentiable function of its heights.
+    """Differentiable `optics.psf` of a relief, as a function of its heights.
 
-    heights: [m]; (4, 4) are the control points of a BSplineRelief, any other square the samples of a HeightMap.
-    radius [m] and n may be one-element tensors, through which gradients flow as well.
-    pupil: further arguments of `optics.Pupil`; view: arguments of `optics.psf` but for the pupil.
-    Returns (wavelength, y, x) [1/m²], float32 unless dtype="float64".
+    heights: [m]. A (4, 4) tensor holds the control points of a BSplineRelief, any other square the samples of a
+        HeightMap.
+    radius, n: radius [m] and refractive index. One-element tensors carry gradients.
+    pupil: further arguments of `optics.Pupil`.
+    view: arguments of `optics.psf` except the pupil. Returns (wavelength, y, x) [1/m²], float32 unless dtype="float64".
 
     Raises:
         ValueError: see `optics.psf`.
         AccuracyError: see `optics.psf`.
-        BackendError: RHABDOM_DEVICE asks for a GPU, and torch cannot use it.
+        BackendError: RHABDOM_DEVICE requires a GPU that torch cannot use.
     """
     import drjit as dr
 
     of_kind("heights", heights, torch.Tensor, "torch.zeros(4, 4)")
     place = _place()
     if view.get("field"):
-        raise ValueError("field: is `optics.psf`'s alone; this is the intensity")
-    precision(view.get("dtype", "float32"))  # refuses other types
+        raise ValueError("field: only `optics.psf` returns it; this function returns the intensity")
+    precision(view.get("dtype", "float32"))  # raises an error for other types
 
     @dr.wrap(source="torch", target="drjit")
     def spread(heights: Array, radius: Scalar, n: Scalar) -> Array:
@@ -57,14 +58,14 @@ def psf(
 
 
 def _place() -> str:
-    """Where optics computes, as torch calls it.
+    """Return the device on which optics computes, by its torch name.
 
     Raises:
-        BackendError: Dr.Jit cannot compute there, or this torch cannot.
+        BackendError: Dr.Jit cannot compute there, or this torch build cannot.
     """
     place = make_ready()
     if place == "cuda" and not torch.cuda.is_available():
-        raise BackendError(f"{VARIABLE} asks for a GPU, and this torch has none: must be cpu, or torch built for CUDA")
+        raise BackendError(f"{VARIABLE} requires a GPU, but this torch has none: must be cpu, or torch built for CUDA")
     return place
 
 
@@ -73,11 +74,11 @@ def _moved(value: Any, place: str) -> Any:
 
 
 class PointSpread(torch.nn.Module):
-    """A pupil whose relief is learnt: forward() gives its PSF, (wavelength, y, x).
+    """Module with a learnable relief: forward() returns the pupil's PSF, (wavelength, y, x).
 
     radius: [m]. wavelengths, sensor_distance, dx, shape, ...: see `optics.psf`.
-    heights: start [m], (4, 4) control points (default: flat) or (n, n) samples. unit: length [m] of one unit of the
-        learnt parameter, so that optimisers see numbers near 1.
+    heights: initial heights [m], (4, 4) control points (default: flat) or (n, n) samples.
+    unit: length [m] of one unit of the learnt parameter. It brings the parameter near 1, as optimisers expect.
 
     Parameter:
         relief: heights / unit.
@@ -103,7 +104,7 @@ class PointSpread(torch.nn.Module):
 
     @property
     def heights(self) -> torch.Tensor:
-        """[m]"""
+        """Heights [m]."""
         return self.relief * self.unit
 
     def forward(self) -> torch.Tensor:

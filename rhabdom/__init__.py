@@ -1,12 +1,12 @@
-"""rhabdom: eyes that evolve, seen through real optics.
+"""rhabdom: eyes that evolve, simulated with physical optics.
 
-optics    light to photoreceptor signal by wave optics
-sim       worlds, and what eyes see in them
+optics    wave optics, from light to photoreceptor signals
+sim       worlds, and the signals of the eyes in them
 evolve    the search: genomes, learning, runs
 
-`rhabdom.optics` and `optics` are the same package; all of it loads on first use. The modules here:
+`rhabdom.optics` and `optics` are the same package. Each package is imported on first use. The modules here:
 
-importing  finds the three packages, and says who else bears their names
+importing  locations of the three packages, and conflicts with other projects of the same names
 command    the command `evolve`
 """
 

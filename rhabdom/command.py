@@ -1,4 +1,4 @@
-"""The command `evolve`, wherever the packages are: importing this has put them on Python's path."""
+"""Entry point of the command `evolve`. Importing this module puts the packages on Python's path."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _SAID = b"evolve: interrupted\n"
 
 
 def run_command() -> int:
-    """Run one command; returns the exit code."""
+    """Run one command and return the exit code."""
     ours = threading.current_thread() is threading.main_thread()
     if ours and signal.getsignal(signal.SIGINT) is signal.default_int_handler:
         signal.signal(signal.SIGINT, _interrupt)
@@ -27,8 +27,11 @@ def run_command() -> int:
 
 
 def _interrupt(number: int, frame: FrameType | None) -> None:
-    """Ctrl-C, an exception as always. While a module loads it ends the process instead: there an exception comes up
-    within somebody's initialisation, and Python, or a library, makes another one of it, or none."""
+    """Interrupt the process on Ctrl-C, or end it if a module is being imported.
+
+    An exception raised during an import may come up in the middle of a library's initialisation. Python or the library
+    may then replace or suppress it.
+    """
     if _imports(frame):
         os.write(2, _SAID)
         os._exit(INTERRUPTED)

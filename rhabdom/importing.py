@@ -1,8 +1,8 @@
-"""Where the packages `optics`, `sim` and `evolve` are, and who else bears their names.
+"""Locations of the packages `optics`, `sim` and `evolve`, and conflicts with other packages of the same names.
 
-In a checkout they stand beside this package. Installed, they stand in `rhabdom/packages`, which `rhabdom.pth` adds to
-Python's path: the package index holds another project named `optics`, and two that share a folder overwrite each
-other's files, and delete them when one is uninstalled.
+In a checkout the three packages lie next to this one. In an installation they lie in `rhabdom/packages`, which
+`rhabdom.pth` adds to Python's path. The reason is that the package index holds another project named `optics`. Two
+projects that install the same folder overwrite each other's files, and uninstalling one deletes files of the other.
 """
 
 from __future__ import annotations
@@ -21,22 +21,24 @@ __all__ = ["HOME", "NAMES", "come_first", "namesakes"]
 
 NAMES = ("optics", "sim", "evolve")
 _BESIDE = Path(__file__).resolve().parent / "packages"
-HOME = _BESIDE if _BESIDE.is_dir() else _BESIDE.parents[1]  # the folder that holds the three
+HOME = _BESIDE if _BESIDE.is_dir() else _BESIDE.parents[1]  # the folder that contains the three packages
 
 
 def come_first() -> None:
-    """Make `import optics`, `sim` and `evolve` find rhabdom's, and `rhabdom.optics` be the same package as `optics`.
+    """Make `import optics`, `sim` and `evolve` find rhabdom's packages, and make `rhabdom.optics` the same module as
+    `optics`.
 
-    Nothing changes where Python finds them by itself. Where another project's come first, one line warns of them.
+    Python's path is left unchanged if it already leads to rhabdom's packages. If packages of other projects come first,
+    a warning names them.
 
     Raises:
-        ImportError: another `optics`, `sim` or `evolve` has been imported already; one line names it.
+        ImportError: another `optics`, `sim` or `evolve` has already been imported; the message names it.
     """
     if not any(isinstance(finder, _Alias) for finder in sys.meta_path):
         sys.meta_path.insert(0, _Alias())
     for name in NAMES:
         if (loaded := sys.modules.get(name)) is not None and (at := _place(loaded.__spec__)) != HOME / name:
-            raise ImportError(f"{at}: is imported as {name}, which rhabdom needs for its own: import rhabdom first")
+            raise ImportError(f"{at}: is already imported as {name}; import rhabdom first")
     before = {name: PathFinder.find_spec(name) for name in NAMES}
     if all(spec is not None and _place(spec) == HOME / name for name, spec in before.items()):
         return
@@ -48,8 +50,9 @@ def come_first() -> None:
 
 
 def namesakes() -> list[str]:
-    """Other projects that have installed a package `optics`, `sim` or `evolve`, a line each: which, and the remedy."""
-    from importlib import metadata  # reads what is installed: not at every import
+    """Return one line for each other project that has installed a package `optics`, `sim` or `evolve`, with the
+    remedy."""
+    from importlib import metadata  # imported here since it reads all installed packages
 
     owners = metadata.packages_distributions()
     return [
@@ -61,7 +64,7 @@ def namesakes() -> list[str]:
 
 
 def _place(spec: ModuleSpec | None) -> Path | None:
-    """Folder of a package, or file of a module."""
+    """Return the folder of a package or the file of a module."""
     if spec is None or spec.origin is None:
         return None
     path = Path(spec.origin).resolve()
@@ -69,7 +72,7 @@ def _place(spec: ModuleSpec | None) -> Path | None:
 
 
 class _Alias(MetaPathFinder, Loader):
-    """`rhabdom.optics.eye` is the module `optics.eye`, and no second copy of it."""
+    """Importer that makes `rhabdom.optics.eye` the module `optics.eye` instead of a second copy."""
 
     def find_spec(self, name: str, path: Sequence[str] | None, target: ModuleType | None = None) -> ModuleSpec | None:
         head, _, rest = name.partition(".")
@@ -81,7 +84,8 @@ class _Alias(MetaPathFinder, Loader):
         return module
 
     def exec_module(self, module: ModuleType) -> None:
-        """It has been executed under its own name, which it keeps: the import system has just given it another."""
+        """Restore the module's own spec, which the import system has just replaced. The module itself has already been
+        executed."""
         spec = module.__spec__
         assert spec is not None
         module.__spec__ = spec.loader_state

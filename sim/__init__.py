@@ -1,27 +1,27 @@
-"""rhabdom.sim: a MuJoCo world, mirrored as a spectral Mitsuba scene, seen by the eyes of many agents at once.
+"""rhabdom.sim: MuJoCo worlds, mirrored as spectral Mitsuba scenes and rendered for the eyes of many agents at once.
 
-Eyes, build_world, World            what there is to see, and with which eyes
-Course                              a course of one's own, for navigation
-TASKS                               names of the tasks
+Eyes, build_world, World            the eyes of an agent, and the built-in worlds
+Course                              a user-defined course for navigation
+TASKS                               names of the built-in tasks
 mirror, Mirror                      any MuJoCo model as a Mitsuba scene
-BatchedRenderer                     all eyes of all worlds as one wavefront
-choose_fidelity, Fidelity           how finely: as the receptors' noise allows
-FidelityWarning                     where nothing is fine enough
-ReferenceRenderer                   the same, slowly: Mitsuba's integrators and optics' convolution
-ModelRenderer, Mount, Poses         eyes on any model of one's own; fan, ring, both_sides: of several
-choose_model_fidelity               how finely eyes on a model see
-Task                                what a robot of one's own has to do: for make_vec_env
-BatchTask                           the same for arrays of all worlds, which is faster
-check_batch_task                    whether one keeps to the protocol
-Outcome, RewardTerms                what its `judge` returns
-Physics                             what moves its worlds
-ArrayWorlds, SlidingAgents          two of these: any MuJoCo model, and the built-in agent
-Encounter, Frozen                   several animals in one world, that see each other
-make_parallel_env                   these as a PettingZoo environment
-make_vec_env, make_env              the environments, natively batched or single
+BatchedRenderer                     all eyes of all worlds, rendered as one wavefront
+choose_fidelity, Fidelity           rendering accuracy, matched to the receptors' noise
+FidelityWarning                     warning that no level of fidelity is accurate enough
+ReferenceRenderer                   slow reference: Mitsuba's integrators and the convolution in optics
+ModelRenderer, Mount, Poses         eyes on any MuJoCo model; fan, ring and both_sides place several eyes
+choose_model_fidelity               rendering accuracy for eyes on a model
+Task                                a user task for a robot with eyes, for make_vec_env
+BatchTask                           the same on arrays of all worlds, which is faster
+check_batch_task                    test of a batch task against the protocol
+Outcome, RewardTerms                return values of `judge` in a batch task
+Physics                             protocol of the physics of a batch of worlds
+ArrayWorlds, SlidingAgents          two implementations: any MuJoCo model, and the built-in agent
+Encounter, Frozen                   several animals in one world that see each other
+make_parallel_env                   an encounter as a PettingZoo environment
+make_vec_env, make_env              environments, natively batched or single
                                     (also gymnasium.make("rhabdom/Detection-v0"), Foraging, Maze ...)
-register_task                       an id of one's own for gymnasium.make
-View, write_exr, read_exr           what was seen, on disk
+register_task                       a Gymnasium id for a user task
+View, write_exr, read_exr           rendered views in EXR files
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-import rhabdom  # noqa: F401 (finds rhabdom's own optics, whoever else has installed a package of that name)
+import rhabdom  # noqa: F401 (makes `import optics` find rhabdom's package if another project has installed one)
 from sim.envs.registration import register as register_environments
 from sim.worlds import catalog
 

@@ -1,12 +1,12 @@
-"""What eyes saw, as OpenEXR files in the spectral layout of Fichet, Pacanowski and Wilkie (2021), "An OpenEXR Layout
+"""Images of eyes as OpenEXR files in the spectral layout of Fichet, Pacanowski and Wilkie (2021), "An OpenEXR Layout
 for Spectral Images", JCGT 10(3).
 
 One part per eye and view: `left.spectral` (spectral radiance, channels `S0.450,000000nm`), `left.receptors`
-(photoreceptor signals, channels `receptor_0` ...), each with an sRGB preview R, G, B (linear, as EXR wants it). Plain
-viewers show the preview; readers of the layout that know only one part (colour-science's) read the first, which is
-spectral if any is. 32-bit floats, ZIP.
+(photoreceptor signals, channels `receptor_0` ...), each with a linear sRGB preview R, G, B. Plain viewers show the
+preview. Readers that support a single part (colour-science) read the first one, which is spectral if any part is.
+Pixels are 32-bit floats with ZIP compression.
 
-Files are written whole or not at all, and each part carries a SHA-256 of what it holds.
+Files are written whole or not at all, and each part carries a SHA-256 of its contents.
 """
 
 from __future__ import annotations
@@ -28,27 +28,27 @@ from sim.scene.color import preview
 LAYOUT_VERSION = "1.0"
 UNITS = "W.m^-2.sr^-1"
 SCALE = "relative: a white Lambertian facing unit daylight has radiance D65, 1 at 560 nm"
-MOST_BYTES = 2**30  # of pixels; sixteen eyes of 128 x 128 in 64 bands have a fifteenth of that
-_HELD = "rhabdom"  # attribute: JSON of what the channels cannot hold
+MOST_BYTES = 2**30  # of pixels: fifteen times as many as sixteen eyes of 128 x 128 in 64 bands have
+_HELD = "rhabdom"  # attribute: JSON of all that is not a channel
 _HASH = "sha256"
 _PREVIEW = ("R", "G", "B")
 
 
 class ExrError(ValueError):
-    """A file that is no whole, undamaged file of `write_exr`."""
+    """A file that is incomplete, damaged, or not written by `write_exr`."""
 
 
 @dataclass(frozen=True)
 class View:
-    """What one eye saw.
+    """Image of one eye.
 
     name: of the eye: "left"
     wavelengths_nm: (band,), the radiance's
     radiance: (band, y, x) float32, or None
     receptors: (channel, y, x) float32, or None
-    rgb: (y, x, 3) float32 linear sRGB preview of the radiance; None: made when written
-    attributes: whatever JSON can hold: seed, time step, position, ...
-    peaks_nm: (channel,), the receptors': their preview shows the longest as red; None: they stand from long to short
+    rgb: (y, x, 3) float32 linear sRGB preview of the radiance; None: computed when written
+    attributes: values that JSON can represent: seed, time step, position, ...
+    peaks_nm: (channel,), of the receptors; the preview shows the longest as red; None: channels are in descending order
     """
 
     name: str
@@ -86,12 +86,12 @@ class View:
 
 
 def _shape(image: Any) -> tuple[int, ...]:
-    """Of an array of any library; () for what is none."""
+    """Shape of an array of any library; () for other objects."""
     return tuple(getattr(image, "shape", ()))
 
 
 def _kind(image: Any) -> str:
-    """What an image has or is, for messages."""
+    """Return the shape or the value of an image, for messages."""
     return f"has shape {_shape(image)}" if hasattr(image, "shape") else f"is {shown(image)}"
 
 

@@ -1,4 +1,4 @@
-"""Fitness without a training."""
+"""Fitness in closed form, without any training."""
 
 from collections.abc import Iterator
 
@@ -6,7 +6,7 @@ from evolve.store.evaluation import Evaluation
 
 
 class ClosedForm:
-    """An executor that knows every candidate's fitness."""
+    """An executor that computes every candidate's fitness in closed form."""
 
     def run(self, jobs, progress) -> Iterator:
         while jobs:

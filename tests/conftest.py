@@ -1,24 +1,26 @@
-"""What tests of several packages share."""
+"""Fixtures and settings that tests of several packages share."""
 
 import os
 import sys
 
 import pytest
 
-# colour-science loads OpenImageIO where it can and keeps some of its objects. Where torch is loaded, too, they outlive
-# the interpreter, and a green run ends in a page of "nanobind: leaked". The test that needs it starts a process.
+# colour-science loads OpenImageIO if it is installed and keeps some of its objects. If torch is loaded too, these
+# objects outlive the interpreter, and a run without failures ends in a page of "nanobind: leaked". The test that needs
+# OpenImageIO starts a process of its own.
 sys.modules["OpenImageIO"] = None  # type: ignore[assignment]
 
 pytest_plugins = ["pytester", "tests.cpu_times", "tests.sharing", "tests.slow_part"]
 
 
-# Tests start many processes, xdist's workers among them: without bytecode each would compile all sources again.
+# Tests start many processes, including xdist's workers. Without bytecode, each process would compile all sources again.
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 sys.dont_write_bytecode = False
 
 
 def pytest_configure() -> None:
-    """Workers beside each other have a thread each: Dr.Jit's second one spins while it waits, at the others' cost."""
+    """Give each xdist worker a single Dr.Jit thread: a second thread spins while it waits and slows the other
+    workers."""
     if "PYTEST_XDIST_WORKER" in os.environ:
         import drjit
 
@@ -27,7 +29,7 @@ def pytest_configure() -> None:
 
 @pytest.fixture(scope="module")
 def short_episodes():
-    """Episodes of 32 actions, not 256: for what does not depend on their length, and needs many of them."""
+    """Episodes of 32 actions instead of 256, for tests that run many episodes and do not depend on their length."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("sim.tasks.built_in.EPISODE_STEPS", 32)
         yield

@@ -1,4 +1,4 @@
-"""Odd values to try as arguments, and what is wrong with how a call answers them."""
+"""Odd values to try as arguments, and a check of the response to them."""
 
 import math
 import traceback
@@ -34,14 +34,14 @@ ODD = {
 
 
 def complaint(call, arguments):
-    """None if it answers, or refuses in one line of our own."""
+    """Return None if the call succeeds or raises a one-line error of this project; otherwise describe the problem."""
     try:
         call(**arguments)
     except (ValueError, OSError) as error:
         last = traceback.extract_tb(error.__traceback__)[-1]
         if not str(error) or "\n" in str(error):
             return f"not one line: {error}"
-        # What compiled code raises has no line of its own: it seems to come from the line that called it.
+        # An error raised by compiled code has no source line of its own: it seems to come from the line of the call.
         ours = last.filename.startswith(OURS) and last.line.startswith("raise ")
         return None if ours or isinstance(error, OSError) else f"{error} ({last.filename}:{last.lineno})"
     except Exception as error:
@@ -50,7 +50,7 @@ def complaint(call, arguments):
 
 
 def complaints(call, valid):
-    """Of every argument in turn, given everything that it is not; the call itself must do."""
+    """Complaints about every argument in turn, with each odd value in its place; the valid call must succeed."""
     call(**valid)
     found = {}
     for argument in valid:

@@ -1,7 +1,7 @@
 """A pytest plugin: with `-n auto`, tests that share expensive fixtures run on one worker, and others on any.
 
-This is what pytest-xdist does with `--dist loadgroup` and its mark `xdist_group`, which have no effect with pytest 9.2.
-Another `--dist` than the default one works as usual.
+This is the behaviour of pytest-xdist's option `--dist loadgroup` and its mark `xdist_group`, which have no effect with
+pytest 9.2. Any other value of `--dist` works as usual.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-# What tests of a group have in common, and how their names begin.
+# Names of groups, and the common start of their tests' names.
 SHARING = {
     "contrasts of the standard observer": ("tests/optics/elements/test_human_eye.py::test_standard_observer",),
     "a run, an episode and its page": ("tests/evolve/report/",),
@@ -32,7 +32,7 @@ SHARING = {
 
 
 def group(test: str) -> str:
-    """Tests of one group run on one worker."""
+    """Name of the group of a test; tests of one group run on one worker."""
     return next((name for name, starts in SHARING.items() if test.startswith(starts)), test)
 
 

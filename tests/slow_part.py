@@ -55,7 +55,7 @@ def slow(*values: object) -> Any:
     return pytest.param(*values, marks=pytest.mark.slow)
 
 
-@pytest.hookimpl(tryfirst=True)  # before pytest leaves out what is marked
+@pytest.hookimpl(tryfirst=True)  # before pytest drops the marked tests
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     cases: defaultdict[str, list[Any]] = defaultdict(list)
     listed = set(LISTED.read_text().splitlines())
@@ -74,9 +74,9 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 
 def fast_cases(cases: list[dict[str, int]], count: int) -> list[int]:
-    """Places of `count` cases, chosen one after another: the first of those with the most values not chosen yet.
+    """Indices of `count` cases, chosen one after another: each time the first case with the most values not chosen yet.
 
-    cases: of each parameter, a number that equal values share
+    cases: for each parameter, a number that equal values share
     """
     chosen: list[int] = []
     seen: set[tuple[str, int]] = set()

@@ -1,13 +1,15 @@
-"""What our source defines, read and not run: modules, their names, members of classes, and every word that it uses.
+"""Names that our source defines, found without running it: modules, their names, members of classes, and every word in
+use.
 
-`missing(text)` lists what a document mentions and nothing defines. A document mentions
+`missing(text)` lists names that a document mentions and that do not exist. It checks
 
-- paths under our folders, anywhere in its text, and file names that end in .py in code spans;
-- modules and their names that begin with one of our packages (`optics.methods.hankel`), anywhere in its text;
-- in code spans, members of our classes (`Eye.kernel`), of modules by their last name (`lighting.onwards`), settings
-  (`search.rungs`), and single words that look like code: called, with an underscore or, in mixed case, a capital.
+- paths under our folders, anywhere in the text, and file names that end in .py in code spans;
+- modules and their names that begin with one of our packages (`optics.methods.hankel`), anywhere in the text;
+- in code spans: members of our classes (`Eye.kernel`), members of modules by their last name
+  (`lighting.spawn_bounce_ray`), settings (`search.rungs`), and single words that look like code (called, with an
+  underscore, or a capital in mixed case).
 
-Fenced commands and code are left out: other tests run them.
+Fenced commands and code are left out, because other tests run them.
 """
 
 from __future__ import annotations
@@ -25,7 +27,7 @@ from tests.sources import tree as parsed
 PACKAGES = ("optics", "sim", "evolve", "validation", "experiments", "tests")
 FOLDERS = (*PACKAGES, "docs", "examples")
 GENERATED = ("validation/figures",)
-TABLES = ("_CONTENTS", "_HOME")  # of contents, of packages that load lazily
+TABLES = ("_CONTENTS", "_HOME")  # tables of contents of packages that load lazily
 LIBRARIES = {"dr", "drjit", "gymnasium", "mi", "mitsuba", "mujoco", "np", "numpy", "rhabdom", "torch"}
 
 SHELL_AND_CODE = re.compile(r"```(?:sh|python|toml)\n.*?```", re.DOTALL)
@@ -44,7 +46,7 @@ FILE = re.compile(r"[\w-]+\.(?:csv|exr|html|json|jsonl|md|npz|png|rrd|safetensor
 
 
 def missing(text: str) -> list[str]:
-    """What the document mentions that is not there."""
+    """Names and paths that the document mentions but that do not exist."""
     prose = LINK_TARGET.sub("]", SHELL_AND_CODE.sub("", text))
     wrong = {path for path in PATH.findall(prose) if path.split("/")[0] in FOLDERS and not path_exists(path)}
     wrong |= {name for name in OURS.findall(PATH.sub("", prose)) if not name_exists(name)}
@@ -62,7 +64,8 @@ def missing(text: str) -> list[str]:
 
 
 def path_exists(path: str) -> bool:
-    """A path from the repository's root, which may hold stars, or the end of a Python file's path."""
+    """Return whether the path exists: a path from the repository's root, which may hold stars, or the end of a Python
+    file's path."""
     path = path.rstrip(".")
     if path.startswith(GENERATED):
         return True
@@ -70,8 +73,8 @@ def path_exists(path: str) -> bool:
 
 
 def name_exists(name: str) -> bool:
-    """A dotted name: from one of our packages on, or from a class, a module or a variable called like one, or a
-    section of a run's settings."""
+    """Return whether a dotted name exists. It starts with one of our packages, with a class, module or variable, or
+    with a section of a run's settings."""
     head, attribute = name.split(".")[:2]
     if head in PACKAGES:
         return _resolves(name)
@@ -89,12 +92,13 @@ def name_exists(name: str) -> bool:
     if any(known):
         return any(attribute in names for names in known)
     if head[0].isupper():
-        return head in words()  # another library's class, which our source uses
+        return head in words()  # a class of another library, used in our source
     return set(name.split(".")[1:]) <= words()
 
 
 def _resolves(name: str) -> bool:
-    """Follows modules as far as they go, then one name of the module, then one member of the class."""
+    """Return whether the name resolves: through modules first, then one name of the module, then one member of the
+    class."""
     module, rest = name, []
     while module not in modules():
         module, _, last = module.rpartition(".")
@@ -113,7 +117,7 @@ def python_files() -> list[str]:
 
 @lru_cache
 def modules() -> dict[str, ast.Module]:
-    """Dotted name -> its source."""
+    """Dotted name of each module -> its syntax tree."""
     found = {package: ast.Module([], []) for package in PACKAGES}
     for path in python_files():
         module = path.removesuffix(".py").replace("/", ".").removesuffix(".__init__")
@@ -123,7 +127,7 @@ def modules() -> dict[str, ast.Module]:
 
 @lru_cache
 def names_of(module: str) -> set[str]:
-    """What a module defines or imports, and what is in a package."""
+    """Names that a module defines or imports, and modules in a package."""
     found = {name.split(".")[-1] for name in modules() if name.rpartition(".")[0] == module}
     for node in modules()[module].body:
         found |= _defined(node)
@@ -136,7 +140,7 @@ def names_of(module: str) -> set[str]:
 
 @lru_cache
 def classes_and_words() -> tuple[dict[str, list[ast.ClassDef]], set[str]]:
-    """From one walk through all sources: name -> the classes that bear it; and the words of all that is not a test."""
+    """Class definitions by name, and all words in code outside the tests, both from one walk through all sources."""
     classes, words = defaultdict(list), set()
     for module, tree in modules().items():
         is_test = module.split(".")[0] == "tests"
@@ -159,7 +163,7 @@ def classes() -> dict[str, list[ast.ClassDef]]:
 
 @lru_cache
 def members(name: str) -> set[str]:
-    """Methods and attributes of all classes of that name, and of their bases among ours."""
+    """Methods and attributes of all classes with this name, and of their base classes in this project."""
     found: set[str] = set()
     for definition in classes().get(name, []):
         for node in definition.body:
@@ -184,7 +188,7 @@ def _defined(node: ast.stmt) -> set[str]:
 
 @lru_cache
 def words() -> set[str]:
-    """Every name, argument and attribute, and every string that may be a key, in all that is not a test."""
+    """Every name, argument, attribute and string that may be a key, in all code outside the tests."""
     found = set(dir(builtins)) | set(SETTINGS) | {setting.split(".")[-1] for setting in SETTINGS} | set(GENE_FIELDS)
     found |= set(re.findall(r"[A-Z]+(?:_[A-Z]+)+", (ROOT / "with-env").read_text(encoding="utf-8")))
     found |= classes_and_words()[1]

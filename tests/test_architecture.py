@@ -1,4 +1,4 @@
-"""Imports run one way, heavy libraries stay where they belong, and package imports are light."""
+"""Imports run one way, heavy libraries stay in their modules, and package imports are light."""
 
 import ast
 import subprocess
@@ -16,7 +16,7 @@ def test_contracts_hold():
 
 
 def imported_at(path: Path) -> dict[str, bool]:
-    """Top-level packages that a file imports -> whether it does so when it is itself imported."""
+    """Top-level packages that a file imports -> True if importing the file imports them."""
     module = tree(path)
     nested = {id(node) for f in ast.walk(module) if isinstance(f, ast.FunctionDef | ast.Lambda) for node in ast.walk(f)}
     found: dict[str, bool] = {}
@@ -34,7 +34,7 @@ def imported_at(path: Path) -> dict[str, bool]:
 
 
 def test_rhabdom_imports_no_package_that_imports_it():
-    """Not for type checking either: `__init__.pyi` says the types."""
+    """rhabdom must not import them for type checking either; `__init__.pyi` declares the types."""
     above = {"optics", "sim", "evolve"}
     circles = {path.name: above & imported_at(path).keys() for path in (ROOT / "rhabdom").glob("*.py")}
     assert not any(circles.values()), circles
@@ -48,7 +48,7 @@ def test_importing_the_packages_loads_nothing_heavy():
 
 
 def test_no_variant_is_set_at_import():
-    """A library that sets Mitsuba's variant when imported changes its user's program."""
+    """A library that sets Mitsuba's variant on import would change the user's program."""
     code = (
         "import mitsuba as mi, optics, sim, evolve, sim.scene.mirror, sim.render.batched_renderer; print(mi.variant())"
     )
@@ -71,7 +71,7 @@ FOLDERS = sorted(
 
 
 def test_packages_are_folders_with_names():
-    """`ls` shows a handful of rooms, and at most three modules beside the table of contents."""
+    """A package holds at most ten folders, and at most three modules next to its `__init__`."""
     for package in PACKAGES:
         modules = {path.name for path in (ROOT / package).glob("*.py")} - {"__init__.py"}
         assert len(modules) <= 3, modules
@@ -79,12 +79,12 @@ def test_packages_are_folders_with_names():
 
 
 def faults_by_folder(faults: Callable[[Path], set[str]]) -> dict[str, set[str]]:
-    """Folders with faults, and these."""
+    """Folders with faults, and their faults."""
     return {folder.relative_to(ROOT).as_posix(): found for folder in FOLDERS if (found := faults(folder))}
 
 
 def test_folders_list_their_modules():
-    """The `__init__` of a folder is a table of contents."""
+    """The docstring of a folder's `__init__` is a table of contents."""
     assert faults_by_folder(unlisted) == {}
 
 
@@ -96,7 +96,7 @@ def unlisted(folder: Path) -> set[str]:
 
 
 def test_tests_mirror_the_folders_and_say_what_covers_what():
-    """In `tests`, the folder's `__init__` names for each module the files that fail where it is wrong."""
+    """The `__init__` of a folder in `tests` names, for each module, the test files that fail if it is broken."""
     assert faults_by_folder(uncovered) == {}
 
 
@@ -112,13 +112,13 @@ def uncovered(folder: Path) -> set[str]:
 
 
 def table(init: Path) -> list[str]:
-    """What a folder's docstring has below its first line, a line each."""
+    """Lines of a folder's docstring below its first line."""
     text = ast.get_docstring(tree(init)) or ""
     return [line for line in text.split("\n")[1:] if line and not line.startswith(" ")]
 
 
 def test_names_of_modules_are_unique_within_a_package():
-    """So that a name in a traceback, or in a search, means one file."""
+    """A name in a traceback or a search result then identifies one file."""
     places: dict[tuple[str, str], list[str]] = {}
     for path in SOURCES:
         inside = path.relative_to(ROOT)
@@ -128,7 +128,7 @@ def test_names_of_modules_are_unique_within_a_package():
 
 
 def test_files_are_small():
-    """A file longer than 300 lines holds two nouns."""
+    """Source files have at most 300 lines; a longer file usually has two responsibilities."""
     long = {str(path.relative_to(ROOT)): n for path in SOURCES if (n := len(path.read_text().splitlines())) > 300}
     assert not long
 

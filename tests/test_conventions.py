@@ -1,4 +1,4 @@
-"""One form of docstring, one form of message, one meaning per name."""
+"""One form of docstring, one form of message, and one meaning per name."""
 
 import ast
 import re
@@ -21,7 +21,7 @@ Definition = ast.FunctionDef | ast.ClassDef
 
 @dataclass(frozen=True)
 class Documented:
-    """A class or function, where it stands, and what its docstring says."""
+    """A class or function, its location, and its docstring."""
 
     where: str
     node: Definition
@@ -37,7 +37,7 @@ def documented(path: Path, module: ast.Module) -> list[Documented]:
 
 
 def faults(thing: Documented) -> list[str]:
-    """What of a docstring has another form."""
+    """Parts of a docstring that do not follow the form."""
     lines, found = thing.text.split("\n"), []
     found += [f"column of names: {line}" for line in lines if COLUMN.match(line)]
     prose = RAISES.sub("", thing.text)
@@ -76,7 +76,7 @@ def test_other_forms_are_noticed(docstring):
 
 
 def messages(module: ast.AST) -> list[str]:
-    """What raised errors say, {} in the place of values."""
+    """Messages of raised errors, with {} in place of values."""
     found = []
     for node in ast.walk(module):
         if isinstance(node, ast.Raise) and isinstance(node.exc, ast.Call) and node.exc.args:
@@ -89,7 +89,8 @@ def messages(module: ast.AST) -> list[str]:
 
 
 def ill_formed(message: str) -> bool:
-    """What is wrong comes first, after a colon or semicolon what would be right: "name = value: must be ..."."""
+    """Return whether a message breaks the form: first the error, then, after a colon or semicolon, the correct value
+    ("name = value: must be ...")."""
     return "\n" in message or bool(re.search(r"^[^:;]*\bmust\b", message))
 
 
@@ -112,7 +113,8 @@ def exported(path: Path) -> set[str]:
 
 
 def test_no_two_names_of_different_packages_are_alike():
-    """Nor two classes of one package. Functions that are called by their module's name (`shapes.build`) may be."""
+    """Class names are unique within a package, too. Functions that are called by their module's name (`shapes.build`)
+    may share a name."""
     homes = defaultdict(list)
     for path in SOURCES:
         for name in exported(path):

@@ -1,4 +1,4 @@
-"""requirements.lock: every package that pyproject.toml asks for, in a version that it allows, with hashes."""
+"""requirements.lock: every package that pyproject.toml requires, in an allowed version, with hashes."""
 
 import re
 import tomllib
@@ -20,10 +20,10 @@ def asked():
 
 
 def pins(text):
-    """{package: version}.
+    """Pinned version of each package.
 
     Raises:
-        ValueError: a line is no pin, or has no hash.
+        ValueError: a line is not a pin, or has no hash.
     """
     found = {}
     lines = [line for line in text.split("\n") if not line.startswith("#")]
@@ -37,7 +37,7 @@ def pins(text):
 
 
 def unmet(requirements, locked):
-    """What the lock file lacks, or has in another version than is asked for."""
+    """Requirements that the lock file lacks, or pins in a version that they do not allow."""
     names = {requirement: canonicalize_name(requirement.name) for requirement in requirements}
     return [
         str(requirement)

@@ -1,7 +1,7 @@
-"""Every setting and every gene moves an output: an option that changes nothing is a lie.
+"""Every setting and every gene changes an output; an option without any effect would mislead users.
 
-The tables name each field of each config dataclass, and each gene, with a change to it and the output that must move.
-A field or gene that is missing here fails the test, so whoever adds one says what it does.
+The tables name each field of each config dataclass, and each gene, with a change to it and the output that must change.
+A field or gene that is missing here fails the test, so a new one needs an entry that shows its effect.
 """
 
 from collections import Counter
@@ -25,7 +25,7 @@ from evolve.genome.genotype import GENES, Genotype
 from evolve.genome.phenotype import develop
 from evolve.learning import fitness
 from evolve.learning.animal_task import animal_task
-from evolve.learning.worlds import LifeWorlds, worlds_of
+from evolve.learning.training_envs import TrainingEnvs, worlds_of
 from evolve.runs import carry_on
 from evolve.search.loop import evolve as carry
 from evolve.store.directory import Run
@@ -34,7 +34,7 @@ from sim.envs.prepared_task import PreparedTask
 from tests.closed_form import ClosedForm
 from tests.evolve.learning.bright_spot import BrightSpot
 
-# One training of two updates and one evaluation episode, through a perfect lens.
+# One training run of two updates and one evaluation episode, through a perfect lens.
 SMALL = (
     "learning.n_envs=4",
     "learning.n_steps=8",
@@ -47,7 +47,7 @@ SMALL = (
     "search.generations=2",
     "genome.placement_range_deg.start=60",
 )
-# Genes that square eyes have not.
+# Genes that square eyes do not have.
 OBLONG = (
     "eye.square=false",
     *(f"genome.resolution_{side}.{key}" for side in ("height", "width") for key in ("low=2", "start=4")),
@@ -63,11 +63,12 @@ def _device(short_episodes):
     backend.require()
 
 
-# --- outputs, each of a config and the animal that starts it
+# --- outputs, each a function of a config and the first animal
 
 
 class Pen(BrightSpot):
-    """A spot of light on a plane, seen without any rendering, where walking costs as contact does in our worlds."""
+    """A spot of light on a plane, observed without rendering. Moving incurs a cost through the term that contact has in
+    our worlds."""
 
     failures: ClassVar = Counter()
 
@@ -80,14 +81,14 @@ class Pen(BrightSpot):
 
 
 def pens(animal, config, *seeds):
-    """In the place of `worlds_of`."""
+    """A replacement for `worlds_of`."""
     episodes = config.evaluation.episodes
-    return LifeWorlds(*(Pen(n, memory=animal.memory_frames) for n in (config.learning.n_envs, episodes, episodes)))
+    return TrainingEnvs(*(Pen(n, memory=animal.memory_frames) for n in (config.learning.n_envs, episodes, episodes)))
 
 
 def life(config, animal):
-    """What becomes of a candidate: training, and the returns of its evaluation episodes. Learning is real, in worlds
-    that cost milliseconds."""
+    """Result of a candidate: its training, and the returns of its evaluation episodes. Learning is real, in worlds that
+    take milliseconds."""
     with TemporaryDirectory() as folder, mock.patch.object(fitness, "worlds_of", pens):
         outcome = fitness.evaluate(animal, config, 7, Path(folder) / "policy")
     assert outcome.failure is None
@@ -95,7 +96,7 @@ def life(config, animal):
 
 
 def views(config, animal):
-    """What the animal sees first in each of the worlds of its life, of which it has several."""
+    """First observation of the animal in each of its training, selection and test environments."""
     found = []
     for each in vars(worlds_of(animal, config, 7, 8)).values():
         with closing(each):
@@ -104,7 +105,7 @@ def views(config, animal):
 
 
 def rides(config, animal):
-    """Rewards and ends of learning episodes, of animals that go straight on at full speed, mostly to a wall."""
+    """Rewards and ends of training episodes. The animals go straight on at full speed, mostly into a wall."""
     lessons, *others = vars(worlds_of(animal, config, 7, 8)).values()
     with ExitStack() as stack:
         for each in (lessons, *others):
@@ -115,7 +116,7 @@ def rides(config, animal):
 
 
 def sight(config, animal):
-    """What the animal sees when it comes into its world."""
+    """First observation of the animal in its world."""
     eyes, memory = animal.eyes(config.eye), animal.memory_frames
     worlds = sim.make_vec_env(config.task, eyes, 1, 7, memory=memory, rays_per_receptor=4)
     try:
@@ -125,7 +126,7 @@ def sight(config, animal):
 
 
 def own_sight(config, animal):
-    """The same in a task of one's own."""
+    """First observation of the animal in a user task."""
     worlds = PreparedTask(animal_task(animal, config)).vec_env(1, 7, animal.memory_frames)
     try:
         return worlds.reset()["eyes"].tobytes()
@@ -139,12 +140,12 @@ def point_image(config, animal):
 
 
 def throughput(config, animal):
-    """Part of the light that a pupil lets in."""
+    """Fraction of the light that the pupil transmits."""
     return animal.eyes(config.eye).eye().throughput
 
 
 def history(config, animal):
-    """Candidates of the whole run, each with its training's seed; evaluated in closed form."""
+    """Candidates of the whole run with the seeds of their training, evaluated in closed form."""
     with TemporaryDirectory() as folder:
         run = Run.create(Path(folder) / "run", config)
         carry(run, ClosedForm(), mock.Mock())
@@ -152,7 +153,7 @@ def history(config, animal):
 
 
 def budget_stages(config, animal):
-    """After which budget stages candidates are evaluated, and how far each is trained."""
+    """Rungs after which candidates are evaluated, and the training steps of each."""
     with TemporaryDirectory() as folder:
         run = Run.create(Path(folder) / "run", config)
         carry(run, ClosedForm(), mock.Mock())
@@ -160,7 +161,7 @@ def budget_stages(config, animal):
 
 
 def hired(config, animal):
-    """Workers that a run starts."""
+    """Number of workers that a run starts."""
     with TemporaryDirectory() as folder, mock.patch.object(carry_on, "LocalExecutor") as executor:
         executor.side_effect = KeyboardInterrupt
         with pytest.raises(KeyboardInterrupt):
@@ -168,12 +169,12 @@ def hired(config, animal):
         return executor.call_args.args[1]
 
 
-# --- what moves what
+# --- changes and the outputs that they affect
 
 
 @dataclass(frozen=True)
 class Case:
-    """`change`, made to a small run of `task` with settings `given`, moves `output`."""
+    """A small run of `task` with settings `given`: applying `change` must change `output`."""
 
     change: str
     output: Callable
@@ -181,9 +182,10 @@ class Case:
     task: str = "detection"
 
 
-# Steps too small to move a weight: but for the receptors' adapting, evaluations play the same, and soon none improves.
+# The steps are too small to change a weight. Evaluations differ only by the adaptation of the receptors, and
+# improvement soon stops.
 STAGNANT = ("learning.learning_rate=1e-30", "learning.total_steps=256", "learning.eval_interval=32", *PERFECT)
-# Eyes whose receptors are as wide as a rhabdom or two.
+# Eyes whose receptors are one or two rhabdoms wide.
 FOCUSED = ("eye.receptor_pitch=4e-6",)
 GUIDED = ("eye.rhabdoms=true", *FOCUSED)
 NAVIGATING = ("genome.resolution_height.start=1", "eye.rays_per_receptor=1", *PERFECT)
@@ -279,7 +281,8 @@ def small(task, settings):
 
 @cache
 def _settled(output, task, given):
-    """The output before the change. Computed twice: one that moves by itself could not show anything."""
+    """The output before the change. It is computed twice, because an output that varies on its own could not show an
+    effect."""
     config = small(task, given)
     animal = develop(Genotype(config.genome).start, config)
     first = output(config, animal)
@@ -293,7 +296,7 @@ def _names(cls, prefix=""):
         if f.name == "genome":
             yield from (f"genome.GENE.{part.name}" for part in fields(GeneConfig))
         elif f.name in ("own", "code", "task_sha256"):
-            continue  # text of a task of one's own, and its hash: tests/evolve/config/test_task_choice.py
+            continue  # source of a user task and its hash: tests/evolve/config/test_task_choice.py
         elif f.name in SECTIONS:
             yield from _names(SECTIONS[f.name], f"{f.name}.")
         else:
@@ -320,7 +323,7 @@ def test_every_setting_moves_its_output(name):
 def test_every_gene_moves_its_output(name):
     output = GENE_OUTPUTS[name]
     spectral = ALL_GENES[name].cluster == "spectral"
-    task = "foraging" if spectral else OWN if output is own_sight else "detection"  # foraging alone is not grey
+    task = "foraging" if spectral else OWN if output is own_sight else "detection"  # only foraging has colours
     special = {SIDE: SQUARE, RHABDOM: GUIDED}
     given = FOUR_TYPES if spectral else special.get(name, () if output is point_image else PERFECT)
     before = _settled(output, task, given)
@@ -333,7 +336,7 @@ def test_every_gene_moves_its_output(name):
 
 
 def test_pupil_lets_light_in_by_its_area():
-    """A wider pupil not only sharpens or blurs: throughput goes with the square of the relative aperture."""
+    """A wider pupil changes more than the sharpness: throughput goes with the square of the relative aperture."""
     config = small("detection", ())
     animal = develop(Genotype(config.genome).start, config)
     assert np.isclose(throughput(config, animal), animal.relative_aperture**2)

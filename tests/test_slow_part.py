@@ -1,4 +1,4 @@
-"""Which tests are left out by default, and that `--all` leaves none out."""
+"""Selection of the tests that are skipped by default; `--all` skips none."""
 
 from itertools import product
 
@@ -32,7 +32,7 @@ def test_count(): print("examples:", len(examples))
 
 @pytest.fixture
 def profile():
-    """The inner run loads a profile of hypothesis; the outer one goes on with its own."""
+    """The inner run loads a hypothesis profile; the outer run continues with its own."""
     before = settings.get_current_profile_name()
     yield
     settings.load_profile(before)

@@ -1,4 +1,4 @@
-"""The tools that hold the style: ruff and mypy over the whole tree."""
+"""The tools that check the style: ruff and mypy over the whole tree."""
 
 import subprocess
 import sys

@@ -1,4 +1,5 @@
-"""`with-env`, its Python a stand-in that installs nothing: who is asked, where commands run, two at once."""
+"""`with-env`, tested with a stand-in for Python that installs nothing: its calls, its working directory, and two starts
+at once."""
 
 import os
 import shutil
@@ -8,7 +9,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
-# Notes how it is called. `-m venv` takes a moment and makes an environment of stand-ins like itself.
+# The stand-in records its calls. `-m venv` takes a moment and creates an environment of stand-ins.
 PYTHON = """#!/bin/bash
 echo "$(basename "$0") $*" >>"$CALLS"
 case "$*" in
@@ -24,7 +25,7 @@ echo "$(basename "$0") $*" >>"$CALLS"
 
 @pytest.fixture
 def checkout(tmp_path):
-    """A folder with `with-env`, and commands that only say that they were called."""
+    """A folder with `with-env`, and commands that only record their calls."""
     folder, tools = tmp_path / "checkout", tmp_path / "tools"
     folder.mkdir()
     tools.mkdir()
@@ -55,7 +56,7 @@ def calls(checkout):
 def test_the_command_runs_where_the_user_stands(checkout, tmp_path):
     stands = tmp_path / "elsewhere"
     stands.mkdir()
-    for _ in range(2):  # set up on the way, and set up already
+    for _ in range(2):  # the first call sets up, the second finds the environment
         made = subprocess.run(
             [checkout / "with-env", "sh", "-c", "pwd; echo $VIRTUAL_ENV"],
             cwd=stands,
@@ -71,7 +72,8 @@ def test_the_command_runs_where_the_user_stands(checkout, tmp_path):
 
 @pytest.mark.parametrize("asked", ["", "1"])
 def test_sudo_is_used_by_those_who_ask_for_it_alone(checkout, asked):
-    """Who has no LLVM and is not root: the package is unpacked beside the environment, unless they say otherwise."""
+    """A user without LLVM and without root rights gets the package unpacked next to the environment. sudo is used only
+    on request."""
     env = environment(checkout, NO_LLVM="1", WITH_ENV_SUDO=asked)
     subprocess.run([checkout / "with-env", "true"], env=env, capture_output=True, check=False)
     assert any(call.startswith("sudo ") for call in calls(checkout)) == (asked == "1")

@@ -1,13 +1,13 @@
-"""Behaviour: one hash for everything that a change of structure must leave alone
+"""Behaviour: one hash of all outputs that a refactoring must not change
 
-Two checkouts behave alike if their hashes are equal, on one machine with the same libraries. Hashes cover episodes of
-the built-in tasks in training and evaluation (1, 24 and 64 worlds, 300 steps), episodes of the user tasks in
-`examples/` (also as a PettingZoo environment), PSFs by every method, the records of seeded evolutions, the EXR files of
-their best agents, and the numbers of a report.
+Two checkouts behave identically if their hashes are equal, on one machine with the same libraries. Hashes cover
+episodes of the built-in tasks in training and evaluation (1, 24 and 64 worlds, 300 steps), episodes of the user tasks
+in `examples/` (also as a PettingZoo environment), PSFs by every method, the records of seeded evolutions, the EXR files
+of their best agents, and the numbers of a report.
 
     python -m validation.behaviour [--out FILE.json] [--against FILE.json]
 
-With --against it names what differs from the stored hashes and exits with 1.
+With --against it lists the differences from the stored hashes and exits with 1 if there are any.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ MODES = ("training", "evaluation")
 WORLDS, STEPS = (1, 24, 64), 300
 USER_TASKS = {"FindBall": "find_ball", "AntSeeks": "ant_seeks", "Prey": "front_or_side"}  # class: file in examples/
 USER_WORLDS, USER_STEPS = (1, 12), 100
-PSFS = 5  # of each method
+PSFS = 5  # for each method
 METHODS = (
     "hankel",
     "low_rank",
@@ -49,7 +49,7 @@ METHODS = (
     "pinhole",
     "auto",
 )
-SMALL = (  # evolution of a user task: a generation of two, with one rollout each
+SMALL = (  # evolution of a user task: one generation of two candidates, with one rollout each
     *("--preset", "quick", "--seed", "4", "--set", "workers=1", "--set", "learning.n_envs=32"),
     *("--set", "search.population=2", "--set", "search.generations=2", "--set", "evaluation.episodes=8"),
     *("--set", "learning.total_steps=2048", "--set", "learning.eval_interval=2048"),
@@ -68,7 +68,7 @@ def episodes(task: str, mode: str, worlds: int) -> str:
 
 
 def user_episodes(task: str, worlds: int) -> str:
-    """The same of a user task from `examples/`."""
+    """Hash of observations, rewards and infos of random actions in a user task from `examples/`."""
     return _played(sim.make_vec_env(_example(task)(), n_envs=worlds, seed=5, memory=2), USER_STEPS)
 
 
@@ -114,7 +114,7 @@ def _example(name: str, file: str | None = None) -> Any:
 
 
 def blurred_view() -> str:
-    """What agents see through a pupil with a relief, in dim light."""
+    """Hash of the agents' signals behind a pupil with a relief, in dim light."""
     relief = optics.BSplineRelief(np.linspace(0, 4e-6, 16).reshape(4, 4))
     pupil = optics.Pupil(40e-6, height=relief, n=1.6)
     budget = optics.PhotonBudget(illuminance=200.0, integration_time=0.02)
@@ -128,7 +128,7 @@ def blurred_view() -> str:
 
 
 def psfs(method: str) -> Iterator[tuple[str, str]]:
-    """PSFs of random pupils, or that the method refuses them."""
+    """Yield names and hashes of PSFs of random pupils, or of the refusal by the method."""
     rng = np.random.default_rng(7)
     for case in range(PSFS):
         radius = rng.uniform(10e-6, 60e-6)
@@ -178,7 +178,7 @@ def _frames(run: Path, task: str = "") -> Iterator[tuple[str, str]]:
 
 
 def _numbers(page: str) -> list[str]:
-    """Numbers that stand by themselves in what a reader sees: no part of a word, a path or a date."""
+    """Standalone numbers in the visible text of a page, without those in words, paths or dates."""
     visible = re.sub(r"<[^>]+>", " ", re.sub(r"<(script|style)\b.*?</\1>", "", page, flags=re.DOTALL))
     return [word for word in visible.split() if re.fullmatch(r"[-−]?\d[\d.,]*%?", word)]
 
@@ -192,7 +192,7 @@ def _hash(text: str) -> str:
 
 
 def behaviour() -> dict[str, str]:
-    """Name of an output -> its hash."""
+    """Return the hash of each output by name."""
     found = {f"episodes {t} {mode}, {n} worlds": episodes(t, mode, n) for t in TASKS for mode in MODES for n in WORLDS}
     found |= {f"episodes {task}, {n} worlds": user_episodes(task, n) for task in USER_TASKS for n in USER_WORLDS}
     found["episodes of an encounter"] = encounter()
@@ -209,7 +209,7 @@ def behaviour() -> dict[str, str]:
 def main() -> int:
     assert __doc__
     options = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    options.add_argument("--out", type=Path, help="file to write the hashes into")
+    options.add_argument("--out", type=Path, help="file to which the hashes are written")
     options.add_argument("--against", type=Path, help="file of hashes to compare with")
     asked = options.parse_args()
     found = behaviour()

@@ -1,11 +1,11 @@
-"""What a run's record and its animals say.
+"""Analysis of a run's record and of its animals.
 
-statistics      per generation; acuity, confidence
-genealogy       who came from whom
-mishaps         what ended episodes in the middle of a life
-vision          what the best eyes see
-recorder        an animal plays, and is recorded
-episode         Episode: one episode, recorded
-episode_scene   EpisodeScene: where bodies and eyes were during it
-episode_file    episodes stored and loaded
+statistics      statistics per generation, acuity, image quality, confidence intervals
+genealogy       lines of descent
+episode_failures  failures of a user task that ended training episodes
+vision          image quality and contrast of an animal's eyes
+recorder        recording of an episode that an animal plays
+episode         Episode: one recorded episode
+episode_scene   EpisodeScene: positions of bodies and eyes during an episode
+episode_file    storage of episodes in files
 """

@@ -1,4 +1,4 @@
-"""One episode of a trained candidate: what it saw and did, where everything was, and what a perfect eye had seen."""
+"""One episode of a trained candidate: its signals, actions and poses, and the signals behind a perfect lens."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ __all__ = ["Episode", "Pictures"]
 
 @dataclass(frozen=True)
 class Pictures:
-    """Pictures for people. times (picture,): times t at which they were taken · pixels (picture, y, x, 3) uint8 sRGB"""
+    """Images for display. times (picture,): time steps of the images · pixels (picture, y, x, 3): uint8 sRGB"""
 
     times: np.ndarray
     pixels: np.ndarray
@@ -28,25 +28,27 @@ class Pictures:
 
 @dataclass(frozen=True)
 class Episode:
-    """One evaluation episode. Time runs along the first axis: at time t the eyes saw, then the animal acted, and
-    `reward`, `reward_terms` and `beside` are what that action led to.
+    """One evaluation episode, with time along the first axis.
 
-    task, candidate_id, seed, phenotype, eye, world: which episode of whom, and where
-    commands: the meaning of an action's numbers · action (t, number) in [-1, 1]
-    reward (t,), reward_terms name -> (t,); 0 where the task has not named the term
+    Row t holds the signals at time t, the action that followed, and the results of this action (rewards and other
+    entries of the observation).
+
+    task, candidate_id, seed, phenotype, eye, world: identity of the episode, its animal and its world
+    commands: meaning of an action's numbers · action (t, number): in [-1, 1]
+    reward (t,), reward_terms name -> (t,): 0 in steps for which the task has not named the term
     counted: title of a count by reward term, see `sim.BatchTask`
     beside: other entries of the observation, name -> (t, number), such as "contact" or "feels"
     seconds: duration of one action · solved: whether the episode counts as solved
-    failure: why it broke off, if it did
+    failure: reason for which the episode broke off; None if it did not
     signals: receptor signals, noise included, (t, eye, channel, height, width)
     perfect_signals: the same receptors behind a perfect lens, without noise
-    wavelengths_nm: of the bands, (band,)
-    radiance_frames: times t at which radiance was kept, (frame,)
-    radiance: of the scene before each eye, on a finer grid, (frame, eye, band, y, x)
-    azimuths [rad], elevations_deg: where each eye looks in the frame of what it is on, (eye,)
-    scene: where everything was
-    position (t, 2) [m], heading (t,) [rad]: of the animal on the ground, before the action
-    plan: the world from above, if the task has a ground plan · pictures: if they were taken
+    wavelengths_nm: wavelengths of the bands, (band,)
+    radiance_frames: time steps at which radiance was recorded, (frame,)
+    radiance: radiance of the scene in front of each eye, on a finer grid, (frame, eye, band, y, x)
+    azimuths [rad], elevations_deg: viewing direction of each eye in the frame of its body, site or camera, (eye,)
+    scene: poses of bodies and eyes
+    position (t, 2) [m], heading (t,) [rad]: pose of the animal on the ground before the action
+    plan: the world from above, if the task has a ground plan · pictures: images for display, if recorded
     """
 
     task: str
@@ -78,31 +80,31 @@ class Episode:
     world: WorldConfig = field(default_factory=WorldConfig)
 
     def __len__(self) -> int:
-        """Actions taken."""
+        """Return the number of actions."""
         return len(self.action)
 
     @property
     def title(self) -> str:
-        """Of the task, for headings."""
+        """Title of the task, for headings."""
         card = card_of(self.task)
         return self.task if card is None else card.title
 
     @property
     def eyes(self) -> sim.Eyes:
-        """The eyes that saw it; where they are is in `azimuths` and `scene`."""
+        """The animal's eyes; `azimuths` and `scene` hold their poses."""
         return self.phenotype.eyes(self.eye)
 
     @property
     def gain(self) -> float:
-        """1/a²: by which the pupil's area dims the light."""
+        """Factor 1/a² that compensates the dimming by a pupil of relative aperture a."""
         return 1 / float(self.eyes.eye().white_signal)
 
     @property
     def objects(self) -> np.ndarray:
-        """Places of the ground plan's objects before each action [m], (t, object, 3)."""
+        """Positions of the ground plan's objects before each action [m], (t, object, 3)."""
         bodies = () if self.plan is None else self.plan.object_bodies
         return self.scene.positions[:, list(bodies)]
 
     def count(self, term: str) -> int:
-        """Number of actions in which a reward term was not 0."""
+        """Return the number of actions in which a reward term was not 0."""
         return int(np.count_nonzero(self.reward_terms[term])) if term in self.reward_terms else 0

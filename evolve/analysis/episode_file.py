@@ -1,4 +1,7 @@
-"""Episodes as files: npz archives, of this form and the former one. Nothing in a file is executed."""
+"""Storage of episodes in npz archives of the current and the former format.
+
+Loading a file never executes anything that it contains.
+"""
 
 from __future__ import annotations
 
@@ -32,13 +35,13 @@ from sim.worlds.world import build_world
 __all__ = ["load_episode", "save_episode"]
 
 FORM = 2
-MOST_BYTES = 2**31  # of an episode; those of 256 steps take some megabytes, with pictures a hundred
+MOST_BYTES = 2**31  # limit for an episode; one of 256 steps takes some megabytes, with images about a hundred
 PARTS = {"scene": EpisodeScene, "plan": GroundPlan, "pictures": Pictures}
 BY_NAME = {"term": "reward_terms", "beside": "beside"}  # prefix of arrays -> dictionary of an episode
 
 
 def save_episode(episode: Episode, path: Path | str) -> None:
-    """Write as npz, whole or not at all: an array per array, and the rest as JSON."""
+    """Write an episode as npz, completely or not at all: each array separately, and the rest as JSON."""
     arrays: dict[str, Any] = {name: value for name, value in vars(episode).items() if isinstance(value, np.ndarray)}
     for prefix, name in BY_NAME.items():
         arrays |= {f"{prefix}_{key}": array for key, array in getattr(episode, name).items()}
@@ -60,16 +63,16 @@ def save_episode(episode: Episode, path: Path | str) -> None:
             rest["parts"][name] = {key: value for key, value in values.items() if not isinstance(value, np.ndarray)}
     rest["solids"] = [_described(solid, number, arrays) for number, solid in enumerate(episode.scene.solids)]
     content = io.BytesIO()
-    # Without allow_pickle: NumPy 2.0 would take it for an array.
+    # `allow_pickle` is left out because NumPy 2.0 would store it as an array of that name.
     np.savez_compressed(content, **arrays, rest=np.array(json.dumps(rest)))
     write_whole(Path(path), content.getvalue())
 
 
 def load_episode(path: Path | str) -> Episode:
-    """Inverse of `save_episode`; of the former form, too.
+    """Load an episode that `save_episode` wrote, also in the former format.
 
     Raises:
-        ValueError: one line, naming the file, if it holds no episode.
+        ValueError: the file holds no episode; the message is one line that names the file.
     """
     try:
         arrays = _arrays(path)
@@ -98,7 +101,7 @@ def _of_second_form(rest: dict[str, Any], arrays: dict[str, Any]) -> Episode:
 
 
 def _of_first_form(rest: dict[str, Any], arrays: dict[str, Any]) -> Episode:
-    """Episodes of built-in tasks, whose world is built again."""
+    """Return an episode of a built-in task from the former format; its world is built again."""
     if "course" not in rest.setdefault("world", {}):
         rest["task"] = task_then(rest["task"])
     rest["world"] = _checked_world(rest["world"])
@@ -124,26 +127,29 @@ def _of_first_form(rest: dict[str, Any], arrays: dict[str, Any]) -> Episode:
         solved=_solved(terms["goal"] != 0, terms["adversary"] != 0, adversary_first),
         azimuths=task.azimuths(),
         elevations_deg=np.zeros(eyes.n_eyes),
-        scene=EpisodeScene.of(world.model, solids_of(world.model), poses, mounts_of_agent(eyes)),
+        scene=EpisodeScene.from_poses(world.model, solids_of(world.model), poses, mounts_of_agent(eyes)),
         plan=task.ground_plan(position[0]),
     )
 
 
 def _checked_world(stored: Mapping[str, Any]) -> WorldConfig:
-    """Settings of the world, within their ranges: a world of a billion mazes is never built."""
+    """Return the world's settings after a check of their ranges, so that no world of a billion mazes is built."""
     world = WorldConfig(**stored)
     check_values(world, prefix="world.")
     return world
 
 
 def _solved(goal: np.ndarray, adversary: np.ndarray, adversary_first: np.ndarray | None) -> bool:
-    """Whether what was reached first is a goal; None: it is not known which of two comes first within an action."""
+    """Return whether the first object reached was a goal.
+
+    adversary_first: whether an adversary was reached before the goal within an action; None if unknown
+    """
     first = goal if adversary_first is None else goal & ~adversary_first
     return bool(first[goal | adversary][:1].any())
 
 
 def _arrays(path: Path | str) -> dict[str, Any]:
-    """What an archive holds, unless it is no file, or would unpack to more than an episode ever takes."""
+    """Return an archive's arrays, unless it is not a regular file or would unpack to more than `MOST_BYTES`."""
     with regular_files.opened(Path(path)) as content:
         with zipfile.ZipFile(content) as archive:
             size = sum(member.file_size for member in archive.infolist())
@@ -155,17 +161,17 @@ def _arrays(path: Path | str) -> dict[str, Any]:
 
 
 def _taken(arrays: dict[str, Any], prefix: str) -> dict[str, Any]:
-    """Arrays whose names begin so, without that beginning; they are taken out."""
+    """Remove and return the arrays whose names start with `prefix`, under their names without it."""
     return {name.removeprefix(prefix): arrays.pop(name) for name in list(arrays) if name.startswith(prefix)}
 
 
 def _tuples(value: Any) -> Any:
-    """JSON's lists as tuples."""
+    """Return a JSON list as a tuple, and any other value as it is."""
     return tuple(value) if isinstance(value, list) else value
 
 
 def _described(solid: Solid, number: int, arrays: dict[str, Any]) -> dict[str, Any]:
-    """A solid as JSON; a mesh's arrays are added to `arrays`."""
+    """Return a solid as JSON values; the arrays of its mesh are added to `arrays`."""
     if solid.triangles is not None:
         mesh = {name: array for name, array in vars(solid.triangles).items() if array is not None}
         arrays |= {f"solid{number}.{name}": array for name, array in mesh.items()}

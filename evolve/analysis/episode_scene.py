@@ -1,4 +1,4 @@
-"""Where bodies and eyes were during an episode."""
+"""Poses of bodies and eyes during an episode."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ __all__ = ["EpisodeScene"]
 
 @dataclass(frozen=True)
 class EpisodeScene:
-    """Lengths [m] and rotations in the world, before each action.
+    """Positions [m] and rotations in world coordinates before each action.
 
-    solids: all geoms that are seen, in the frames of their bodies, as they were at the episode's beginning
-    bodies: names, or "body_<id>" of those that have none
-    positions (t, body, 3), rotations (t, body, 3, 3)
-    eye_positions (t, eye, 3): pupils · eye_rotations (t, eye, 3, 3), columns (right, up, ahead)
-    path (t, 3): of the animal, where the first eye's body, site or camera is
-    headings (t,): of the same, from the world's x axis [rad]
+    solids: all visible geoms in the frames of their bodies, with their appearance at the start of the episode
+    bodies: names of the bodies; "body_<id>" for a body without a name
+    positions (t, body, 3), rotations (t, body, 3, 3): poses of the bodies
+    eye_positions (t, eye, 3): pupils · eye_rotations (t, eye, 3, 3): columns (right, up, ahead)
+    path (t, 3): position of the animal, defined by the body, site or camera that carries the first eye
+    headings (t,): heading of the animal from the world's x axis [rad]
     """
 
     solids: tuple[Solid, ...]
@@ -37,10 +37,13 @@ class EpisodeScene:
     headings: np.ndarray
 
     @classmethod
-    def of(
+    def from_poses(
         cls, model: mujoco.MjModel, solids: tuple[Solid, ...], poses: Poses, mounts: Sequence[Mount]
     ) -> EpisodeScene:
-        """poses: of every time, in the place of worlds"""
+        """Return the scene of an episode.
+
+        poses: poses at all times, with time on the axis of worlds
+        """
         places, frames = zip(*(_eye(model, mount, poses) for mount in mounts), strict=True)
         kind, index = mounts[0].found_in(model)
         path, turned = poses.frames(kind, index)
@@ -58,7 +61,7 @@ class EpisodeScene:
 
 
 def _eye(model: mujoco.MjModel, mount: Mount, poses: Poses) -> tuple[np.ndarray, np.ndarray]:
-    """Pupil (t, 3) and frame (t, 3, 3) of an eye."""
+    """Return the position of the pupil (t, 3) and the frame (t, 3, 3) of an eye."""
     kind, index = mount.found_in(model)
     origin, turned = poses.frames(kind, index)
     place, frame = mount.local(kind)

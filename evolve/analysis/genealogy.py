@@ -1,4 +1,4 @@
-"""Who came from whom: the record names each candidate's parents; a line of descent follows the nearest of them."""
+"""Lines of descent: the record names each candidate's parents, and a line follows the nearest of them."""
 
 from __future__ import annotations
 
@@ -12,9 +12,10 @@ __all__ = ["descent", "nearest_parent"]
 
 
 def nearest_parent(candidate: Candidate, known: Mapping[int, Candidate]) -> Candidate | None:
-    """Of its parents on record, the one whose genome is nearest (Euclid, the earliest of several); None without any.
+    """Return the parent on record whose genome has the least Euclidean distance, or None if no parent is on record.
 
-    CMA-ES makes a generation from the mean of the better half of the last, so there each candidate has many.
+    Several parents at the same distance: the earliest. CMA-ES samples a generation around the mean of the better half
+    of the previous one, so its candidates have many parents.
     """
     parents = [known[candidate_id] for candidate_id in sorted(candidate.parents) if candidate_id in known]
     distances = [float(np.linalg.norm(candidate.vector - parent.vector)) for parent in parents]
@@ -22,7 +23,7 @@ def nearest_parent(candidate: Candidate, known: Mapping[int, Candidate]) -> Cand
 
 
 def descent(candidate: Candidate, candidates: Sequence[Candidate]) -> list[Candidate]:
-    """From the first of its line to the candidate itself."""
+    """Return a candidate's line of descent, from its first ancestor to the candidate itself."""
     known = {other.id: other for other in candidates}
     line = [candidate]
     while (parent := nearest_parent(line[-1], known)) is not None and parent not in line:

@@ -1,4 +1,4 @@
-"""Episodes recorded: a candidate plays, and the same scenes are seen through a perfect lens."""
+"""Recording of episodes: a candidate plays, and the same scenes are rendered behind a perfect lens as well."""
 
 from __future__ import annotations
 
@@ -27,32 +27,34 @@ from sim.worlds.ground_plan import GroundPlan
 
 __all__ = ["FINE_PIXELS", "Recorder", "record"]
 
-FINE_PIXELS = 60  # least pixels along the longer side of the radiance pictures
-FINE = {"rays": 16, "areas": 4, "edges": 16}  # samples per receptor and pixel, where speed does not matter
-MOST_PICTURES = 128  # for people: they are kept at even times
-ELSEWHERE = ("eyes", "previous_action")  # entries of an observation that an episode has under other names
+FINE_PIXELS = 60  # minimum number of pixels along the longer side of the radiance images
+FINE = {"rays": 16, "areas": 4, "edges": 16}  # samples per receptor and pixel; speed does not matter here
+MOST_PICTURES = 128  # maximum number of images for display, at equal intervals of time
+ELSEWHERE = ("eyes", "previous_action")  # entries of an observation that an episode stores under other names
 
 
 class UnfitPolicy(ValueError):
-    """The policy is that of an animal with other eyes."""
+    """The policy belongs to an animal with other eyes."""
 
 
 def record(
     run: Run, candidate_id: int | None = None, seed: int = 0, radiance_every: int = 8, pictures: bool = False
 ) -> Episode:
-    """Let a candidate (default: the best) play one evaluation episode; same arguments, same episode, bit for bit.
+    """Record one evaluation episode of a candidate (default: the best).
 
-    radiance_every: actions between two pictures of the scene's radiance
-    pictures: whether to take pictures for people; they are always taken if the task has no ground plan
+    The same arguments give the same episode, bit for bit.
+
+    radiance_every: actions between two images of the scene's radiance
+    pictures: whether to render images for display; a task without a ground plan always gets them
 
     Raises:
-        RunError: there is no such candidate, or its policy is missing or no policy.
-        ConfigError: the task is a user's, and has not been named.
+        RunError: the candidate does not exist, or its policy is missing or damaged.
+        ConfigError: the task is a user task, and its code has not been named.
     """
     candidate = run.candidate(candidate_id)
     path = run.policy_path(candidate.id)
     require_policy(candidate, path)
-    _ = run.config.choice.named_code  # before the policy is read
+    _ = run.config.choice.named_code  # a task that has not been named is reported before the policy is read
     try:
         policy = load_policy(path)
     except ValueError as error:
@@ -68,7 +70,11 @@ def record(
 
 @dataclass(frozen=True)
 class Recorder:
-    """phenotype, config, policy: who plays · radiance_every, pictures: see `record`"""
+    """Plays and records episodes.
+
+    phenotype, config, policy: the animal, its run's configuration and its policy
+    radiance_every, pictures: see `record`
+    """
 
     phenotype: Phenotype
     config: RunConfig
@@ -77,22 +83,22 @@ class Recorder:
     pictures: bool = False
 
     def play(self, candidate_id: int, seed: int) -> Episode:
-        """One episode; same arguments, same episode.
+        """Play and return one episode; the same arguments give the same episode.
 
         Raises:
-            UnfitPolicy: the policy takes what other eyes see.
-            TrainingDiverged: its actions are not finite.
+            UnfitPolicy: the policy was trained with other eyes.
+            TrainingDiverged: the policy's actions are not finite.
         """
         animal, config = self.phenotype, self.config
         prepared = PreparedTask(animal_task(animal, config))
         task, mounts = prepared.task, prepared.task.agents()[0].kinds[0].mounts
         with contextlib.closing(prepared.vec_env(1, seed, animal.memory_frames, render_mode="rgb_array")) as worlds:
             _require_fit(self.policy, worlds)
-            begun = _Beginning.of(worlds)
+            begun = _Beginning.from_env(worlds)
             taken = self.pictures or begun.plan is None
             poses, columns = _play(self.policy, worlds, begun, taken)
             views = self._perfect_views(prepared, worlds.simulation, poses, begun.light)
-            scene = EpisodeScene.of(worlds.worlds.model, begun.solids, Poses.joined(*poses), mounts)
+            scene = EpisodeScene.from_poses(worlds.worlds.model, begun.solids, Poses.joined(*poses), mounts)
             seconds = float(worlds.worlds.seconds)
         return Episode(
             task=config.task,
@@ -115,8 +121,8 @@ class Recorder:
     def _perfect_views(
         self, prepared: PreparedTask, simulation: Simulation, poses: list[Poses], light: np.ndarray
     ) -> dict[str, Any]:
-        """The same scenes in the same light through a perfect lens: by the same receptors, and as radiance on a finer
-        grid."""
+        """Return the same scenes in the same light behind a perfect lens, as signals of the same receptors and as
+        radiance on a finer grid."""
         perfect = replace(self.phenotype.eyes(self.config.eye), optics=None, waveguide=None)
         height, width = perfect.resolution
         factor = max(1, -(-FINE_PIXELS // max(height, width)))
@@ -138,9 +144,9 @@ class Recorder:
 
 @dataclass(frozen=True)
 class _Beginning:
-    """What must be read before an episode ends, since the next one begins at once.
+    """State at the start of an episode, read before it ends because the next episode starts immediately.
 
-    observation, info: the first ones · light: factors of the lights, (1, band) float32
+    observation, info: values at the first step · light: factors of the lights, (1, band) float32
     """
 
     observation: dict[str, np.ndarray]
@@ -150,7 +156,7 @@ class _Beginning:
     plan: GroundPlan | None
 
     @classmethod
-    def of(cls, worlds: EyesVecEnv) -> _Beginning:
+    def from_env(cls, worlds: EyesVecEnv) -> _Beginning:
         observation, info = worlds.reset(), worlds.reset_infos[0]
         wavelengths = np.asarray(worlds.renderer.eye.spectral_bands.wavelengths)
         light = worlds.simulation.light(wavelengths)
@@ -162,7 +168,7 @@ class _Beginning:
 
 
 def _model(physics: Any) -> mujoco.MjModel:
-    """Of the only world as it is in this episode."""
+    """Return the model of the only world, as varied for this episode."""
     model: mujoco.MjModel = physics.datas[0].model if hasattr(physics, "datas") else physics.model
     return model
 
@@ -170,13 +176,13 @@ def _model(physics: Any) -> mujoco.MjModel:
 def _require_fit(policy: EyePolicy, worlds: EyesVecEnv) -> None:
     own, here = (space["eyes"].shape for space in (policy.observation_space, worlds.observation_space))
     if own != here:
-        raise UnfitPolicy(f"it sees {own}, this one {here} (memory, eye, channel, y, x)")
+        raise UnfitPolicy(f"its eyes have the shape {own}, those of this animal {here} (memory, eye, channel, y, x)")
 
 
 def _play(
     policy: EyePolicy, worlds: EyesVecEnv, begun: _Beginning, pictures: bool
 ) -> tuple[list[Poses], dict[str, Any]]:
-    """Where everything was before each action, and the columns that playing fills."""
+    """Return the poses before each action, and the episode's arrays that playing fills."""
     poses, rows, taken = list[Poses](), list[tuple[Any, ...]](), list[np.ndarray]()
     observation, infos, done, solved = begun.observation, [begun.info], False, None
     every = max(1, -(-worlds.simulation.episode_steps // MOST_PICTURES))
@@ -208,8 +214,10 @@ def _play(
 
 
 def _on_ground(infos: list[Mapping[str, Any]]) -> dict[str, np.ndarray]:
-    """Places [m] and headings [rad] before each action, where a task's `info` has them: exact, unlike those that follow
-    from rotations."""
+    """Return positions [m] and headings [rad] before each action if the task's `info` holds them.
+
+    These are exact; values derived from rotations are not.
+    """
     if not all(np.shape(info.get("position", ())) == (2,) and "heading" in info for info in infos):
         return {}
     return {name: np.array([info[name] for info in infos]) for name in ("position", "heading")}

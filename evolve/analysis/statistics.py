@@ -1,6 +1,6 @@
-"""What a run's candidates say: statistics per generation, gene trajectories, acuity, image quality, confidence.
+"""Statistics per generation, gene trajectories, acuity, image quality and confidence intervals.
 
-Pure functions of candidates and phenotypes; the report and the comparisons draw what they return.
+All are pure functions of candidates and phenotypes; the report and the comparisons draw their results.
 """
 
 from __future__ import annotations
@@ -45,9 +45,9 @@ PERCENTILE_RESAMPLES = 2000
 
 @dataclass(frozen=True)
 class GenerationStatistics:
-    """Fitness of one generation; NaN where every candidate failed.
+    """Fitness of one generation; NaN if every candidate failed.
 
-    low, high: the population's 10 % and 90 % quantiles (linear interpolation)
+    low, high: the 10 % and 90 % quantiles of the population (linear interpolation)
     best_so_far: best fitness up to and including this generation
     """
 
@@ -65,7 +65,7 @@ class GenerationStatistics:
 class Trajectory:
     """One quantity of the phenotypes over the generations; all arrays (generation,).
 
-    best: its value in the best candidate found so far; NaN before there is one
+    best: value of the quantity in the best candidate so far; NaN before a candidate has succeeded
     """
 
     generations: NDArray[np.int64]
@@ -76,18 +76,18 @@ class Trajectory:
 
 
 def succeeded(candidate: Candidate) -> bool:
-    """Whether the candidate was trained and evaluated to the end."""
+    """Return whether the candidate's training and evaluation were completed."""
     return candidate.failure is None and math.isfinite(candidate.fitness)
 
 
 def by_generation(candidates: Sequence[Candidate]) -> list[tuple[int, list[Candidate]]]:
-    """Candidates of each generation, generations and indices ascending."""
+    """Return the candidates of each generation, sorted by generation and index."""
     ordered = sorted(candidates, key=lambda c: (c.generation, c.index))
     return [(generation, list(members)) for generation, members in groupby(ordered, lambda c: c.generation)]
 
 
 def champions(candidates: Sequence[Candidate]) -> list[tuple[int, Candidate]]:
-    """(generation, best candidate up to its end), from the first generation in which one succeeded."""
+    """Return (generation, best candidate so far), from the first generation in which a candidate succeeded."""
     found: list[tuple[int, Candidate]] = []
     best: Candidate | None = None
     for generation, members in by_generation(candidates):
@@ -100,7 +100,7 @@ def champions(candidates: Sequence[Candidate]) -> list[tuple[int, Candidate]]:
 
 
 def generation_statistics(candidates: Sequence[Candidate]) -> list[GenerationStatistics]:
-    """Fitness statistics of every generation that has candidates; failed ones count as failed, not as fitness."""
+    """Return fitness statistics of every generation with candidates; failed candidates are counted separately."""
     rows: list[GenerationStatistics] = []
     best_so_far = math.nan
     for generation, members in by_generation(candidates):
@@ -114,7 +114,7 @@ def generation_statistics(candidates: Sequence[Candidate]) -> list[GenerationSta
 
 
 def trajectory(candidates: Sequence[Candidate], value: Callable[[Phenotype], float]) -> Trajectory:
-    """`value` of every phenotype over the generations: spread of all that were tried, and of the best so far."""
+    """Return `value` of the phenotypes over the generations: its spread in each population, and the best so far."""
     groups = by_generation(candidates)
     spread = np.array([_quantiles(np.array([value(c.phenotype) for c in members])) for _, members in groups])
     best: list[float] = []
@@ -129,7 +129,7 @@ def trajectory(candidates: Sequence[Candidate], value: Callable[[Phenotype], flo
 
 
 def _quantiles(values: Floats) -> tuple[float, float, float]:
-    """Low, median, high of what there is; NaN for no values."""
+    """Return the low quantile, median and high quantile of the finite values; NaN if there are none."""
     values = values[np.isfinite(values)]
     if not values.size:
         return math.nan, math.nan, math.nan
@@ -138,9 +138,12 @@ def _quantiles(values: Floats) -> tuple[float, float, float]:
 
 
 def gene_values(phenotype: Phenotype, eye: EyeConfig | None = None) -> dict[str, float]:
-    """Value of every gene that shows in the phenotype, under the genes' names; optical ones only with optics on,
-    spectral ones where receptors are inherited: NaN for the peaks of types that the animal has not. With `eye`, of the
-    genes alone that a run with such eyes has: of a symmetric relief an eighth, of a square eye one side."""
+    """Return the values of all genes that the phenotype expresses, by gene name.
+
+    Optical genes are present only with optics on, and spectral genes only if receptors are inherited; the peaks of
+    receptor types that the animal lacks are NaN. If `eye` is given, only genes of a run with such eyes are returned:
+    an eighth of a symmetric relief, and one side of a square eye.
+    """
     height, width = phenotype.resolution
     values = {
         "n_eyes": float(phenotype.n_eyes),
@@ -175,10 +178,10 @@ def gene_values(phenotype: Phenotype, eye: EyeConfig | None = None) -> dict[str,
 
 
 def acuity_cpd(phenotype: Phenotype) -> float:
-    """Finest grating the animal's sampling allows [cycles/degree]: 1 / (2 min(range/(n_eyes - 1), fov/width)).
+    """Return the frequency of the finest grating that the animal's sampling resolves [cycles/degree].
 
-    Tiwary, Young et al. (2025). Only the second term where there is one eye, or where all eyes look the same way:
-    no angle lies between them.
+    1 / (2 min(range/(n_eyes - 1), fov/width)), after Tiwary, Young et al. (2025). With a single eye, or if all eyes
+    look in the same direction, only the second term counts, because no angle separates the eyes.
     """
     between_receptors = phenotype.fov_deg / phenotype.resolution[1]
     if phenotype.n_eyes == 1 or phenotype.placement_range_deg == 0:
@@ -188,13 +191,16 @@ def acuity_cpd(phenotype: Phenotype) -> float:
 
 
 def polychromatic(eye: optics.Eye, psf: optics.PSFResult) -> optics.PSFResult:
-    """The PSF of white daylight, (1, y, x): bands weighted as the mean of the receptor channels weighs them."""
+    """Return the PSF of white daylight, (1, y, x), with bands weighted by the mean of the receptor channels."""
     return psf.mean(_of_daylight(eye))
 
 
 def white_strehl(eye: optics.Eye, psf: optics.PSFResult) -> float:
-    """Strehl ratio in white daylight: the PSF's peak, over that of an aperture as wide without aberration at any
-    wavelength. (That at the mean wavelength is lower: peaks go with 1/λ².) NaN where the window holds no peak."""
+    """Return the Strehl ratio in white daylight; NaN if the window does not contain the peak.
+
+    The ratio compares the PSF's peak with that of an aperture of the same width that has no aberration at any
+    wavelength. The ratio at the mean wavelength is lower, because peaks are proportional to 1/λ².
+    """
     import optics
 
     try:
@@ -204,7 +210,7 @@ def white_strehl(eye: optics.Eye, psf: optics.PSFResult) -> float:
 
 
 def _of_daylight(eye: optics.Eye) -> NDArray[np.float64]:
-    """What each band is of white daylight, to the mean of the receptor channels; they sum to 1."""
+    """Return the shares of the bands in the receptor channels' mean response to white daylight; they sum to 1."""
     from optics.spectra.bands import daylight
 
     weights = eye.spectral_bands.weights.mean(axis=0) * daylight(eye.spectral_bands.wavelengths)
@@ -213,9 +219,9 @@ def _of_daylight(eye: optics.Eye) -> NDArray[np.float64]:
 
 
 def eye_image_quality(phenotype: Phenotype, config: EyeConfig) -> float:
-    """`optics.image_quality` of the phenotype's eye in white daylight, up to its receptors' Nyquist frequency: [0, 1].
+    """Return `optics.image_quality` of the phenotype's eye in white daylight, in [0, 1].
 
-    A perfect lens has contrast 1 at all of them.
+    Frequencies extend to the Nyquist frequency of the receptors. A perfect lens has contrast 1 at all of them.
 
     Raises:
         optics.AccuracyError: the PSF cannot be computed.
@@ -237,15 +243,16 @@ def bootstrap_interval(
     level: float = 0.95,
     seed: int = 0,
 ) -> tuple[float, float]:
-    """Percentile bootstrap interval of a statistic (Efron & Tibshirani 1993, ch. 13); same seed, same interval.
+    """Return the percentile bootstrap interval of a statistic (Efron & Tibshirani 1993, ch. 13).
+
+    The same seed gives the same interval. The interval is too narrow for few samples: for six samples of a normal
+    distribution, the 95 % interval of the mean covers it in about 88 % of cases. A single sample contains no
+    information about the spread, and the result is (NaN, NaN).
 
     statistic: called as statistic(resamples, axis=1)
 
-    Narrow for few samples: of six normal ones, the 95 % interval of the mean covers it in about 88 %. A single one says
-    nothing about its spread: (NaN, NaN).
-
     Raises:
-        ValueError: without samples, with one that is not finite, or for a level outside (0, 1).
+        ValueError: samples are missing or not finite, or the level is outside (0, 1).
     """
     values = np.asarray(samples, dtype=np.float64)
     if values.ndim != 1 or not values.size or not np.isfinite(values).all():
@@ -260,12 +267,12 @@ def bootstrap_interval(
 
 
 def psnr(signals: NDArray[np.floating], reference: NDArray[np.floating], gain: float = 1.0) -> float:
-    """Peak signal-to-noise ratio of `gain` x signals against a reference [dB]; the peak is 1, white in daylight.
+    """Return the peak signal-to-noise ratio of `gain` x signals relative to a reference [dB].
 
-    Infinite where they agree.
+    The peak is 1, the signal of white in daylight. The ratio of equal images is infinite.
 
     Raises:
-        ValueError: different shapes.
+        ValueError: the shapes differ.
     """
     if signals.shape != reference.shape:
         raise ValueError(f"signals has shape {signals.shape}: must be that of the reference, {reference.shape}")

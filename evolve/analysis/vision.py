@@ -1,4 +1,4 @@
-"""What the best eyes see, over the generations: image quality, contrast, and their view beside a perfect lens's."""
+"""Image quality and contrast of an animal's eyes, and comparison of their images with a perfect lens's images."""
 
 from __future__ import annotations
 
@@ -20,20 +20,20 @@ from sim.tasks.simulation import Simulation
 
 __all__ = ["Vision", "ssim", "vision"]
 
-SCENES = 16  # starts of episodes that all eyes look at
+SCENES = 16  # starts of episodes, the same for all eyes
 RAYS = 16  # per receptor
-WINDOW = 7  # receptors, of the structural similarity
+WINDOW = 7  # width of the structural similarity's window, in receptors
 Floats = NDArray[np.floating]
 
 
 @dataclass(frozen=True)
 class Vision:
-    """One eye, by four measures; NaN where one has no meaning.
+    """Four measures of an eye; NaN for a measure that is undefined.
 
     image_quality: area of the MTF above the noise, times throughput, in [0, 1]: `optics.image_quality`
     contrast: MTF in white daylight at half the receptors' Nyquist frequency
-    psnr_db: of the view, brought to the brightness of a perfect lens's, against that view
-    ssim: structural similarity of the same, in [-1, 1]; NaN for retinas narrower than three receptors
+    psnr_db: peak signal-to-noise ratio of the image, scaled to the brightness of a perfect lens's image, to that image
+    ssim: structural similarity of the same images, in [-1, 1]; NaN for retinas narrower than three receptors
     """
 
     image_quality: float
@@ -43,7 +43,7 @@ class Vision:
 
 
 def vision(animal: Phenotype, config: RunConfig) -> Vision:
-    """How well an animal's eyes see the run's task; NaN throughout where their optics cannot be computed."""
+    """Return the measures of an animal's eyes in the run's task; all NaN if their optics cannot be computed."""
     eyes = animal.eyes(config.eye)
     try:
         quality, contrast = eye_image_quality(animal, config.eye), _contrast(eyes.eye())
@@ -55,8 +55,10 @@ def vision(animal: Phenotype, config: RunConfig) -> Vision:
 
 
 def seen_and_perfect(animal: Phenotype, config: RunConfig) -> tuple[Floats, Floats]:
-    """Signals without noise of an animal's eyes, and of the same behind a perfect lens, (scene, eye, channel, height,
-    width); the scenes are the same for all eyes of a task."""
+    """Return the signals of an animal's eyes without noise, with its own optics and behind a perfect lens.
+
+    Both are (scene, eye, channel, height, width). The scenes are the same for all eyes of a task.
+    """
     eyes, task = animal.eyes(config.eye), animal_task(animal, config)
     if (light := task.compared_light) is None:
         fidelity = replace(PreparedTask(task).fidelity, rays_per_receptor=RAYS)
@@ -71,9 +73,10 @@ def seen_and_perfect(animal: Phenotype, config: RunConfig) -> tuple[Floats, Floa
 
 
 def ssim(signals: Floats, reference: Floats) -> float:
-    """Mean structural similarity (Wang et al. 2004, by scikit-image) of pictures (…, height, width) of range 1.
+    """Return the mean structural similarity (Wang et al. 2004, by scikit-image) of images (…, height, width).
 
-    The window is 7 receptors wide, or as wide as the retina; NaN where that is less than 3.
+    Values range from 0 to 1.
+    The window is 7 receptors wide, or the width of a narrower retina. The result is NaN below 3 receptors.
     """
     from skimage.metrics import structural_similarity
 
@@ -86,7 +89,7 @@ def ssim(signals: Floats, reference: Floats) -> float:
 
 
 def _contrast(eye: optics.Eye) -> float:
-    """MTF at half the Nyquist frequency; 1 behind a perfect lens."""
+    """Return the MTF at half the Nyquist frequency; 1 behind a perfect lens."""
     if eye.pupil is None:
         return 1.0
     white = polychromatic(eye, eye.psf())

@@ -1,12 +1,12 @@
 """The command `evolve`.
 
-main         exit codes
-arguments    arguments of all commands, and suggestions for what was mistyped
-commands     what each command does
-notes        warnings, each said once
-waiting      a bar for every other wait
-run_plan     what a run is going to do
-pace         how fast this machine is
+main         entry point, and exit codes
+arguments    arguments of all commands, and suggestions for mistyped ones
+commands     implementations of the commands
+notes        warnings, each shown once
+waiting      progress bar for waits other than a run
+run_plan     predicted steps, hours and disk space of a run
+pace         measured speed of this machine
 tensorboard  fitness, learning and genes for TensorBoard
-doctor       does it work here?
+doctor       check of the installation
 """

@@ -1,4 +1,4 @@
-"""The arguments of every command, their help with examples, and suggestions for what was mistyped."""
+"""Arguments of every command, their help with examples, and suggestions for mistyped arguments."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ __all__ = ["SHELLS", "build_parser", "parse"]
 SHELLS = ("bash", "zsh", "tcsh")
 FIRST = """\
 begin here:
-  evolve doctor                              does it work here?
+  evolve doctor                              check the installation
   evolve demo --open                         a finished run, to look at
   evolve run detection --preset quick        evolve eyes, a few minutes
   evolve list                                the runs under runs/
@@ -25,10 +25,10 @@ every command has examples: evolve run --help
 EXAMPLES = {
     "run": """\
   evolve run detection --preset quick                       a few minutes
-  evolve run navigation --dry-run                           genes, hours and disk; nothing is begun
+  evolve run navigation --dry-run                           print genes, hours and disk space; start nothing
   evolve run detection --set search.generations=10 --out runs/first
   evolve run foraging --from runs/first:12                  from an animal of another run
-  evolve run ant_seeks.py:AntSeeks --preset quick           a task of your own
+  evolve run ant_seeks.py:AntSeeks --preset quick           a user task
 """,
     "demo": "  evolve demo --open\n  evolve demo --out elsewhere\n",
     "resume": "  evolve resume runs/first --open\n",
@@ -47,7 +47,7 @@ Commands: TypeAlias = "argparse._SubParsersAction[Parser]"
 
 
 class Parser(argparse.ArgumentParser):
-    """argparse, with errors of one line that suggest what was meant."""
+    """Argument parser whose errors are one line with a suggestion for the mistyped word."""
 
     def error(self, message: str) -> NoReturn:
         said = re.sub(r" \(choose from (.*)\)", "", message)
@@ -58,10 +58,10 @@ class Parser(argparse.ArgumentParser):
 
 
 def parse(arguments: Sequence[str]) -> argparse.Namespace:
-    """What was asked for.
+    """Return the parsed arguments.
 
     Raises:
-        SystemExit: help or the version was, with code 0; or something that there is not, with code 2 after one line.
+        SystemExit: help or the version was requested (code 0), or an argument is unknown (code 2, after one line).
     """
     parser = build_parser()
     if not arguments:
@@ -87,7 +87,7 @@ def _nearest(word: str, known: Sequence[str]) -> str:
 
 
 def build_parser() -> Parser:
-    """All commands."""
+    """Return the parser of all commands."""
     parser = Parser(
         prog="evolve",
         description="Evolve eyes that see through wave optics.",
@@ -110,7 +110,7 @@ def _version() -> str:
 
 
 def _add_runs(commands: Commands) -> None:
-    """Commands that carry a run on."""
+    """Add the commands that start or continue a run."""
     run = _command(commands, "run", "run.start", "start a run: evolve eyes and brains for a task")
     _add_settings(run)
     run.add_argument("--seed", type=int, help="same as --set seed=N")
@@ -154,12 +154,12 @@ def _add_runs(commands: Commands) -> None:
 
 
 def _add_settings(command: argparse.ArgumentParser) -> None:
-    """What a configuration is put together from."""
+    """Add the arguments from which a configuration is assembled."""
     command.add_argument(
         "task",
         metavar="TASK",
         nargs="?",
-        help="task to evolve for, or FILE.py:CLASS, one of your own; not needed if the preset sets one (list: evolve "
+        help="task to evolve for, or FILE.py:CLASS of a user task; not needed if the preset sets one (list: evolve "
         "tasks)",
     )
     command.add_argument(
@@ -176,7 +176,7 @@ def _add_settings(command: argparse.ArgumentParser) -> None:
 
 
 def _add_watching(commands: Commands) -> None:
-    """Commands that read records."""
+    """Add the commands that read records."""
     status = _command(commands, "status", "status.status", "show the state of a run", directory=True)
     status.add_argument("--json", action="store_true", help="print JSON")
     status.add_argument("--watch", action="store_true", help="print again at every change until the run ends")
@@ -189,19 +189,19 @@ def _add_watching(commands: Commands) -> None:
     compare.add_argument("directories", type=Path, nargs="+", metavar="DIR", help="run directories")
     compare.add_argument("--json", action="store_true", help="print JSON")
     compare.add_argument("--html", type=Path, metavar="FILE", help="also write an HTML page with their fitness curves")
-    drift = _command(commands, "drift", "drift.drift", "say which genes moved further than chance moves them")
+    drift = _command(commands, "drift", "drift.drift", "test which genes moved further than chance explains")
     drift.add_argument("directories", type=Path, nargs="+", metavar="DIR", help="run directories that differ in seeds")
-    many = "how many with random fitness to compare with (default: 200)"
+    many = "number of searches with random fitness to compare with (default: 200)"
     drift.add_argument("--searches", type=_searches, default=200, metavar="N", help=many)
     drift.add_argument("--json", action="store_true", help="print JSON")
 
 
 def _add_products(commands: Commands) -> None:
-    """Commands that make files of a run."""
+    """Add the commands that write files from a run."""
     for name, meaning, out in (
         ("replay", "play one episode of the best agent, and print the result", "FILE"),
         ("report", "write the HTML report", "FILE"),
-        ("export", "write what the best agent sees as spectral EXR files", "DIR"),
+        ("export", "write the best agent's views as spectral EXR files", "DIR"),
     ):
         product = _command(commands, name, f"products.{name}", meaning, directory=True)
         _add_task(product)
@@ -210,26 +210,26 @@ def _add_products(commands: Commands) -> None:
             product.add_argument("--seed", type=_seed, default=0, help="seed of the episode (default: 0)")
         if name == "replay":
             product.add_argument("--rrd", action="store_true", help="also write a recording for Rerun")
-            product.add_argument("--gif", action="store_true", help="also write a moving picture, for slides and pages")
-            product.add_argument("--mp4", action="store_true", help="also write a film, every action a frame")
+            product.add_argument("--gif", action="store_true", help="also write an animated GIF, for slides and pages")
+            product.add_argument("--mp4", action="store_true", help="also write a video with one frame per action")
         if name != "export":
             product.add_argument("--open", action="store_true", help="open the page in a browser")
-        product.add_argument("--out", type=Path, metavar=out, help="where to write (default: in the run directory)")
+        product.add_argument("--out", type=Path, metavar=out, help="output path (default: in the run directory)")
         _add_voice(product)
     demo = _command(
         commands, "demo", "demo.demo", "look at a finished run that ships with rhabdom: report, replay, EXR"
     )
     demo.add_argument(
-        "--out", type=Path, metavar="DIR", default=Path("runs/demo"), help="where to (default: runs/demo)"
+        "--out", type=Path, metavar="DIR", default=Path("runs/demo"), help="output directory (default: runs/demo)"
     )
     demo.add_argument("--open", action="store_true", help="open the report in a browser")
     _add_voice(demo)
 
 
 def _add_task(command: argparse.ArgumentParser) -> None:
-    """Code of a run's own task runs only if it is named."""
+    """Add the argument that names a user task; its code runs only if it is named."""
     command.add_argument(
-        "--task", metavar="FILE.py:CLASS", help="the run's task, where it is one of your own: allows its code to run"
+        "--task", metavar="FILE.py:CLASS", help="user task of the run; its code runs only if you name it here"
     )
 
 
@@ -240,13 +240,13 @@ def _add_voice(command: argparse.ArgumentParser) -> None:
 
 
 def _add_tables(commands: Commands) -> None:
-    """Commands that say what there is, and whether it works."""
+    """Add the commands that list contents and check the installation."""
     validate = _command(
-        commands, "validate", "validate.validate", "run the proofs of a checkout, which assert and draw"
+        commands, "validate", "validate.validate", "run the validation scripts of a checkout, which check and draw"
     )
-    validate.add_argument("proofs", nargs="*", metavar="NAME", help="proofs to run (default: all)")
-    validate.add_argument("--list", action="store_true", help="list the proofs by name, and run none")
-    doctor = _command(commands, "doctor", "validate.doctor", "say what is installed and whether it works")
+    validate.add_argument("proofs", nargs="*", metavar="NAME", help="scripts to run (default: all)")
+    validate.add_argument("--list", action="store_true", help="list the scripts by name, and run none")
+    doctor = _command(commands, "doctor", "validate.doctor", "report what is installed and whether it works")
     tasks = _command(commands, "tasks", "listings.tasks", "list the tasks")
     presets = _command(commands, "presets", "listings.presets", "list the presets")
     genes = _command(commands, "genes", "listings.genes", "list the genes")
@@ -260,14 +260,14 @@ def _add_tables(commands: Commands) -> None:
 
 
 def _seed(text: str) -> int:
-    """A seed as NumPy takes it."""
+    """Return a seed that NumPy accepts."""
     if not text.isdecimal():
         raise argparse.ArgumentTypeError(f"{text!r}: must be a whole number, 0 or more")
     return int(text)
 
 
 def _searches(text: str) -> int:
-    """As many as a p can be made of."""
+    """Return a number of searches that is large enough for a p-value."""
     if not text.isdecimal() or int(text) < 2:
         raise argparse.ArgumentTypeError(f"{text!r}: must be a whole number, 2 or more")
     return int(text)
@@ -276,7 +276,7 @@ def _searches(text: str) -> int:
 def _command(
     commands: Commands, name: str, home: str, meaning: str, directory: bool = False
 ) -> argparse.ArgumentParser:
-    """A command that lives in evolve.cli.commands.<home>."""
+    """Add a command that is implemented in evolve.cli.commands.<home>."""
     parser = commands.add_parser(
         name,
         help=meaning,

@@ -1,4 +1,4 @@
-"""What this installation is made of and whether it works: versions, LLVM, Mitsuba variants, processor."""
+"""Check of the installation: versions, LLVM, Mitsuba variants and processor."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ PACKAGES = (
     "tomli-w",
     "pandas",
 )
-# One child process loads Mitsuba (its import alone can fail on a broken installation) and renders in each variant.
+# One child process loads Mitsuba, whose import alone can fail on a broken installation, and renders in each variant.
 RENDER = """
 import sys, mitsuba as mi, numpy as np
 for name in sys.argv[1:]:
@@ -53,14 +53,17 @@ for name in sys.argv[1:]:
 
 
 def unsupported(platform_name: str = sys.platform) -> str | None:
-    """One line where the system cannot run evolutions: processes and locks are those of Linux and macOS."""
+    """Return one line on a system that cannot run evolutions, else None.
+
+    Processes and locks use features of Linux and macOS.
+    """
     if platform_name in ("linux", "darwin"):
         return None
     return f"{platform_name}: is not supported; must be Linux or macOS (on Windows: in WSL 2, which is Linux)"
 
 
 def examine() -> dict[str, object]:
-    """Findings as a dictionary: python, machine, packages, llvm (every library tried), variants, gpu, device, notes,
+    """Return the findings: python, machine, packages, llvm (every library tried), variants, gpu, device, notes,
     good."""
     chosen, tried = backend.find(cached=False)
     environment = {**os.environ, backend.VARIABLE: chosen.path} if chosen else dict(os.environ)
@@ -98,7 +101,7 @@ def _version(name: str) -> str:
 
 
 def _device() -> str:
-    """Where PSFs, eyes and rays are computed."""
+    """Return the device on which PSFs, eyes and rays are computed."""
     try:
         return device()
     except backend.BackendError as error:
@@ -106,7 +109,7 @@ def _device() -> str:
 
 
 def _gpu() -> str:
-    """Name of the first NVIDIA GPU, "" where there is none."""
+    """Return the name of the first NVIDIA GPU, or "" if there is none."""
     try:
         query = ["nvidia-smi", "--query-gpu=name", "--format=csv,noheader"]
         child = subprocess.run(query, capture_output=True, text=True, timeout=20, check=True)
@@ -124,7 +127,7 @@ def _render(variants: list[str], environment: dict[str, str]) -> dict[str, str]:
 
 
 def print_findings(as_json: bool = False) -> int:
-    """Print the findings; 0 when everything that `evolve run` needs works, else 2."""
+    """Print the findings; return 0 if everything that `evolve run` needs works, else 2."""
     findings = examine()
     if as_json:
         print(json.dumps(findings, indent=2))

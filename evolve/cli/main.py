@@ -1,7 +1,7 @@
-"""The command `evolve`: reads arguments, calls the command, turns what is the user's to mend into one line and a code.
+"""The command `evolve`: parses arguments, calls the command, and prints errors that users can correct as one line.
 
-Exit codes: 0 done, 1 done but not as hoped, 2 wrong input or environment, 130 interrupted.
-Commands load on use, so that help comes at once.
+Exit codes: 0 success, 1 completed with failures, 2 wrong input or environment, 130 interrupted.
+Commands are imported on use, so that help appears immediately.
 """
 
 from __future__ import annotations
@@ -21,22 +21,24 @@ __all__ = ["main"]
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run one command; returns the exit code."""
+    """Run one command and return the exit code."""
     given = list(sys.argv[1:] if arguments is None else arguments)
     try:
-        with voices(patient=given[:1] in (["run"], ["resume"])), notes():  # these go on when nobody reads any more
+        # Runs continue after the reader of a pipe has gone.
+        with voices(patient=given[:1] in (["run"], ["resume"])), notes():
             return _outcome(given)
     except BrokenPipeError:
         return 0  # `evolve genes | head`
 
 
 def _outcome(arguments: Sequence[str]) -> int:
-    """The exit code of a command; what is the user's to mend is said in one line."""
+    """Return the exit code of a command; errors that users can correct are printed as one line."""
     try:
         parsed = parse(arguments)
         if parsed.module != "validate":
             _require_system()
-        # Numerical libraries read this as they load. More threads than one sum in another order, and a run must repeat.
+        # Numerical libraries read these variables on import. With several threads the order of sums varies, and runs
+        # must be reproducible.
         os.environ.update(dict.fromkeys(("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1"))
         if getattr(parsed, "device", None):
             os.environ["RHABDOM_DEVICE"] = parsed.device  # workers inherit it
@@ -58,7 +60,7 @@ def _outcome(arguments: Sequence[str]) -> int:
 
 
 def _require_system() -> None:
-    """What the commands need, every system but Windows has."""
+    """Exit with an error on Windows, which lacks the required processes and locks."""
     if sys.platform == "win32":
         from evolve.cli.doctor import unsupported
 
@@ -73,7 +75,7 @@ def _one_line(error: Exception) -> str:
 
 
 def _is_users(error: Exception) -> bool:
-    """Errors whose message is one line for the user; anything else is a bug of ours and keeps its traceback."""
+    """Return whether an error's message is one line for the user; any other error is a bug and keeps its traceback."""
     from evolve.config.run_config import ConfigError
     from evolve.search.local_executor import ExecutorError
     from evolve.store.directory import RunError

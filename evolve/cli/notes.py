@@ -1,4 +1,4 @@
-"""What rhabdom's own modules warn of, each thing said once and in one line, as commands speak."""
+"""Warnings of rhabdom's modules, each shown once and in one line."""
 
 from __future__ import annotations
 
@@ -15,9 +15,10 @@ OWN = ("optics", "sim", "evolve")
 
 @contextmanager
 def notes() -> Iterator[None]:
-    """For the length of a command; other packages' warnings are shown as Python shows them.
+    """Show rhabdom's warnings as notes while a command runs; warnings of other packages keep Python's format.
 
-    One command builds the same world several times, for a film, for vision, for lessons: each warns from its own line.
+    A command may build the same world several times, for example for a replay and for training. Each build repeats
+    the warning from another line of code, so Python's own filter does not suppress it.
     """
     python, said = warnings.showwarning, set[str]()
 

@@ -1,4 +1,4 @@
-"""How fast this machine evaluates: some ten seconds of the real thing, in as many processes as the run will have."""
+"""Measured speed of this machine: some ten seconds of real training, in the number of processes of the run."""
 
 from __future__ import annotations
 
@@ -20,23 +20,23 @@ from evolve.search.worker import evaluate_candidate, prepare_device
 
 __all__ = ["Pace", "measure_pace"]
 
-ROLLOUTS = 4  # chosen, the fewest that tell start, step and evaluation apart; evaluations follow the second and fourth
+ROLLOUTS = 4  # minimum that separates the times of start, step and evaluation; evaluations follow the second and fourth
 
 DIED = (
-    "a process died that measured this machine's pace, as systems have it that run out of memory: take fewer workers "
-    "(workers in the settings), or free some"
+    "a process that measured this machine's pace died, probably because memory ran out: use fewer workers "
+    "(workers in the settings), or free some memory"
 )
 
 
 @dataclass(frozen=True)
 class Pace:
-    """What one worker achieves with one animal while all others work too.
+    """Speed of one worker with one animal while all other workers are busy.
 
-    start_s: until its first world is ready
-    steps_per_s: agent steps trained per second at first, learning included
-    play_s: one evaluation: all its episodes, side by side
-    policy_bytes of its trained policy
-    pass_s: what each pass over the samples takes of that, per agent step
+    start_s: time until the first world is ready
+    steps_per_s: agent steps trained per second at the start, learning included
+    play_s: time of one evaluation with all its episodes in parallel
+    policy_bytes: size of the trained policy
+    pass_s: time of each pass over the samples, per agent step
     """
 
     start_s: float
@@ -46,26 +46,27 @@ class Pace:
     pass_s: float = 0.0
 
     def candidate_s(self, config: RunConfig) -> float:
-        """Seconds for one candidate that trains to the end in one go."""
-        return self.stage_s(config.learning, 0, config.learning.total_steps)
+        """Return the seconds for one candidate whose training is not divided into rungs."""
+        return self.rung_s(config.learning, 0, config.learning.total_steps)
 
-    def stage_s(self, learning: LearningConfig, begin: int, end: int) -> float:
-        """Seconds for a budget stage from so many steps to so many, and the evaluation after it."""
+    def rung_s(self, learning: LearningConfig, begin: int, end: int) -> float:
+        """Return the seconds for a rung from `begin` to `end` steps, with the evaluation after it."""
         plays = -(-(end - begin) // learning.eval_interval) + 1
         return self.start_s + self.training_s(learning, begin, end) + plays * self.play_s
 
     def training_s(self, learning: LearningConfig, begin: int, end: int) -> float:
-        """Seconds of rollouts and updates: passes become fewer."""
+        """Return the seconds of rollouts and updates; the number of passes decreases with the steps."""
         spared = learning.n_epochs - mean_passes(learning, begin, end)
         return (end - begin) * (1 / self.steps_per_s - spared * self.pass_s)
 
 
 def measure_pace(config: RunConfig, animals: Mapping[str, Phenotype], workers: int) -> dict[str, Pace]:
-    """Pace with each animal, of the slowest worker that tried it; all workers try at the same time.
+    """Return the pace of the slowest worker with each animal; all workers measure at the same time.
 
     Raises:
         BackendError: Dr.Jit cannot work here.
-        ConfigError: an animal cannot be evaluated here: its eyes cannot be computed, say; names which and why.
+        ConfigError: an animal cannot be evaluated here, for example because its eyes cannot be computed; the message
+            names the animal and the reason.
         ExecutorError: a process died.
     """
     context = multiprocessing.get_context("spawn")
@@ -96,12 +97,14 @@ def _slowest(paces: list[Pace]) -> Pace:
 
 
 def _short_life(config: RunConfig, animal: Phenotype, seed: int) -> Pace:
-    """A life of four rollouts, with an evaluation between the second and the third. The first update has all passes,
-    the third, between the other two, as few as a third of them."""
+    """Measure a training run of four rollouts, with an evaluation after the second and after the fourth.
+
+    The first update has all passes, and the third may have only a third of them.
+    """
     rollout = config.learning.n_envs * config.learning.n_steps
     spans = {"total_steps": ROLLOUTS * rollout, "eval_interval": ROLLOUTS // 2 * rollout, "decay_after": rollout // 2}
     short = replace(config.learning, **spans)
-    # Stages of the budget would be shorter than a rollout.
+    # Rungs of so short a training run would be shorter than a rollout.
     once = replace(config, learning=short, search=replace(config.search, rungs=1))
     marks: list[float] = []
     with TemporaryDirectory() as folder:

@@ -1,4 +1,4 @@
-"""What a run is going to do, before it does any of it: genes, evaluations, steps, hours and disk."""
+"""Plan of a run before it starts: genes, evaluations, steps, hours and disk space."""
 
 from __future__ import annotations
 
@@ -25,15 +25,17 @@ from evolve.store.evaluation import Evaluation
 
 __all__ = ["RunPlan", "steps_each"]
 
-REPORT_BYTES = 5_000_000  # chosen: an allowance for pages; the report of eight candidates has 0.6 MB (`evolve report`)
-# The exported episode as evolve.analysis.recorder records it, which would load torch; tests hold these to it.
+REPORT_BYTES = 5_000_000  # allowance for pages; the report of eight candidates has 0.6 MB (`evolve report`)
+# Values of evolve.analysis.recorder for the exported episode. Importing it would load torch; tests compare the values.
 EPISODE_ACTIONS, EXR_EVERY, EXR_PIXELS = 256, 8, 60
 
 
 @dataclass(frozen=True)
 class RunPlan:
-    """What a run is going to do. `paces` holds the pace of the start animal and of one in the middle of all ranges,
-    which bracket what evolution will ask for; {} before `measured`."""
+    """Plan of a run.
+
+    paces: the pace of the start animal and of an animal in the middle of all ranges; empty before `measured`
+    """
 
     config: RunConfig
     directory: Path
@@ -41,40 +43,40 @@ class RunPlan:
     paces: dict[str, Pace] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, config: RunConfig, directory: Path) -> RunPlan:
+    def from_config(cls, config: RunConfig, directory: Path) -> RunPlan:
         return cls(config, directory, config.workers or cores())
 
     def measured(self) -> RunPlan:
-        """With the paces of this machine, which takes some ten seconds."""
+        """Return the plan with the paces of this machine; the measurement takes some ten seconds."""
         paces = measure_pace(self.config, self.animals, self.workers)
         return RunPlan(self.config, self.directory, self.workers, paces)
 
     @property
     def animals(self) -> dict[str, Phenotype]:
-        """Animals that stand for those to come."""
+        """Animals that represent all animals of the run."""
         genotype = Genotype(self.config.genome)
         middle = np.full(genotype.dimension, 0.5)
         return {"start": develop(genotype.start, self.config), "middle": develop(middle, self.config)}
 
     @property
     def hours(self) -> dict[str, float]:
-        """Wall time of the whole run if all candidates were like each of the animals, and trained to the end."""
+        """Wall time of the whole run if all candidates resembled one of the animals and completed their training."""
         search, learning = self.config.search, self.config.learning
         if search.steady_state:
-            busy = min(self.workers, search.population)  # no more candidates are under way at once
+            busy = min(self.workers, search.population)  # maximum number of candidates in training at the same time
             rounds = -(-self.config.candidates // busy)
             return {name: rounds * pace.candidate_s(self.config) / 3600 for name, pace in self.paces.items()}
-        stages = list(zip(sizes(search), pairwise((0, *budgets(search, learning))), strict=True))
+        rungs = list(zip(sizes(search), pairwise((0, *budgets(search, learning))), strict=True))
         return {
             name: search.generations
-            * sum(-(-size // self.workers) * pace.stage_s(learning, *span) for size, span in stages)
+            * sum(-(-size // self.workers) * pace.rung_s(learning, *span) for size, span in rungs)
             / 3600
             for name, pace in self.paces.items()
         }
 
     @property
     def disk_bytes(self) -> int:
-        """Policies, record, report and EXR files; of the larger animal."""
+        """Size of policies, record, report and EXR files for the larger of the animals."""
         policy = max(pace.policy_bytes for pace in self.paces.values())
         pictures = max(_exr_bytes(animal, self.config.eye.bands) for animal in self.animals.values())
         lines = evaluations(self.config.search) * self._line_bytes()
@@ -82,19 +84,19 @@ class RunPlan:
 
     @property
     def free_bytes(self) -> int:
-        """Free on the disk that will hold the run."""
+        """Free space on the disk of the run directory."""
         existing = next(path for path in (self.directory.resolve(), *self.directory.resolve().parents) if path.exists())
         return shutil.disk_usage(existing).free
 
-    def _budget_stages(self) -> list[str]:
-        """How many of a generation are trained how far, where budgets are divided."""
+    def _rung_lines(self) -> list[str]:
+        """Return the line with candidates and steps of each rung, if training is divided into rungs."""
         search = self.config.search
         ends = zip(sizes(search), budgets(search, self.config.learning), strict=True)
-        stages = ", ".join(f"{size} to {steps:,} steps" for size, steps in ends)
-        return [f"budget stages  {stages}"] if search.rungs > 1 else []
+        rungs = ", ".join(f"{size} to {steps:,} steps" for size, steps in ends)
+        return [f"rungs  {rungs}"] if search.rungs > 1 else []
 
     def _line_bytes(self) -> int:
-        """A candidate's line in the record."""
+        """Return the size of a candidate's line in the record."""
         config, genotype = self.config, Genotype(self.config.genome)
         plays = -(-config.learning.total_steps // config.learning.eval_interval)
         value = np.pi
@@ -102,10 +104,10 @@ class RunPlan:
         genome = (value / 4,) * genotype.dimension
         animal = self.animals["middle"]
         parents = tuple(range(config.search.population // 2))
-        return len(Candidate.of(Place(1, 1, 1), genome, animal, 2**31, outcome, parents).to_line())
+        return len(Candidate.from_evaluation(Place(1, 1, 1), genome, animal, 2**31, outcome, parents).to_line())
 
     def lines(self) -> list[str]:
-        """The plan as text."""
+        """Return the plan as lines of text."""
         config = self.config
         search, genotype = config.search, Genotype(config.genome)
         order = "steady state" if search.steady_state else "generation by generation"
@@ -113,7 +115,7 @@ class RunPlan:
             f"task           {config.task}, seed {config.seed}",
             f"search         {search.optimizer}, {order}, on {self.workers} workers",
             f"evaluations    {search.generations} generations x {search.population} candidates = {config.candidates:,}",
-            *self._budget_stages(),
+            *self._rung_lines(),
             f"steps          up to {steps_each(config)} each, {total_steps(config):,} in all",
             f"genes open     {genotype.dimension} of {len(config.genome)}",
             *_gene_lines(config),
@@ -131,12 +133,12 @@ class RunPlan:
         return lines + [f"note           {note}" for note in self.notes()]
 
     def notes(self) -> list[str]:
-        """What one should know before it begins."""
+        """Return warnings about the run."""
         short = self.paces and self.disk_bytes > self.free_bytes
         return [*lint(self.config), *(["the disk is too small for this run"] if short else [])]
 
     def record(self) -> dict[str, Any]:
-        """The plan for machines."""
+        """Return the plan as JSON values."""
         config = self.config
         opening = {g.name: config.genome[g.name].opens_at for g in Genotype(config.genome).open_genes}
         return {
@@ -155,7 +157,7 @@ class RunPlan:
 
 
 def steps_each(config: RunConfig) -> str:
-    """Steps of one training, with what was asked for where that is not whole rollouts."""
+    """Return the steps of one training run; if they were rounded up to whole rollouts, with the configured number."""
     learning = config.learning
     trained = trained_steps(learning, 0, learning.total_steps)
     rounded = f" ({learning.total_steps:,} rounded up to rollouts of {learning.n_envs * learning.n_steps:,})"
@@ -163,7 +165,7 @@ def steps_each(config: RunConfig) -> str:
 
 
 def _gene_lines(config: RunConfig) -> list[str]:
-    """Open genes, cluster by cluster, and from which generation on."""
+    """Return lines with the open genes of each cluster and the generation in which they open."""
     genes = Genotype(config.genome).open_genes
     lines = []
     for cluster in CLUSTERS:
@@ -178,7 +180,7 @@ def _gene_lines(config: RunConfig) -> list[str]:
 
 
 def _exr_bytes(animal: Phenotype, bands: int) -> int:
-    """EXR files of an episode, before compression: bands and a preview in float32."""
+    """Return the size of an episode's EXR files before compression: bands and a preview in float32."""
     factor = max(1, -(-EXR_PIXELS // max(animal.resolution)))
     pixels = animal.n_eyes * animal.resolution[0] * animal.resolution[1] * factor**2
     return EPISODE_ACTIONS // EXR_EVERY * pixels * (bands + 3) * 4

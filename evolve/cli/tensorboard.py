@@ -1,7 +1,7 @@
-"""A run's scalars for TensorBoard: fitness over the generations, learning within a lifetime, genes.
+"""Scalars of a run for TensorBoard: fitness over the generations, learning curves of training runs, and genes.
 
-Written by TensorBoard's own writer, into `tensorboard/` of the run directory; they are drawn from the record and say
-nothing that it does not, so a run that is continued writes them anew.
+TensorBoard's own writer writes them into `tensorboard/` of the run directory. All of them are derived from the record,
+so a continued run writes the files again.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ FOLDER = "tensorboard"
 
 
 class TensorBoardWriter:
-    """Watcher that keeps a run's scalars; a context manager.
+    """Watcher that writes a run's scalars; a context manager.
 
     Raises:
         ExecutorError: TensorBoard is not installed.
@@ -49,11 +49,13 @@ class TensorBoardWriter:
             writer.close()
 
     def training(self, candidate_id: int, steps: int, planned: int) -> None:
-        """Nothing: what is not on record is not shown."""
+        """Do nothing, because only values on record are shown."""
 
     def evaluated(self, candidate: Candidate) -> None:
-        """The candidate's values over its id (again after every budget stage), its generation's over the generation,
-        its learning over steps."""
+        """Write the candidate's values over its id, and its learning curve over steps, after each rung.
+
+        Values of a complete generation are written over the generation.
+        """
         if candidate.failure is None:
             values = {"fitness": candidate.fitness, "success_rate": candidate.success_rate}
             genes = {
@@ -75,7 +77,7 @@ class TensorBoardWriter:
                 self._add("generations", {f"fitness/{name}": v for name, v in values.items()}, candidate.generation)
 
     def _close(self, name: str) -> None:
-        """Until there is more to add: another writer writes another file then, and TensorBoard reads both."""
+        """Close a writer; later values go to a new file, and TensorBoard reads both."""
         if name in self._writers:
             self._writers.pop(name).close()
 
@@ -91,10 +93,10 @@ class TensorBoardWriter:
 
 
 def require_tensorboard() -> None:
-    """Fail early where there is no TensorBoard.
+    """Check that TensorBoard is installed.
 
     Raises:
-        ExecutorError: it is not installed.
+        ExecutorError: TensorBoard is not installed.
     """
     _writer_class()
 

@@ -1,4 +1,4 @@
-"""A wait with a bar on a terminal: what is being done, how much of it, for how long; nothing where nobody looks on."""
+"""Progress bar of a wait: current step, share done and elapsed time; shown only on a terminal."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ __all__ = ["Waiting"]
 
 
 class Waiting:
-    """Steps of a wait whose lengths nobody knows; a context manager.
+    """Progress bar over steps of unknown duration; a context manager.
 
-    steps: how many there are
-    shown: whether anything is
-    out: stderr if None
+    steps: number of steps
+    shown: whether the bar is shown
+    out: output stream; None for stderr
     """
 
     def __init__(self, steps: int, shown: bool = True, out: TextIO | None = None) -> None:
@@ -27,7 +27,7 @@ class Waiting:
         self._progress: Any = None
 
     def of_one_step(self, text: str) -> Waiting:
-        """The same, whose only step begins with it."""
+        """Return this wait after setting `text` as its only step, which starts with the wait."""
         self._first = text
         return self
 
@@ -51,12 +51,12 @@ class Waiting:
             self._progress.stop()
 
     def step(self, text: str) -> None:
-        """The next step begins."""
+        """Start the next step."""
         self._done += 1
         self.within(text, 0.0)
 
     def within(self, text: str, share: float) -> None:
-        """Of the step that has begun, so much is done."""
+        """Show the share of the current step that is done."""
         if self._progress is not None:
             shown = printable(text).replace("[", "\\[")
             self._progress.update(self._bar, completed=self._done + share, description=shown)

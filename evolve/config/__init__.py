@@ -1,18 +1,18 @@
 """Settings of a run.
 
-run_config     RunConfig
-settings       its sections: every setting, its range, what it does
-assemble       all sources put together, later ones winning
-sources        presets, tasks, files and options
-provenance     where a setting stands
-checks         one line that says what would be right
-lint           what is odd, though nothing forbids it
-relief_starts  where the genes of a relief start
-formats        formats of config.toml, and how former ones are read
+run_config     RunConfig: the configuration of a run
+settings       sections of RunConfig: default, range and effect of each setting
+assemble       RunConfig from all sources; later sources override earlier ones
+sources        presets, tasks, files and options as sources of settings
+provenance     location of a setting: file and line, or option
+checks         type and range checks of single settings
+lint           warnings about settings that are allowed but odd
+relief_starts  start values of a relief's genes
+formats        formats of config.toml, and conversion of former ones
 square_eyes    one gene for both sides of an eye
-task_choice    TaskChoice: which task, and its code if it may run
-task_card      TaskCard: what is known of a task without executing it
-task_code      TaskCode: a user's task, as text
-numbering      which id belongs to which generation
-tasks/         what a task sets unless a run says otherwise
+task_choice    TaskChoice: a task, and its code if it may run
+task_card      TaskCard: properties of a task that are known without executing it
+task_code      TaskCode: source text of a user task
+numbering      ids and generations of candidates
+tasks/         default settings of the tasks
 """

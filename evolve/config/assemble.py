@@ -1,5 +1,8 @@
-"""A run's configuration put together from its sources: defaults, preset and its scale, task, TOML file, another run's
-animal, `--set key=value`. Later ones win, but a preset made for the task wins over the task's settings."""
+"""A run's configuration assembled from its sources.
+
+The sources are the defaults, the preset and its scale, the task, a TOML file, an animal of another run, and
+`--set key=value`. Later sources override earlier ones, but a preset made for the task overrides the task's settings.
+"""
 
 from __future__ import annotations
 
@@ -47,15 +50,16 @@ def assemble(
     starts: Source | None = None,
     scale: str | None = None,
 ) -> RunConfig:
-    """A run's configuration from all its sources; `task` and `assignments` ("search.population=8") win.
+    """Return a run's configuration from all its sources; `task` and `assignments` override all others.
 
-    task: one of TASKS, or FILE.py:CLASS; may be missing where preset or file names one
-    starts: where the genes start instead, as `evolve.runs.start_from` reads it from another run
-    scale: how much of its work a preset does, where it comes in several: one of SCALES, "laptop" if not given
+    task: one of TASKS, or FILE.py:CLASS; may be missing if preset or file names a task
+    assignments: settings such as "search.population=8"
+    starts: start values of the genes, as `evolve.runs.start_from` reads them from another run
+    scale: size of a preset that comes in several sizes: one of SCALES, "laptop" if not given
 
     Raises:
-        ConfigError: unknown key, wrong type, value out of range, contradiction, unreadable file; one line that names
-            key, value, what is allowed, and where it was set.
+        ConfigError: unknown key, wrong type, value out of range, contradiction, or unreadable file; one line that names
+            key, value, allowed values, and the place of the setting.
     """
     choice = None if task is None else TaskChoice.named(task)
     code = None if choice is None else choice.code
@@ -69,12 +73,12 @@ def assemble(
 
 
 def _assembled(below: list[Source], asked: list[Source]) -> RunConfig:
-    """From what was asked, later sources winning, over the task's and the preset's settings."""
+    """Return the configuration; the sources in `asked` override the settings of task and preset."""
     known_task = [source.tree["task"] for source in (*below, *asked) if "task" in source.tree]
     if not known_task:
         raise ConfigError(f"task: missing; must be one of {', '.join(TASKS)}")
     of_task = task_defaults(known_task[-1])
-    # A preset that is made for this task knows better than the task's own settings; one for any task does not.
+    # A preset made for this task overrides the task's settings; a general preset does not.
     made_for_it = any(source.tree.get("task") == known_task[-1] for source in below)
     layers = [of_task, *below, *asked] if made_for_it else [*below, of_task, *asked]
     trees = [_checked(source) for source in layers]
@@ -85,26 +89,28 @@ def _assembled(below: list[Source], asked: list[Source]) -> RunConfig:
 
 
 def from_toml(path: Path) -> RunConfig:
-    """Configuration written by `to_toml`, in this format or a former one."""
+    """Return the configuration that `to_toml` wrote, in this format or a former one."""
     return _read_back(read_toml(path))
 
 
 def from_text(text: bytes | str, name: str = "config.toml") -> RunConfig:
-    """As `from_toml`, from the text itself, which messages call `name`."""
+    """Return the configuration in a TOML text, which messages call `name`; see `from_toml`."""
     return _read_back(parsed_toml(text, name))
 
 
 def _read_back(written: Source) -> RunConfig:
-    """Every default is written out, so no task's and no preset's settings are looked up."""
+    """Return a stored configuration; it contains all defaults, so settings of tasks and presets are not needed."""
     return _assembled([], [replace(written, tree=upgraded(written.tree))])
 
 
 def _asked_for(source: Source, code: TaskCode | None) -> Source:
-    """What somebody asks for, maybe with another run's config.toml: of this format, and naming no code to run, which
-    only the command itself does."""
+    """Return the settings of a user's file, which may be the config.toml of another run.
+
+    The file must have the current format. It cannot name a user task, because only the command may name code to run.
+    """
     if names_code(source.tree.get("task")) and code is None:
         raise ConfigError(
-            f"{source.name}: task = {source.tree['task']!r}: a file names no code to run: say evolve run FILE.py:CLASS",
+            f"{source.name}: task = {source.tree['task']!r}: a file cannot name code; use evolve run FILE.py:CLASS",
             "task",
         )
     if "format" in source.tree and format_of(source.tree) != FORMAT:
@@ -114,7 +120,7 @@ def _asked_for(source: Source, code: TaskCode | None) -> Source:
 
 
 def to_toml(config: RunConfig) -> str:
-    """TOML text with every setting; `from_toml` reads it back equal."""
+    """Return TOML text with every setting; `from_toml` restores an equal configuration."""
     import tomli_w
 
     tree = {"format": FORMAT, **asdict(replace(config, code=None))}
@@ -128,8 +134,10 @@ def to_toml(config: RunConfig) -> str:
 
 
 def _checked(source: Source) -> Tree:
-    """The source's tree, every key known, every value in range, groups of genes spelled out; else a ConfigError that
-    names the source and line."""
+    """Return the source's tree after checks of keys and values, with groups of genes expanded.
+
+    Errors name the source and line.
+    """
     try:
         return {key: _checked_entry(key, value) for key, value in source.tree.items()}
     except ConfigError as error:
@@ -139,7 +147,10 @@ def _checked(source: Source) -> Tree:
 
 
 def _blamed(error: ConfigError, layers: Iterable[Source]) -> str:
-    """ " (mine.toml, line 3; --set ...)": where the settings that contradict each other were set, the ones that won."""
+    """Return the places of contradicting settings, such as " (mine.toml, line 3; --set ...)".
+
+    For each setting, this is the place of the value that is in effect.
+    """
     won = [next((at for s in reversed(list(layers)) if (at := s.place(key))), None) for key in error.keys]
     places = list(dict.fromkeys(place for place in won if place))
     return f" ({'; '.join(places)})" if places else ""
@@ -169,7 +180,10 @@ def _checked_entry(key: str, value: Any) -> Any:
 
 
 def _checked_genome(section: Tree) -> Tree:
-    """Per-gene settings; a cluster's name or a family's stands for its genes, and the narrower name wins."""
+    """Return settings per gene.
+
+    The name of a cluster or a family stands for all its genes; the name of a smaller group overrides that of a larger.
+    """
     result: Tree = {}
     for group in sorted(section, key=lambda name: -len(group_members(name))):
         key, members, use = f"genome.{group}", group_members(group), section[group]
@@ -189,13 +203,13 @@ def _checked_genome(section: Tree) -> Tree:
 
 
 def _merged(trees: Iterable[Tree]) -> Tree:
-    """All trees as one; later ones win."""
+    """Return all trees merged; later trees override earlier ones."""
     empty: Tree = {}
     return reduce(_merge, trees, empty)
 
 
 def _merge(below: Tree, above: Tree) -> Tree:
-    """Both trees; where they meet, `above` wins."""
+    """Return both trees merged; values in `above` override those in `below`."""
     merged = dict(below)
     for key, value in above.items():
         under = merged.get(key)
@@ -204,7 +218,7 @@ def _merge(below: Tree, above: Tree) -> Tree:
 
 
 def _require_genes(source: Source, eye: EyeConfig, card: TaskCard) -> None:
-    """Genes that are named one by one must be genes of such eyes."""
+    """Check that genes named individually are genes of these eyes."""
     for name in with_relief(source.tree, eye).get("genome", {}):
         if name in (SIDE, *SIDES) and name not in eye.genes:
             raise ConfigError(no_such_side(name, eye), f"genome.{name}", "eye.square")
@@ -215,7 +229,7 @@ def _require_genes(source: Source, eye: EyeConfig, card: TaskCard) -> None:
             )
         if not card.has_gene(name):
             raise ConfigError(
-                f"genome.{name}: is for tasks of one's own; in others eyes look along the floor",
+                f"genome.{name}: is for user tasks; in built-in tasks eyes look along the floor",
                 *(f"genome.{name}", "task"),
             )
         if name in ALL_GENES and name not in eye.genes:
@@ -223,10 +237,10 @@ def _require_genes(source: Source, eye: EyeConfig, card: TaskCard) -> None:
 
 
 def _build(trees: list[Tree], layers: list[Source]) -> RunConfig:
-    """RunConfig from checked trees, later ones winning, defaults filled in."""
+    """Return the RunConfig from checked trees; later trees override earlier ones, and defaults are filled in."""
     asked = _merged(trees)
     eye, card = EyeConfig(**asked.get("eye", {})), card_of(asked["task"])
-    assert card is not None  # `_checked` has seen it
+    assert card is not None  # guaranteed by `_checked`
     table = {name: gene for name, gene in eye.genes.items() if card.has_gene(name)}
     layers = [with_square_eyes(source, eye) for source in layers]
     for source in layers:
@@ -236,7 +250,7 @@ def _build(trees: list[Tree], layers: list[Source]) -> RunConfig:
     genes = tree.get("genome", {})
     genome = {}
     for name, gene in table.items():
-        # With optics off the optical genes are frozen, unless someone asks for the contradiction in so many words.
+        # With optics off the optical genes are frozen, unless a setting opens one of them explicitly.
         off = gene.cluster == "optical" and not sections["eye"].optics
         genome[name] = replace(gene.default, **{**({"open": False} if off else {}), **genes.get(name, {})})
     top = {name: tree[name] for name in TOP_LEVEL if name in tree}

@@ -1,4 +1,4 @@
-"""Checking single settings: kind and range, or one line that says what would be right."""
+"""Checks of single settings: type and range, with one-line messages that name the allowed values."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ __all__ = [
     "suggestion",
 ]
 
-SHOWN = 200  # letters of a value that a message quotes
-MOST_LISTED = 36  # of known words: all genes and tasks, and not all settings
+SHOWN = 200  # maximum number of characters of a value in a message
+MOST_LISTED = 36  # maximum number of listed words: enough for all genes and tasks, but not for all settings
 
 
 class ConfigError(ValueError):
-    """A setting that cannot be used; the message is one line naming key, value and what is allowed.
+    """An invalid setting; the message is one line with key, value and allowed values.
 
-    keys: dotted names of the settings to blame, so that whoever knows where they were set can say so
+    keys: dotted names of the settings that caused the error, from which callers find the place of each
     """
 
     def __init__(self, message: str, *keys: str) -> None:
@@ -41,10 +41,10 @@ class ConfigError(ValueError):
 
 
 def check_value(cls: type, name: str, value: Any, key: str) -> Any:
-    """`value` as field `name` of `cls` takes it.
+    """Return `value`, converted for field `name` of `cls`.
 
     Raises:
-        ConfigError: one line, naming `key`, the value and what is allowed.
+        ConfigError: the value is invalid; one line that names `key`, the value and the allowed values.
     """
     definition = next(f for f in fields(cls) if f.name == name)
     if definition.type == "float | str":
@@ -57,21 +57,21 @@ def check_value(cls: type, name: str, value: Any, key: str) -> Any:
 
 
 def check_values(settings: Any, names: Iterable[str] | None = None, prefix: str = "") -> None:
-    """Those of a frozen dataclass of settings, or the named ones of them.
+    """Check all settings of a frozen dataclass, or the named ones.
 
     Raises:
-        ConfigError: see above.
+        ConfigError: see `check_value`.
     """
     for name in [one.name for one in fields(settings)] if names is None else names:
         value = check_value(type(settings), name, getattr(settings, name), f"{prefix}{name}")
-        object.__setattr__(settings, name, value)  # Python's number for NumPy's
+        object.__setattr__(settings, name, value)  # converted from NumPy's to Python's number types
 
 
 def check_gene_value(gene: Gene, name: str, value: Any, key: str) -> Any:
-    """`value` as a gene's "open", "low", "high", "start" or "opens_at" takes it.
+    """Return `value`, converted for a gene's "open", "low", "high", "start" or "opens_at".
 
     Raises:
-        ConfigError: see above.
+        ConfigError: see `check_value`.
     """
     if name == "open":
         return _checked(value, bool, None, key)
@@ -81,10 +81,10 @@ def check_gene_value(gene: Gene, name: str, value: Any, key: str) -> Any:
 
 
 def check_gene_use(gene: Gene, use: GeneConfig) -> None:
-    """A gene's search range must be one, and hold its start.
+    """Check that a gene's search range is not empty and contains its start value.
 
     Raises:
-        ConfigError: it is none, or does not.
+        ConfigError: the range is empty or does not contain the start value.
     """
     key = f"genome.{gene.name}"
     if use.start not in gene.range or math.isnan(use.start):
@@ -101,8 +101,10 @@ def check_gene_use(gene: Gene, use: GeneConfig) -> None:
 
 
 def suggestion(word: Any, known: Iterable[str]) -> str:
-    """ "did you mean X?" where a known word, or the last part of one, is near; else the list of them, the first
-    MOST_LISTED of it."""
+    """Return "did you mean X?" if a known word or its last part is similar, else the list of known words.
+
+    The list ends after MOST_LISTED words.
+    """
     known, word = list(known), str(word)
     by_last = {name.rpartition(".")[2]: name for name in known}
     last = close_match(word.rpartition(".")[2], by_last, cutoff=0.75)
@@ -114,7 +116,7 @@ def suggestion(word: Any, known: Iterable[str]) -> str:
 
 
 def _checked(value: Any, kind: type[Any], valid: Interval | None, key: str) -> Any:
-    """`value`, if it is of this kind (a whole number may stand for a number) and in `valid`."""
+    """Return `value` if it has this type and lies in `valid`; integers are accepted as numbers."""
     names = {int: "an integer", float: "a number", bool: "true or false", str: "text"}
     shown = str(value).lower() if isinstance(value, bool) else quoted(value)
     allowed = names[kind] if valid is None else f"{names[kind]} in {valid}"
@@ -126,15 +128,15 @@ def _checked(value: Any, kind: type[Any], valid: Interval | None, key: str) -> A
             raise ConfigError(f"{key} = {shown}: must be {allowed}", key)
         if valid is not None and value not in valid:
             raise ConfigError(f"{key} = {shown}: must be in {valid}", key)
-    except OverflowError:  # a whole number that no float comes near
+    except OverflowError:  # an integer beyond the range of floats
         raise ConfigError(f"{key} = {shown}: must be {allowed}", key) from None
     return value
 
 
 def quoted(value: Any) -> str:
-    """As a message shows it, on one line."""
+    """Return a value as text for a message, on one line."""
     try:
         whole = repr(value) if isinstance(value, str) else shown(value)
-    except ValueError:  # more digits than Python writes
+    except ValueError:  # more digits than Python converts to text
         return "a number of thousands of digits"
     return whole if len(whole) <= SHOWN else f"{whole[:SHOWN]}..."

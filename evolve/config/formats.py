@@ -1,13 +1,14 @@
-"""Formats of a run's config.toml: which one is written, and how former ones are read.
+"""Formats of a run's config.toml, and conversion of former ones.
 
-1   no number in the file. The task "navigation" was a maze, and `learning.rays_per_eye` limited the rays in training.
-2   "navigation" is a course, "maze" the maze, and `learning.rays_per_receptor` limits the rays.
+1   without a number in the file. The task "navigation" means a maze, and `learning.rays_per_eye` limits the rays in
+    training.
+2   the current format. "navigation" means a course, "maze" the maze, and `learning.rays_per_receptor` limits the rays.
 
-Runs of both formats may lack `learning.least_epochs`: theirs did as many passes throughout. They may lack
-`search.active`: their CMA-ES learnt from the worse candidates, too.
+Runs of both formats may lack `learning.least_epochs`; the number of passes per update is then constant. They may lack
+`search.active`; CMA-ES then also learns from the worse candidates.
 
-A run of a former format is opened, replayed and reported on as what it was. Its trainings cannot be carried on, because
-their light was another.
+A run of a former format can be opened, replayed and reported with its original meaning. Its training runs cannot be
+continued, because light is computed differently.
 """
 
 from __future__ import annotations
@@ -20,27 +21,27 @@ from evolve.config.checks import ConfigError
 __all__ = ["FORMAT", "LAST_OF_FORMER", "format_of", "task_then", "upgraded"]
 
 FORMAT = 2
-LAST_OF_FORMER = "f4d9978"  # the last commit that continues runs of format 1
+LAST_OF_FORMER = "f4d9978"  # last commit that can continue runs of format 1
 
 Tree = dict[str, Any]
 
 
 def format_of(tree: Mapping[str, Any]) -> int:
-    """Of a run's config.toml.
+    """Return the format of a run's config.toml.
 
     Raises:
-        ConfigError: it is none that is known.
+        ConfigError: the format is unknown.
     """
     number = tree.get("format", 1)
     if type(number) is not int or not 1 <= number <= FORMAT:
         raise ConfigError(
-            f"format = {number!r}: must be a whole number up to {FORMAT}, or a newer rhabdom reads it", "format"
+            f"format = {number!r}: must be a whole number up to {FORMAT}; a newer rhabdom may read this file", "format"
         )
     return number
 
 
 def upgraded(tree: Mapping[str, Any]) -> Tree:
-    """A run's settings as this version names them."""
+    """Return a run's settings under the names of this version."""
     number = format_of(tree)
     now = {key: value for key, value in tree.items() if key != "format"}
     if isinstance(learning := now.get("learning"), dict):
@@ -61,5 +62,5 @@ def _learning_then(learning: Tree, number: int) -> Tree:
 
 
 def task_then(task: Any) -> Any:
-    """Today's name of a task of format 1."""
+    """Return the current name of a task of format 1."""
     return "maze" if task == "navigation" else task

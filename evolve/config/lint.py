@@ -1,4 +1,4 @@
-"""Lint: settings that are allowed but odd. They change nothing, or make eyes see colours wrongly."""
+"""Warnings about settings that are allowed but odd: they have no effect, or give wrong colour signals."""
 
 from __future__ import annotations
 
@@ -9,18 +9,18 @@ from evolve.genome.genes import INHERITED, LAMBDA_MAX
 
 __all__ = ["coarse_bands", "idle_genes", "idle_settings", "idle_starts", "lint"]
 
-PEAKS = 17  # of an open gene's range, at which its pigment is tried
-SHOWN = 4  # names in a line, at most
-LEAST_ERROR = 1e-3  # of white's signal: what the 64 bands that others are held against may be wrong by themselves
+PEAKS = 17  # number of tested peaks of a pigment over an open gene's range
+SHOWN = 4  # maximum number of names in a line
+LEAST_ERROR = 1e-3  # relative to the signal of white; possible error of the reference, which has 64 bands
 
 
 def lint(config: RunConfig) -> list[str]:
-    """Lint messages, one line each."""
+    """Return all warnings, one line each."""
     return [*idle_genes(config), *idle_starts(config), *idle_settings(config), *coarse_bands(config)]
 
 
 def coarse_bands(config: RunConfig) -> list[str]:
-    """A line where the bands misjudge the world's measured spectra by more than a receptor's noise."""
+    """Return a line if the bands' error for the world's measured spectra exceeds a receptor's noise."""
     if config.card.grey is not False:  # spectra are unknown or flat
         return []
     from sim.scene.band_error import band_error, measured
@@ -42,19 +42,23 @@ def coarse_bands(config: RunConfig) -> list[str]:
 
 
 def _most_light(config: RunConfig) -> float:
-    """What white is worth behind the widest pupil that animals may have, 1 in full light."""
+    """Return the signal of white behind the widest pupil that animals may have; 1 in full light."""
     use = config.genome["relative_aperture"]
     return float(use.high if use.open else use.start) ** 2 if config.eye.optics else 1.0
 
 
 def _doublings(bands: int) -> list[int]:
-    """So many bands, and twice as many, and so on; 64 are what they are held against."""
+    """Return `bands` and its doublings below 64, which is the reference."""
     return [bands * 2**k for k in range(6) if k == 0 or bands * 2**k < 64]
 
 
 def _types(config: RunConfig) -> list[str | tuple[float, ...]]:
-    """Receptors of the run; where they are inherited, each open gene's range in turn, the others at their start. (All
-    ranges together would be more, by a third in the preset `ultraviolet`, where peaks lie far apart.)"""
+    """Return the receptors of the run.
+
+    If receptors are inherited, one open gene at a time takes values over its range, with the others at their start.
+    Varying all of them together would give a larger error: a third larger in the preset `ultraviolet`, whose peaks
+    lie far apart.
+    """
     if config.eye.receptors != INHERITED:
         return [config.eye.receptors]
     uses = [config.genome[name] for name in LAMBDA_MAX]
@@ -69,7 +73,7 @@ def _types(config: RunConfig) -> list[str | tuple[float, ...]]:
 
 
 def idle_genes(config: RunConfig) -> list[str]:
-    """Open genes that have no effect because of how other genes are fixed, one line each."""
+    """Return lines about open genes that have no effect because other genes are fixed."""
     uses, table = config.genome, config.genes
     notes = []
     if uses["placement_range_deg"].open and not uses["n_eyes"].open and uses["n_eyes"].start == 1:
@@ -92,14 +96,14 @@ def idle_genes(config: RunConfig) -> list[str]:
 
 
 def idle_settings(config: RunConfig) -> list[str]:
-    """Settings that were set although nothing reads them, one line each."""
+    """Return lines about settings that were changed although they have no effect."""
     notes, search, eye = [], config.search, config.eye
     for name, gene in config.genes.items():
         use, alike = config.genome[name], [other for other in config.genes.values() if other.cluster == gene.cluster]
-        # What is said of a whole cluster is meant for those that are open.
+        # A value for a whole cluster applies to its open genes, so its closed genes give no warning.
         together = {config.genome[other.name].opens_at for other in alike} == {use.opens_at}
         if use.opens_at and not use.open and not gene.default.open and not together:
-            notes.append(f"genome.{name}.opens_at has no effect: the gene is held; set genome.{name}.open = true")
+            notes.append(f"genome.{name}.opens_at has no effect: the gene is frozen; set genome.{name}.open = true")
     if search.rungs == 1 and search.promoted != SearchConfig.promoted:
         notes.append("search.promoted has no effect: search.rungs = 1")
     if search.active and search.optimizer != "CMA":
@@ -112,7 +116,7 @@ def idle_settings(config: RunConfig) -> list[str]:
 
 
 def idle_starts(config: RunConfig) -> list[str]:
-    """Genes whose start was set although nothing reads it, one line per reason."""
+    """Return lines about genes whose start was changed although it has no effect, one line per reason."""
     unread = {"optical": f"eye.optics = {config.eye.optics}".lower()} if not config.eye.optics else {}
     if config.eye.receptors != INHERITED:
         unread["spectral"] = f"eye.receptors = {config.eye.receptors}, not {INHERITED}"

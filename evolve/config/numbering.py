@@ -1,4 +1,4 @@
-"""How a search numbers its candidates: ids run through all generations, `population` of them in each."""
+"""Numbering of candidates: ids run through all generations, with `population` ids in each."""
 
 from __future__ import annotations
 
@@ -9,18 +9,18 @@ __all__ = ["Place", "generation_ids"]
 
 @dataclass(frozen=True)
 class Place:
-    """Where a candidate stands in a search: candidate `id` is number `index` of `generation`; all count from 0."""
+    """Place of a candidate in a search: candidate `id` is number `index` of `generation`; all count from 0."""
 
     id: int
     generation: int
     index: int
 
     @classmethod
-    def of(cls, candidate_id: int, population: int) -> Place:
-        """The place of a candidate where every generation has `population` of them."""
+    def from_id(cls, candidate_id: int, population: int) -> Place:
+        """Return the place of a candidate if every generation has `population` candidates."""
         return cls(candidate_id, *divmod(candidate_id, population))
 
 
 def generation_ids(generation: int, population: int) -> range:
-    """Ids of a generation's candidates."""
+    """Return the ids of a generation's candidates."""
     return range(generation * population, (generation + 1) * population)

@@ -1,4 +1,4 @@
-"""Where a setting stands: the line of a TOML file, or the `--set` that made it."""
+"""Location of a setting: the line of a TOML file, or a `--set` option."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from evolve.genome.genes import groups_of
 __all__ = ["Source"]
 
 Tree = dict[str, Any]
-LONGEST_VALUE = 100  # lines
+LONGEST_VALUE = 100  # maximum number of lines of a value
 
 
 @dataclass(frozen=True)
 class Source:
-    """Settings from one place.
+    """Settings from one source.
 
-    name: as messages call it: a file's path, "--set fov_deg=3", "preset quick"; "" for what needs no name
-    tree: the settings, as nested tables
-    text: the TOML they were read from; None where there is none
+    name: name in messages: a file's path, "--set fov_deg=3", "preset quick"; "" for a source that messages never name
+    tree: the settings as nested tables
+    text: the TOML text of the settings; None if there is none
     """
 
     name: str
@@ -29,7 +29,10 @@ class Source:
     text: str | None = None
 
     def place(self, key: str) -> str | None:
-        """ "mine.toml, line 7", where this source sets `key` (dotted; a gene also through its groups), else None."""
+        """Return the location of `key` in this source, such as "mine.toml, line 7", or None.
+
+        key: dotted name; a gene is also found through the name of its group
+        """
         for path in _spellings(key):
             if not _holds(self.tree, path):
                 continue
@@ -39,7 +42,7 @@ class Source:
 
 
 def _spellings(key: str) -> Iterator[list[str]]:
-    """The key's parts, then those under which a group of genes sets it, the narrowest first."""
+    """Yield the parts of the key, then its parts under each group that contains the gene, the smallest group first."""
     path = key.split(".")
     yield path
     if path[0] == "genome" and len(path) > 1:
@@ -48,13 +51,13 @@ def _spellings(key: str) -> Iterator[list[str]]:
 
 
 def _line_of(text: str, path: list[str]) -> int | None:
-    """The line that ends the setting of `path`: the first after which the file, cut off there, holds it.
+    """Return the last line of the setting of `path`; None if a value spans more lines than LONGEST_VALUE.
 
-    tomllib keeps no positions. What a file cut off at a line holds, it holds when cut off later, so halving finds the
-    line. None where a value spans more lines than LONGEST_VALUE.
+    tomllib does not report positions. A setting that is present in the first n lines is also present in any longer
+    part of the file, so bisection finds the smallest n.
     """
     lines = text.splitlines(keepends=True)
-    low, high = 0, len(lines)  # cut off at low, it does not hold it; at high it does
+    low, high = 0, len(lines)  # the setting is absent from the first `low` lines and present in the first `high`
     while high - low > 1:
         middle = (low + high) // 2
         cut, tree = _parsed_from(lines, middle)
@@ -68,8 +71,10 @@ def _line_of(text: str, path: list[str]) -> int | None:
 
 
 def _parsed_from(lines: list[str], count: int) -> tuple[int, Tree | None]:
-    """The first place from `count` on where the file can be cut off, and what it holds then: inside a value that spans
-    lines it does not parse."""
+    """Return the smallest number of lines, at least `count`, after which the file parses, and its settings then.
+
+    A file that ends within a value of several lines does not parse.
+    """
     for cut in range(count, min(count + LONGEST_VALUE, len(lines)) + 1):
         try:
             return cut, tomllib.loads("".join(lines[:cut]))

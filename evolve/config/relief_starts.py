@@ -1,4 +1,4 @@
-"""Where the genes of a relief start: what was spelled out for one number of them, for the eyes that a run has."""
+"""Start values of a relief's genes, converted to the number of genes that the run's eyes have."""
 
 from __future__ import annotations
 
@@ -18,17 +18,19 @@ Tree = dict[str, Any]
 
 
 def with_relief(tree: Tree, eye: EyeConfig) -> Tree:
-    """`tree`, whose starts for a relief of 4 x 4 genes, if it spells them out, become the same surface's for more, and
-    if they say one thing eightfold, an eighth of them where reliefs are symmetric.
+    """Return `tree` with start values for the relief that these eyes have.
+
+    Start values of all 4 x 4 genes are converted to the same surface with more genes. If reliefs are symmetric and the
+    values have the eightfold symmetry, only an eighth of them is returned.
 
     Raises:
-        ConfigError: they are spelled out for more than 4 x 4, but not for as many as there are.
+        ConfigError: start values are given for more than 4 x 4 genes, but not for the number of genes of these eyes.
     """
     genes, names = tree.get("genome", {}), doe_names(eye.relief_points)
     side = _spelled_out(genes)
     if PATCH < side < eye.relief_points:
         raise ConfigError(
-            f"eye.relief_points = {eye.relief_points}: heights of {side} x {side} points cannot become so many; "
+            f"eye.relief_points = {eye.relief_points}: heights of {side} x {side} points cannot be converted; "
             f"must be {side}",
             "eye.relief_points",
         )
@@ -44,19 +46,19 @@ def with_relief(tree: Tree, eye: EyeConfig) -> Tree:
 
 
 def _spelled_out(genes: Tree) -> int:
-    """The side of the square of relief genes that have a start, each and no others; 0 where they are no square."""
+    """Return N if exactly the relief genes of an N x N square have start values, else 0."""
     given = {name for name, use in genes.items() if name.startswith("doe_") and "start" in use}
     return next((side for side in range(PATCH, int(RELIEF_POINTS.high) + 1) if given == set(doe_names(side))), 0)
 
 
 def _same(one: Tree, other: Tree) -> bool:
-    """The same settings of a gene, its start up to rounding."""
+    """Return whether the settings of two genes are equal, with start values equal up to rounding."""
     rest, others = ({key: value for key, value in use.items() if key != "start"} for use in (one, other))
     return rest == others and math.isclose(one["start"], other["start"], abs_tol=1e-9)
 
 
 def no_such_gene(name: str, eye: EyeConfig) -> str:
-    """Why these eyes have no such relief gene."""
+    """Return a message that explains why these eyes lack a relief gene."""
     points = eye.relief_points
     if eye.relief_symmetric and name in doe_names(points):
         own = ", ".join(_relief_genes(eye))

@@ -1,4 +1,4 @@
-"""Configuration of a run: what is asked for, checked value by value, frozen."""
+"""Configuration of a run, with all values checked; immutable."""
 
 from __future__ import annotations
 
@@ -39,26 +39,27 @@ __all__ = [
 ]
 
 RHABDOMS = ("rhabdom_index", "rhabdom_surround", "rhabdom_length", "rhabdom_absorption")
-# Numerical apertures: 0.25 is a fly's. With less a rhabdom guides next to nothing, with more it has hundreds of modes.
+# Limits of the numerical aperture; a fly's is 0.25. Below the range a rhabdom guides almost no light, and above it
+# there are hundreds of modes.
 LEAST_STEP, MOST_STEP = 0.2, 0.5
-LEAST_EXPOSURE = 2e-4  # [lx s]: of some 30 photons from white at a = 1; of few, noise is not what it is taken for
+LEAST_EXPOSURE = 2e-4  # [lx s]: some 30 photons from white at a = 1; with fewer the approximation of noise fails
 
 
 @dataclass(frozen=True)
 class RunConfig:
-    """Everything that decides a run's outcome, and how many processes work on it.
+    """All settings that determine a run's outcome, and the number of its processes.
 
-    task: one of TASKS, or FILE.py:CLASS, a user's `sim.Task`
-    code: of a user's task, if the user has named it: nothing of it is executed otherwise
+    task: one of TASKS, or FILE.py:CLASS for a user's `sim.Task`
+    code: code of a user task that the user has named; code that is not named is never executed
 
     Raises:
-        ConfigError: settings that contradict each other.
+        ConfigError: settings contradict each other.
     """
 
     task: str
     seed: int = setting(0, Interval(0, 2**63 - 1), "seed of search, training and evaluation")
     workers: int = setting(0, Interval(0, 1024), "worker processes; 0: one per core")
-    task_sha256: str = setting("", None, "of the file of a task of one's own: another text is another task")
+    task_sha256: str = setting("", None, "SHA-256 of a user task's file; a changed file is a different task")
     eye: EyeConfig = field(default_factory=EyeConfig)
     world: WorldConfig = field(default_factory=WorldConfig)
     genome: Mapping[str, GeneConfig] = field(default_factory=lambda: _default_genome())
@@ -91,11 +92,11 @@ class RunConfig:
                 f"learning.batch_size = {self.learning.batch_size}: must be at most n_envs x n_steps = {rollout}",
                 *("learning.batch_size", "learning.n_envs", "learning.n_steps"),
             )
-        self._check_budget_stages(rollout)
+        self._check_rungs(rollout)
         if self.eye.receptor_pitch > 0 and self.eye.sensor_width != EyeConfig.sensor_width:
             raise ConfigError(
-                f"eye.sensor_width = {self.eye.sensor_width:g}: retinas are as wide as eye.receptor_pitch = "
-                f"{self.eye.receptor_pitch:g} makes them: set one of the two",
+                f"eye.sensor_width = {self.eye.sensor_width:g}: eye.receptor_pitch = {self.eye.receptor_pitch:g} "
+                "already determines the width of retinas: set one of the two",
                 *("eye.sensor_width", "eye.receptor_pitch"),
             )
         if (cramped := anatomy.contradiction(self.genome, self.eye)) is not None:
@@ -106,30 +107,30 @@ class RunConfig:
         for name in OPTIONAL_GENES:
             if name in self.genome and not self.card.has_gene(name):
                 raise ConfigError(
-                    f"genome.{name}: is for tasks of one's own; in {self.task} eyes look along the floor",
+                    f"genome.{name}: is for user tasks; in {self.task} eyes look along the floor",
                     *(f"genome.{name}", "task"),
                 )
         self._check_settings(OF_SLIDING_AGENTS)
 
     def _check_world(self) -> None:
-        """Only what the task's world has may be set."""
+        """Check the courses, and that the task has the settings of mazes and courses."""
         for name in ("course", "evaluation_course"):
             if (course := getattr(self.world, name)) not in COURSES:
                 raise ConfigError(f"world.{name} = {course!r}: must be one of {', '.join(COURSES)}", f"world.{name}")
         self._check_settings((*OF_MAZES, *OF_COURSES))
 
     def _check_settings(self, keys: tuple[str, ...]) -> None:
-        """Settings that the task does not have must be left at their defaults."""
+        """Check that settings of other tasks have their default values."""
         for key in keys:
             section, name = key.split(".")
             default = getattr(SECTIONS[section], name)
             if key not in self.card.settings and getattr(getattr(self, section), name) != default:
                 others = tasks_with(key)
-                whose = f"the task {others[0]}" if len(others) == 1 else "rhabdom's own agents"
+                whose = f"the task {others[0]}" if len(others) == 1 else "built-in tasks"
                 raise ConfigError(f"{key}: is for {whose}, not for {self.task}", key, "task")
 
     def _check_light(self) -> None:
-        """So little light that it must be a mistake, or a time to count photons in where none are counted."""
+        """Check that light is not implausibly weak, and that an integration time is set only with shot noise."""
         light, default = self.eye.illuminance, EyeConfig.integration_time
         if 0 < light * self.eye.integration_time < LEAST_EXPOSURE:
             raise ConfigError(
@@ -139,13 +140,13 @@ class RunConfig:
             )
         if light == 0 and self.eye.integration_time != default:
             raise ConfigError(
-                f"eye.integration_time = {self.eye.integration_time:g}: counts photons, and there are none: set "
+                f"eye.integration_time = {self.eye.integration_time:g}: has no effect without shot noise: set "
                 f"eye.illuminance, or leave it at {default:g}",
                 *("eye.integration_time", "eye.illuminance"),
             )
 
     def _check_rhabdoms(self) -> None:
-        """They guide, and behind a pupil; what describes them says nothing where there are none."""
+        """Check that rhabdoms guide light behind a pupil, and that their settings are changed only if there are any."""
         eye, default = self.eye, EyeConfig()
         for name in RHABDOMS if not eye.rhabdoms else ():
             if getattr(eye, name) != getattr(default, name):
@@ -154,13 +155,13 @@ class RunConfig:
                 )
         if eye.rhabdoms and not eye.optics:
             raise ConfigError(
-                "eye.rhabdoms = true: take waves of a pupil, and eye.optics = false has none",
+                "eye.rhabdoms = true: needs the waves of a pupil; eye.optics = false gives none",
                 "eye.rhabdoms",
                 "eye.optics",
             )
         if eye.rhabdom_length == 0 and eye.rhabdom_absorption != default.rhabdom_absorption:
             raise ConfigError(
-                f"eye.rhabdom_absorption = {eye.rhabdom_absorption:g}: absorbs along a length: set eye.rhabdom_length",
+                f"eye.rhabdom_absorption = {eye.rhabdom_absorption:g}: needs a length: set eye.rhabdom_length",
                 *("eye.rhabdom_absorption", "eye.rhabdom_length"),
             )
         step = math.sqrt(max(eye.rhabdom_index**2 - eye.rhabdom_surround**2, 0.0))
@@ -172,7 +173,7 @@ class RunConfig:
             )
 
     def _check_clusters(self) -> None:
-        """Something must be open, and nothing that the run leaves out."""
+        """Check that at least one gene is open, and no gene that the run does not use."""
         genes = [gene for name, gene in self.genes.items() if self.genome[name].open]
         opened = {
             cluster: [f"genome.{gene.name}.open" for gene in genes if gene.cluster == cluster] for cluster in CLUSTERS
@@ -192,8 +193,8 @@ class RunConfig:
             keys = [f"genome.{name}.open" for name in self.genome]
             raise ConfigError("genome: every gene is frozen; open at least one (genome.NAME.open = true)", *keys)
 
-    def _check_budget_stages(self, rollout: int) -> None:
-        """Successive halving ranks whole generations, and its first budget stage must teach something."""
+    def _check_rungs(self, rollout: int) -> None:
+        """Check that successive halving has whole generations and a first rung of at least one rollout."""
         search = self.search
         if search.rungs == 1:
             return
@@ -205,13 +206,13 @@ class RunConfig:
         first = self.learning.total_steps * search.promoted ** (search.rungs - 1)
         if first < rollout:
             raise ConfigError(
-                f"search.rungs = {search.rungs}: the first budget stage, {first:.0f} steps, is less than one rollout "
+                f"search.rungs = {search.rungs}: the first rung, {first:.0f} steps, is less than one rollout "
                 f"of {rollout} (learning.n_envs x n_steps)",
                 *("search.rungs", "search.promoted", "learning.total_steps"),
             )
 
     def _check_phases(self) -> None:
-        """Every open gene must open within the run, and one of them at its beginning."""
+        """Check that every open gene opens within the run, and at least one at its start."""
         opening = {name: use.opens_at for name, use in self.genome.items() if use.open}
         for name, generation in opening.items():
             if generation >= self.search.generations:
@@ -227,19 +228,19 @@ class RunConfig:
             )
 
     def __repr__(self) -> str:
-        """Short: there are some 150 settings."""
+        """Return a short description; all settings would be some 150."""
         search, steps = self.search, self.learning.total_steps
         plan = f"{search.generations} generations x {search.population} candidates x {steps:,} steps"
         return f"<RunConfig {self.task}, seed {self.seed}, {plan}>"
 
     @property
     def genes(self) -> Mapping[str, Gene]:
-        """Every gene that this run's animals have, by name."""
+        """All genes of this run's animals, by name."""
         return {name: gene for name, gene in self.eye.genes.items() if name in self.genome}
 
     @property
     def choice(self) -> TaskChoice:
-        """The task, and its code if it may run."""
+        """Task of the run, with its code if it may run."""
         return TaskChoice(self.task, self.task_sha256, self.code)
 
     @property
@@ -249,23 +250,23 @@ class RunConfig:
 
     @property
     def task_name(self) -> str:
-        """In a few letters: "detection"; the class of a user's task."""
+        """Short name of the task: "detection"; the class of a user task."""
         return self.card.name
 
     def with_code(self, named: str) -> RunConfig:
-        """The same, with the code of its task named: "FILE.py:CLASS".
+        """Return this configuration with the code of its task, named as "FILE.py:CLASS".
 
         Raises:
-            ConfigError: the run has no such task, the class has another name, or the file has changed.
+            ConfigError: the run has no user task, the class has another name, or the file has changed.
         """
         return replace(self, code=self.choice.read(named))
 
     @property
     def candidates(self) -> int:
-        """Evaluations in the whole run."""
+        """Number of candidates of the whole run."""
         return self.search.population * self.search.generations
 
 
 def _default_genome() -> Mapping[str, GeneConfig]:
-    """Of animals in the built-in tasks."""
+    """Return the default genes of animals in the built-in tasks."""
     return {name: gene.default for name, gene in GENES.items() if name not in OPTIONAL_GENES}

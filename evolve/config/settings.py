@@ -1,4 +1,4 @@
-"""The sections of a run's configuration: each setting with its default, its valid range and what it does."""
+"""Sections of a run's configuration: each setting with its default, valid range and effect."""
 
 from __future__ import annotations
 
@@ -22,41 +22,41 @@ __all__ = [
 
 @dataclass(frozen=True)
 class WorldConfig:
-    """What the worlds of a run are like, beside its task."""
+    """Settings of the worlds of a run."""
 
     mazes: int = setting(1, Interval(1, 32), "number of mazes in the task maze; an episode begins in any of them")
     unseen: bool = setting(
         False,
         None,
-        "evaluate in other mazes than those trained in; selection and early stopping use them, so not held out",
+        "evaluate in other mazes than those of training; selection and early stopping use them: they are not held out",
     )
-    course: str = setting("short", None, "navigation's course: short, or long, twice as long in half as many actions")
+    course: str = setting("short", None, "navigation's course: short, or long (twice the length, half the actions)")
     evaluation_course: str = setting("short", None, "navigation's course in evaluation")
     least_light: float = setting(
         1.0,
         Interval(1e-6, 1),
-        "darkest light that an episode may have, as a share of daylight; each draws its own between that and 1",
+        "darkest light of an episode, as a share of daylight; each episode draws its light between this and 1",
     )
 
     @property
     def training(self) -> dict[str, Any]:
-        """Arguments of `sim.make_vec_env` for worlds to learn in."""
+        """Arguments of `sim.make_vec_env` for training."""
         return {"mazes": self.mazes, "world_seed": 0, "course": self.course}
 
     @property
     def evaluation(self) -> dict[str, Any]:
-        """The same for those that fitness comes from."""
+        """Arguments of `sim.make_vec_env` for the evaluation of fitness."""
         return {"mazes": self.mazes, "world_seed": int(self.unseen), "course": self.evaluation_course}
 
     @property
     def vary(self) -> dict[str, tuple[float, float]] | None:
-        """What differs between episodes, as `sim.make_vec_env` has it; None: nothing."""
+        """Argument `vary` of `sim.make_vec_env`; None if episodes do not vary."""
         return {"light": (self.least_light, 1.0)} if self.least_light < 1 else None
 
 
 @dataclass(frozen=True)
 class SearchConfig:
-    """Who proposes candidates, how many at a time, and when it is told how they fared."""
+    """Settings of the search: optimizer, population and successive halving."""
 
     population: int = setting(16, Interval(2, 10_000), "candidates per generation")
     generations: int = setting(50, Interval(1, 100_000), "generations")
@@ -65,45 +65,45 @@ class SearchConfig:
     active: bool = setting(
         False,
         None,
-        "CMA learns from the worse half of a population, too; where the fittest are at the end of a gene's range, its "
+        "CMA also learns from the worse half of a population; if the fittest are at the end of a gene's range, its "
         "steps then grow without bound",
     )
     steady_state: bool = setting(
         False, None, "propose a new candidate as soon as one has been evaluated; if false, generation by generation"
     )
     rungs: int = setting(
-        1, Interval(1, 10), "budget stages of a training; after each, only the better candidates go on; 1: no halving"
+        1, Interval(1, 10), "rungs of a training run; only the better candidates continue after a rung; 1: no halving"
     )
     promoted: float = setting(
         0.5,
         Interval(0, 0.9, open_low=True),
-        "share of candidates that go on after a budget stage; also a stage's budget as a share of the next one's",
+        "share of candidates that continue after a rung; also a rung's budget as a share of the next rung's",
     )
 
 
 @dataclass(frozen=True)
 class LearningConfig:
-    """PPO, for each candidate."""
+    """Settings of PPO, for each candidate."""
 
     total_steps: int = setting(1_000_000, Interval(1, 10**10), "agent steps to train for")
     n_envs: int = setting(128, Interval(1, 65_536), "worlds simulated in parallel")
     n_steps: int = setting(32, Interval(2, 10**6), "steps per world between updates")
     batch_size: int = setting(1024, Interval(2, 10**7), "samples per gradient step")
-    n_epochs: int = setting(10, Interval(1, 1000), "passes over the samples per update, at first")
+    n_epochs: int = setting(10, Interval(1, 1000), "initial number of passes over the samples per update")
     least_epochs: int = setting(
         3,
         Interval(1, 1000),
-        "fewest passes, to which they fall once the step size has halved; n_epochs or more: they stay as many",
+        "minimum number of passes, which fall to it after the step size has halved; n_epochs or more: constant passes",
     )
     learning_rate: float = setting(
         3e-3,
         Interval(0, 1, open_low=True),
-        "initial step size of Adam; brains of more than 64 units take √(64 / units) of it",
+        "initial step size of Adam; brains of more than 64 units use √(64 / units) of it",
     )
     decay_after: int = setting(
         75_000,
         Interval(1, 10**10),
-        "steps after which learning slows down as one over the steps: Adam's step size halves, then passes get fewer",
+        "steps after which learning slows down as 1/steps: Adam's step size falls to half, then the passes decrease",
     )
     gamma: float = setting(0.9, Interval(0, 1), "discount per step")
     gae_lambda: float = setting(
@@ -118,15 +118,15 @@ class LearningConfig:
     contact_ramp: int = setting(
         0,
         Interval(0, 10**10),
-        "steps until contact costs its full price: a tenth of it for a third of them, then rising exponentially",
+        "steps until contact has its full cost: a tenth of it for the first third, then rising exponentially",
     )
     rays_per_receptor: float = setting(
         8.0,
         Interval(0, 4096, open_low=True),
-        "most rays, or areas, per receptor and frame in training and in its checkpoints",
+        "maximum rays, or areas, per receptor and frame in training and in its checkpoints",
     )
     least_return: float = setting(
-        0.0, Interval(-1e6, 0), "a training episode whose rewards add up to no more is truncated; 0: none is"
+        0.0, Interval(-1e6, 0), "a training episode is truncated when its return falls to this value; 0: never"
     )
     eval_interval: int = setting(50_000, Interval(1, 10**10), "training steps between evaluations")
     patience: int = setting(5, Interval(1, 10**6), "evaluations without improvement before training stops")
@@ -134,7 +134,7 @@ class LearningConfig:
 
 @dataclass(frozen=True)
 class EvaluationConfig:
-    """Fitness of a trained candidate."""
+    """Settings of the evaluation of fitness."""
 
     episodes: int = setting(32, Interval(1, 10_000), "evaluation episodes whose mean return is the fitness")
 

@@ -1,4 +1,4 @@
-"""Where settings come from: presets and their scales, tasks, TOML files, `--set key=value`."""
+"""Sources of settings: presets and their scales, tasks, TOML files, `--set key=value`."""
 
 from __future__ import annotations
 
@@ -26,17 +26,17 @@ __all__ = [
 ]
 
 Tree = dict[str, Any]
-SCALES = ("laptop", "paper")  # of the presets that have scales; the first unless asked otherwise
+SCALES = ("laptop", "paper")  # scales of presets that have several; the first is the default
 
 
 def preset_names() -> list[str]:
-    """Names that `preset` takes."""
+    """Return the names of all presets."""
     folder = resources.files("evolve") / "presets"
     return sorted(entry.name.removesuffix(".toml") for entry in folder.iterdir() if entry.name.endswith(".toml"))
 
 
 def preset_about(name: str) -> dict[str, Any]:
-    """A preset's name, its task (None: any), its scales, and what it is for: the first sentence of its file."""
+    """Return a preset's name, task (None: any), scales and purpose, which is the first sentence of its file."""
     text = (resources.files("evolve") / "presets" / f"{name}.toml").read_text(encoding="utf-8")
     tree = tomllib.loads(text)
     remarks = " ".join(line.removeprefix("# ") for line in takewhile(lambda line: line[:1] == "#", text.split("\n")))
@@ -46,10 +46,10 @@ def preset_about(name: str) -> dict[str, Any]:
 
 
 def preset_sources(name: str | None, scale: str | None) -> list[Source]:
-    """A preset's settings, and over them those of its scale; [] without a preset.
+    """Return a preset's settings, followed by the settings of its scale, which override them; [] without a preset.
 
     Raises:
-        ConfigError: there is no such preset or scale.
+        ConfigError: the preset or the scale is unknown.
     """
     if name is None:
         return []
@@ -70,17 +70,17 @@ def preset_sources(name: str | None, scale: str | None) -> list[Source]:
 
 
 def task_defaults(task: Any) -> Source:
-    """What a task sets unless a run says otherwise: evolve/config/tasks/TASK.toml, if there is one."""
+    """Return the default settings of a task from evolve/config/tasks/TASK.toml, if the file exists."""
     file = resources.files("evolve") / "config" / "tasks" / f"{task}.toml"
     known = isinstance(task, str) and task in TASKS
     return Source("", tomllib.loads(file.read_text(encoding="utf-8")) if known and file.is_file() else {})
 
 
 def read_toml(path: Path) -> Source:
-    """A TOML file.
+    """Read a TOML file.
 
     Raises:
-        ConfigError: one line, naming file and, where there is one to name, line.
+        ConfigError: the file cannot be read; one line that names the file and, if known, the line.
     """
     try:
         return parsed_toml(path.read_bytes(), str(path))
@@ -89,10 +89,10 @@ def read_toml(path: Path) -> Source:
 
 
 def parsed_toml(text: bytes | str, name: str) -> Source:
-    """TOML, from the place that messages call `name`.
+    """Parse TOML text, which messages call `name`.
 
     Raises:
-        ConfigError: one line, as `read_toml`.
+        ConfigError: the text is not valid TOML; see `read_toml`.
     """
     try:
         text = text.decode("utf-8") if isinstance(text, bytes) else text
@@ -101,7 +101,7 @@ def parsed_toml(text: bytes | str, name: str) -> Source:
         raise ConfigError(f"{name}: is not UTF-8 text") from error
     except tomllib.TOMLDecodeError as error:
         raise ConfigError(f"{name}: is not valid TOML: {error}") from error
-    except (ValueError, RecursionError) as error:  # a number of 6,000 digits, brackets within brackets
+    except (ValueError, RecursionError) as error:  # a number of 6,000 digits, or deeply nested brackets
         raise ConfigError(f"{name}: is not valid TOML: {_first_line(error)}") from error
 
 
@@ -110,10 +110,10 @@ def _first_line(error: Exception) -> str:
 
 
 def read_assignment(text: str) -> Source:
-    """{"search": {"population": 8}} from "search.population=8"; the value is TOML, a bare word is text.
+    """Return {"search": {"population": 8}} for "search.population=8"; the value is TOML, and a bare word is text.
 
     Raises:
-        ConfigError: it does not look like that.
+        ConfigError: the text has another form.
     """
     key, equals, value = (part.strip() for part in text.partition("="))
     parts = key.split(".")
@@ -123,7 +123,7 @@ def read_assignment(text: str) -> Source:
         found: Tree = tomllib.loads(f"value = {value}")
     except tomllib.TOMLDecodeError:
         found = {"value": value}
-    except (ValueError, RecursionError) as error:  # a number of 6,000 digits, brackets within brackets
+    except (ValueError, RecursionError) as error:  # a number of 6,000 digits, or deeply nested brackets
         raise ConfigError(f"--set {key}: {_first_line(error)}") from error
     if found.keys() != {"value"}:
         raise ConfigError(f"--set {text!r}: must be one setting")

@@ -1,4 +1,4 @@
-"""Square eyes have one gene for both sides; what was said alike of height and width holds for it."""
+"""Square eyes: one gene for both sides, which takes equal settings of height and width."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ __all__ = ["no_such_side", "with_square_eyes"]
 
 
 def with_square_eyes(source: Source, eye: EyeConfig) -> Source:
-    """`source`, whose settings of height and width, if they are the same, are those of a square eye's gene.
+    """Return `source` with equal settings of height and width moved to the gene of a square eye.
 
-    A task or a preset may be written for one row of receptors. If a user asks for square eyes instead, the task's
-    height does not hold, and the preset's width is that of the square.
+    A task or a preset may be written for one row of receptors. If a user selects square eyes instead, the task's
+    height is ignored, and the preset's width applies to both sides.
     """
     genes = source.tree.get("genome", {})
     if eye.square and not source.name:
@@ -30,7 +30,7 @@ def with_square_eyes(source: Source, eye: EyeConfig) -> Source:
 
 
 def no_such_side(name: str, eye: EyeConfig) -> str:
-    """Why these eyes have no such gene."""
+    """Return a message that explains why these eyes lack a gene."""
     if eye.square:
         return f"genome.{name}: square eyes have the gene {SIDE} for both sides; set it, or eye.square = false"
     return f"genome.{name}: only square eyes have this gene, others have {' and '.join(SIDES)}; set eye.square = true"

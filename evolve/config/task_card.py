@@ -1,4 +1,4 @@
-"""The properties of a task that are known without executing it. Settings, lint, tables and titles read them here."""
+"""Properties of a task that are known without executing it; used by settings, lint, tables and titles."""
 
 from __future__ import annotations
 
@@ -11,19 +11,21 @@ from sim.worlds.catalog import TASKS
 
 __all__ = ["CARDS", "OF_COURSES", "OF_SLIDING_AGENTS", "TaskCard", "card_of", "tasks_with"]
 
-# Settings that only some tasks have. A sliding agent has a speed, a turn and contact with walls.
+# Settings that only some tasks have. A sliding agent has a speed, a turning rate and contact with walls.
 OF_SLIDING_AGENTS = ("world.least_light", "learning.first_speed", "learning.contact_ramp", "learning.least_return")
 OF_MAZES = ("world.mazes", "world.unseen")
 OF_COURSES = ("world.course", "world.evaluation_course")
-OPTIONAL_GENES = (TILT,)  # of some tasks only
+OPTIONAL_GENES = (TILT,)  # genes that only some tasks have
 
 
 @dataclass(frozen=True)
 class TaskCard:
-    """name: in directories and tables · title: in headings
+    """Properties of a task.
+
+    name: name in directories and tables · title: name in headings
     aim: completes "Eyes and brains evolved ..."
-    settings: of those that only some tasks have · genes: the same
-    grey: whether its world reflects all wavelengths alike; None: unknown
+    settings: settings of this task that some tasks lack · genes: genes of this task that some tasks lack
+    grey: whether all wavelengths are reflected equally in its world; None: unknown
     has_file: whether it is a class in a user's file
     """
 
@@ -36,7 +38,7 @@ class TaskCard:
     has_file: bool = False
 
     def has_gene(self, name: str) -> bool:
-        """Whether animals in this task have this gene."""
+        """Return whether animals in this task have this gene."""
         return name not in OPTIONAL_GENES or name in self.genes
 
 
@@ -58,15 +60,15 @@ CARDS = {
 
 
 def card_of(task: Any) -> TaskCard | None:
-    """Of a built-in task by its name, or of a user task, "FILE.py:CLASS"; None: it is neither."""
+    """Return the card of a built-in task, given its name, or of a user task "FILE.py:CLASS"; None for other values."""
     if not isinstance(task, str):
         return None
     if LABEL.fullmatch(task) is not None:
         name = task.rpartition(":")[2]
-        return TaskCard(name, name, f"for {task}, a task of one’s own", genes=(TILT,), has_file=True)
+        return TaskCard(name, name, f"for {task}, a user task", genes=(TILT,), has_file=True)
     return CARDS.get(task)
 
 
 def tasks_with(setting: str) -> list[str]:
-    """Names of the built-in tasks that have this setting."""
+    """Return the names of the built-in tasks that have this setting."""
     return [name for name, card in CARDS.items() if setting in card.settings]

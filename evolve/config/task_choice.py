@@ -1,4 +1,4 @@
-"""The choice of a task: a built-in one by its name, or a user's by file and class."""
+"""Choice of a task: a built-in task by its name, or a user task by file and class."""
 
 from __future__ import annotations
 
@@ -15,8 +15,11 @@ __all__ = ["TaskChoice"]
 
 @dataclass(frozen=True)
 class TaskChoice:
-    """label: in config.toml: a built-in task's name, or FILE.py:CLASS
-    sha256: of the file, "" if there is none · code: of a user's task, if the user has named it: only then may it run
+    """A task, and the code that may run.
+
+    label: value in config.toml: a built-in task's name, or FILE.py:CLASS
+    sha256: hash of the file, "" if there is none
+    code: code of a user task that the user has named; code that is not named must not run
     """
 
     label: str
@@ -25,10 +28,10 @@ class TaskChoice:
 
     @classmethod
     def named(cls, said: str) -> TaskChoice:
-        """The task that a command names. A file is read, and not executed.
+        """Return the task that a command names; a file is read but not executed.
 
         Raises:
-            ConfigError: no such file or class, or no Python.
+            ConfigError: the file or class does not exist, or the file is not valid Python.
         """
         if not names_code(said):
             return cls(said)
@@ -37,19 +40,19 @@ class TaskChoice:
 
     @property
     def settings(self) -> dict[str, str]:
-        """What config.toml says of it."""
+        """Return the task's entries in config.toml."""
         return {"task": self.label, **({"task_sha256": self.sha256} if self.sha256 else {})}
 
     @property
     def card(self) -> TaskCard:
-        """Its properties.
+        """Properties of the task.
 
         Raises:
-            ConfigError: there is no such task, or its hash is missing or belongs to no file.
+            ConfigError: the task does not exist, its hash is missing, or a hash is given for a task without a file.
         """
         if (card := card_of(self.label)) is None:
             raise ConfigError(
-                f"task = {quoted(self.label)}: must be one of {', '.join(TASKS)}, or FILE.py:CLASS, one of your own",
+                f"task = {quoted(self.label)}: must be one of {', '.join(TASKS)}, or FILE.py:CLASS of a user task",
                 "task",
             )
         if re.fullmatch("[0-9a-f]{64}" if card.has_file else "", self.sha256 or "") is None:
@@ -59,32 +62,32 @@ class TaskChoice:
 
     @property
     def named_code(self) -> TaskCode | None:
-        """The code of a user's task; None: a built-in task needs none.
+        """Code of a user task; None for a built-in task, which has none.
 
         Raises:
-            ConfigError: the user has not named it, so it must not run.
+            ConfigError: the user has not named the code, so it must not run.
         """
         if self.sha256 and self.code is None:
             raise ConfigError(
                 f"this run evolves {self.label}, whose code runs only if you name it: add --task {self.label} "
-                "(or the file's path where it is now)"
+                "(or the present path of the file)"
             )
         return self.code
 
     def read(self, named: str) -> TaskCode:
-        """The code of this task, which the user names as "FILE.py:CLASS".
+        """Return the code of this task, which the user names as "FILE.py:CLASS".
 
         Raises:
             ConfigError: this task has no code, the class has another name, or the file has changed.
         """
         if not self.sha256:
-            raise ConfigError(f"--task {named}: this run's task, {self.label}, is rhabdom's own: leave it out")
+            raise ConfigError(f"--task {named}: this run's task, {self.label}, is built in: leave --task out")
         code = TaskCode.read(named)
         if code.name != self.card.name:
             raise ConfigError(f"--task {named}: this run evolves {self.label}, not {code.name}")
         if code.sha256 != self.sha256:
             raise ConfigError(
                 f"--task {named}: {code.file.name} has changed since the run began (SHA-256 {code.sha256[:12]}..., was "
-                f"{self.sha256[:12]}...): bring the old text back, or begin a new run"
+                f"{self.sha256[:12]}...): restore the old file, or start a new run"
             )
         return code

@@ -1,5 +1,7 @@
-"""The code of a user's task, as text: a class of a Python file. It is read and hashed here, and executed only by
-`evolve.learning.task_module`."""
+"""Source text of a user task, which is a class in a Python file.
+
+The file is read and hashed here, and executed only by `evolve.learning.task_module`.
+"""
 
 from __future__ import annotations
 
@@ -21,9 +23,9 @@ LARGEST_FILE = 2_000_000  # bytes
 
 @dataclass(frozen=True)
 class TaskCode:
-    """FILE.py:CLASS as it was read.
+    """Contents of FILE.py:CLASS.
 
-    name: of the class · file: where it was · text: of the whole file
+    name: name of the class · file: path of the file · text: text of the whole file
     """
 
     name: str
@@ -32,7 +34,7 @@ class TaskCode:
 
     @property
     def label(self) -> str:
-        """What a run's config calls it, wherever the file is."""
+        """Name in a run's config, which does not contain the folder of the file."""
         return f"{self.file.name}:{self.name}"
 
     @property
@@ -41,10 +43,10 @@ class TaskCode:
 
     @classmethod
     def read(cls, named: str) -> TaskCode:
-        """From "FILE.py:CLASS"; the file is parsed, and not executed.
+        """Read "FILE.py:CLASS"; the file is parsed but not executed.
 
         Raises:
-            ConfigError: one line: no such file or class, or no Python.
+            ConfigError: the file or class does not exist, or the file is not valid Python; one line.
         """
         place, _, name = named.partition(".py:") if ".py:" in named else (named.removesuffix(".py"), "", "")
         file = Path(f"{place}.py")
@@ -65,12 +67,12 @@ class TaskCode:
 
 
 def names_code(said: Any) -> bool:
-    """Whether a user who specifies this task means a Python file."""
+    """Return whether the name of a task denotes a Python file."""
     return isinstance(said, str) and (said.endswith(".py") or ".py:" in said)
 
 
 def _parsed(file: Path, content: bytes) -> tuple[str, list[str]]:
-    """The text, and the names of its classes."""
+    """Return the text of a file and the names of its classes."""
     try:
         text = content.decode("utf-8").replace("\r\n", "\n")
         tree = ast.parse(text, str(file))
@@ -78,6 +80,6 @@ def _parsed(file: Path, content: bytes) -> tuple[str, list[str]]:
         raise ConfigError(f"{file}: is not UTF-8 text", "task") from error
     except SyntaxError as error:
         raise ConfigError(f"{file}, line {error.lineno}: {error.msg}", "task") from error
-    except (ValueError, RecursionError) as error:  # null bytes; brackets within brackets
-        raise ConfigError(f"{file}: is no Python: {error}", "task") from error
+    except (ValueError, RecursionError) as error:  # null bytes, or deeply nested brackets
+        raise ConfigError(f"{file}: is not valid Python: {error}", "task") from error
     return text, [node.name for node in tree.body if isinstance(node, ast.ClassDef)]

@@ -1,12 +1,12 @@
-"""From a vector of numbers to an animal.
+"""Development of a genome, a vector of numbers, into an animal.
 
-genes         GENES: what evolution may change
-genotype      Genotype: the encoding
-phenotype     Phenotype, develop
-phenotype_on_record  one as a file has it, checked
-eye_config    EyeConfig: settings that all eyes of a run have in common
-anatomy       eyes and receptors take room
-relief_genes  the genes of a relief
+genes         GENES: quantities that evolution can change
+genotype      Genotype: encoding of gene values in a genome
+phenotype     Phenotype: the animal; develop
+phenotype_on_record  checks of a phenotype that was read from a file
+eye_config    EyeConfig: settings shared by all eyes of a run
+anatomy       space constraints of eyes and receptors
+relief_genes  genes of a relief
 interval      ranges of values
-plain_values  values from a file, or one line
+plain_values  checks of values that were read from a file
 """

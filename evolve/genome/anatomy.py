@@ -1,8 +1,9 @@
-"""Anatomy: eyes and receptors take room. What overlaps is repaired, by changing genes as little as will do.
+"""Space constraints of eyes and receptors; overlaps are repaired by the smallest sufficient change of genes.
 
-Eyes sit on the equator of a head of radius `eye.head_radius`, each as wide as its retina; neighbours are
-placement range / (eyes - 1) apart. Retinas are all `eye.sensor_width` wide, with receptors side by side, none narrower
-than `eye.receptor_width`; or, where `eye.receptor_pitch` is above 0, as wide as so many receptors of that width.
+Eyes sit on the equator of a head of radius `eye.head_radius`, and an eye has the width of its retina. The angle between
+neighbours is placement range / (eyes - 1). All retinas are `eye.sensor_width` wide and filled with receptors, which are
+at least `eye.receptor_width` wide. If `eye.receptor_pitch` is above 0, the width of a retina is instead the number of
+receptors times this pitch.
 """
 
 from __future__ import annotations
@@ -19,26 +20,26 @@ Values = dict[str, float]
 Uses = Mapping[str, GeneConfig]
 Pair = tuple[float, float]
 Contradiction = tuple[str, tuple[str, ...]]
-SLACK = 1e-9  # of rounding: eyes that just touch do not overlap
+SLACK = 1e-9  # tolerance for rounding, so that eyes in contact do not count as overlapping
 
 
 def retina_width(receptors: float, sizes: EyeConfig) -> float:
-    """Width of a retina with so many receptors side by side [m]: an eye's on the head."""
+    """Return the width of a retina with this number of receptors [m], which is also the eye's width on the head."""
     return receptors * sizes.receptor_pitch if sizes.receptor_pitch > 0 else sizes.sensor_width
 
 
 def sides(values: Values) -> tuple[int, int]:
-    """An eye's receptors, (height, width)."""
+    """Return an eye's numbers of receptors (height, width)."""
     height, width = (SIDE, SIDE) if SIDE in values else SIDES
     return int(values[height]), int(values[width])
 
 
 def fitted(values: Values, uses: Uses, sizes: EyeConfig) -> Values:
-    """`values` of an animal in which nothing overlaps; genes stay within their searched ranges.
+    """Return `values` after repair of overlaps; genes stay within their searched ranges.
 
-    Receptors too narrow are fewer, and rhabdoms wider than receptors narrower. Eyes too close are spread; where the
-    searched range of their placement ends, there are fewer of them, or, where eyes of fewer receptors are narrower,
-    fewer of both in like proportion.
+    Too narrow receptors are reduced in number, and rhabdoms are narrowed to the width of a receptor. Eyes that overlap
+    are spread. If the searched range of their placement is too small, the number of eyes is reduced. If the width of an
+    eye depends on its receptors, eyes and receptors are reduced in the same proportion instead.
     """
     fits, width = dict(values), _width_gene(uses)
     fits[width] = min(values[width], float(_most_receptors(sizes)))
@@ -56,11 +57,12 @@ def fitted(values: Values, uses: Uses, sizes: EyeConfig) -> Values:
 
 
 def _thinned(asked: Pair, least: Pair, range_deg: float, sizes: EyeConfig) -> Pair:
-    """The eyes and their receptors that are most like those asked for, of those that fit and are not below the least.
+    """Return the numbers of eyes and receptors that fit, are at least `least`, and are most similar to `asked`.
 
-    Likeness is by ratios: the least sum of squared logarithms halves both rather than quarter one. Were one of them
-    always to give way, evolution would drift to the other; selection is to choose between eyes and receptors. Room goes
-    with the gaps between eyes, one fewer than eyes; counted halfway, they keep their proportion to receptors best.
+    Similarity is the sum of squared logarithms of ratios, which halves both numbers rather than quartering one. If the
+    repair always reduced the same number, evolution would drift towards the other; the choice between eyes and
+    receptors is left to selection. The required space depends on the gaps between eyes, which are one fewer than the
+    eyes. The ratio uses the mean of the counts of eyes and gaps, which preserves their proportion to receptors best.
     """
     (eyes, receptors), (fewest_eyes, fewest) = asked, least
     counts = range(int(fewest), int(receptors) + 1)
@@ -74,7 +76,7 @@ def _ratio(one: float, other: float) -> float:
 
 
 def contradiction(uses: Uses, sizes: EyeConfig) -> Contradiction | None:
-    """Why no animal with these genes fits together, and the settings to blame; None if every genome can be repaired."""
+    """Return a message and the settings that cause it if no genome fits; None if every genome can be repaired."""
     return _crowded_retina(uses, sizes) or _crowded_head(uses, sizes)
 
 

@@ -1,4 +1,4 @@
-"""The settings that all eyes of a run have in common."""
+"""Settings shared by all eyes of a run."""
 
 from __future__ import annotations
 
@@ -11,68 +11,66 @@ from evolve.genome.interval import Interval
 
 __all__ = ["AUTO", "EyeConfig", "setting"]
 
-AUTO = "auto"  # in place of a number: chosen when it is needed
+AUTO = "auto"  # value instead of a number, which is then chosen on use
 
 
 def setting(default: Any, valid: Interval | None, meaning: str) -> Any:
-    """Dataclass field that knows its valid range and what it does."""
+    """Return a dataclass field with a valid range and a meaning."""
     return field(default=default, metadata={"valid": valid, "meaning": meaning})
 
 
 @dataclass(frozen=True)
 class EyeConfig:
-    """What all eyes of a run have in common."""
+    """Settings shared by all eyes of a run."""
 
     optics: bool = setting(True, None, "see through the pupil and its relief; if false, through a perfect lens")
     sensor_width: float = setting(
-        200e-6, Interval(1e-6, 1e-2), "width of the retina [m]; unless receptor_pitch gives it"
+        200e-6, Interval(1e-6, 1e-2), "width of the retina [m], unless receptor_pitch determines it"
     )
     noise_sigma: float = setting(0.01, Interval(0, 10), "standard deviation of a receptor's noise [signal]")
     illuminance: float = setting(
-        0.0, Interval(0, 1e6), "daylight on the scene [lx], of which receptors count the photons; 0: no shot noise"
+        0.0, Interval(0, 1e6), "illuminance of the scene [lx], which determines shot noise; 0: no shot noise"
     )
     integration_time: float = setting(
         0.02, Interval(1e-6, 1e3), "time over which a receptor sums photons [s]; used only if illuminance is above 0"
     )
     receptors: str = setting(
-        "rgb", None, "receptor types: rgb, lms, honeybee or goldfish; genes: each animal's spectral genes decide"
+        "rgb", None, "receptor types: rgb, lms, honeybee or goldfish; genes: from each animal's spectral genes"
     )
     bands: int = setting(4, Interval(1, 64), "spectral bands")
-    relief_height: float = setting(
-        100e-6, Interval(0, 1e-2, open_low=True), "height of the relief where its gene is 1 [m]"
-    )
+    relief_height: float = setting(100e-6, Interval(0, 1e-2, open_low=True), "height of the relief at gene value 1 [m]")
     relief_points: int = setting(
         4,
         RELIEF_POINTS,
-        "relief genes along one side; 4 make a bicubic patch, more a cubic spline through their heights",
+        "relief genes along one side; 4: a bicubic patch; more: a cubic spline through their heights",
     )
     relief_symmetric: bool = setting(
-        False, None, "reliefs stay the same when mirrored or turned by 90 degrees, so an eighth of the genes is enough"
+        False, None, "reliefs are invariant under reflection and rotation by 90 degrees, with an eighth of the genes"
     )
     rays_per_receptor: float | str = setting(
         AUTO,
         Interval(0, 4096, open_low=True),
-        "rays traced per receptor and frame; auto: as few as the noise allows, or areas",
+        "rays traced per receptor and frame; auto: the minimum that the noise allows, or areas",
     )
     square: bool = setting(
-        False, None, "eyes are square: the gene resolution in place of resolution_height and resolution_width"
+        False, None, "eyes are square: the gene resolution replaces resolution_height and resolution_width"
     )
     receptor_pitch: float = setting(
         0.0,
         Interval(0, 1e-4),
-        "width of a receptor [m], so that eyes of more receptors are wider; 0: all retinas are sensor_width wide",
+        "width of a receptor [m], so that eyes with more receptors are wider; 0: all retinas are sensor_width wide",
     )
     rhabdoms: bool = setting(
         False,
         None,
-        "receptors are rhabdoms, which take light in modes; if false, squares that absorb all light on them",
+        "receptors are rhabdoms, which guide light in modes; if false, squares that absorb all incident light",
     )
     rhabdom_index: float = setting(1.363, Interval(1, 2), "refractive index of rhabdoms")
-    rhabdom_surround: float = setting(1.340, Interval(1, 2), "refractive index of what is around them")
+    rhabdom_surround: float = setting(1.340, Interval(1, 2), "refractive index of the medium around rhabdoms")
     rhabdom_length: float = setting(
         0.0,
         Interval(0, 1e-2),
-        "length of rhabdoms [m], along which light is absorbed; 0: all that is caught is absorbed",
+        "length of rhabdoms [m], along which light is absorbed; 0: all guided light is absorbed",
     )
     rhabdom_absorption: float = setting(
         6e3, Interval(0, 1e6, open_low=True), "absorption along rhabdoms [1/m]; used only if rhabdom_length is above 0"
@@ -86,5 +84,5 @@ class EyeConfig:
 
     @property
     def genes(self) -> Mapping[str, Gene]:
-        """Every gene that animals with such eyes have, by name."""
+        """All genes of animals with these eyes, by name."""
         return gene_table(self.relief_points, self.relief_symmetric, self.square, self.rhabdoms)

@@ -1,4 +1,4 @@
-"""The genes: what evolution may change, in which units and ranges, and how a run uses each unless told otherwise."""
+"""The genes: quantities that evolution can change, with their units, ranges and default use in a run."""
 
 from __future__ import annotations
 
@@ -35,24 +35,24 @@ __all__ = [
 
 Cluster = Literal["morphological", "optical", "neural", "spectral"]
 CLUSTERS: tuple[Cluster, ...] = ("morphological", "optical", "neural", "spectral")
-FAMILIES = ("doe", "lambda_max")  # genes of one kind: what their names begin with
-RELIEF_POINTS = Interval(4, 9)  # of a relief along one side; names of its genes have a digit for each side
-SIDE = "resolution"  # of a square eye, which has it in place of the two
+FAMILIES = ("doe", "lambda_max")  # prefixes of the names of genes of one kind
+RELIEF_POINTS = Interval(4, 9)  # points along one side of a relief; its genes' names have one digit for each side
+SIDE = "resolution"  # gene of a square eye, which replaces SIDES
 SIDES = ("resolution_height", "resolution_width")
-RHABDOM = "rhabdom_diameter_um"  # of eyes whose receptors are rhabdoms
-TILT = "elevation_deg"  # of eyes on bodies of somebody's own; rhabdom's own agents look along the floor
+RHABDOM = "rhabdom_diameter_um"  # gene of eyes whose receptors are rhabdoms
+TILT = "elevation_deg"  # gene in user tasks; in built-in tasks eyes look along the floor
 REAL: Literal["real"] = "real"
 INTEGER: Literal["integer"] = "integer"
 APERTURE_SHAPES = ("circle", "annulus", "slit", "triangle", "square", "pentagon", "hexagon")
-# Where the peaks of the types of receptor start [nm]: red, green and blue as of "rgb", then one in the ultraviolet.
+# Start values of the receptor types' peaks [nm]: red, green and blue as in "rgb", then one in the ultraviolet.
 LAMBDA_MAX: Mapping[str, float] = {f"lambda_max_{i}_nm": peak for i, peak in enumerate((600, 520, 460, 360))}
 
 
 @dataclass(frozen=True)
 class GeneConfig:
-    """How a run uses one gene: evolved over [low, high] from `start` where open, else held at `start`.
+    """Use of one gene in a run: an open gene evolves over [low, high] from `start`; a frozen gene stays at `start`.
 
-    opens_at: the first generation that varies it; until then it is held at its start
+    opens_at: first generation that varies the gene, which stays at `start` until then
     """
 
     open: bool
@@ -64,7 +64,7 @@ class GeneConfig:
 
 @dataclass(frozen=True)
 class Gene:
-    """One gene: the values that make sense at all (`range`) and how a run uses it unless told otherwise (`default`)."""
+    """One gene, with its valid values (`range`) and its default use in a run (`default`)."""
 
     name: str
     cluster: Cluster
@@ -76,23 +76,27 @@ class Gene:
 
     @property
     def mutation(self) -> str:
-        """How the optimizer "mutation" varies it; any other draws from the distribution it has learnt."""
+        """Kind of mutation by the optimizer "mutation"; other optimizers sample a distribution that they adapt."""
         return "Gaussian" if self.kind == "real" else "±1"
 
     def decode(self, u: float, use: GeneConfig) -> float:
-        """Gene's value at u in [0, 1]. Integers share [0, 1] in equal parts, so the ends are as likely as the rest."""
+        """Return the gene's value at u in [0, 1]; all integers have equal shares of [0, 1]."""
         if self.kind == "real":
             return use.low + u * (use.high - use.low)
         return min(use.low + float(np.floor(u * (use.high - use.low + 1))), use.high)
 
     def encode(self, value: float, use: GeneConfig) -> float:
-        """Inverse of `decode`: for integers the middle of the value's part of [0, 1]."""
+        """Return the inverse of `decode`; for an integer, the middle of its share of [0, 1]."""
         if self.kind == "real":
             return (value - use.low) / (use.high - use.low)
         return (value - use.low + 0.5) / (use.high - use.low + 1)
 
     def mutated(self, u: float, sigma: float, normal: float, step: int, use: GeneConfig) -> float:
-        """u after one mutation: a real gene by `normal` σ's, reflected at the ends; an integer by `step`, kept in."""
+        """Return u after one mutation.
+
+        A real gene moves by `normal` times sigma and is reflected at the ends; an integer moves by `step` and is
+        clipped to its range.
+        """
         if self.kind == "integer":
             value = self.decode(u, use) + step
             return self.encode(min(max(value, use.low), use.high), use)
@@ -104,8 +108,11 @@ class Gene:
 def gene_table(
     relief_points: int = 4, relief_symmetric: bool = False, square: bool = False, rhabdoms: bool = False
 ) -> Mapping[str, Gene]:
-    """Every gene by name, in the order in which they stand in a genome; the relief has relief_points² of them, or those
-    of an eighth of it, square eyes have one for both their sides, and rhabdoms one for how wide they are."""
+    """Return all genes by name, in the order of the genome.
+
+    The relief has relief_points² genes, or the genes of an eighth if it is symmetric. Square eyes have one gene for
+    both sides, and rhabdoms one for their diameter.
+    """
     relief = set(representatives(relief_points, relief_symmetric))
     absent = (*(SIDES if square else (SIDE,)), *(() if rhabdoms else (RHABDOM,)))
     return {
@@ -125,7 +132,7 @@ def _body() -> list[Gene]:
     return [
         gene("n_eyes", INTEGER, (1, 32), (1, 16, 1), "", "eyes around the body"),
         gene("placement_range_deg", REAL, (0, 180), (0, 180, 90), "deg", "arc over which the eyes are spread"),
-        _held(gene(TILT, REAL, (-90, 90), (-60, 60, 0), "deg", "how far eyes look up; in tasks of one's own")),
+        _held(gene(TILT, REAL, (-90, 90), (-60, 60, 0), "deg", "elevation of the eyes; only in user tasks")),
         gene("fov_deg", REAL, (1, 100), (1, 100, 45), "deg", "an eye's horizontal field of view"),
         gene("resolution_height", INTEGER, (1, 64), (1, 16, 1), "receptors", "an eye's receptors, top to bottom"),
         gene("resolution_width", INTEGER, (1, 64), (1, 16, 1), "receptors", "an eye's receptors, left to right"),
@@ -139,17 +146,17 @@ def _optics(relief_points: int) -> list[Gene]:
     shapes = ", ".join(f"{number} {name}" for number, name in enumerate(APERTURE_SHAPES))
     last = len(APERTURE_SHAPES) - 1
     return [
-        # Below a hundredth (a radius of 1 µm in a 200 µm eye) the pupil is no wider than the wavelengths it admits.
+        # Below 0.01 (a radius of 1 µm in a 200 µm eye) the pupil is about as narrow as the wavelength or narrower.
         gene("relative_aperture", REAL, (0.01, 1), (0.01, 1, 0.5), "", "pupil diameter / retina width"),
         *(
             gene(f"doe_{i}{j}", REAL, (0, 1), (0, 1, 0.5), "relief height", f"relief control point ({i}, {j})")
             for i, j in places
         ),
         gene("refractive_index", REAL, (1, 2), (1, 2, 1.5), "", "index of the relief's material, at 588 nm"),
-        # Glasses reach from 1/90 to 1/20; 0 is a material that does not disperse.
+        # Glasses have values from 1/90 to 1/20; a material with 0 has no dispersion.
         _held(gene("dispersion", REAL, (0, 0.1), (0, 0.05, 0), "1 / Abbe number", "fall of the index with wavelength")),
         _held(gene("aperture_shape", INTEGER, (0, last), (0, last, 0), "", f"pupil: {shapes}")),
-        # Thinner ones guide next to nothing of red light, and wider ones have a hundred modes.
+        # Thinner rhabdoms guide almost no red light, and wider ones have a hundred modes.
         _held(gene(RHABDOM, REAL, (0.8, 10), (1, 6, 2), "µm", "diameter of rhabdoms, at most a receptor's width")),
     ]
 
@@ -164,8 +171,10 @@ def _brain() -> list[Gene]:
 
 
 def _spectra() -> list[Gene]:
-    """Types of receptor, and what each is most sensitive to. Pigments are known from 357 to 620 nm; the template's
-    limits, 330 and 700 nm, are optics'."""
+    """Return the genes for the number of receptor types and for the peak sensitivity of each.
+
+    Known pigments have peaks from 357 to 620 nm. The limits of 330 and 700 nm come from the template in `optics`.
+    """
     gene, most = partial(_gene, "spectral"), len(LAMBDA_MAX)
     return [
         _held(gene("receptor_types", INTEGER, (1, most), (1, most, 3), "", "types of receptor, one channel each")),
@@ -185,31 +194,31 @@ def _gene(
     unit: str,
     meaning: str,
 ) -> Gene:
-    """A gene, open unless told otherwise; `search` is (low, high, start)."""
+    """Return a gene that is open by default; `search` is (low, high, start)."""
     low, high, start = map(float, search)
     return Gene(name, cluster, kind, Interval(*valid), GeneConfig(True, low, high, start), unit, meaning)
 
 
 def _held(gene: Gene) -> Gene:
-    """The same gene, frozen unless told otherwise."""
+    """Return the gene frozen by default."""
     return replace(gene, default=replace(gene.default, open=False))
 
 
 GENES: Mapping[str, Gene] = gene_table()
-ALL_GENES: Mapping[str, Gene] = _all_genes(int(RELIEF_POINTS.high))  # of eyes of any kind; no animal has them all
+ALL_GENES: Mapping[str, Gene] = _all_genes(int(RELIEF_POINTS.high))  # genes of all kinds of eyes together
 
 
 def group_members(name: str) -> tuple[str, ...]:
-    """Genes that a cluster's name, a family's or a gene's own stands for; () if it is none of them."""
+    """Return the genes of a cluster or family, or the gene of this name; () for an unknown name."""
     return tuple(gene for gene in ALL_GENES if name in (gene, *groups_of(gene)))
 
 
 def groups_of(name: str) -> tuple[str, ...]:
-    """Groups that a gene belongs to, the narrowest first; () for what is no gene."""
+    """Return the groups of a gene, the smallest first; () for an unknown name."""
     if name not in ALL_GENES:
         return ()
     families = tuple(family for family in FAMILIES if name.startswith(f"{family}_"))
     return (*families, ALL_GENES[name].cluster)
 
 
-INHERITED = "genes"  # in place of receptors' name: each animal's are as its spectral genes say
+INHERITED = "genes"  # value instead of a receptor set's name: receptors follow from the spectral genes

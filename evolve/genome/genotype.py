@@ -1,4 +1,4 @@
-"""The encoding: how a genome, a vector in [0, 1]^d, stands for the values of the open genes (`evolve.genome.genes`)."""
+"""Encoding of the open genes' values (`evolve.genome.genes`) in a genome, which is a vector in [0, 1]^d."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ __all__ = ["CLUSTERS", "GENES", "Gene", "GeneConfig", "Genotype", "group_members
 
 @dataclass(frozen=True)
 class Genotype:
-    """The encoding of one run: which genes are open, in which order they stand in the genome, and over what range.
+    """Encoding of one run: the open genes, their order in the genome, and their ranges.
 
-    A gene that opens in a later generation has its place in the genome from the first, and holds its start there.
+    A gene that opens in a later generation has a place in the genome from the first generation, with its start value.
     """
 
     uses: Mapping[str, GeneConfig]
@@ -33,21 +33,21 @@ class Genotype:
 
     @property
     def start(self) -> NDArray[np.float64]:
-        """Genome of the start phenotype, (dimension,)."""
+        """Genome of the first animal, (dimension,)."""
         uses = self.uses
         return np.array([gene.encode(uses[gene.name].start, uses[gene.name]) for gene in self.open_genes])
 
     @cached_property
     def phases(self) -> tuple[int, ...]:
-        """Generations in which a gene opens, ascending."""
+        """Generations in which genes open, in ascending order."""
         return tuple(sorted({self.uses[gene.name].opens_at for gene in self.open_genes}))
 
     def varied(self, generation: int) -> NDArray[np.intp]:
-        """Places in the genome of the genes that are varied in a generation."""
+        """Return the indices in the genome of the genes that are varied in a generation."""
         return np.array([i for i, g in enumerate(self.open_genes) if self.uses[g.name].opens_at <= generation], np.intp)
 
     def decode(self, genome: NDArray[np.float64]) -> dict[str, float]:
-        """Value of every gene, open or not. Total: coordinates outside [0, 1] are clipped.
+        """Return the values of all genes, open or frozen; coordinates outside [0, 1] are clipped.
 
         Raises:
             ValueError: `genome` has another length than `dimension`, or is not finite.
@@ -61,7 +61,7 @@ class Genotype:
         return values
 
     def count(self, steps: int) -> float:
-        """Genotypes there are if a real gene has `steps` values that differ."""
+        """Return the number of genotypes if a real gene has `steps` distinct values."""
         sizes = [
             self.uses[g.name].high - self.uses[g.name].low + 1 if g.kind == "integer" else steps
             for g in self.open_genes

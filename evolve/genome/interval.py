@@ -1,4 +1,4 @@
-"""Ranges that values must lie in, and that error messages quote."""
+"""Valid ranges of values, which error messages quote."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ __all__ = ["Interval"]
 
 @dataclass(frozen=True)
 class Interval:
-    """The numbers from `low` to `high`; `open_low` leaves `low` itself out."""
+    """The numbers from `low` to `high`; `open_low` excludes `low` itself."""
 
     low: float
     high: float = math.inf

@@ -1,4 +1,4 @@
-"""Development: from gene values to the animal that is simulated."""
+"""Development of gene values into the simulated animal."""
 
 from __future__ import annotations
 
@@ -23,16 +23,16 @@ if TYPE_CHECKING:
 
 __all__ = ["FORMER_ENCODER", "Phenotype", "develop", "repaired"]
 
-ANNULUS_INNER = 0.5  # radius of what an annulus leaves out, in pupil radii
+ANNULUS_INNER = 0.5  # inner radius of an annulus, in pupil radii
 SLIT_ASPECT = 4.0  # height of an upright slit / its width
-# A small brain must not see through a large encoder. With 64 neurons encoders are 16 wide, and wider ones, which cost
-# more, learnt no faster (docs/measurements/learning.md).
+# The encoder is proportional to the brain, so that a small brain does not get a large encoder. With 64 neurons encoders
+# are 16 wide; wider ones take longer and learnt no faster (docs/measurements/learning.md).
 NEURONS_PER_FEATURE = 4
-FORMER_ENCODER = 16  # of animals and policies on record that do not say: whatever their neurons
+FORMER_ENCODER = 16  # width in records without this field, for any number of neurons
 
 
 class Settings(Protocol):
-    """Of a run's settings, those that shape its animals."""
+    """Settings of a run that shape its animals."""
 
     @property
     def genome(self) -> Mapping[str, GeneConfig]: ...
@@ -44,14 +44,14 @@ class Settings(Protocol):
 class Phenotype:
     """An animal: its eyes and its brain.
 
-    `relative_aperture`, `relief` and `refractive_index` are None together: optics off, a perfect lens.
-    `relief` holds N x N heights in [0, 1], row-major (y, x): for N = 4 control points of a bicubic B-spline patch, for
-    more the heights at cell centres that a cubic spline goes through.
-    `aperture_shape` is a place in APERTURE_SHAPES, `dispersion` the inverse of the relief's Abbe number.
-    `elevation_deg` is how far its eyes look up; None in rhabdom's own tasks, where they look along the floor.
-    `rhabdom_diameter_um` is that of its receptors; None: they are squares that absorb all light on them.
-    `encoder` is the width of the layers that each eye's signals go through first.
-    `lambda_max_nm` are the peaks of its receptor types' pigments; None: the receptors that all eyes of the run have.
+    With optics off (a perfect lens), `relative_aperture`, `relief` and `refractive_index` are all None.
+    `relief` holds N x N heights in [0, 1], row-major (y, x). For N = 4 they are control points of a bicubic B-spline
+    patch; for larger N they are heights at cell centres, interpolated by a cubic spline.
+    `aperture_shape` is an index into APERTURE_SHAPES, and `dispersion` the inverse of the relief's Abbe number.
+    `elevation_deg` is the elevation of the eyes; None in built-in tasks, in which eyes look along the floor.
+    `rhabdom_diameter_um` is the diameter of the receptors; None: receptors are squares that absorb all incident light.
+    `encoder` is the width of the first layers, one per eye.
+    `lambda_max_nm` are the peaks of the receptor types' pigments; None: the animal has the receptors of its run.
     """
 
     n_eyes: int
@@ -72,7 +72,7 @@ class Phenotype:
     rhabdom_diameter_um: float | None = None
 
     def waveguide(self, eye: EyeConfig) -> optics.Waveguide | None:
-        """Each receptor, no wider than its place; None for squares."""
+        """Return the waveguide of each receptor, limited to the receptor's width; None for squares."""
         import optics
 
         if self.rhabdom_diameter_um is None:
@@ -87,7 +87,7 @@ class Phenotype:
         )
 
     def pupil(self, eye: EyeConfig) -> optics.Pupil | None:
-        """Pupil of each of the eyes; None for the perfect lens."""
+        """Return the pupil of each eye; None for a perfect lens."""
         import optics
 
         if self.relative_aperture is None or self.relief is None or self.refractive_index is None:
@@ -103,7 +103,7 @@ class Phenotype:
         )
 
     def eyes(self, eye: EyeConfig) -> sim.Eyes:
-        """The eyes as the simulation wants them."""
+        """Return the eyes for the simulation."""
         import optics
         import sim
 
@@ -122,12 +122,12 @@ class Phenotype:
         )
 
     def to_json(self) -> dict[str, Any]:
-        """Plain values for a run file."""
+        """Return JSON values for a run file."""
         return {name: list(value) if isinstance(value, tuple) else value for name, value in vars(self).items()}
 
     @classmethod
     def from_json(cls, record: Mapping[str, Any]) -> Phenotype:
-        """Inverse of `to_json`.
+        """Return the phenotype that `to_json` described.
 
         Raises:
             ValueError: a field is unknown, of another type, or outside the range of its genes.
@@ -137,7 +137,10 @@ class Phenotype:
 
 
 def develop(genome: NDArray[np.float64], config: Settings) -> Phenotype:
-    """Phenotype of a genome under a run's config; every genome of the right length has one, and its eyes fit."""
+    """Return the phenotype of a genome under a run's config, with overlaps repaired.
+
+    Every genome of the right length has a phenotype.
+    """
     values = fitted(Genotype(config.genome).decode(genome), config.genome, config.eye)
     seen_through = config.eye.optics
     relief = tuple(values[name] for name in representatives(config.eye.relief_points, config.eye.relief_symmetric))
@@ -163,14 +166,14 @@ def develop(genome: NDArray[np.float64], config: Settings) -> Phenotype:
 
 
 def repaired(genome: NDArray[np.float64], config: Settings) -> tuple[str, ...]:
-    """Genes whose values had to change so that nothing overlaps; () for a genome that develops as it says."""
+    """Return the genes whose values were changed to repair overlaps; () for a genome without overlaps."""
     asked = Genotype(config.genome).decode(genome)
     fits = fitted(asked, config.genome, config.eye)
     return tuple(name for name, value in asked.items() if fits[name] != value)
 
 
 def _aperture(shape: str) -> Any:
-    """The pupil's shape, in units of its radius."""
+    """Return the aperture of a named shape, in units of its radius."""
     import optics
 
     if shape == "circle":

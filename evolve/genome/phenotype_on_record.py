@@ -1,6 +1,6 @@
-"""A phenotype as a file has it, field by field: of its type, and within what its genes range over.
+"""Checks of a phenotype that was read from a file: the type of each field, and the range of its gene.
 
-Whoever builds an animal builds arrays as large as it says, so it is looked at before.
+The sizes of an animal's arrays follow from these fields, so they are checked before the animal is built.
 """
 
 from __future__ import annotations
@@ -17,14 +17,14 @@ __all__ = ["checked_fields"]
 
 SIDES = ("resolution_height", "resolution_width")
 SEEN_THROUGH = ("relative_aperture", "relief", "refractive_index")
-LARGEST_COUNT = 4096  # of what no gene counts
+LARGEST_COUNT = 4096  # limit of counts without a gene
 
 
 def checked_fields(record: Any, names: Iterable[str]) -> dict[str, Any]:
-    """The fields of a phenotype, each as `Phenotype` takes it.
+    """Return the fields of a phenotype, converted to the types of `Phenotype`.
 
     Raises:
-        ValueError: one of them is unknown, of another type, or outside its range; says which.
+        ValueError: a field is unknown, has another type, or lies outside its range; the message names it.
     """
     if not isinstance(record, Mapping):
         raise ValueError("phenotype: must be a table of its fields")
@@ -32,7 +32,7 @@ def checked_fields(record: Any, names: Iterable[str]) -> dict[str, Any]:
         raise ValueError(f"phenotype.{unknown[0][:40]}: unknown")
     fields = {name: _checked(name, value) for name, value in record.items()}
     if len({fields.get(name) is None for name in SEEN_THROUGH}) > 1:
-        raise ValueError(f"phenotype: {', '.join(SEEN_THROUGH)} must be null together, or none of them")
+        raise ValueError(f"phenotype: {', '.join(SEEN_THROUGH)} must all be null, or none of them")
     return fields
 
 
@@ -57,7 +57,7 @@ def _checked(name: str, value: Any) -> Any:
 
 
 def _of_gene(gene: str, key: str, value: Any) -> float | int:
-    """A gene's value; where there is no such gene, a count of something."""
+    """Return a gene's value after a check; without such a gene, the value is a count."""
     valid = ALL_GENES[gene].range if gene in ALL_GENES else Interval(1, LARGEST_COUNT)
     if gene not in ALL_GENES or ALL_GENES[gene].kind == "integer":
         return whole_number(value, key, int(valid.low), int(valid.high))

@@ -1,4 +1,4 @@
-"""Values from a file that somebody else may have written: of the right type and within a range, or one line."""
+"""Checks of values from an untrusted file: their type and range, with one-line messages."""
 
 from __future__ import annotations
 
@@ -9,27 +9,27 @@ from evolve.genome.interval import Interval
 
 __all__ = ["listed", "parsed", "real", "whole_number"]
 
-SHOWN = 40  # letters of a value that a message quotes
-ROUNDING = 1e-9  # of a range's width, by which a number computed from its ends may lie outside
+SHOWN = 40  # maximum number of characters of a value in a message
+ROUNDING = 1e-9  # tolerance for numbers computed from the ends of a range, as a fraction of its width
 
 
 def parsed(text: str | bytes) -> Any:
-    """JSON as its standard has it, without NaN and Infinity.
+    """Parse standard JSON, which excludes NaN and Infinity.
 
     Raises:
-        ValueError: it is none, or holds numbers or brackets beyond all bounds.
+        ValueError: the text is not JSON, or numbers or brackets exceed the parser's limits.
     """
     try:
         return json.loads(text, parse_constant=_refused)
     except RecursionError:
-        raise ValueError("too many brackets within brackets") from None
+        raise ValueError("too many nested brackets") from None
 
 
 def whole_number(value: Any, name: str, low: int, high: int) -> int:
-    """An integer.
+    """Return `value` if it is an integer within the range.
 
     Raises:
-        ValueError: it is none, or not within the range.
+        ValueError: the value has another type or lies outside the range.
     """
     if type(value) is not int or not low <= value <= high:
         raise ValueError(f"{name} = {_shown(value)}: must be a whole number from {low} to {high:,}")
@@ -37,10 +37,10 @@ def whole_number(value: Any, name: str, low: int, high: int) -> int:
 
 
 def real(value: Any, name: str, valid: Interval) -> float:
-    """A number.
+    """Return `value` as a float if it is a number within the range, up to rounding.
 
     Raises:
-        ValueError: it is none, or not within the range.
+        ValueError: the value has another type or lies outside the range.
     """
     if type(value) not in (int, float) or not valid.low <= value <= valid.high:
         slack = ROUNDING * (valid.high - valid.low)
@@ -50,10 +50,10 @@ def real(value: Any, name: str, valid: Interval) -> float:
 
 
 def listed(value: Any, name: str, least: int, most: int) -> list[Any]:
-    """A list, of so many entries.
+    """Return `value` if it is a list of allowed length.
 
     Raises:
-        ValueError: it is none, or too short or long.
+        ValueError: the value has another type, or the list is too short or too long.
     """
     if not isinstance(value, list):
         raise ValueError(f"{name} = {_shown(value)}: must be a list")
@@ -65,10 +65,10 @@ def listed(value: Any, name: str, least: int, most: int) -> list[Any]:
 def _shown(value: Any) -> str:
     try:
         quoted = repr(value)
-    except (ValueError, RecursionError):  # too many digits, too deep
+    except (ValueError, RecursionError):  # too many digits, or too deeply nested
         return type(value).__name__
     return quoted if len(quoted) <= SHOWN else f"{quoted[:SHOWN]}..."
 
 
 def _refused(constant: str) -> Any:
-    raise ValueError(f"{constant} is no number in JSON")
+    raise ValueError(f"{constant} is not a number in JSON")

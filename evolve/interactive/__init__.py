@@ -1,9 +1,9 @@
-"""Runs from Python and in notebooks: the same code and the same record as the command's.
+"""Runs from Python and in notebooks, with the code and the record of the command `evolve`.
 
-run_from_python  evolve.run and evolve.resume: a run to its end
-opened_run       evolve.Run: a run to look at, and to resume
+run_from_python  evolve.run and evolve.resume: complete runs
+opened_run       evolve.Run: an opened run, for analysis and resumption
 callbacks        a user's functions as a watcher
 table            candidates as a table
-eye_picture      an animal's eyes, drawn
-summary          what a notebook shows of a run and of an animal
+eye_picture      figure of an animal's eyes
+summary          display of runs and animals in notebooks
 """

@@ -1,4 +1,4 @@
-"""A user's functions, called with every candidate that has been evaluated."""
+"""A user's functions, called after each evaluated candidate."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ Callback = Callable[[Run, Candidate], Any]
 
 @dataclass(frozen=True)
 class CallbackWatcher:
-    """Calls back with each candidate that has been evaluated and is on record."""
+    """Watcher that calls functions with each candidate after it has been evaluated and recorded."""
 
     run: Run
     callbacks: Sequence[Callback]
 
     def training(self, candidate_id: int, steps: int, planned: int) -> None:
-        """Nothing is called while a candidate trains."""
+        """Do nothing while a candidate trains."""
 
     def evaluated(self, candidate: Candidate) -> None:
         for callback in self.callbacks:
@@ -37,7 +37,7 @@ class CallbackWatcher:
 
 @dataclass(frozen=True)
 class Callbacks:
-    """The watchers of a run from Python: a progress bar or lines on stderr, if `progress`, and the callbacks.
+    """Watchers of a run from Python: the callbacks and, with `progress`, a progress bar or lines on stderr.
 
     Raises:
         ConfigError: the callbacks are not a list of functions.
@@ -52,10 +52,10 @@ class Callbacks:
             raise ConfigError(f"callbacks = {quoted(given)}: must be a list of functions of a run and a candidate")
 
     def carry_on(self, run: Run) -> None:
-        """Carry a run, whose lock is held, to its end. An exception in a callback ends it; it can be resumed then.
+        """Carry a locked run to its end; an exception in a callback ends it, and the run can be resumed.
 
         Raises:
-            RunError: the record cannot be written, or this search does not propose what is on record.
+            RunError: the record cannot be written, or this search proposes other candidates than those on record.
             ExecutorError: no candidate can be evaluated.
         """
         with voices(patient=True):

@@ -1,4 +1,4 @@
-"""An animal's eyes, drawn: where they look, what light passes, and what becomes of a point."""
+"""Figure of an animal's eyes: fields of view, relief of the pupil, and PSF."""
 
 from __future__ import annotations
 
@@ -20,8 +20,10 @@ __all__ = ["eye_picture"]
 
 
 def eye_picture(phenotype: Phenotype, config: EyeConfig) -> Figure:
-    """Fields of view around the head, and for each eye the relief of its pupil [µm] and its PSF in white daylight on a
-    logarithmic scale, with a receptor's outline; a perfect lens has neither."""
+    """Draw the fields of view around the head, the relief of the pupil [µm], and the PSF in white daylight.
+
+    The PSF has a logarithmic scale and the outline of a receptor. A perfect lens has neither relief nor PSF.
+    """
     eye = phenotype.eyes(config).eye()
     figure, panels = pyplot.subplots(1, 1 if eye.pupil is None else 3, squeeze=False, layout="constrained")
     figure.set_size_inches(3.6 * panels.size, 3.4)
@@ -33,7 +35,7 @@ def eye_picture(phenotype: Phenotype, config: EyeConfig) -> Figure:
 
 
 def _head(axes: Axes, phenotype: Phenotype, config: EyeConfig) -> None:
-    """From above, heading up."""
+    """Draw the fields of view from above, with the heading upwards."""
     half = phenotype.fov_deg / 2
     for azimuth in np.degrees(phenotype.eyes(config).azimuths()):
         towards = 90 + azimuth
@@ -55,7 +57,7 @@ def _relief(axes: Axes, pupil: optics.Pupil) -> None:
 
 
 def _psf(axes: Axes, eye: optics.Eye) -> None:
-    light = WhiteLight.through(eye)
+    light = WhiteLight.from_eye(eye)
     picture, half = middle_of_psf(light)
     peak, edge, pitch = picture.max() / 1e12, 1e6 * half, 1e6 * eye.receptor_pitch
     floor = peak * 10.0**-DECADES

@@ -1,4 +1,4 @@
-"""`evolve.Run`: a run directory to look at in Python, and to carry on."""
+"""`evolve.Run`: a run directory opened in Python, for analysis and resumption."""
 
 from __future__ import annotations
 
@@ -30,21 +30,21 @@ __all__ = ["OpenedCandidate", "OpenedRun"]
 
 @dataclass(frozen=True, repr=False)
 class OpenedCandidate(Candidate):
-    """A candidate of a run that is open: it knows what all eyes of its run have in common."""
+    """A candidate of an opened run, with the settings shared by all eyes of the run."""
 
     eye: EyeConfig = field(default_factory=EyeConfig)
 
     @classmethod
     def of_run(cls, candidate: Candidate, run: Run) -> OpenedCandidate:
-        """The candidate, with its run's settings of eyes."""
+        """Return the candidate with its run's settings of eyes."""
         return cls(**{f.name: getattr(candidate, f.name) for f in fields(Candidate)}, eye=run.config.eye)
 
     def to_line(self) -> str:
-        """Its line of a record."""
+        """Return the candidate's line of a record."""
         return Candidate(**{f.name: getattr(self, f.name) for f in fields(Candidate)}).to_line()
 
     def show_eye(self) -> Figure:
-        """The eyes on the head with their fields of view, and the pupil's relief and PSF of each of them."""
+        """Draw the fields of view of the eyes on the head, and the relief and PSF of their pupil."""
         from evolve.interactive.eye_picture import eye_picture
 
         return eye_picture(self.phenotype, self.eye)
@@ -54,32 +54,32 @@ class OpenedCandidate(Candidate):
 
 
 class OpenedRun(Run):
-    """A run directory: its config, its candidates, and what can be made of them."""
+    """A run directory: its config, its candidates, and tables and figures of them."""
 
     @property
     def best(self) -> OpenedCandidate | None:
-        """The candidate of highest fitness, the earliest where several have it; None before one has succeeded."""
+        """Candidate of highest fitness, the earliest of equal ones; None before a candidate has succeeded."""
         best = super().best
         return None if best is None else OpenedCandidate.of_run(best, self)
 
     def candidate(self, candidate_id: int | None = None) -> OpenedCandidate:
-        """The candidate with this id; None: the best.
+        """Return the candidate with this id; None: the best.
 
         Raises:
-            RunError: it has not been evaluated, or none has succeeded.
+            RunError: the candidate has not been evaluated, or no candidate has succeeded.
         """
         return OpenedCandidate.of_run(super().candidate(candidate_id), self)
 
     def frozen(self, task: Task, candidate_id: int | None = None) -> Frozen:
-        """A candidate (None: the best) as an animal that learns no more, for the `others` of another task.
+        """Return a candidate (None: the best) as an animal with a fixed policy, for the `others` of another task.
 
-        task: its body, as in the run's own task; its eyes are the candidate's
+        task: task with the body of the run's task; it receives the candidate's eyes
 
         Raises:
-            RunError: there is no such candidate, or its policy is missing or no policy.
-            ValueError: the task places other eyes than the candidate has.
+            RunError: the candidate does not exist, or its policy is missing or damaged.
+            ValueError: the eyes that the task places differ from the candidate's.
         """
-        from evolve.learning.animal_task import embodied
+        from evolve.learning.animal_task import with_phenotype
         from evolve.learning.policy import load_policy
         from sim.tasks.encounter import Frozen
 
@@ -90,16 +90,15 @@ class OpenedRun(Run):
             policy = load_policy(path)
         except ValueError as error:
             raise RunError(str(error)) from error
-        return Frozen(embodied(task, candidate.phenotype, self.config), policy)
+        return Frozen(with_phenotype(task, candidate.phenotype, self.config), policy)
 
     def resume(self, callbacks: Sequence[Callback] = (), progress: bool = True) -> None:
-        """Carry an interrupted run to its end, and leave a finished one as it is; see `evolve.run` for the
-        arguments.
+        """Carry an interrupted run to its end; a finished run stays unchanged. See `evolve.run` for the arguments.
 
         Raises:
-            LockedError: another process works on it.
-            RunError: its format is a former one.
-            ConfigError: its task is somebody's own and has not been named, or cannot be begun; or callbacks are none.
+            LockedError: another process works on the run.
+            RunError: the run has a former format.
+            ConfigError: the user task has not been named or fails at its start, or callbacks are not functions.
         """
         watchers = Callbacks(callbacks, progress)
         with resuming(self) as unfinished:
@@ -107,16 +106,18 @@ class OpenedRun(Run):
                 watchers.carry_on(self)
 
     def to_dataframe(self) -> pd.DataFrame:
-        """A row per candidate, by its id: how it fared, and the value of every gene that shows in it."""
+        """Return a table with a row per candidate: its outcome, and the values of all genes that it expresses."""
         return candidate_table(self.candidates)
 
     def drift(self, searches: int = 200) -> pd.DataFrame:
-        """A row per open gene, for the acuity and for the number of receptors: its mean over the last generations, that
-        of searches with random fitness (median, and the range of 95 % of them), and the p of the run's.
+        """Return a comparison of the last generations with searches with random fitness.
+
+        Each open gene, the acuity and the number of receptors have a row with the mean of the run, the median and the
+        95 % range of the searches with random fitness, and the p-value of the run's mean.
 
         Raises:
             RunError: no generation is complete yet.
-            ValueError: fewer than two searches.
+            ValueError: there are fewer than two searches.
         """
         from evolve.interactive.table import drift_table
         from evolve.report.gene_drift import drift_of
@@ -124,8 +125,10 @@ class OpenedRun(Run):
         return drift_table(drift_of([self], searches))
 
     def plot_fitness(self, axes: Axes | None = None) -> Axes:
-        """Fitness over the generations: every candidate, the generations' medians, the best so far. Returns the axes,
-        new ones unless given."""
+        """Plot fitness over the generations: all candidates, the median of each generation, and the best so far.
+
+        Return the axes, which are new if none are given.
+        """
         from matplotlib import pyplot
         from matplotlib.ticker import MaxNLocator
 
@@ -143,7 +146,7 @@ class OpenedRun(Run):
         return axes
 
     def report(self) -> Path:
-        """Write the report, one HTML page, and return where it is.
+        """Write the report, one HTML page, and return its path.
 
         Raises:
             RunError: the best candidate's policy is missing or damaged.

@@ -1,4 +1,4 @@
-"""`evolve.run` and `evolve.resume`: a run to its end."""
+"""`evolve.run` and `evolve.resume`, which carry a run to its end."""
 
 from __future__ import annotations
 
@@ -31,30 +31,31 @@ def run(
     callbacks: Sequence[Callback] = (),
     progress: bool = True,
 ) -> OpenedRun:
-    """Evolve, as the command `evolve run` does, and return the run when it has ended.
+    """Evolve, as the command `evolve run` does, and return the finished run.
 
-    The record is the same, whoever began the run: `evolve status`, `resume` and `report` know it too.
+    The record does not depend on the way in which a run was started: `evolve status`, `resume` and `report` can also
+    be used.
 
-    task: to evolve for, or "FILE.py:CLASS", one of your own; may be missing where the preset names one
+    task: task to evolve for, or "FILE.py:CLASS" of a user task; may be missing if the preset names a task
     preset: settings to start from: "quick" (minutes), "paper" (a day), or an experiment
-    settings: by their dotted names, {"search.generations": 2, "seed": 1}; they override all others
+    settings: settings by dotted name, {"search.generations": 2, "seed": 1}; they override all others
     config: TOML file of settings, which override the preset's
-    scale: of an experiment: "laptop" or "paper"
+    scale: size of an experiment: "laptop" or "paper"
     start_from: "RUN:ID", an animal of another run
     out: run directory; runs/TASK-PRESET-N if None
     callbacks: each called as callback(run, candidate) after every evaluated candidate; an exception ends the run
-    progress: whether to print how it goes, to stderr
+    progress: whether to print the progress to stderr
 
     Raises:
-        ConfigError: a setting or an argument that cannot be used; one line.
-        RunError: the directory holds something already, or cannot be written.
-        BackendError: Dr.Jit has no LLVM that it can use.
+        ConfigError: a setting or an argument is invalid; one line.
+        RunError: the directory is not empty, or cannot be written.
+        BackendError: Dr.Jit cannot find a usable LLVM.
     """
     _check(task=task, preset=preset, settings=settings, config=config, scale=scale, start_from=start_from, out=out)
     watchers = Callbacks(callbacks, progress)
     assignments = [f"{key}={_toml(value)}" for key, value in (settings or {}).items()]
     file = None if config is None else Path(config)
-    with prepare_run(RunRequest(task, preset, file, assignments, scale, start_from)).begin(OpenedRun, out) as begun:
+    with prepare_run(RunRequest(task, preset, file, assignments, scale, start_from)).create(OpenedRun, out) as begun:
         watchers.carry_on(begun)
     return begun
 
@@ -66,20 +67,21 @@ def resume(
     callbacks: Sequence[Callback] = (),
     progress: bool = True,
 ) -> OpenedRun:
-    """Carry an interrupted run to its end, as the command `evolve resume` does, and return it. A finished run stays as
-    it is.
+    """Carry an interrupted run to its end, as the command `evolve resume` does, and return it.
 
-    directory: of the run; the command may have begun it, or Python
-    task: "FILE.py:CLASS", if the run evolves a user task: its code runs only if you name it
+    A finished run stays unchanged.
+
+    directory: run directory, started by the command or from Python
+    task: "FILE.py:CLASS" if the run evolves a user task; its code runs only if you name it
     callbacks: each called as callback(run, candidate) after every evaluated candidate; an exception ends the run
-    progress: whether to print how it goes, to stderr
+    progress: whether to print the progress to stderr
 
     Raises:
-        ConfigError: an argument or the config cannot be used, or the user task has not been named, has changed or
-            fails; one line.
-        RunError: there is no run, its record is damaged or cannot be written, or its format is a former one.
-        LockedError: another process works on it.
-        BackendError: Dr.Jit has no LLVM that it can use.
+        ConfigError: an argument or the config is invalid, or the user task has not been named, has changed or fails;
+            one line.
+        RunError: the run does not exist or has a former format, or its record is damaged or cannot be written.
+        LockedError: another process works on the run.
+        BackendError: Dr.Jit cannot find a usable LLVM.
     """
     _check(directory=directory, task=task)
     opened = OpenedRun.open(directory, task)
@@ -100,7 +102,7 @@ RIGHT: Mapping[str, tuple[Any, str]] = {
 
 
 def _check(**given: Any) -> None:
-    """ConfigError for what is none of its kind."""
+    """Check the types of arguments; a wrong type gives a ConfigError."""
     for name, value in given.items():
         kinds, right = RIGHT[name]
         if not isinstance(value, kinds):
@@ -108,7 +110,10 @@ def _check(**given: Any) -> None:
 
 
 def _toml(value: Any) -> str:
-    """A setting as `--set` takes it: JSON writes numbers, texts, true and false as TOML does; NumPy's are those."""
+    """Return a setting in the form of `--set`; JSON and TOML write numbers, texts, true and false in the same way.
+
+    NumPy's values are converted to Python's.
+    """
     try:
         return json.dumps(value.tolist() if isinstance(value, (np.generic, np.ndarray)) else value)
     except TypeError:

@@ -1,4 +1,4 @@
-"""What a notebook shows of a run and of an animal: a few facts, every text escaped."""
+"""Display of runs and animals in notebooks, with all text escaped."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from evolve.store.directory import Run
 
 __all__ = ["animal_as_html", "run_as_html"]
 
-SHOWN = 12  # generations, the latest
+SHOWN = 12  # number of latest generations
 
 
 def run_as_html(run: Run) -> Html:
-    """A run's facts, and its latest generations."""
+    """Return a run's summary with its latest generations."""
     facts = {
         "task": run.config.task,
         "candidates": f"{len(run.candidates)} of {run.config.candidates} evaluated",
@@ -29,7 +29,7 @@ def run_as_html(run: Run) -> Html:
 
 
 def animal_as_html(candidate: Candidate) -> Html:
-    """How a candidate fared, and what it is."""
+    """Return a candidate's outcome and its phenotype."""
     animal = candidate.phenotype
     height, width = animal.resolution
     facts = {

@@ -19,8 +19,11 @@ OUTCOME = ("generation", "index", "fitness", "success_rate", "steps", "seconds",
 
 
 def candidate_table(candidates: Sequence[Candidate]) -> pd.DataFrame:
-    """A row per candidate, by its id: how it fared, its acuity [cycles/degree], and the value of every gene that shows
-    in the animal. A failed one has a fitness of NaN, and says why under `failure`."""
+    """Return a table with a row per candidate, indexed by id.
+
+    Columns are the outcome, the acuity [cycles/degree], and the values of all genes that the animal expresses. A failed
+    candidate has a fitness of NaN and the reason in `failure`.
+    """
     import pandas as pd
 
     rows = [_row(candidate) for candidate in candidates]
@@ -28,7 +31,7 @@ def candidate_table(candidates: Sequence[Candidate]) -> pd.DataFrame:
 
 
 def drift_table(drift: Drift) -> pd.DataFrame:
-    """A row per quantity, by its name: where the run ended, and searches with random fitness."""
+    """Return a table with a row per quantity: its mean at the end of the run, and in searches with random fitness."""
     import pandas as pd
 
     rows = [(one.mean, one.median, one.low, one.high, one.p) for one in drift.moved]

@@ -1,20 +1,20 @@
-"""One lifetime: an animal learns its task.
+"""Training run and evaluation of one animal.
 
-fitness           evaluate: a candidate's whole life
-animal_task       the task with an animal in it
-worlds            where an animal lives
-task_module       a task of somebody's own, executed
-task_trial        the same, tried for a moment
-ppo               PPO, its settings' meaning, early stopping
-policy            actor and critic, stored and loaded
-observed          entries of an observation beside the eyes
-eye_features      the network behind each eye
-per_eye_layers    what it is made of
-schedule          how it slows down: step size and passes
-training_rewards  rewards in the learner's units, some terms at a share of their price
-rollout_buffer    frames kept once
-adam              the optimiser
+fitness           evaluate: training run and fitness of a candidate
+animal_task       task with an animal in it
+training_envs     environments for training, selection and test
+task_module       execution of a user task's code
+task_trial        short trial of a user task before a run
+ppo               PPO with early stopping
+policy            actor and critic, with storage
+observed          entries of an observation other than the eyes' signals
+eye_features      encoder of each eye
+per_eye_layers    linear layers with separate weights per eye
+schedule          decrease of step size and passes during training
+training_rewards  rewards in the learner's units, with reduced costs at the start
+rollout_buffer    rollout buffer that stores each frame once
+adam              optimiser
 tensor_file       tensors from a run's files
-checkpoint        a training as it stands
-training_stage    how far a training goes
+checkpoint        state of a training run, stored in a file
+training_rung     rung of a training run
 """

@@ -1,7 +1,7 @@
-"""Adam over all weights as one vector: a few operations per step instead of a few per tensor.
+"""Adam on a single vector of all weights, with a few operations per step instead of a few per tensor.
 
-torch.optim would do the same in ten times as many calls, and its first use imports torch's compiler, which takes every
-worker process seconds.
+torch.optim needs ten times the number of calls, and its first use imports torch's compiler, which takes seconds in
+every worker process.
 """
 
 from __future__ import annotations
@@ -13,13 +13,13 @@ import torch
 from torch import Tensor, nn
 
 BETAS = (0.9, 0.999)  # decay of the running means of gradient and squared gradient
-EPSILON = 1e-5  # as SB3's PPO sets it
+EPSILON = 1e-5  # value of SB3's PPO
 
 
 class Adam:
-    """Kingma and Ba (2015), algorithm 1, as far as stable-baselines3 asks an optimizer for it.
+    """Adam (Kingma and Ba 2015, algorithm 1), with the interface that stable-baselines3 needs.
 
-    Parameters and their gradients become views of two vectors; whoever writes to either has to do it in place.
+    Parameters and gradients are views of two vectors, so all changes of them must be made in place.
     """
 
     def __init__(self, parameters: Iterable[nn.Parameter], lr: float) -> None:
@@ -53,12 +53,12 @@ class Adam:
         self.values.addcdiv_(self.mean, spread, value=-self.param_groups[0]["lr"] / unbias_mean)
 
     def state_dict(self) -> dict[str, Tensor | int]:
-        """What a later step depends on, besides the parameters."""
+        """Return the state that later steps need in addition to the parameters."""
         return {"mean": self.mean, "square": self.square, "steps": self.steps}
 
     @torch.no_grad()
     def load_state_dict(self, state: Mapping[str, Tensor | int]) -> None:
-        """Inverse of `state_dict`."""
+        """Restore a state from `state_dict`."""
         for name in ("mean", "square"):
             getattr(self, name).copy_(state[name])
         self.steps = int(state["steps"])

@@ -1,4 +1,4 @@
-"""The run's task with one animal in it: the one place that resolves a task's name into an object."""
+"""The run's task with one animal in it; only this module resolves a task's name into an object."""
 
 from __future__ import annotations
 
@@ -17,22 +17,22 @@ from sim.tasks.registry import task_of
 from sim.tasks.user_tasks import UserTask, batched, with_evolved_eyes
 from sim.worlds.world import build_world
 
-__all__ = ["animal_task", "azimuths", "embodied"]
+__all__ = ["animal_task", "azimuths", "with_phenotype"]
 
 
 def animal_task(
     phenotype: Phenotype, config: RunConfig, mode: str = "evaluation", eyes: Eyes | None = None
 ) -> BatchTask:
-    """The task that this animal lives in, for arrays of worlds; in training, the layout may be another one.
+    """Return this animal's task for arrays of worlds; training and evaluation may have different layouts.
 
-    eyes: in the place of the animal's own
+    eyes: eyes that replace the animal's own
 
     Raises:
-        ConfigError: it is a user's task and has not been named, or its module cannot be executed.
-        ValueError: it places other eyes than the animal has.
+        ConfigError: a user task has not been named, or its module cannot be executed.
+        ValueError: the eyes that the task places differ from the animal's.
     """
     if (code := config.choice.named_code) is not None:
-        task = embodied(executed_task(code), phenotype, config, eyes)
+        task = with_phenotype(executed_task(code), phenotype, config, eyes)
         return batched(task).in_mode(mode)
     eyes, layout = eyes or phenotype.eyes(config.eye), getattr(config.world, mode)
     asked = fidelity_asked(config.eye.rays_per_receptor, eyes)
@@ -43,24 +43,28 @@ def animal_task(
 
 
 def azimuths(phenotype: Phenotype, config: RunConfig) -> np.ndarray:
-    """Directions of the animal's eyes [rad], (eye,), in the frame of what they are on. No world is built.
+    """Return the azimuths of the animal's eyes [rad], (eye,), in the frame of their body, site or camera.
+
+    No world is built.
 
     Raises:
-        ConfigError: as `animal_task`.
-        ValueError: as `animal_task`.
+        ConfigError: see `animal_task`.
+        ValueError: see `animal_task`.
     """
     if (code := config.choice.named_code) is not None:
-        return batched(embodied(executed_task(code), phenotype, config)).azimuths()
+        return batched(with_phenotype(executed_task(code), phenotype, config)).azimuths()
     return phenotype.eyes(config.eye).azimuths()
 
 
-def embodied(task: UserTask, phenotype: Phenotype, config: RunConfig, eyes: Eyes | None = None) -> UserTask:
-    """A user's task with this animal in it, whose eyes have the fidelity of the run or, if that is "auto", the task's.
+def with_phenotype(task: UserTask, phenotype: Phenotype, config: RunConfig, eyes: Eyes | None = None) -> UserTask:
+    """Return a user task with this animal in it.
 
-    eyes: in the place of the animal's own
+    The eyes have the fidelity of the run or, if that is "auto", of the task.
+
+    eyes: eyes that replace the animal's own
 
     Raises:
-        ValueError: it places other eyes than the animal has.
+        ValueError: the eyes that the task places differ from the animal's.
     """
     animal = with_evolved_eyes(task, eyes or phenotype.eyes(config.eye), phenotype.elevation_deg or 0.0)
     rays, bands = config.eye.rays_per_receptor, config.eye.bands

@@ -1,4 +1,4 @@
-"""A training as it stands: all that whoever goes on with it, in fresh worlds, needs to know. Tensors and numbers."""
+"""State of a training run, from which it can continue in new worlds: tensors and numbers."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ __all__ = ["Checkpoint", "load_checkpoint", "save_checkpoint"]
 
 @dataclass(frozen=True)
 class Checkpoint:
-    """Where a training stands.
+    """State of a training run.
 
-    steps: trained so far
-    curve: (steps, mean return of the evaluation episodes), so far
-    unit: in which rewards are measured
-    now: all that learning has changed, as it is
-    best: the same, as it was at the best evaluation
+    steps: number of steps so far
+    curve: (steps, mean return of the evaluation episodes) so far
+    unit: unit of rewards
+    now: current values of all tensors that learning changes
+    best: their values at the best evaluation
     adam: state of the optimizer: mean, square, steps
     """
 
@@ -39,7 +39,7 @@ class Checkpoint:
 
 
 def save_checkpoint(checkpoint: Checkpoint, path: Path) -> None:
-    """Write as safetensors, what is no tensor in the metadata; whole or not at all."""
+    """Write a checkpoint as safetensors, completely or not at all; values other than tensors go to the metadata."""
     parts = {"now": checkpoint.now, "best": checkpoint.best, "adam": checkpoint.adam}
     tensors = {
         f"{part}/{name}": value.detach().clone().contiguous()
@@ -53,10 +53,12 @@ def save_checkpoint(checkpoint: Checkpoint, path: Path) -> None:
 
 
 def load_checkpoint(path: Path) -> Checkpoint | None:
-    """Inverse of `save_checkpoint`; None where there is none, or a file that is none. Nothing in it is executed.
+    """Load a checkpoint that `save_checkpoint` wrote; None if the file is missing or damaged.
+
+    Nothing in the file is executed.
 
     Raises:
-        StrangeFileError: a link, FIFO or directory bears its name.
+        StrangeFileError: the path is a link, FIFO or directory.
     """
     try:
         metadata, tensors = read_tensors(path)

@@ -1,11 +1,11 @@
-"""What an eye's signals become before actor and critic see them: an MLP per eye over a memory of frames.
+"""Encoder of the eyes' signals for actor and critic: an MLP per eye over a memory of frames.
 
-Every eye has weights of its own, and one encoder serves all its remembered frames: signals -> w -> w -> w per frame,
-then `memory` x w -> w over the frames. The eyes' features are joined with the other entries of the observation: what
-the animal feels, and its previous action.
-Units are leaky rectifiers: tanh learnt detection from a third more samples, at ten times the cost per unit.
-Receptors adapt: the first layer sees signals less their running mean, in units of their spread, as learning has met
-them.
+Each eye has its own weights, and one encoder serves all its frames in memory. Each frame passes signals -> w -> w -> w,
+then the frames together `memory` x w -> w. The eyes' features are joined with the other entries of the observation:
+proprioception and the previous action.
+Units are leaky rectifiers; tanh needed a third more samples to learn detection, at ten times the cost per unit.
+Receptors adapt: the first layer subtracts the running mean of the signals and divides by their running spread. Both are
+measured during learning.
 """
 
 from __future__ import annotations
@@ -24,27 +24,26 @@ from evolve.learning.per_eye_layers import DARK, AdaptedLinear, MemoryLinear, Pe
 
 __all__ = ["UNITS", "EyeFeatures"]
 
-ENCODER_LAYERS = 3  # hidden, hidden, code of one frame
-FARTHEST = 10.0  # spreads off the mean that anything felt counts, at most
-UNITS = nn.LeakyReLU  # of all hidden layers; leaky, so that none dies
+ENCODER_LAYERS = 3  # two hidden layers and the code of one frame
+FARTHEST = 10.0  # limit of normalised proprioception, in spreads from the mean
+UNITS = nn.LeakyReLU  # units of all hidden layers; leaky, so that every unit keeps a gradient
 
 
 class Felt(nn.Module):
-    """What an animal feels, in whatever units: less its running mean, in units of its running spread, number by number
-    (Welford 1962)."""
+    """Proprioception in any units, normalised element by element by its running mean and spread (Welford 1962)."""
 
     def __init__(self, size: int) -> None:
         super().__init__()
         self.register_buffer("mean", torch.zeros(size))
         self.register_buffer("variance", torch.ones(size))
-        self.register_buffer("seen", torch.zeros(1))  # observations
+        self.register_buffer("seen", torch.zeros(1))  # number of observations
 
     def forward(self, x: Tensor) -> Tensor:
         return ((x - self.mean) * torch.rsqrt(self.variance + DARK)).clamp(-FARTHEST, FARTHEST)
 
     @torch.no_grad()
     def adapt(self, x: Tensor) -> None:
-        """Take observations (sample, number) into mean and spread."""
+        """Update mean and spread with observations (sample, number)."""
         share = x.shape[0] / (self.seen + x.shape[0])
         deviation = x - self.mean
         step = deviation.mean(dim=0)
@@ -54,12 +53,13 @@ class Felt(nn.Module):
 
 
 class EyeFeatures(BaseFeaturesExtractor):
-    """Features of an observation: `width` per eye, as wide as each layer below, then what is known beside them.
+    """Features of an observation: `width` per eye, which is also the width of each layer, then the other entries.
 
-    Two forms are understood. Stacked, as environments give it: `eyes` (sample, memory, eye, channel, height, width).
-    Unstacked, as rollouts keep it, each frame once: `frames` (memory - 1 + step, segment, eye, channel, height, width)
-    and `age` (step, segment), the steps since the episode's first frame; samples are (step, segment) flattened.
-    Both give the same features: an episode's first frame stands in for those before it, as in sim's environments.
+    Two forms are accepted. Environments give stacked frames: `eyes` (sample, memory, eye, channel, height, width).
+    Rollouts store each frame once: `frames` (memory - 1 + step, segment, eye, channel, height, width) and `age`
+    (step, segment), the steps since the episode's first frame; samples are (step, segment) flattened.
+    Both give the same features. As in sim's environments, the first frame of an episode replaces the missing frames
+    before it.
     """
 
     def __init__(self, observation_space: spaces.Dict, width: int) -> None:
@@ -90,23 +90,23 @@ class EyeFeatures(BaseFeaturesExtractor):
         return torch.cat([features, *(known[name] for name in self.beside)], dim=1)
 
     def _less_mean(self, observation: Mapping[str, Tensor]) -> dict[str, Tensor]:
-        """Entries that are normalised."""
+        """Return the normalised entries after normalisation."""
         if self.felt is None:
             return {}
         joined = self.felt(torch.cat([observation[name] for name in self.normalised], dim=-1))
         return dict(zip(self.normalised, joined.split(self._sizes, dim=-1), strict=True))
 
     def _encode(self, frames: Tensor) -> Tensor:
-        """(a, b, eye, channel, height, width) -> codes (eye, code, a, b)."""
+        """Return codes (eye, code, a, b) of frames (a, b, eye, channel, height, width)."""
         a, b = frames.shape[:2]
         return self.encoder(self._signals(frames)).unflatten(2, (a, b))
 
     def _signals(self, frames: Tensor) -> Tensor:
-        """(..., eye, channel, height, width) -> (eye, receptors, sample)."""
+        """Return frames (..., eye, channel, height, width) as (eye, receptors, sample)."""
         return frames.reshape(-1, self.n_eyes, self.n_receptors).permute(1, 2, 0)
 
     def adapt(self, frames: Tensor, beside: Mapping[str, Tensor] | None = None) -> None:
-        """Adapt the receptors to more frames (..., eye, channel, height, width), and normalised entries to theirs
+        """Adapt the receptors to more frames (..., eye, channel, height, width), and the normalisation to more entries
         (..., number)."""
         self.encoder[0].adapt(self._signals(frames))
         if self.felt is not None and beside is not None:
@@ -114,10 +114,10 @@ class EyeFeatures(BaseFeaturesExtractor):
             self.felt.adapt(felt.reshape(-1, felt.shape[-1]))
 
     def _at_each_step(self, codes: Tensor, age: Tensor) -> Tensor:
-        """Codes (eye, code, memory - 1 + step, segment) -> features (eye, feature, sample)."""
+        """Return features (eye, feature, sample) of codes (eye, code, memory - 1 + step, segment)."""
         layer, unit = self.temporal
         features = layer.slide(codes)
-        young = (age < self.memory - 1).flatten().nonzero()[:, 0]  # samples that look back before their episode
+        young = (age < self.memory - 1).flatten().nonzero()[:, 0]  # samples with missing frames
         if len(young):
             step, segment = young // age.shape[1], young % age.shape[1]
             first = self.memory - 1 + step - age.flatten()[young]

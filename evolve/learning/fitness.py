@@ -1,4 +1,4 @@
-"""Fitness: a candidate's life. It learns, then plays the evaluation episodes, whose mean return is its fitness."""
+"""Fitness of a candidate: its mean return over the evaluation episodes after a training run."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from evolve.genome.phenotype import Phenotype
 from evolve.learning.checkpoint import Checkpoint, load_checkpoint, save_checkpoint
 from evolve.learning.policy import Brain, TrainingDiverged, save_policy
 from evolve.learning.ppo import Episodes, Progress, Training, Worlds, play, train
-from evolve.learning.training_stage import TrainingStage
-from evolve.learning.worlds import worlds_of
+from evolve.learning.training_envs import worlds_of
+from evolve.learning.training_rung import TrainingRung
 from evolve.store.evaluation import Evaluation, most_frequent
 
 __all__ = ["evaluate"]
@@ -28,26 +28,26 @@ def evaluate(
     seed: int,
     policy_path: Path,
     progress: Progress | None = None,
-    stage: TrainingStage | None = None,
+    rung: TrainingRung | None = None,
 ) -> Evaluation:
-    """Train one candidate, write its policy, and measure its fitness; same arguments, same outcome on one machine.
+    """Train one candidate, write its policy, and measure its fitness.
 
-    seed: of the policy's first weights, of all worlds and of all chance in learning
-    policy_path: where the trained policy is written (safetensors); nothing is written if learning diverged
-    progress: told (steps trained, steps planned) after every rollout
-    stage: how far to train, and from where (`evolve.search.successive_halving`); None: a whole training
+    The same arguments give the same outcome on one machine. Divergence gives a failed Evaluation, not an exception.
 
-    A training that diverges is a failed Evaluation, not an exception.
+    seed: seed of the policy's initial weights, of all worlds and of all random numbers in learning
+    policy_path: path of the trained policy (safetensors), which is not written if learning diverged
+    progress: called with (steps trained, steps planned) after every rollout
+    rung: rung to train to, with the checkpoints before it (`evolve.search.successive_halving`); None: train to the end
     """
     began, failures = time.perf_counter(), Counter[str]()
     try:
-        if stage is None:
+        if rung is None:
             training, episodes = _live(phenotype, config, seed, failures, progress)
         else:
-            training, episodes = _live_until(stage, phenotype, config, seed, failures, progress)
+            training, episodes = _live_until(rung, phenotype, config, seed, failures, progress)
     except TrainingDiverged as error:
         diverged = Evaluation.failed(str(error), time.perf_counter() - began)
-        return replace(diverged, mishaps=most_frequent(failures))
+        return replace(diverged, episode_failures=most_frequent(failures))
     save_policy(training.policy, policy_path)
     return Evaluation(
         fitness=float(episodes.returns.mean()),
@@ -56,31 +56,31 @@ def evaluate(
         steps=training.steps,
         seconds=time.perf_counter() - began,
         curve=training.curve,
-        mishaps=most_frequent(failures),
+        episode_failures=most_frequent(failures),
     )
 
 
 def _live_until(
-    stage: TrainingStage,
+    rung: TrainingRung,
     phenotype: Phenotype,
     config: RunConfig,
     seed: int,
     failures: Counter[str],
     progress: Progress | None,
 ) -> tuple[Training, Episodes]:
-    """Through all stages up to this one, from the latest whose checkpoint there is; failures are those since then."""
+    """Train through all rungs up to this one, from the latest existing checkpoint; count failures since then."""
     begun, first = None, 0
-    for earlier in reversed(range(stage.number)):
-        if begun is None and (begun := load_checkpoint(stage.checkpoints[earlier])) is not None:
+    for earlier in reversed(range(rung.number)):
+        if begun is None and (begun := load_checkpoint(rung.checkpoints[earlier])) is not None:
             first = earlier + 1
-    for number in range(first, stage.number + 1):
-        learning = replace(config.learning, total_steps=stage.ends[number])
-        # A stage has none itself: a little budget, divided once more, may be too little for one.
+    for number in range(first, rung.number + 1):
+        learning = replace(config.learning, total_steps=rung.ends[number])
+        # A rung is not divided into rungs itself, whose budgets could be less than one rollout.
         life = replace(config, learning=learning, search=replace(config.search, rungs=1))
-        entropy = [seed, number] if number else seed  # the first stage begins as a whole training does
+        entropy = [seed, number] if number else seed  # the first rung starts like an undivided training run
         training, episodes = _live(phenotype, life, entropy, failures, progress, begun)
         begun = training.end
-        save_checkpoint(begun, stage.checkpoints[number])
+        save_checkpoint(begun, rung.checkpoints[number])
     return training, episodes
 
 
@@ -92,15 +92,17 @@ def _live(
     progress: Progress | None,
     begun: Checkpoint | None = None,
 ) -> tuple[Training, Episodes]:
-    """Training, and the evaluation episodes after it, from starts and objects' places never seen before. Mazes are
-    the same for all of a run, and of all runs. What failed in any of them is counted in `failures`, also where learning
-    diverges."""
+    """Train, then play the evaluation episodes, whose start poses and object positions are new.
+
+    Mazes are the same for all candidates of all runs. Failures of episodes are counted in `failures`, also if learning
+    diverges.
+    """
     weights, *seeds = (int(s) for s in np.random.SeedSequence(entropy).generate_state(3))
     places = worlds_of(phenotype, config, *seeds)
     with (
-        closing(places.lessons) as lessons,
-        closing(places.checkpoints) as checkpoints,
-        closing(places.finals) as finals,
+        closing(places.training) as lessons,
+        closing(places.selection) as checkpoints,
+        closing(places.test) as finals,
     ):
         brain = Brain(phenotype.neurons, phenotype.layers, phenotype.encoder)
         try:

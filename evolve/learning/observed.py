@@ -1,4 +1,4 @@
-"""Entries of an observation beside the eyes: their names, sizes and limits."""
+"""Entries of an observation other than the eyes' signals: names, sizes and limits."""
 
 from __future__ import annotations
 
@@ -17,8 +17,10 @@ EYES, LAST = "eyes", "previous_action"
 
 @dataclass(frozen=True)
 class Entry:
-    """name: in the observation · size: count of its numbers
-    low, high: limits of each of them; a policy normalises an entry that has none
+    """An entry of an observation.
+
+    name: key in the observation · size: number of elements
+    low, high: limits of each element; a policy normalises entries without limits
     """
 
     name: str
@@ -28,7 +30,7 @@ class Entry:
 
     @property
     def normalised(self) -> bool:
-        """Whether a policy sees it less its running mean, in units of its running spread."""
+        """True if a policy normalises the entry by its running mean and spread."""
         return math.isinf(self.low) and math.isinf(self.high)
 
     @property
@@ -36,21 +38,21 @@ class Entry:
         return spaces.Box(self.low, self.high, (self.size,), np.float32)
 
     def record(self) -> list[Any]:
-        """As JSON; None: no limit."""
+        """Return the entry as JSON values; None: no limit."""
         limits = (None if math.isinf(limit) else limit for limit in (self.low, self.high))
         return [self.name, self.size, *limits]
 
     @classmethod
     def from_record(cls, stored: Sequence[Any]) -> Entry:
-        """Inverse of `record`.
+        """Return the entry that `record` described.
 
         Raises:
-            TypeError: it is no list.
-            ValueError: it is no such entry.
+            TypeError: the stored value is not a list.
+            ValueError: the list does not describe an entry.
         """
         name, size, low, high = stored
         if not isinstance(name, str):
-            raise ValueError(f"{name!r} is no name of an entry")
+            raise ValueError(f"{name!r} is not the name of an entry")
         return cls(name, int(size), -math.inf if low is None else float(low), math.inf if high is None else float(high))
 
 
@@ -58,12 +60,12 @@ CONTACT = Entry("contact", 1, 0.0, 1.0)
 
 
 def known_beside_eyes(space: spaces.Dict) -> dict[str, int]:
-    """Entries beside "eyes", and the count of numbers in each, in the order in which brains see them."""
+    """Return the entries other than "eyes" with their sizes, in the order in which policies receive them."""
     return {name: math.prod(part.shape or (1,)) for name, part in sorted(space.spaces.items()) if name != EYES}
 
 
 def entries_of(space: spaces.Dict) -> tuple[Entry, ...]:
-    """Entries beside the eyes and the previous action, in the same order."""
+    """Return the entries other than the eyes' signals and the previous action, in the same order."""
     sizes = known_beside_eyes(space)
     limits = {name: part for name, part in space.spaces.items() if isinstance(part, spaces.Box)}
     return tuple(

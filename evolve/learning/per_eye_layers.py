@@ -1,7 +1,7 @@
-"""Linear layers with weights of their own for every eye: plain ones, one whose inputs adapt, one over memory.
+"""Linear layers with separate weights for each eye: a plain layer, one with adaptation, and one over memory.
 
-Samples come last: W x is then one batched GEMM with no copy; x Wᵀ with so few outputs took three times as long,
-forward and backward.
+Samples are on the last axis, so that W x is one batched matrix product (GEMM) without a copy. With the small number of
+outputs, x Wᵀ took three times longer, forward and backward.
 """
 
 from __future__ import annotations
@@ -14,12 +14,12 @@ from torch import Tensor, nn
 
 __all__ = ["CONTRAST", "AdaptedLinear", "MemoryLinear", "PerEyeLinear"]
 
-DARK = 1e-6  # spread of signals that all are the same: keeps weights finite
-CONTRAST = 0.4  # what a signal one spread off its mean counts, where 675 move a unit together; 1 learnt no faster
+DARK = 1e-6  # lower limit of the spread of signals, which keeps weights finite if all signals are equal
+CONTRAST = 0.4  # scale of normalised signals, chosen for 675 inputs per unit; 1 learnt no faster
 
 
 class PerEyeLinear(nn.Module):
-    """A linear layer with weights per eye: (eye, inputs, sample) -> (eye, outputs, sample)."""
+    """Linear layer with separate weights for each eye: (eye, inputs, sample) -> (eye, outputs, sample)."""
 
     def __init__(self, n_eyes: int, inputs: int, outputs: int) -> None:
         super().__init__()
@@ -33,17 +33,18 @@ class PerEyeLinear(nn.Module):
 
 
 class AdaptedLinear(PerEyeLinear):
-    """The same over signals less each receptor's running mean, in units of their eye's spread about it.
+    """Linear layer on signals that are normalised by each receptor's running mean and their eye's spread.
 
-    Signals of one scene are mostly alike from moment to moment, and behind a small pupil they are small numbers: raw,
-    their means would saturate the units and their changes hardly move them. Folded into weight and bias, it is free.
+    Signals of one scene change little over time, and behind a small pupil they are small. Without normalisation, their
+    means would saturate the units, and their changes would have almost no effect. The normalisation is folded into
+    weight and bias, so that it takes no time.
     """
 
     def __init__(self, n_eyes: int, inputs: int, outputs: int) -> None:
         super().__init__(n_eyes, inputs, outputs)
         self.register_buffer("mean", torch.zeros(n_eyes, inputs, 1))
         self.register_buffer("variance", torch.ones(n_eyes, 1, 1))
-        self.register_buffer("seen", torch.zeros(1))  # frames
+        self.register_buffer("seen", torch.zeros(1))  # number of frames
 
     def forward(self, x: Tensor) -> Tensor:
         weight = CONTRAST * self.weight * torch.rsqrt(self.variance + DARK**2)
@@ -51,7 +52,7 @@ class AdaptedLinear(PerEyeLinear):
 
     @torch.no_grad()
     def adapt(self, x: Tensor) -> None:
-        """Take signals (eye, inputs, sample) into mean and spread (Chan, Golub and LeVeque 1983, eq. 2.1)."""
+        """Update mean and spread with signals (eye, inputs, sample) (Chan, Golub and LeVeque 1983, eq. 2.1)."""
         share = x.shape[2] / (self.seen + x.shape[2])
         deviation = x - self.mean
         step = deviation.mean(dim=2, keepdim=True)
@@ -62,7 +63,7 @@ class AdaptedLinear(PerEyeLinear):
 
 
 class MemoryLinear(PerEyeLinear):
-    """The same over the codes of `memory` frames: (eye, code, memory, sample) -> (eye, outputs, sample)."""
+    """Linear layer on the codes of `memory` frames: (eye, code, memory, sample) -> (eye, outputs, sample)."""
 
     def __init__(self, n_eyes: int, memory: int, code: int, outputs: int) -> None:
         super().__init__(n_eyes, code * memory, outputs)
@@ -72,18 +73,23 @@ class MemoryLinear(PerEyeLinear):
         return super().forward(codes.flatten(1, 2))
 
     def slide(self, codes: Tensor) -> Tensor:
-        """Over the last `memory` frames at each step: (eye, code, memory - 1 + step, segment) -> (eye, outputs,
-        sample), samples (step, segment) flattened."""
+        """Apply the layer to the last `memory` frames at each step.
+
+        (eye, code, memory - 1 + step, segment) -> (eye, outputs, sample), with samples (step, segment) flattened.
+        """
         return _Slide.apply(codes, self.weight.unflatten(2, (-1, self.memory)), self.bias)
 
 
 class _Slide(torch.autograd.Function):
-    """Σ W[lag] codes[lag : lag + steps] over lags. Every sum is a GEMM on codes where they lie: copies of all windows
-    of frames took four times as long, forward and backward."""
+    """Sum of W[lag] codes[lag : lag + steps] over lags.
+
+    Each term is a matrix product (GEMM) on the stored codes. Copies of all windows of frames took four times longer,
+    forward and backward.
+    """
 
     @staticmethod
     def forward(ctx: Any, codes: Tensor, weight: Tensor, bias: Tensor) -> Tensor:
-        """Codes (eye, code, frame, segment), weight (eye, output, code, lag), bias (eye, output, 1)."""
+        """Return the sum; codes (eye, code, frame, segment), weight (eye, output, code, lag), bias (eye, output, 1)."""
         weights = weight.permute(3, 0, 1, 2).contiguous()
         total, *pieces = _slices(codes, len(weights))
         result = torch.baddbmm(bias, weights[0], total)
@@ -104,7 +110,7 @@ class _Slide(torch.autograd.Function):
 
 
 def _slices(codes: Tensor, memory: int) -> list[Tensor]:
-    """Views of codes (eye, code, frame, segment): by lag, (eye, code, sample), of the frames seen at every step."""
+    """Return a view (eye, code, sample) of codes (eye, code, frame, segment) for each lag."""
     segments, frames = codes.shape[3], codes.flatten(2)
     samples = frames.shape[2] - (memory - 1) * segments
     return [frames[:, :, lag * segments :][:, :, :samples] for lag in range(memory)]

@@ -1,6 +1,6 @@
-"""What an agent does with what it sees: features of its eyes, and over them an actor and a critic.
+"""Policy of an agent: an actor and a critic on the features of its eyes.
 
-A policy is stored as safetensors: tensors, and its shape in the metadata. Nothing in such a file is code.
+A policy is stored as safetensors, with its shape in the metadata. The file contains no code.
 """
 
 from __future__ import annotations
@@ -29,20 +29,22 @@ from evolve.learning.observed import CONTACT, Entry, entries_of, known_beside_ey
 from evolve.learning.tensor_file import read_tensors
 from evolve.store.atomic_files import write_whole
 
-FEELS = "feels"  # the entry of tasks of one world at a time
-LARGEST_COUNT = 4096  # of anything in a policy's shape; genes allow 512
-MOST_SIGNALS = 2**24  # in what a policy remembers at once; genes allow half as many
-FIRST_SPREAD = 0.5  # standard deviation of the first actions: with 1, a third of them are clipped
+FEELS = "feels"  # proprioception of a `sim.Task`
+LARGEST_COUNT = 4096  # limit of every number in a policy's shape; genes allow 512
+MOST_SIGNALS = 2**24  # limit of the signals in a policy's memory; genes allow half of it
+FIRST_SPREAD = 0.5  # standard deviation of an untrained policy's actions; with 1, a third of them would be clipped
 
 
 class TrainingDiverged(FloatingPointError):
-    """Learning produced numbers that are none; the message says which."""
+    """Learning produced numbers that are not finite; the message names them."""
 
 
 @dataclass(frozen=True)
 class Brain:
-    """Size of a brain: actor and critic have `layers` hidden layers of `neurons` each; all layers of its eyes' encoders
-    are `encoder` wide."""
+    """Size of a brain.
+
+    Actor and critic have `layers` hidden layers of `neurons` each, and all layers of the encoders are `encoder` wide.
+    """
 
     neurons: int
     layers: int = 2
@@ -51,11 +53,12 @@ class Brain:
 
 @dataclass(frozen=True)
 class PolicyConfig:
-    """The shape of a policy: all that is needed to build it again.
+    """Shape of a policy, from which it can be built again.
 
     eyes: shape of the observation's `eyes` (memory, eye, channel, height, width)
     neurons, layers, encoder: see `Brain`
-    actions: numbers in an action · beside: entries of the observation beside the eyes and the previous action
+    actions: numbers in an action
+    beside: entries of the observation other than the eyes' signals and the previous action
     """
 
     eyes: tuple[int, ...]
@@ -66,13 +69,13 @@ class PolicyConfig:
     beside: tuple[Entry, ...] = (CONTACT,)
 
     @classmethod
-    def of(cls, space: spaces.Dict, neurons: int, layers: int, encoder: int) -> PolicyConfig:
-        """For these observations."""
+    def from_space(cls, space: spaces.Dict, neurons: int, layers: int, encoder: int) -> PolicyConfig:
+        """Return the shape of a policy for these observations."""
         actions = known_beside_eyes(space)["previous_action"]
         return cls(tuple(space["eyes"].shape), neurons, layers, encoder, actions, entries_of(space))
 
     def observation_space(self) -> spaces.Dict:
-        """The observation that sim's environments give with these eyes."""
+        """Return the observation space of sim's environments with these eyes."""
         known: dict[str, spaces.Space[Any]] = {
             "eyes": spaces.Box(-np.inf, np.inf, self.eyes, np.float32),
             "previous_action": spaces.Box(-1.0, 1.0, (self.actions,), np.float32),
@@ -80,8 +83,11 @@ class PolicyConfig:
         return spaces.Dict(known | {entry.name: entry.space for entry in self.beside})
 
     def record(self) -> dict[str, Any]:
-        """Plain values. Same values, same bytes: policies are hashed, so files keep the entries that they had before
-        there was `beside`."""
+        """Return the shape as JSON values.
+
+        Policies are hashed, so equal shapes must give equal bytes. A policy of a built-in task is therefore written
+        with the entries of former versions, which had no list of other entries.
+        """
         values = {name: value for name, value in asdict(self).items() if name != "beside"}
         if self.beside == (CONTACT,) and self.actions == 2:
             del values["actions"]
@@ -93,12 +99,12 @@ class PolicyConfig:
 
     @classmethod
     def from_record(cls, stored: Mapping[str, Any]) -> PolicyConfig:
-        """Inverse of `record`.
+        """Return the shape that `record` described.
 
         Raises:
             KeyError: an entry is missing.
-            TypeError: an entry is no number.
-            ValueError: an entry is no number.
+            TypeError: an entry is not a number.
+            ValueError: an entry is not a number.
         """
         return cls(
             eyes=tuple(int(n) for n in stored["eyes"]),
@@ -120,10 +126,10 @@ def _entries(stored: Mapping[str, Any]) -> tuple[Entry, ...]:
 
 
 class _Within(torch.autograd.Function):
-    """Means of actions whose gradient may push them up to the bounds, -1 and 1, and back, but not further out.
+    """Means of actions whose gradients never move them beyond the bounds -1 and 1.
 
-    Commands beyond the bounds are clipped: a mean far out acts as if it did not explore at all, so nothing would ever
-    bring it back (Hausknecht and Stone 2016, section 5.2, "zeroing gradients").
+    Actions beyond the bounds are clipped. With a mean far outside, exploration has no effect, so that no gradient would
+    return the mean (Hausknecht and Stone 2016, section 5.2, "zeroing gradients").
     """
 
     @staticmethod
@@ -134,13 +140,12 @@ class _Within(torch.autograd.Function):
     @staticmethod
     def backward(ctx: Any, gradient: Tensor) -> Tensor:
         (mean,) = ctx.saved_tensors
-        # Descent raises the mean where the gradient is negative.
+        # Gradient descent increases the mean if the gradient is negative.
         return gradient * torch.where(gradient < 0, mean < 1, mean > -1)
 
 
 class EyePolicy(MultiInputActorCriticPolicy):
-    """SB3's actor-critic over EyeFeatures of width `encoder`, with `layers` hidden layers of `neurons` each for actor
-    and critic.
+    """SB3's actor-critic on EyeFeatures of width `encoder`; actor and critic have `layers` hidden layers of `neurons`.
 
     first_actions: mean and standard deviation of each number of the untrained policy's actions; None: 0, FIRST_SPREAD
     """
@@ -165,7 +170,7 @@ class EyePolicy(MultiInputActorCriticPolicy):
             "optimizer_class": Adam,
         }
         super().__init__(observation_space, action_space, lr_schedule, **kwargs)
-        self.config = PolicyConfig.of(observation_space, neurons, layers, encoder)
+        self.config = PolicyConfig.from_space(observation_space, neurons, layers, encoder)
         with torch.no_grad():
             means, spreads = zip(*(first_actions or [(0.0, FIRST_SPREAD)] * self.config.actions), strict=True)
             self.action_net.bias.copy_(torch.tensor(means))
@@ -174,7 +179,7 @@ class EyePolicy(MultiInputActorCriticPolicy):
     def extract_features(
         self, obs: dict[str, Tensor], features_extractor: BaseFeaturesExtractor | None = None
     ) -> Tensor:
-        """As SB3's, without its preprocessing: signals are light, not 8-bit images, and rollouts come unstacked."""
+        """Return the features without SB3's preprocessing, which expects 8-bit images and stacked frames."""
         return (features_extractor or self.features_extractor)(obs)
 
     def _get_action_dist_from_latent(self, latent_pi: Tensor) -> Distribution:
@@ -185,35 +190,36 @@ class EyePolicy(MultiInputActorCriticPolicy):
 
 
 def build_policy(config: PolicyConfig, learning_rate: float = 1e-3) -> EyePolicy:
-    """An untrained policy, drawn from torch's random state."""
+    """Return an untrained policy with weights from torch's random state."""
     action_space = spaces.Box(-1.0, 1.0, (config.actions,), np.float32)
     shape: dict[str, Any] = {"neurons": config.neurons, "layers": config.layers, "encoder": config.encoder}
     return EyePolicy(config.observation_space(), action_space, lambda _: learning_rate, **shape)
 
 
 def save_policy(policy: EyePolicy, path: Path | str) -> None:
-    """Write the policy's tensors as safetensors, its shape in the metadata; whole or not at all."""
+    """Write the policy's tensors as safetensors with its shape in the metadata, completely or not at all."""
     tensors = {name: tensor.detach().clone() for name, tensor in learnt(policy).items()}
-    # One entry: safetensors writes several in random order, and the same policy must be the same bytes.
+    # A single entry, because safetensors writes several in random order and the same policy must give the same bytes.
     metadata = {"config": json.dumps({**policy.config.record(), "units": UNITS.__name__})}
     write_whole(Path(path), safetensors.torch.save(tensors, metadata))
 
 
 def load_policy(path: Path | str) -> EyePolicy:
-    """Build the policy a file holds. Nothing in the file is ever executed.
+    """Build the policy in a file; nothing in the file is executed.
 
-    Sets torch to one thread, as learning does: more sum in another order, and an episode must repeat.
+    Torch is set to one thread, as in learning. Several threads would change the order of sums, and episodes would not
+    be reproducible.
 
     Raises:
-        ValueError: one line, naming the file, if it is no policy written by `save_policy` (a pickle, say, or cut
-            short).
-        StrangeFileError: a link, FIFO or directory bears its name.
+        ValueError: the file is not a policy written by `save_policy`, for example a pickle or a truncated file; one
+            line that names the file.
+        StrangeFileError: the path is a link, FIFO or directory.
     """
     try:
         metadata, tensors = read_tensors(Path(path))
         stored = json.loads(metadata["config"])
         if stored.get("units") != UNITS.__name__:
-            raise ValueError(f"its units are not {UNITS.__name__}, as those of this version's policies are")
+            raise ValueError(f"its units are not {UNITS.__name__}, which this version uses")
         config = PolicyConfig.from_record(stored)
         if not all(torch.isfinite(tensor).all() for tensor in tensors.values()):
             raise ValueError("it holds numbers that are not finite")
@@ -231,16 +237,16 @@ def load_policy(path: Path | str) -> EyePolicy:
 
 
 def learnt(policy: EyePolicy) -> dict[str, Tensor]:
-    """All that learning changes, by name: weights, and what the receptors have adapted to."""
+    """Return all tensors that learning changes, by name: weights, and the means and spreads of adaptation."""
     return {**dict(policy.named_parameters()), **dict(policy.named_buffers())}
 
 
 @torch.no_grad()
 def set_learnt(policy: EyePolicy, tensors: Mapping[str, Tensor]) -> None:
-    """Inverse of `learnt`.
+    """Set the tensors that `learnt` returns.
 
     Raises:
-        ValueError: a name or a shape that the policy has not.
+        ValueError: a name or a shape differs from the policy's.
     """
     own = learnt(policy)
     _require_same_shapes(own, tensors)
@@ -249,14 +255,14 @@ def set_learnt(policy: EyePolicy, tensors: Mapping[str, Tensor]) -> None:
 
 
 def _require_shape(config: PolicyConfig, tensors: Mapping[str, Tensor]) -> None:
-    """Whether a policy of this shape has these tensors, found out before anything of its size is built."""
+    """Check that a policy of this shape has these tensors, before memory for it is allocated."""
     known = sum(entry.size for entry in config.beside)
     counts = [*config.eyes, config.neurons, config.layers, config.encoder, config.actions, known + 1]
     if min(counts) < 1 or max(counts) > LARGEST_COUNT or math.prod(config.eyes) > MOST_SIGNALS:
         raise ValueError(f"its shape is impossible: {config}")
     if config.layers > len(tensors):
         raise ValueError(f"it has {len(tensors)} tensors, too few for {config.layers} layers")
-    with torch.device("meta"):  # shapes alone, no numbers
+    with torch.device("meta"):  # shapes without storage
         _require_same_shapes(learnt(build_policy(config)), tensors)
 
 

@@ -1,6 +1,6 @@
-"""Learning within a lifetime: PPO (stable-baselines3) on batched worlds, until it is solved, stuck or out of steps.
+"""PPO (stable-baselines3) on batched worlds, until returns stop improving or all steps are used.
 
-Its settings, with their ranges, are `evolve.config.settings.LearningConfig`.
+`evolve.config.settings.LearningConfig` defines the settings and their ranges.
 """
 
 from __future__ import annotations
@@ -26,22 +26,22 @@ from evolve.learning.schedule import first_step_size, schedule
 from evolve.learning.training_rewards import RewardsInUnits, ramped_share
 from sim.tasks.batch_task import BatchTask
 
-UNIT_RATE = 0.2  # of the way to the spread of the last returns, per rollout
-SPEED = "speed"  # the command that `learning.first_speed` is for
+UNIT_RATE = 0.2  # share of the (logarithmic) difference to the returns' spread by which the unit changes per rollout
+SPEED = "speed"  # command to which `learning.first_speed` applies
 VERDICTS = {True: 1, False: -1, None: 0}
-FLAT = 1e-6  # spread of returns that all are the same
+FLAT = 1e-6  # minimum spread of returns, for returns that are all equal
 
 Progress = Callable[[int, int], None]  # (steps trained, steps planned)
 
 
 @dataclass(frozen=True)
 class Training:
-    """What became of a training.
+    """Result of a training run.
 
-    policy: as it was at the best evaluation
-    steps: environment steps taken, in whole rollouts
+    policy: policy at the best evaluation
+    steps: number of environment steps, in whole rollouts
     curve: (steps, mean return of the evaluation episodes), every `eval_interval` steps
-    end: as it stands at its end, for a training that goes on from there
+    end: state at the end, from which training can continue
     """
 
     policy: EyePolicy
@@ -52,7 +52,7 @@ class Training:
 
 @dataclass(frozen=True)
 class Episodes:
-    """One whole episode of each world.
+    """Results of one complete episode in each world.
 
     returns (world,) · verdicts (world,): +1 solved, -1 not solved, 0 undecided, see `BatchTask.solved`
     """
@@ -62,16 +62,15 @@ class Episodes:
 
     @property
     def successes(self) -> np.ndarray:
-        """Worlds whose episode was solved, (world,) bool."""
+        """Return whether each world's episode was solved, (world,) bool."""
         return self.verdicts > 0
 
 
 class AdaptingPPO(PPO):
-    """PPO whose policy adapts to the signals it meets, and which stops at the first rollout or update that is not
-    finite, instead of learning nonsense from it.
+    """PPO with normalisation of signals and rewards, which stops at the first rollout or update that is not finite.
 
-    It sees rewards in units of the spread of its discounted returns, so that an agent's first minutes at a wall, a
-    hundred times as bad as anything later, do not swamp the critic.
+    Rewards are divided by the spread of the discounted returns. Early contact with walls gives costs about a hundred
+    times larger than any later rewards, which would otherwise dominate the critic.
     """
 
     rollout_buffer: FrameRolloutBuffer
@@ -100,8 +99,11 @@ class AdaptingPPO(PPO):
         self.set_logger(Logger(None, []))
 
     def _update_learning_rate(self, optimizers: Adam) -> None:
-        """And the passes of the update that follows. Not by the part of a plan that is done, as SB3 does: a training
-        goes the same way whatever is planned."""
+        """Set the step size and the passes of the next update.
+
+        Both depend on the steps so far and not, as in SB3, on the share of the planned steps. A training run is
+        therefore independent of its planned length.
+        """
         self.n_epochs, share = schedule(self.config, self.num_timesteps)
         optimizers.param_groups[0]["lr"] = self.learning_rate * share
 
@@ -118,11 +120,12 @@ class AdaptingPPO(PPO):
         for name in ("rewards", "values", "log_probs"):
             _require_finite(name, getattr(self.rollout_buffer, name), self.num_timesteps)
         super().train()
-        # A loss that overflows leaves the weights alone (SB3 clips its gradient to zero), and nothing is learnt.
+        # SB3 clips the gradient of an overflowing loss to zero, so that the weights stay finite without any learning.
         _require_finite("loss", np.asarray(self.logger.name_to_value["train/value_loss"]), self.num_timesteps)
         for name, parameter in self.policy.named_parameters():
             _require_finite(f"policy's {name}", parameter.detach().numpy(), self.num_timesteps)
-        # Not before: the update compares the policy with what it was when it acted. Neighbouring frames are alike.
+        # Adaptation follows the update, which compares the policy with its state during the rollout. Every eighth frame
+        # is enough, because neighbouring frames are similar.
         self._adapt(self.rollout_buffer.new_frames[:, ::8], self.rollout_buffer.beside)
         self._adapt_unit()
 
@@ -133,27 +136,30 @@ class AdaptingPPO(PPO):
 
     @torch.no_grad()
     def _adapt_unit(self) -> None:
-        """Measure rewards in units of the spread of returns; what the critic says of the worlds stays the same
-        (Pop-Art: van Hasselt et al. 2016, eq. 5). A rollout without any reward says nothing of their spread: its
-        returns are what the critic says, discounted, and the unit would shrink without end."""
+        """Adapt the unit of rewards to the spread of returns, and rescale the critic so that its predictions stay the
+        same (Pop-Art: van Hasselt et al. 2016, eq. 5).
+
+        A rollout without rewards does not change the unit. Its returns are the critic's own discounted predictions, so
+        that the unit would shrink without limit.
+        """
         if not self.env.paid:
             return
         self.env.paid = False
         change = max(float(self.rollout_buffer.returns.std()), FLAT)
-        if self.env.unit != 1:  # not the first rollout that pays: forget gradually
+        if self.env.unit != 1:  # after the first rollout with rewards, the unit changes gradually
             change **= UNIT_RATE
         self.env.unit *= change
         for parameter in self.policy.value_net.parameters():
             parameter.div_(change)
 
     def checkpoint(self, curve: list[tuple[int, float]], best: dict[str, torch.Tensor]) -> Checkpoint:
-        """The training as it stands; curve and best are kept outside."""
+        """Return the state of training; the caller supplies learning curve and best policy."""
         now = {name: tensor.detach().clone() for name, tensor in learnt(self.policy).items()}
         adam = self.policy.optimizer.state_dict()
         return Checkpoint(self.num_timesteps, tuple(curve), float(self.env.unit), now, best, adam)
 
     def restore(self, begun: Checkpoint) -> None:
-        """Go on from there; worlds and chance are this learner's own."""
+        """Continue from a checkpoint; worlds and random numbers are new."""
         self.num_timesteps = begun.steps
         self.env.unit = begun.unit
         set_learnt(self.policy, begun.now)
@@ -166,7 +172,7 @@ def _require_finite(name: str, values: np.ndarray, steps: int) -> None:
 
 
 class _Report(BaseCallback):
-    """Tells how far the training is, after every rollout."""
+    """Callback that reports the steps after every rollout."""
 
     def __init__(self, progress: Progress, planned: int) -> None:
         super().__init__()
@@ -181,7 +187,7 @@ class _Report(BaseCallback):
 
 @dataclass(frozen=True)
 class Worlds:
-    """Where a training learns, and where it is evaluated meanwhile."""
+    """Environments for training, and for its evaluations."""
 
     training: VecEnv
     evaluation: VecEnv
@@ -195,15 +201,16 @@ def train(
     progress: Progress | None = None,
     begun: Checkpoint | None = None,
 ) -> Training:
-    """Learn to act: same arguments, same policy, bit for bit (on one machine). A training `begun` goes on from there,
-    its steps counted.
+    """Train a policy; on one machine, the same arguments give the same policy, bit for bit.
 
-    After every `eval_interval` steps the policy plays one episode in each of the evaluation worlds; learning ends
-    after `patience` such evaluations without a better mean return, or after `total_steps`. The policy returned
-    is the one with the best mean return (the earliest of them).
+    After every `eval_interval` steps the policy plays one episode in each of the evaluation worlds. Training ends after
+    `patience` evaluations without a better mean return, or after `total_steps`. The returned policy is the one with the
+    best mean return (the earliest of equal ones).
+
+    begun: checkpoint from which to continue; its steps count
 
     Raises:
-        TrainingDiverged: rewards, loss, weights or actions stop being finite.
+        TrainingDiverged: rewards, loss, weights or actions are not finite.
     """
     model = AdaptingPPO(worlds.training, brain, config, seed)
     report = _Report(progress, config.total_steps) if progress else None
@@ -225,13 +232,13 @@ def train(
 
 
 def stuck(curve: list[tuple[int, float]], patience: int) -> bool:
-    """Whether the last `patience` evaluations all failed to better the best one before them."""
+    """Return whether none of the last `patience` evaluations exceeded the best one before them."""
     returns = [value for _, value in curve]
     return len(returns) > patience and max(returns[-patience:]) <= max(returns[:-patience])
 
 
 def play(policy: EyePolicy, worlds: VecEnv, seed: int) -> Episodes:
-    """One episode in each world, from a reset with this seed, the policy acting without exploration."""
+    """Play one episode in each world after a reset with this seed; the policy acts without exploration."""
     worlds.seed(seed)
     observation = worlds.reset()
     returns = np.zeros(worlds.num_envs)
@@ -251,13 +258,15 @@ def play(policy: EyePolicy, worlds: VecEnv, seed: int) -> Episodes:
 
 
 def batch_task_of(worlds: VecEnv) -> BatchTask:
-    """The task of these worlds."""
+    """Return the task of these worlds."""
     task: BatchTask = worlds.get_attr("batch_task")[0]
     return task
 
 
 def first_actions(task: BatchTask, config: LearningConfig) -> list[tuple[float, float]]:
-    """Mean and standard deviation of each number of the untrained policy's actions: a speed's are those of
-    `learning.first_speed`."""
+    """Return mean and standard deviation of each number of the untrained policy's actions.
+
+    Those of a speed follow from `learning.first_speed`.
+    """
     speed = (2 * config.first_speed - 1, config.first_speed)
     return [speed if command.name == SPEED else (0.0, FIRST_SPREAD) for command in task.commands()]

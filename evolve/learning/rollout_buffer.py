@@ -1,8 +1,8 @@
-"""The rollout buffer of a learner with memory: every frame is kept once, and encoded once per mini-batch.
+"""Rollout buffer for a learner with memory: each frame is stored once, and encoded once per mini-batch.
 
-SB3's own buffer keeps the stacked observation, `memory` copies of each frame (221 MB at 64 worlds x 64 steps of
-2 x 15 x 15 receptors with 10 frames), and PPO then encodes every copy. Here a mini-batch is a set of segments:
-consecutive steps of one world, whose windows of remembered frames overlap.
+SB3's buffer stores stacked observations with `memory` copies of each frame, and PPO then encodes every copy. That takes
+221 MB for 64 worlds x 64 steps of 2 x 15 x 15 receptors with 10 frames. Here a mini-batch is a set of segments, which
+are consecutive steps of one world whose windows of memory overlap.
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ from torch import Tensor
 
 from evolve.learning.observed import known_beside_eyes
 
-SEGMENT_STEPS = 8  # at most: longer ones share more frames, shorter ones mix better (docs/measurements/learning.md)
+SEGMENT_STEPS = 8  # maximum; longer segments share more frames, shorter ones mix better (docs/measurements/learning.md)
 
 
 class FrameRolloutBuffer(RolloutBuffer):
-    """Rollout buffer that yields unstacked observations, as `evolve.learning.eye_features` understands them.
+    """Rollout buffer that yields unstacked observations for `evolve.learning.eye_features`.
 
-    Frames before an episode's first repeat it, in the environment's stack as here.
+    As in the environment's stack, the first frame of an episode replaces the missing frames before it.
     """
 
     observation_space: spaces.Dict
@@ -60,7 +60,7 @@ class FrameRolloutBuffer(RolloutBuffer):
     ) -> None:
         step, remembered = self.pos, self.memory - 1
         if step == 0:
-            # What came before the rollout is kept as it was stacked, repetitions included: older than any window.
+            # Frames before the rollout are stored as stacked, repetitions included, so their age exceeds any window.
             self.frames[:, :remembered] = obs["eyes"][:, :-1]
             self.age[:, 0] = remembered
         else:
@@ -78,11 +78,11 @@ class FrameRolloutBuffer(RolloutBuffer):
 
     @property
     def new_frames(self) -> np.ndarray:
-        """The frames of this rollout's steps, (world, step, eye, channel, height, width)."""
+        """Frames of this rollout's steps, (world, step, eye, channel, height, width)."""
         return self.frames[:, self.memory - 1 :]
 
     def get(self, batch_size: int | None = None) -> Iterator[DictRolloutBufferSamples]:
-        """Mini-batches of whole segments, about `batch_size` samples each, every sample once per call."""
+        """Yield mini-batches of whole segments with about `batch_size` samples each; every sample occurs once."""
         assert self.full
         starts = np.arange(0, self.buffer_size, self.segment_steps)
         worlds, starts = (a.ravel() for a in np.meshgrid(np.arange(self.n_envs), starts, indexing="ij"))
@@ -93,7 +93,7 @@ class FrameRolloutBuffer(RolloutBuffer):
             yield self._segments(worlds[chosen], starts[chosen])
 
     def _segments(self, worlds: np.ndarray, starts: np.ndarray) -> DictRolloutBufferSamples:
-        """The samples of segments, (step, segment) flattened; worlds and starts (segment,)."""
+        """Return the samples of segments, (step, segment) flattened; worlds and starts are (segment,)."""
         steps = starts + np.arange(self.segment_steps)[:, None]
         frames = starts + np.arange(self.memory - 1 + self.segment_steps)[:, None]
 

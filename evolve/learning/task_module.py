@@ -1,4 +1,4 @@
-"""A user's task, executed: the one place where a run's code becomes objects."""
+"""Execution of a user task's code; no other module executes a run's code."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from evolve.config.checks import ConfigError
 from evolve.config.task_code import TaskCode
 from sim.tasks.batch_task import BatchTask
 from sim.tasks.task import Task
-from sim.tasks.task_fidelity import with_settled_others
+from sim.tasks.task_fidelity import resolve_other_fidelities
 from sim.tasks.task_settings import compiled
 from sim.tasks.user_tasks import require_rewards
 
@@ -20,11 +20,12 @@ __all__ = ["executed_task"]
 
 @lru_cache(maxsize=4)
 def executed_task(code: TaskCode) -> Task | BatchTask:
-    """The task: its file's text is executed as it was read, whatever the file holds by now.
+    """Execute the code and return the task; later changes of the file have no effect.
 
     Raises:
-        ConfigError: one line, with file and line where it comes from there: it cannot be executed, the class is no
-            `sim.Task` or `sim.BatchTask` or wants arguments, its model cannot be compiled, or a setting of it is wrong.
+        ConfigError: the code cannot be executed, the class does not derive from `sim.Task` or `sim.BatchTask` or
+            requires arguments, its model cannot be compiled, or one of its settings is invalid. The message is one line
+            and names file and line of an error in the user's code.
     """
     module = _executed(code)
     cls = getattr(module, code.name, None)
@@ -34,29 +35,29 @@ def executed_task(code: TaskCode) -> Task | BatchTask:
         task = cls()
         compiled(task)
         require_rewards(task)
-        return with_settled_others(task) if isinstance(task, Task) else task
+        return resolve_other_fidelities(task) if isinstance(task, Task) else task
     except (Exception, SystemExit) as error:
         raise ConfigError(f"{code.label}: {_told(error, code)}", "task") from error
 
 
 def _executed(code: TaskCode) -> ModuleType:
-    """Under a name that no other module has, where pickle and dataclasses find it, too."""
+    """Execute the code as a module with a unique name, which pickle and dataclasses can find."""
     name = f"rhabdom_task_{code.sha256[:16]}"
     module = ModuleType(name)
     module.__file__ = str(code.file)
     sys.modules[name] = module
     if str(code.file.parent) not in sys.path:
-        sys.path.append(str(code.file.parent))  # last: a neighbour of the file shadows nobody
+        sys.path.append(str(code.file.parent))  # last, so that files in this folder shadow no other module
     try:
         exec(compile(code.text, str(code.file), "exec"), module.__dict__)
-    except (Exception, SystemExit) as error:  # sys.exit, too, would end us without a word
+    except (Exception, SystemExit) as error:  # sys.exit would end this process without a message
         del sys.modules[name]
         raise ConfigError(f"{code.file.name}: {_told(error, code)}", "task") from error
     return module
 
 
 def _told(error: BaseException, code: TaskCode) -> str:
-    """The line of the user's file that it comes from, if it does, and what it says."""
+    """Return the message of an error, with the line of the user's file that caused it, if there is one."""
     lines = [frame.lineno for frame in traceback.extract_tb(error.__traceback__) if frame.filename == str(code.file)]
     said = " ".join(f"{type(error).__name__}: {error}".split())
     return f"line {lines[-1]}: {said}" if lines else said

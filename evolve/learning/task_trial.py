@@ -1,4 +1,4 @@
-"""A user's task, tried for a moment before a run begins: a failure there would occur in every animal."""
+"""Short trial of a user task before a run starts, because a failure there would affect every animal."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ WORLDS, ACTIONS = 2, 4
 
 
 def try_task(config: RunConfig) -> None:
-    """Let the first animal take a few random actions; nothing, if the task is a built-in one.
+    """Let the first animal take a few random actions; do nothing for a built-in task.
 
     Raises:
-        ConfigError: one line: what the task's module, model, eyes or methods fail with.
+        ConfigError: the task's module, model, eyes or methods fail; one line.
     """
     if config.choice.named_code is None:
         return
@@ -36,7 +36,7 @@ def try_task(config: RunConfig) -> None:
     try:
         task = PreparedTask(animal_task(animal, config))
         with closing(task.vec_env(WORLDS, config.seed, animal.memory_frames)) as worlds, warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # the failure itself is told
+            warnings.simplefilter("ignore")  # the failure is reported as an error instead
             failure = _failure(worlds)
     except (ValueError, RuntimeError, OSError) as error:
         said = str(error) if isinstance(error, ConfigError) else f"{config.task}: {error}"
@@ -46,7 +46,7 @@ def try_task(config: RunConfig) -> None:
 
 
 def _failure(worlds: EyesVecEnv) -> str | None:
-    """Of the first method that fails."""
+    """Return the message of the first method that fails, or None."""
     random = np.random.default_rng(0)
     worlds.reset()
     for _ in range(ACTIONS):

@@ -1,4 +1,4 @@
-"""Tensors from a run's files (safetensors): read through the one door to them, and nothing in them is executed."""
+"""Tensors from a run's files (safetensors); nothing in a file is executed."""
 
 from __future__ import annotations
 
@@ -15,20 +15,20 @@ if TYPE_CHECKING:
 
 __all__ = ["read_tensors"]
 
-LENGTH_BYTES = 8  # of the header's length, at the beginning of a file
+LENGTH_BYTES = 8  # bytes of the header's length, at the start of a file
 
 
 def read_tensors(path: Path) -> tuple[dict[str, str], dict[str, Tensor]]:
-    """Metadata and tensors of a file, by name.
+    """Return the metadata and tensors of a file, by name.
 
     Raises:
-        StrangeFileError: it is no regular file.
-        OSError: it cannot be read.
-        SafetensorError: it holds something else.
-        ValueError: its header is no JSON.
+        StrangeFileError: the path is not a regular file.
+        OSError: the file cannot be read.
+        SafetensorError: the file is not in the format safetensors.
+        ValueError: the header is not JSON.
     """
     content = read(path)
-    tensors = safetensors.torch.load(content)  # checks the header, so that what follows can rely on it
+    tensors = safetensors.torch.load(content)  # also validates the header, which is parsed below
     end = LENGTH_BYTES + int.from_bytes(content[:LENGTH_BYTES], "little")
     metadata = json.loads(content[LENGTH_BYTES:end]).get("__metadata__") or {}
     return metadata, tensors

@@ -1,4 +1,4 @@
-"""Rewards as a learner meets them: in units of its own, and with some terms at a share of their price."""
+"""Rewards for learning: in the learner's units, and with reduced costs at the start."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from stable_baselines3.common.vec_env.base_vec_env import VecEnvStepReturn
 
 __all__ = ["RewardsInUnits", "ramped_share", "terms_of"]
 
-FIRST_SHARE = 0.1  # of what contact costs in the end; with a third, agents turned on the spot
+FIRST_SHARE = 0.1  # initial share of the cost of contact; with a third, agents learnt to turn on the spot
 
 
 class RewardsInUnits(VecEnvWrapper):
-    """Worlds whose rewards come in units that the learner sets, and in which some terms count in part.
+    """Worlds with rewards in units that the learner sets, and with partial weights of some terms.
 
-    shares: of reward terms, by name; others count in full
-    paid: whether there was any reward but 0 since it was last set to False
+    shares: weights of reward terms, by name; other terms have the weight 1
+    paid: whether a reward differed from 0 since `paid` was last set to False
     """
 
     def __init__(self, worlds: VecEnv) -> None:
@@ -41,10 +41,10 @@ class RewardsInUnits(VecEnvWrapper):
 
 
 def ramped_share(steps: int, ramp: int) -> float:
-    """The share of a term's whole price after so many steps: FIRST_SHARE for a third of the ramp, then more by the same
-    factor each step.
+    """Return the share of a term's full cost after `steps`.
 
-    Agents that pay for contact before they can steer learn to stand still, which costs nothing, and never steer.
+    It is FIRST_SHARE for the first third of the ramp and then rises exponentially to 1. With the full cost of contact
+    from the start, agents learn to stand still, which costs nothing, before they can steer, and never learn to steer.
     """
     if steps >= ramp:
         return 1.0
@@ -52,6 +52,6 @@ def ramped_share(steps: int, ramp: int) -> float:
 
 
 def terms_of(info: dict[str, Any]) -> dict[str, float]:
-    """What a step's reward is the sum of, by name."""
+    """Return the terms of a step's reward, by name."""
     terms: dict[str, float] = info["reward_terms"]
     return terms

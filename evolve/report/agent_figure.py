@@ -1,4 +1,4 @@
-"""The animal as a figure: its head and eyes from in front and above, with what its eyes look at on their level."""
+"""Drawing of an animal: its head and eyes from the front and above, with horizontal fields of view."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ from evolve.report.markup import Html, html, joined
 
 __all__ = ["agent_figure"]
 
-RADIUS = 48.0  # of the head, in units of the drawing
-REACH = 2.8  # head radii that fields of view are drawn
-ELEVATION = math.radians(42)  # of the onlooker, in front of the animal
-AHEAD = math.radians(205)  # direction that the head is seen from: a little to its left, so that it is no flat face
-LARGEST_EYE = math.radians(24)  # half angle of the head that an eye's disk takes, at most
+RADIUS = 48.0  # radius of the head, in units of the drawing
+REACH = 2.8  # length of the drawn fields of view, in head radii
+ELEVATION = math.radians(42)  # elevation of the viewpoint in front of the animal
+AHEAD = math.radians(205)  # azimuth of the heading in the drawing: the viewpoint is slightly to one side
+LARGEST_EYE = math.radians(24)  # maximum half angle of an eye's disk on the head
 
 
 def agent_figure(eyes: sim.Eyes, name: str, placed: Sequence[float] | np.ndarray) -> Html:
-    """A drawing of the head, seen from in front and above; eyes as disks, as wide as their room on the head allows.
+    """Return a drawing of the head from the front and above, with eyes as disks that do not overlap.
 
-    name: keeps the ids in the drawing apart from those of others on the page
+    name: prefix of the ids in the drawing, unique on the page
     placed: azimuths of the eyes [rad]
     """
     azimuths = [float(azimuth) for azimuth in placed]
@@ -43,28 +43,28 @@ def agent_figure(eyes: sim.Eyes, name: str, placed: Sequence[float] | np.ndarray
 
 
 def _closest(azimuths: Sequence[float]) -> float:
-    """Between neighbours that do not look the same way, all round; 0 where there are none."""
+    """Return the smallest angle between neighbouring directions around the head; 0 if all directions are equal."""
     around = np.unique(np.round(np.mod(azimuths, 2 * math.pi), 6))
     return float(np.diff([*around, around[0] + 2 * math.pi]).min()) if len(around) > 1 else 0.0
 
 
 def _projected(points: np.ndarray) -> np.ndarray:
-    """Points (n, 3) in head radii, x ahead, y left, z up, as the onlooker sees them, (n, 2) in units of the drawing."""
+    """Project points (n, 3) in head radii (x ahead, y left, z up) to (n, 2) in units of the drawing."""
     x, y, z = points.T
     turned = AHEAD - math.pi
-    depth = x * math.cos(turned) + y * math.sin(turned)  # towards the onlooker
+    depth = x * math.cos(turned) + y * math.sin(turned)  # towards the viewpoint
     right = -x * math.sin(turned) + y * math.cos(turned)
     up = z * math.cos(ELEVATION) - depth * math.sin(ELEVATION)
     return RADIUS * np.stack([right, -up], axis=1)
 
 
 def _faces(azimuth: float) -> bool:
-    """Whether an eye on the head's equator is on the side that is seen."""
+    """Return whether an eye on the head's equator is on the visible side."""
     return math.cos(azimuth - (AHEAD - math.pi)) > 0
 
 
 def _field(azimuth: float, fov: float) -> Html:
-    """What an eye looks at, as a sector on the level of the eyes."""
+    """Return the horizontal field of view of an eye as a sector in the plane of the eyes."""
     angles = azimuth + np.linspace(-fov / 2, fov / 2, 1 + max(2, int(math.degrees(fov) / 5)))
     near = np.array([[math.cos(azimuth), math.sin(azimuth), 0.0]])
     far = REACH * np.stack([np.cos(angles), np.sin(angles), np.zeros_like(angles)], axis=1)
@@ -72,7 +72,7 @@ def _field(azimuth: float, fov: float) -> Html:
 
 
 def _eye(azimuth: float, half: float) -> Html:
-    """A disk on the head's equator, with a glint."""
+    """Return an eye as a disk on the head's equator, with a highlight."""
     around = np.linspace(0, 2 * math.pi, 33)[:-1]
     normal = np.array([math.cos(azimuth), math.sin(azimuth), 0.0])
     left, up = np.array([-math.sin(azimuth), math.cos(azimuth), 0.0]), np.array([0.0, 0.0, 1.0])

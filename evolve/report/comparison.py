@@ -1,4 +1,4 @@
-"""Runs side by side: how far each came, at what cost, and in which settings they differ."""
+"""Comparison of runs: their results, their cost, and the settings in which they differ."""
 
 from __future__ import annotations
 
@@ -20,8 +20,10 @@ OF_THE_BEST = ("best candidate", "fitness", "95 % interval", "success rate", "ac
 
 
 def run_summary(run: Run) -> dict[str, Any]:
-    """One run as plain values, such as JSON has; those of the best candidate are None before one has succeeded, its
-    interval also after a single episode."""
+    """Return one run as JSON values.
+
+    Values of the best candidate are None before a candidate has succeeded; its interval is None for a single episode.
+    """
     best = run.best
     interval = None if best is None else bootstrap_interval(best.returns)
     return {
@@ -45,7 +47,10 @@ def run_summary(run: Run) -> dict[str, Any]:
 
 
 def differing_settings(runs: Sequence[Run]) -> dict[str, list[Any]]:
-    """Dotted settings in which the runs' configs differ, a value for each run; None where one has no such setting."""
+    """Return the settings in which the runs' configs differ, by dotted name, with a value for each run.
+
+    The value is None for a run without the setting.
+    """
     flat = [dict(_flat(asdict(run.config))) for run in runs]
     names = list(dict.fromkeys(name for settings in flat for name in settings))
     values = {name: [settings.get(name) for settings in flat] for name in names}
@@ -53,7 +58,7 @@ def differing_settings(runs: Sequence[Run]) -> dict[str, list[Any]]:
 
 
 def comparison_lines(runs: Sequence[Run]) -> list[str]:
-    """The comparison as a table for a terminal: a row per quantity, a column per run."""
+    """Return the comparison as a table for a terminal, with a row per quantity and a column per run."""
     columns = [_column(run_summary(run)) for run in runs]
     rows = [(name, *(column[name] for column in columns)) for name in columns[0]]
     settings = [(name, *(_shown(value) for value in row)) for name, row in differing_settings(runs).items()]
@@ -63,7 +68,7 @@ def comparison_lines(runs: Sequence[Run]) -> list[str]:
 
 
 def write_page(runs: Sequence[Run], path: Path) -> None:
-    """An HTML page of best fitness over the generations and the table, whole or not at all."""
+    """Write an HTML page with the best fitness over the generations and the table, completely or not at all."""
     columns = [_column(run_summary(run)) for run in runs]
     rows = [[name, *(column[name] for column in columns)] for name in list(columns[0])[1:]]
     rows += [[name, *(_shown(v) for v in row)] for name, row in differing_settings(runs).items()]
@@ -79,7 +84,7 @@ def write_page(runs: Sequence[Run], path: Path) -> None:
 
 
 def _column(one: Mapping[str, Any]) -> dict[str, str]:
-    """A summary's values as text, under the names of their rows."""
+    """Return a summary's values as text, by row name."""
     column = {
         "run": one["run"],
         "task": one["task"],
@@ -109,7 +114,7 @@ def _flat(tree: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]
 
 
 def _shown(value: Any) -> str:
-    """As `--set` takes it."""
+    """Return a value in the form of `--set`."""
     if isinstance(value, bool):
         return str(value).lower()
     return "-" if value is None else f"{value:g}" if isinstance(value, float) else str(value)

@@ -1,4 +1,4 @@
-"""Telling who waits what is being made."""
+"""Progress messages while files are written."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ from collections.abc import Callable
 
 __all__ = ["Doing", "in_silence"]
 
-Doing = Callable[[str, float], None]  # what is being made, and what share of the whole has been, [0, 1]
+Doing = Callable[[str, float], None]  # called with the current step and the share done, [0, 1]
 
 
 def in_silence(what: str, share: float) -> None:
-    """Nobody is told."""
+    """Ignore a progress message."""

@@ -1,4 +1,4 @@
-"""What an agent saw, as a sequence of spectral EXR files for any tool that reads them."""
+"""Radiance and signals of an agent's eyes, as a sequence of spectral EXR files."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ __all__ = ["export_episode", "export_run"]
 def export_run(
     run: Run, candidate_id: int | None = None, seed: int = 0, out: Path | None = None, doing: Doing = in_silence
 ) -> list[Path]:
-    """Record an episode (default: of the best candidate) and write it to the folder `out`, the run's `exr/` if None;
-    returns the files.
+    """Record an episode (default: of the best candidate), write EXR files, and return their paths.
 
-    doing: is told what is being made, and how much has been, [0, 1]
+    out: folder of the files; None for `exr/` in the run directory
+    doing: called with the current step and the share done, [0, 1]
 
     Raises:
-        RunError: there is no such candidate, or no policy of it.
+        RunError: the candidate does not exist, or has no policy.
     """
     if out is not None:
         out.parent.mkdir(parents=True, exist_ok=True)
@@ -35,10 +35,11 @@ def export_run(
 
 
 def export_episode(episode: Episode, directory: Path, doing: Doing = in_silence) -> list[Path]:
-    """One file per time at which radiance was kept; in it, per eye, one part with the spectral radiance before it
-    and one with what its receptors signalled (`left.spectral`, `left.receptors`, ...).
+    """Write one file for each time at which radiance was recorded, and return the paths.
 
-    Files are named after candidate, episode seed and time, so that another export doesn't overwrite this one.
+    Each eye has a part with the spectral radiance in front of it and a part with its receptors' signals
+    (`left.spectral`, `left.receptors`, ...). File names contain candidate, episode seed and time, so that exports of
+    other episodes do not overwrite each other.
     """
     folder(directory)
     files = []
@@ -52,7 +53,7 @@ def export_episode(episode: Episode, directory: Path, doing: Doing = in_silence)
 
 
 def _views(episode: Episode, frame: int) -> list[sim.View]:
-    """What each eye saw at one kept time."""
+    """Return the views of all eyes at one recorded time."""
     t, lens = int(episode.radiance_frames[frame]), episode.eyes.eye()
     peaks = None if lens.mosaic is not None else [kind.peak_nm for kind in lens.receptors.types]
     return [
@@ -69,7 +70,7 @@ def _views(episode: Episode, frame: int) -> list[sim.View]:
 
 
 def _attributes(episode: Episode, t: int, eye: int) -> dict[str, Any]:
-    """Where and when a view was seen."""
+    """Return the metadata of a view: task, candidate, time and direction."""
     up = float(episode.elevations_deg[eye])
     return {
         "task": episode.task,

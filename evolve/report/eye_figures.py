@@ -1,4 +1,4 @@
-"""Figures of one eye's optics: the pupil's relief, its point spread function, its modulation transfer function."""
+"""Figures of one eye's optics: relief of the pupil, point spread function and modulation transfer function."""
 
 from __future__ import annotations
 
@@ -26,38 +26,38 @@ from optics.spectra.bands import daylight
 __all__ = ["DECADES", "WhiteLight", "eye_figures", "middle_of_psf", "relief_heights"]
 
 SIZE = (370, 310)
-PIXELS = 161  # of a picture, at most: fine enough for its size on the page
-DECADES = 4  # of the PSF that are shown
-SHOWN_POWER = 0.98  # of the light in its window that the PSF's picture holds
+PIXELS = 161  # maximum number of pixels along a side of an image, enough for its size on the page
+DECADES = 4  # number of decades of the PSF in the image
+SHOWN_POWER = 0.98  # share of the light in the PSF's window that the image contains
 
 
 @dataclass(frozen=True)
 class WhiteLight:
-    """An eye, its PSF per band, and in white daylight."""
+    """An eye with its PSF per band and in white daylight."""
 
     eye: optics.Eye
     psf: optics.PSFResult
     white: optics.PSFResult
 
     @classmethod
-    def through(cls, eye: optics.Eye) -> WhiteLight:
+    def from_eye(cls, eye: optics.Eye) -> WhiteLight:
         psf = eye.psf()
         return cls(eye, psf, polychromatic(eye, psf))
 
     @property
     def per_degree(self) -> float:
-        """Metres on the retina, near the axis, that a degree spans."""
+        """Distance on the retina per degree near the axis [m]."""
         return self.eye.sensor_distance * np.pi / 180
 
 
 def eye_figures(phenotype: Phenotype, config: EyeConfig) -> Html:
-    """Figures with captions; for a perfect lens a sentence instead."""
+    """Return figures with captions; for a perfect lens a sentence instead."""
     eye = phenotype.eyes(config).eye()
     if eye.pupil is None:
         return html("<p>Optics are off in this run: every eye has a perfect lens, which neither blurs nor dims.</p>\n")
     pupil = _pupil(eye, phenotype)
     try:
-        light = WhiteLight.through(eye)
+        light = WhiteLight.from_eye(eye)
     except optics.AccuracyError as error:
         parts = [pupil, _unknown("Point spread function", error)]
     else:
@@ -67,7 +67,7 @@ def eye_figures(phenotype: Phenotype, config: EyeConfig) -> Html:
 
 
 def _or_why_not(name: str, draw: Callable[[WhiteLight], Html], light: WhiteLight) -> Html:
-    """A figure, or one line where the light cannot be known well enough for it."""
+    """Return a figure, or one line if the PSF cannot be computed accurately enough for it."""
     try:
         return draw(light)
     except optics.AccuracyError as error:
@@ -75,11 +75,11 @@ def _or_why_not(name: str, draw: Callable[[WhiteLight], Html], light: WhiteLight
 
 
 def _unknown(name: str, error: optics.AccuracyError) -> Html:
-    return html("<p><b>{}.</b> It is not known: {}.</p>", name, str(error))
+    return html("<p><b>{}.</b> It cannot be computed: {}.</p>", name, str(error))
 
 
 def _pupil(eye: optics.Eye, phenotype: Phenotype) -> Html:
-    """Height of the relief over the pupil."""
+    """Return the figure of the relief's height over the pupil."""
     pupil = eye.pupil
     assert pupil is not None
     heights, inside = relief_heights(pupil)
@@ -88,7 +88,7 @@ def _pupil(eye: optics.Eye, phenotype: Phenotype) -> Html:
     with drawing(*SIZE) as drawn:
         axes = drawn.subplots()
         extent = (-radius, radius, -radius, radius)
-        # A circle's rim is drawn as such; other shapes end at pixels.
+        # A circular rim is drawn exactly; other shapes are masked pixel by pixel.
         seen = 1e6 * (heights if _is_round(pupil) else np.where(inside, heights, np.nan))
         picture = axes.imshow(seen, extent=extent, origin="lower", interpolation="none", vmin=low, vmax=high)
         picture.set_clip_path(Circle((0, 0), radius, transform=axes.transData))
@@ -101,7 +101,7 @@ def _pupil(eye: optics.Eye, phenotype: Phenotype) -> Html:
     waves = (index - 1) * (high - low) / 0.55
     caption = html(
         "<b>Pupil.</b> Height of its {}, {} to {} µm within a radius of {} µm (a = {}). With n = {} the relief "
-        "delays green light (550 nm) by up to {} waves from place to place.",
+        "delays green light (550 nm) by up to {} waves across the pupil.",
         *(hint("relief"), rounded(low), rounded(high), rounded(radius), rounded(eye.relative_aperture)),
         *(rounded(index, 4), rounded(waves)),
     )
@@ -113,7 +113,7 @@ def _is_round(pupil: optics.Pupil | None) -> bool:
 
 
 def relief_heights(pupil: optics.Pupil) -> tuple[np.ndarray, np.ndarray]:
-    """Relief [m] over the pupil's square, (y, x), row 0 at y = -a; and which of it lies in the aperture."""
+    """Return the relief [m] over the pupil's square, (y, x) with row 0 at y = -a, and the mask of the aperture."""
     types = precision("float64")
     centres = (np.arange(PIXELS) + 0.5) / PIXELS * 2 - 1
     x, y = (plane.ravel() for plane in np.meshgrid(centres, centres))
@@ -126,7 +126,7 @@ def relief_heights(pupil: optics.Pupil) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _psf(light: WhiteLight) -> Html:
-    """The polychromatic PSF, logarithmic, with a receptor's outline."""
+    """Return the figure of the polychromatic PSF, logarithmic, with the outline of a receptor."""
     picture, half = middle_of_psf(light)
     edge, pitch = 1e6 * half, 1e6 * light.eye.receptor_pitch
     peak = picture.max()
@@ -147,7 +147,7 @@ def _psf(light: WhiteLight) -> Html:
         svg = inline(drawn, "psf", f"Point spread function over {2 * edge:.3g} µm, peak {peak / 1e12:.3g} per µm².")
     plan = light.psf.plan
     caption = html(
-        "<b>{}</b> of a distant point, all {} as white daylight weighs them; logarithmic, "
+        "<b>{}</b> of a distant point, all {} weighted by white daylight; logarithmic, "
         "{} decades. White square: one {}, {} µm wide. Least accurate band: {}, predicted error {}.",
         *(hint("psf", "Point spread function"), hint("bands"), DECADES, hint("receptor"), rounded(pitch)),
         *(plan.method.replace("_", " "), f"{plan.predicted_error:.1g}"),
@@ -156,7 +156,7 @@ def _psf(light: WhiteLight) -> Html:
 
 
 def middle_of_psf(light: WhiteLight) -> tuple[np.ndarray, float]:
-    """The middle of the PSF that holds most of the light, averaged to at most PIXELS, and its half width [m]."""
+    """Return the central part of the PSF with most of the light, averaged to at most PIXELS, and its half width [m]."""
     image, dx = light.white.psf[0], light.white.dx
     middle = image.shape[0] // 2
     ring = np.maximum(*np.abs(np.indices(image.shape) - middle))
@@ -172,7 +172,7 @@ def middle_of_psf(light: WhiteLight) -> tuple[np.ndarray, float]:
 
 
 def _cuts(light: WhiteLight) -> Html:
-    """Each band's PSF along x through the axis."""
+    """Return the figure of each band's PSF along x through the axis."""
     psf = light.psf
     _, half = middle_of_psf(light)
     inside = np.abs(psf.x) <= half
@@ -194,7 +194,7 @@ def _cuts(light: WhiteLight) -> Html:
 
 
 def _mtf(light: WhiteLight) -> Html:
-    """Contrast over spatial frequency beside what the aperture allows at best."""
+    """Return the figure of contrast over spatial frequency, with the diffraction limit of the aperture."""
     eye, scale = light.eye, light.per_degree
     cutoff = light.psf.cutoff
     nyquist = 1 / (2 * eye.receptor_pitch)
@@ -213,7 +213,7 @@ def _mtf(light: WhiteLight) -> Html:
         )
     green = int(np.argmin(np.abs(light.psf.wavelengths - 550e-9)))
     strehl = optics.strehl_ratio(light.psf)[green]
-    of_whom = "" if _is_round(eye.pupil) else " of a circle as wide"
+    of_whom = "" if _is_round(eye.pupil) else " of a circle of this width"
     quality = optics.image_quality(light.white, nyquist, eye.white_signal, noise_of(eye, eye.white_signal))[0]
     caption = html(
         "<b>{}</b> in white daylight, mean of all orientations ({}), and the diffraction "
@@ -232,8 +232,10 @@ def _mtf(light: WhiteLight) -> Html:
 
 
 def diffraction_limit(light: WhiteLight, frequency: np.ndarray) -> np.ndarray:
-    """MTF of a circular aperture as wide, without aberrations, in white daylight, (frequency,): the bands' limits
-    (2/π)(arccos s - s √(1 - s²)), s = f / cutoff (Goodman, §6.3.3), weighted by their light."""
+    """Return the MTF of a circular aperture of the same width without aberrations in white daylight, (frequency,).
+
+    Each band has the limit (2/π)(arccos s - s √(1 - s²)) with s = f / cutoff (Goodman, §6.3.3), weighted by its light.
+    """
     weights = light.eye.spectral_bands.weights.mean(axis=0) * daylight(light.psf.wavelengths)
     s = np.clip(frequency / light.psf.cutoff[:, None], 0, 1)
     limits = 2 / np.pi * (np.arccos(s) - s * np.sqrt(1 - s**2))
@@ -249,7 +251,7 @@ def _bar(axes: Axes, picture: Any, label: str) -> None:
 
 
 def _degrees(axes: Axes, eye: optics.Eye, edge: float) -> None:
-    """A second axis on top: the angle that a retinal position [µm] looks at."""
+    """Add an axis at the top with the visual angle of positions on the retina [µm]."""
     distance = 1e6 * eye.sensor_distance
     top = axes.secondary_xaxis(
         "top",

@@ -28,12 +28,12 @@ __all__ = [
 ]
 
 SIZE = (370, 260)
-DASHES = ("-", "--", ":", "-.")  # of more lines than there are colours
+DASHES = ("-", "--", ":", "-.")  # line styles if there are more lines than colours
 Generations = Sequence[int] | NDArray[np.int64]
 
 
 def fitness_figure(rows: Sequence[GenerationStatistics], candidates: Sequence[Candidate]) -> Html:
-    """Every candidate's fitness as a dot, the population's spread and median, the best so far."""
+    """Draw every candidate's fitness as a dot, the spread and median of each population, and the best so far."""
     with drawing(*SIZE) as figure:
         axes = figure.subplots()
         _candidates(axes, candidates, [c.fitness for c in candidates])
@@ -49,7 +49,7 @@ def fitness_figure(rows: Sequence[GenerationStatistics], candidates: Sequence[Ca
 
 
 def comparison_figure(curves: Mapping[str, Sequence[GenerationStatistics]]) -> Html:
-    """Best fitness so far of several runs, each under its name."""
+    """Draw the best fitness so far of several runs, by name."""
     with drawing(460, 300) as figure:
         axes = figure.subplots()
         for place, (name, rows) in enumerate(curves.items()):
@@ -65,8 +65,10 @@ def comparison_figure(curves: Mapping[str, Sequence[GenerationStatistics]]) -> H
 
 
 def genealogy_figure(candidates: Sequence[Candidate], best: Candidate) -> Html:
-    """Every candidate beside its generation, at its fitness, joined with the nearest of its parents; the best one's
-    line of descent in the accent colour."""
+    """Draw every candidate at its generation and fitness, with a line to the nearest of its parents.
+
+    The best candidate's line of descent has the accent colour.
+    """
     known = {candidate.id: candidate for candidate in candidates}
     population = max(candidate.index for candidate in candidates) + 1
     with drawing(*SIZE) as figure:
@@ -90,7 +92,7 @@ def genealogy_figure(candidates: Sequence[Candidate], best: Candidate) -> Html:
 
 
 def _links(axes: Axes, candidates: Sequence[Candidate], place: Callable[[Candidate], tuple[float, float]]) -> None:
-    """A place to click over each candidate's dot, which leads to its row of the table."""
+    """Add a link over each candidate's dot that leads to its row of the table."""
     good = [candidate for candidate in candidates if succeeded(candidate)]
     x, y = np.transpose([place(candidate) for candidate in good])
     dots = axes.scatter(x, y, s=90, color=ACCENT, alpha=0.0)
@@ -98,7 +100,7 @@ def _links(axes: Axes, candidates: Sequence[Candidate], place: Callable[[Candida
 
 
 def vision_figure(name: str, label: str, generations: Sequence[int], values: Sequence[float]) -> Html:
-    """One measure of the best eye so far over the generations."""
+    """Draw one measure of the best eye so far over the generations."""
     with drawing(250, 165, font=10.5) as figure:
         axes = figure.subplots()
         axes.plot(generations, values, color=ACCENT, lw=1.8, marker="o", ms=3)
@@ -109,7 +111,7 @@ def vision_figure(name: str, label: str, generations: Sequence[int], values: Seq
 
 
 def success_figure(candidates: Sequence[Candidate]) -> Html:
-    """Share of evaluation episodes solved, against fitness's generation."""
+    """Draw the share of solved evaluation episodes over the generations."""
     with drawing(*SIZE) as figure:
         axes = figure.subplots()
         _candidates(axes, candidates, [100 * c.success_rate for c in candidates])
@@ -124,7 +126,7 @@ def success_figure(candidates: Sequence[Candidate]) -> Html:
 
 
 def learning_figure(candidates: Sequence[Candidate], best: Candidate) -> Html:
-    """Mean evaluation return while each candidate learned; the best one's curve in the accent colour."""
+    """Draw the mean evaluation return during each candidate's training, the best one in the accent colour."""
     with drawing(*SIZE) as figure:
         axes = figure.subplots()
         faint = float(np.clip(8 / len(candidates), 0.08, 0.4))
@@ -145,7 +147,7 @@ def learning_figure(candidates: Sequence[Candidate], best: Candidate) -> Html:
 def gene_figure(
     name: str, label: str, path: Trajectory, limits: tuple[float, float] | None, whole: bool = False
 ) -> Html:
-    """One gene over the generations, on the range that evolution may search; ticks at whole numbers only if `whole`."""
+    """Draw one gene over the generations on its searched range; with `whole`, ticks are integers."""
     with drawing(250, 165, font=10.5) as figure:
         axes = figure.subplots()
         _trajectory(axes, path)
@@ -159,7 +161,7 @@ def gene_figure(
 
 
 def relief_figure(paths: dict[str, Trajectory]) -> Html:
-    """The relief's genes, laid out as they lie over the pupil (row 0 at y = -a, at the bottom)."""
+    """Draw the relief's genes in panels that follow their positions over the pupil (row 0 at y = -a, at the bottom)."""
     with drawing(440, 340) as figure:
         rows = sorted({name[-2] for name in paths}, reverse=True)
         columns = sorted({name[-1] for name in paths})
@@ -187,7 +189,7 @@ def _trajectory(axes: Axes, path: Trajectory, marker_size: float = 3) -> None:
 
 
 def _spread(axes: Axes, x: Generations, low: ArrayLike, median: ArrayLike, high: ArrayLike) -> None:
-    """The population: 10-90 % band (bars where a single generation has no width) and median."""
+    """Draw the 10-90 % band of the population (bars for a single generation, which has no width) and the median."""
     if len(x) == 1:
         axes.vlines(x, low, high, color=MUTED, alpha=0.4, lw=6)
     axes.fill_between(x, low, high, color=MUTED, alpha=0.18, lw=0)
@@ -195,7 +197,7 @@ def _spread(axes: Axes, x: Generations, low: ArrayLike, median: ArrayLike, high:
 
 
 def _candidates(axes: Axes, candidates: Sequence[Candidate], values: Sequence[float]) -> None:
-    """A dot per candidate, those of one generation side by side; a cross at the bottom for a failed one."""
+    """Draw a dot per candidate, with generations spread horizontally, and a cross at the bottom for a failed one."""
     generations = np.array([c.generation for c in candidates], float)
     population = max(c.index for c in candidates) + 1
     x = generations + 0.5 * (np.array([c.index for c in candidates]) / max(population - 1, 1) - 0.5)
@@ -206,7 +208,7 @@ def _candidates(axes: Axes, candidates: Sequence[Candidate], values: Sequence[fl
 
 
 def _confidence(axes: Axes, candidates: Sequence[Candidate]) -> None:
-    """95 % bootstrap interval of the best candidate's fitness, from its episodes' returns."""
+    """Draw the 95 % bootstrap interval of the best candidate's fitness, from its episodes' returns."""
     best = [(generation, champion) for generation, champion in champions(candidates) if champion.returns]
     if best:
         low, high = zip(*(bootstrap_interval(champion.returns) for _, champion in best), strict=True)

@@ -1,4 +1,4 @@
-"""Selection or drift: where the open genes of runs end, beside searches with random fitness."""
+"""Selection or drift: comparison of the final gene values of runs with searches with random fitness."""
 
 from __future__ import annotations
 
@@ -27,8 +27,9 @@ ALLOWED_TO_DIFFER = ("seed", "workers")
 class QuantityDrift:
     """One quantity at the end of runs and of searches with random fitness, as means over candidates.
 
-    runs: of each run · low, median, high: of the searches, whose middle 95 % lie between low and high
-    p: two-sided, of the runs' mean
+    runs: mean of each run
+    low, median, high: of the searches; the central 95 % lie between low and high
+    p: two-sided p-value of the runs' mean
     """
 
     quantity: str
@@ -45,7 +46,7 @@ class QuantityDrift:
 
 @dataclass(frozen=True)
 class Drift:
-    """The comparison: of how many runs, over which generations, numbered from 0, with how many searches."""
+    """The comparison: number of runs, generations (numbered from 0), number of searches, and quantities."""
 
     of: int
     generations: range
@@ -53,12 +54,12 @@ class Drift:
     moved: tuple[QuantityDrift, ...]
 
     def as_plain_values(self) -> dict[str, Any]:
-        """Such as JSON has."""
+        """Return the comparison as JSON values."""
         first, last = self.generations[0], self.generations[-1]
         return {"generations": [first, last], "searches": self.searches, "moved": [asdict(one) for one in self.moved]}
 
     def lines(self) -> list[str]:
-        """As a table for a terminal."""
+        """Return the comparison as a table for a terminal."""
         rows = [("", "run" if self.of == 1 else f"mean of {self.of} runs", "null model", "95 % of its searches", "p")]
         for one in self.moved:
             numbers = (f"{one.mean:.4g}", f"{one.median:.4g}", f"{one.low:.4g} to {one.high:.4g}", f"{one.p:.2g}")
@@ -70,18 +71,20 @@ class Drift:
             *table,
             f"Means over candidates of generations {first} to {last}; null model: {self.searches} searches with random "
             "fitness.",
-            f"p is two-sided, and {2 / (self.searches + 1):.2g} at the least; by chance alone it is below 0.05 in one "
-            "of twenty rows.",
+            f"p is two-sided and at least {2 / (self.searches + 1):.2g}; by chance alone it is below 0.05 in one of "
+            "twenty rows.",
         ]
 
 
 def drift_of(runs: Sequence[Run], searches: int = SEARCHES, done: Callable[[float], None] = lambda _: None) -> Drift:
-    """Open genes, acuity [cycles/degree] and number of receptors at the end of runs that differ in nothing but their
-    seeds, as far as all of them have come, beside searches with random fitness (`evolve.search.null_model`).
+    """Compare runs that differ only in their seeds with searches with random fitness (`evolve.search.null_model`).
+
+    Quantities are the open genes, acuity [cycles/degree] and number of receptors, at the last generations that all runs
+    have completed.
 
     Raises:
-        RunError: settings differ in more than seeds, or a run is named twice; or one has no complete generation.
-        ValueError: fewer than two searches.
+        RunError: the settings differ in more than seeds, a run is named twice, or a run has no complete generation.
+        ValueError: there are fewer than two searches.
     """
     if searches < 2:
         raise ValueError(f"searches = {searches}: must be 2 or more")
@@ -101,8 +104,8 @@ def _require_alike(runs: Sequence[Run]) -> None:
     differing = set(differing_settings(runs)) - set(ALLOWED_TO_DIFFER)
     if differing:
         raise RunError(
-            f"{runs[0].path} and others differ in {', '.join(sorted(differing))}: runs that are taken together may "
-            "differ in their seeds only"
+            f"{runs[0].path} and others differ in {', '.join(sorted(differing))}: runs in one comparison may differ "
+            "only in their seeds"
         )
     seeds = [run.config.seed for run in runs]
     if twice := [seed for seed in seeds if seeds.count(seed) > 1]:
@@ -110,7 +113,7 @@ def _require_alike(runs: Sequence[Run]) -> None:
 
 
 def _complete(run: Run) -> int:
-    """Generations of which all is known."""
+    """Return the number of complete generations."""
     known = [successive_halving.complete(run, generation) for generation in range(run.config.search.generations)]
     done = [*known, False].index(False)
     if not done:
@@ -129,7 +132,7 @@ def _open(name: str, config: RunConfig) -> bool:
 
 
 def _end(run: Run, quantity: str, generations: range) -> float:
-    """Mean over the candidates that succeeded; NaN if none has the quantity."""
+    """Return the mean over successful candidates; NaN if none has the quantity."""
     alive = [c for c in run.candidates if c.generation in generations and succeeded(c)]
     values: Floats = np.array([_measured(c.phenotype, run.config)[quantity] for c in alive])
     finite = values[np.isfinite(values)]

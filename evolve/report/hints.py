@@ -1,4 +1,4 @@
-"""What the words of a report mean: shown where somebody points at one of them, or comes to it by the keyboard."""
+"""Explanations of terms in a report, shown when the pointer or the keyboard focus is on a term."""
 
 from __future__ import annotations
 
@@ -6,25 +6,25 @@ from evolve.report.markup import Html, html
 
 __all__ = ["MEANINGS", "hint"]
 
-# Each is a word of docs/glossary.md, here in a sentence for who has not read it.
+# Each term is also in docs/glossary.md; these sentences assume no other definitions.
 MEANINGS = {
-    "fitness": "what an animal earns in an evaluation episode after it has learnt, on average; the more, the better",
-    "candidate": "one genome of the run with the animal that it became, trained and evaluated",
-    "generation": "the candidates that are proposed together, from what the ones before have earned",
-    "genome": "the numbers that evolution varies; an animal's eyes and brain follow from them",
-    "phenotype": "the eyes and the brain that a genome becomes",
-    "receptor": "one light-sensitive cell of an eye: a pixel of what the animal sees",
-    "acuity": "the finest stripes that the receptors are close enough to tell, in pairs of stripes per degree",
-    "relief": "the shape of the glass in the pupil; its thickness delays light and so can bend it to a focus",
-    "psf": "point spread function: what becomes of the light of a distant point on the retina",
-    "mtf": "modulation transfer function: how much contrast is left of stripes, the finer they are",
-    "Strehl ratio": "brightness of the image of a point, as a share of what a perfect lens of that width would give",
+    "fitness": "mean return of an animal's evaluation episodes after training; higher is better",
+    "candidate": "one genome of the run with the animal that develops from it, trained and evaluated",
+    "generation": "the candidates that are proposed together, based on the fitness of earlier ones",
+    "genome": "the numbers that evolution varies; they determine an animal's eyes and brain",
+    "phenotype": "the eyes and the brain that develop from a genome",
+    "receptor": "one light-sensitive cell of an eye, comparable to a pixel of a camera",
+    "acuity": "the finest stripes that the spacing of receptors can resolve, in pairs of stripes per degree",
+    "relief": "the shape of the glass in the pupil; its thickness delays light and can focus it",
+    "psf": "point spread function: distribution of the light of a distant point on the retina",
+    "mtf": "modulation transfer function: contrast of stripes in the image, depending on their fineness",
+    "Strehl ratio": "peak brightness of the image of a point, relative to a perfect lens of the same width",
     "radiance": "light that arrives from one direction; 1 is white in full daylight",
-    "signal": "what a receptor reports to the brain, noise included",
+    "signal": "the response of a receptor, noise included",
     "bands": "ranges of wavelengths, each computed at one wavelength",
 }
 
 
 def hint(term: str, shown: str | None = None) -> Html:
-    """A word with its meaning, written as `shown` if it is not to stand as it is."""
+    """Return a term with its explanation, displayed as `shown` if given."""
     return html('<dfn tabindex="0" aria-label="{}: {}">{}</dfn>', term, MEANINGS[term], shown or term)

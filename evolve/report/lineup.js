@@ -1,4 +1,4 @@
-// The best animal after each generation: one card at a time, as the slider says. Without this, all of them show.
+// The slider selects the card of the best animal after a generation. Without this script, all cards are shown.
 "use strict";
 document.querySelectorAll(".lineup").forEach((root) => {
   const slider = root.querySelector("input[type=range]");

@@ -1,4 +1,4 @@
-"""The first animal beside the best one, with a slider through the best of each generation between them."""
+"""The first animal and the best one, with a slider through the best animals of the generations between them."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from evolve.store.directory import Run
 
 __all__ = ["lineup"]
 
-MOST = 60  # animals: a page of thousands of generations shows as many of them, evenly spread
+MOST = 60  # maximum number of animals on a page, evenly spread over the generations
 
 
 def lineup(run: Run) -> Html:
-    """Two cards side by side, of which lineup.js lets the reader choose the right one."""
+    """Return two cards side by side; lineup.js lets the reader select the right one."""
     best = _thinned(champions(run.candidates))
     if not best:
         return Html()
@@ -33,12 +33,12 @@ def lineup(run: Run) -> Html:
 
 
 def _whose(generation: int) -> str:
-    """The earliest animal; all of the generations before it may have failed."""
+    """Return the heading of the earliest animal; all candidates of earlier generations may have failed."""
     return f"Generation {generation}’s best, the first to succeed" if generation else "The first generation’s best"
 
 
 def _thinned(best: list[tuple[int, Candidate]]) -> list[tuple[int, Candidate]]:
-    """At most MOST of them, the first and the last among them."""
+    """Return at most MOST of the best animals, including the first and the last."""
     if len(best) <= MOST:
         return best
     return [best[round(i * (len(best) - 1) / (MOST - 1))] for i in range(MOST)]

@@ -1,7 +1,7 @@
-"""HTML by construction: text reaches a page through `html` alone, which escapes whatever is no Html already.
+"""Safe HTML: text is added to a page only through `html`, which escapes everything except Html objects.
 
-`html` fills a template that stands in the code. A string that somebody forgot to think of is escaped; and the browser
-runs and applies only what the page's policy names by its hash.
+`html` fills a template that is a constant in the code, so any other string is escaped. The browser accepts only scripts
+and styles whose hashes are in the page's policy.
 """
 
 from __future__ import annotations
@@ -29,22 +29,22 @@ __all__ = [
     "joined",
     "json_script",
     "key",
-    "look",
     "rounded",
     "section",
+    "style",
     "table",
 ]
 
-_CONTROLS = dict.fromkeys((*range(9), 11, 12, *range(14, 32), 127), "\ufffd")  # HTML allows none of them
+_CONTROLS = dict.fromkeys((*range(9), 11, 12, *range(14, 32), 127), "\ufffd")  # characters that HTML forbids
 _SLOT = "{}"
 
 
 @dataclass(frozen=True)
 class Html:
-    """A piece of a page. Outside this module and `svg`, only `html` and what is made of it make one.
+    """A piece of a page; outside this module and `svg`, it is created only by `html` and functions that use it.
 
-    markup: the HTML itself
-    rules: what elements in it look like, by the value of their attribute `data-look`
+    markup: the HTML text
+    rules: CSS declarations of its elements, by the value of their attribute `data-look`
     """
 
     markup: str = ""
@@ -58,30 +58,32 @@ class Html:
 
 
 def html(template: str, *pieces: object) -> Html:
-    """A template with its "{}" filled, one after the other: Html as it is, everything else as text.
+    """Fill the placeholders "{}" of a template in order: Html unchanged, everything else as escaped text.
 
     Raises:
-        ValueError: more or fewer pieces than the template has room for.
+        ValueError: the number of pieces differs from the number of placeholders.
     """
     literal = template.split(_SLOT)
     if len(literal) != len(pieces) + 1:
-        raise ValueError(f"html: template has room for {len(literal) - 1} pieces, got {len(pieces)}")
+        raise ValueError(f"html: template has {len(literal) - 1} placeholders, got {len(pieces)} pieces")
     filled = [piece if isinstance(piece, Html) else Html(_escaped(piece)) for piece in pieces]
     markup = literal[0] + "".join(piece.markup + rest for piece, rest in zip(filled, literal[1:], strict=True))
     return Html(markup, {name: rule for piece in filled for name, rule in piece.rules.items()})
 
 
 def joined(pieces: Iterable[Html]) -> Html:
-    """One after the other."""
+    """Return all pieces in sequence."""
     listed = list(pieces)
     return html(_SLOT * len(listed), *listed)
 
 
-def look(declarations: str) -> Html:
-    """An element's own look, "width:5px", as an attribute: the page's policy allows no `style`.
+def style(declarations: str) -> Html:
+    """Return CSS declarations of one element, such as "width:5px", as an attribute.
+
+    The page's policy does not allow the attribute `style`.
 
     Raises:
-        ValueError: more than declarations.
+        ValueError: the text contains more than declarations.
     """
     if re.search(r"[{}<>@\\\x00-\x1f]|/\*", declarations):
         raise ValueError(f"declarations = {declarations!r}: must be CSS declarations")
@@ -90,23 +92,26 @@ def look(declarations: str) -> Html:
 
 
 def key(kind: str) -> Html:
-    """A line of a legend, in the colour of that class."""
+    """Return a legend's line in the colour of a CSS class."""
     return html('<span class="key {}" aria-hidden="true"></span>', kind)
 
 
 def rounded(value: float, digits: int = 3) -> str:
-    """`digits` significant digits without an exponent, a real minus sign; an en dash for what is no number."""
+    """Return a number with `digits` significant digits, a typographic minus sign and no exponent.
+
+    NaN and infinity give an en dash.
+    """
     if not math.isfinite(value):
         return "–"
     if value == 0:
         return "0"
-    rounded = float(f"{value:.{digits}g}")  # 9.999 has an exponent of 1, once rounded to three digits
+    rounded = float(f"{value:.{digits}g}")  # 9.999 rounds to 10.0, which has one more digit
     decimals = max(0, digits - 1 - math.floor(math.log10(abs(rounded))))
     return f"{value:,.{decimals}f}".replace(",", " ").replace("-", "−")
 
 
 def duration(seconds: float) -> str:
-    """Seconds below two minutes, minutes below two hours, hours below two days, then days."""
+    """Return a time in seconds below two minutes, minutes below two hours, hours below two days, then days."""
     for unit, name in ((86400, "days"), (3600, "h"), (60, "min")):
         if seconds >= 2 * unit:
             return f"{rounded(seconds / unit, 2)} {name}"
@@ -114,7 +119,7 @@ def duration(seconds: float) -> str:
 
 
 def exact(value: float) -> str:
-    """A setting or a whole number, with no more digits than it has."""
+    """Return a setting or an integer without rounding."""
     return f"{value:g}".replace("-", "−")
 
 
@@ -125,7 +130,7 @@ def table(
     highlight: int | None = None,
     ids: Sequence[str] = (),
 ) -> Html:
-    """A table that scrolls sideways where it must; row `highlight` stands out, and `ids` name its rows."""
+    """Return a table that can scroll sideways, with the row `highlight` emphasised; `ids` are the ids of its rows."""
     head = joined(html('<th scope="col">{}</th>', cell) for cell in header)
     body = joined(
         html(
@@ -144,7 +149,7 @@ def table(
 
 
 def figure(content: Html, caption: Html, kind: str = "") -> Html:
-    """A figure with its caption."""
+    """Return a figure with its caption."""
     return html('<figure class="{}">{}<figcaption>{}</figcaption></figure>\n', kind, content, caption)
 
 
@@ -153,25 +158,25 @@ def section(name: str, title: str, content: Html) -> Html:
 
 
 def contents(page: Html) -> Html:
-    """Links to a page's sections."""
+    """Return links to a page's sections."""
     found = re.findall(r'<section id="([^"]+)"><h2>([^<]*)</h2>', page.markup)
     links = joined(html('<a href="#{}">{}</a> ', Html(name), Html(title)) for name, title in found)
     return html('<nav class="contents" aria-label="Contents">{}</nav>\n', links)
 
 
 def json_script(value: Any, kind: str) -> Html:
-    """Data for a script; "<" cannot end the element early."""
+    """Return JSON data for a script; "<" is escaped, so that the data cannot end the element."""
     encoded = json.dumps(value, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
     return html('<script type="application/json" class="{}">{}</script>', kind, Html(encoded))
 
 
 def asset(name: str) -> str:
-    """A style sheet or script that lies beside this module."""
+    """Return the text of a style sheet or script in this module's folder."""
     return resources.files("evolve.report").joinpath(name).read_text(encoding="utf-8")
 
 
 def document(title: str, body: Html, scripts: Sequence[str] = ()) -> bytes:
-    """A whole page that needs nothing but itself, and lets nothing else be loaded, applied or run."""
+    """Return a complete, self-contained page whose policy forbids loading, applying or running anything else."""
     from evolve.report.theme import CSS
 
     looks = "".join(f'[data-look="{name}"]{{{rule}}}\n' for name, rule in sorted(body.rules.items()))
@@ -189,7 +194,7 @@ def document(title: str, body: Html, scripts: Sequence[str] = ()) -> bytes:
 
 
 def _policy(styles: Sequence[str], scripts: Sequence[str]) -> str:
-    """The browser itself refuses anything from outside this file, and of what is in it all but these."""
+    """Return the content security policy: nothing from other files, and only these styles and scripts."""
     return (
         f"default-src 'none'; img-src data:; base-uri 'none'; form-action 'none'; "
         f"style-src {_hashes(styles)}; script-src {_hashes(scripts)}"
@@ -202,6 +207,6 @@ def _hashes(contents: Sequence[str]) -> str:
 
 
 def _escaped(value: object) -> str:
-    """For elements and quoted attributes; what UTF-8 or HTML cannot hold is replaced."""
+    """Return text escaped for elements and quoted attributes, with invalid characters of UTF-8 or HTML replaced."""
     whole = str(value).encode("utf-8", "replace").decode()
     return escape(whole.translate(_CONTROLS), quote=True)

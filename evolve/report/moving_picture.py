@@ -1,4 +1,4 @@
-"""An episode as a moving picture: the world from above with the agent's path, and beside it what its eyes report."""
+"""An episode as a GIF or video: the world from above with the agent's path, next to its eyes' signals."""
 
 from __future__ import annotations
 
@@ -21,17 +21,17 @@ from sim.worlds.ground_plan import GroundPlan
 
 __all__ = ["require_ffmpeg", "write_gif", "write_mp4"]
 
-HEIGHT, ASIDE, GAP = 320, 150, 10  # pixels: of the picture, most of the eyes' column, between
-SMOOTH = 2  # drawn so many times as large, then reduced
-SPEED = 2.0  # times as fast as it was
-LONGEST = 150  # frames: noise hardly compresses
-FIELD = "#c9e0ef"  # of view
+HEIGHT, ASIDE, GAP = 320, 150, 10  # height, maximum width of the eyes' column, and gap, in pixels
+SMOOTH = 2  # scale of the drawing before it is reduced, for smooth edges
+SPEED = 2.0  # relative to real time
+LONGEST = 150  # maximum number of frames, because noise hardly compresses
+FIELD = "#c9e0ef"  # fields of view
 OWN = (INK, MUTED, PAPER, PANEL, ACCENT, VERMILLION, GREEN, FIELD)
-LEVELS = (0, 51, 102, 153, 204, 255)  # of red, green and blue that eyes' pictures are shown with
+LEVELS = (0, 51, 102, 153, 204, 255)  # values of red, green and blue for the eyes' signals
 
 
 def write_gif(episode: Episode, path: Path) -> Path:
-    """Write an episode as an animated GIF that repeats, whole or not at all; returns its path."""
+    """Write an episode as a repeating GIF, completely or not at all, and return its path."""
     stride = max(1, -(-len(episode) // LONGEST))
     palette = _palette()
     first, *rest = (picture.quantize(palette=palette, dither=Image.Dither.NONE) for picture in _frames(episode, stride))
@@ -43,10 +43,10 @@ def write_gif(episode: Episode, path: Path) -> Path:
 
 
 def require_ffmpeg() -> Any:
-    """The package imageio_ffmpeg, which runs ffmpeg as a program.
+    """Return the package imageio_ffmpeg, which runs ffmpeg as a program.
 
     Raises:
-        ConfigError: it is not installed, or has no ffmpeg for this system.
+        ConfigError: the package is not installed, or has no ffmpeg for this system.
     """
     try:
         import imageio_ffmpeg
@@ -58,14 +58,14 @@ def require_ffmpeg() -> Any:
 
 
 def write_mp4(episode: Episode, path: Path) -> Path:
-    """Write an episode as an H.264 film with a frame for each action, whole or not at all; returns its path.
+    """Write an episode as an H.264 video with a frame for each action, completely or not at all; return its path.
 
     Raises:
         ConfigError: ffmpeg is not installed.
     """
     frames = _frames(episode, stride=1)
     first = next(frames)
-    # Colours are stored for squares of four pixels, so a film has an even number both ways.
+    # Colours are stored for squares of four pixels, so width and height must be even.
     width, height = (2 * (n // 2) for n in first.size)
     with unfinished(path) as neighbour:
         film = require_ffmpeg().write_frames(
@@ -75,7 +75,7 @@ def write_mp4(episode: Episode, path: Path) -> Path:
             quality=8,
             codec="libx264",
             macro_block_size=2,
-            output_params=["-f", "mp4", "-movflags", "+faststart"],  # an unfinished file's name tells no format
+            output_params=["-f", "mp4", "-movflags", "+faststart"],  # a temporary file has no format ending
         )
         film.send(None)
         for picture in chain([first], frames):
@@ -85,13 +85,13 @@ def write_mp4(episode: Episode, path: Path) -> Path:
 
 
 def _frames(episode: Episode, stride: int) -> Iterator[Image.Image]:
-    """Every stride-th moment."""
+    """Return the frames at every stride-th time."""
     eyes = display(episode.signals, episode.gain)
     return (_frame(_world(episode, time), eyes[time]) for time in range(0, len(episode), stride))
 
 
 def _palette() -> Image.Image:
-    """What all frames are painted with: the drawing's own colours, and a cube of others."""
+    """Return the palette of all frames: the drawing's colours and a colour cube."""
     own = [int(name[i : i + 2], 16) for name in OWN for i in (1, 3, 5)]
     cube = [level for colour in product(LEVELS, repeat=3) for level in colour]
     palette = Image.new("P", (1, 1))
@@ -100,7 +100,7 @@ def _palette() -> Image.Image:
 
 
 def _world(episode: Episode, time: int) -> Image.Image:
-    """One moment from above; without a ground plan, the picture that was taken last, or nothing."""
+    """Return the world from above at one time; without a ground plan, the latest rendered image, or nothing."""
     plan, pictures = episode.plan, episode.pictures
     if plan is None:
         if pictures is None:
@@ -116,7 +116,7 @@ def _world(episode: Episode, time: int) -> Image.Image:
 
 
 def _frame(world: Image.Image, seen: np.ndarray) -> Image.Image:
-    """One moment: the world on the left, an eye below the other on the right."""
+    """Return one frame: the world on the left, and the eyes one below the other on the right."""
     width = world.width
     room = (HEIGHT - GAP * (len(seen) - 1)) / len(seen)
     size = min(ASIDE / seen.shape[2], room / seen.shape[1])
@@ -130,7 +130,7 @@ def _frame(world: Image.Image, seen: np.ndarray) -> Image.Image:
 
 
 def _draw_world(draw: ImageDraw.ImageDraw, episode: Episode, plan: GroundPlan, time: int, scale: float) -> None:
-    """Walls, objects, path so far, fields of view and the agent, in pixels of the large drawing."""
+    """Draw walls, objects, path so far, fields of view and the agent, in pixels of the large drawing."""
 
     def place(x: float, y: float) -> tuple[float, float]:
         return (x - plan.bounds[0]) * scale, (plan.bounds[3] - y) * scale

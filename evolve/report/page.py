@@ -1,4 +1,4 @@
-"""The report's page: its sections, and what each figure's caption says."""
+"""The report's page: its sections, and the captions of its figures."""
 
 from __future__ import annotations
 
@@ -37,13 +37,13 @@ POPULATION = html("{} 10–90 % of the population, {} its median", key("muted ba
 VISION = {
     "image quality": ("IQ", "image_quality", "area of the MTF above the noise, times throughput"),
     "contrast": ("MTF", "contrast", "at half the receptors’ Nyquist frequency, in white daylight"),
-    "PSNR": ("PSNR [dB]", "psnr_db", "of the view, made as bright, against a perfect lens’s"),
-    "SSIM": ("SSIM", "ssim", "structural similarity with a perfect lens’s view"),
+    "PSNR": ("PSNR [dB]", "psnr_db", "of the signals, scaled to equal brightness, relative to a perfect lens"),
+    "SSIM": ("SSIM", "ssim", "structural similarity to the signals behind a perfect lens"),
 }
 
 
 def header(run: Run) -> Html:
-    """Title, what was evolved, headline numbers."""
+    """Return the title, the aim of the run, and a sentence on the best candidate."""
     card = run.config.card
     return html(
         '<header><p class="kicker">rhabdom · evolution report · {}</p>\n<h1>{}</h1>\n'
@@ -53,7 +53,7 @@ def header(run: Run) -> Html:
 
 
 def _best_in_a_sentence(run: Run) -> Html:
-    """Who is the best, and how well it does."""
+    """Return a sentence on the best candidate and its success."""
     if (best := run.best) is None:
         return Html()
     animal = best.phenotype
@@ -69,7 +69,7 @@ def _best_in_a_sentence(run: Run) -> Html:
 
 
 def animals_section(run: Run) -> Html:
-    """First and best, side by side."""
+    """Return the section with the first and the best animal."""
     shown = lineup(run)
     return section("animals", "First and best", shown) if shown else Html()
 
@@ -79,7 +79,7 @@ def numbers_section(run: Run) -> Html:
 
 
 def fitness_section(run: Run) -> Html:
-    """Fitness and success over the generations, learning within a lifetime."""
+    """Return the section with fitness and success over the generations, and the learning curves."""
     if not run.candidates:
         return section("fitness", "Fitness", html("<p>No candidate has been evaluated yet.</p>\n"))
     rows = generation_statistics(run.candidates)
@@ -113,13 +113,13 @@ def fitness_section(run: Run) -> Html:
 
 
 def genes_section(run: Run) -> Html:
-    """Every open gene over the generations, cluster by cluster, and the acuity that follows from them."""
+    """Return the section with every open gene over the generations, by cluster, and the acuity."""
     if not run.candidates:
         return Html()
     parts = [
         html(
-            "<p>What the open {} came to: {} value in the best candidate so far, {}. The vertical axes span the "
-            "range that evolution may search. Chance moves genes, too: <code>evolve drift DIR</code> says how far."
+            "<p>Values of the open {}: {} value in the best candidate so far, {}. The vertical axes span the searched "
+            "range. Genes also drift by chance: <code>evolve drift DIR</code> computes by how much."
             "</p>\n",
             *(hint("genome", "genes"), key("accent"), POPULATION),
         )
@@ -171,13 +171,13 @@ def _relief(run: Run, genes: list[Gene]) -> Html:
 
 
 def vision_section(run: Run, doing: Doing) -> Html:
-    """What the best eyes so far see, over the generations."""
+    """Return the section with image quality and contrast of the best eyes so far, over the generations."""
     best = champions(run.candidates)
     if not best:
         return Html()
     seen: dict[int, Vision] = {}
     for one, candidate in {candidate.id: candidate for _, candidate in best}.items():
-        doing(f"what candidate {one} sees", len(seen) / len(best))
+        doing(f"views of candidate {one}", len(seen) / len(best))
         seen[one] = vision(candidate.phenotype, run.config)
     generations = [generation for generation, _ in best]
     figures = Html()
@@ -186,7 +186,7 @@ def vision_section(run: Run, doing: Doing) -> Html:
         if any(math.isfinite(value) for value in values):
             figures += figure(vision_figure(name, label, generations, values), html("<b>{}</b>: {}", name, meaning))
     content = html(
-        "<p>The best eye so far in each generation; views are of {} starts of episodes, without noise.</p>\n"
+        "<p>The best eye so far in each generation. Signals are without noise, at {} starts of episodes.</p>\n"
         '<div class="figures small">{}</div>\n',
         *(SCENES, figures),
     )
@@ -194,12 +194,12 @@ def vision_section(run: Run, doing: Doing) -> Html:
 
 
 def candidates_section(run: Run) -> Html:
-    """The table of everyone, and the list of those who failed."""
+    """Return the section with the tables of all candidates and of failures."""
     intro = html(
         "<p>Fitness is the mean return of the evaluation episodes; lowest and highest are single episodes.</p>\n"
     )
     everybody = tables.all_candidates(run) + tables.failures(run)
-    return section("candidates", "Candidates", intro + everybody + tables.mishaps(run))
+    return section("candidates", "Candidates", intro + everybody + tables.episode_failures(run))
 
 
 def facts_section(run: Run) -> Html:
@@ -207,9 +207,9 @@ def facts_section(run: Run) -> Html:
 
 
 def best_section(run: Run, best: Candidate, episode: Episode) -> Html:
-    """The best candidate: its eye, what it sees, and its genes."""
+    """Return the section on the best candidate: its eye, its views, and its genes."""
     content = html(
-        "<p>{} {} of {} {}, {} {}.</p>\n{}<h3>What it sees</h3>\n{}<h3>Its genes</h3>\n{}",
+        "<p>{} {} of {} {}, {} {}.</p>\n{}<h3>Views</h3>\n{}<h3>Genes</h3>\n{}",
         *(hint("candidate", "Candidate"), best.id, hint("generation"), best.generation),
         *(hint("fitness"), rounded(best.fitness, 4), eye_figures(best.phenotype, run.config.eye)),
         *(what_it_sees(episode), tables.best_genes(run, best)),
@@ -223,7 +223,7 @@ def episode_section(run: Run, episode: Episode) -> Html:
 
 
 def _makers(run: Run, episode: Episode | None) -> Iterator[tuple[str, Callable[[Doing], Html]]]:
-    """The page's sections in their order: what is made, and how."""
+    """Yield the page's sections in order, each as a progress message and a function that makes it."""
     if (best := run.best) is not None and episode is not None:
         yield "the episode's player", lambda doing: episode_section(run, episode)
         yield "the first animal and the best", lambda doing: animals_section(run)
@@ -234,20 +234,20 @@ def _makers(run: Run, episode: Episode | None) -> Iterator[tuple[str, Callable[[
     yield "the run in numbers", lambda doing: numbers_section(run)
     yield "fitness over the generations", lambda doing: fitness_section(run)
     yield "genes over the generations", lambda doing: genes_section(run)
-    yield "what the best eyes see", lambda doing: vision_section(run, doing)
+    yield "views of the best eyes", lambda doing: vision_section(run, doing)
     yield "the table of candidates", lambda doing: candidates_section(run)
     yield "facts of the run", lambda doing: facts_section(run)
 
 
 def _within(doing: Doing, done: int, of: int, what: str, share: float) -> None:
-    """What share of a section has been made, told as one of all sections."""
+    """Report the progress within a section as a share of all sections."""
     doing(what, (done + share) / of)
 
 
 def render(run: Run, episode: Episode | None, doing: Doing = in_silence) -> bytes:
-    """The whole page; without an episode where no candidate has succeeded.
+    """Return the whole page; `episode` is None if no candidate has succeeded.
 
-    doing: is told what is being made, and how much of the page has been, [0, 1]
+    doing: called with the current step and the share done, [0, 1]
     """
     makers = list(_makers(run, episode))
     parts = []

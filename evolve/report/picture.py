@@ -1,4 +1,4 @@
-"""What receptors signal, as pictures: sRGB encoding, PNG files and sheets of many frames."""
+"""Signals of receptors as images: sRGB encoding, PNG files and sheets of many frames."""
 
 from __future__ import annotations
 
@@ -11,13 +11,14 @@ from numpy.typing import NDArray
 
 __all__ = ["data_uri", "display", "film_sheet", "png"]
 
-SHEET_WIDTH = 4096  # pixels at most along a sheet's rows: every browser decodes images of this size
+SHEET_WIDTH = 4096  # maximum width of a sheet in pixels, which every browser can decode
 
 
 def display(signals: NDArray[np.floating], gain: float = 1.0) -> NDArray[np.uint8]:
-    """Signals (..., channel, y, x) as sRGB pixels (..., y, x, 3): receptors shown as linear red, green and blue.
+    """Return signals (..., channel, y, x) as sRGB pixels (..., y, x, 3), with channels as linear red, green and blue.
 
-    Fewer than three channels show as grey (their mean), of more the first three count. IEC 61966-2-1:1999.
+    Fewer than three channels appear as grey (their mean); of more than three, the first three are used.
+    IEC 61966-2-1:1999.
     """
     linear = np.moveaxis(np.asarray(signals, dtype=np.float64), -3, -1)
     linear = linear[..., :3] if linear.shape[-1] >= 3 else linear.mean(axis=-1, keepdims=True).repeat(3, axis=-1)
@@ -27,7 +28,10 @@ def display(signals: NDArray[np.floating], gain: float = 1.0) -> NDArray[np.uint
 
 
 def png(pixels: NDArray[np.uint8]) -> bytes:
-    """An 8-bit RGB PNG of pixels (y, x, 3); same pixels, same bytes (PNG specification, 3rd ed., sections 5 and 11)."""
+    """Return an 8-bit RGB PNG of pixels (y, x, 3) (PNG specification, 3rd ed., sections 5 and 11).
+
+    The same pixels give the same bytes.
+    """
     height, width, _ = pixels.shape
     rows = np.concatenate([np.zeros((height, 1), np.uint8), pixels.reshape(height, 3 * width)], axis=1)
     header = struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)
@@ -39,14 +43,14 @@ def png(pixels: NDArray[np.uint8]) -> bytes:
 
 
 def data_uri(pixels: NDArray[np.uint8]) -> str:
-    """The PNG of pixels (y, x, 3), to stand in an `src`."""
+    """Return the PNG of pixels (y, x, 3) as a data URI for an attribute `src`."""
     return "data:image/png;base64," + base64.b64encode(png(pixels)).decode("ascii")
 
 
 def film_sheet(frames: NDArray[np.uint8]) -> tuple[NDArray[np.uint8], int]:
-    """Frames (time, eye, y, x, 3) on one sheet (y, x, 3), and how many frames stand in a row of it.
+    """Return frames (time, eye, y, x, 3) on one sheet (y, x, 3), and the number of frames in a row.
 
-    A frame shows all eyes side by side; frames follow each other as words do on a page.
+    A frame contains all eyes side by side; frames fill the sheet row by row.
     """
     time, eyes, height, width, _ = frames.shape
     columns = max(1, min(time, SHEET_WIDTH // (eyes * width)))

@@ -1,4 +1,4 @@
-"""Pictures of an episode on a page: where they are shown, and what its player needs of them."""
+"""Rendered images of an episode on a page: their figure, and their data for the player."""
 
 from __future__ import annotations
 
@@ -10,31 +10,31 @@ import numpy as np
 from PIL import Image
 
 from evolve.analysis.episode import Pictures
-from evolve.report.markup import Html, html, look
+from evolve.report.markup import Html, html, style
 from evolve.report.picture import SHEET_WIDTH
 
 __all__ = ["figure_of_pictures", "film_of_pictures"]
 
-WIDTH = 320  # pixels of a picture on a page
-QUALITY = 80  # of JPEG: what is left of them is not seen at this size
+WIDTH = 320  # width of an image on a page, in pixels
+QUALITY = 80  # quality of JPEG, whose artefacts are invisible at this size
 
 
 def figure_of_pictures(pictures: Pictures) -> Html:
-    """Where player.js shows them."""
+    """Return the figure in which player.js shows the images."""
     height, width = _size(pictures)
     caption = html(
-        "<b>The animal at its task</b>, as the task's camera sees it. Dots mark its eyes, lines the rims of their "
-        "fields of view; a colour is an eye."
+        "<b>The animal at its task</b>, rendered by the task's camera. Dots mark its eyes, and lines the rims of their "
+        "fields of view, with a colour for each eye."
     )
     return html(
         '<figure><canvas class="world" role="img" aria-label="The animal at its task, with its eyes and '
         'the rims of their fields of view" {}></canvas><figcaption>{}</figcaption></figure>\n',
-        *(look(f"aspect-ratio:{width}/{height}"), caption),
+        *(style(f"aspect-ratio:{width}/{height}"), caption),
     )
 
 
 def film_of_pictures(pictures: Pictures, kept: np.ndarray) -> dict[str, Any]:
-    """What player.js reads beside what all films have; over the frames that are kept."""
+    """Return the images' part of the data for player.js, for the selected frames."""
     size = _size(pictures)
     columns = max(1, min(len(pictures.pixels), SHEET_WIDTH // size[1]))
     shown = np.searchsorted(pictures.times, kept, side="right") - 1
@@ -45,13 +45,13 @@ def film_of_pictures(pictures: Pictures, kept: np.ndarray) -> dict[str, Any]:
 
 
 def _size(pictures: Pictures) -> tuple[int, int]:
-    """Of the pictures on a page (height, width) [pixels]."""
+    """Return the size of the images on a page (height, width) [pixels]."""
     height, width = pictures.pixels.shape[1:3]
     return round(WIDTH * height / width), WIDTH
 
 
 def _sheet(pictures: np.ndarray, size: tuple[int, int], columns: int) -> Image.Image:
-    """All pictures, as words stand on a page."""
+    """Return all images on one sheet, filled row by row."""
     height, width = size
     sheet = Image.new("RGB", (columns * width, -(-len(pictures) // columns) * height))
     for number, picture in enumerate(pictures):

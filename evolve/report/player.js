@@ -1,5 +1,5 @@
 // A playable episode: the world from above, what each eye signals, and the reward so far.
-// The film (evolve/report/player.py) stands as JSON inside the player's element.
+// The film (evolve/report/player.py) is stored as JSON inside the player's element.
 "use strict";
 (() => {
   const TAU = 2 * Math.PI;
@@ -34,7 +34,7 @@
     return { scale, x: (x) => left + scale * (x - x0), y: (y) => top + scale * (y1 - y) };
   }
 
-  // A task of somebody's own: nobody knows what there is to draw, so pictures were taken.
+  // A user task without a ground plan has rendered images instead of a drawing.
   function drawPicture(canvas, film, frame, sheet) {
     if (!sheet.complete || !sheet.naturalWidth) return;
     const { context: c, width, height } = sharp(canvas);
@@ -57,7 +57,7 @@
     c.fillRect(at.x(x0), at.y(y1), at.scale * (x1 - x0), at.scale * (y1 - y0));
     drawRegion(c, film.goal_region, at, colour);
     c.fillStyle = colour.wall;
-    for (const [cx, cy, hx, hy] of film.walls)  // half a pixel more, or seams show between neighbours
+    for (const [cx, cy, hx, hy] of film.walls)  // half a pixel larger, to avoid visible seams between neighbours
       c.fillRect(at.x(cx - hx) - 0.25, at.y(cy + hy) - 0.25, 2 * hx * at.scale + 0.5, 2 * hy * at.scale + 0.5);
     drawPath(c, film, film.position.length - 1, at, colour.line, 1.5);
     drawFields(c, film, frame, at, colour);
@@ -136,7 +136,7 @@
     });
   }
 
-  // Never drawn smaller than can be seen, so in a large world not to scale.
+  // The size has a minimum for visibility, so in a large world it is not to scale.
   function drawAgent(c, film, frame, at, colour) {
     const [x, y] = film.position[frame], heading = film.heading[frame];
     const radius = Math.max(film.body_radius * at.scale, 6);
@@ -287,7 +287,7 @@
       const inside = root.contains(event.target);
       if (event.altKey || event.ctrlKey || event.metaKey || event.target === speed) return;
       const step = event.shiftKey ? 10 : 1;
-      if (!inside) return;  // the page scrolls, as readers expect
+      if (!inside) return;  // let the page scroll
       const moves = { ArrowLeft: frame - step, ArrowRight: frame + step, Home: 0, End: last };
       if (event.key in moves) {
         play(false);

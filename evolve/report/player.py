@@ -1,4 +1,4 @@
-"""A recorded episode as something to play: trajectory from above, what each eye signals, the reward so far."""
+"""Player of a recorded episode: trajectory from above, signals of each eye, and accumulated reward."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from evolve.analysis.episode import Episode
-from evolve.report.markup import Html, document, exact, html, joined, json_script, key, look, rounded
+from evolve.report.markup import Html, document, exact, html, joined, json_script, key, rounded, style
 from evolve.report.picture import data_uri, display, film_sheet
 from evolve.report.picture_sheet import figure_of_pictures, film_of_pictures
 from evolve.store.atomic_files import write_whole
@@ -16,13 +16,13 @@ from sim.worlds.ground_plan import GroundPlan
 
 __all__ = ["episode_sentence", "player", "write_player"]
 
-LARGEST_FILM = 1_500_000  # bytes of pixels per sheet; noise hardly compresses, and the page should stay small
-EVENTS = ("goal", "adversary")  # reward terms that player.js marks where they are not 0
-TERM_COLOURS = ("accent", "green", "vermillion", "purple")  # as in player.js
+LARGEST_FILM = 1_500_000  # maximum bytes of pixels per sheet, which limits the page's size; noise hardly compresses
+EVENTS = ("goal", "adversary")  # reward terms that player.js marks when they differ from 0
+TERM_COLOURS = ("accent", "green", "vermillion", "purple")  # the same as in player.js
 
 
 def write_player(episode: Episode, path: Path) -> Path:
-    """Write the playable episode as a page of its own; returns its path."""
+    """Write a page that plays the episode, and return its path."""
     name = f"{episode.title}: candidate {episode.candidate_id} plays"
     body = html(
         '<header><p class="kicker">rhabdom · replay</p>\n<h1>{}</h1>\n<p>{}</p></header>\n{}',
@@ -33,7 +33,7 @@ def write_player(episode: Episode, path: Path) -> Path:
 
 
 def episode_sentence(episode: Episode) -> str:
-    """One sentence on how the episode went."""
+    """Return one sentence with the outcome of the episode."""
     total = rounded(float(episode.reward.sum(dtype=np.float64)), 4)
     terms = ", ".join(f"{name} {rounded(float(term.sum()))}" for name, term in episode.reward_terms.items())
     parts = f" ({terms})" if terms else ""
@@ -42,7 +42,7 @@ def episode_sentence(episode: Episode) -> str:
 
 
 def player(episode: Episode) -> Html:
-    """The player's element; the page that holds it needs player.js."""
+    """Return the player's element; its page needs player.js."""
     film = json_script(_film(episode), "film")
     left, right = _world(episode) + _controls(episode), _sights(episode) + _score(episode)
     return html(
@@ -54,7 +54,7 @@ def player(episode: Episode) -> Html:
 
 
 def _world(episode: Episode) -> Html:
-    """From above, or pictures."""
+    """Return the view from above, or rendered images."""
     if episode.plan is not None:
         return _from_above(episode.plan)
     return Html() if episode.pictures is None else figure_of_pictures(episode.pictures)
@@ -77,23 +77,23 @@ def _from_above(plan: GroundPlan) -> Html:
     return html(
         '<figure><canvas class="world" role="img" aria-label="The world from above: walls, objects, the agent, its '
         'path and the fields of view of its eyes" {}></canvas><figcaption>{}</figcaption></figure>\n',
-        *(look(f"aspect-ratio:{x1 - x0:g}/{y1 - y0:g}"), caption),
+        *(style(f"aspect-ratio:{x1 - x0:g}/{y1 - y0:g}"), caption),
     )
 
 
 def _sights(episode: Episode) -> Html:
-    """A pair of canvases per eye: what it signals, and what it would signal behind a perfect lens."""
+    """Return a pair of canvases per eye: its signals, and its signals behind a perfect lens."""
     eyes, gain = episode.eyes, episode.gain
     height, width = eyes.resolution
     room = 140 if eyes.n_eyes <= 2 else 88 if eyes.n_eyes <= 6 else 60
     scale = room / max(height, width)
-    shape = look(f"width:{scale * width:.4g}px;aspect-ratio:{width}/{height}")
+    shape = style(f"width:{scale * width:.4g}px;aspect-ratio:{width}/{height}")
     size = html('width="{}" height="{}" {}', width, height, shape)
     pairs = [_pair(eye, name, size) for eye, name in enumerate(eyes.names())]
-    brighter = "" if gain == 1 else f", brightened {rounded(gain)} times (1/a², the light the pupil leaves out)"
+    brighter = "" if gain == 1 else f", brightened {rounded(gain)} times (1/a², to compensate for the pupil's area)"
     note = html(
-        "<b>What the eyes see</b>, left to right: receptor signals shown as linear red, green and blue, noise "
-        "included{}; beside them the same receptors behind a perfect lens, without noise.",
+        "<b>Signals of the eyes</b>, left to right: receptor signals shown as linear red, green and blue, noise "
+        "included{}; next to them the same receptors behind a perfect lens, without noise.",
         brighter,
     )
     return html(
@@ -124,7 +124,7 @@ def _controls(episode: Episode) -> Html:
 
 
 def _score(episode: Episode) -> Html:
-    """Cumulated reward, term by term."""
+    """Return the figure of cumulated reward by term."""
     names = [*episode.reward_terms, "total"]
     colours = [TERM_COLOURS[i % len(TERM_COLOURS)] for i in range(len(names) - 1)] + ["ink"]
     cells = joined(
@@ -133,15 +133,15 @@ def _score(episode: Episode) -> Html:
     )
     return html(
         '<figure class="score"><canvas class="rewards" role="img" aria-label="Cumulated reward terms over time">'
-        "</canvas><dl>{}</dl><figcaption><b>Reward so far</b> (dimensionless), by term, weighted as in fitness; "
-        "the action at this instant counted in. In the player, arrow keys step (with shift: ten steps) and space plays."
+        "</canvas><dl>{}</dl><figcaption><b>Reward so far</b> (dimensionless), by term, weighted as in fitness and "
+        "including the current action. In the player, arrow keys step (with shift: ten steps) and space plays."
         "</figcaption></figure>\n",
         cells,
     )
 
 
 def _film(episode: Episode) -> dict[str, Any]:
-    """What player.js reads; everything over the frames that are kept."""
+    """Return the data for player.js, for the selected frames."""
     kept, eyes = _kept(episode), episode.eyes
     terms = {name: np.cumsum(term, dtype=np.float64)[kept] for name, term in episode.reward_terms.items()}
     seen, columns = film_sheet(display(episode.signals[kept], episode.gain))
@@ -159,7 +159,7 @@ def _film(episode: Episode) -> dict[str, Any]:
 
 
 def _film_of_world(episode: Episode, kept: np.ndarray) -> dict[str, Any]:
-    """The world's part of it: positions [m], angles [rad], quantities that were commanded; or pictures."""
+    """Return the world's part of the data: positions [m], angles [rad] and commands, or rendered images."""
     plan, commands = episode.plan, _commands(episode, kept)
     if plan is None:
         return commands | ({} if episode.pictures is None else film_of_pictures(episode.pictures, kept))
@@ -181,7 +181,7 @@ def _film_of_world(episode: Episode, kept: np.ndarray) -> dict[str, Any]:
 
 
 def _commands(episode: Episode, kept: np.ndarray) -> dict[str, Any]:
-    """Speed [m/s] and turn [°], of which player.js makes a sentence, or the numbers of other actions."""
+    """Return speed [m/s] and turn [°], which player.js writes as a sentence, or the numbers of other actions."""
     action = episode.action[kept]
     found = {
         command.name: command.quantity(numbers) for command, numbers in zip(episode.commands, action.T, strict=True)
@@ -192,15 +192,17 @@ def _commands(episode: Episode, kept: np.ndarray) -> dict[str, Any]:
 
 
 def _kept(episode: Episode) -> np.ndarray:
-    """Frames that are kept: all, but for eyes so many and fine that the page would grow too large. The last action
-    always is: with it come the whole return, and what ended the episode."""
+    """Return the frames to show: all, or fewer if the number of receptors would make the page too large.
+
+    The last action is always included, because it gives the whole return and the end of the episode.
+    """
     pixels = episode.signals[0, :, 0].size * 3
     stride, last = max(1, -(-len(episode) * pixels // LARGEST_FILM)), len(episode) - 1
     return np.append(np.arange(0, last, stride), last)
 
 
 def _events(episode: Episode, kept: np.ndarray) -> list[tuple[int, str]]:
-    """(frame, "goal" or "adversary"): what was reached since the frame before."""
+    """Return (frame, "goal" or "adversary") for each object reached since the frame before."""
     found = [
         (int(np.searchsorted(kept, time)), name)
         for name in EVENTS
@@ -210,5 +212,5 @@ def _events(episode: Episode, kept: np.ndarray) -> list[tuple[int, str]]:
 
 
 def _rounded(values: np.ndarray, decimals: int = 3) -> Any:
-    """Nested lists of numbers, short ones: no one sees a millimetre."""
+    """Return nested lists of rounded numbers; a millimetre is invisible in the drawing."""
     return np.round(np.asarray(values, dtype=np.float64), decimals).tolist()

@@ -1,4 +1,4 @@
-"""An episode once more: as a table in the terminal, and as a page that plays it."""
+"""Replay of an episode: a table in the terminal, and a page that plays it."""
 
 from __future__ import annotations
 
@@ -24,16 +24,17 @@ BESIDE: Mapping[str, Callable[[Any, Path], Path]] = {"rrd": write_recording, "gi
 def write_replay(
     run: Run, candidate_id: int | None = None, seed: int = 0, also: Collection[str] = (), out: Path | None = None
 ) -> tuple[Episode, list[Path]]:
-    """Record an episode (default: of the best candidate) and write a page that plays it.
+    """Record an episode (default: of the best candidate), and write a page that plays it.
 
-    also: of BESIDE, beside the page: "rrd", a recording for rerun, and the moving pictures "gif" and "mp4"
-    out: the page's file; in the run directory if None
-    Returns the episode, and the paths.
+    Return the episode and the paths of the files.
+
+    also: additional files, of BESIDE: "rrd", a recording for rerun, and "gif" and "mp4"
+    out: path of the page; None for the run directory
 
     Raises:
-        RunError: there is no such candidate, or no policy of it.
-        ConfigError: rerun or ffmpeg are needed, but not installed; or `out` ends as what may lie beside the page.
-        StrangeFileError: `out` is a directory, say.
+        RunError: the candidate does not exist, or has no policy.
+        ConfigError: rerun or ffmpeg is needed but not installed, or `out` has the ending of one of the other files.
+        StrangeFileError: `out` is not a regular file, for example a directory.
     """
     if out is not None:
         _require_page(out)
@@ -47,23 +48,23 @@ def write_replay(
 
 
 def _require_page(out: Path) -> None:
-    """Before an episode is played."""
+    """Check the path of the page, before an episode is played."""
     require_file_name(out)
     if (form := out.suffix.lower().removeprefix(".")) in BESIDE:
         page = out.with_suffix(".html")
-        raise ConfigError(f"out = {out}: names the page, such as {page}; with --{form}, {out.name} lies beside it")
+        raise ConfigError(f"out = {out}: must name the page, such as {page}; --{form} writes {out.name} next to it")
 
 
 def write_page(run: Run, episode: Episode, out: Path | None = None) -> Path:
-    """Write the page that plays an episode of a run, to `out` or into the run directory; returns its path."""
+    """Write the page that plays an episode of a run, to `out` or into the run directory, and return its path."""
     path = out or run.path / f"replay_candidate{episode.candidate_id:06d}_seed{episode.seed}.html"
-    if out is not None:  # a run that was deleted meanwhile stays so
+    if out is not None:  # the run directory is not created again if it was deleted meanwhile
         path.parent.mkdir(parents=True, exist_ok=True)
     return write_player(episode, path)
 
 
 def episode_facts(episode: Episode) -> dict[str, Any]:
-    """How an episode went: return, what it is made of, and what was reached."""
+    """Return the outcome of an episode: return, its terms, and the objects that were reached."""
     return {
         "task": episode.task,
         "candidate": episode.candidate_id,
@@ -78,7 +79,7 @@ def episode_facts(episode: Episode) -> dict[str, Any]:
 
 
 def episode_table(episode: Episode) -> str:
-    """The same, one line each."""
+    """Return the outcome of an episode as a table with one line per quantity."""
     rows: list[tuple[str, str]] = []
     for name, value in episode_facts(episode).items():
         if isinstance(value, dict):

@@ -1,4 +1,4 @@
-"""A task's model for rerun: its bodies with all that eyes see of them, and the eyes."""
+"""Bodies of a task's model for rerun, with their visible geoms, and the eyes."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from sim.worlds.ground_plan import GroundPlan
 __all__ = ["EYES", "draw_bodies", "draw_goal_region"]
 
 BODIES, EYES = ("world", "bodies"), ("world", "eyes")
-GOAL, GOAL_HEIGHT = (0, 158, 115), 0.01  # green, [m] half of it
+GOAL, GOAL_HEIGHT = (0, 158, 115), 0.01  # green; half height [m]
 
 
 def draw_bodies(to: RerunStream, scene: EpisodeScene, eyes: sim.Eyes) -> None:
-    """What there is, and where it is before each action."""
+    """Draw all bodies and eyes, with their poses before each action."""
     for body in sorted({solid.body for solid in scene.solids}):
         _place(to, (*BODIES, scene.bodies[body]), scene.positions[:, body], scene.rotations[:, body])
     for solid in scene.solids:
@@ -33,7 +33,7 @@ def draw_bodies(to: RerunStream, scene: EpisodeScene, eyes: sim.Eyes) -> None:
 
 
 def draw_goal_region(to: RerunStream, plan: GroundPlan) -> None:
-    """The area on the floor that is the goal, if the task has one."""
+    """Draw the area of the floor that is the goal, if the task has one."""
     if plan.goal_region is None:
         return
     (x0, y0, x1, y1), z = plan.goal_region, GOAL_HEIGHT
@@ -44,7 +44,7 @@ def draw_goal_region(to: RerunStream, plan: GroundPlan) -> None:
 
 
 def _place(to: RerunStream, entity: tuple[str, ...], positions: np.ndarray, rotations: np.ndarray) -> None:
-    """Where something is before each action, (t, 3) [m] and (t, 3, 3)."""
+    """Log the poses of an entity before each action, (t, 3) [m] and (t, 3, 3)."""
     to.columns(entity, len(positions), to.rr.Transform3D.columns(translation=positions, mat3x3=rotations))
 
 
@@ -64,6 +64,6 @@ def _shape(rr: Any, solid: Solid) -> Any:
         return rr.Boxes3D(half_sizes=[[x, y, z]], **look)
     if solid.kind == "ellipsoid":
         return rr.Ellipsoids3D(half_sizes=[[x, y, z]], **look)
-    if solid.kind == "capsule":  # rerun's begin at the middle of an end
+    if solid.kind == "capsule":  # rerun's origin is the centre of one end
         return rr.Capsules3D(lengths=[2 * z], radii=[x], translations=[[0, 0, -z]], **look)
     return rr.Cylinders3D(lengths=[2 * z], radii=[x], **look)

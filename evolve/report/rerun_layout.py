@@ -1,4 +1,4 @@
-"""What a recording for rerun opens with: the world and numbers over time, and beside them what each eye saw."""
+"""Layout in which rerun opens a recording: the world, numbers over time, and the images of each eye."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from evolve.report.rerun_bodies import EYES
 
 __all__ = ["layout"]
 
-ACROSS = 4  # eyes side by side
+ACROSS = 4  # number of eyes side by side
 
 
 def layout(rr: Any, episode: Episode) -> Any:
-    """A blueprint for `rerun_recording`'s entities; without one the viewer lays several eyes' pictures on each other.
+    """Return a blueprint for `rerun_recording`'s entities; without it the viewer superimposes the images of all eyes.
 
     rr: the package rerun
     """
@@ -25,10 +25,10 @@ def layout(rr: Any, episode: Episode) -> Any:
         shown = [kind(origin=rr.new_entity_path([*above, eye]), name=eye) for eye in names]
         return views.Grid(*shown, grid_columns=min(len(names), ACROSS), name=name)
 
-    as_numbers = grid("the same as numbers", ("signals",), views.TensorView)
-    scenes = grid(f"the scene, at the latest of {len(episode.radiance_frames)} moments", ("scene",))
+    as_numbers = grid("signals as numbers", ("signals",), views.TensorView)
+    scenes = grid(f"the scene, at the latest of {len(episode.radiance_frames)} times", ("scene",))
     seen = views.Vertical(
-        views.Tabs(grid("what the eyes signal", EYES), as_numbers),
+        views.Tabs(grid("signals of the eyes", EYES), as_numbers),
         views.Tabs(grid("behind perfect lenses", ("perfect_lens",)), scenes),
     )
     world = views.Spatial3DView(origin="/world", name="world")

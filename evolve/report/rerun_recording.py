@@ -1,10 +1,11 @@
-"""An episode as a recording of rerun, to be looked at from all sides: `rerun FILE.rrd`. Needs the extra `rerun`.
+"""Recording of an episode for the viewer rerun (`rerun FILE.rrd`); needs the extra `rerun`.
 
-Timelines: `action` counts actions, `time` is the world's [s]. Entities: `world` holds `bodies`, the animal's `path` and
-its `eyes`, each a camera that shows what it signals; `signals` the same as numbers (channel, y, x); `perfect_lens` and
-`scene` what the same receptors would signal behind a perfect lens, and what a fine grid of them would; `action`,
-`reward` with its terms below it, and other entries of the observation, such as `contact` or `feels`, are numbers over
-time. `outcome` says how the episode ended.
+Timelines: `action` counts actions, `time` is the world's time [s].
+Entities: `world` contains `bodies`, the animal's `path` and its `eyes`, each a camera with an image of its signals.
+`signals` contains the signals as numbers (channel, y, x), and `perfect_lens` the signals of the same receptors behind a
+perfect lens. `scene` contains the signals of a finer grid behind a perfect lens. `action`, `reward` with its terms, and
+other entries of the observation, such as `contact` or `feels`, are numbers over time. `outcome` is the outcome of the
+episode.
 """
 
 from __future__ import annotations
@@ -23,12 +24,12 @@ from evolve.store.atomic_files import unfinished
 
 __all__ = ["write_recording"]
 
-# Told apart by the colour-blind (Okabe and Ito 2008), on black.
+# Colours that colour-blind readers can distinguish on black (Okabe and Ito 2008).
 COLORS = ((235, 235, 235), (230, 159, 0), (86, 180, 233), (213, 94, 0), (0, 158, 115), (240, 228, 66), (204, 121, 167))
 
 
 def write_recording(episode: Episode, path: Path) -> Path:
-    """Write an episode, whole or not at all; returns the path.
+    """Write an episode, completely or not at all, and return the path.
 
     Raises:
         ConfigError: rerun is not installed.
@@ -38,11 +39,11 @@ def write_recording(episode: Episode, path: Path) -> Path:
     stream = rr.RecordingStream("rhabdom", recording_id=name, send_properties=False)
     opens_with = layout(rr, episode)
     strict = rr.strict_mode()
-    rr.set_strict_mode(True)  # else it warns and leaves out what it does not understand
+    rr.set_strict_mode(True)  # by default it only warns about arguments that it does not accept, and omits them
     try:
         with unfinished(path) as neighbour:
             stream.save(neighbour, default_blueprint=opens_with)
-            stream.set_log_time_enabled(False)  # when it was written says nothing about the episode
+            stream.set_log_time_enabled(False)  # the time of writing is unrelated to the episode
             stream.set_log_tick_enabled(False)
             _write(RerunStream(rr, stream, episode.seconds), episode)
             stream.flush()
@@ -63,7 +64,7 @@ def _write(to: RerunStream, episode: Episode) -> None:
 
 
 def _look(to: RerunStream, episode: Episode) -> None:
-    """What each eye signals, would signal behind a perfect lens, and what there is to see, before each action."""
+    """Log the signals of each eye, those behind a perfect lens, and the scene before each action."""
     rr, weights = to.rr, episode.eyes.eye().spectral_bands.weights
     gain = episode.gain
     scenes = {int(t): frame for frame, t in enumerate(episode.radiance_frames)}
@@ -78,7 +79,7 @@ def _look(to: RerunStream, episode: Episode) -> None:
 
 
 def _count(to: RerunStream, episode: Episode) -> None:
-    """Numbers over time: rewards by term, commands, and other entries of the observation."""
+    """Log numbers over time: rewards by term, commands, and other entries of the observation."""
     numbers: dict[tuple[str, ...], np.ndarray] = {("reward",): episode.reward}  # no term has its name
     numbers |= {("reward", name): term for name, term in episode.reward_terms.items()}
     commands = zip(episode.commands, episode.action.T, strict=True)
@@ -92,7 +93,7 @@ def _count(to: RerunStream, episode: Episode) -> None:
 
 
 def _end(to: RerunStream, episode: Episode) -> None:
-    """How it ended, at the last action."""
+    """Log the outcome at the last action."""
     told, level = ("solved" if episode.solved else "not solved"), "INFO"
     if episode.failure is not None:
         told, level = f"failed: {episode.failure}", "ERROR"

@@ -1,4 +1,7 @@
-"""Matplotlib figures as inline SVG that follows the page's theme; no pyplot, no state, same figure -> same bytes."""
+"""Matplotlib figures as inline SVG that follows the page's theme.
+
+Without pyplot and its state, the same figure gives the same bytes.
+"""
 
 from __future__ import annotations
 
@@ -13,13 +16,13 @@ import matplotlib
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 
-from evolve.report.markup import Html, html, joined, look
+from evolve.report.markup import Html, html, joined, style
 from evolve.report.theme import INK, LINE, MUTED, VARIABLES
 
 __all__ = ["drawing", "inline", "label"]
 
 _STYLE = {
-    "svg.fonttype": "none",  # real text: the reader's own font, selectable, small
+    "svg.fonttype": "none",  # text elements are small and selectable, in the reader's font
     "axes.spines.top": False,
     "axes.spines.right": False,
     "axes.edgecolor": LINE,
@@ -46,7 +49,7 @@ _STYLE = {
 
 @contextmanager
 def drawing(width: float, height: float, font: float = 11.0) -> Iterator[Figure]:
-    """A figure of `width` x `height` SVG units, in the report's style as long as the context lasts."""
+    """Create a figure of `width` x `height` SVG units; within the context, Matplotlib uses the report's style."""
     sizes = {"font.size": font, "axes.titlesize": font, "axes.labelsize": font, "legend.fontsize": font}
     ticks = {"xtick.labelsize": font - 1, "ytick.labelsize": font - 1}
     with matplotlib.rc_context({**_STYLE, **sizes, **ticks}):
@@ -54,21 +57,23 @@ def drawing(width: float, height: float, font: float = 11.0) -> Iterator[Figure]
 
 
 def label(name: str) -> str:
-    """A name from outside as Matplotlib writes it: as it is, not as a formula, without what no font has."""
+    """Return an untrusted name as a label: never parsed as a formula, and without unprintable characters."""
     plain = "".join(letter if letter.isprintable() else "\ufffd" for letter in name)
     return plain.replace("$", r"\$")
 
 
 def inline(figure: Figure, name: str, alt: str) -> Html:
-    """The figure as an <svg> element; `name` keeps its ids apart from other figures' on the page. What it looks like
-    is left to the page's style sheet, as its policy demands."""
+    """Return the figure as an <svg> element; `name` makes its ids unique on the page.
+
+    Its styles are moved to the page's style sheet, because of the page's policy.
+    """
     buffer = io.StringIO()
     with matplotlib.rc_context({"svg.hashsalt": name, "svg.fonttype": "none"}):
         nothing: dict[str, Any] = {"Date": None, "Creator": None, "Format": None, "Type": None}
         FigureCanvasSVG(figure).print_svg(buffer, metadata=nothing)
     text = buffer.getvalue()
     text = text[text.index("<svg") :]
-    # Matplotlib's one rule for all its figures is in style.css.
+    # The only rule in Matplotlib's style element is in style.css.
     text = re.sub(r"<metadata>.*?</metadata>\s*|<!--.*?-->\s*|<style.*?</style>\s*", "", text, flags=re.DOTALL)
     view_box = re.search(r'viewBox="[^"]*"', text)
     assert view_box is not None
@@ -79,13 +84,13 @@ def inline(figure: Figure, name: str, alt: str) -> Html:
 
 
 def _with_looks(text: str) -> Html:
-    """Attributes `style` as looks. None can stand in what a figure says: its quotes are written as such."""
+    """Replace attributes `style` by `data-look`; quotes in the figure's text are escaped, so text never matches."""
     pieces = re.split(r' style="([^"]*)"', text)
-    return joined(html(" {}", look(unescape(piece))) if at % 2 else Html(piece) for at, piece in enumerate(pieces))
+    return joined(html(" {}", style(unescape(piece))) if at % 2 else Html(piece) for at, piece in enumerate(pieces))
 
 
 def _with_own_ids(text: str, name: str) -> str:
-    """Only the ids that something refers to, marked with the figure's name; links to other places stay as they are."""
+    """Prefix referenced ids with the figure's name and remove all other ids; links to other targets stay unchanged."""
     used = set(re.findall(r'(?:url\(#|href="#)([^")]+)', text)) & set(re.findall(r' id="([^"]+)"', text))
     text = re.sub(r' id="([^"]+)"', lambda m: f' id="{name}-{m[1]}"' if m[1] in used else "", text)
     return re.sub(

@@ -1,8 +1,8 @@
-"""The report's numbers: headline, best candidate's genes, all candidates, failures, facts of the run."""
+"""Tables of the report: headline numbers, genes of the best candidate, all candidates, failures, facts of the run."""
 
 from __future__ import annotations
 
-from evolve.analysis.mishaps import mishaps_of
+from evolve.analysis.episode_failures import episode_failures_of
 from evolve.analysis.statistics import acuity_cpd, bootstrap_interval, gene_values, succeeded
 from evolve.config.assemble import to_toml
 from evolve.genome.genes import ALL_GENES
@@ -13,11 +13,11 @@ from evolve.store.candidate import Candidate
 from evolve.store.directory import Run
 from evolve.store.versions import recorded
 
-__all__ = ["all_candidates", "best_genes", "failures", "headline", "mishaps", "run_facts"]
+__all__ = ["all_candidates", "best_genes", "episode_failures", "failures", "headline", "run_facts"]
 
 
 def headline(run: Run) -> Html:
-    """The numbers one asks for first."""
+    """Return the most important numbers of the run."""
     failed = sum(not succeeded(c) for c in run.candidates)
     generations = len({c.generation for c in run.candidates})
     seconds = sum(c.seconds for c in run.candidates)
@@ -56,7 +56,7 @@ def _best_tiles(best: Candidate) -> list[tuple[str | Html, str, str]]:
 
 
 def best_genes(run: Run, best: Candidate) -> Html:
-    """Every gene of the best candidate beside where it started."""
+    """Return the table of the best candidate's genes and their start values."""
     values = gene_values(best.phenotype, run.config.eye)
     relief = sorted({name[:-1] for name in values if name.startswith("doe_")})
     groups = [[name] for name in values if not name.startswith("doe_")]
@@ -66,7 +66,7 @@ def best_genes(run: Run, best: Candidate) -> Html:
 
 
 def _gene_row(run: Run, names: list[str], values: dict[str, float]) -> list[str | Html]:
-    """One gene, or a row of the relief's side by side."""
+    """Return the table row of one gene, or of the genes in one row of the relief."""
     genes, uses = [ALL_GENES[name] for name in names], [run.config.genome[name] for name in names]
     name, meaning = names[0], genes[0].meaning
     if len(names) > 1:
@@ -78,7 +78,7 @@ def _gene_row(run: Run, names: list[str], values: dict[str, float]) -> list[str 
 
 
 def all_candidates(run: Run) -> Html:
-    """One row per candidate, in the order of their ids; the best one stands out."""
+    """Return a table with one row per candidate, sorted by id, with the best one emphasised."""
     header = [
         *("no.", "gener\u00adation", "fitness", "lowest", "highest", "solved [%]"),
         *("eyes", "placement [°]", "fov [°]", "receptors (h × w)", "acuity [cpd]"),
@@ -112,7 +112,7 @@ def _traits(phenotype: Phenotype) -> list[str]:
 
 
 def failures(run: Run) -> Html:
-    """Which candidates failed, and why; "" if none did."""
+    """Return the table of failed candidates with the reasons; "" if no candidate failed."""
     failed = [c for c in run.candidates if not succeeded(c)]
     if not failed:
         return Html()
@@ -120,21 +120,21 @@ def failures(run: Run) -> Html:
     return html("<h3>Failed candidates</h3>\n{}", table(["no.", "generation", "reason"], rows, "failures"))
 
 
-def mishaps(run: Run) -> Html:
-    """What ended episodes in the middle of candidates' lives, how often and whose; "" if nothing did."""
-    found = mishaps_of(run.candidates)
+def episode_failures(run: Run) -> Html:
+    """Return the table of failures that ended single episodes, with their numbers; "" if there are none."""
+    found = episode_failures_of(run.candidates)
     if not found:
         return Html()
     rows = [[one.said, str(one.episodes), str(one.candidates)] for one in found]
     return html(
-        "<h3>Episodes that failed</h3>\n<p>Each of these ended where it was, in training or evaluation, and the "
-        "candidate's life went on.</p>\n{}",
+        "<h3>Episodes that failed</h3>\n<p>Each failure ended one episode of training or evaluation; the candidate "
+        "continued with the next episode.</p>\n{}",
         table(["what failed", "episodes", "candidates"], rows, "mishaps"),
     )
 
 
 def run_facts(run: Run) -> Html:
-    """Settings, seeds and software."""
+    """Return the facts of the run: settings, seeds and software."""
     versions = recorded(run.path)
     commit = versions.pop("commit", "") or "not recorded"
     software = ", ".join(f"{name} {version}" for name, version in versions.items()) or "not recorded"

@@ -1,8 +1,8 @@
-"""Colours of the report: one accent, the rest after Okabe & Ito's palette, which colour-blind readers can tell apart,
-dark enough for text on paper (contrast of 4.5 and more, WCAG 2.2, 1.4.3).
+"""Colours of the report: one accent and colours after the palette of Okabe & Ito.
 
-Every colour has a light and a dark value. Figures are drawn with the light ones; `svg` turns them into CSS variables,
-so that the page's theme reaches into them.
+Colour-blind readers can distinguish the colours of this palette. All are dark enough for text on paper (contrast of at
+least 4.5, WCAG 2.2, 1.4.3). Every colour has a light and a dark value. Figures are drawn with the light values; `svg`
+converts these to CSS variables, so that figures follow the page's theme.
 """
 
 from __future__ import annotations
@@ -24,10 +24,10 @@ __all__ = [
 ]
 
 INK, MUTED, LINE, PAPER, PANEL = "#1d2329", "#5c6670", "#d8dde2", "#fefefe", "#f5f6f8"
-WALL = "#59636d"  # of a ground plan; where pages are dark no brighter than it takes to be seen (contrast of 3)
+WALL = "#59636d"  # walls of a ground plan; on dark pages with the minimum contrast for visibility (3)
 ACCENT, VERMILLION, GREEN, PURPLE = "#0072b2", "#b34f00", "#007a59", "#a8467f"
 
-LINES = (PURPLE, ACCENT, GREEN, VERMILLION, INK, MUTED)  # of a figure, one after the other
+LINES = (PURPLE, ACCENT, GREEN, VERMILLION, INK, MUTED)  # colours of a figure's lines, in this order
 
 _DARK = {
     "ink": (INK, "#e4e7ea"),

@@ -1,4 +1,4 @@
-"""The report of a run: one HTML file that needs nothing but itself."""
+"""Report of a run: one self-contained HTML file."""
 
 from __future__ import annotations
 
@@ -17,28 +17,29 @@ FILE = "report.html"
 
 
 def write(run: Run, episode: Episode | None = None, out: Path | None = None, doing: Doing = in_silence) -> Path:
-    """Write `report.html` of a run, whole or not at all, with an episode of the best candidate (default: played now).
+    """Write `report.html` of a run, completely or not at all.
 
-    out: another file to write to
-    doing: is told what is being made, and how much of the page has been, [0, 1]
+    With the same versions of the libraries, the same run gives the same bytes.
 
-    The same run gives the same bytes with the same versions of the libraries.
+    episode: an episode of the best candidate; None: it is played now
+    out: path of the file; None for `report.html` in the run directory
+    doing: called with the current step and the share done, [0, 1]
 
     Raises:
         ValueError: the best candidate's policy is missing or damaged.
-        StrangeFileError: `out` is a directory, say.
+        StrangeFileError: `out` is not a regular file, for example a directory.
     """
     from evolve.analysis.recorder import record
     from evolve.report.page import render
     from evolve.store.atomic_files import require_file_name, write_whole
 
-    if out is not None:  # before an episode is played
+    if out is not None:  # checked before an episode is played
         require_file_name(out)
     if episode is None and run.best is not None:
         doing("the best agent plays an episode", 0.0)
         episode = record(run)
     path = out or run.path / FILE
-    if out is not None:  # a run that was deleted meanwhile stays so
+    if out is not None:  # the run directory is not created again if it was deleted meanwhile
         path.parent.mkdir(parents=True, exist_ok=True)
     write_whole(path, render(run, episode, doing))
     return path

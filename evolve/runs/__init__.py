@@ -1,9 +1,9 @@
-"""Starting and resuming runs: the code that the command `evolve` and Python's `evolve.run` and `evolve.resume` share.
+"""Starting and resuming runs, for the command `evolve` and for Python's `evolve.run` and `evolve.resume`.
 
-begin       from settings to a run directory; bad settings are refused before anything is written
-resume      an interrupted run: locked, repaired, checked and made ready to go on
-carry_on    executor and watchers, and the search between them
-start_from  starting from an animal of another run
-progress    how a run is going: watchers for terminals, logs and machines
-output      text for a terminal, made safe to print
+begin       creation of a run directory from settings, which are checked before anything is written
+resume      preparation of an interrupted run: lock, repair and checks
+carry_on    search with an executor and watchers
+start_from  start values from an animal of another run
+progress    watchers that show a run's progress on terminals, in logs and as JSON
+output      safe output of text on a terminal
 """

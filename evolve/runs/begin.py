@@ -1,4 +1,4 @@
-"""Beginning a run: its settings are assembled and tried, then its directory is created."""
+"""Start of a run: its settings are assembled and checked, then its directory is created."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class RunRequest:
     preset: settings to start from
     config: TOML file, which overrides the preset
     assignments: single settings, "KEY=VALUE", which override the file
-    scale: of an experiment
+    scale: size of an experiment
     start_from: "RUN:ID", an animal of another run
     """
 
@@ -43,10 +43,10 @@ class RunRequest:
 
 @dataclass(frozen=True)
 class PreparedRun:
-    """A run that can begin; nothing has been written yet.
+    """A run that can start; nothing has been written yet.
 
-    preset: its part of the directory's name
-    origin: the animal from which the genes start, "RUN:ID"; None without one
+    preset: name of the preset, which is part of the directory's name
+    origin: animal whose genes are the start values, "RUN:ID"; None without such an animal
     """
 
     config: RunConfig
@@ -54,19 +54,19 @@ class PreparedRun:
     origin: str | None
 
     def directory(self, out: Path | str | None = None) -> Path:
-        """The directory that `begin` would create now."""
+        """Return the directory that `create` would use now."""
         return next_directory(self.config.task_name, self.preset) if out is None else Path(out)
 
     @contextmanager
-    def begin(self, kind: type[RunT], out: Path | str | None = None) -> Iterator[RunT]:
-        """Create the run and keep its lock while the context lasts.
+    def create(self, kind: type[RunT], out: Path | str | None = None) -> Iterator[RunT]:
+        """Create the run and hold its lock within the context.
 
         kind: class of the run
-        out: its directory; runs/TASK-PRESET-N if None
+        out: run directory; runs/TASK-PRESET-N if None
 
         Raises:
-            RunError: the directory holds something already, or cannot be written.
-            LockedError: another process creates a run there.
+            RunError: the directory is not empty, or cannot be written.
+            LockedError: another process is creating a run there.
         """
         if out is None:
             run = kind.create_next(self.config, self.preset, self.origin)
@@ -77,16 +77,16 @@ class PreparedRun:
 
 
 def prepare_run(request: RunRequest) -> PreparedRun:
-    """Assemble the settings of a run and check that it can begin on this machine. Nothing is written.
+    """Assemble the settings of a run and check that it can start on this machine; nothing is written.
 
     Raises:
-        ConfigError: a setting cannot be used, the optimizer is unknown, or the user task fails; one line.
+        ConfigError: a setting is invalid, the optimizer is unknown, or the user task fails; one line.
         RunError: the animal to start from does not exist.
-        BackendError: Dr.Jit has no LLVM that it can use.
+        BackendError: Dr.Jit cannot find a usable LLVM.
     """
     starts = starts_from(request.start_from) if request.start_from else None
     config = assemble(request.task, request.preset, request.config, request.assignments, starts, request.scale)
-    Search(config)  # refuses an unknown optimizer
+    Search(config)  # raises an error for an unknown optimizer
     device.make_ready()
     try_task(config)
     origin = starts.name.removeprefix("--from ") if starts else None

@@ -1,4 +1,4 @@
-"""Carrying a run to its end: an executor evaluates its candidates, and watchers follow them."""
+"""Continuation of a run to its end: an executor evaluates its candidates, and watchers show the progress."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ __all__ = ["Workers", "carry_on", "local_workers"]
 
 
 class Workers(Executor, Protocol):
-    """An executor that states the number of its workers.
+    """An executor with a known number of workers.
 
-    count: of workers
+    count: number of workers
     """
 
     count: int
 
 
 def local_workers(config: RunConfig) -> LocalExecutor:
-    """Processes on this machine; the setting `workers` is their number."""
+    """Return an executor with processes on this machine; the setting `workers` is their number."""
     return LocalExecutor(evaluate_candidate, config.workers, prepare_device)
 
 
@@ -34,14 +34,15 @@ def carry_on(
     watched: Callable[[Run, int], AbstractContextManager[Watcher]],
     workers: Callable[[RunConfig], AbstractContextManager[Workers]] = local_workers,
 ) -> None:
-    """Evaluate all candidates that the record of a run lacks. The caller holds its lock. If an exception ends this
-    early, the record remains and the run can be resumed.
+    """Evaluate all candidates that the record of a run lacks; the caller holds its lock.
 
-    watched: makes the watcher, given the run and the number of workers; entered after the executor
-    workers: makes the executor
+    After an exception, the record is intact and the run can be resumed.
+
+    watched: function of the run and the number of workers that makes the watcher; entered after the executor
+    workers: function that makes the executor
 
     Raises:
-        RunError: the record cannot be written, or this search does not propose what is on record.
+        RunError: the record cannot be written, or this search proposes other candidates than those on record.
         ExecutorError: no candidate can be evaluated.
     """
     with workers(run.config) as executor, watched(run, executor.count) as watcher:

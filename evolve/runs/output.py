@@ -1,7 +1,8 @@
-"""The one door to the terminal: what commands print passes through a Voice, wherever its text comes from.
+"""Output on a terminal: everything that commands print passes through a Voice, whatever its source.
 
-Escape sequences in a stranger's failure texts, settings and directory names are shown, not obeyed. What the terminal's
-encoding has no letters for is shown by number. And a reader that closes its end, as `head` does, ends no run.
+Escape sequences in untrusted messages, settings and directory names are printed as text, so that they have no effect.
+Characters that the terminal's encoding lacks are printed as numbers. A run continues if a reader such as `head` closes
+its pipe.
 """
 
 from __future__ import annotations
@@ -16,13 +17,13 @@ from typing import Any, TextIO, cast
 
 __all__ = ["Voice", "as_it_is", "printable", "spelled", "voices"]
 
-_UNSEEN = ("Cc", "Cf", "Cn", "Co", "Cs", "Zl", "Zp")  # controls, marks that turn a line around, no letters, line ends
+_UNSEEN = ("Cc", "Cf", "Cn", "Co", "Cs", "Zl", "Zp")  # controls, direction marks, unassigned characters, line ends
 _LAYOUT = "\n\t"
 _SPELLINGS = {"σ": "sigma", "λ": "lambda", "±": "+-", "×": "x", "°": " deg", "µ": "u", "²": "^2", "·": "*", "–": "-"}
 
 
 def printable(text: str) -> str:
-    """The text with whatever steers a terminal written as Python would: "\\x1b[31m"."""
+    """Return the text with control characters escaped as in Python: "\\x1b[31m"."""
     if text.isascii() and text.replace("\n", "").isprintable():
         return text
     return "".join(
@@ -32,7 +33,7 @@ def printable(text: str) -> str:
 
 
 def spelled(text: str, stream: TextIO) -> str:
-    """The text in letters that a stream's encoding has: "sigma", where there is no σ."""
+    """Return the text in characters of a stream's encoding, for example "sigma" instead of σ."""
     encoding = stream.encoding or "utf-8"
     try:
         text.encode(encoding)
@@ -54,10 +55,10 @@ def _named(letter: str) -> str:
 
 
 class Voice:
-    """A text stream to print to.
+    """A text stream for output.
 
-    patient: whether to go on in silence when nobody reads any more; if not, BrokenPipeError ends the command
-    obeyed: whether what steers a terminal may pass: for a progress bar, whose own escapes are meant
+    patient: whether to continue without output after the reader has gone; if not, BrokenPipeError ends the command
+    obeyed: whether control characters are passed on, for a progress bar, which uses escape sequences
     """
 
     def __init__(self, stream: TextIO, patient: bool, obeyed: bool = False) -> None:
@@ -75,14 +76,14 @@ class Voice:
         try:
             speak()
         except OSError as error:
-            if error.errno not in (errno.EPIPE, errno.EIO):  # a closed pipe, a terminal that is gone
+            if error.errno not in (errno.EPIPE, errno.EIO):  # a closed pipe or terminal
                 raise
             self._fall_silent()
             if not self.patient:
                 raise BrokenPipeError(error.errno, error.strerror) from error
 
     def _fall_silent(self) -> None:
-        """Whatever is printed from here on, what is still in the buffer included, goes nowhere."""
+        """Discard all further output, including the contents of the buffer."""
         nowhere = os.open(os.devnull, os.O_WRONLY)
         os.dup2(nowhere, self.stream.fileno())
         os.close(nowhere)
@@ -93,7 +94,7 @@ class Voice:
 
 @contextmanager
 def voices(patient: bool) -> Iterator[None]:
-    """stdout and stderr as Voices, as long as the context lasts."""
+    """Replace stdout and stderr by Voices within the context."""
     before = sys.stdout, sys.stderr
     sys.stdout, sys.stderr = (cast(TextIO, Voice(stream, patient)) for stream in before)
     try:
@@ -104,5 +105,5 @@ def voices(patient: bool) -> Iterator[None]:
 
 
 def as_it_is(stream: TextIO) -> TextIO:
-    """The same stream for what may steer the terminal."""
+    """Return the same stream for output that may contain control characters."""
     return cast(TextIO, Voice(stream.stream, stream.patient, obeyed=True)) if isinstance(stream, Voice) else stream

@@ -1,4 +1,4 @@
-"""How a run is going: a bar on a terminal, a line per candidate elsewhere, JSON for machines."""
+"""Progress of a run: a bar on a terminal, a line per candidate in other outputs, or JSON."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from evolve.store.directory import Run
 
 __all__ = ["Bar", "Events", "Lines", "Silent", "Tally", "Watchers", "clock", "watcher"]
 
-EVENT_S = 1.0  # least time between two events of one candidate's training
+EVENT_S = 1.0  # minimum time between two events of one candidate's training
 
 
 class Tally:
-    """Counts what happened since the run was begun or continued; candidates in training count by their steps."""
+    """Counts of evaluations and steps since the start of this process; candidates in training count by their steps."""
 
     def __init__(self, run: Run, workers: int = 1) -> None:
         self._run, self._workers = run, workers
@@ -44,18 +44,18 @@ class Tally:
 
     @property
     def done(self) -> float:
-        """Evaluations done, those in training by the part that is over."""
+        """Number of evaluations so far; candidates in training count as fractions."""
         parts = (min(steps / planned, 1.0) for steps, planned in self._in_training.values() if planned)
         return len(self._run.in_order_of_finish) + sum(parts)
 
     @property
     def planned(self) -> int:
-        """Evaluations in all: of every candidate, after every budget stage that it reaches."""
+        """Total number of evaluations: of every candidate, after every rung that it reaches."""
         return evaluations(self._run.config.search)
 
     @property
     def seconds(self) -> float:
-        """Since the run was begun or continued."""
+        """Time since the run was started or continued [s]."""
         return max(time.monotonic() - self._began, 1e-9)
 
     @property
@@ -64,12 +64,12 @@ class Tally:
 
     @property
     def utilisation(self) -> float:
-        """Part of the workers' time that was spent on candidates which are done."""
+        """Share of the workers' time that was spent on completed candidates."""
         return self._busy / (self._workers * self.seconds)
 
     @property
     def seconds_left(self) -> float | None:
-        """At the pace so far; None before anything has been done."""
+        """Predicted time left at the pace so far [s]; None without any progress."""
         since = self.done - self._known_before
         if since <= 0:
             return None
@@ -85,10 +85,10 @@ class Tally:
         return statistics.median(fitness) if fitness else None
 
     def summary(self) -> str:
-        """Generation, best and median fitness, pace and time left."""
+        """Return generation, best and median fitness, pace and time left as text."""
         run = self._run
         search = run.config.search
-        reached = Place.of(len(run.candidates), search.population).generation + 1
+        reached = Place.from_id(len(run.candidates), search.population).generation + 1
         parts = [f"generation {min(reached, search.generations)}/{search.generations}"]
         if run.best is not None:
             parts.append(f"best {run.best.fitness:.3g}")
@@ -100,7 +100,7 @@ class Tally:
         return ", ".join(parts)
 
     def closing(self) -> str:
-        """Pace, and how busy the workers were."""
+        """Return the pace and the utilisation of the workers as text."""
         return (
             f"{clock(self.seconds)} at {self.steps_per_second:,.0f} steps/s; "
             f"the {self._workers} workers were busy {self.utilisation:.0%} of the time"
@@ -108,7 +108,7 @@ class Tally:
 
 
 class _Watcher:
-    """What all watchers have in common; a context manager."""
+    """Base class of watchers; a context manager."""
 
     def __init__(self, run: Run, out: TextIO, workers: int) -> None:
         self.run, self.out, self.tally = run, out, Tally(run, workers)
@@ -129,7 +129,7 @@ class _Watcher:
 
 
 class Silent(_Watcher):
-    """Watcher that says nothing."""
+    """Watcher without output."""
 
 
 class Lines(_Watcher):
@@ -179,7 +179,7 @@ class Events(_Watcher):
 
 
 class Bar(_Watcher):
-    """Watcher that draws a progress bar on a terminal; failures stay above it."""
+    """Watcher that draws a progress bar on a terminal, with failures above it."""
 
     def __init__(self, run: Run, out: TextIO, workers: int) -> None:
         from rich.console import Console
@@ -216,7 +216,7 @@ class Bar(_Watcher):
 
 
 class Watchers:
-    """Several watchers as one."""
+    """Several watchers combined."""
 
     def __init__(self, watchers: Sequence[Any]) -> None:
         self._watchers = watchers
@@ -231,14 +231,14 @@ class Watchers:
 
 
 def watcher(run: Run, out: TextIO = sys.stderr, workers: int = 1, as_json: bool = False) -> Bar | Events | Lines:
-    """The watcher that suits `out`; `as_json` for machines."""
+    """Return the watcher for an output: a bar on a terminal, else lines; JSON with `as_json`."""
     if as_json:
         return Events(run, out, workers)
     return Bar(run, out, workers) if out.isatty() else Lines(run, out, workers)
 
 
 def clock(seconds: float) -> str:
-    """1:02:03, or 2:03 below an hour."""
+    """Return a time as 1:02:03, or 2:03 below an hour."""
     minutes, rest = divmod(round(seconds), 60)
     hours, minutes = divmod(minutes, 60)
     return f"{hours}:{minutes:02}:{rest:02}" if hours else f"{minutes}:{rest:02}"

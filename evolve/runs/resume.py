@@ -1,4 +1,4 @@
-"""Resuming an interrupted run: everything between opening it and training the next candidate."""
+"""Resumption of an interrupted run: all steps between opening it and training the next candidate."""
 
 from __future__ import annotations
 
@@ -16,22 +16,24 @@ __all__ = ["resuming"]
 
 
 def _ignore(note: str) -> None:
-    """The note is not shown."""
+    """Ignore a note."""
 
 
 @contextmanager
 def resuming(run: Run, note: Callable[[str], Any] = _ignore) -> Iterator[bool]:
-    """Repair a run and keep its lock while the context lasts; yields whether candidates remain to be evaluated. If
-    they do, the run has been checked and this start is on record. If not, only left-over trainings have been removed.
+    """Repair a run, hold its lock within the context, and yield whether candidates remain to be evaluated.
+
+    If candidates remain, the run has been checked and this start has been recorded. Otherwise, only obsolete
+    checkpoints have been removed.
 
     note: called with each remark on lost policies or lines, and on settings or software that have changed
 
     Raises:
-        LockedError: another process works on it.
-        RunError: its record is damaged or cannot be written, its config.toml has changed since the run was opened, or
-            its format is a former one.
-        ConfigError: its user task has not been named, or fails.
-        BackendError: Dr.Jit has no LLVM that it can use.
+        LockedError: another process works on the run.
+        RunError: the record is damaged or cannot be written, config.toml has changed since the run was opened, or the
+            run has a former format.
+        ConfigError: the user task has not been named, or fails.
+        BackendError: Dr.Jit cannot find a usable LLVM.
     """
     device.make_ready()
     with run.lock():
@@ -51,11 +53,11 @@ def resuming(run: Run, note: Callable[[str], Any] = _ignore) -> Iterator[bool]:
 
 
 def _changes(run: Run) -> Iterator[str]:
-    """Settings and software that differ from those with which the run began; numbers may differ with them."""
+    """Yield notes on settings and software that have changed since the run started and may change its numbers."""
     if altered(run.path):
         yield (
             f"config.toml has changed since the last start. Candidates from {len(run.candidates)} on are "
-            "trained and evaluated with other settings than those before"
+            "trained and evaluated with other settings than earlier ones"
         )
     then, now = recorded(run.path), present()
     changed = [f"{name} {now[name]} (was {then[name]})" for name in now if name in then and then[name] != now[name]]

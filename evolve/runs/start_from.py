@@ -1,4 +1,4 @@
-"""Starting from an animal of another run: `--from RUN:ID`."""
+"""Start from an animal of another run: `--from RUN:ID`."""
 
 from __future__ import annotations
 
@@ -14,21 +14,23 @@ from evolve.store.directory import Run
 
 __all__ = ["starts_from"]
 
-LENGTHS = ("sensor_width", "receptor_pitch", "relief_height")  # settings that genes of optics are multiplied with
+LENGTHS = ("sensor_width", "receptor_pitch", "relief_height")  # settings that are the units of optical genes
 
 
 def starts_from(text: str) -> Source:
-    """Every gene's start as the animal RUN:ID has it (RUN alone: the run's best); RUN is a run directory. Where it sees
-    through optics, also the lengths that its genes are measured in, or the same genes would be another lens.
+    """Return the genes of the animal RUN:ID as start values; RUN alone stands for the run's best animal.
+
+    RUN is a run directory. If the animal has optics, the settings that are the units of its genes are returned as well,
+    because with other units the same genes would describe another lens.
 
     Raises:
-        RunError: no such run, no such candidate, or none that succeeded.
+        RunError: the run or the candidate does not exist, or no candidate has succeeded.
     """
     path, candidate_id = _parsed(text)
     run = Run.open(path)
     candidate = run.candidate(candidate_id)
     values = gene_values(candidate.phenotype)
-    values.pop(SIDE, None)  # height and width say the same, and do so in runs whose eyes are not square
+    values.pop(SIDE, None)  # height and width have the same value, and also exist in runs with eyes that are not square
     genome = {name: {"start": _exact(name, value)} for name, value in values.items() if not math.isnan(value)}
     tree: dict[str, Any] = {"genome": genome, "eye": {}}
     if candidate.phenotype.relief is not None:
@@ -45,7 +47,7 @@ def starts_from(text: str) -> Source:
 
 
 def _parsed(text: str) -> tuple[Path, int | None]:
-    """Run directory and candidate; a path may hold colons of its own."""
+    """Return run directory and candidate; a path may also contain colons."""
     head, colon, tail = text.rpartition(":")
     if colon and tail.isdecimal():
         return Path(head), int(tail)

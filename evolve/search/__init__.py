@@ -1,16 +1,16 @@
 """The search over generations.
 
-ask_tell            the whole idea in a page: read this first
-loop                propose, evaluate, write down, tell
-search              Search: proposals, phases, seeds
-optimizers          CMA-ES and others
-null_model          the same search with random fitness
-same_search         whether a search proposes what is on record
-successive_halving  who is trained further
-job                 what executors are given
-local_executor      processes on this machine
-worker              what such a process does
-dask_executor       many machines
-scheduler           where they are asked for, and by which certificates
-dask_worker         what one of them does
+ask_tell            the search in its simplest form, as an introduction
+loop                main loop: proposals, evaluations, record and optimizer
+search              Search: proposals, phases and seeds
+optimizers          CMA-ES and other optimizers
+null_model          search with random fitness
+same_search         check that a search repeats the candidates on record
+successive_halving  selection of the candidates that continue after a rung
+job                 jobs for executors
+local_executor      executor with processes on this machine
+worker              worker process of the local executor
+dask_executor       executor on a Dask cluster
+scheduler           address and certificates of a Dask scheduler
+dask_worker         evaluation of a candidate in a Dask worker
 """

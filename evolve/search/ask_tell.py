@@ -1,7 +1,7 @@
-"""The search in its simplest form: ask CMA-ES for genomes, evaluate them, tell it their fitness, and again.
+"""The search in its simplest form: CMA-ES proposes genomes, which are evaluated, and receives their fitness.
 
-`evolve.search.loop` does the same with animals that must be trained first: by many workers, through phases in which
-genes open, and so that a run that is killed goes on as if nothing had happened. A test holds it to these lines.
+`evolve.search.loop` does the same with animals that are trained first. It adds several workers, phases in which genes
+open, and exact continuation of a killed run. A test checks that both give the same results.
 
     python -m evolve.search.ask_tell
 """
@@ -25,7 +25,7 @@ Floats = NDArray[np.float64]
 def ask_tell(
     fitness: Callable[[Floats], float], start: Floats, search: SearchConfig, seed: int
 ) -> Iterator[tuple[list[Floats], list[float]]]:
-    """Genomes (dimension,) in [0, 1] of each generation, and their fitness, which the search maximises."""
+    """Yield the genomes (dimension,) in [0, 1] of each generation, and their fitness, which the search maximises."""
     optimizer = build_optimizer(Space(genes=(), start=start, seed=(seed,)), search)
     for generation in range(search.generations):
         ids = generation_ids(generation, search.population)
@@ -37,7 +37,7 @@ def ask_tell(
 
 
 def main() -> None:
-    """Find the top of a paraboloid at (0.7, 0.7, 0.7)."""
+    """Find the maximum of a paraboloid at (0.7, 0.7, 0.7)."""
     search = SearchConfig(population=8, generations=20)
     generations = ask_tell(lambda genome: -float(np.sum((genome - 0.7) ** 2)), np.full(3, 0.5), search, seed=0)
     for number, (genomes, values) in enumerate(generations):

@@ -1,4 +1,4 @@
-"""Candidates evaluated by a Dask cluster: from processes on this machine to SLURM and Kubernetes (docs/cluster.md)."""
+"""Executor on a Dask cluster, from processes on this machine to SLURM and Kubernetes (docs/cluster.md)."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ from evolve.store.evaluation import Evaluation
 __all__ = ["DaskExecutor"]
 
 CONNECT_S = 8.0
-LISTEN_S = 0.5  # between looks at progress
-REPLY_S = 10.0  # for a worker to send what it has
+LISTEN_S = 0.5  # interval between progress updates
+REPLY_S = 10.0  # time limit for a worker to send its result
 
 
 @dataclass(frozen=True)
 class _Trial:
-    """A job on its way."""
+    """A submitted job."""
 
     job: Job
     counter: Any
@@ -37,17 +37,17 @@ class _Trial:
 
 @dataclass
 class DaskExecutor:
-    """Workers of a Dask scheduler, one candidate each at a time; a context manager that takes back what it asked for.
+    """Workers of a Dask scheduler, with one candidate each at a time; a context manager that cancels pending jobs.
 
-    scheduler: where it is; an address alone will do
-    function: "module:name" of what evaluates, with the arguments of `evolve.learning.fitness.evaluate`
-    patience_s: how long to wait for workers, and for a scheduler that is gone to come back
+    A candidate whose worker dies is evaluated again, up to `ATTEMPTS` times in total. After the scheduler has been
+    unreachable, pending jobs are submitted again.
 
-    A worker that dies takes nobody with it: its candidate is evaluated again, `ATTEMPTS` times in all. When the
-    scheduler comes back, whatever was under way is asked for again.
+    scheduler: the scheduler, or its address
+    function: "module:name" of the evaluating function, with the arguments of `evolve.learning.fitness.evaluate`
+    patience_s: maximum time to wait for workers, and for an unreachable scheduler
 
     Raises:
-        ExecutorError: Dask is not installed, nobody answers, or no worker can do the work.
+        ExecutorError: Dask is not installed, the scheduler does not answer, or no worker can evaluate candidates.
     """
 
     scheduler: Scheduler | str
@@ -69,22 +69,24 @@ class DaskExecutor:
             self._client.wait_for_workers(1, timeout=self.patience_s)
         except TimeoutError:
             self._client.close()
-            raise ExecutorError(f"{self._address}: no worker has come within {self.patience_s:g} s") from None
+            raise ExecutorError(f"{self._address}: no worker has connected within {self.patience_s:g} s") from None
         self.count = len(self._client.scheduler_info(n_workers=-1)["workers"])
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        with contextlib.suppress(Exception):  # nothing is lost with a connection that is gone already
+        with contextlib.suppress(Exception):  # a connection that is already closed causes no loss
             self._client.close()
 
     def run(self, jobs: Iterable[Job], progress: Progress | None = None) -> Iterator[tuple[Job, Evaluation]]:
-        """Evaluate all jobs; each comes out as soon as it is done, in any order. A deque may be added to meanwhile.
+        """Evaluate all jobs and yield each as soon as it is complete, in any order.
+
+        A deque of jobs may be extended meanwhile.
 
         Raises:
-            ExecutorError: no worker can do the work, a worker's machine refuses something (its disk is full), the run's
-                settings cannot be used there, or the scheduler is gone for good.
+            ExecutorError: no worker can evaluate candidates, a worker's machine lacks resources such as disk space, the
+                run's settings cannot be used there, or the scheduler stays unreachable.
         """
         waiting = jobs if isinstance(jobs, deque) else deque(jobs)
         under_way: dict[Any, _Trial] = {}
@@ -112,7 +114,7 @@ class DaskExecutor:
             self._withdraw(under_way)
 
     def _trial(self, job: Job) -> _Trial:
-        """A job with a counter of its attempts, which lives with the scheduler: workers die, and tell nobody."""
+        """Return a job with a counter of its attempts, stored by the scheduler because workers may die silently."""
         from distributed import Variable
 
         name = f"{self._name}-{job.id}-{uuid.uuid4().hex[:6]}"
@@ -125,22 +127,22 @@ class DaskExecutor:
         return self._client.submit(dask_worker.evaluate, trial.order, key=key, pure=False, retries=0)
 
     def _died_too_few_times(self, trial: _Trial, future: Any) -> bool:
-        """Whether the scheduler has given a candidate up before we do."""
+        """Return whether the scheduler has given up a candidate before the last attempt."""
         from distributed import KilledWorker
 
         killed = future.status == "error" and isinstance(future.exception(), KilledWorker)
         return killed and int(trial.counter.get()) < ATTEMPTS
 
     def _done(self, under_way: dict[Any, _Trial]) -> list[Any]:
-        """Futures that came to an end; waits a moment for the first."""
+        """Return the completed futures, after a short wait for the first one."""
         from distributed import wait
 
-        with contextlib.suppress(Exception):  # none yet, or the connection is gone, which `run` sees
+        with contextlib.suppress(Exception):  # none is complete, or the connection is lost, which `run` handles
             wait(list(under_way), timeout=LISTEN_S, return_when="FIRST_COMPLETED")
         return [future for future in under_way if future.status != "pending"]
 
     def _outcome(self, trial: _Trial, future: Any) -> Evaluation | None:
-        """What became of a candidate, its policy written where it belongs; None if the worker that knew has died."""
+        """Return the evaluation of a candidate and write its policy; None if the worker with the result has died."""
         from distributed import KilledWorker
 
         if future.status == "error":
@@ -154,12 +156,12 @@ class DaskExecutor:
             outcome, policy, checkpoint = dask_worker.decode(future.result(timeout=REPLY_S))
         except TimeoutError:
             return None
-        future.release()  # else its worker's death would have it evaluated again
+        future.release()  # otherwise Dask would repeat the evaluation if its worker died
         trial.counter.delete()
         if policy:
             write_whole(trial.job.policy_path, policy)
-        if checkpoint and trial.job.stage is not None:
-            write_whole(trial.job.stage.checkpoints[-1], checkpoint)
+        if checkpoint and trial.job.rung is not None:
+            write_whole(trial.job.rung.checkpoints[-1], checkpoint)
         return outcome
 
     def _tell(self, progress: Progress | None) -> None:
@@ -182,10 +184,10 @@ class DaskExecutor:
         return client
 
     def _reconnect(self) -> None:
-        """Wait for a scheduler that is gone."""
+        """Wait for an unreachable scheduler."""
         deadline = time.monotonic() + self.patience_s
         while self._client.status != "running":
-            if self._client.status == "connecting":  # it is trying by itself
+            if self._client.status == "connecting":  # the client is reconnecting itself
                 time.sleep(LISTEN_S)
             else:
                 try:
@@ -193,9 +195,9 @@ class DaskExecutor:
                 except ExecutorError:
                     time.sleep(LISTEN_S)
             if time.monotonic() > deadline:
-                raise ExecutorError(f"{self._address}: the scheduler has been gone for {self.patience_s:g} s")
+                raise ExecutorError(f"{self._address}: the scheduler has been unreachable for {self.patience_s:g} s")
 
     def _withdraw(self, under_way: dict[Any, _Trial]) -> None:
-        """Nobody will ask for these any more; workers stop at the next progress report."""
-        with contextlib.suppress(Exception):  # with the scheduler gone there is nothing to withdraw
+        """Cancel pending jobs; workers stop at their next progress report."""
+        with contextlib.suppress(Exception):  # an unreachable scheduler has no jobs to cancel
             self._client.cancel(list(under_way), force=True)

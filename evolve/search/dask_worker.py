@@ -1,7 +1,7 @@
-"""What a Dask worker does: evaluate one candidate, given and returned as plain text and bytes.
+"""Evaluation of a candidate in a Dask worker; job and result are plain text and bytes.
 
-Nothing is shared with the process that sends candidates but the scheduler: no files, no state. A worker evaluates one
-candidate at a time, however many threads it has, so that it sums as a local worker does.
+Worker and sender share only the scheduler, without files or state. A worker evaluates one candidate at a time, for any
+number of threads, so that the order of its sums equals that of a local worker.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from evolve.config.assemble import from_text
 from evolve.config.checks import ConfigError
 from evolve.config.task_code import TaskCode
 from evolve.genome.phenotype import Phenotype
-from evolve.learning.training_stage import TrainingStage
+from evolve.learning.training_rung import TrainingRung
 from evolve.search.job import ATTEMPTS, Job
 from evolve.search.worker import evaluated, prepare_device, refusal
 from evolve.store.evaluation import Evaluation
@@ -29,31 +29,31 @@ from evolve.store.versions import present
 
 __all__ = ["Order", "UnfitWorker", "decode", "encode", "evaluate"]
 
-COUNTER_S = 20.0  # for the scheduler to answer
+COUNTER_S = 20.0  # time limit for the scheduler's answer
 Reply = tuple[str, bytes, bytes]
 _one_at_a_time = threading.Lock()
 _prepared = False
 
 
 class UnfitWorker(RuntimeError):
-    """A worker cannot evaluate anything, or not as the others do; the message is one line that says why."""
+    """A worker cannot evaluate candidates, or would give different numbers; the message is one line with the reason."""
 
 
 class _Unwanted(Exception):
-    """Whoever asked for this candidate is gone."""
+    """The sender of this candidate has gone or cancelled it."""
 
 
 @dataclass(frozen=True)
 class Order:
     """A job as text.
 
-    function: "module:name" of what evaluates it
-    counter: name of the scheduler's variable that counts its attempts
-    topic: under which it tells its progress
-    ends: of the budget stages up to where it trains; () where budgets are not divided
-    begun: (stage, checkpoint): where its training stands, if it has begun
-    software: that the sender runs
-    code: file and text of a user's task; None: built-in tasks need none
+    function: "module:name" of the evaluating function
+    counter: name of the scheduler's variable that counts the attempts
+    topic: topic of progress reports
+    ends: steps at the ends of the rungs up to the last one to train; () if training is not divided into rungs
+    begun: (rung, checkpoint) of a training run that has started
+    software: versions of the sender's software
+    code: file and text of a user task; None for a built-in task
     """
 
     function: str
@@ -70,20 +70,22 @@ class Order:
 
 
 def encode(job: Job, toml: str, function: str, counter: str, topic: str) -> Order:
-    """A job whose config is `toml`; `counter` and `topic` are names on the scheduler."""
+    """Return a job as text; `toml` is its config, and `counter` and `topic` are names on the scheduler."""
     phenotype = json.dumps(job.phenotype.to_json())
     task = job.config.choice.named_code
     code = None if task is None else (str(task.file), task.text)
     order = Order(function, job.id, phenotype, toml, job.seed, counter, topic, _software(), code=code)
-    if job.stage is None:
+    if job.rung is None:
         return order
-    kept = [(number, read(path)) for number, path in enumerate(job.stage.checkpoints[:-1]) if path.exists()]
-    return replace(order, ends=job.stage.ends, begun=kept[-1] if kept else None)
+    kept = [(number, read(path)) for number, path in enumerate(job.rung.checkpoints[:-1]) if path.exists()]
+    return replace(order, ends=job.rung.ends, begun=kept[-1] if kept else None)
 
 
 def evaluate(order: Order) -> Reply:
-    """Evaluate a candidate: its Evaluation as JSON, its policy and its training's checkpoint, empty where there is
-    none."""
+    """Evaluate a candidate and return its Evaluation as JSON, its policy, and its checkpoint.
+
+    Policy and checkpoint are empty if there are none.
+    """
     from distributed import Variable, get_worker
 
     worker = get_worker()
@@ -106,18 +108,19 @@ def evaluate(order: Order) -> Reply:
         try:
             return _evaluate(getattr(import_module(module), name), order, progress)
         except (OSError, MemoryError) as error:
-            raise UnfitWorker(f"a worker's machine refuses: {refusal(error)}, and go on with evolve resume") from error
+            raise UnfitWorker(f"error on a worker's machine: {refusal(error)}, then use evolve resume") from error
         except ConfigError as error:
             raise UnfitWorker(" ".join(str(error).split())) from error
 
 
 def decode(reply: Reply) -> tuple[Evaluation, bytes, bytes]:
-    """Inverse of what `evaluate` makes of an Evaluation."""
+    """Return the Evaluation, policy and checkpoint in a reply of `evaluate`."""
     text, policy, checkpoint = reply
     record = json.loads(text)
     record["returns"] = tuple(record["returns"])
     record["curve"] = tuple((int(steps), float(value)) for steps, value in record["curve"])
-    record["mishaps"] = tuple((said, int(episodes)) for said, episodes in record["mishaps"])
+    failures = record["episode_failures"]
+    record["episode_failures"] = tuple((said, int(episodes)) for said, episodes in failures)
     return Evaluation(**record), policy, checkpoint
 
 
@@ -133,8 +136,8 @@ def _evaluate(function: Callable[..., Evaluation], order: Order, progress: Calla
         if order.begun is not None:
             number, content = order.begun
             checkpoints[number].write_bytes(content)
-        stage = (TrainingStage(order.ends, checkpoints),) if checkpoints else ()
-        outcome = evaluated(function, (phenotype, config, order.seed, policy, *stage), progress)
+        rung = (TrainingRung(order.ends, checkpoints),) if checkpoints else ()
+        outcome = evaluated(function, (phenotype, config, order.seed, policy, *rung), progress)
         return _text(outcome), _content(policy), _content(checkpoints[-1]) if checkpoints else b""
 
 
@@ -143,7 +146,7 @@ def _content(path: Path) -> bytes:
 
 
 def _prepare(order: Order) -> None:
-    """Once in each process: the same software as the sender's, and a device that works."""
+    """Check once in each process that the software equals the sender's and that a device works."""
     global _prepared
     here = _software()
     differing = [name for name, there in order.software.items() if there and here[name] and here[name] != there]
@@ -160,7 +163,7 @@ def _prepare(order: Order) -> None:
 
 @lru_cache
 def _software() -> Mapping[str, str]:
-    """As it is when first asked for: git answers in milliseconds, but for every candidate."""
+    """Return the software at the first call; asking git for every candidate would take milliseconds each time."""
     return present()
 
 

@@ -1,4 +1,4 @@
-"""What executors are given: jobs, and whom to tell how far they are."""
+"""Jobs for executors, and the type of progress callbacks."""
 
 from __future__ import annotations
 
@@ -9,23 +9,23 @@ from typing import Any
 
 from evolve.config.run_config import RunConfig
 from evolve.genome.phenotype import Phenotype
-from evolve.learning.training_stage import TrainingStage
+from evolve.learning.training_rung import TrainingRung
 
 __all__ = ["ATTEMPTS", "ExecutorError", "Job", "Progress"]
 
-ATTEMPTS = 3  # a candidate whose worker dies is evaluated again, twice at most
+ATTEMPTS = 3  # maximum number of attempts to evaluate a candidate whose worker dies
 Progress = Callable[[int, int, int], None]  # (candidate id, steps trained, steps planned)
 
 
 class ExecutorError(RuntimeError):
-    """The workers cannot work at all; the message is one line that says why."""
+    """No worker can evaluate candidates; the message is one line with the reason."""
 
 
 @dataclass(frozen=True)
 class Job:
-    """One candidate to evaluate: arguments of `evolve.learning.fitness.evaluate`, under the candidate's id.
+    """One candidate to evaluate: its id, and the arguments of `evolve.learning.fitness.evaluate`.
 
-    stage: how far it is trained, where budgets are divided; None: to the end
+    rung: last rung to train; None: training is not divided into rungs
     """
 
     id: int
@@ -33,9 +33,9 @@ class Job:
     config: RunConfig
     seed: int
     policy_path: Path
-    stage: TrainingStage | None = None
+    rung: TrainingRung | None = None
 
     @property
     def arguments(self) -> tuple[Any, ...]:
-        stage = () if self.stage is None else (self.stage,)
-        return self.phenotype, self.config, self.seed, self.policy_path, *stage
+        rung = () if self.rung is None else (self.rung,)
+        return self.phenotype, self.config, self.seed, self.policy_path, *rung

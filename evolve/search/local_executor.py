@@ -1,4 +1,4 @@
-"""Executors: who evaluates candidates. Here: processes on this machine, one candidate each at a time."""
+"""Executor with processes on this machine; each process evaluates one candidate at a time."""
 
 from __future__ import annotations
 
@@ -21,19 +21,19 @@ from evolve.store.evaluation import Evaluation
 
 __all__ = ["ExecutorError", "Job", "LocalExecutor", "Progress", "cores"]
 
-# Several processes share the cores, so each keeps to one thread; read when the numerical libraries are loaded.
+# Several processes share the cores, so each uses one thread; numerical libraries read these variables on import.
 ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")
 STOPPING_S = 5.0
 KILLED = "by SIGKILL"
 OUT_OF_MEMORY = (
-    f"the worker of candidate {{}} was killed {ATTEMPTS} times (SIGKILL), as systems do that run out of memory; take "
-    "fewer workers (workers in config.toml), or free some, and go on with evolve resume"
+    f"the worker of candidate {{}} was killed {ATTEMPTS} times (SIGKILL), probably because memory ran out; use fewer "
+    "workers (workers in config.toml), or free some memory, then use evolve resume"
 )
 
 
 @dataclass
 class _Worker:
-    """A process, our end of its pipe, and what it is doing."""
+    """A process, this end of its pipe, and its current job."""
 
     process: Any
     connection: Connection
@@ -44,13 +44,13 @@ class _Worker:
 class LocalExecutor:
     """Worker processes that call `evaluate(*job.arguments, progress=...)`; a context manager that ends them.
 
-    count: workers; 0: one per core that this process may use
-    prepare: called once in each new worker; an exception there ends the run, because no candidate could be evaluated
+    An exception in `evaluate` counts as a failure of the candidate, except OSError and ConfigError, which end the run.
+    A worker that dies is replaced, and its candidate is evaluated again, up to `ATTEMPTS` times in total. The candidate
+    then counts as failed, unless each worker was killed (SIGKILL). Systems do that when memory runs out, and it ends
+    the run.
 
-    An exception in `evaluate` is that candidate's failure, but an OSError or a ConfigError, which end the run. A worker
-    that dies takes nobody with it: it is replaced and its candidate evaluated again, `ATTEMPTS` times in all. Only what
-    the animal may have caused is then its failure: a worker that is killed each time, as the system does for want of
-    memory, ends the run.
+    count: number of workers; 0: one per core that this process may use
+    prepare: called once in each new worker; an exception there ends the run, because no candidate could be evaluated
     """
 
     evaluate: Callable[..., Evaluation]
@@ -76,11 +76,13 @@ class LocalExecutor:
         self._workers.clear()
 
     def run(self, jobs: Iterable[Job], progress: Progress | None = None) -> Iterator[tuple[Job, Evaluation]]:
-        """Evaluate all jobs; each comes out as soon as it is done, in any order. A deque may be added to meanwhile.
+        """Evaluate all jobs and yield each as soon as it is complete, in any order.
+
+        A deque of jobs may be extended meanwhile.
 
         Raises:
-            ExecutorError: a worker could not be made ready, the machine refuses something, such as a file or
-                memory, or the run's settings cannot be used.
+            ExecutorError: a worker cannot be prepared, the machine lacks resources such as disk space or memory, or the
+                run's settings cannot be used.
         """
         waiting = jobs if isinstance(jobs, deque) else deque(jobs)
         deaths: dict[int, list[str]] = {}
@@ -108,7 +110,7 @@ class LocalExecutor:
                     yield job, Evaluation.failed(f"its worker process died {ATTEMPTS} times, at last {how}")
 
     def _hand_out(self, waiting: deque[Job]) -> None:
-        """Give jobs to idle workers, hiring as many as there is work and room for."""
+        """Give jobs to idle workers, and start further workers up to `count` if needed."""
         idle = [worker for worker in self._workers if worker.job is None]
         while waiting and (idle or len(self._workers) < self.count):
             worker = idle.pop() if idle else self._hire()
@@ -116,7 +118,7 @@ class LocalExecutor:
             try:
                 worker.connection.send(worker.job.arguments)
             except (BrokenPipeError, ConnectionResetError):
-                continue  # it has died; its pipe says so next time we listen
+                continue  # the process has died, which `_messages` will report
 
     def _hire(self) -> _Worker:
         context = multiprocessing.get_context("spawn")
@@ -129,17 +131,17 @@ class LocalExecutor:
         return self._workers[-1]
 
     def _messages(self) -> Iterator[tuple[_Worker, Message]]:
-        """What workers have to say; blocks until one says something or dies."""
+        """Yield the messages of workers; wait until one sends a message or dies."""
         by_connection = {worker.connection: worker for worker in self._workers}
         for ready in wait(list(by_connection)):
             worker = by_connection[ready]  # type: ignore[index]
             try:
                 yield worker, worker.connection.recv()
-            except (EOFError, OSError):  # a pipe that closed, be it within a message
+            except (EOFError, OSError):  # the pipe was closed, possibly within a message
                 yield worker, Message("died")
 
     def _bury(self, worker: _Worker) -> str:
-        """Forget a worker whose pipe is closed; says how it died."""
+        """Remove a worker whose pipe is closed, and return the cause of its death."""
         self._workers.remove(worker)
         _end(worker)
         code = worker.process.exitcode
@@ -147,12 +149,12 @@ class LocalExecutor:
 
 
 def cores() -> int:
-    """Cores that this process may use."""
+    """Return the number of cores that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def _end(worker: _Worker) -> None:
-    """Wait for a process that should be ending, and make sure of it."""
+    """Wait for a process to end, and kill it if it does not."""
     worker.process.join(STOPPING_S)
     if worker.process.is_alive():
         worker.process.kill()
@@ -162,7 +164,7 @@ def _end(worker: _Worker) -> None:
 
 @contextmanager
 def _environment(variables: Mapping[str, str]) -> Iterator[None]:
-    """Environment in which a child starts; ours is put back after."""
+    """Set environment variables for a child process within the context, and restore them afterwards."""
     before = {name: os.environ.get(name) for name in variables}
     os.environ.update(variables)
     try:
@@ -177,8 +179,10 @@ def _environment(variables: Mapping[str, str]) -> Iterator[None]:
 
 @contextmanager
 def _without_main() -> Iterator[None]:
-    """Let a child not run the caller's script again, as multiprocessing has it: workers need nothing from there, and a
-    script that begins a run would begin another one in each of them."""
+    """Prevent multiprocessing from executing the caller's script again in a child.
+
+    Workers do not need the script, and a script that starts a run would start another run in each of them.
+    """
     main = sys.modules["__main__"]
     hidden: dict[str, Any] = {name: vars(main).pop(name) for name in ("__file__", "__spec__") if name in vars(main)}
     main.__spec__ = None
@@ -190,8 +194,8 @@ def _without_main() -> Iterator[None]:
 
 @contextmanager
 def _interrupts_held() -> Iterator[None]:
-    """Hold back Ctrl-C meanwhile; a child inherits that for life, so Ctrl-C on a terminal is for the parent alone."""
-    # multiprocessing's own helper, which comes with the first child, would let interrupts through again before it.
+    """Block Ctrl-C within the context; a child inherits the block, so that only the parent receives Ctrl-C."""
+    # multiprocessing starts its own helper with the first child, and would then unblock interrupts too early.
     resource_tracker.ensure_running()
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:

@@ -1,9 +1,9 @@
-"""The loop: propose candidates, evaluate what the record lacks, write each down, tell, repeat.
+"""Main loop: propose candidates, evaluate them unless they are on record, record them, and report their fitness.
 
-A run that is continued goes through the same loop from its beginning: candidates on record are not evaluated again,
-only told again, which brings the search to where it was. Generation by generation, the history follows from the seed
-alone. In the steady state, fitness is told in the order in which candidates finish, so it follows from the record's
-order too.
+A continued run executes the same loop from its start. Candidates on record are not evaluated again, but their fitness
+is reported to the optimizer, which restores the state of the search. In the mode generation by generation, the history
+follows from the seed alone. In the steady state, fitness is reported in the order in which candidates finish, so the
+history also depends on the order of the record.
 """
 
 from __future__ import annotations
@@ -14,43 +14,45 @@ from dataclasses import replace
 from typing import Protocol
 
 from evolve.genome.phenotype import develop
-from evolve.learning.training_stage import TrainingStage
+from evolve.learning.training_rung import TrainingRung
 from evolve.search.job import Job, Progress
 from evolve.search.same_search import SameSearch
 from evolve.search.search import Proposal, Search, training_seed
 from evolve.search.successive_halving import budgets, reaching
 from evolve.store.candidate import Candidate
 from evolve.store.directory import Run
-from evolve.store.evaluation import Evaluation, mishaps_in_all
+from evolve.store.evaluation import Evaluation, total_episode_failures
 from evolve.store.policies import digest
 
 __all__ = ["Executor", "Watcher", "evolve"]
 
 
 class Executor(Protocol):
-    """Someone who evaluates candidates."""
+    """Protocol of objects that evaluate candidates."""
 
     def run(self, jobs: deque[Job], progress: Progress | None = None) -> Iterator[tuple[Job, Evaluation]]:
-        """Evaluate all jobs, handed out in their order; each comes out once, as soon as it is done. Whoever receives
-        one may add to `jobs` before asking for the next."""
+        """Start all jobs in order, and yield each once, as soon as it is complete.
+
+        The caller may append to `jobs` between results.
+        """
 
 
 class Watcher(Protocol):
-    """Someone who looks on."""
+    """Protocol of objects that follow a run."""
 
     def training(self, candidate_id: int, steps: int, planned: int) -> None:
-        """A candidate has been trained for `steps` of `planned` steps."""
+        """Receive the progress of a candidate: `steps` of `planned` steps."""
 
     def evaluated(self, candidate: Candidate) -> None:
-        """A candidate has been evaluated and is on record."""
+        """Receive a candidate that has been evaluated and recorded."""
 
 
 def evolve(run: Run, executor: Executor, watcher: Watcher) -> None:
-    """Carry a run (whose lock is held) to its end.
+    """Carry a locked run to its end.
 
     Raises:
-        RunError: the record cannot be written, or this search does not propose what is on record.
-        ConfigError: the search cannot be begun.
+        RunError: the record cannot be written, or this search proposes other candidates than those on record.
+        ConfigError: the search cannot start.
         ExecutorError: no candidate can be evaluated.
     """
     search = Search(run.config)
@@ -61,16 +63,16 @@ def evolve(run: Run, executor: Executor, watcher: Watcher) -> None:
 
 
 def _by_generations(run: Run, search: Search, executor: Executor, watcher: Watcher) -> None:
-    """Tell a generation, in the order of its candidates, once all of it is known, all stages included."""
+    """Report the fitness of a generation in the order of its candidates, after all its rungs are complete."""
     same = SameSearch(run)
     for generation in range(run.config.search.generations):
         proposals = {proposal.id: proposal for proposal in search.propose_generation()}
         for candidate in run.generation(generation):
             same.require(proposals[candidate.id], candidate)
-        for stage in range(run.config.search.rungs):
-            missing = sorted(reaching(run, generation, stage) - run.evaluated_at(stage))
+        for rung in range(run.config.search.rungs):
+            missing = sorted(reaching(run, generation, rung) - run.evaluated_at(rung))
             same.require_complete(generation, missing)
-            jobs = deque(_job(run, proposals[candidate_id], stage) for candidate_id in missing)
+            jobs = deque(_job(run, proposals[candidate_id], rung) for candidate_id in missing)
             for job, outcome in executor.run(jobs, watcher.training):
                 _write_down(run, proposals[job.id], job, outcome, watcher)
         run.forget_trainings(proposals)
@@ -78,7 +80,7 @@ def _by_generations(run: Run, search: Search, executor: Executor, watcher: Watch
 
 
 def _steadily(run: Run, search: Search, executor: Executor, watcher: Watcher) -> None:
-    """Keep one population on its way: whenever a candidate is done, tell it and propose the next one."""
+    """Keep one population in evaluation: after each candidate, report its fitness and propose the next one."""
     under_way: dict[int, Proposal] = {}
 
     def refill() -> list[Proposal]:
@@ -100,21 +102,21 @@ def _steadily(run: Run, search: Search, executor: Executor, watcher: Watcher) ->
         jobs.extend(_job(run, proposal) for proposal in refill())
 
 
-def _job(run: Run, proposal: Proposal, stage: int = 0) -> Job:
+def _job(run: Run, proposal: Proposal, rung: int = 0) -> Job:
     phenotype = develop(proposal.vector, run.config)
     seed = training_seed(run.config.seed, proposal.id)
     training = None
     if run.config.search.rungs > 1:
-        ends = budgets(run.config.search, run.config.learning)[: stage + 1]
-        training = TrainingStage(ends, tuple(run.checkpoint_path(proposal.id, i) for i in range(stage + 1)))
+        ends = budgets(run.config.search, run.config.learning)[: rung + 1]
+        training = TrainingRung(ends, tuple(run.checkpoint_path(proposal.id, i) for i in range(rung + 1)))
     return Job(proposal.id, phenotype, run.config, seed, run.policy_path(proposal.id), training)
 
 
 def _write_down(run: Run, proposal: Proposal, job: Job, outcome: Evaluation, watcher: Watcher) -> Candidate:
     genome, parents = proposal.genome, proposal.parents
-    candidate = Candidate.of(proposal.place, genome, job.phenotype, job.seed, outcome, parents)
-    if job.stage is not None:
-        candidate = replace(candidate, rung=job.stage.number)
+    candidate = Candidate.from_evaluation(proposal.place, genome, job.phenotype, job.seed, outcome, parents)
+    if job.rung is not None:
+        candidate = replace(candidate, rung=job.rung.number)
         if (before := run.on_record(candidate.id, candidate.rung - 1)) is not None:
             candidate = _after(before, candidate)
     if candidate.failure is None:
@@ -125,9 +127,11 @@ def _write_down(run: Run, proposal: Proposal, job: Job, outcome: Evaluation, wat
 
 
 def _after(before: Candidate, candidate: Candidate) -> Candidate:
-    """A candidate after a later budget stage, all of its life counted in; where that stage fails, it has learned what
-    it had learned before."""
+    """Return a candidate after a later rung, with the sums over all rungs.
+
+    If the later rung failed, steps and learning curve come from the earlier rungs.
+    """
     if candidate.failure is not None:
         candidate = replace(candidate, steps=before.steps, curve=before.curve)
-    mishaps = mishaps_in_all(before.mishaps, candidate.mishaps)
-    return replace(candidate, seconds=before.seconds + candidate.seconds, mishaps=mishaps)
+    failures = total_episode_failures(before.episode_failures, candidate.episode_failures)
+    return replace(candidate, seconds=before.seconds + candidate.seconds, episode_failures=failures)

@@ -1,7 +1,7 @@
-"""The null model of a search: the same search with random fitness.
+"""Null model of a search: the same search with random fitness.
 
-A gene that begins near one end of its range can only move away from it, and selection by random fitness moves genes
-too. A result counts as the work of selection only where it lies outside the range of the null model.
+A gene that starts near one end of its range can only move away from it, and selection by random fitness also moves
+genes. A result is evidence of selection only if it lies outside the range of the null model.
 """
 
 from __future__ import annotations
@@ -23,25 +23,28 @@ __all__ = ["FIRST_SEED", "LAST", "SEVERAL", "NullModel", "last_generations", "nu
 
 Floats = NDArray[np.float64]
 Measure: TypeAlias = "Callable[[Phenotype], Mapping[str, float]]"
-LAST = 3  # generations whose mean says where a search ends
-FIRST_SEED = 10_000  # none that anybody takes for a run
-SEVERAL = 20_000  # of searches drawn together, where several runs are compared with the null model as one
-TIE = 1e-5  # relative: means over candidates may be equal but for the order in which they were summed, or for digits
+LAST = 3  # number of last generations whose mean is the end of a search
+FIRST_SEED = 10_000  # above the usual seeds of runs
+SEVERAL = 20_000  # number of random groups of searches for a comparison with the mean of several runs
+TIE = 1e-5  # relative difference up to which means count as equal, because of summation order and rounded records
 
 
 @dataclass(frozen=True)
 class NullModel:
-    """What searches with random fitness come to.
+    """Results of searches with random fitness.
 
-    means: of each quantity, over the candidates of a generation that have it, (search, generation); NaN if none has
-    counts: how many have, (search, generation)
+    means: mean of each quantity over the candidates of a generation that have it, (search, generation); NaN if none has
+    counts: number of candidates that have it, (search, generation)
     """
 
     means: Mapping[str, Floats]
     counts: Mapping[str, NDArray[np.int64]]
 
     def ends(self, quantity: str, generations: range) -> Floats:
-        """Mean over all candidates of these generations, (search,), of the searches in which some have the quantity."""
+        """Return the mean over all candidates of these generations, (search,).
+
+        Searches in which no candidate has the quantity are omitted.
+        """
         late = slice(generations.start, generations.stop)
         means, counts = self.means[quantity][:, late], self.counts[quantity][:, late]
         some = counts.any(axis=1)
@@ -52,10 +55,11 @@ class NullModel:
 def null_model(
     config: RunConfig, measure: Measure, generations: int, searches: int, done: Callable[[float], None] = lambda _: None
 ) -> NullModel:
-    """The first generations of so many searches with these settings, from other seeds than theirs.
+    """Run the first generations of searches with these settings, random fitness and other seeds.
 
-    measure: quantities of an animal that has not lived, the same ones of each; NaN for what it does not have
-    done: told what share of the searches has been made
+    generations, searches: number of generations of each search, and of searches
+    measure: quantities of an untrained animal, the same for all animals; NaN for quantities that it lacks
+    done: called with the share of completed searches
     """
     found = []
     for i in range(searches):
@@ -67,7 +71,7 @@ def null_model(
 
 
 def _search(config: RunConfig, measure: Measure, generations: int) -> dict[str, tuple[list[float], list[int]]]:
-    """Of each quantity: its mean in each generation, and over how many candidates."""
+    """Return, for each quantity, its mean in each generation and the number of candidates that have it."""
     found: dict[str, tuple[list[float], list[int]]] = {}
     for proposals in _proposals(config, generations):
         measured = [measure(develop(proposal.vector, config)) for proposal in proposals]
@@ -80,7 +84,7 @@ def _search(config: RunConfig, measure: Measure, generations: int) -> dict[str, 
 
 
 def _proposals(config: RunConfig, generations: int) -> Iterator[list[Proposal]]:
-    """A generation after the other; in the steady state candidates are told, and others proposed, one by one."""
+    """Yield one generation after the other; in the steady state, fitness is reported after each candidate."""
     search, chance = Search(config), np.random.default_rng(config.seed)
     if not config.search.steady_state:
         for _ in range(generations):
@@ -100,16 +104,19 @@ def _proposals(config: RunConfig, generations: int) -> Iterator[list[Proposal]]:
 
 
 def last_generations(config: RunConfig, generations: int) -> list[range]:
-    """The last LAST generations of each phase of a search that goes on for so many, or all of a shorter phase."""
+    """Return the last LAST generations of each phase of a search, or all generations of a shorter phase."""
     starts = sorted({use.opens_at for use in config.genome.values() if use.open and use.opens_at < generations})
     ends = [*starts[1:], generations]
     return [range(max(start, end - LAST), end) for start, end in zip(starts, ends, strict=True)]
 
 
 def p_value(values: Sequence[float], ends: Floats) -> float:
-    """Two-sided p of a run's end, were it drawn like these of the null model: the one that is asked about counts as one
-    of them (Davison and Hinkley 1997, §4.2), so that it is 2 / (searches + 1) at the least. Of several runs' ends: that
-    of their mean, among the means of as many searches drawn at random, and no less than of one."""
+    """Return the two-sided p-value of the ends of one or several runs under the null model.
+
+    For one run, its end counts as an additional sample of the null model (Davison and Hinkley 1997, §4.2), so that p is
+    at least 2 / (searches + 1). For several runs, their mean is compared with means of random groups of searches of the
+    same number, with the same lower limit of p.
+    """
     asked = float(np.mean(values))
     several = np.random.default_rng(0).choice(ends, (SEVERAL, len(values))).mean(axis=1)
     drawn, near = ends if len(values) == 1 else several, TIE * abs(asked)

@@ -1,7 +1,7 @@
-"""Optimizers: each proposes genomes one by one and is told the fitness of each, in any order.
+"""Optimizers, which propose genomes one by one and receive their fitness in any order.
 
-All that an optimizer does follows from its seed and from what it was asked and told, in that order; that is how a run
-continues without stored state. nevergrad is imported here and nowhere else.
+The state of an optimizer follows from its seed, its proposals and the fitness values in their order, so a run can
+continue without stored state. Only this module imports nevergrad.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Space:
-    """What is searched, in coordinates [0, 1]: `genes` with their uses, from `start`, with all chance from `seed`."""
+    """Search space in coordinates [0, 1]: `genes` with their uses, start value `start`, and seed of random numbers."""
 
     genes: Sequence[tuple[Gene, GeneConfig]]
     start: Floats
@@ -35,20 +35,20 @@ class Space:
 
 
 class Optimizer(Protocol):
-    """Someone who proposes genomes and learns from their fitness, which it maximises."""
+    """Protocol of optimizers, which propose genomes and maximise fitness."""
 
     def ask(self, candidate_id: int) -> tuple[Floats, tuple[int, ...]]:
-        """Genome for the candidate with this id, and the candidates it was made from."""
+        """Return a genome for the candidate with this id, and the ids of its parents."""
 
     def tell(self, candidate_id: int, fitness: float) -> None:
-        """Fitness of a candidate that was asked for; finite."""
+        """Receive the fitness of a proposed candidate, which must be finite."""
 
 
 def build_optimizer(space: Space, search: SearchConfig) -> Optimizer:
-    """The optimizer that `search.optimizer` names.
+    """Return the optimizer that `search.optimizer` names.
 
     Raises:
-        ConfigError: there is none of that name, or it cannot be used here.
+        ConfigError: the name is unknown, or the optimizer cannot be used here.
     """
     if search.optimizer == "mutation":
         return Mutation(space, search)
@@ -58,10 +58,10 @@ def build_optimizer(space: Space, search: SearchConfig) -> Optimizer:
 
 
 class Mutation:
-    """Children of the fittest, one mutation of each gene away: Gaussian for real genes, -1, 0 or +1 for integers.
+    """Optimizer that mutates each gene of a parent: Gaussian steps for real genes, -1, 0 or +1 for integers.
 
-    Parents are the fittest of the last two populations told, a quarter as many as one has. Luck in noisy fitness
-    expires with them.
+    Parents are the fittest candidates among the last two populations with known fitness; their number is a quarter of
+    a population. Because older candidates are excluded, a high fitness by chance has no permanent effect.
     """
 
     def __init__(self, space: Space, search: SearchConfig) -> None:
@@ -91,7 +91,7 @@ class Mutation:
 
 
 class Named:
-    """Any optimizer of nevergrad; its step is `sigma`, if it knows one."""
+    """Any optimizer of nevergrad; `sigma` is its step size, if it has one."""
 
     def __init__(self, space: Space, search: SearchConfig) -> None:
         self._dimension = space.start.size
@@ -134,12 +134,13 @@ class Named:
 
 
 class CMA(Named):
-    """CMA-ES (Hansen and Ostermeier 2001, as in pycma, by nevergrad), whose first generation spreads by `sigma`.
+    """CMA-ES (Hansen and Ostermeier 2001), implemented by pycma through nevergrad, with initial step size `sigma`.
 
-    A candidate's parents are those whose mean its distribution moved to: the better half of the last population told.
+    The parents of a candidate are the better half of the last population with known fitness, whose mean is the centre
+    of the distribution.
 
-    nevergrad has a flag for noisy functions, but CMA-ES there heeds it only when recommending a single best genome.
-    We take the best candidate from the record and ask for no recommendation.
+    nevergrad has an option for noisy functions, but its CMA-ES uses the option only to recommend a single best genome.
+    Here the best candidate is taken from the record instead.
     """
 
     def __init__(self, space: Space, search: SearchConfig) -> None:
@@ -152,12 +153,12 @@ class CMA(Named):
         from nevergrad.optimization.optimizerlib import ParametrizedCMA
 
         def scaled(scale: float) -> Any:
-            # Where samples are reflected at a bound, negative weights shrink the covariance across it to nothing, and
-            # what is left of a step there counts as so long that the step size grows without bound.
+            # If samples are reflected at a bound, negative weights shrink the covariance across it to zero. The
+            # remaining steps then count as very long, and the step size grows without limit.
             configured = ParametrizedCMA(scale=scale, popsize=search.population, inopts={"CMA_active": search.active})
             return configured(_array(space, 1.0), num_workers=search.population)
 
-        # nevergrad shrinks the step in bounded spaces by a factor of its own choosing; it is divided out.
+        # nevergrad reduces the step size in bounded spaces by an internal factor, which is compensated here.
         return scaled(search.sigma / scaled(1.0).es.sigma)
 
     def tell(self, candidate_id: int, fitness: float) -> None:
@@ -172,11 +173,11 @@ class CMA(Named):
 
 
 def _array(space: Space, sigma: float) -> Any:
-    """nevergrad's array of coordinates in [0, 1]."""
+    """Return nevergrad's array of coordinates in [0, 1]."""
     from nevergrad import p
 
-    # CMA-ES has no covariance to adapt in one dimension (nevergrad would switch to a package we don't depend on):
-    # a single open gene gets a coordinate beside it that no one reads.
+    # CMA-ES needs at least two dimensions to adapt a covariance; with one, nevergrad would use an optional package.
+    # A single open gene therefore gets an additional coordinate, which is ignored.
     padded = np.append(space.start, 0.5) if space.start.size == 1 else space.start
     array = p.Array(init=padded, lower=0.0, upper=1.0).set_mutation(sigma=sigma)
     array.random_state.seed(np.random.SeedSequence(list(space.seed)).generate_state(4))
@@ -185,9 +186,12 @@ def _array(space: Space, sigma: float) -> Any:
 
 @contextmanager
 def _quiet() -> Iterator[None]:
-    """pycma misses the mirrored samples it planted in a small population when nevergrad tells them as reflected at the
-    bounds, and warns; the samples told are those that were evaluated, which is what counts. nevergrad warns of
-    optimizers that learn nothing before a whole population is told."""
+    """Suppress two warnings that have no consequences here.
+
+    In small populations pycma injects mirrored samples. nevergrad reflects samples at the bounds, so that pycma does
+    not recognise the injected ones and warns; it still receives the samples that were evaluated. nevergrad warns about
+    optimizers that learn only from complete populations.
+    """
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", message="orphanated injected solution")
         warnings.filterwarnings("ignore", module="nevergrad")

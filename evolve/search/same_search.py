@@ -1,9 +1,9 @@
-"""Whether a search proposes what is on record. The same one goes on; another is refused.
+"""Check that a rebuilt search proposes the candidates on record; a different search cannot continue a run.
 
-A search is rebuilt by proposing and telling again what was proposed and told before, so it must come to the same
-genomes. On the processor that began the run it does, bit for bit. Another processor rounds otherwise, and once in a
-while that counts for more than rounding: pycma knows the solutions that come back by their bits, takes one whose last
-bit differs for somebody else's, and shortens it if it is long.
+A search is rebuilt by repeating all proposals and fitness values, so it must give the same genomes. On the processor
+that started the run they are equal bit for bit. Another processor rounds differently, which can have a larger effect:
+pycma identifies its solutions by their bits. It treats a solution whose last bit differs as an injected one, and
+shortens it if it is long.
 """
 
 from __future__ import annotations
@@ -19,18 +19,18 @@ from evolve.store.versions import present, recorded
 
 __all__ = ["SameSearch"]
 
-# Of a coordinate in [0, 1], with room for longer runs: 500 and 5 times what was seen. Seventeen records of a processor
-# with AVX-512, proposed again on one without: 2e-12 at most where no solution was taken for another's, 4e-3 where one
-# was (tests/experiments/test_records.py).
+# Tolerances of a coordinate in [0, 1], with margins for longer runs: 500 and 5 times the largest observed differences.
+# Seventeen records of a processor with AVX-512 were repeated on one without. The differences were at most 2e-12, and
+# 4e-3 if a solution was treated as injected (tests/experiments/test_records.py).
 ROUNDING, TAKEN_FOR_ANOTHERS = 1e-9, 0.02
 LIBRARIES = ("nevergrad", "cma", "numpy")
 
 
 class SameSearch:
-    """Holds what a search proposes against a run's record.
+    """Comparison of a search's proposals with a run's record.
 
-    The first generation follows from the settings alone and may differ by rounding only; so may all of them where the
-    libraries are not those that began the run.
+    The first generation follows from the settings alone and may differ only by rounding. With other libraries than at
+    the start of the run, the same tolerance applies to all generations.
     """
 
     def __init__(self, run: Run) -> None:
@@ -38,10 +38,10 @@ class SameSearch:
         self._same_libraries = all(self._then.get(name) == self._now[name] for name in LIBRARIES)
 
     def require(self, proposal: Proposal | None, candidate: Candidate) -> None:
-        """Refuse to go on with another search than the one that began.
+        """Check that a proposal equals the candidate on record.
 
         Raises:
-            RunError: the search does not propose what is on record.
+            RunError: the search proposes another candidate than the one on record.
         """
         allowed = TAKEN_FOR_ANOTHERS if self._same_libraries and candidate.generation > 0 else ROUNDING
         if proposal is not None and np.abs(proposal.vector - candidate.vector).max() <= allowed:
@@ -50,16 +50,16 @@ class SameSearch:
             ", ".join(f"{name} {versions.get(name, '?')}" for name in LIBRARIES) for versions in (self._then, self._now)
         )
         raise RunError(
-            f"{self._run.path} cannot be continued: candidate {candidate.id} is not what the search proposes here "
-            f"(started with {before}; here {after}). Continue it with the versions that began it, and an unchanged "
-            f"config.toml"
+            f"{self._run.path} cannot be continued: candidate {candidate.id} differs from the search's proposal "
+            f"here (started with {before}; here {after}). Continue it with the versions that started it, and an "
+            f"unchanged config.toml"
         )
 
     def require_complete(self, generation: int, missing: Collection[int]) -> None:
-        """Before anybody is trained for it: a search that has gone on from a generation knew all of it.
+        """Check, before any training, that a generation with later generations on record is complete.
 
         Raises:
-            RunError: candidates of a generation are missing although there are later ones.
+            RunError: candidates of a generation are missing although later ones are on record.
         """
         if missing and any(candidate.generation > generation for candidate in self._run.candidates):
             raise RunError(

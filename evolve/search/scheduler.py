@@ -1,4 +1,4 @@
-"""Where a Dask scheduler is, and by which certificates it and we know each other."""
+"""Address of a Dask scheduler, and certificates for its connections."""
 
 from __future__ import annotations
 
@@ -16,19 +16,21 @@ from evolve.search.job import ExecutorError
 __all__ = ["Scheduler"]
 
 ADDRESS = re.compile(r"(?:(?P<protocol>tcp|tls)://)?(?P<host>\[[0-9A-Fa-f:.%\w]+\]|[^\s:/\[\]]+):(?P<port>\d{1,5})")
-ANSWER_S = 5.0  # for one that is just being started, too
+ANSWER_S = 5.0  # time limit for an answer, enough for a scheduler that is just starting
 RETRY_S = 0.25
 
 
 @dataclass(frozen=True)
 class Scheduler:
-    """A scheduler's address, "tls://host:8786", or "tcp://host:8786" in a network where everybody is trusted.
+    """A scheduler's address: "tls://host:8786", or "tcp://host:8786" in a trusted network.
 
-    ca_file: certificates of those who vouch for scheduler and workers; certificate, key: ours. PEM files, all or none;
-    without them Dask's own settings (distributed.comm.tls) say where they are.
+    ca_file: certificates of the authorities for scheduler and workers
+    certificate, key: certificate and key of this process
+
+    All three are PEM files; without them, Dask's own settings apply (distributed.comm.tls).
 
     Raises:
-        ConfigError: no such address, or certificates that are missing, of no use, or not used.
+        ConfigError: the address is malformed, or certificates are missing, invalid or unused.
     """
 
     address: str
@@ -44,7 +46,7 @@ class Scheduler:
         if len(given) not in (0, 3):
             raise ConfigError("--tls-ca-file, --tls-cert and --tls-key: must be given together, or not at all")
         if given and not self.encrypted:
-            raise ConfigError(f"--scheduler {self.address}: must begin with tls:// where certificates are given")
+            raise ConfigError(f"--scheduler {self.address}: must begin with tls:// if certificates are given")
         if given:
             self._require_certificates()
 
@@ -53,7 +55,7 @@ class Scheduler:
         return self.address.startswith("tls://")
 
     def _require_certificates(self) -> None:
-        """What Dask would complain about only later, and at length."""
+        """Check the certificates early, because Dask reports errors in them later and with long messages."""
         for file in (self.ca_file, self.certificate, self.key):
             if not Path(str(file)).is_file():
                 raise ConfigError(f"{file}: no such file: must be a PEM file")
@@ -68,11 +70,11 @@ class Scheduler:
             ) from None
 
     def require_answer(self) -> None:
-        """Make sure that somebody listens there, before anything is begun.
+        """Check that the scheduler answers, before a run starts.
 
         Raises:
-            ConfigError: as `security`.
-            ExecutorError: nobody does, within seconds, or Dask is not installed.
+            ConfigError: see `security`.
+            ExecutorError: the scheduler does not answer within seconds, or Dask is not installed.
         """
         self.security()
         found = ADDRESS.fullmatch(self.address)
@@ -91,10 +93,10 @@ class Scheduler:
             time.sleep(RETRY_S)
 
     def security(self) -> Any:
-        """Dask's `Security`; None for its own settings.
+        """Return Dask's `Security`; None for Dask's own settings.
 
         Raises:
-            ConfigError: the address asks for certificates, and there are none.
+            ConfigError: the address requires certificates, and there are none.
             ExecutorError: Dask is not installed.
         """
         try:

@@ -1,7 +1,7 @@
-"""The search: proposes candidates and is told their fitness, through the phases in which genes open.
+"""The search, which proposes candidates and receives their fitness, through the phases in which genes open.
 
-Its whole state follows from the seed and the fitness told so far, so a run is continued by proposing and telling again
-what was proposed and told before; no state is stored.
+Its state follows from the seed and the fitness values received so far. A run continues by repeating all proposals and
+fitness values; no state is stored.
 """
 
 from __future__ import annotations
@@ -20,17 +20,17 @@ from evolve.search.optimizers import Optimizer, Space, build_optimizer
 
 __all__ = ["Proposal", "Search", "training_seed"]
 
-LOWEST = -1e9  # below any mean return: what a failure counts as while no candidate has succeeded
+LOWEST = -1e9  # fitness of a failure while no candidate has succeeded, below any mean return
 
 
 @dataclass(frozen=True)
 class Proposal:
-    """A genome to try.
+    """A proposed genome.
 
-    place: of the candidate in the search
+    place: place of the candidate in the search
     genome: (dimension,) in [0, 1]
-    parents: ids of the candidates that it was made from; in a later phase, before its optimizer names any, that one
-        around which the phase began
+    parents: ids of its parents; in a later phase, before the optimizer names any, the candidate around which the phase
+        started
     """
 
     place: Place
@@ -39,7 +39,7 @@ class Proposal:
 
     @property
     def id(self) -> int:
-        """The candidate's id."""
+        """Id of the candidate."""
         return self.place.id
 
     @property
@@ -48,13 +48,13 @@ class Proposal:
 
 
 class Search:
-    """Proposes one candidate after the other.
+    """Search that proposes one candidate after the other.
 
-    Where genes open in a later generation, a new optimizer begins there: from the best genome so far, over the genes
-    that are open then. Fitness that comes in late is told to the optimizer that had asked for it.
+    When further genes open in a later generation, a new optimizer starts from the best genome so far, over the genes
+    that are open then. Each optimizer receives the fitness of the candidates that it proposed.
 
     Raises:
-        ConfigError: there is no such optimizer.
+        ConfigError: the optimizer is unknown.
     """
 
     def __init__(self, config: RunConfig) -> None:
@@ -69,12 +69,12 @@ class Search:
 
     @property
     def proposed(self) -> int:
-        """Candidates proposed so far."""
+        """Number of candidates proposed so far."""
         return self._next
 
     def propose(self) -> Proposal:
-        """The next candidate."""
-        place = Place.of(self._next, self._config.search.population)
+        """Return the next candidate."""
+        place = Place.from_id(self._next, self._config.search.population)
         if place.index == 0 and place.generation > 0 and place.generation in self._genotype.phases:
             self._begin_phase(place.generation)
         part, parents = self._optimizer.ask(self._next)
@@ -86,25 +86,27 @@ class Search:
         return proposal
 
     def propose_generation(self) -> list[Proposal]:
-        """All candidates of the next generation.
+        """Return all candidates of the next generation.
 
         Raises:
-            RuntimeError: the fitness of the last one has not been told yet.
+            RuntimeError: the fitness of the last generation is not complete.
         """
         if self._asked:
-            raise RuntimeError("propose_generation: the fitness of the last generation has not been told yet")
+            raise RuntimeError("propose_generation: the fitness of the last generation is not complete")
         return [self.propose() for _ in range(self._config.search.population)]
 
     def tell(self, fitness: Sequence[tuple[int, float]]) -> None:
-        """(candidate id, fitness) of candidates proposed; -inf (failed) counts as the worst fitness so far, and as
-        worse than any that may come before there is one.
+        """Receive (candidate id, fitness) of proposed candidates.
+
+        A failed candidate has the fitness -inf, which counts as the lowest fitness so far, or as a constant below all
+        possible values if no candidate has succeeded.
 
         Raises:
-            ValueError: a candidate was not proposed, or has been told already.
+            ValueError: a candidate was not proposed, or its fitness has been received already.
         """
         for candidate_id, value in fitness:
             if candidate_id not in self._asked:
-                raise ValueError(f"tell: candidate {candidate_id} has not been proposed, or has been told already")
+                raise ValueError(f"tell: candidate {candidate_id} was not proposed, or already has a fitness")
             if math.isfinite(value):
                 self._worst = min(self._worst, value)
         worst = self._worst if math.isfinite(self._worst) else LOWEST
@@ -115,7 +117,7 @@ class Search:
                 self._best, self._fittest, self._fittest_id = value, proposal.vector, candidate_id
 
     def _begin_phase(self, generation: int) -> None:
-        """A new optimizer over the genes open in this generation, around the best genome so far."""
+        """Start a new optimizer over the genes that are open in this generation, around the best genome so far."""
         self._base = self._fittest
         self._origin = () if self._fittest_id is None else (self._fittest_id,)
         self._varied = self._genotype.varied(generation)
@@ -130,5 +132,5 @@ class Search:
 
 
 def training_seed(run_seed: int, candidate_id: int) -> int:
-    """Seed of one candidate's training and evaluation: fresh for each, whoever evaluates it."""
+    """Return the seed of a candidate's training and evaluation, which differs between candidates."""
     return int(np.random.SeedSequence([run_seed, candidate_id]).generate_state(1)[0])

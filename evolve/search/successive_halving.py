@@ -1,12 +1,11 @@
 """Successive halving within a generation (Jamieson and Talwalkar 2016, algorithm 1).
 
-A training has budget stages. All of a generation is trained through the first; after each stage the better part goes on
-to the next, and the last stage ends a whole training. A stage takes a training up where the one before left it, in
-fresh worlds whose seeds follow from candidate and stage. What it becomes follows from seeds and the tensors left, so a
-run that was killed within a stage begins that stage again, and ends as if nothing had happened.
+A training run is divided into rungs. All candidates of a generation are trained through the first rung. After each rung
+the better candidates continue to the next one, and the last rung completes the training run. Each rung continues from
+the previous one's checkpoint in new worlds, whose seeds follow from candidate and rung. The result depends only on
+seeds and checkpoint, so a run that was killed within a rung repeats this rung and gives the same result.
 
-In settings and records a stage is called a rung: `search.rungs` says how many there are, and the `rung` of a record's
-line after which one it was written.
+`search.rungs` is the number of rungs, and `rung` in a line of the record is the rung after which the line was written.
 """
 
 from __future__ import annotations
@@ -32,17 +31,17 @@ __all__ = [
 
 
 def budgets(search: SearchConfig, learning: LearningConfig) -> tuple[int, ...]:
-    """Steps that a training has come to at the end of each stage, (stage,); the last is a whole training."""
+    """Return the total steps at the end of each rung, (rung,); the last is a complete training run."""
     return tuple(math.ceil(learning.total_steps * search.promoted**after) for after in range(search.rungs - 1, -1, -1))
 
 
 def sizes(search: SearchConfig) -> tuple[int, ...]:
-    """Candidates of a generation that are trained through each stage, (stage,), if none fails."""
-    return tuple(max(1, math.ceil(search.population * search.promoted**stage)) for stage in range(search.rungs))
+    """Return the numbers of candidates of a generation that are trained through each rung, (rung,), if none fails."""
+    return tuple(max(1, math.ceil(search.population * search.promoted**rung)) for rung in range(search.rungs))
 
 
 def steps(config: RunConfig) -> int:
-    """Agent steps of the whole run, if all trainings take what they may."""
+    """Return the maximum number of agent steps of the whole run."""
     search, reached, total = config.search, 0, 0
     for candidates, end in zip(sizes(search), budgets(search, config.learning), strict=True):
         before, reached = reached, trained_steps(config.learning, reached, end)
@@ -51,8 +50,10 @@ def steps(config: RunConfig) -> int:
 
 
 def trained_steps(learning: LearningConfig, begin: int, end: int) -> int:
-    """Steps that a training from `begin` has come to when it stops at `end`: it goes on by whole rollouts of
-    n_envs x n_steps, evaluated every `eval_interval`."""
+    """Return the total steps of training from `begin` to `end`, rounded up to whole rollouts.
+
+    A rollout has n_envs x n_steps steps, and evaluations follow every `eval_interval`.
+    """
     rollout, trained = learning.n_envs * learning.n_steps, begin
     while trained < end:
         trained += rollout * math.ceil(min(learning.eval_interval, end - trained) / rollout)
@@ -60,23 +61,28 @@ def trained_steps(learning: LearningConfig, begin: int, end: int) -> int:
 
 
 def evaluations(search: SearchConfig) -> int:
-    """Evaluations in the whole run: every candidate's, after every stage that it reaches."""
+    """Return the number of evaluations in the whole run: of every candidate, after every rung that it reaches."""
     return search.generations * sum(sizes(search))
 
 
-def promoted(search: SearchConfig, stage: int, fitness: Sequence[tuple[int, float]]) -> set[int]:
-    """Ids that go on after a stage, given (id, fitness) of all that reached it: the fittest, the first of equals; none
-    that failed (-inf)."""
-    if stage + 1 >= search.rungs:
+def promoted(search: SearchConfig, rung: int, fitness: Sequence[tuple[int, float]]) -> set[int]:
+    """Return the ids that continue after a rung, given (id, fitness) of all candidates that reached it.
+
+    The fittest continue, with the lower id first at equal fitness; failed candidates (-inf) never continue.
+    """
+    if rung + 1 >= search.rungs:
         return set()
     able = sorted((told for told in fitness if math.isfinite(told[1])), key=lambda told: (-told[1], told[0]))
-    return {candidate_id for candidate_id, _ in able[: sizes(search)[stage + 1]]}
+    return {candidate_id for candidate_id, _ in able[: sizes(search)[rung + 1]]}
 
 
-def reaching(run: Run, generation: int, stage: int) -> set[int]:
-    """Ids of a generation that reach a stage: all of it the first; {} any later one until the one before is done."""
+def reaching(run: Run, generation: int, rung: int) -> set[int]:
+    """Return the ids of a generation that reach a rung; {} until the previous rung is complete.
+
+    All candidates reach the first rung.
+    """
     ids = set(generation_ids(generation, run.config.search.population))
-    for earlier in range(stage):
+    for earlier in range(rung):
         told = [run.on_record(candidate_id, earlier) for candidate_id in ids]
         known = [(candidate.id, candidate.fitness) for candidate in told if candidate is not None]
         if len(known) < len(ids):
@@ -86,20 +92,20 @@ def reaching(run: Run, generation: int, stage: int) -> set[int]:
 
 
 def complete(run: Run, generation: int) -> bool:
-    """Whether all of a generation has been evaluated, after every stage that it reaches."""
+    """Return whether all candidates of a generation have been evaluated, after every rung that they reach."""
     return _complete(run, generation, _evaluated(run))
 
 
 def finished(run: Run) -> bool:
-    """Whether all of a run has been evaluated."""
+    """Return whether all candidates of a run have been evaluated."""
     evaluated = _evaluated(run)
     return all(_complete(run, generation, evaluated) for generation in range(run.config.search.generations))
 
 
 def _evaluated(run: Run) -> list[set[int]]:
-    """Ids of all candidates that have been evaluated after each stage."""
-    return [run.evaluated_at(stage) for stage in range(run.config.search.rungs)]
+    """Return the ids of all candidates that have been evaluated after each rung."""
+    return [run.evaluated_at(rung) for rung in range(run.config.search.rungs)]
 
 
 def _complete(run: Run, generation: int, evaluated: Sequence[set[int]]) -> bool:
-    return all(reaching(run, generation, stage) <= done for stage, done in enumerate(evaluated))
+    return all(reaching(run, generation, rung) <= done for rung, done in enumerate(evaluated))

@@ -1,4 +1,4 @@
-"""What a worker process does: evaluate one candidate after another, until its pipe closes or its parent is gone."""
+"""Worker process, which evaluates one candidate after another until its pipe closes or its parent ends."""
 
 from __future__ import annotations
 
@@ -19,20 +19,23 @@ from typing import Any, Literal
 
 from evolve.config.run_config import ConfigError, RunConfig
 from evolve.genome.phenotype import Phenotype
-from evolve.learning.training_stage import TrainingStage
+from evolve.learning.training_rung import TrainingRung
 from evolve.store.evaluation import Evaluation
 
 __all__ = ["Message", "evaluate_candidate", "evaluated", "prepare_device", "refusal", "work"]
 
 M_TRIM_THRESHOLD, M_MMAP_THRESHOLD = -1, -3  # names of settings in glibc's malloc.h
-LARGEST_THRESHOLD = 2**25  # bytes of an array; glibc refuses more
-KEPT = 2**30  # bytes: more than a training's arrays take at once
-NO_MEMORY = ("allocate memory", "out of memory", "bad_alloc", "bad allocation")  # as PyTorch's and Dr.Jit's errors say
+LARGEST_THRESHOLD = 2**25  # bytes of an array, the maximum that glibc accepts
+KEPT = 2**30  # bytes, more than the arrays of a training run need at once
+NO_MEMORY = ("allocate memory", "out of memory", "bad_alloc", "bad allocation")  # in PyTorch's and Dr.Jit's errors
 
 
 @dataclass(frozen=True)
 class Message:
-    """From a worker to its executor: steps trained, an evaluation, why it cannot work here; "died" says the pipe."""
+    """Message from a worker to its executor.
+
+    The content is steps trained, an evaluation, or the reason why the worker cannot work; "died" means a closed pipe.
+    """
 
     kind: Literal["progress", "done", "unfit", "died"]
     content: Any = None
@@ -55,7 +58,7 @@ def work(connection: Connection, evaluate: Callable[..., Evaluation], prepare: C
         try:
             outcome = evaluated(evaluate, arguments, lambda *steps: connection.send(Message("progress", steps)))
         except (OSError, MemoryError) as error:
-            connection.send(Message("unfit", f"{refusal(error)}, and go on with evolve resume"))
+            connection.send(Message("unfit", f"{refusal(error)}, then use evolve resume"))
             return
         except ConfigError as error:
             connection.send(Message("unfit", " ".join(str(error).split())))
@@ -64,8 +67,9 @@ def work(connection: Connection, evaluate: Callable[..., Evaluation], prepare: C
 
 
 def prepare_device() -> None:
-    """Make Dr.Jit ready for work beside other workers: a proven LLVM library, or a GPU; one thread. Arrays that are
-    given back are kept for the next ones.
+    """Prepare Dr.Jit for one of several workers: a tested LLVM library or a GPU, and one thread.
+
+    Freed memory is kept for later arrays.
 
     Raises:
         BackendError: Dr.Jit cannot work here.
@@ -80,8 +84,11 @@ def prepare_device() -> None:
 
 
 def _keep_freed_memory() -> None:
-    """Until a candidate is done. glibc maps arrays of some 100 kB and more anew each time, and the system zeroes their
-    pages: a tenth of what an update of a many-eyed brain takes. Other systems' libraries are left alone."""
+    """Keep freed memory until a candidate is complete.
+
+    By default, glibc maps new pages for each array of some 100 kB or more, which the system sets to zero. That takes a
+    tenth of the time of an update with many eyes. On other systems nothing is changed.
+    """
     allocator = getattr(ctypes.CDLL(None), "mallopt", None) if sys.platform == "linux" else None
     if allocator is not None:
         allocator(M_MMAP_THRESHOLD, LARGEST_THRESHOLD)
@@ -93,32 +100,33 @@ def evaluate_candidate(
     config: RunConfig,
     seed: int,
     policy_path: Path,
-    stage: TrainingStage | None = None,
+    rung: TrainingRung | None = None,
     *,
     progress: Callable[[int, int], None],
 ) -> Evaluation:
-    """`evolve.learning.fitness.evaluate`, whose libraries are loaded in workers alone."""
+    """Call `evolve.learning.fitness.evaluate`, whose libraries are imported only in workers."""
     from evolve.learning.fitness import evaluate
     from sim.scene.mirror import MirrorWarning
 
     with warnings.catch_warnings():
         warnings.simplefilter(
             "ignore", MirrorWarning
-        )  # the same of every candidate: whoever began the run has been told
-        return evaluate(phenotype, config, seed, policy_path, progress, stage)
+        )  # equal for all candidates, and already shown at the start of the run
+        return evaluate(phenotype, config, seed, policy_path, progress, rung)
 
 
 def evaluated(
     evaluate: Callable[..., Evaluation], arguments: tuple[Any, ...], progress: Callable[[int, int], None]
 ) -> Evaluation:
-    """The candidate's evaluation; whatever goes wrong in it becomes its failure, but what the machine refuses: a disk
-    that is full says nothing about an animal, and neither does memory that others have taken. Nor do settings that
-    cannot be used: they are the same for all.
+    """Return the candidate's evaluation; most errors in it count as a failure of the candidate.
+
+    Errors that do not depend on the animal are raised instead: a full disk, insufficient memory, and invalid settings,
+    which are the same for all candidates.
 
     Raises:
-        OSError: its policy cannot be written, say.
-        MemoryError: there is no more.
-        ConfigError: its run's own task cannot be begun here, say.
+        OSError: a file cannot be written, for example the policy.
+        MemoryError: memory is insufficient.
+        ConfigError: the run's settings cannot be used here, for example because a user task cannot start.
     """
     began = time.perf_counter()
     try:
@@ -134,18 +142,20 @@ def evaluated(
 
 
 def refusal(error: OSError | MemoryError) -> str:
-    """What the machine refuses, and what to do about it."""
+    """Return a message on missing resources and the remedy."""
     if isinstance(error, OSError):
-        return f"{error}; mend that"
+        return f"{error}; correct this"
     reason = " ".join(str(error).split())[:200]
-    return f"out of memory ({reason}); take fewer workers (workers in config.toml), or free some"
+    return f"out of memory ({reason}); use fewer workers (workers in config.toml), or free some memory"
 
 
 def _give_back_memory() -> None:
-    """To the system, what the last candidate's arrays have left free between what is still in use: glibc keeps it, some
-    10 MB a candidate, and arrays of other sizes do not fill it. Dr.Jit keeps its kernels, those of every shape of eye
-    that has been; what is needed again it finds on the disk."""
-    gc.collect()  # frozen functions first, which hold kernels
+    """Return freed memory to the system after a candidate.
+
+    glibc keeps some 10 MB per candidate in gaps that arrays of other sizes do not fill. Dr.Jit keeps the kernels for
+    every shape of eye; it reloads kernels from disk when they are needed again.
+    """
+    gc.collect()  # first collect frozen functions, which hold kernels
     if (drjit := sys.modules.get("drjit")) is not None and multiprocessing.parent_process() is not None:
         drjit.flush_kernel_cache()
         drjit.flush_malloc_cache()
@@ -155,13 +165,13 @@ def _give_back_memory() -> None:
 
 
 def _one_line(error: Exception) -> str:
-    """ "ValueError: what it says (file.py:12)"."""
+    """Return an error as one line, "ValueError: message (file.py:12)"."""
     where = traceback.extract_tb(error.__traceback__)[-1]
     return f"{type(error).__name__}: {error} ({Path(where.filename).name}:{where.lineno})"
 
 
 def _die_with_parent() -> None:
-    """A parent that is killed cannot end its workers, and nobody would want what they are working on."""
+    """End this process when its parent ends, because a killed parent cannot stop its workers."""
     parent = multiprocessing.parent_process()
     if parent is not None:
         wait([parent.sentinel])

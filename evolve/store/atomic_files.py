@@ -1,4 +1,4 @@
-"""Files that are written whole or not at all."""
+"""Files that are written completely or not at all."""
 
 from __future__ import annotations
 
@@ -16,15 +16,14 @@ POLICIES, TRAININGS = "policies", "trainings"  # folders of a run
 
 
 def sweep(folder: Path) -> None:
-    """Remove what writers left that were killed in the middle. A replay may be written there meanwhile: what a process
-    writes that lives stays."""
+    """Remove unfinished files of killed processes; files of living processes, such as a replay, stay."""
     for path in folder.glob(f".*{UNFINISHED}"):
         if not _lives(path.name.removesuffix(UNFINISHED).rpartition(".")[2]):
             path.unlink(missing_ok=True)
 
 
 def _lives(process: str) -> bool:
-    """Whether there is a process of this number, other than this one."""
+    """Return whether a process with this number exists, other than this one."""
     if not process.isdecimal() or int(process) == os.getpid():
         return False
     try:
@@ -37,34 +36,35 @@ def _lives(process: str) -> bool:
 
 
 def write_whole(path: Path, content: bytes) -> None:
-    """Write a file so that a reader, or a machine that dies meanwhile, sees the old one or all of the new one. A run's
-    folder of policies or trainings is made if it is missing, but not what that stands in: a run that was deleted stays
-    so.
+    """Write a file atomically: readers, also after a crash of the machine, find either the old or the new content.
+
+    A run's folder of policies or trainings is created if it is missing, but not the run directory, so that a deleted
+    run is not created again.
 
     Raises:
-        StrangeFileError: a link, FIFO, device or directory bears its name.
-        OSError: it cannot be written; names `path`.
+        StrangeFileError: the path is a link, FIFO, device or directory.
+        OSError: the file cannot be written; the error names `path`.
     """
     with unfinished(path) as neighbour, neighbour.open("r+b") as file:
         file.write(content)
 
 
 def require_file_name(path: Path) -> None:
-    """What a file may be written under: neither "." nor "/", nor the name of what is no file.
+    """Check that a path can be written as a file: it is neither "." nor "/", nor the path of another kind of entry.
 
     Raises:
-        StrangeFileError: a link, FIFO, device or directory bears the name.
+        StrangeFileError: the path is a link, FIFO, device or directory.
     """
     require_regular(path if path.name else path.resolve())
 
 
 @contextmanager
 def unfinished(path: Path) -> Iterator[Path]:
-    """A neighbour of `path` to write to, empty at first; afterwards it is on the disk, under the name of `path`.
+    """Create an empty file next to `path` for writing; at the end it is synchronised and renamed to `path`.
 
     Raises:
-        StrangeFileError: a link, FIFO, device or directory bears its name.
-        OSError: it cannot be written; names `path`.
+        StrangeFileError: the path is a link, FIFO, device or directory.
+        OSError: the file cannot be written; the error names `path`.
     """
     require_file_name(path)
     neighbour = path.with_name(f".{path.name}.{os.getpid()}{UNFINISHED}")
@@ -78,10 +78,10 @@ def unfinished(path: Path) -> Iterator[Path]:
         neighbour.replace(path)
         sync_folder(path.parent)
     except BaseException as error:
-        with contextlib.suppress(OSError):  # what went wrong first is what is told
+        with contextlib.suppress(OSError):  # the first error is the one that is reported
             neighbour.unlink(missing_ok=True)
         if isinstance(error, OSError):
-            # Libraries raise OSErrors that have a message alone.
+            # Some libraries raise an OSError without an error number.
             number, said = (error.errno, error.strerror) if error.errno is not None else (errno.EIO, str(error))
             raise type(error)(number, said, str(path)) from error
         raise

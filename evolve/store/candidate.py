@@ -16,17 +16,18 @@ from evolve.genome.interval import Interval
 from evolve.genome.phenotype import Phenotype
 from evolve.genome.plain_values import listed, parsed, real, whole_number
 from evolve.store.evaluation import Evaluation
+from optics.numerics.renamed import renamed
 
 __all__ = ["Candidate"]
 
 
 @dataclass(frozen=True)
 class Candidate:
-    """A genome, the animal it became, and how that one fared; see `Evaluation` for the fields it has in common.
+    """A genome, its phenotype, and the outcome of training and evaluation; `Evaluation` describes the shared fields.
 
-    parents: ids of the candidates from which the search made it; () where it drew from none
-    rung: budget stage after which it was evaluated, 0 the first; steps and seconds are from the beginning
-    policy: SHA-256 of the file of its trained policy; None where it has none, or was written down by a former version
+    parents: ids of the candidates from which the search made it; () if there are none
+    rung: rung after which it was evaluated, counted from 0; steps and seconds include all earlier rungs
+    policy: SHA-256 of the file of its trained policy; None if it has no policy, or in records of former versions
     """
 
     id: int
@@ -45,16 +46,18 @@ class Candidate:
     parents: tuple[int, ...] = ()
     rung: int = 0
     policy: str | None = None
-    mishaps: tuple[tuple[str, int], ...] = ()
+    episode_failures: tuple[tuple[str, int], ...] = ()
 
     def __repr__(self) -> str:
-        """Short: a record holds thousands."""
+        """Return a short description, because a record holds thousands of candidates."""
         outcome = f"failed: {self.failure}" if self.failure is not None else f"fitness {self.fitness:.4g}"
         return f"<Candidate {self.id}, generation {self.generation}, {outcome}>"
 
+    mishaps, of = renamed("episode_failures"), renamed("from_evaluation")
+
     @property
     def place(self) -> Place:
-        """Where it stands in the search."""
+        """Place of the candidate in the search."""
         return Place(self.id, self.generation, self.index)
 
     @property
@@ -63,7 +66,7 @@ class Candidate:
         return np.array(self.genome)
 
     @classmethod
-    def of(
+    def from_evaluation(
         cls,
         place: Place,
         genome: tuple[float, ...],
@@ -72,31 +75,32 @@ class Candidate:
         outcome: Evaluation,
         parents: tuple[int, ...] = (),
     ) -> Candidate:
-        """Candidate at `place` with its outcome; a fitness that is no number is a failure."""
+        """Return the candidate at `place` with its outcome; a fitness that is not finite is a failure."""
         if outcome.failure is None and not math.isfinite(outcome.fitness):
             outcome = Evaluation.failed(f"fitness is {outcome.fitness}", outcome.seconds)
         found = {f.name: getattr(outcome, f.name) for f in fields(Evaluation)}
         return cls(**vars(place), genome=genome, phenotype=phenotype, seed=seed, **found, parents=parents)
 
     def to_line(self) -> str:
-        """One line of JSON; numbers are written so that they read back bit for bit, and what is no number as null."""
-        record = {**vars(self), "phenotype": self.phenotype.to_json()}
-        if not self.mishaps:
+        """Return one line of JSON, from which numbers can be restored bit for bit; NaN and infinity become null."""
+        record = {KEYS.get(name, name): value for name, value in vars(self).items()}
+        record["phenotype"] = self.phenotype.to_json()
+        if not self.episode_failures:
             del record["mishaps"]
         return json.dumps(_finite(record), allow_nan=False) + "\n"
 
     @classmethod
     def from_line(cls, line: str) -> Candidate:
-        """Inverse of `to_line`.
+        """Return the candidate that `to_line` wrote.
 
         Raises:
-            ValueError: says what is wrong with the line.
+            ValueError: the line is invalid; the message names the reason.
         """
         record = parsed(line)
         if isinstance(record, dict):
-            # The first runs wrote none of these, and no run writes that nothing went wrong.
+            # The first runs wrote none of these fields, and an empty list of failures is never written.
             record = {"parents": [], "rung": 0, "policy": None, "mishaps": [], **record}
-        names = [f.name for f in fields(cls)]
+        names = [KEYS.get(f.name, f.name) for f in fields(cls)]
         if not isinstance(record, dict) or sorted(record) != sorted(names):
             raise ValueError(f"wrong fields: must hold exactly {', '.join(names)}")
         try:
@@ -111,7 +115,9 @@ class Candidate:
                 curve=tuple(_point(entry) for entry in listed(record["curve"], "curve", 0, _LONGEST)),
                 failure=_text(record["failure"], "failure"),
                 policy=_checksum(record["policy"]),
-                mishaps=tuple(_mishap(entry) for entry in listed(record["mishaps"], "mishaps", 0, _LONGEST)),
+                episode_failures=tuple(
+                    _episode_failure(entry) for entry in listed(record["mishaps"], "mishaps", 0, _LONGEST)
+                ),
                 parents=tuple(
                     whole_number(one, "parents", 0, _COUNTS["id"])
                     for one in listed(record["parents"], "parents", 0, _LONGEST)
@@ -123,18 +129,19 @@ class Candidate:
         return candidate
 
     def _require_success(self) -> None:
-        """Whoever has not failed has a fitness, and returns that it comes from."""
+        """Check that a candidate that has not failed has a fitness and returns."""
         if self.failure is not None:
             return
         if not math.isfinite(self.fitness):
-            raise ValueError("fitness = null: must be a number, or failure must say why there is none")
+            raise ValueError("fitness = null: must be a number, or failure must state the reason")
         if not self.returns or not all(map(math.isfinite, (*self.returns, self.success_rate))):
-            raise ValueError("returns, success_rate: must be numbers, as nothing has failed")
+            raise ValueError("returns, success_rate: must be numbers if failure is null")
 
 
+KEYS = {"episode_failures": "mishaps"}  # fields with another name in records
 _ANY = Interval(-1e300, 1e300)
-_LONGEST = 1_000_000  # entries of a list
-# The largest of each: ids and generations are as many as settings allow, seeds what generators take.
+_LONGEST = 1_000_000  # maximum number of entries of a list
+# Maximum values: ids and generations are limited by the settings' ranges, seeds by random generators.
 _COUNTS = {"id": 10**9, "generation": 10**5, "index": 10**4, "seed": 2**64 - 1, "steps": 10**12, "rung": 9}
 
 
@@ -152,30 +159,30 @@ def _point(entry: Any) -> tuple[int, float]:
     return whole_number(steps, "curve", 0, _COUNTS["steps"]), _real_or_none(value, "curve", _ANY)
 
 
-def _mishap(entry: Any) -> tuple[str, int]:
+def _episode_failure(entry: Any) -> tuple[str, int]:
     said, episodes = listed(entry, "mishaps", 2, 2)
     text = _text(said, "mishaps")
     if text is None:
-        raise ValueError("mishaps: must say what went wrong")
+        raise ValueError("mishaps: must contain a message")
     return text, whole_number(episodes, "mishaps", 1, _COUNTS["steps"])
 
 
 def _text(value: Any, name: str) -> str | None:
-    """Text as it can be printed: a file's name in it, say in why a candidate failed, may be no text at all."""
+    """Return printable text; a file's name in a failure message may contain bytes that are not valid text."""
     if value is not None and not isinstance(value, str):
         raise ValueError(f"{name}: must be text or null")
     return value if value is None else value.encode(errors="backslashreplace").decode()
 
 
 def _checksum(value: Any) -> str | None:
-    """Of a policy's file, as `evolve.store.policies.digest` writes it."""
+    """Return the hash of a policy's file after a check; see `evolve.store.policies.digest`."""
     if value is not None and (not isinstance(value, str) or re.fullmatch("[0-9a-f]{64}", value) is None):
         raise ValueError("policy: must be a SHA-256 in 64 lower-case hexadecimal digits, or null")
     return value
 
 
 def _finite(value: Any) -> Any:
-    """JSON has no infinity and no NaN: null stands for them."""
+    """Return a value with null instead of infinity and NaN, which JSON lacks."""
     if isinstance(value, dict):
         return {key: _finite(entry) for key, entry in value.items()}
     if isinstance(value, list | tuple):

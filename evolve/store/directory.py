@@ -1,11 +1,11 @@
-"""The run directory: a run's only memory. Plain text and plain tensors; nothing in it is code.
+"""The run directory, which holds the complete state of a run as text and tensors, without code.
 
 config.toml        every setting
-versions.json      with which software the run was started, and continued
-candidates.jsonl   the record: one line per evaluated candidate and budget stage, in the order in which they finished
+versions.json      versions of the software at each start of the run
+candidates.jsonl   the record: one line per evaluated candidate and rung, in order of completion
 policies/          trained policies
-trainings/         as they stand after each budget stage, until none of them goes on
-lock               held by the process that works on the run
+trainings/         checkpoints of training runs that may continue after a rung
+lock               lock of the process that works on the run
 """
 
 from __future__ import annotations
@@ -32,12 +32,12 @@ __all__ = ["Candidate", "Run", "RunError", "next_directory"]
 
 CONFIG = "config.toml"
 CANDIDATES = "candidates.jsonl"
-PRODUCTS = ("exr", "tensorboard")  # folders of what is made from a run
+PRODUCTS = ("exr", "tensorboard")  # folders of files that are derived from a run
 
 
 @dataclass
 class Run:
-    """A run directory: its config, its record, and where its other files are."""
+    """A run directory: its config, its record, and the paths of its other files."""
 
     path: Path
     config: RunConfig
@@ -45,29 +45,29 @@ class Run:
     _lock: RunLock | None = None
 
     def __repr__(self) -> str:
-        """Short: a record is long."""
+        """Return a short description, because a record is long."""
         best = "" if self.best is None else f", best fitness {self.best.fitness:.4g}"
         evaluated = f"{len(self.candidates)} of {self.config.candidates} candidates evaluated"
         return f"<Run {str(self.path)!r}: {self.config.task}, {evaluated}{best}>"
 
     @classmethod
     def create(cls, path: Path | str, config: RunConfig, origin: str | None = None) -> Self:
-        """New run in a directory that does not exist or is empty; `origin` names the animal that it starts from.
+        """Create a run in a directory that does not exist or is empty; `origin` names the animal that it starts from.
 
         Raises:
-            RunError: the directory holds something already, or cannot be written.
-            LockedError: another process creates a run there.
+            RunError: the directory is not empty, or cannot be written.
+            LockedError: another process is creating a run there.
         """
         path = Path(path)
         try:
             path.mkdir(parents=True, exist_ok=True)
-            _require_no_run(path)  # before the lock, which leaves a file
+            _require_no_run(path)  # checked before locking, which creates a file
             with RunLock(path):
                 _require_no_run(path)
                 folder(path / POLICIES)
                 opened(path / CANDIDATES, "ab", create=True).close()
                 text = to_toml(config)
-                (path / VERSIONS).unlink(missing_ok=True)  # of an attempt that was killed here
+                (path / VERSIONS).unlink(missing_ok=True)  # left by an attempt that was killed here
                 record_start(path, 0, origin, fingerprint(text))
                 write_whole(path / CONFIG, text.encode())
         except OSError as error:
@@ -76,39 +76,39 @@ class Run:
 
     @classmethod
     def open(cls, path: Path | str, task: str | None = None) -> Self:
-        """A run as it is on disk.
+        """Open a run directory.
 
-        task: FILE.py:CLASS, where the run evolves a task of somebody's own: its code runs only if it is named, and is
-            needed to carry on the run, and to let its animals play
+        task: FILE.py:CLASS if the run evolves a user task. Its code runs only if it is named here, and is needed to
+            continue the run and to let its animals play.
 
         Raises:
-            RunError: no run there, or its candidates cannot be read; names file and line.
-            ConfigError: its config cannot be used, or another task is named than the run's, or its file has changed.
-            StrangeFileError: a link, FIFO or device bears the name of one of its files or folders.
+            RunError: the directory holds no run, or its candidates cannot be read; names file and line.
+            ConfigError: the config is invalid, the named task differs from the run's, or its file has changed.
+            StrangeFileError: a link, FIFO or device has the name of one of the run's files or folders.
         """
         path = Path(path)
         if not path.is_dir():
-            raise RunError(f"{path} is no run: there is no such directory")
+            raise RunError(f"{path} is not a run: there is no such directory")
         _require_plain(path)
         try:
             config = from_text(read(path / CONFIG), str(path / CONFIG))
         except FileNotFoundError:
-            raise RunError(f"{path} is no run: it holds no {CONFIG}") from None
+            raise RunError(f"{path} is not a run: it holds no {CONFIG}") from None
         if task is not None:
             config = config.with_code(task)
         return cls(path, config, Record.read(path / CANDIDATES, config))
 
     @classmethod
     def create_next(cls, config: RunConfig, preset: str, origin: str | None = None) -> Self:
-        """New run in the next free directory, also where others are begun at the same time.
+        """Create a run in the next free directory, also if other processes create runs at the same time.
 
         Raises:
-            RunError: it cannot be written.
+            RunError: the directory cannot be written.
         """
         path, tried = next_directory(config.task_name, preset), None
-        while path != tried:  # a name that is neither free nor taken is that of a link to nowhere
+        while path != tried:  # the path of a broken link appears free but cannot be created
             try:
-                path.mkdir(parents=True)  # whose it is
+                path.mkdir(parents=True)  # fails if another process has created it
                 break
             except FileExistsError:
                 path, tried = next_directory(config.task_name, preset), path
@@ -117,10 +117,10 @@ class Run:
         return cls.create(path, config, origin)
 
     def require_present_format(self) -> None:
-        """Trainings can be carried on in the light in which they began, and in no other.
+        """Check that the run has the present format, because only then is light computed as in its earlier training.
 
         Raises:
-            RunError: the run's format is a former one; names the version that carries it on.
+            RunError: the run has a former format; the message names the version that can continue it.
         """
         number = format_of(parsed_toml(read(self.path / CONFIG), str(self.path / CONFIG)).tree)
         if number != FORMAT:
@@ -130,19 +130,19 @@ class Run:
             )
 
     def lock(self) -> RunLock:
-        """The right to write to this run, as a context manager.
+        """Return the lock for writing to this run, a context manager.
 
         Raises:
-            LockedError: another process has it.
+            LockedError: another process holds the lock.
         """
         self._lock = RunLock(self.path)
         return self._lock
 
     def repair(self) -> None:
-        """Cut off an unfinished last line and remove files half written (after `lock`); read the rest anew.
+        """Read the record again, and remove an unfinished last line and incomplete files; call it after `lock`.
 
         Raises:
-            RunError: the record is damaged or cannot be written, or config.toml is no longer as it was opened.
+            RunError: the record is damaged or cannot be written, or config.toml has changed since the run was opened.
         """
         try:
             text = read(self.path / CONFIG)
@@ -159,51 +159,51 @@ class Run:
         self.record.cut_off_unfinished()
 
     def append(self, candidate: Candidate) -> None:
-        """Write a candidate down for good.
+        """Append a candidate to the record and synchronise the file.
 
         Raises:
-            RunError: the candidate is there already, somebody else has changed the record, or it cannot be written;
-                what was there before still is.
+            RunError: the candidate is already on record, another process has changed the record, or it cannot be
+                written; earlier lines are intact.
         """
         if self._lock is not None and not self._lock.stands:
-            raise RunError(f"{self.record.path}: is no longer as this process left it; nothing is added")
+            raise RunError(f"{self.record.path}: was changed by another process; nothing is added")
         self.record.append(candidate)
 
     def policy_path(self, candidate_id: int) -> Path:
-        """Where a candidate's trained policy is kept."""
+        """Return the path of a candidate's trained policy."""
         return self.path / POLICIES / f"{candidate_id:06d}.safetensors"
 
-    def checkpoint_path(self, candidate_id: int, stage: int) -> Path:
-        """Where a candidate's training is kept as it stands after a budget stage, until it goes on no more."""
-        return self.path / TRAININGS / f"{candidate_id:06d}-{stage}.safetensors"
+    def checkpoint_path(self, candidate_id: int, rung: int) -> Path:
+        """Return the path of a candidate's checkpoint after a rung."""
+        return self.path / TRAININGS / f"{candidate_id:06d}-{rung}.safetensors"
 
     def forget_trainings(self, candidate_ids: Iterable[int]) -> None:
-        """Remove what the trainings of these candidates have left, now that none of them goes on."""
+        """Remove the checkpoints of these candidates, whose training does not continue."""
         for candidate_id in candidate_ids:
             for path in (self.path / TRAININGS).glob(f"{candidate_id:06d}-*.safetensors"):
                 path.unlink(missing_ok=True)
 
     @property
     def candidates(self) -> tuple[Candidate, ...]:
-        """Evaluated candidates in order of their ids, each as it is after the last budget stage that it has reached."""
+        """Evaluated candidates in order of their ids, each after the last rung that it has reached."""
         return self.record.candidates
 
     @property
     def notice(self) -> str | None:
-        """One line on what was left out when the record was read, or on policies that are lost; None if neither."""
+        """One line about a skipped line of the record or about lost policies; None if there are neither."""
         return self.record.notice or lost(self.candidates, self.policy_path)
 
     @property
     def best(self) -> Candidate | None:
-        """The candidate of highest fitness, the earliest where several have it; None before one has succeeded."""
+        """Candidate of highest fitness, the earliest of equal ones; None before a candidate has succeeded."""
         done = [candidate for candidate in self.candidates if candidate.failure is None]
         return max(done, key=lambda candidate: (candidate.fitness, -candidate.id), default=None)
 
     def candidate(self, candidate_id: int | None = None) -> Candidate:
-        """The candidate with this id; None: the best.
+        """Return the candidate with this id; None: the best.
 
         Raises:
-            RunError: it has not been evaluated, or none has succeeded.
+            RunError: the candidate has not been evaluated, or no candidate has succeeded.
         """
         if candidate_id is None:
             if self.best is None:
@@ -215,33 +215,35 @@ class Run:
         raise RunError(f"{self.path}: there is no candidate {candidate_id}; {len(self.candidates)} have been evaluated")
 
     def generation(self, number: int) -> list[Candidate]:
-        """Candidates of one generation that have been evaluated."""
+        """Return the evaluated candidates of one generation."""
         return [candidate for candidate in self.candidates if candidate.generation == number]
 
     @property
     def in_order_of_finish(self) -> list[Candidate]:
-        """Candidates in the order in which they were evaluated and written down, once for each budget stage."""
+        """Candidates in the order of the record, once for each rung."""
         return list(self.record.lines.values())
 
-    def on_record(self, candidate_id: int, stage: int) -> Candidate | None:
-        """The candidate as it was after a budget stage; None where it has not been evaluated there."""
-        return self.record.lines.get((candidate_id, stage))
+    def on_record(self, candidate_id: int, rung: int) -> Candidate | None:
+        """Return the candidate after a rung; None if it has not been evaluated there."""
+        return self.record.lines.get((candidate_id, rung))
 
     def steps_of(self, candidate_id: int) -> int:
-        """Steps that a candidate has been trained so far, as far as is on record."""
-        steps = stage = 0
-        while (line := self.on_record(candidate_id, stage)) is not None:
-            steps, stage = max(steps, line.steps), stage + 1
+        """Return the number of training steps of a candidate on record."""
+        steps = rung = 0
+        while (line := self.on_record(candidate_id, rung)) is not None:
+            steps, rung = max(steps, line.steps), rung + 1
         return steps
 
-    def evaluated_at(self, stage: int) -> set[int]:
-        """Ids of all candidates that have been evaluated after a budget stage."""
-        return {candidate_id for candidate_id, reached in self.record.lines if reached == stage}
+    def evaluated_at(self, rung: int) -> set[int]:
+        """Return the ids of all candidates that have been evaluated after a rung."""
+        return {candidate_id for candidate_id, reached in self.record.lines if reached == rung}
 
 
 def _require_no_run(path: Path) -> None:
-    """A directory must be empty, or as a process leaves it that is killed while it creates a run: config.toml, which
-    makes it one, is written last."""
+    """Check that a directory is empty, or contains only files of a process that was killed while creating a run.
+
+    config.toml is written last and marks a complete run.
+    """
     begun = {RunLock.NAME, VERSIONS, CANDIDATES, POLICIES}
     names = {entry.name for entry in path.iterdir() if not entry.name.endswith(UNFINISHED)}
     _require_plain(path)
@@ -253,7 +255,7 @@ def _require_no_run(path: Path) -> None:
 
 
 def _require_plain(path: Path) -> None:
-    """What bears the name of a run's file must be a file, and of a folder a folder: named before anything is read."""
+    """Check, before anything is read, that a run's files are regular files and its folders are folders."""
     for name in (CONFIG, VERSIONS, CANDIDATES, RunLock.NAME):
         require_regular(path / name)
     for name in (POLICIES, TRAININGS, *PRODUCTS):
@@ -261,7 +263,7 @@ def _require_plain(path: Path) -> None:
 
 
 def next_directory(task: str, preset: str, base: Path = Path("runs")) -> Path:
-    """runs/<task>-<preset>-<n>, n the first that is free."""
+    """Return runs/<task>-<preset>-<n> with the first free number n."""
     n = 1
     while (base / f"{task}-{preset}-{n}").exists():
         n += 1

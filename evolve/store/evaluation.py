@@ -1,4 +1,4 @@
-"""What became of one candidate."""
+"""Outcome of one candidate."""
 
 from __future__ import annotations
 
@@ -6,22 +6,22 @@ import math
 from collections import Counter
 from dataclasses import dataclass
 
-__all__ = ["Evaluation", "mishaps_in_all", "most_frequent"]
+__all__ = ["Evaluation", "most_frequent", "total_episode_failures"]
 
-KINDS, LONGEST = 4, 300  # of mishaps that are told apart, and letters of each
+KINDS, LONGEST = 4, 300  # maximum number of different failures, and of characters of each
 OTHERS = "others"
 
 
 @dataclass(frozen=True)
 class Evaluation:
-    """Outcome of one candidate's learning and evaluation episodes.
+    """Outcome of one candidate's training run and evaluation episodes.
 
-    fitness: mean of `returns`; -inf where the evaluation failed
+    fitness: mean of `returns`; -inf if the evaluation failed
     steps: agent steps trained
     seconds: wall time
     curve: (training steps, mean evaluation return), ...
-    failure: one line that says what went wrong; None if nothing did
-    mishaps: (what ended episodes in the middle of its life, in one line; how many), the most frequent first
+    failure: message in one line; None if nothing failed
+    episode_failures: (message in one line, number of episodes that it ended), the most frequent first
     """
 
     fitness: float
@@ -31,27 +31,27 @@ class Evaluation:
     seconds: float = 0.0
     curve: tuple[tuple[int, float], ...] = ()
     failure: str | None = None
-    mishaps: tuple[tuple[str, int], ...] = ()
+    episode_failures: tuple[tuple[str, int], ...] = ()
 
     @classmethod
     def failed(cls, failure: str, seconds: float = 0.0) -> Evaluation:
-        """The evaluation of a candidate that has none, in one line."""
+        """Return the evaluation of a candidate that failed."""
         return cls(fitness=-math.inf, seconds=seconds, failure=_in_one_line(failure))
 
 
 def most_frequent(failures: Counter[str]) -> tuple[tuple[str, int], ...]:
-    """Mishaps of as many kinds as a record has room for, and how many others there were."""
+    """Return the most frequent failures, up to `KINDS`, followed by the number of all others."""
     told: Counter[str] = Counter()
     for failure, episodes in failures.items():
         told[_in_one_line(failure)[:LONGEST]] += episodes
-    others = told.pop(OTHERS, 0)  # of mishaps that were ranked before
+    others = told.pop(OTHERS, 0)  # from earlier calls of this function
     ranked = sorted(told.items(), key=lambda item: (-item[1], item[0]))
     others += sum(episodes for _, episodes in ranked[KINDS:])
     return (*ranked[:KINDS], (OTHERS, others)) if others else tuple(ranked)
 
 
-def mishaps_in_all(*mishaps: tuple[tuple[str, int], ...]) -> tuple[tuple[str, int], ...]:
-    """Mishaps of several parts of a life as those of all of it."""
+def total_episode_failures(*mishaps: tuple[tuple[str, int], ...]) -> tuple[tuple[str, int], ...]:
+    """Return the failures of several parts of a training run combined."""
     counts: Counter[str] = Counter()
     for part in mishaps:
         counts.update(dict(part))
@@ -59,5 +59,5 @@ def mishaps_in_all(*mishaps: tuple[tuple[str, int], ...]) -> tuple[tuple[str, in
 
 
 def _in_one_line(text: str) -> str:
-    told = text.encode(errors="backslashreplace").decode()  # a file's name in it may be no text at all
+    told = text.encode(errors="backslashreplace").decode()  # a file's name in it may contain invalid text
     return " ".join(told.split())

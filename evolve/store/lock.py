@@ -1,4 +1,4 @@
-"""One process at a time may write to a run."""
+"""Lock of a run, which lets only one process at a time write to it."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from evolve.store.regular_files import StrangeFileError, opened
 
 __all__ = ["LockedError", "RunLock", "holder"]
 
-PATIENCE_S = 0.5  # someone asking `holder` has the lock for an instant
-LONGEST = 400  # bytes of a lock's text: a process and the name of its machine
+PATIENCE_S = 0.5  # `holder` in another process takes the lock for an instant
+LONGEST = 400  # maximum bytes of a lock's text, which names a process and its machine
 
 
 class LockedError(ValueError):
-    """Another process works on the run, or it cannot be written; the message is one line that says which."""
+    """Another process works on the run, or it cannot be written; the message is one line."""
 
 
 class RunLock:
-    """The operating system's lock on the file `lock`: it ends with its process, however that dies."""
+    """Lock of the operating system on the file `lock`; it ends with its process, also if that is killed."""
 
     NAME = "lock"
 
@@ -58,7 +58,7 @@ class RunLock:
 
     @property
     def stands(self) -> bool:
-        """Whether the lock that is held is still the run's: its directory may have been deleted, and begun anew."""
+        """True if the lock still belongs to the run, whose directory may have been deleted and created again."""
         if self._file is None:
             return False
         try:
@@ -68,10 +68,10 @@ class RunLock:
 
 
 def holder(run: Path) -> str | None:
-    """The process that works on a run ("1234 on host"), None if nobody does.
+    """Return the process that works on a run ("1234 on host"), or None.
 
     Raises:
-        OSError: its lock cannot be read.
+        OSError: the lock cannot be read.
     """
     try:
         with opened(run / RunLock.NAME) as file:

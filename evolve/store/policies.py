@@ -1,4 +1,4 @@
-"""Whether trained policies are still those that the record speaks of."""
+"""Comparison of the files of trained policies with the record."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ from evolve.store.regular_files import read
 
 __all__ = ["digest", "lost", "require_policy"]
 
-SHOWN = 5  # ids in a line, at most
-REMEDY = "put the file back from a copy of the run; nothing else needs it but replay, report and export"
+SHOWN = 5  # maximum number of ids in a line
+REMEDY = "restore the file from a copy of the run; only replay, report and export need it"
 
 
 def digest(path: Path) -> str | None:
-    """SHA-256 of a policy's file; None if there is none.
+    """Return the SHA-256 of a policy's file; None if the file is missing.
 
     Raises:
-        OSError: it cannot be read, or is no regular file.
+        OSError: the file cannot be read, or is not a regular file.
     """
     try:
         return hashlib.sha256(read(path)).hexdigest()
@@ -29,7 +29,7 @@ def digest(path: Path) -> str | None:
 
 
 def lost(candidates: Iterable[Candidate], where: Callable[[int], Path]) -> str | None:
-    """One line on policies that the record knows and the directory has not; None if it has all of them."""
+    """Return one line about policies on record whose files are missing; None if all files exist."""
     gone = [c.id for c in candidates if c.policy is not None and not where(c.id).exists()]
     if not gone:
         return None
@@ -38,16 +38,16 @@ def lost(candidates: Iterable[Candidate], where: Callable[[int], Path]) -> str |
 
 
 def require_policy(candidate: Candidate, path: Path) -> None:
-    """The policy with which a candidate was evaluated, and no other.
+    """Check that a file is the policy with which a candidate was evaluated.
 
     Raises:
-        RunError: it is lost, or another one is in its place, or there never was one.
+        RunError: the file is lost or has another content, or the candidate never had a policy.
     """
-    if candidate.failure is not None:  # a file there is of an earlier budget stage, and nothing is known of its fitness
+    if candidate.failure is not None:  # an existing file belongs to an earlier rung
         raise RunError(f"candidate {candidate.id} has no policy, as it failed: {candidate.failure}")
     found = digest(path)
     if found is None and candidate.policy is None:
-        raise RunError(f"no policy at {path}, and the record names none that was kept: choose another candidate")
+        raise RunError(f"no policy at {path}, and none is on record: choose another candidate")
     if found is None:
         raise RunError(f"no policy at {path}: {REMEDY}")
     if candidate.policy is not None and found != candidate.policy:

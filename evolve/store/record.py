@@ -1,6 +1,6 @@
-"""The record of a run, candidates.jsonl: one line per evaluated candidate and budget stage, in order of finishing.
+"""The record of a run, candidates.jsonl: one line per evaluated candidate and rung, in order of finishing.
 
-It is read whole, checked line by line, and only ever added to.
+It is read completely and checked line by line; lines are only appended.
 """
 
 from __future__ import annotations
@@ -18,21 +18,21 @@ from evolve.store.regular_files import opened, read
 
 __all__ = ["Record", "RunError"]
 
-LAST_LINE = "; it is the last line: without it, the run goes on, and evaluates this candidate again"
-Lines = dict[tuple[int, int], Candidate]  # (candidate id, rung) -> the candidate as it was there
+LAST_LINE = "; it is the last line: if you delete it, the run can continue and evaluates this candidate again"
+Lines = dict[tuple[int, int], Candidate]  # (candidate id, rung) -> the candidate after this rung
 
 
 class RunError(ValueError):
-    """A run directory that cannot be used as asked; the message is one line that says why."""
+    """An operation on a run directory is impossible; the message is one line with the reason."""
 
 
 @dataclass
 class Record:
-    """The lines of a record, as they are on disk.
+    """The lines of a record on disk.
 
     lines: candidates by (id, rung), in the order of the file
-    candidates: in order of their ids, each as it is on the highest rung that it has reached
-    notice: one line on what had to be left out when reading: a line that was being written when the power went
+    candidates: candidates in order of their ids, each after the highest rung that it has reached
+    notice: one line about an unfinished line that was skipped, for example after a power failure
     """
 
     path: Path
@@ -43,7 +43,7 @@ class Record:
 
     @classmethod
     def read(cls, path: Path, config: RunConfig) -> Record:
-        """The record in a file, each line of which must agree with `config` and with the lines before it.
+        """Read a record; each line must agree with `config` and with the lines before it.
 
         Raises:
             RunError: the file cannot be read, or a line is damaged; names file and line.
@@ -70,24 +70,24 @@ class Record:
         return cls(path, lines, _furthest(lines), notice, whole_bytes)
 
     def append(self, candidate: Candidate) -> None:
-        """Write a candidate down for good.
+        """Append a candidate and synchronise the file.
 
         Raises:
-            RunError: the candidate is there already, somebody else has changed the record, or it cannot be written;
-                what was there before still is.
+            RunError: the candidate is already on record, another process has changed the record, or it cannot be
+                written; earlier lines are intact.
         """
         if (candidate.id, candidate.rung) in self.lines:
             raise RunError(f"{self.path.parent}: candidate {candidate.id} has been evaluated already")
         line = candidate.to_line().encode()
         try:
             with opened(self.path, "ab") as file:
-                if file.tell() != self._whole_bytes:  # the directory was deleted, say, and another run begun in it
-                    raise RunError(f"{self.path}: is no longer as this process left it; nothing is added")
+                if file.tell() != self._whole_bytes:  # for example if another run was started in the directory
+                    raise RunError(f"{self.path}: was changed by another process; nothing is added")
                 file.write(line)
                 file.flush()
                 os.fsync(file.fileno())
         except FileNotFoundError:
-            raise RunError(f"{self.path}: is no longer as this process left it; nothing is added") from None
+            raise RunError(f"{self.path}: was changed by another process; nothing is added") from None
         except OSError as error:
             raise RunError(f"{self.path}: cannot be written: {error.strerror}") from error
         self._whole_bytes += len(line)
@@ -109,13 +109,13 @@ class Record:
 
 
 def _furthest(lines: Lines) -> tuple[Candidate, ...]:
-    """Each candidate as it is on the highest rung that it has reached, in order of ids."""
+    """Return each candidate after the highest rung that it has reached, in order of ids."""
     furthest = {candidate_id: lines[candidate_id, rung] for candidate_id, rung in sorted(lines)}
     return tuple(furthest.values())
 
 
 def _with(candidates: tuple[Candidate, ...], new: Candidate) -> tuple[Candidate, ...]:
-    """The same as `_furthest` makes of all lines, one more among them, without a look at each."""
+    """Return the result of `_furthest` with one more line, without a pass over all lines."""
     at = bisect_left(candidates, new.id, key=lambda candidate: candidate.id)
     known = at < len(candidates) and candidates[at].id == new.id
     if known and candidates[at].rung > new.rung:
@@ -124,11 +124,12 @@ def _with(candidates: tuple[Candidate, ...], new: Candidate) -> tuple[Candidate,
 
 
 def _require_agreement(candidate: Candidate, config: RunConfig, dimension: int, earlier: Lines) -> None:
-    """A line must agree with the run's settings and with the lines before it; what the search would have proposed is
-    for the search to compare.
+    """Check that a line agrees with the run's settings and with earlier lines.
+
+    The search itself compares the line with its proposals.
 
     Raises:
-        ValueError: says what does not agree.
+        ValueError: the line disagrees; the message names the reason.
     """
     population, rungs = config.search.population, config.search.rungs
     if (candidate.id, candidate.rung) in earlier:
@@ -136,8 +137,8 @@ def _require_agreement(candidate: Candidate, config: RunConfig, dimension: int, 
     if not 0 <= candidate.rung < rungs:
         raise ValueError(f"rung = {candidate.rung}: must be at least 0 and below search.rungs = {rungs}")
     if candidate.rung and (candidate.id, candidate.rung - 1) not in earlier:
-        raise ValueError(f"candidate {candidate.id} is on rung {candidate.rung}, but has not been one below")
-    if candidate.place != Place.of(candidate.id, population):
+        raise ValueError(f"candidate {candidate.id} is on rung {candidate.rung}, but the rung below is missing")
+    if candidate.place != Place.from_id(candidate.id, population):
         raise ValueError(
             f"candidate {candidate.id} can't be number {candidate.index} of generation {candidate.generation} "
             f"with a population of {population}"

@@ -1,7 +1,7 @@
-"""The one door to the files of a run: behind each name is a regular file of that run, or nothing is opened.
+"""Access to the files of a run, which opens only regular files in the run directory.
 
-A run directory may come from a stranger. A link in it leads to any file of whoever reads it, and would have it
-overwritten; a FIFO keeps waiting for ever whoever opens it.
+A run directory may come from an untrusted source. A link in it could point to any file of the user, which would then be
+overwritten, and opening a FIFO could block forever.
 """
 
 from __future__ import annotations
@@ -34,15 +34,15 @@ _FLAGS = {"rb": os.O_RDONLY, "r+b": os.O_RDWR, "ab": os.O_WRONLY | os.O_APPEND}
 
 
 class StrangeFileError(OSError):
-    """Something else stands where a run has a file or a folder of its own; `strerror` and `filename` say what."""
+    """A run's file or folder is another kind of entry; `strerror` and `filename` describe it."""
 
 
 def opened(path: Path, mode: Literal["rb", "r+b", "ab"] = "rb", create: bool = False) -> BinaryIO:
-    """A run's file, opened: "rb", "r+b" or "ab". None of them truncates, and only `create` makes one that is missing.
+    """Open a run's file in the mode "rb", "r+b" or "ab"; no mode truncates it, and only `create` makes a missing file.
 
     Raises:
-        StrangeFileError: no regular file, or, where it is to be written, one that has other names as well.
-        OSError: there is none, or it may not be opened.
+        StrangeFileError: the path is not a regular file, or a file opened for writing has several hard links.
+        OSError: the file does not exist or cannot be opened.
     """
     require_regular(path)
     flags = _FLAGS[mode] | (os.O_CREAT if create else 0)
@@ -50,32 +50,32 @@ def opened(path: Path, mode: Literal["rb", "r+b", "ab"] = "rb", create: bool = F
 
 
 def read(path: Path) -> bytes:
-    """All of a run's file.
+    """Return the content of a run's file.
 
     Raises:
-        StrangeFileError: no regular file.
-        OSError: there is none, or it may not be read.
+        StrangeFileError: the path is not a regular file.
+        OSError: the file does not exist or cannot be read.
     """
     with opened(path) as file:
         return file.read()
 
 
 def created(path: Path) -> BinaryIO:
-    """A new file, opened for writing; whatever bore its name is removed, and not written to.
+    """Create a file and open it for writing; an existing entry of this name is removed and never written to.
 
     Raises:
-        OSError: it cannot be made.
+        OSError: the file cannot be created.
     """
     path.unlink(missing_ok=True)
     return os.fdopen(_descriptor(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL), "wb")
 
 
 def folder(path: Path) -> Path:
-    """A run's folder, made if it is missing; what it stands in must be there.
+    """Return a run's folder, created if it is missing; its parent must exist.
 
     Raises:
-        StrangeFileError: something else stands there.
-        OSError: it cannot be made.
+        StrangeFileError: the path is another kind of entry.
+        OSError: the folder cannot be created.
     """
     path.mkdir(exist_ok=True)
     require_folder(path)
@@ -83,10 +83,10 @@ def folder(path: Path) -> Path:
 
 
 def require_regular(path: Path) -> None:
-    """What others open by name must be a regular file, or not be there.
+    """Check that a path is a regular file or does not exist, before other code opens it by name.
 
     Raises:
-        StrangeFileError: something else is there.
+        StrangeFileError: the path is another kind of entry.
     """
     mode = _mode(path)
     if mode is not None and not stat.S_ISREG(mode):
@@ -94,10 +94,10 @@ def require_regular(path: Path) -> None:
 
 
 def require_folder(path: Path) -> None:
-    """A run's folder must be one, or not be there.
+    """Check that a path is a folder or does not exist.
 
     Raises:
-        StrangeFileError: something else is there.
+        StrangeFileError: the path is another kind of entry.
     """
     mode = _mode(path)
     if mode is not None and not stat.S_ISDIR(mode):
@@ -105,35 +105,36 @@ def require_folder(path: Path) -> None:
 
 
 def sync_folder(path: Path) -> None:
-    """Write to the disk which names a folder holds: a file that has just got one loses it with the power otherwise.
+    """Synchronise a folder's entries with the disk, so that new names of files survive a power failure.
 
     Raises:
-        OSError: the disk refuses.
+        OSError: the disk reports an error.
     """
     descriptor = os.open(path, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
     try:
         os.fsync(descriptor)
     except OSError as error:
-        if error.errno not in (errno.EINVAL, errno.ENOTSUP):  # file systems that know no such thing
+        if error.errno not in (errno.EINVAL, errno.ENOTSUP):  # file systems without this operation
             raise
     finally:
         os.close(descriptor)
 
 
 def _descriptor(path: Path, flags: int, alone: bool = False) -> int:
-    """Opened, and only then looked at: nobody can put something else there in between."""
+    """Return the descriptor of an opened file; it is checked after opening, so that it cannot be exchanged between."""
     descriptor = os.open(path, flags | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC, 0o644)
     found = os.fstat(descriptor)
     if stat.S_ISREG(found.st_mode) and (not alone or found.st_nlink == 1):
         return descriptor
     os.close(descriptor)
     if stat.S_ISREG(found.st_mode):
-        raise _strange(path, f"has {found.st_nlink} names (hard links): must have one, or all would change; copy it")
+        names = f"{found.st_nlink} names (hard links)"
+        raise _strange(path, f"has {names}: must have one, because writing would change all; copy it")
     raise _strange(path, f"is {_kind(found.st_mode)}: must be a regular file")
 
 
 def _mode(path: Path) -> int | None:
-    """Kind of what bears a name, links not followed; None if nothing does."""
+    """Return the mode of a directory entry without following links; None if it does not exist."""
     try:
         return path.lstat().st_mode
     except FileNotFoundError:

@@ -1,4 +1,4 @@
-"""The run that ships with rhabdom, evolved by the quick preset: its whole record, and the policy of its best animal."""
+"""The run that ships with rhabdom, evolved with the quick preset: its record and the policy of its best animal."""
 
 from __future__ import annotations
 
@@ -18,17 +18,17 @@ FOLDER = "demo"  # in evolve/, as a run directory
 
 
 def copy_shipped_run(directory: Path) -> Run:
-    """The shipped run in a directory, copied there unless it is there already.
+    """Return the shipped run in a directory, copied there unless it exists already.
 
     Raises:
-        RunError: the directory holds something else.
-        OSError: it cannot be written.
+        RunError: the directory holds other files.
+        OSError: the directory cannot be written.
     """
     files = dict(_files(resources.files("evolve") / FOLDER))
     there = [name for name in files if (directory / name).exists()]
     same = all(read(directory / name) == files[name] for name in there)
     if not same or (not there and directory.exists() and any(directory.iterdir())):
-        raise RunError(f"{directory} holds something else: choose another directory with --out")
+        raise RunError(f"{directory} holds other files: choose another directory with --out")
     directory.mkdir(parents=True, exist_ok=True)
     for name, content in files.items():
         if name not in there:
@@ -37,7 +37,7 @@ def copy_shipped_run(directory: Path) -> Run:
 
 
 def _files(folder: Traversable, within: str = "") -> Iterator[tuple[str, bytes]]:
-    """Names below the folder, and what is in these files."""
+    """Yield the names and contents of all files below a folder."""
     for entry in folder.iterdir():
         if entry.is_dir():
             yield from _files(entry, f"{within}{entry.name}/")

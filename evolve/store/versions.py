@@ -1,4 +1,4 @@
-"""Which software, and settings, a run was started and continued with."""
+"""Versions of software, and fingerprints of settings, at each start of a run."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ PACKAGES = (
 
 
 def present() -> dict[str, str]:
-    """Versions of what decides a run's numbers, as they are now."""
+    """Return the present versions of the software that influences a run's numbers."""
     versions = {"python": platform.python_version(), "machine": platform.machine(), "commit": _commit()}
     versions["device"] = device()
     for package in PACKAGES:
@@ -45,27 +45,30 @@ def present() -> dict[str, str]:
 
 
 def recorded(run: Path) -> dict[str, str]:
-    """Versions with which a run was begun; {} if they are not readable."""
+    """Return the versions with which a run was started; {} if they cannot be read."""
     starts = _starts(run)
     return starts[0]["versions"] if starts else {}
 
 
 def commits(run: Path) -> list[str]:
-    """Of rhabdom, with which a run was begun and continued, in order and without repetitions; those that are known."""
+    """Return the known commits of rhabdom at the starts of a run, in order and without repetitions."""
     known = [start["versions"].get("commit") for start in _starts(run)]
     return list(dict.fromkeys(commit for commit in known if commit))
 
 
 def fingerprint(config: str) -> str:
-    """Of the text of a run's config.toml, but for what trains and evaluates nobody otherwise: remarks, the workers'
-    number, and how long the run lasts."""
+    """Return the fingerprint of a run's config.toml.
+
+    It ignores text without influence on training and evaluation: comments, the number of workers, and the number of
+    generations.
+    """
     left_out = ("workers =", "generations =", "#")
     lines = [line.strip() for line in config.splitlines() if line.strip() and not line.startswith(left_out)]
     return hashlib.sha256("\n".join(lines).encode()).hexdigest()[:16]
 
 
 def altered(run: Path) -> bool:
-    """Whether a run's config.toml has changed since the run was begun or last continued."""
+    """Return whether a run's config.toml has changed since the last start of the run."""
     starts = _starts(run)
     return bool(starts) and starts[-1].get("settings", _settings(run)) != _settings(run)
 
@@ -75,8 +78,12 @@ def _settings(run: Path) -> str:
 
 
 def record_start(run: Path, candidates: int, origin: str | None = None, settings: str | None = None) -> None:
-    """Write down that a run goes on from `candidates` evaluated ones with the present versions, with which settings
-    (their fingerprint; None: those of its config.toml), and `origin`, from whose animal it started."""
+    """Record a start of a run with the present versions.
+
+    candidates: number of evaluated candidates at this start
+    origin: animal from which the run started; None without one
+    settings: fingerprint of the settings; None: of the run's config.toml
+    """
     start: dict[str, Any] = {
         "time": datetime.now(UTC).isoformat(timespec="seconds"),
         "candidates": candidates,
@@ -89,13 +96,13 @@ def record_start(run: Path, candidates: int, origin: str | None = None, settings
 
 
 def origin(run: Path) -> str | None:
-    """From whose animal a run started ("runs/first:12"); None if from its own config, or if it is not readable."""
+    """Return the animal from which a run started ("runs/first:12"); None if there is none or it cannot be read."""
     starts = _starts(run)
     return str(starts[0]["from"]) if starts and "from" in starts[0] else None
 
 
 def _starts(run: Path) -> list[dict[str, Any]]:
-    """Earlier starts. The file informs and decides nothing, so one that is lost or damaged begins anew."""
+    """Return the earlier starts; a lost or damaged file counts as empty, because it serves only for information."""
     try:
         starts = json.loads(read(run / FILE))
         return [start for start in starts if isinstance(start["versions"], dict)]
@@ -104,7 +111,7 @@ def _starts(run: Path) -> list[dict[str, Any]]:
 
 
 def _commit() -> str:
-    """Commit of the checkout that runs, "+" where files differ from it; "" outside a checkout."""
+    """Return the commit of the running checkout, with "+" if files differ from it; "" outside a checkout."""
     here = Path(__file__).parent
     try:
         described = subprocess.run(

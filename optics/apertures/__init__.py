@@ -1,17 +1,17 @@
-"""Shapes of a pupil's opening, made ready for sums: with a soft edge for samples on a grid, or as quadrature nodes.
+"""Shapes of the pupil's opening, prepared for sums: with a soft edge for samples on a grid, or as quadrature nodes.
 
-aperture       Aperture: what every shape offers
+aperture       Aperture: interface of all shapes
 circular       Circle, Annulus
 rings          Rings: zone plates
 polygonal      Polygon, Slit
-shapes         Disk, Oblong, Spider: what openings are cut from
+shapes         Disk, Oblong, Spider: parts of combined openings
 combined       union, difference, intersection; hexagonal segments
-boundary       the edge of a combination
-pixelated      any shape, tiled by square pixels
-outline        where lines cross an edge
-strips         quadrature over what an outline encloses
-soft_edge      the kernel that softens an edge
-soft_polygon   a polygon convolved with it
-soft_outline   straight pieces and arcs convolved with it
+boundary       edge of a combination
+pixelated      any shape tiled by square pixels
+outline        edges and their crossings with lines
+strips         quadrature over the area inside an outline
+soft_edge      kernel that softens an edge
+soft_polygon   polygons convolved with this kernel
+soft_outline   straight pieces and arcs convolved with this kernel
 triangulation  polygons as triangles
 """

@@ -1,4 +1,4 @@
-"""What every aperture offers: its shape, a soft edge that a grid can carry, and quadrature nodes fitted to its edge.
+"""Interface of all apertures: shape, soft edge for samples on a grid, and quadrature nodes fitted to the edge.
 
 A hard edge has no band limit: sampled on a Cartesian grid, its error falls only like N⁻¹ to N⁻¹·⁵. Here the aperture is
 convolved with a low-pass kernel of compact support (optics.apertures.soft_edge), so that sums over samples (the
@@ -22,16 +22,16 @@ from optics.numerics.precision import Precision, padded_for_packets
 
 __all__ = ["EDGE_REACH", "LEAST_RIPPLE", "Aperture", "Nodes", "SoftAperture"]
 
-# Choice. The soft edge reaches at most this far beyond the aperture, in radii.
+# Choice: the largest reach of the soft edge beyond the aperture, in radii.
 EDGE_REACH = 0.25
 LEAST_RIPPLE = 1e-13  # choice: of a soft edge's spectrum, above float64's rounding
 
 
 class SoftAperture(ABC):
-    """An aperture whose edge a grid can carry. Lengths in units of the pupil's radius R, frequencies in cycles per R.
+    """An aperture with a soft edge, for samples on a grid. Lengths in pupil radii R, frequencies in cycles per R.
 
-    Its spectrum is the aperture's own up to `passband` and vanishes beyond `stopband`, to `ripple`; further than
-    `reach` from the edge it is 1 or 0.
+    Its spectrum equals the hard aperture's up to `passband` and vanishes beyond `stopband`, both to within `ripple`.
+    Further than `reach` from the edge the transmittance is 1 or 0.
     """
 
     edge: SoftEdge
@@ -54,17 +54,17 @@ class SoftAperture(ABC):
 
     @property
     def seconds_per_point(self) -> float:
-        """What `transmittance` takes for a point, roughly."""
+        """Approximate cost [s] of `transmittance` for one point."""
         return SOFT_EDGE_SAMPLE
 
     @abstractmethod
     def transmittance(self, x: Array, y: Array, types: Precision) -> Array:
-        """At points (x, y), flat Dr.Jit Float64 arrays; differentiable in both."""
+        """Transmittance at points (x, y), flat Dr.Jit Float64 arrays; differentiable in both."""
 
 
 @dataclass(frozen=True, eq=False)
 class Nodes:
-    """Quadrature nodes x, y and weights over an aperture: flat float64 arrays, in units of R and R², fit for Dr.Jit."""
+    """Quadrature nodes x, y and weights over an aperture: flat float64 arrays for Dr.Jit, in units of R and R²."""
 
     x: np.ndarray
     y: np.ndarray
@@ -84,21 +84,21 @@ class Aperture(ABC):
     @property
     @abstractmethod
     def area(self) -> float:
-        """In R²."""
+        """Area in units of R²."""
 
     @property
     @abstractmethod
     def rotationally_symmetric(self) -> bool:
-        """Whether the aperture is the same seen from every side."""
+        """True if the aperture is invariant under every rotation about the axis."""
 
     @property
     def mirror_symmetric(self) -> bool:
-        """Whether it is known to be the same where x or y is mirrored."""
+        """True if the aperture is known to be invariant under mirroring of x and of y."""
         return self.rotationally_symmetric
 
     @property
     def rings(self) -> tuple[tuple[float, float], ...]:
-        """Of a rotationally symmetric aperture: inner and outer radii of the rings that are open, in R."""
+        """Inner and outer radii of the open rings of a rotationally symmetric aperture, in units of R."""
         return ((0.0, 1.0),)
 
     @property
@@ -109,16 +109,17 @@ class Aperture(ABC):
     @property
     @abstractmethod
     def outline(self) -> Outline:
-        """Its edge."""
+        """Edge of the aperture."""
 
     @abstractmethod
     def contains(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """Which points lie within the aperture."""
+        """Return a mask of the points that lie within the aperture."""
 
     def nodes(self, cycles: float, digits: float) -> Nodes:
-        """Nodes whose sum is good to 10^-digits of the area, for integrands of at most `cycles` cycles per R.
+        """Return nodes whose sum is accurate to 10^-digits of the area, for integrands up to `cycles` cycles per R.
 
-        That bounds the local frequency in any direction, everywhere; a varying amplitude needs a share of it too.
+        This limit applies to the local frequency at every point and in every direction. A varying amplitude uses part
+        of it.
 
         Raises:
             ValueError: cycles outside [0, 1e5] or digits outside [0, 16].
@@ -126,11 +127,11 @@ class Aperture(ABC):
         return self._nodes(in_range("cycles", cycles, 0.0, 1e5), in_range("digits", digits, 0.0, 16.0))
 
     def node_count(self, cycles: float, digits: float) -> int | None:
-        """How many `nodes` there are; None: only who makes them knows."""
+        """Return the number of `nodes`, or None if it is known only after they have been computed."""
         return None
 
     def soften(self, passband: float, ripple: float, widest_reach: float = EDGE_REACH) -> SoftAperture:
-        """The aperture, low-passed from `passband` [cycles per R] on with the transition that costs fewest samples.
+        """Return the aperture low-passed from `passband` [cycles per R], with the transition that needs fewest samples.
 
         Raises:
             ValueError: passband negative, ripple outside [1e-13, 0.5], or widest_reach not positive.
@@ -142,8 +143,8 @@ class Aperture(ABC):
 
     @abstractmethod
     def _nodes(self, cycles: float, digits: float) -> Nodes:
-        """Edge-fitted nodes."""
+        """Return edge-fitted nodes."""
 
     @abstractmethod
     def _softened(self, edge: SoftEdge) -> SoftAperture:
-        """The aperture convolved with the edge's kernel."""
+        """Return the aperture convolved with the edge's kernel."""

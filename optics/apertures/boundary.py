@@ -1,4 +1,6 @@
-"""The edge of a combination of shapes: all their edges, cut where they meet, less what lies within or without it."""
+"""Edge of a combination of shapes: the edges of all shapes, cut at their intersections, without the pieces that do not
+separate open from closed areas.
+"""
 
 from __future__ import annotations
 
@@ -14,17 +16,20 @@ from optics.apertures.outline import TURN, Outline
 __all__ = ["Boundary", "boundary"]
 
 SHORTEST = 1e-9  # choice, radii: pieces that are shorter are left out
-ASIDE = 1e-7  # choice, radii: where it is looked which side is open
+ASIDE = 1e-7  # choice, radii: distance from an edge at which its sides are tested
 PARALLEL = 1e-12
-TOUCHING = 1e-9  # choice, squared shares: a tangent is a cut, too
+TOUCHING = 1e-9  # choice, squared shares: tangents count as intersections
 
 Contains = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
 
 @dataclass(frozen=True, eq=False)
 class Boundary:
-    """segments: (n, 2, 2), with the opening on their left. arcs: (m, 6), as in `Outline`, and 1 where the opening is on
-    the side of their centre, -1 where it is not."""
+    """Pieces of an edge that separate open from closed areas.
+
+    segments: (n, 2, 2), with the opening on their left.
+    arcs: (m, 6), as in `Outline`, and 1 if the opening is on the side of their centre, else -1.
+    """
 
     segments: np.ndarray
     arcs: np.ndarray
@@ -35,7 +40,7 @@ class Boundary:
 
     @property
     def area(self) -> float:
-        """Green's theorem, ∮ (x dy - y dx)/2."""
+        """Enclosed area by Green's theorem, ∮ (x dy - y dx)/2."""
         (x0, y0), (x1, y1) = (self.segments[:, k].T for k in (0, 1))
         cx, cy, radius, begin, end, side = self.arcs.T
         turns = radius * (end - begin) + cx * (np.sin(end) - np.sin(begin)) - cy * (np.cos(end) - np.cos(begin))
@@ -57,7 +62,7 @@ class Boundary:
 
 
 def boundary(pieces: Outline, contains: Contains) -> Boundary:
-    """Of the region that `contains` describes, which has no other edges than these pieces, or parts of them."""
+    """Return the boundary of the region that `contains` describes; its edges are these pieces or parts of them."""
     segments, arcs = _cut_segments(pieces), _cut_arcs(pieces)
     along = segments[:, 1] - segments[:, 0]
     left = np.column_stack([-along[:, 1], along[:, 0]]) / np.hypot(*along.T)[:, None]
@@ -72,7 +77,9 @@ def boundary(pieces: Outline, contains: Contains) -> Boundary:
 
 
 def _edges(middle: np.ndarray, left: np.ndarray, contains: Contains) -> tuple[np.ndarray, np.ndarray]:
-    """Which pieces part open from closed, one of those that coincide; and which have the opening on their right."""
+    """Return masks of the pieces between open and closed areas (one of each coinciding pair), and of those with the
+    opening on their right.
+    """
     here, there = (contains(*(middle + sign * ASIDE * left).T) for sign in (1, -1))
     kept = here != there
     _, first = np.unique(np.round(middle / ASIDE).astype(np.int64), axis=0, return_index=True)
@@ -100,7 +107,10 @@ def _cut_segments(pieces: Outline) -> np.ndarray:
 
 
 def _on_lines(start: np.ndarray, along: np.ndarray, starts: np.ndarray, alongs: np.ndarray) -> np.ndarray:
-    """Where along one segment others meet it, in shares of its length; of others on its own line the ends."""
+    """Return the positions along one segment at which other segments intersect it, in shares of its length.
+
+    Collinear segments contribute their ends.
+    """
     gap = starts - start
     determinant = along[0] * alongs[:, 1] - along[1] * alongs[:, 0]
     size = float(along @ along)
@@ -139,7 +149,7 @@ def _cut_arcs(pieces: Outline) -> np.ndarray:
 
 
 def _between(places: np.ndarray, low: float, high: float, shortest: float) -> np.ndarray:
-    """Both ends and the places between them, ascending, none nearer to another than `shortest`."""
+    """Return both ends and the places between them, ascending and at least `shortest` apart."""
     inside = np.sort(places[(places > low + shortest) & (places < high - shortest)])
     kept = inside[np.diff(inside, prepend=low) > shortest]
     return np.concatenate([[low], kept, [high]])

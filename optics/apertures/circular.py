@@ -105,7 +105,7 @@ class Annulus(Aperture):
 
 @dataclass(frozen=True)
 class SoftAnnulus(SoftAperture):
-    """Difference of two soft disks, or one where `inner` is 0."""
+    """Difference of two soft disks; a single soft disk if `inner` is 0."""
 
     edge: SoftEdge
     inner: float
@@ -122,19 +122,21 @@ class SoftAnnulus(SoftAperture):
 def disk_table(edge: SoftEdge, radius: float) -> Interpolant:
     """Profile of a soft disk across its edge."""
     ends = radius - edge.reach, radius + edge.reach
-    return Interpolant.of(lambda rho: disk_profile(edge, radius, rho), ends, 2 * edge.cycles, edge.ripple / 4)
+    return Interpolant.from_function(
+        lambda rho: disk_profile(edge, radius, rho), ends, 2 * edge.cycles, edge.ripple / 4
+    )
 
 
 def disk_profile(edge: SoftEdge, radius: float, distance: np.ndarray) -> np.ndarray:
     """Transmittance of a soft disk at distances ρ from its axis, by quadrature; even in ρ.
 
-    A(ρ) = ∫ g(r) r θ(ρ, r) dr, θ = 2 arccos((ρ² + r² - R²)/(2ρr)) the angle under which a circle of radius r about
+    A(ρ) = ∫ g(r) r θ(ρ, r) dr, with θ = 2 arccos((ρ² + r² - R²)/(2ρr)) the angle over which a circle of radius r about
     the point lies inside the disk. r = lower + span sin²(πu/2) smooths the arccos at both ends.
     """
     rho = np.maximum(np.abs(np.asarray(distance, dtype=np.float64)), 1e-9 * radius)[:, None]
     lower = np.abs(rho - radius)
     span = np.maximum(np.minimum(edge.reach, rho + radius) - lower, 0)
-    # Choice: more nodes than the kernel's cycles and its window's steepness ask for.
+    # Choice: more nodes than the kernel's cycles and the steepness of its window require.
     u, weight = gauss_legendre(int(24 + 4 * edge.cycles + 2 * edge.beta))
     r = np.maximum(lower + span * np.sin(pi * u / 2) ** 2, 1e-300)
     cosine = np.clip((rho**2 + r**2 - radius**2) / (2 * rho * r), -1, 1)
@@ -145,9 +147,10 @@ def disk_profile(edge: SoftEdge, radius: float, distance: np.ndarray) -> np.ndar
 
 
 def ring_nodes(inner: float, outer: float, cycles: float, digits: float) -> Nodes:
-    """Gauss-Legendre in radius, trapezoid in angle with fewer nodes on smaller rings: exact edge, spectral convergence.
+    """Gauss-Legendre nodes in radius, trapezoidal rule in angle with fewer nodes on smaller rings.
 
-    Over a full disk the mean around a ring is a smooth function of r², which pays for few cycles.
+    The edge is exact and convergence is spectral. Over a full disk the mean around a ring is a smooth function of r²,
+    so for few cycles a rule in r² needs fewer nodes.
     """
     r, weight, count = _ring_rule(inner, outer, cycles, digits)
     place = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
@@ -158,13 +161,13 @@ def ring_nodes(inner: float, outer: float, cycles: float, digits: float) -> Node
 
 @lru_cache(maxsize=256)
 def _ring_rule(inner: float, outer: float, cycles: float, digits: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Radii, their weights, and how many nodes each ring has."""
-    digits += 0.3  # log10 2: half the error to each of the two rules
+    """Radii, their weights, and the number of nodes on each ring."""
+    digits += 0.3  # log10 2: each of the two rules may contribute half the error
     span = outer - inner
     u, weight = gauss_legendre(gauss_legendre_count(cycles * span, digits))
     rings = [(inner + span * u, span * weight)]
     if inner == 0:
-        # Along a diameter, of which r² sees half the nodes.
+        # The rule covers a diameter; in r² half of its nodes are enough.
         u, weight = gauss_legendre(ceil(gauss_legendre_count(2 * cycles * outer, digits) / 2))
         rings.append((outer * np.sqrt(u), outer * weight / (2 * np.sqrt(u))))
     counts = [harmonics(2 * pi * cycles * r, digits) for r, _ in rings]

@@ -1,4 +1,4 @@
-"""Openings made of several shapes: joined, cut out of each other, or what they have in common."""
+"""Openings composed of several shapes: their union, difference or intersection."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from optics.numerics.arguments import finite, in_range, is_sized, one_of, shown,
 __all__ = ["Combined", "difference", "hexagonal_segments", "intersection", "union"]
 
 MOST_RINGS = 12  # choice: 469 segments
-SMALLEST = 1e-9  # choice, R²: of an opening
+SMALLEST = 1e-9  # choice, R²: smallest area of an opening
 
 RULES: dict[str, Callable[[list[np.ndarray]], np.ndarray]] = {
     "union": lambda inside: reduce(np.logical_or, inside),
@@ -34,12 +34,13 @@ RULES: dict[str, Callable[[list[np.ndarray]], np.ndarray]] = {
 
 @dataclass(frozen=True, eq=False)
 class Combined(Aperture):
-    """What `union`, `difference` and `intersection` make of shapes, as far as it lies within the pupil's circle.
+    """Union, difference or intersection of shapes, clipped to the pupil's circle.
 
-    rule: one of these names. shapes: apertures, or `Disk`, `Oblong` and `Spider`, which may lie anywhere.
+    rule: "union", "difference" or "intersection".
+    shapes: apertures, or `Disk`, `Oblong` and `Spider`, which may lie anywhere.
 
     Raises:
-        ValueError: no such rule, a shape that is none, or nothing is open.
+        ValueError: unknown rule, an argument that is not a shape, or an empty opening.
     """
 
     rule: str
@@ -93,7 +94,7 @@ class Combined(Aperture):
 
 
 def union(*shapes: Shape) -> Combined:
-    """Open where any of the shapes is, within the pupil.
+    """Return an aperture that is open where at least one of the shapes is, within the pupil.
 
     Raises:
         ValueError: see `Combined`.
@@ -102,8 +103,9 @@ def union(*shapes: Shape) -> Combined:
 
 
 def difference(shape: Shape, *closed: Shape) -> Combined:
-    """Open where the first shape is and none of the others, within the pupil: `difference(Annulus(0.3), Spider(4,
-    0.02))` is a telescope's.
+    """Return an aperture that is open where the first shape is and none of the others, within the pupil.
+
+    `difference(Annulus(0.3), Spider(4, 0.02))` is the aperture of a telescope.
 
     Raises:
         ValueError: see `Combined`.
@@ -112,7 +114,7 @@ def difference(shape: Shape, *closed: Shape) -> Combined:
 
 
 def intersection(*shapes: Shape) -> Combined:
-    """Open where all of the shapes are, within the pupil.
+    """Return an aperture that is open where all of the shapes are, within the pupil.
 
     Raises:
         ValueError: see `Combined`.
@@ -123,14 +125,15 @@ def intersection(*shapes: Shape) -> Combined:
 def hexagonal_segments(
     rings: int, gap: float = 0.0, rotation_deg: float = 0.0, without: tuple[int, ...] = ()
 ) -> Combined:
-    """A mirror of hexagons in rings around a middle one, as wide as the pupil: corners of the outermost lie on its rim.
+    """Return a mirror of hexagons in rings around a central one; the outermost corners lie on the pupil's rim.
 
-    gap: between neighbours, in units of the distance of their centres. rotation_deg: 0 has corners of hexagons towards
-        x. without: segments that are left out, by their number: 0 the middle one, then ring by ring, counterclockwise
-        from `rotation_deg` + 30 degrees on (James Webb's: 2 rings without segment 0).
+    gap: gap between neighbours, in units of the distance of their centres.
+    rotation_deg: rotation; 0 puts corners of the hexagons towards x.
+    without: numbers of omitted segments. Segment 0 is the central one; numbers continue ring by ring, counterclockwise
+        from `rotation_deg` + 30 degrees. James Webb's mirror has 2 rings without segment 0.
 
     Raises:
-        ValueError: rings outside 0 to 12, gap outside [0, 1), a number that no segment has, or nothing left.
+        ValueError: rings outside 0 to 12, gap outside [0, 1), a number without a segment, or no segment left.
     """
     rings = whole("rings", rings, 0, MOST_RINGS)
     in_range("gap", gap, 0, 0.999)

@@ -1,4 +1,4 @@
-"""The edge of an opening: where lines cross it, so that quadrature can end exactly there."""
+"""Edge of an opening and its crossings with lines, at which quadrature ends exactly."""
 
 from __future__ import annotations
 
@@ -20,8 +20,9 @@ def _none(*shape: int) -> np.ndarray:
 class Outline:
     """Straight pieces and arcs, by the even-odd rule: a point is inside if a ray from it crosses an odd number of them.
 
-    segments: (n, 2, 2), their ends (x, y). arcs: (n, 5), of circles: centre x and y, radius, and the angles [rad]
-        between which they lie, from < to <= from + 2π.
+    segments: (n, 2, 2), the ends (x, y) of each.
+    arcs: (n, 5), circular arcs: x and y of the centre, radius, and the first and last angle [rad], with from < to <=
+        from + 2π.
     """
 
     segments: np.ndarray = field(default_factory=lambda: _none(2, 2))
@@ -33,12 +34,12 @@ class Outline:
 
     @classmethod
     def polygon(cls, vertices: np.ndarray) -> Outline:
-        """vertices: (n, 2)."""
+        """Return the outline of a polygon with vertices (n, 2)."""
         return cls(np.stack([vertices, np.roll(vertices, -1, axis=0)], axis=1))
 
     @classmethod
     def joined(cls, outlines: list[Outline]) -> Outline:
-        """All pieces of several."""
+        """Return one outline with the pieces of several."""
         segments, arcs = ([getattr(each, name) for each in outlines] for name in ("segments", "arcs"))
         return cls(np.concatenate([_none(2, 2), *segments]), np.concatenate([_none(5), *arcs]))
 
@@ -48,7 +49,7 @@ class Outline:
         return float(np.hypot(*(self.segments[:, 1] - self.segments[:, 0]).T).sum() + (radius * (end - begin)).sum())
 
     def points(self, apart: float = 0.01) -> np.ndarray:
-        """(n, 2) along it, evenly, about this far apart."""
+        """Return points (n, 2) along the outline, evenly spaced by about `apart`."""
         found = []
         for start, end in self.segments:
             n = max(1, round(float(np.hypot(*(end - start))) / apart))
@@ -60,8 +61,10 @@ class Outline:
         return np.concatenate(found)
 
     def crossings(self, y: np.ndarray) -> np.ndarray:
-        """x where the edge crosses the horizontal lines at `y`, ascending: (line, crossing). As many for all lines:
-        no `turning` height may lie between them."""
+        """Return x of the crossings of the edge with the horizontal lines at `y`, ascending: (line, crossing).
+
+        All lines must have the same number of crossings, so no `turning` height may lie between them.
+        """
         y = np.asarray(y, dtype=np.float64)
         middle = float(y.mean())
         found = []
@@ -77,7 +80,7 @@ class Outline:
         return np.sort(np.array(found).reshape(-1, len(y)).T, axis=1)
 
     def heights(self, x: float) -> np.ndarray:
-        """y where the edge crosses the vertical line at x."""
+        """Return y of the crossings of the edge with the vertical line at x."""
         found = []
         for cx, cy, radius, begin, end in self.arcs:
             if abs(x - cx) < radius:
@@ -91,7 +94,7 @@ class Outline:
 
     @cached_property
     def turning(self) -> np.ndarray:
-        """Heights at which crossings begin and end, or turn a corner."""
+        """Heights at which crossings begin, end or pass a corner."""
         _, cy, radius, begin, end = self.arcs.T
         corners = [cy + radius * np.sin(begin), cy + radius * np.sin(end)]
         tops = [
@@ -103,13 +106,15 @@ class Outline:
 
     @cached_property
     def tangent(self) -> np.ndarray:
-        """Tops and bottoms of circles, at which crossings set off like a square root, on the arcs or near to them."""
+        """Heights of the tops and bottoms of circles, on or near the arcs. Crossings start there like a square root."""
         _, cy, radius, _, _ = self.arcs.T
         return np.unique(np.concatenate([cy - radius, cy + radius]))
 
     def near(self, x: np.ndarray, y: np.ndarray, half: float) -> np.ndarray:
-        """Whether squares of half a side `half` about points (x, y) may be cut by the edge: all that are, and few that
-        are not."""
+        """Return a mask of the squares of half side `half` about points (x, y) that the edge may cut.
+
+        It contains all squares that are cut and few others.
+        """
         cut = np.zeros(np.broadcast(x, y).shape, dtype=bool)
         for cx, cy, radius, _, _ in self.arcs:
             across, along = np.abs(x - cx), np.abs(y - cy)
@@ -119,10 +124,10 @@ class Outline:
             along = end - start
             place = np.clip(((x - start[0]) * along[0] + (y - start[1]) * along[1]) / (along @ along), 0, 1)
             off = np.hypot(x - start[0] - place * along[0], y - start[1] - place * along[1])
-            cut |= off < 1.5 * half  # its diagonal is 1.42 long
+            cut |= off < 1.5 * half  # half the diagonal is 1.42 half
         return cut
 
 
 def _within(angle: float, begin: float, end: float) -> bool:
-    """Whether an angle [rad] lies on an arc."""
+    """Return whether an angle [rad] lies on an arc."""
     return bool((angle - begin) % TURN < end - begin or end - begin >= TURN)

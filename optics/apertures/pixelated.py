@@ -1,9 +1,9 @@
-"""Quadrature over an opening that square pixels tile, for integrands that jump from one pixel to the next.
+"""Quadrature over an opening tiled by square pixels, for integrands that jump between pixels.
 
-Whole pixels have Gauss-Legendre nodes. Those that the opening's edge cuts are divided where the edge enters and leaves
-them, into panels with smooth ends (`strips`; `PixelatedAperture.nodes`). Where nodes must lie
-on a grid of rows and columns, cut pixels have the nodes of whole ones, with the weights that integrate the
-interpolating polynomial over what is left of them (`PixelatedAperture.weights`).
+Whole pixels have Gauss-Legendre nodes. Pixels cut by the opening's edge are divided into panels with smooth ends at the
+points where the edge enters and leaves them (`strips`; `PixelatedAperture.nodes`). If nodes must lie on a grid of rows
+and columns, cut pixels use the nodes of whole ones. Their weights integrate the interpolating polynomial over the open
+part of the pixel (`PixelatedAperture.weights`).
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ from optics.numerics.quadrature import gauss_legendre, gauss_legendre_count, har
 
 __all__ = ["PixelatedAperture"]
 
-MOMENT_DIGITS = 8.0  # choice: of what is left of a cut pixel
-# Choice, along a pixel: beyond, what is left of pixels that the edge cuts is a matter of too many moments.
+MOMENT_DIGITS = 8.0  # choice: accuracy of the moments of a cut pixel
+# Choice, nodes along a pixel: with more, cut pixels would need too many moments.
 MOST_NODES = 32
 
 
@@ -56,8 +56,8 @@ class PixelatedAperture(Aperture):
         return self.opening.contains(x, y)
 
     def nodes_across(self, cycles: float, digits: float) -> int | None:
-        """Of each pixel, so that rows and columns of nodes are as good as `nodes`; None where they are too many."""
-        share = min(1.0, len(self._cut) * self._pitch**2 / self.area)  # all that interpolation counts for
+        """Nodes along each pixel that make rows and columns as accurate as `nodes`; None if too many are needed."""
+        share = min(1.0, len(self._cut) * self._pitch**2 / self.area)  # share that interpolation affects
         turns = np.array(pi * cycles * self._pitch)
         across = max(
             gauss_legendre_count(cycles * self._pitch, digits + 0.3),
@@ -66,12 +66,12 @@ class PixelatedAperture(Aperture):
         return across if across <= MOST_NODES else None
 
     def rows(self, across: int) -> np.ndarray:
-        """Places of rows and of columns of nodes, ascending, in units of R, (count x across,)."""
+        """Positions of rows and columns of nodes, ascending, in units of R, (count x across,)."""
         u, _ = gauss_legendre(across)
         return (self._centres[:, None] + (u - 0.5) * self._pitch).ravel()
 
     def weights(self, across: int) -> np.ndarray:
-        """Of the nodes [R²], (row, column)."""
+        """Weights of the nodes [R²], (row, column)."""
         return _weights(self, across)
 
     @cached_property
@@ -85,17 +85,17 @@ class PixelatedAperture(Aperture):
 
     @cached_property
     def _near(self) -> np.ndarray:
-        """Which pixels the edge may cut, (row, column)."""
+        """Mask of the pixels that the edge may cut, (row, column)."""
         return self.outline.near(self._centres[None, :], self._centres[:, None], self._pitch / 2)
 
     @cached_property
     def _whole(self) -> np.ndarray:
-        """Which pixels lie inside, (row, column)."""
+        """Mask of the pixels that lie inside, (row, column)."""
         return self.contains(self._centres[None, :], self._centres[:, None]) & ~self._near
 
     @cached_property
     def _cut(self) -> np.ndarray:
-        """(row, column) of each pixel that may be cut."""
+        """Index (row, column) of each pixel that may be cut."""
         return np.argwhere(self._near)
 
     def _nodes(self, cycles: float, digits: float) -> Nodes:
@@ -118,13 +118,13 @@ class PixelatedAperture(Aperture):
     def _pieces(
         self, at: np.ndarray, cycles: float, digits: float, degree: int = 0
     ) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
-        """x, y and weights over each panel of the part of a cut pixel that is inside: see `strips`."""
+        """Yield x, y and weights over each panel of the open part of a cut pixel: see `strips`."""
         bottom, left = self._centres[at] - self._pitch / 2
         box = float(left), float(left + self._pitch), float(bottom), float(bottom + self._pitch)
         return strips(self.outline, box, cycles, digits, degree)
 
     def _softened(self, edge: SoftEdge) -> SoftAperture:
-        raise TypeError("jumps between pixels have no band limit: a soft edge does not make them fit for a grid")
+        raise TypeError("jumps between pixels have no band limit: a soft edge does not make a grid accurate")
 
 
 @lru_cache(maxsize=4)

@@ -19,14 +19,14 @@ __all__ = ["Polygon", "Slit"]
 
 # Rounding allowed to a vertex on the unit circle.
 RIM = 1 + 1e-9
-MOST_SIDES = 10_000  # choice: looking for edges that cross takes its square, seconds; more sides are a circle
+MOST_SIDES = 10_000  # choice: the search for crossing edges takes seconds (quadratic); more sides are a circle
 
 
 @dataclass(frozen=True, eq=False)
 class Polygon(Aperture):
     """A simple polygon (its edges meet only at its vertices), convex or not.
 
-    vertices: (n, 2), x and y in units of R, in either sense; kept counterclockwise.
+    vertices: (n, 2), x and y in units of R, in either sense; stored counterclockwise.
 
     Raises:
         ValueError: fewer than 3 vertices, NaN, one outside the unit circle, two that coincide, edges that cross.
@@ -43,7 +43,7 @@ class Polygon(Aperture):
 
     @classmethod
     def regular(cls, n: int, rotation_deg: float = 0.0) -> Polygon:
-        """n equal sides in the unit circle, the first vertex `rotation_deg` from the x axis.
+        """Return a regular polygon with n sides in the unit circle, the first vertex `rotation_deg` from the x axis.
 
         Raises:
             ValueError: n not a whole number from 3 to 10,000, or rotation_deg not finite.
@@ -66,7 +66,7 @@ class Polygon(Aperture):
         return float(x), float(y)
 
     def contains(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """By the number of edges that cross the ray from the point towards +x."""
+        """Count the edges that cross the ray from each point towards +x."""
         x, y = np.broadcast_arrays(np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64))
         inside = np.zeros(x.shape, dtype=bool)
         for (x0, y0), (x1, y1) in zip(self.vertices, np.roll(self.vertices, -1, axis=0), strict=True):
@@ -142,7 +142,7 @@ class Slit(Aperture):
         return np.array([[-x, -y], [x, -y], [x, y], [-x, y]])
 
     def _nodes(self, cycles: float, digits: float) -> Nodes:
-        """Tensor Gauss-Legendre."""
+        """Tensor product of Gauss-Legendre nodes."""
         u, u_weight = gauss_legendre(gauss_legendre_count(cycles * self.width, digits + 0.3))
         v, v_weight = gauss_legendre(gauss_legendre_count(cycles * self.height, digits + 0.3))
         x, y = np.meshgrid((u - 0.5) * self.width, (v - 0.5) * self.height)
@@ -153,7 +153,7 @@ class Slit(Aperture):
 
 
 def _twice_area(vertices: np.ndarray) -> float:
-    """Gauss's area formula, signed."""
+    """Return twice the signed area, by the shoelace formula."""
     x, y = vertices.T
     return float(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y))
 

@@ -1,4 +1,4 @@
-"""Concentric rings: zone plates, and what else is open at some radii and closed at others."""
+"""Concentric rings, such as zone plates."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ MOST = 500  # choice: radii
 
 @dataclass(frozen=True, eq=False)
 class Rings(Aperture):
-    """Rings about the axis that are open: from the first radius to the second, from the third to the fourth, and so on.
+    """Concentric open rings: from the first radius to the second, from the third to the fourth, and so on.
 
     radii: ascending from 0 (an open centre) or more to at most 1, an even number of them, in units of R.
 
@@ -47,8 +47,10 @@ class Rings(Aperture):
     def zone_plate(
         cls, aperture_radius: float, focal_length: float, wavelength: float = 550e-9, open_centre: bool = True
     ) -> Rings:
-        """Every second of the zones from which light of a wavelength [m] arrives in phase at a focal length [m] behind
-        a pupil of this radius [m]: they end at √(nλf + n²λ²/4) (Fresnel). A tenth of the light, 1/π², goes there.
+        """Return every second Fresnel zone of a pupil of this radius [m], for a focal length [m] and a wavelength [m].
+
+        Light from these zones arrives in phase at the focal length behind the pupil. Zones end at √(nλf + n²λ²/4)
+        (Fresnel). A tenth of the light, 1/π², goes into this focus.
 
         Raises:
             ValueError: a length that is not positive, fewer than two zones, or more than 500.
@@ -103,7 +105,7 @@ class Rings(Aperture):
 
 @dataclass(frozen=True, eq=False)
 class SoftRings(SoftAperture):
-    """Soft disks, added and taken away."""
+    """Sums and differences of soft disks."""
 
     edge: SoftEdge
     radii: np.ndarray

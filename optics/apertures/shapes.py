@@ -1,4 +1,4 @@
-"""Shapes that openings are cut from: they may lie anywhere, and reach beyond the pupil."""
+"""Shapes from which openings are combined. They may lie anywhere and extend beyond the pupil."""
 
 from __future__ import annotations
 
@@ -12,20 +12,23 @@ from optics.numerics.arguments import finite, in_range, point_2d, positive, whol
 
 __all__ = ["Disk", "Oblong", "Shape", "Spider"]
 
-BEYOND = 1.5  # choice, radii: how far out a spider's vanes end, beyond any opening
+BEYOND = 1.5  # choice, radii: length of a spider's vanes, beyond any opening
 MOST_VANES = 64
 FARTHEST = 10.0  # choice, radii
 
 
 class Shape(Protocol):
-    """What can be joined, cut out or intersected: every aperture is one. Lengths in units of the pupil's radius R."""
+    """Interface of shapes that can be joined, subtracted or intersected.
+
+    Every aperture has it. Lengths in pupil radii R.
+    """
 
     @property
     def outline(self) -> Outline:
-        """Its edge, or more than that."""
+        """Edge of the shape; it may contain further pieces."""
 
     def contains(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """Which points lie within."""
+        """Return a mask of the points that lie within the shape."""
 
 
 @dataclass(frozen=True)
@@ -57,7 +60,7 @@ class Oblong:
     """A rectangle of full `width` and `height` about a centre (x, y), turned by an angle, in units of R.
 
     Raises:
-        ValueError: a side not positive or above 20, a centre beyond 10, an angle that is no finite number.
+        ValueError: a side not positive or above 20, a centre beyond 10, or an angle that is not finite.
     """
 
     width: float
@@ -87,8 +90,10 @@ class Oblong:
 
 @dataclass(frozen=True)
 class Spider:
-    """Vanes of this full width from the centre outwards, evenly around it, the first towards `rotation_deg` from the x
-    axis: what holds a telescope's second mirror.
+    """Vanes that hold a telescope's secondary mirror, evenly spaced around the centre.
+
+    width: full width of each vane.
+    rotation_deg: angle of the first vane from the x axis.
 
     Raises:
         ValueError: vanes outside 1 to 64, or a width outside (0, 1].

@@ -1,8 +1,9 @@
-"""The low-pass kernel that softens an aperture's edge.
+"""Low-pass kernel that softens an aperture's edge.
 
-A jinc under a Kaiser window in radius: an aperture convolved with it keeps its spectrum up to `passband` and has none
-beyond `stopband`, to `ripple`. The kernel ends at `reach`, so that the aperture stays 1 or 0 further than that from its
-edge. Lengths are in units of the pupil's radius R, frequencies in cycles per R.
+The kernel is a jinc under a Kaiser window in radius. An aperture convolved with it has an unchanged spectrum up to
+`passband` and a zero spectrum beyond `stopband`, both to within `ripple`. The kernel ends at `reach`, so the
+transmittance stays 1 or 0 further than that from the edge. Lengths are in units of the pupil's radius R, frequencies in
+cycles per R.
 """
 
 from __future__ import annotations
@@ -33,10 +34,10 @@ class SoftEdge:
     def cheapest(
         cls, passband: float, ripple: float, widest_reach: float, half_widths: tuple[float, float] = (1.0, 1.0)
     ) -> SoftEdge:
-        """The transition with the fewest samples over an aperture of these half widths.
+        """Return the transition that needs the fewest samples over an aperture of these half widths.
 
-        With b = β/π = reach x transition t, samples (h_x + b/t) (h_y + b/t) (2 passband + t)² are fewest at the one
-        positive root of 2 h_x h_y t³ + b s t² - 2 b s passband t - 4 b² passband, s = h_x + h_y.
+        With b = β/π = reach x transition t, the number of samples (h_x + b/t) (h_y + b/t) (2 passband + t)² is smallest
+        at the only positive root of 2 h_x h_y t³ + b s t² - 2 b s passband t - 4 b² passband, where s = h_x + h_y.
         """
         b = _beta(ripple) / pi
         (h_x, h_y), s = half_widths, sum(half_widths)
@@ -56,17 +57,20 @@ class SoftEdge:
 
     @property
     def cycles(self) -> float:
-        """Cycles that the kernel turns through from its centre to its end."""
+        """Cycles of the kernel's oscillation from its centre to its end."""
         return self.reach * self.stopband
 
     def ring(self, r: np.ndarray) -> np.ndarray:
-        """2π r g(r), the kernel's share on the circle of radius r <= reach; its integral from 0 to `reach` is 1."""
+        """2π r g(r), the kernel's share on the circle of radius r <= reach. Its integral from 0 to `reach` is 1."""
         return np.asarray(self._odd_series(np.minimum(r, self.reach)))
 
     @cached_property
     def _odd_series(self) -> Chebyshev:
-        """`ring` from -reach to reach, where it is odd: tables ask for it at thousands of radii, and a Bessel function
-        takes a hundred cosines. Of odd terms alone it is 0 on the axis, and rises from it as exactly as it should."""
+        """Chebyshev series of `ring` from -reach to reach, an odd function.
+
+        Tables evaluate `ring` at thousands of radii, and one Bessel function takes a hundred cosines. Only odd terms
+        are retained, so the series is exactly 0 on the axis and has the correct slope.
+        """
         degree, domain = 2 * int(24 + 4 * self.cycles + self.beta / 2) + 1, [-self.reach, self.reach]
         series = Chebyshev.interpolate(lambda r: np.sign(r) * self._bare(np.abs(r)), degree, domain)
         series.coef[::2] = 0
@@ -80,8 +84,11 @@ class SoftEdge:
 
 
 def _positive_root(a: float, b: float, c: float, d: float) -> float:
-    """Of at³ + bt² + ct + d with a, b > 0 >= c, d: from above Newton's steps come down to it, one by one."""
-    t = max(-2 * c / b, (-4 * c / a) ** 0.5, (-4 * d / a) ** (1 / 3))  # each of the two falling terms is outweighed
+    """Positive root of at³ + bt² + ct + d with a, b > 0 >= c, d.
+
+    Newton's iteration starts above it and descends monotonically.
+    """
+    t = max(-2 * c / b, (-4 * c / a) ** 0.5, (-4 * d / a) ** (1 / 3))  # outweighs each of the two negative terms
     if t == 0:
         return 0.0
     for _ in range(MOST_STEPS):
@@ -93,9 +100,12 @@ def _positive_root(a: float, b: float, c: float, d: float) -> float:
 
 
 def _beta(ripple: float) -> float:
-    """Kaiser's rule is for one dimension. In the plane side lobes from every direction meet at frequency 0, and add up
-    to 7 ripples at 0.5, 20 at 1e-6 and 50 at 1e-12 (largest over the passband's width). Choice: ripples
-    10, 27 and 82 times smaller there. tests/optics/apertures/test_aperture.py holds the spectrum below the ripple."""
+    """Kaiser parameter β for a ripple in two dimensions.
+
+    Kaiser's rule applies to one dimension. In the plane, side lobes from all directions add up at frequency 0, to 7
+    ripples at 0.5, 20 at 1e-6 and 50 at 1e-12 (largest over the passband's width). Choice: design ripples that are 10,
+    27 and 82 times smaller. tests/optics/apertures/test_aperture.py checks that the spectrum stays below the ripple.
+    """
     return kaiser_beta(ripple**1.08 / 9)
 
 

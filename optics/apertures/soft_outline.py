@@ -1,8 +1,9 @@
-"""An opening of straight pieces and arcs convolved with the soft edge's kernel, at any point.
+"""Transmittance at any point of an opening with straight and circular edges, convolved with the soft edge's kernel.
 
-As in `soft_polygon`, with the arcs beside the lines: the kernel's share that a piece of the edge adds is ∫ G(r) dθ over
-the angle θ under which it is seen. Along a circle of radius R that is H(r) (R - d cos t) R dt where the arc is within
-the kernel's reach, d the distance between its centre and the point, and the angle over 2π where it is not.
+The method extends `soft_polygon` by arcs. The share of the kernel that a piece of the edge adds is ∫ G(r) dθ over the
+angle θ that it subtends at the point. Along a circle of radius R the integrand is H(r) (R - d cos t) R dt where the
+arc lies within the kernel's reach, with d the distance between its centre and the point. Beyond the reach the share
+is the angle over 2π.
 """
 
 from __future__ import annotations
@@ -23,14 +24,17 @@ from optics.numerics.quadrature import gauss_legendre, gauss_legendre_count
 
 __all__ = ["SoftOutline"]
 
-EMPTY = 1e-9  # [rad]: an arc that is none
-MOST_OF_A_TURN = pi / 2  # choice: of an arc that is looked at as one
+EMPTY = 1e-9  # [rad]: arcs below this length are empty
+MOST_OF_A_TURN = pi / 2  # choice: longest arc that is handled in one piece
 
 
 @dataclass(frozen=True, eq=False)
 class SoftOutline(SoftAperture):
-    """segments: (n, 2, 2), with the opening on their left. arcs: (m, 6), cx, cy, radius, from, to [rad] and 1 where the
-    opening is on the side of the centre, -1 where it is not."""
+    """Edges of an opening convolved with a soft edge's kernel.
+
+    segments: (n, 2, 2), with the opening on their left.
+    arcs: (m, 6): cx, cy, radius, from, to [rad], and 1 if the opening is on the side of the centre, else -1.
+    """
 
     edge: SoftEdge
     segments: np.ndarray
@@ -53,7 +57,7 @@ class SoftOutline(SoftAperture):
 
 
 def _short(arcs: np.ndarray) -> np.ndarray:
-    """The same arcs, none longer than a quarter of a turn."""
+    """Split arcs into pieces of at most a quarter of a turn."""
     found = []
     for *circle, begin, end, side in arcs:
         parts = max(1, ceil((end - begin) / MOST_OF_A_TURN - 1e-9))
@@ -79,7 +83,7 @@ def _arcs_share(edge: SoftEdge, arcs: np.ndarray, x: Array, y: Array, types: Pre
 
 
 class _Arc:
-    """What an arc adds, counterclockwise around its centre, at a point (x, y) from that centre."""
+    """Contribution of an arc, counterclockwise around its centre, at a point (x, y) relative to that centre."""
 
     def __init__(self, edge: SoftEdge, types: Precision) -> None:
         import drjit as dr
@@ -87,14 +91,17 @@ class _Arc:
         self.types = types
         self.reach = opaque(types, edge.reach)
         self.radial = radial_table(edge)
-        # Within the reach a quarter of a turn is no longer than π/2 of its chord.
+        # Within the reach, a quarter of a turn is at most π/2 times as long as its chord.
         nodes, weights = gauss_legendre(gauss_legendre_count(pi * edge.cycles, 1 - log10(edge.ripple)) + 4)
         self.nodes, self.weights = types.Float64(nodes), types.Float64(weights)
         self.count = dr.opaque(types.Index, len(nodes))
 
     def share(self, x: Array, y: Array, radius: Array, begin: Array, end: Array) -> Array:
-        """The part within reach is centred on the point's direction φ, half as wide as τ; seen from the arc's middle
-        that is at most one turn back or on, and may come in from both ends."""
+        """The part within reach is centred on the point's direction φ and has the half angle τ.
+
+        Relative to the arc's middle that direction lies at most one turn back or forward, and the part may overlap both
+        ends.
+        """
         import drjit as dr
 
         squared = x * x + y * y
@@ -116,18 +123,18 @@ class _Arc:
         return total
 
     def _angle(self, x: Array, y: Array, radius: Array, first: Array, last: Array) -> Array:
-        """Under which an arc is seen: that of its chord, and a whole turn more from between the two."""
+        """Angle that an arc subtends: the angle of its chord, plus a full turn for points between chord and arc."""
         import drjit as dr
 
         (sin_a, cos_a), (sin_b, cos_b) = dr.sincos(first), dr.sincos(last)
         ax, ay, bx, by = radius * cos_a - x, radius * sin_a - y, radius * cos_b - x, radius * sin_b - y
         cross, dot = ax * by - ay * bx, ax * bx + ay * by
-        # Of an arc that is empty, cross is rounding: no turn is missing there.
+        # For an empty arc, cross is rounding error, and no full turn is added.
         between = (cross < 0) & (x * x + y * y < radius * radius) & (last - first > EMPTY)
         return dr.atan2(cross, dot + TINY) + dr.select(between, 2 * pi, 0)
 
     def _integral(self, x: Array, y: Array, radius: Array, first: Array, last: Array, zero: Array) -> Array:
-        """∫ H(r) (R - p·e(t)) R dt."""
+        """Integral ∫ H(r) (R - p·e(t)) R dt."""
         import drjit as dr
 
         types = self.types

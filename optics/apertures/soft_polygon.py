@@ -1,9 +1,10 @@
-"""A polygon convolved with the soft edge's kernel, at any point.
+"""Transmittance at any point of a polygon convolved with the soft edge's kernel.
 
-The kernel's share within the triangle of a point and an edge is ∫ G(r) dθ over the angle θ under which the edge is
-seen, G(r) = ∫₀^r g(r') r' dr' and r the distance to the edge. The polygon's transmittance is the sum over its edges
-(angles, and so shares, are negative where the point lies outside an edge). With t along an edge at signed distance d,
-G dθ = d H(r) dt, r² = d² + t², where H = G/r² is smooth; beyond the kernel's reach G = 1/2π, and angles are enough.
+The kernel's share within the triangle of a point and an edge is ∫ G(r) dθ over the angle θ that the edge subtends, with
+G(r) = ∫₀^r g(r') r' dr' and r the distance to the edge. The polygon's transmittance is the sum over its edges. Angles,
+and hence shares, are negative if the point lies outside an edge. With t along an edge at signed distance d, G dθ = d
+H(r) dt, r² = d² + t², where H = G/r² is smooth. Beyond the kernel's reach G = 1/2π, so the share depends only on the
+angle.
 """
 
 from __future__ import annotations
@@ -24,13 +25,13 @@ from optics.numerics.quadrature import gauss_legendre, gauss_legendre_count
 
 __all__ = ["TINY", "SoftPolygon", "radial_table", "sides_share"]
 
-# Squared length far below any that counts: keeps roots and angles differentiable on an edge or a corner.
+# A squared length far below all relevant ones keeps roots and angles differentiable on an edge or a corner.
 TINY = 1e-40
 
 
 @dataclass(frozen=True, eq=False)
 class SoftPolygon(SoftAperture):
-    """Vertices (n, 2), counterclockwise."""
+    """A polygon with a soft edge; vertices (n, 2), counterclockwise."""
 
     edge: SoftEdge
     vertices: np.ndarray
@@ -44,7 +45,7 @@ class SoftPolygon(SoftAperture):
 
 
 def sides_share(edge: SoftEdge, starts: np.ndarray, ends: np.ndarray, x: Array, y: Array, types: Precision) -> Array:
-    """What straight pieces of an edge add, (n, 2) each, with the opening on their left."""
+    """Contribution of the straight pieces of an edge, (n, 2) each, with the opening on their left."""
     import drjit as dr
 
     along = ends - starts
@@ -66,10 +67,10 @@ def sides_share(edge: SoftEdge, starts: np.ndarray, ends: np.ndarray, x: Array, 
 
 
 class _Line:
-    """What a piece of a line adds: W(d, s) for the piece from the foot of the perpendicular d to a distance s along it.
+    """Contribution W(d, s) of the piece of a line from the foot of the perpendicular d to a distance s along the line.
 
-    Beyond the reach that is an angle; the whole chord within the reach comes from the half-plane's profile, whose line
-    goes on for ever; what ends within the reach is ∫ d H(r) dt.
+    Beyond the reach it is an angle. The whole chord within the reach comes from the profile of a half-plane, whose edge
+    is infinite. A piece that ends within the reach contributes ∫ d H(r) dt.
     """
 
     def __init__(self, edge: SoftEdge, types: Precision) -> None:
@@ -78,14 +79,14 @@ class _Line:
         self.types = types
         self.reach = opaque(types, edge.reach)
         self.radial, self.straight = radial_table(edge), _straight_table(edge)
-        # H is even in t, so that half the nodes of an even rule from -s to s are enough.
+        # H is even in t, so half the nodes of an even rule from -s to s are enough.
         nodes, weights = gauss_legendre(2 * ceil(gauss_legendre_count(2 * edge.cycles, -log10(edge.ripple)) / 2))
         half = len(nodes) // 2
         self.nodes, self.weights = types.Float64(2 * nodes[half:] - 1), types.Float64(2 * weights[half:])
         self.count = dr.opaque(types.Index, half)
 
     def between(self, d: Array, start: Array, end: Array) -> Array:
-        """From `start` to `end` at the signed distance d, positive inside."""
+        """Contribution from `start` to `end` at the signed distance d, positive inside."""
         import drjit as dr
 
         near = dr.abs(d) < self.reach
@@ -95,17 +96,17 @@ class _Line:
         return self._to(end, d, near, half, chord, zero) - self._to(start, d, near, half, chord, zero)
 
     def _to(self, s: Array, d: Array, near: Array, half: Array, chord: Array, zero: Array) -> Array:
-        """W(d, s); `chord` is half the whole chord's share and 0 where the line is not near."""
+        """W(d, s); `chord` is half the share of the whole chord, and 0 where the line is out of reach."""
         import drjit as dr
 
         within = near & (dr.abs(s) < half)
-        # Selected before they are divided: no lane may divide by 0, for its derivative would be NaN.
+        # Operands are selected before the division: a division by 0 in any lane would make its derivative NaN.
         slope = dr.select(within, 0, dr.select(near, -d, s)) / dr.select(within, 1, dr.select(near, s, d))
         through = dr.select(within, 0, dr.select(s < 0, -chord, chord))
         return dr.atan(slope) / (2 * pi) + through + dr.if_stmt((s, d, zero), within, self._integral, _nothing)
 
     def _integral(self, s: Array, d: Array, zero: Array) -> Array:
-        """∫ d H(r) dt from 0 to s."""
+        """Integral ∫ d H(r) dt from 0 to s."""
         import drjit as dr
 
         types = self.types
@@ -134,8 +135,8 @@ def radial_table(edge: SoftEdge) -> Interpolant:
         within = np.minimum(r, edge.reach)
         return np.asarray(edge.ring(np.outer(within, u)) @ weight * within / (2 * pi * r**2))
 
-    # A little further than the reach, whence the interpolation's outermost samples come.
-    return Interpolant.of(mean, (-1.1 * edge.reach, 1.1 * edge.reach), 2.2 * edge.cycles, edge.ripple / 4)
+    # The table extends slightly beyond the reach, to provide the outermost samples of the interpolation.
+    return Interpolant.from_function(mean, (-1.1 * edge.reach, 1.1 * edge.reach), 2.2 * edge.cycles, edge.ripple / 4)
 
 
 @lru_cache(maxsize=64)
@@ -150,4 +151,4 @@ def _straight_table(edge: SoftEdge) -> Interpolant:
         beyond = (jacobian * edge.ring(r) * np.arccos(np.clip(depth / r, 0, 1)) / pi) @ weight
         return np.where(d < 0, beyond, 1 - beyond)
 
-    return Interpolant.of(inside, (-edge.reach, edge.reach), 2 * edge.cycles, edge.ripple / 4)
+    return Interpolant.from_function(inside, (-edge.reach, edge.reach), 2 * edge.cycles, edge.ripple / 4)

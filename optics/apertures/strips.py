@@ -1,5 +1,7 @@
-"""Quadrature over what an outline encloses of a rectangle: panels between the heights at which the edge enters, leaves
-or turns, and chords across them. Exact edge, spectral convergence.
+"""Quadrature over the part of a rectangle that an outline encloses.
+
+Panels lie between the heights at which the edge enters, leaves or turns, and chords cross them. The edge is exact and
+convergence is spectral.
 """
 
 from __future__ import annotations
@@ -15,10 +17,10 @@ from optics.numerics.quadrature import gauss_legendre, gauss_legendre_count
 
 __all__ = ["strips"]
 
-EDGE_DEGREE = 4  # choice: more than the digits asked for: of the polynomials that a curved edge is to these digits
+EDGE_DEGREE = 4  # choice: degree beyond the digits, of polynomials that approximate a curved edge
 ROUNDING = 1e-12
-TANGENT = 1e-7  # choice: within which places agree where shapes touch
-STEEPNESS = 3.0  # choice: of panels' lengths beside a square root
+TANGENT = 1e-7  # choice: tolerance for coinciding positions of touching shapes
+STEEPNESS = 3.0  # choice: ratio of panel lengths near a square root
 
 Box = tuple[float, float, float, float]
 
@@ -26,22 +28,24 @@ Box = tuple[float, float, float, float]
 def strips(
     outline: Outline, box: Box, cycles: float, digits: float, degree: int = 0
 ) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
-    """x, y and weights over each panel of what is inside the box (left, right, bottom, top), for a wave of so many
-    cycles per unit of length times a polynomial of this degree in either direction."""
+    """Yield x, y and weights over each panel of the part inside the box (left, right, bottom, top).
+
+    The integrand is a wave of `cycles` cycles per unit of length times a polynomial of this degree in either direction.
+    """
     left, right, bottom, top = box
     within = np.concatenate([outline.turning, outline.heights(left), outline.heights(right)])
     ends = np.unique([bottom, top, *within[(within > bottom) & (within < top)]])
     for low, high in pairwise(_graded(ends, outline.tangent)):
         if high - low < ROUNDING:
             continue
-        # Where the edge slants, nodes slide along it, and the wave turns by as much more.
+        # Along a slanted edge nodes shift from row to row, which adds to the wave's phase.
         inner = low + (high - low) * np.array([1e-6, 1 - 1e-6])
         slide = np.abs(np.diff(np.clip(outline.crossings(inner), left, right), axis=0)).max(initial=0.0)
         turns = cycles * float(np.hypot(slide, high - low))
         y, weight = _panel(low, high, outline.tangent, turns, digits, 2 * degree + EDGE_DEGREE + ceil(digits))
         sides = np.clip(outline.crossings(y), left, right)
         if sides.shape[1] % 2 and high - low < TANGENT:
-            continue  # where shapes touch, heights agree no better, and nothing is between
+            continue  # rounding between shapes that touch: the panel is empty
         for start, end in zip(sides.T[::2], sides.T[1::2], strict=True):
             if not (end > start).any():
                 continue
@@ -52,8 +56,10 @@ def strips(
 
 
 def _graded(ends: np.ndarray, tangent: np.ndarray) -> np.ndarray:
-    """Ends of panels, with more of them where a circle's top or bottom is nearer to a panel than the panel is long:
-    polynomials do not follow the square root beside it."""
+    """Ends of panels, with more of them close to a circle's top or bottom than the length of a panel.
+
+    Polynomials do not approximate the square root there.
+    """
     more = []
     for at in tangent:
         for low, high in pairwise(ends):
@@ -70,8 +76,10 @@ def _graded(ends: np.ndarray, tangent: np.ndarray) -> np.ndarray:
 def _panel(
     low: float, high: float, tangent: np.ndarray, cycles: float, digits: float, degree: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Heights and weights between two ends, for a wave of so many cycles between them. Where one is a circle's top or
-    bottom, whose chord begins there like a square root, y goes there like sin²."""
+    """Heights and weights between two ends, for a wave of `cycles` cycles between them.
+
+    At a circle's top or bottom the chord starts like a square root; y approaches such an end like sin².
+    """
     span = high - low
     touching = any(abs(end - at) < ROUNDING for at in tangent for end in (low, high))
     slower = pi / 2 if touching else 1.0

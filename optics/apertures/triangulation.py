@@ -1,4 +1,4 @@
-"""Simple polygons: the check that they are, their triangles, and quadrature nodes over a triangle."""
+"""Simple polygons: a check for crossing edges, triangulation, and quadrature nodes over a triangle."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from optics.numerics.quadrature import gauss_legendre, gauss_legendre_count, har
 
 __all__ = ["crossing", "kernel_point", "triangle_nodes", "triangles"]
 
-# Relative to the lengths involved: what counts as touching or parallel.
+# Tolerance for touching or parallel, relative to the lengths involved.
 ROUNDING = 1e-12
 
 
@@ -17,7 +17,7 @@ def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def crossing(vertices: np.ndarray) -> tuple[int, int] | None:
-    """The first two edges that meet other than at a shared end, or None for a simple polygon."""
+    """Return the first two edges that meet other than at a shared end, or None for a simple polygon."""
     n = len(vertices)
     along = np.roll(vertices, -1, axis=0) - vertices
     following = np.roll(along, -1, axis=0)
@@ -35,7 +35,7 @@ def crossing(vertices: np.ndarray) -> tuple[int, int] | None:
 
 
 def _meet(a: np.ndarray, along: np.ndarray, others: np.ndarray, along_others: np.ndarray) -> np.ndarray:
-    """Which of the other segments share a point with the one from a."""
+    """Return a mask of the other segments that share a point with the one from a."""
     gap = others - a
     determinant = _cross(along, along_others)
     parallel = np.abs(determinant) <= ROUNDING * np.hypot(*along) * np.hypot(*along_others.T)
@@ -49,7 +49,7 @@ def _meet(a: np.ndarray, along: np.ndarray, others: np.ndarray, along_others: np
 
 
 def kernel_point(vertices: np.ndarray) -> np.ndarray | None:
-    """The centroid, where it sees the whole counterclockwise polygon, else None."""
+    """Return the centroid if it sees the whole counterclockwise polygon, else None."""
     following = np.roll(vertices, -1, axis=0)
     twice = _cross(vertices, following)
     centroid = ((vertices + following) * twice[:, None]).sum(axis=0) / (3 * twice.sum())
@@ -58,10 +58,10 @@ def kernel_point(vertices: np.ndarray) -> np.ndarray | None:
 
 
 def triangles(vertices: np.ndarray) -> np.ndarray:
-    """(m, 3, 2): a counterclockwise polygon cut into triangles by clipping ears (Meisters 1975)."""
+    """Cut a counterclockwise polygon into triangles (m, 3, 2) by clipping ears (Meisters 1975)."""
     left, ears = list(range(len(vertices))), []
     while len(left) > 3:
-        # Among the ears the one with the shortest cut, so that triangles stay compact.
+        # The ear with the shortest cut is clipped first, so that triangles stay compact.
         best, shortest = -1, np.inf
         for k in range(len(left)):
             a, b, c = left[k - 1], left[k], left[(k + 1) % len(left)]
@@ -78,7 +78,7 @@ def triangles(vertices: np.ndarray) -> np.ndarray:
 
 
 def _is_ear(vertices: np.ndarray, a: int, b: int, c: int, left: list[int]) -> bool:
-    """Whether the triangle a, b, c turns left and holds no other corner."""
+    """Return whether the triangle a, b, c turns left and contains no other corner."""
     corner = vertices[[a, b, c]]
     if _cross(corner[1] - corner[0], corner[2] - corner[1]) < 0:
         return False
@@ -88,8 +88,10 @@ def _is_ear(vertices: np.ndarray, a: int, b: int, c: int, left: list[int]) -> bo
 
 
 def triangle_nodes(corners: np.ndarray, cycles: float, digits: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """x, y, weight: Gauss-Legendre from the first corner to the opposite side, and along the lines parallel to it
-    with fewer nodes on the shorter ones (Duffy 1982).
+    """Return x, y and weights of Gauss-Legendre nodes over a triangle (Duffy 1982).
+
+    Nodes run from the first corner to the opposite side and along the lines parallel to it, with fewer nodes on shorter
+    lines.
     """
     apex, side = corners[0], corners[2] - corners[1]
     far = max(np.hypot(*(corners[1] - apex)), np.hypot(*(corners[2] - apex)))

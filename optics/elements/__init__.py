@@ -1,17 +1,17 @@
-"""What light comes from and passes: a source, a pupil, and the relief on it.
+"""Optical elements: light sources, pupils, and the reliefs, wavefronts and masks of pupils.
 
 source            PointSource
 pupil             Pupil: aperture, relief, ideal lens
 relief            Relief, HeightMap, BSplineRelief
-pixel_relief      PixelRelief: steps
-fine_detail       which frequencies samples hold
-square_samples    the numbers of reliefs, masks and wavefronts, as users give them
+pixel_relief      PixelRelief: stepped reliefs
+fine_detail       spatial frequencies in samples
+square_samples    checks of the samples of reliefs, masks and wavefronts
 wavefront         Zernike, WavefrontMap
 transmittance     GaussianMask, MaskMap
-human_eye         HumanEye, mean_human_mtf: as they were published
-exit_pupil        read_exit_pupil: lenses of other programs
+human_eye         HumanEye, mean_human_mtf: published models
+exit_pupil        read_exit_pupil: lenses from other programs
 refractive_index  RefractiveIndex, Sellmeier, Cornu; media of eyes
-wavefront_slopes  where the rays of a wavefront go
-beam              light of one wavelength on its way to a plane
-ray_field         what rays make of polarised light
+wavefront_slopes  directions of a wavefront's rays
+beam              light of one wavelength between source and sensor plane
+ray_field         polarised light along rays
 """

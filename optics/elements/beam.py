@@ -1,4 +1,4 @@
-"""Light of one wavelength from a source through a pupil, on its way to a plane behind it."""
+"""Light of one wavelength from a source through a pupil to a plane behind it."""
 
 from __future__ import annotations
 
@@ -33,12 +33,12 @@ class Beam:
 
     @property
     def radius(self) -> Scalar:
-        """[m]"""
+        """Radius of the pupil [m]."""
         return self.pupil.aperture_radius
 
     @property
     def index(self) -> float:
-        """Of the medium behind the pupil."""
+        """Refractive index of the medium behind the pupil."""
         return self.pupil.index_behind(self.wavelength)
 
     def waves(self, x: Array, y: Array, types: Precision) -> Array:
@@ -46,11 +46,11 @@ class Beam:
         return self.pupil.path(x, y, self.wavelength, self.source, types) * opaque(types, 1 / self.wavelength)
 
     def behind(self, soft: SoftAperture, grid: Grid, types: Precision) -> Field:
-        """Field just behind the pupil on a grid [m], aperture softened."""
+        """Field just behind the pupil on a grid [m], with a softened aperture."""
         return self.at(soft, *grid.coordinates(types), grid, types)
 
     def at(self, soft: SoftAperture, x: Array, y: Array, grid: Grid, types: Precision) -> Field:
-        """The same at any points (x, y) [m], which the grid stands for."""
+        """Field just behind the pupil at arbitrary points (x, y) [m] that belong to the grid's cells."""
         scale = 1 / opaque(types, self.radius)
         size = soft.transmittance(x * scale, y * scale, types)
         if self.pupil.mask is not None:

@@ -1,4 +1,4 @@
-"""Lenses of other programs: their exit pupil and wavefront, read from their objects by the names they have there."""
+"""Lenses from other programs: exit pupil and wavefront, read from the attributes of their objects."""
 
 from __future__ import annotations
 
@@ -14,21 +14,23 @@ from optics.numerics.arguments import complexes, is_sized, positive, shown, vacu
 __all__ = ["ExitPupil", "read_exit_pupil"]
 
 MM, UM = 1e-3, 1e-6
-SECTORS, ROUND = 8, 0.9  # choice: around the pupil, in each of which light reaches so far out, of the farthest
+SECTORS, ROUND = 8, 0.9  # choice: sectors, each with light out to this share of the pupil's radius
 RAYS_PER_MODE = 3  # choice
-LIT = 1e-3  # choice: of the brightest sample
-EVEN = 0.1  # choice: of the median amplitude, by which others may differ within ROUND of the radius
-# Choice: of the radius, and of the rays that lie so far in where all are spread evenly. Of rays in rings there are as
-# many whatever the number of rings.
+LIT = 1e-3  # choice: lowest intensity, relative to the brightest sample
+EVEN = 0.1  # choice: tolerance on amplitudes within ROUND of the radius, relative to their median
+# Choice: a disk of CENTRE of the radius must hold FILLED of the rays that an even distribution would have there. #
+# Distributions in rings pass this test with any number of rings.
 CENTRE, FILLED = 0.4, 0.25
 
 
 @dataclass(frozen=True, eq=False)
 class ExitPupil:
-    """pupil: an ideal lens to the reference sphere's centre, with the wavefront before it as Zernike's modes.
+    """An exit pupil with its wavefront.
 
-    distance: [m] to that centre, where a sensor sees what the other program calls its image.
-    rms: of the wavefront [m], piston and tilt aside; residual: of what the modes leave over [m].
+    pupil: an ideal lens focused on the centre of the reference sphere, with the wavefront as Zernike modes.
+    distance: distance [m] to that centre, the image position of the other program.
+    rms: root mean square of the wavefront [m] without piston and tilt.
+    residual: root mean square of the fit's residual [m].
     """
 
     pupil: Pupil
@@ -40,18 +42,19 @@ class ExitPupil:
 def read_exit_pupil(
     system: Any, wavelength: float, medium_n: float = 1.0, focal_length: float | None = None, order: int = 8
 ) -> ExitPupil:
-    """What another program's object says of a lens, as a pupil with a wavefront.
+    """Convert another program's description of a lens into a pupil with a wavefront.
 
-    system: with pupil_x, pupil_y, pupil_z, radius [mm] and opd [waves], like optiland's WavefrontData, of any
-        distribution of rays; or with data (complex), dx [mm] and wavelength [µm], like prysm's Wavefront in a pupil,
-        whose phase must turn by less than half a wave from sample to sample.
-    wavelength: in vacuum [m]. medium_n: of the image space.
-    focal_length: [m] from pupil to image, where the object does not say (prysm).
-    order: of the highest Zernike mode that is fitted.
+    system: an object with pupil_x, pupil_y, pupil_z, radius [mm] and opd [waves], like optiland's WavefrontData with
+        any distribution of rays; or with data (complex), dx [mm] and wavelength [µm], like prysm's Wavefront in a
+        pupil, whose phase must change by less than half a wave between samples.
+    wavelength: vacuum wavelength [m].
+    medium_n: refractive index of the image space.
+    focal_length: distance from pupil to image [m], required if the object does not contain it (prysm).
+    order: highest radial order of the fitted Zernike modes.
 
     Raises:
-        ValueError: the object has neither set of names, too few samples, or a pupil that is not round, obscured, or of
-            uneven light; or a bad argument.
+        ValueError: an object with neither set of attributes, too few samples, a pupil that is obscured, not round or
+            unevenly illuminated, or a bad argument.
     """
     vacuum_wavelength(wavelength)
     count = whole("order", order, 1, 30)
@@ -59,7 +62,7 @@ def read_exit_pupil(
         x, y, ahead, distance = _of_rays(system, wavelength)
     elif all(hasattr(system, name) for name in ("data", "dx", "wavelength")):
         if focal_length is None:
-            raise ValueError("focal_length is missing: this object does not say how far [m] its image is")
+            raise ValueError("focal_length is missing: this object does not contain the distance [m] of its image")
         distance = positive("focal_length", focal_length)
         x, y, ahead = _of_samples(system, wavelength)
     else:
@@ -71,15 +74,18 @@ def read_exit_pupil(
 
 
 def _of_rays(system: Any, wavelength: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
-    """Places on the plane that touches the reference sphere at the chief ray, how far the wave is ahead there, and the
-    sphere's radius: a point of the sphere lies in the direction of the plane's R tan θ."""
+    """Return positions x and y on the tangent plane, the wave's lead there, and the radius of the reference sphere.
+
+    The plane touches the reference sphere at the chief ray. A point of the sphere in direction θ is mapped to R tan θ
+    on the plane.
+    """
     x, y, z, opd, intensity = _alike(system)
     places = np.stack([x, y, z]) * MM
-    ahead = opd * wavelength  # theirs is the chief ray's path less the ray's: positive is ahead
+    ahead = opd * wavelength  # opd: the chief ray's path minus the ray's, so positive values are ahead
     light = np.nan_to_num(intensity)
     lit = np.isfinite(places).all(axis=0) & np.isfinite(ahead) & (light > LIT * light.max(initial=0.0))
     if not lit.any():
-        raise ValueError("intensity: no ray has light and a finite place and path: some must")
+        raise ValueError("intensity: no ray has positive intensity and finite position and path: at least one must")
     places, ahead = places[:, lit], ahead[lit]
     radius = abs(_one("radius", system.radius)) * MM
     given = getattr(system, "reference_center", None)
@@ -94,7 +100,7 @@ def _of_rays(system: Any, wavelength: float) -> tuple[np.ndarray, np.ndarray, np
 
 
 def _alike(system: Any) -> list[np.ndarray]:
-    """pupil_x, pupil_y, pupil_z, opd and intensity (1 where there is none) of every ray."""
+    """pupil_x, pupil_y, pupil_z, opd and intensity (1 if missing) of every ray."""
     found = {name: _flat(name, getattr(system, name)) for name in ("pupil_x", "pupil_y", "pupil_z", "opd")}
     rays = len(found["pupil_x"])
     found["intensity"] = _flat("intensity", getattr(system, "intensity", np.ones(rays)))
@@ -105,7 +111,7 @@ def _alike(system: Any) -> list[np.ndarray]:
 
 
 def _centre(places: np.ndarray, radius: float) -> np.ndarray:
-    """Of the sphere through the places, behind them."""
+    """Centre of the sphere through the points, behind them."""
     matrix = np.concatenate([2 * places, np.ones((1, places.shape[1]))]).T
     found = np.linalg.lstsq(matrix, np.sum(places**2, axis=0), rcond=None)[0][:3]
     if not np.isclose(np.linalg.norm(places - found[:, None], axis=0).mean(), radius, rtol=0.05):
@@ -114,7 +120,7 @@ def _centre(places: np.ndarray, radius: float) -> np.ndarray:
 
 
 def _of_samples(system: Any, wavelength: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Places [m] on the pupil's plane, and how far the wave is ahead there: the negative of its phase."""
+    """Positions [m] on the pupil's plane and the wave's lead there, the negative of its phase."""
     data, own = complexes("data", system.data), _one("wavelength", system.wavelength)
     pitch = positive("dx", _one("dx", system.dx), "mm") * MM
     if data.ndim != 2 or data.size == 0 or not np.isfinite(data).all():
@@ -131,17 +137,17 @@ def _of_samples(system: Any, wavelength: float) -> tuple[np.ndarray, np.ndarray,
 
 
 def _check_even(amplitude: np.ndarray, x: np.ndarray, y: np.ndarray, lit: tuple[np.ndarray, np.ndarray]) -> None:
-    """ValueError unless the circle around what is lit is open all over, and its light alike."""
+    """Refuse a circle around the illuminated samples that is not open everywhere and evenly illuminated."""
     (top, bottom), (left, right) = ((at[n].min(), at[n].max()) for at, n in zip((y, x), lit, strict=True))
     off = np.hypot(y[:, None] - (top + bottom) / 2, x[None, :] - (left + right) / 2)
     within = amplitude[off < ROUND * max(bottom - top, right - left) / 2]
     middle = np.median(within) if within.size else 0.0
     if within.size and np.abs(within - middle).max() > EVEN * middle:
-        raise ValueError("data: the pupil is obscured, not round, or its light uneven: only open circles are read")
+        raise ValueError("data: the pupil is obscured, not round, or unevenly lit: only open circles can be read")
 
 
 def _unwrapped(data: np.ndarray, lit: np.ndarray) -> np.ndarray:
-    """Phase without jumps: along the brightest column, and from there along every row."""
+    """Unwrapped phase: first along the brightest column, then along every row."""
     phase, middle = np.where(lit, np.angle(data), 0.0), int(lit.sum(axis=0).argmax())
     phase[:, middle] = np.unwrap(phase[:, middle])
     right, left = np.unwrap(phase[:, middle:], axis=1), np.unwrap(phase[:, middle::-1], axis=1)[:, ::-1]
@@ -157,10 +163,10 @@ def _fitted(x: np.ndarray, y: np.ndarray, ahead: np.ndarray, distance: float, me
     sector = ((np.arctan2(y, x) / (2 * np.pi) % 1) * SECTORS).astype(int) % SECTORS
     farthest = np.array([r[sector == each].max(initial=0.0) for each in range(SECTORS)])
     if farthest.min() < ROUND * farthest.max():
-        raise ValueError("the pupil is not round: only circles are read")
+        raise ValueError("the pupil is not round: only circles can be read")
     radius = float(farthest.max())
     if np.mean(r < CENTRE * radius) < FILLED * CENTRE**2:
-        raise ValueError("the pupil is obscured: only open circles are read")
+        raise ValueError("the pupil is obscured: only open circles can be read")
     basis = np.stack([mode(n, m, x / radius, y / radius) for n, m in modes], axis=1)
     found = np.linalg.lstsq(basis, ahead, rcond=None)[0]
     residual = float(np.sqrt(np.mean(np.square(ahead - basis @ found))))
@@ -171,7 +177,7 @@ def _fitted(x: np.ndarray, y: np.ndarray, ahead: np.ndarray, distance: float, me
 
 
 def _flat(name: str, values: Any) -> np.ndarray:
-    """Of NumPy, or of a tensor that can be turned into it."""
+    """Convert a NumPy array, or a tensor that can become one, to a flat float64 array."""
     plain = values.detach().cpu().numpy() if hasattr(values, "detach") else values
     try:
         return np.atleast_1d(np.asarray(plain, dtype=np.float64)).ravel()
@@ -180,7 +186,7 @@ def _flat(name: str, values: Any) -> np.ndarray:
 
 
 def _one(name: str, value: Any) -> float:
-    """A number, or the first of several, in the other program's unit."""
+    """Return a number, or the first of several, in the other program's unit."""
     found = _flat(name, value)
     if value is None or found.size == 0 or not abs(found[0]) > 0 or not np.isfinite(found[0]):
         raise ValueError(f"{name} = {shown(value)}: must be a finite number that is not 0")

@@ -1,4 +1,4 @@
-"""Which spatial frequencies samples over a square hold: what a grid must resolve, and what sends light off its rays."""
+"""Spatial frequencies in samples over a square, for the resolution of grids and the extent of scattered light."""
 
 from __future__ import annotations
 
@@ -6,13 +6,15 @@ import numpy as np
 
 __all__ = ["band_of", "power_beyond", "reach_of"]
 
-CUBIC = 4  # coefficients along an axis of what slopes tell well: a B-spline's one patch
+CUBIC = 4  # coefficients along an axis of a single B-spline patch, which slopes describe well
 
 
 def band_of(samples: np.ndarray, level: float) -> float:
-    """Frequency [cycles per half a side] above which there is less than `level`, from the samples' spectrum. A cubic
-    spline repeats content of frequency f around multiples of the sampling rate, weaker by the fourth power of the
-    frequencies' ratio."""
+    """Frequency [cycles per half a side] above which the samples' spectrum stays below `level`.
+
+    A cubic spline repeats content of frequency f around multiples of the sampling rate, weaker by the fourth power of
+    the ratio of the two frequencies.
+    """
     n = len(samples)
     if n < 4:
         return 1.0
@@ -29,10 +31,10 @@ def band_of(samples: np.ndarray, level: float) -> float:
 
 
 def power_beyond(samples: np.ndarray) -> np.ndarray:
-    """(n,) mean squares of what samples hold at frequencies of k/4 cycles per half a side and more, along x or y, k
-    from 0 on; without the bicubic polynomial nearest to them, which bends light as its slopes tell and scatters none.
+    """Mean squares (n,) of the content at frequencies from k/4 cycles per half a side, along x or y, for k from 0.
 
-    By cosines, whose even continuation has no jumps, so that ends are no detail.
+    The nearest bicubic polynomial is subtracted first: it bends light according to its slopes and scatters none. The
+    transform is a cosine transform, whose even continuation has no jumps, so the ends add no detail.
     """
     from scipy.fft import dctn
 
@@ -48,8 +50,7 @@ def power_beyond(samples: np.ndarray) -> np.ndarray:
 
 
 def reach_of(beyond: np.ndarray, level: float) -> float:
-    """Frequency [cycles per half a side] beyond which there is less than `level`, root mean square; see
-    `power_beyond`."""
+    """Frequency [cycles per half a side] beyond which the root mean square is below `level`; see `power_beyond`."""
     more = np.flatnonzero(beyond > level**2)
     return float(more[-1]) / 4 if more.size else 0.0
 

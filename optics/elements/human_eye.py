@@ -1,4 +1,4 @@
-"""Human eyes as they were published: wavefronts with the chromatic aberration of humans, and a mean MTF."""
+"""Published models of the human eye: wavefronts with human chromatic aberration, and a mean MTF."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ from optics.numerics.arguments import in_range, of_kind, one_of, positive, reals
 
 __all__ = ["HUMAN_WAVEFRONTS", "HumanEye", "mean_human_mtf"]
 
-# Autrusseau, Thibos & Shevell, Vision Research 51, 2282 (2011), table 1, µm for a pupil of 6 mm that is looked at in
-# 570 nm, in the order of OSA and ANSI. Unit, order and sign are those that reproduce their figure 11: contrast of L and
-# M cones in tests/optics/elements/test_human_eye.py, of S cones in decision 051.
-# Piston and tilts, which move a picture alone, are left out.
+# Autrusseau, Thibos & Shevell, Vision Research 51, 2282 (2011), table 1, µm for a pupil of 6 mm at 570 nm, in the order
+# of OSA and ANSI. Unit, order and sign reproduce their figure 11: contrast of L and M cones in
+# tests/optics/elements/test_human_eye.py, of S cones in docs/concepts/eye.md. Piston and tilts are left out, since they
+# only shift an image.
 HUMAN_WAVEFRONTS = {
     "standard_observer": Zernike(
         {
@@ -42,17 +42,18 @@ HUMAN_WAVEFRONTS = {
 }
 IN_FOCUS = 570e-9  # [m], of Autrusseau et al.
 SURFACE = 5.55e-3  # [m], of Thibos, Ye, Zhang & Bradley, Appl. Opt. 31, 3594 (1992): the reduced eye's one surface
-ASPHERIC = (2, 4, 6)  # orders by which its aspheric form is met; order 8 is below 1 nm
-NODES = 24  # of their integrals, polynomials of order 12 and less
+ASPHERIC = (2, 4, 6)  # orders that describe its aspheric form; order 8 is below 1 nm
+NODES = 24  # of their integrals over polynomials up to order 12
 PERFECT_NM = 555.0  # of the perfect lens in `mean_human_mtf`
 
 
 @dataclass(frozen=True, eq=False)
 class HumanEye:
-    """One refracting surface between air and Thibos' medium, with a human eye's chromatic aberration, free of others in
-    570 nm; and a wavefront.
+    """A reduced eye: one refracting surface between air and Thibos' medium, with an additional wavefront.
 
-    aperture_radius: of its pupil [m], at most that of the circle over which the wavefront is known.
+    It has a human eye's chromatic aberration and no other aberration at 570 nm.
+
+    aperture_radius: radius of its pupil [m], at most that of the circle over which the wavefront is known.
     wavefront: "standard_observer" (Autrusseau, Thibos & Shevell 2011, known to 3 mm); a Zernike; or None.
 
     Raises:
@@ -69,7 +70,7 @@ class HumanEye:
         elif self.wavefront is not None:
             of_kind("wavefront", self.wavefront, Zernike, 'Zernike({(2, 0): 0.1}), or "standard_observer"')
             if self.wavefront.asks:
-                raise ValueError("wavefront asks for a derivative, which it does not carry: give it to a Pupil")
+                raise ValueError("wavefront requires a derivative, but none is propagated through it: use a Pupil")
         known = self._reported.radius
         if known is not None and self.aperture_radius > known * (1 + 1e-9):
             raise ValueError(
@@ -78,13 +79,13 @@ class HumanEye:
 
     @cached_property
     def focal_length(self) -> float:
-        """From the pupil to the retina [m]."""
+        """Distance from the pupil to the retina [m]."""
         index = medium("chromatic_eye").at(IN_FOCUS)
         return index * SURFACE / (index - 1)
 
     @cached_property
     def pupil(self) -> Pupil:
-        """The eye as `optics.psf` and others take it, with `focal_length` as their distance."""
+        """Pupil of the eye for `optics.psf` and other functions, with `focal_length` as their distance."""
         humour = medium("chromatic_eye")
         paraboloid = BSplineRelief.paraboloid(0.0, 1 / SURFACE, self.aperture_radius)
         reported = self._reported
@@ -102,16 +103,17 @@ class HumanEye:
         )
 
     def frequency(self, cycles_per_degree: Any) -> np.ndarray:
-        """On the retina [cycles per metre], as `optics.MTF.profile` takes it: an array of any shape.
+        """Convert to cycles per metre on the retina, as `optics.MTF.profile` expects: an array of any shape.
 
         Raises:
-            ValueError: a number below 0, or none.
+            ValueError: a negative or invalid number.
         """
         return _not_negative(cycles_per_degree) * (180 / math.pi) / self._nodal_distance
 
     def sensor_width(self, fov_deg: float) -> float:
-        """Side of the patch of retina that sees a square field this wide [m], 2 (f/n) tan(fov/2): that of an
-        `optics.Eye` with this eye's pupil.
+        """Side [m] of the retinal patch that sees a square field this wide, 2 (f/n) tan(fov/2).
+
+        An `optics.Eye` with this eye's pupil has this sensor.
 
         Raises:
             ValueError: not in [1e-3, 170].
@@ -129,7 +131,7 @@ class HumanEye:
         return HUMAN_WAVEFRONTS[self.wavefront] if isinstance(self.wavefront, str) else self.wavefront
 
     def _aspheric(self, order: int, radius: float) -> float:
-        """Coefficient [µm] of what the path to the retina, n (√(r² + f²) - f), has beyond the paraboloid's n r²/2f."""
+        """Zernike coefficient [µm] of the path to the retina, n (√(r² + f²) - f), minus n r²/2f."""
         at, weights = np.polynomial.legendre.leggauss(NODES)
         rho = (at + 1) / 2
         r, f = radius * rho, self.focal_length
@@ -145,13 +147,15 @@ def _not_negative(cycles_per_degree: Any) -> np.ndarray:
 
 
 def mean_human_mtf(cycles_per_degree: Any, pupil_diameter: float) -> np.ndarray:
-    """Mean contrast of 200 healthy eyes at their best focus, all orientations, in white light:
+    """Mean contrast of 200 healthy eyes at their best focus, over all orientations, in white light:
 
-        M(u, d) = √D(u, d) (1 + (u/u₁)²)^-.62,   u₁ = 21.95 - 5.512 d + .3922 d²  [cycles per degree], d in mm
+        M(u, d) = √D(u, d) (1 + (u/u₁)²)^(-0.62),   u₁ = 21.95 - 5.512 d + 0.3922 d²  [cycles per degree], d in mm
 
-    with D the contrast of a perfect lens in 555 nm (Watson, J. Vision 13(6):18, 2013, eq. 4 and 5; stray light apart).
+    with D the contrast of a perfect lens at 555 nm (Watson, J. Vision 13(6):18, 2013, eq. 4 and 5; without stray
+    light).
 
-    cycles_per_degree: 0 or more, an array of any shape, which is the result's. pupil_diameter: d [m], 2 to 6 mm.
+    cycles_per_degree: 0 or more, an array of any shape; the result has the same shape.
+    pupil_diameter: d [m], 2 to 6 mm.
 
     Raises:
         ValueError: names argument, value and valid range.

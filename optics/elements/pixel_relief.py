@@ -1,4 +1,4 @@
-"""Reliefs of square pixels, each as high as it is told: what lithography and spatial light modulators make."""
+"""Reliefs of square pixels with individual heights, as made by lithography and spatial light modulators."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ from optics.numerics.precision import Precision
 
 __all__ = ["PixelRelief"]
 
-REPETITIONS = 32  # choice: of the pixels' frequencies; all beyond have 1/(π² 32) of the light at most
+REPETITIONS = 32  # choice: repetitions of the pixels' spectrum; at most 1/(π² 32) of the light lies beyond
 
 
 @dataclass(frozen=True, eq=False)
 class PixelRelief(Relief):
-    """Heights [m] of n x n square pixels that fill the square [-a, a]²: a diffractive optical element of steps.
+    """Heights [m] of n x n square pixels that fill the square [-a, a]²: a stepped diffractive optical element.
 
-    samples: (n, n), (y, x). Of a smooth height h, N levels one step apart, wrapped to one wave in glass of index n,
-        step = wavelength / (n - 1) / N, are `np.round(h / step) % N * step`.
+    samples: (n, n), (y, x). For a smooth height h, wrapped to one wave in glass of index n and quantised to N levels
+        with step = wavelength / (n - 1) / N, use `np.round(h / step) % N * step`.
 
-    A Dr.Jit tensor of samples carries derivatives. (Smooth surfaces: `HeightMap`, which joins its samples.)
+    A Dr.Jit tensor of samples carries derivatives. For smooth surfaces use `HeightMap`, which interpolates its samples.
 
     Raises:
         ValueError: not square, empty, or not finite.
@@ -53,17 +53,21 @@ class PixelRelief(Relief):
         return float(np.ptp(self._heights))
 
     def bandwidth(self, level: float) -> float:
-        """Jumps have no end of frequencies."""
+        """Return infinity unless the relief is level, since jumps have no band limit."""
         return 0.0 if self._level else math.inf
 
     def detail(self, level: float) -> float:
-        """All of it is in `scatter`."""
+        """Return 0: `scatter` covers all detail."""
         return 0.0
 
     def scatter(self, turns: float, opening: Aperture, share: float) -> float:
-        """Spatial frequency [cycles per aperture radius] along x and y beyond which no more than this share of the
-        light goes that fills the opening, `turns` [1/m] waves per height: that of a transform over the pixels, sinc² of
-        a pixel's width at each repetition."""
+        """Spatial frequency [cycles per aperture radius] along x and y beyond which at most this share of light goes.
+
+        The light is a discrete transform over the pixels, weighted with sinc² of a pixel's width at each repetition.
+
+        turns: waves per metre of height [1/m].
+        opening: aperture; `share` is relative to the light that fills it.
+        """
         n = len(self._heights)
         centres = (np.arange(n) + 0.5) * 2 / n - 1
         x, y = centres[None, :], centres[:, None]
@@ -81,7 +85,7 @@ class PixelRelief(Relief):
 
     @property
     def pixels(self) -> int:
-        """None of which anything is told apart by where all are level, unless derivatives ask about each of them."""
+        """Number of pixels along a side; 0 if all heights are equal and no derivatives are requested."""
         return 0 if self._level else len(self._heights)
 
     @property
@@ -94,7 +98,7 @@ class PixelRelief(Relief):
 
 
 def _reach(power: np.ndarray, share: float) -> float:
-    """Frequency [cycles per aperture radius] that a share of the power over the pixels' frequencies goes beyond."""
+    """Frequency [cycles per aperture radius] beyond which the remaining power is at most this share."""
     n = len(power)
     order = np.arange(-(n // 2) - n * REPETITIONS, n - n // 2 + n * REPETITIONS)
     sent = power[order % n] * np.sinc(order / n) ** 2

@@ -25,11 +25,11 @@ from optics.numerics.precision import Precision, opaque, precision
 
 __all__ = ["MIDDLE", "Pupil"]
 
-TALLEST = 100.0  # choice, radii: a relief as high as one is no thin element any more
-ANY_HEIGHT = 1e-3  # choice [m]: not too tall for any pupil
-LEVEL, TRANSMISSION_DIGITS = 1e-6, 9.0  # choice: of a mask's spectrum, and of the light that it lets through
-MIDDLE = 550e-9  # choice [m]: wavelength of an image's place
-SENSOR_DISTANCE = 240e-6  # choice [m]: of a pupil without a lens, where nobody says
+TALLEST = 100.0  # choice, radii: the thin-element model does not apply to higher reliefs
+ANY_HEIGHT = 1e-3  # choice [m]: allowed for every pupil
+LEVEL, TRANSMISSION_DIGITS = 1e-6, 9.0  # choice: level of a mask's spectrum, and digits of its transmission
+MIDDLE = 550e-9  # choice [m]: wavelength that defines the image distance
+SENSOR_DISTANCE = 240e-6  # choice [m]: default for a pupil without a lens
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,19 +37,16 @@ class Pupil:
     """Transmittance A(x, y) M(x, y) exp(ik [(n - object_n) h(x, y) - W(x, y)]), thin-element model.
 
     aperture_radius: R [m].
-    height: None; a square array [m] (y, x) of samples at cell centres over [-R, R]² (see HeightMap); or a Relief, such
-        as PixelRelief for one of steps.
+    height: None; a square array [m] (y, x) of samples at cell centres over [-R, R]² (HeightMap); or any Relief.
     n: refractive index of the relief, constant or dispersive.
-    medium_n: index of what lies behind the pupil, a number, or dispersive (`optics.medium`).
-    object_n: of what lies before it, in which the relief stands; None: the same.
-    thin_lens_focal_length: adds an ideal lens exp(-ik medium_n (√(r² + f²) - f)) [m], which brings parallel light of
-        every wavelength to a point f behind it; negative diverges.
-    aperture: its shape within the circle of radius R: Circle (default), Annulus, Rings, Polygon, Slit, or what `union`,
-        `difference` and `intersection` make of such.
-    wavefront: W [m], in vacuum at every wavelength: Zernike, or WavefrontMap, over a circle no smaller than the pupil.
-
-    mask: M, the amplitude that is let through: GaussianMask, or MaskMap. A PSF stays relative to the light that falls
-        on the open aperture, so that what a mask takes away is missing from it.
+    medium_n: refractive index behind the pupil, a number, or dispersive (`optics.medium`).
+    object_n: refractive index in front of the pupil, around the relief; None: equal to medium_n.
+    thin_lens_focal_length: adds an ideal lens exp(-ik medium_n (√(r² + f²) - f)), f in metres. It focuses parallel
+        light of every wavelength at the distance f behind it; a negative f diverges.
+    aperture: Circle (default), Annulus, Rings, Polygon, Slit, or a `union`, `difference` or `intersection` of shapes.
+    wavefront: W [m], in vacuum at every wavelength: Zernike or WavefrontMap, over at least the pupil's circle.
+    mask: M, the transmitted amplitude: GaussianMask or MaskMap. A PSF is relative to the light that falls on the open
+        aperture, so light absorbed by a mask reduces its sum.
 
     Radius, height, n, focal length and the numbers of W and M may be Dr.Jit arrays (maps: tensors): derivatives flow
     through them.
@@ -115,13 +112,14 @@ class Pupil:
 
     @property
     def area(self) -> float:
-        """[m²]"""
+        """Open area [m²]."""
         return self.aperture.area * self.radius**2
 
     @property
     def transmission(self) -> Scalar:
-        """Share of the light on the open aperture that the mask lets through, with derivatives; 1 without a mask."""
-        # A graph serves one backward pass; and who holds Dr.Jit's numbers may ask for a derivative at any time.
+        """Share of the light on the open aperture that the mask transmits, with derivatives; 1 without a mask."""
+        # A graph serves a single backward pass, and gradients of Dr.Jit numbers may be enabled later: nothing is
+        # cached.
         if is_differentiable(self.aperture_radius) or not (self.mask is None or self.mask.plain):
             import drjit as dr
 
@@ -144,7 +142,7 @@ class Pupil:
         return dr.sum(types.Float64(nodes.weight) * dr.square(amplitude)) / self.aperture.area
 
     def amplitude(self, x: Array, y: Array, types: Precision) -> Array:
-        """The mask's, at points in units of R."""
+        """Amplitude that the mask transmits at points in units of R."""
         if self.mask is None:
             return types.Float64(1)
         radius = opaque(types, self.aperture_radius)
@@ -152,16 +150,16 @@ class Pupil:
 
     @property
     def pixels(self) -> int:
-        """Squares across the pupil between which its relief jumps; 0: it is smooth."""
+        """Number of square pixels across the pupil between which its relief jumps; 0 for a smooth relief."""
         return 0 if self.height is None else int(self.height.pixels)
 
     def image_distance(self, source_distance: float) -> float:
-        """Where [m] behind the pupil a sensor is that nobody has placed: in the image of a source at this distance [m]
-        if there is an ideal lens, 1/z = 1/f - n₀/(n s) at 550 nm, and at 240 µm otherwise. It stays there: no
-        derivative moves it.
+        """Default distance [m] of the sensor behind the pupil, without derivatives.
+
+        It is 240 µm without a lens, else the image distance of this source [m], 1/z = 1/f - n₀/(n s) at 550 nm.
 
         Raises:
-            ValueError: the lens makes no real image, or the distance is none.
+            ValueError: the lens makes no real image, or the distance is invalid.
         """
         positive("source_distance", source_distance, infinite=True)
         if self.thin_lens_focal_length is None:
@@ -171,22 +169,22 @@ class Pupil:
         if power <= 0:
             raise ValueError(
                 f"sensor_distance is missing: a lens of focal length {number(self.thin_lens_focal_length):.3g} m "
-                f"makes no real image of a source at {source_distance:.3g} m, so say where the sensor is [m]"
+                f"makes no real image of a source at {source_distance:.3g} m, so specify the sensor's distance [m]"
             )
         return 1 / power
 
     def index_behind(self, wavelength: float) -> float:
-        """Of the medium between pupil and sensor at a vacuum wavelength [m]."""
+        """Refractive index between pupil and sensor at a vacuum wavelength [m]."""
         return self._index("medium_n", wavelength)
 
     def index_before(self, wavelength: float) -> float:
-        """Of the medium between source and pupil."""
+        """Refractive index between source and pupil at a vacuum wavelength [m]."""
         if self.object_n is None:
             return self.index_behind(wavelength)
         return self._index("object_n", wavelength)
 
     def _index(self, name: str, wavelength: float) -> float:
-        """Of a medium; asked for many times for every picture."""
+        """Refractive index of a medium, cached because every PSF evaluates it many times."""
         known = self._indices
         if (name, wavelength) not in known:
             known[name, wavelength] = number(index_of(name, getattr(self, name)).at(wavelength))
@@ -201,11 +199,11 @@ class Pupil:
         return replace(self, height=None)
 
     def index_step(self, wavelength: float) -> Scalar:
-        """n(λ) less the index before the pupil, in which the relief stands."""
+        """n(λ) minus the index in front of the pupil, which surrounds the relief."""
         return self.n.at(wavelength) - self.index_before(wavelength)
 
     def bends(self, wavelength: float) -> bool:
-        """Whether the relief does anything, or is asked what it would do."""
+        """Return whether the relief changes the path, or derivatives of its index are requested."""
         step = self.index_step(wavelength)
         return self.height is not None and (is_differentiable(step) or step != 0)
 
@@ -216,7 +214,7 @@ class Pupil:
         return self.aperture.rotationally_symmetric and relief_is and wavefront_is and mask_is
 
     def mirror_symmetric(self, wavelength: float) -> bool:
-        """Whether nothing changes where x or y is mirrored, under any change that is asked about."""
+        """Return whether the pupil is invariant under mirroring of x and of y, also under all requested derivatives."""
         relief_is = not self.bends(wavelength) or self.height.mirror_symmetric
         wavefront_is = self.wavefront is None or self.wavefront.rotationally_symmetric
         mask_is = self.mask is None or self.mask.rotationally_symmetric
@@ -242,25 +240,27 @@ class Pupil:
         return total
 
     def slopes(self, wavelength: float, source: PointSource) -> Slopes:
-        """Gradient of the optical path over the disk and its soft edge, by central differences: between a relief's
-        jumps, where pixels are level, that of all the rest."""
-        # A path knows its wavelength by the indices alone: where these stay what they are, so do slopes.
+        """Gradient of the optical path over the disk and its soft edge, by differences; pixels of reliefs are level."""
+        # A path depends on the wavelength only through these indices: equal indices give equal slopes.
         indices = number(self.index_step(wavelength)), self.index_before(wavelength), self.index_behind(wavelength)
         same = self._first_with.setdefault(indices, wavelength)
         return _slopes(self._level if self.pixels else self, same, number(source.distance), source.angle)
 
     @cached_property
     def _first_with(self) -> dict[tuple[float, float, float], float]:
-        """The first wavelength that was asked for with these indices."""
+        """First wavelength that was requested with these indices."""
         return {}
 
     def scatter(self, wavelength: float, share: float) -> float:
-        """Spatial frequency [1/m] along x and y by which light leaves its rays, but for this share: by a relief's
-        jumps, a mask, and ripples, which send none further than their slopes and own frequency do (Carson's rule)."""
+        """Spatial frequency [1/m] along x and y beyond which at most this share of the light is scattered off its rays.
+
+        A relief's jumps, a mask, and ripples scatter light. Ripples send it at most as far as the sum of their slopes
+        and their own frequency (Carson's rule).
+        """
         bends, found = self.bends(wavelength), 0.0
         rough = sum(p is not None and p.scatters for p in (self.height if bends else None, self.wavefront))
         each = share / max(1, rough + (self.mask is not None))
-        of_disk = each * self.aperture.area / math.pi  # samples are of all the disk, light is of the opening
+        of_disk = each * self.aperture.area / math.pi  # samples cover the whole disk, light only the opening
         turns, level = number(self.index_step(wavelength)) / wavelength, math.sqrt(of_disk) / (2 * math.pi)  # waves
         if bends and isinstance(self.height, PixelRelief):
             found += self.height.scatter(turns, self.aperture, each) / self.radius
@@ -273,9 +273,10 @@ class Pupil:
         return found if self.mask is None else found + self.mask.detail(light, self.radius)
 
     def bandwidth(self, wavelength: float, tolerance: float) -> float:
-        """Spatial frequency [1/m] above which relief and wavefront change the phase by less than `tolerance` rad,
-        and the mask the amplitude by as much. Jumps between pixels count for nothing: they are sampled for
-        themselves."""
+        """Spatial frequency [1/m] above which phase [rad] and mask amplitude change by less than `tolerance`.
+
+        Jumps between pixels are excluded, because they are sampled separately.
+        """
         level, step = tolerance * wavelength / (2 * np.pi), abs(number(self.index_step(wavelength)))
         found = 0.0
         if self.height is not None and step != 0 and not self.pixels:

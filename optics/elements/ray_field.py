@@ -1,8 +1,8 @@
-"""What rays make of polarised light: its field just behind a pupil, a thing of masks.
+"""Field of polarised light along rays, just behind a pupil, expressed by masks.
 
-A ray is perpendicular to the wavefront, so that it goes along s = ∇L/n, L the path through source and pupil. Its field
-is turned with it, by the shortest way: a lens that does not reflect or absorb does that (Richards & Wolf, Proc. R. Soc.
-A 253, 358, 1959, §2).
+A ray is perpendicular to the wavefront, so its direction is s = ∇L/n with L the path through source and pupil. The
+field is rotated with it along the shortest arc: a lens that neither reflects nor absorbs does that (Richards & Wolf,
+Proc. R. Soc. A 253, 358, 1959, §2).
 """
 
 from __future__ import annotations
@@ -20,24 +20,27 @@ from optics.numerics.precision import Precision, opaque
 
 __all__ = ["SCALAR", "RayField", "Vector", "Weights", "before_pupil", "rays_behind", "turned"]
 
-STEP = 1e-4  # choice, radii: of central differences; a lens' slopes err by 1e-8, and rounding by 1e-11
-SPREAD = 2.0  # choice: how much finer than the path itself fields are, which depend on products of its slopes
+STEP = 1e-4  # choice, radii: step of differences; errors of a lens' slopes are 1e-8, of rounding 1e-11
+SPREAD = 2.0  # choice: bandwidth of fields relative to the path's, since they depend on products of slopes
 
-SCALAR = (1.0, 0.0, 0.0, 0.0, 0.0)  # weights of a `RayField` that is the mask of the pupil alone
+SCALAR = (1.0, 0.0, 0.0, 0.0, 0.0)  # weights of a `RayField` that contains only the pupil's own mask
 
 Weights = tuple[float, float, float, float, float]
 Vector = tuple[Any, Any, Any]  # x, y, z: floats, or arrays of NumPy or Dr.Jit
 
 
 def turned(field: Vector, before: Vector, after: Vector) -> Vector:
-    """A field turned as the shortest way turns one unit vector into another; the field is at right angles to it."""
+    """Rotate a field as the shortest rotation turns `before` into `after`, two unit vectors.
+
+    The field is perpendicular to `before`.
+    """
     share = _product(field, after) / (1 + _product(before, after))
     x, y, z = (f - share * (b + a) for f, b, a in zip(field, before, after, strict=True))
     return x, y, z
 
 
 def before_pupil(source: PointSource, axis: int) -> tuple[Vector, Vector]:
-    """Direction of light from far away, and its field if it is polarised along x (0) or y (1)."""
+    """Direction of light from a distant source, and its field if polarised along x (0) or y (1)."""
     x, y = (math.tan(angle) for angle in source.angle)
     length = math.hypot(x, y, 1)
     along = (x / length, y / length, 1 / length)
@@ -45,8 +48,10 @@ def before_pupil(source: PointSource, axis: int) -> tuple[Vector, Vector]:
 
 
 def rays_behind(beam: Beam, x: Array, y: Array, types: Precision) -> Vector:
-    """Directions of rays that leave points (x, y) [m], unit vectors of float64 arrays; where light is evanescent, z
-    is 0."""
+    """Directions of rays that leave points (x, y) [m]: unit vectors of float64 arrays.
+
+    For evanescent light z is 0.
+    """
     import drjit as dr
 
     radius, bare = beam.pupil.radius, replace(beam.pupil, mask=None)
@@ -62,10 +67,11 @@ def rays_behind(beam: Beam, x: Array, y: Array, types: Precision) -> Vector:
 
 @dataclass(frozen=True, eq=False)
 class RayField(Mask):
-    """The amplitude behind a pupil of w₀ + w₁ Ex + w₂ ξEx/R + w₃ Ey + w₄ ηEy/R, times that of the pupil's own mask.
+    """Amplitude behind a pupil, w₀ + w₁ Ex + w₂ ξEx/R + w₃ Ey + w₄ ηEy/R, times that of the pupil's own mask.
 
-    beam: the light before it takes this mask. axis: along which it is polarised before the pupil, 0 (x) or 1 (y).
-    weights: w; numbers apart, all such masks are one kernel.
+    beam: the light without this mask.
+    axis: polarisation before the pupil, 0 (x) or 1 (y).
+    weights: w. All such masks share one kernel, since only the weights differ.
     """
 
     beam: Beam
@@ -93,7 +99,7 @@ class RayField(Mask):
         return found if own is None else found * own.amplitude(x, y, radius, types)
 
     def bandwidth(self, level: float, radius: float) -> float:
-        """The path's own, and what directions have that a lens gives: poles at the height of its focus."""
+        """Bandwidth of the path, plus that of a lens' ray directions, which have poles at its focal distance."""
         pupil, own = self.beam.pupil, self.beam.pupil.mask
         found = SPREAD * self._bare.bandwidth(self.beam.wavelength, level)
         found += 0.0 if own is None else own.bandwidth(level, radius)

@@ -38,19 +38,20 @@ class Dispersion(ABC):
 
     @property
     def is_differentiable(self) -> bool:
-        """Whether it carries derivatives."""
+        """True if the curve carries derivatives."""
         return False
 
     @abstractmethod
     def _n(self, wavelength: float) -> Scalar:
-        """At a vacuum wavelength [m], unchecked."""
+        """Index at a vacuum wavelength [m], unchecked."""
 
 
 @dataclass(frozen=True)
 class RefractiveIndex(Dispersion):
     """n(λ) = A + B/λ² + C/λ⁴ + D/λ⁶ (Cauchy's equation; Born & Wolf, Principles of Optics, §2.3.3), λ in vacuum.
 
-    a: A, at least 1 (vacuum). b, c, d: [m²], [m⁴], [m⁶]; 0 is a material without dispersion.
+    a: A, at least 1 (vacuum).
+    b, c, d: [m²], [m⁴], [m⁶]; 0 for a material without dispersion.
     """
 
     a: Scalar
@@ -66,7 +67,7 @@ class RefractiveIndex(Dispersion):
 
     @classmethod
     def from_abbe(cls, n_d: float, abbe_number: float) -> RefractiveIndex:
-        """The Cauchy curve with index n_d at 587.562 nm and the given Abbe number (infinite: no dispersion)."""
+        """Return the Cauchy curve with index n_d at 587.562 nm and the given Abbe number (infinite: no dispersion)."""
         in_range("n_d", n_d, 1.0, 10.0, carried=True)
         number = positive("abbe_number", abbe_number, "1", infinite=True)
         b = (n_d - 1) / number / (LINE_F**-2 - LINE_C**-2)
@@ -87,10 +88,11 @@ class RefractiveIndex(Dispersion):
 class Sellmeier(Dispersion):
     """n²(λ) = 1 + Σ B λ²/(λ² - C), λ in vacuum.
 
-    strengths: B. poles_um2: C [µm²]; as many of each.
+    strengths: B.
+    poles_um2: C [µm²]; the same number as strengths.
 
     Raises:
-        ValueError: no terms, not as many of each, or numbers that are not finite.
+        ValueError: no terms, different numbers of strengths and poles, or numbers that are not finite.
     """
 
     strengths: tuple[float, ...]
@@ -103,7 +105,7 @@ class Sellmeier(Dispersion):
                 raise ValueError(f"{name} = {shown(values)}: must be a row of numbers")
             object.__setattr__(self, name, tuple(finite(name, value) for value in values))
         if len(self.strengths) != len(self.poles_um2):
-            raise ValueError(f"{len(self.poles_um2)} poles_um2: must be as many as strengths, {len(self.strengths)}")
+            raise ValueError(f"{len(self.poles_um2)} poles_um2: must be one per strength, {len(self.strengths)}")
 
     def _n(self, wavelength: float) -> float:
         square = (wavelength / UM) ** 2
@@ -131,7 +133,7 @@ class Cornu(Dispersion):
 
 
 def _cauchy(a: float, b: float, c: float, d: float) -> RefractiveIndex:
-    """Of coefficients for nm."""
+    """Cauchy curve from coefficients for wavelengths in nm."""
     return RefractiveIndex(a, b * 1e-18, c * 1e-36, d * 1e-54)
 
 
@@ -145,39 +147,38 @@ MEDIA: dict[str, Dispersion] = {
     "cornea": _cauchy(1.361594, 6009.687, -6.760760e8, 5.908450e13),
     "aqueous": _cauchy(1.321631, 6070.796, -7.062305e8, 6.147861e13),
     "vitreous": _cauchy(1.322357, 5560.240, -5.817391e8, 5.036810e13),
-    # Thibos, Ye, Zhang & Bradley, Appl. Opt. 31, 3594 (1992): one medium that has a whole human eye's dispersion.
+    # Thibos, Ye, Zhang & Bradley, Appl. Opt. 31, 3594 (1992): one medium with the dispersion of a whole human eye.
     "chromatic_eye": Cornu(1.320535, 0.004685, 0.214102),
 }
 
 
 def medium(name: str) -> Dispersion:
-    """The index of a medium of eyes over wavelength: "water", "cornea", "aqueous", "vitreous", or "chromatic_eye", the
-    one medium of Thibos' reduced human eye.
+    """Return the dispersion of a medium of eyes.
+
+    name: "water", "cornea", "aqueous", "vitreous", or "chromatic_eye", the single medium of Thibos' reduced human eye.
 
     Raises:
-        ValueError: no such medium.
+        ValueError: unknown medium.
     """
     return MEDIA[one_of("medium", name, MEDIA)]
 
 
 def index_of(name: str, value: Any) -> Dispersion:
-    """A number, or a curve, as a curve; numbers must lie in [1, 10] and carry no derivative.
+    """Convert a number or a curve to a curve; numbers must lie in [1, 10] and carry no derivatives.
 
     Raises:
-        ValueError: it is neither.
+        ValueError: neither a number nor a curve.
     """
     if isinstance(value, Dispersion):
         if value.is_differentiable:
-            raise ValueError(
-                f"{name} asks for a derivative, which it does not carry to the picture: give plain numbers"
-            )
+            raise ValueError(f"{name} requires a derivative, but none is propagated through it: pass plain numbers")
         return value
     _refuse_name(name, value)
     return RefractiveIndex(in_range(name, value, 1.0, 10.0))
 
 
 def material(name: str, value: Any) -> Dispersion:
-    """The same, of numbers that may carry derivatives. Errors: as `index_of`."""
+    """Convert a number or a curve to a curve; numbers may carry derivatives. Errors: see `index_of`."""
     if isinstance(value, Dispersion):
         return value
     _refuse_name(name, value)

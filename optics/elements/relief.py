@@ -1,7 +1,7 @@
 """Reliefs: height maps of the pupil's glass, over the square that holds the pupil.
 
-A relief is a function of (x, y) in units of the aperture radius; inside the pupil both lie in [-1, 1].
-Row index and y grow together, as do column index and x. `Pupil.path` makes it a path, and `Beam.waves` a phase.
+A relief is a function of (x, y) in units of the aperture radius; inside the pupil both lie in [-1, 1]. Row index and y
+increase together, as do column index and x. `Pupil.path` converts it to a path, and `Beam.waves` to a phase.
 """
 
 from __future__ import annotations
@@ -23,13 +23,13 @@ from optics.numerics.precision import Precision
 
 __all__ = ["BSplineRelief", "HeightMap", "Relief"]
 
-FEWEST_FOR_JUMPS = 16  # choice: samples a side
+FEWEST_FOR_JUMPS = 16  # choice: samples along a side
 
 
 class Relief(ABC):
     """A height map [m]."""
 
-    scatters = True  # perhaps: light to where no slope of it points
+    scatters = True  # it may send light in directions other than those of its slopes
 
     @abstractmethod
     def height(self, x: Array, y: Array, types: Precision) -> Array:
@@ -40,37 +40,37 @@ class Relief(ABC):
         """Spatial frequency [cycles per aperture radius] above which the relief's content is below `level` [m]."""
 
     def detail(self, level: float) -> float:
-        """Frequency [cycles per aperture radius] beyond which less than `level` [m] (rms) is untold by slopes."""
+        """Frequency [cycles per aperture radius] beyond which content missed by the slopes is below `level` [m] rms."""
         return self.bandwidth(level)
 
     @property
     @abstractmethod
     def knots(self) -> int:
-        """Polynomial pieces across the pupil."""
+        """Number of polynomial pieces across the pupil."""
 
     @property
     def span(self) -> float:
-        """Highest less lowest of the numbers [m] that the relief is made of."""
+        """Difference between the largest and smallest height [m] that define the relief."""
         return 0.0
 
     @property
     def jump(self) -> float:
-        """Largest step [m] between neighbouring samples that a smooth relief is too coarse for; 0: none."""
+        """Largest step [m] between neighbouring samples that a smooth relief cannot resolve; 0 for none."""
         return 0.0
 
     @property
     def pixels(self) -> int:
-        """Squares across the pupil between which the height jumps, in each of which it is the same; 0: it is smooth."""
+        """Number of constant-height squares across the pupil, between which the height jumps; 0 for a smooth relief."""
         return 0
 
     @property
     def rotationally_symmetric(self) -> bool:
-        """Whether the height depends on the distance from the axis alone, under any change that is asked about."""
+        """True if the height depends only on the distance from the axis, also under all requested derivatives."""
         return False
 
     @property
     def mirror_symmetric(self) -> bool:
-        """Whether it is the same where x or y is mirrored, under any change that is asked about."""
+        """True if the height is invariant under mirroring of x and of y, also under all requested derivatives."""
         return self.rotationally_symmetric
 
 
@@ -78,9 +78,9 @@ class Relief(ABC):
 class BSplineRelief(Relief):
     """One uniform bicubic B-spline patch: heights h(x, y) = Σ_ij c[i, j] B_i(v) B_j(u), u = (x/a + 1)/2.
 
-    control_points: (4, 4) heights [m], (y, x), knots -3 ... 4. The patch is every bicubic polynomial, so it contains
-    every paraboloid exactly (`paraboloid`). Outside the square the polynomial goes on.
-    Piegl & Tiller, The NURBS Book, ch. 2.
+    control_points: (4, 4) heights [m], (y, x), knots -3 ... 4. The patch represents every bicubic polynomial, so it
+    contains every paraboloid exactly (`paraboloid`). Outside the square the polynomial continues. Piegl & Tiller, The
+    NURBS Book, ch. 2.
 
     A Dr.Jit tensor of control points carries derivatives.
 
@@ -106,10 +106,10 @@ class BSplineRelief(Relief):
     def paraboloid(cls, height: float, curvature: float, radius: float) -> BSplineRelief:
         """h = height - curvature (x² + y²)/2 [m], curvature in 1/m, over a pupil of the given radius [m].
 
-        With curvature medium_n / ((n - medium_n) f) it is the paraxial lens exp(-ikr²/2f), to the phase of `height`.
+        With curvature medium_n / ((n - medium_n) f) it is the paraxial lens exp(-ikr²/2f) times the phase of `height`.
 
-        On uniform knots the polar form gives x² the control values X_i² - δ²/3, X_i = (2i - 3) a the Greville
-        abscissae and δ = 2a the knot spacing.
+        On uniform knots the polar form of x² has the control values X_i² - δ²/3, with the Greville abscissae X_i = (2i
+        - 3) a and the knot spacing δ = 2a.
 
         Raises:
             ValueError: names argument, value and valid range.
@@ -150,9 +150,9 @@ class BSplineRelief(Relief):
 
     @property
     def rotationally_symmetric(self) -> bool:
-        """A paraboloid on the axis, whose control values lie on c₀ + c₁ (i² + j²), or a constant."""
+        """True for a constant, or a paraboloid on the axis, whose control values lie on c₀ + c₁ (i² + j²)."""
         if is_differentiable(self.control_points):
-            return False  # a derivative asks about every control point
+            return False  # a derivative depends on every control point
         points = self.control_points
         square = (2 * np.arange(4) - 3) ** 2
         corner, curvature = points[1, 1], (points[0, 1] - points[1, 1]) / 8
@@ -168,7 +168,7 @@ class BSplineRelief(Relief):
 class HeightMap(Relief):
     """Heights [m] sampled at cell centres over the square [-a, a]², joined by cubic splines (not-a-knot ends).
 
-    samples: (n, n), (y, x). Beyond the outermost centres the spline goes on for a cell, then straight.
+    samples: (n, n), (y, x). Beyond the outermost centres the spline continues for one cell, then linearly.
 
     A Dr.Jit tensor of samples carries derivatives.
 
@@ -191,7 +191,7 @@ class HeightMap(Relief):
 
     @property
     def jump(self) -> float:
-        """Of half the whole span or more from one of many samples to the next, as where a lens is wrapped."""
+        """Largest step between neighbours if at least half the span, as in a wrapped lens (many samples); else 0."""
         many = len(self._heights) >= FEWEST_FOR_JUMPS
         steepest = max(np.abs(np.diff(self._heights, axis=axis)).max() for axis in (0, 1)) if many else 0.0
         return float(steepest) if steepest > self.span / 2 else 0.0
@@ -234,7 +234,7 @@ class HeightMap(Relief):
         return total
 
     def on_grid(self, at: np.ndarray) -> np.ndarray:
-        """Heights, (y, x), at normalised places along either axis; NumPy arrays, without derivative."""
+        """Heights, (y, x), at normalised positions along either axis; NumPy arrays without derivatives."""
         n, width = len(self._heights), len(self._coefficients)
         place = (at + 1) * (n / 2) + self._margin - 0.5
         cell = np.clip(np.floor(place), 1, width - 3)
@@ -245,7 +245,7 @@ class HeightMap(Relief):
         return found
 
     def _cell(self, position: Array, n: int, width: int, types: Precision) -> tuple[Array, list[Array]]:
-        """First of the four coefficients that act at a position, and the four weights."""
+        """Index of the first of the four coefficients that act at a position, and the four weights."""
         import drjit as dr
 
         half, shift = dr.opaque(types.Float64, n / 2), dr.opaque(types.Float64, self._margin - 0.5)
@@ -257,7 +257,7 @@ class HeightMap(Relief):
         return band_of(self._heights, level)
 
     def detail(self, level: float, part: float = 1.0) -> float:
-        """part: half the side of the square in the middle that counts: then the frequency's own unit."""
+        """part: half side of the central square that is analysed; it is also the unit of length of the frequency."""
         return reach_of(_power_beyond(self, min(part, 1.0)), level)
 
     @property
@@ -274,7 +274,7 @@ class HeightMap(Relief):
 
 
 def _spline_coefficients(samples: np.ndarray, margin: int) -> np.ndarray:
-    """Uniform B-spline coefficients along axis 0, `margin` more at either end: c = s - s''/6 of a cubic spline s."""
+    """Uniform B-spline coefficients along axis 0, `margin` extra at either end: c = s - s''/6 of a cubic spline s."""
     from scipy.interpolate import make_interp_spline
 
     n = len(samples)
@@ -295,6 +295,6 @@ def _spline_coefficients(samples: np.ndarray, margin: int) -> np.ndarray:
 
 @lru_cache(maxsize=16)
 def _power_beyond(relief: HeightMap, part: float) -> np.ndarray:
-    """Of a square in the middle; see `fine_detail.power_beyond`."""
+    """Mean squares in a central square; see `fine_detail.power_beyond`."""
     at = ((np.arange(n := math.ceil(part * relief.knots)) + 0.5) * 2 / n - 1) * part
     return power_beyond(relief._heights if part == 1 else relief.on_grid(at))

@@ -17,8 +17,8 @@ class PointSource:
     """A point source of unit amplitude on the pupil: exp(ik(ρ(x, y) - ρ(0, 0))), ρ the distance from the source.
 
     distance: axial distance in front of the pupil [m]; infinite for a plane wave.
-    angle: (θx, θy) [rad], the direction in which its light travels: a thin lens sends it to about f (tan θx, tan θy),
-        with the aberrations that a single stigmatic lens has off its axis.
+    angle: (θx, θy) [rad], the direction in which its light travels. A thin lens focuses it near f (tan θx, tan θy),
+    with the off-axis aberrations of a single stigmatic lens.
     """
 
     distance: Scalar = math.inf
@@ -31,7 +31,7 @@ class PointSource:
         object.__setattr__(self, "angle", angle)
 
     def path(self, x: Array, y: Array, types: Precision) -> Array:
-        """Optical path [m] in vacuum at the pupil's points, less the one at the centre (flat float64 arrays)."""
+        """Optical path [m] in vacuum at the pupil's points, relative to the centre (flat float64 arrays)."""
         import drjit as dr
 
         tx, ty = (math.tan(theta) for theta in self.angle)
@@ -40,7 +40,7 @@ class PointSource:
         if math.isinf(number(self.distance)):
             return along
         centre = opaque(types, self.distance) * norm
-        # ρ - ρ₀ = (r² + 2 ρ₀ (x, y)·t) / (ρ + ρ₀): no difference of nearly equal numbers
+        # ρ - ρ₀ = (r² + 2 ρ₀ (x, y)·t) / (ρ + ρ₀) avoids a difference of nearly equal numbers
         excess = x * x + y * y + 2 * centre * along
         rho = dr.sqrt(excess + centre * centre)
         return excess / (rho + centre)

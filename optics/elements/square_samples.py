@@ -1,4 +1,4 @@
-"""Numbers on a square, as users give them: heights of a relief, amplitudes of a mask, samples of a wavefront."""
+"""Checks of samples over a square: heights of a relief, amplitudes of a mask, values of a wavefront."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ __all__ = ["on_both_sides", "square_samples"]
 
 
 def on_both_sides(heights: np.ndarray) -> bool:
-    """The same numbers left and right, and above and below."""
+    """Return whether samples are invariant under mirroring in both directions."""
     return np.array_equal(heights, heights[::-1]) and np.array_equal(heights, heights[:, ::-1])
 
 
 def square_samples(samples: Any, name: str = "height", what: str = "heights [m]") -> np.ndarray:
-    """The same without derivatives, as an array that nobody can change.
+    """Return the samples without derivatives, as a read-only array.
 
     Raises:
         ValueError: not square, empty, or not finite.

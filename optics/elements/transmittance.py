@@ -1,4 +1,4 @@
-"""Masks: how much of the light's amplitude a pupil lets through from place to place."""
+"""Masks: amplitude transmittance over the pupil."""
 
 from __future__ import annotations
 
@@ -16,47 +16,49 @@ from optics.numerics.precision import Precision, opaque, padded_for_packets, pre
 
 __all__ = ["GaussianMask", "Mask", "MaskMap"]
 
-OVERSHOOT = 0.02  # choice: by which the spline may leave [-1, 1]
-FINER = 4  # choice: steps per sample at which that is looked at
+OVERSHOOT = 0.02  # choice: largest excess of the spline over [-1, 1]
+FINER = 4  # choice: steps per sample of this check
 
 
 class Mask(ABC):
-    """Transmittance of the amplitude, between -1 and 1; its square is that of the intensity."""
+    """Amplitude transmittance, between -1 and 1; its square is the intensity transmittance."""
 
     @abstractmethod
     def amplitude(self, x: Array, y: Array, radius: Scalar, types: Precision) -> Array:
-        """At points (x, y) [m] of a pupil of this radius [m], flat Dr.Jit float64 arrays."""
+        """Amplitude at points (x, y) [m] of a pupil of this radius [m], flat Dr.Jit float64 arrays."""
 
     @abstractmethod
     def bandwidth(self, level: float, radius: float) -> float:
-        """Spatial frequency [1/m] above which its content is below `level`."""
+        """Spatial frequency [1/m] above which the mask's content is below `level`."""
 
     def detail(self, light: float, radius: float) -> float:
-        """Spatial frequency [1/m] along x and y beyond which it sends no more than this light, as a mean over the disk
-        of a pupil of this radius [m]; 1 is all that falls onto it."""
+        """Spatial frequency [1/m] along x and y beyond which the mask sends at most this light.
+
+        light: mean over the disk of a pupil of this radius [m]; 1 is all incident light.
+        """
         return self.bandwidth(math.sqrt(light), radius)
 
     @property
     def rotationally_symmetric(self) -> bool:
-        """Whether it depends on the distance from the axis alone, under any change that is asked about."""
+        """True if the mask depends only on the distance from the axis, also under all requested derivatives."""
         return False
 
     @property
     def radius(self) -> float | None:
-        """[m], of what it is known over; None: the pupil's, or everywhere."""
+        """Radius [m] over which the mask is known; None: the pupil's, or unlimited."""
         return None
 
     @property
     def plain(self) -> bool:
-        """Whether its numbers are plain ones, of which nobody can ask for a derivative."""
+        """True if all its numbers are plain ones, which cannot carry derivatives."""
         return False
 
 
 @dataclass(frozen=True, eq=False)
 class GaussianMask(Mask):
-    """exp(-r²/w²), as a laser's beam or the guiding of a photoreceptor has it: intensity falls to 1/e² at r = w.
+    """exp(-r²/w²), as for a laser beam or the guided mode of a photoreceptor: intensity falls to 1/e² at r = w.
 
-    waist: w [m], which may be a Dr.Jit number that carries a derivative.
+    waist: w [m]; a Dr.Jit number may carry a derivative.
 
     Raises:
         ValueError: not positive.
@@ -73,11 +75,11 @@ class GaussianMask(Mask):
         return dr.exp(-(x * x + y * y) / dr.square(opaque(types, self.waist)))
 
     def bandwidth(self, level: float, radius: float) -> float:
-        """Its spectrum is exp(-π²w²f²)."""
+        """Frequency from the mask's spectrum, exp(-π²w²f²)."""
         return math.sqrt(max(-math.log(level), 1.0)) / (math.pi * number(self.waist))
 
     def detail(self, light: float, radius: float) -> float:
-        """Of the light exp(-2π²w²f²) goes beyond f."""
+        """A share exp(-2π²w²f²) of the light lies beyond f."""
         waist = number(self.waist)
         beam = (waist / radius) ** 2 / 2 * -math.expm1(-2 * (radius / waist) ** 2)
         return math.sqrt(max(-math.log(light / beam), 0.0) / 2) / (math.pi * waist)
@@ -93,15 +95,17 @@ class GaussianMask(Mask):
 
 @dataclass(frozen=True, eq=False)
 class MaskMap(Mask):
-    """Amplitudes in [-1, 1] sampled at cell centres over the square [-radius, radius]², joined by cubic splines (see
-    HeightMap). For edges at which light is let through or not there are apertures.
+    """Amplitudes in [-1, 1] sampled at cell centres over the square [-radius, radius]², joined by cubic splines.
 
-    samples: (n, n), (y, x). reach: [m] of the square, at least the pupil's radius; None: the pupil's.
+    The interpolation is that of HeightMap. For hard edges use apertures instead.
+
+    samples: (n, n), (y, x).
+    reach: half side [m] of the square, at least the pupil's radius; None: the pupil's.
 
     A Dr.Jit tensor of samples carries derivatives.
 
     Raises:
-        ValueError: not square, empty, not finite, or beyond [-1, 1], as the spline is where samples jump.
+        ValueError: not square, empty, not finite, or beyond [-1, 1], which also happens to the spline at jumps.
     """
 
     samples: np.ndarray | Array
@@ -137,7 +141,7 @@ class MaskMap(Mask):
         return self._map.height(x * scale, y * scale, types)
 
     def on_grid(self, at: np.ndarray, radius: float) -> np.ndarray:
-        """Amplitudes, (y, x), at places along either axis in units of a pupil's radius [m]; without derivative."""
+        """Amplitudes, (y, x), at positions along either axis in units of the pupil's radius [m]; no derivatives."""
         return self._map.on_grid(at if self.reach is None else at * (radius / self.reach))
 
     def bandwidth(self, level: float, radius: float) -> float:

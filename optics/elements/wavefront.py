@@ -1,7 +1,7 @@
-"""Wavefronts: what an eye, or any other optics, does to the light's phase beside its lens, as aberrometers report it.
+"""Wavefront aberrations of an eye or other optics, added to an ideal lens, in the convention of aberrometers.
 
-The sign is that of reports on human eyes: positive where the wavefront that leaves the eye is ahead, so that a positive
-defocus is a myope's. Light that enters has an optical path shorter by as much.
+The sign is that of reports on human eyes: positive where the wavefront that leaves the eye is ahead, so a positive
+defocus belongs to a myope. For light that enters the eye, the optical path is shorter by the same amount.
 """
 
 from __future__ import annotations
@@ -23,15 +23,14 @@ from optics.numerics.precision import Precision, opaque
 
 __all__ = ["HIGHEST", "Aberration", "WavefrontMap", "Zernike", "mode"]
 
-HIGHEST = 30  # choice: radial order
+HIGHEST = 30  # choice: highest radial order
 UM = 1e-6
 
 
 class Aberration(ABC):
-    """How far a wavefront that leaves the pupil is ahead [m], over a circle or square of `radius` [m] (None: the
-    pupil's).
+    """Lead [m] of a wavefront that leaves the pupil, over a circle or square of `radius` [m] (None: the pupil's).
 
-    scatters: whether it may send light where no slope of it points
+    scatters: True if it may send light in directions other than those of its slopes.
     """
 
     scatters: ClassVar[bool] = True
@@ -39,30 +38,34 @@ class Aberration(ABC):
 
     @abstractmethod
     def ahead(self, x: Array, y: Array, types: Precision) -> Array:
-        """[m] at positions in units of the radius: flat Dr.Jit float64 arrays in and out."""
+        """Lead [m] at positions in units of the radius: flat Dr.Jit float64 arrays in and out."""
 
     @abstractmethod
     def bandwidth(self, level: float) -> float:
-        """Spatial frequency [cycles per radius] above which its content is below `level` [m]."""
+        """Spatial frequency [cycles per radius] above which the wavefront's content is below `level` [m]."""
 
     def detail(self, level: float, part: float = 1.0) -> float:
-        """Spatial frequency [cycles per radius] along x and y beyond which what slopes do not tell of it is below
-        `level` [m], root mean square, over a pupil whose radius is this part of the wavefront's."""
+        """Spatial frequency [cycles per radius] beyond which content missed by the slopes is below `level` [m] rms.
+
+        The frequency is along x and y.
+
+        part: the pupil's radius relative to the wavefront's.
+        """
         return self.bandwidth(level)
 
     @property
     @abstractmethod
     def knots(self) -> int:
-        """Polynomial pieces across it that slopes should be told apart by."""
+        """Number of polynomial pieces across the wavefront that its slopes must resolve."""
 
     @property
     @abstractmethod
     def span(self) -> float:
-        """Highest less lowest [m], or somewhat more."""
+        """Largest minus smallest value [m], or an upper bound."""
 
     @property
     def rotationally_symmetric(self) -> bool:
-        """Whether it depends on the distance from the axis alone, under any change that is asked about."""
+        """True if the wavefront depends only on the distance from the axis, also under all requested derivatives."""
         return False
 
     def _check_radius(self) -> None:
@@ -72,22 +75,22 @@ class Aberration(ABC):
 
 @dataclass(frozen=True, eq=False)
 class Zernike(Aberration):
-    """W = Σ c_n^m Z_n^m(x, y) by Zernike's polynomials, in the order, sign and normalisation of OSA and ANSI:
+    """W = Σ c_n^m Z_n^m(x, y) in Zernike polynomials, with the order, sign and normalisation of OSA and ANSI:
 
         Z_n^m = √((2 - δ_m0)(n + 1)) R_n^|m|(ρ) {cos mθ, m >= 0; sin |m|θ, m < 0},   x = ρ cos θ, y = ρ sin θ
 
     (Thibos, Applegate, Schwiegerling & Webb, J. Refract. Surg. 18, S652, 2002), with a variance of 1 over the circle.
 
     coefficients_um: {(n, m): [µm]}, or a vector [µm] by the index j = (n(n + 2) + m)/2, piston first.
-    radius: of the circle [m] that they are reported for, at least the pupil's; None: the pupil's.
+    radius: radius [m] of the circle to which the coefficients refer, at least the pupil's; None: the pupil's.
 
     A Dr.Jit vector, or Dr.Jit numbers in a dictionary, carry derivatives.
 
     Raises:
-        ValueError: no such mode, its order is above 30, or a coefficient is no finite number.
+        ValueError: an unknown mode, an order above 30, or a coefficient that is not finite.
     """
 
-    # A mode turns by n/2 cycles; its slopes, which grow with n² at the rim, tell of more.
+    # A mode has n/2 cycles; its slopes, which grow with n² at the rim, cover higher frequencies.
     scatters: ClassVar[bool] = False
     coefficients_um: Any
     radius: float | None = None
@@ -114,7 +117,7 @@ class Zernike(Aberration):
         return total
 
     def at(self, x: Any, y: Any) -> np.ndarray:
-        """W [m] at positions in units of the radius, NumPy arrays; beyond 1 the polynomials go on."""
+        """W [m] at positions in units of the radius, NumPy arrays; the polynomials continue beyond 1."""
         x, y = np.broadcast_arrays(reals("x", x), reals("y", y))
         total = np.zeros(x.shape)
         for (n, m), value in self.modes.items():
@@ -123,14 +126,14 @@ class Zernike(Aberration):
 
     @property
     def rms(self) -> float:
-        """Root mean square of W [m] over its whole circle, piston aside: √Σc²."""
+        """Root mean square of W [m] over its whole circle without piston: √Σc²."""
         return UM * math.sqrt(sum(value**2 for key, value in self.modes.items() if key != (0, 0)))
 
     def bandwidth(self, level: float) -> float:
         return max(1.0, self.order / 2) if self.span > level or self.asks else 0.0
 
     def detail(self, level: float, part: float = 1.0) -> float:
-        """A mode turns by n/2 cycles, and at the rim its slopes, which grow with n², tell of more."""
+        """Return 0: a mode has n/2 cycles, and its slopes, which grow with n² at the rim, cover higher frequencies."""
         return 0.0
 
     @property
@@ -147,7 +150,7 @@ class Zernike(Aberration):
 
     @cached_property
     def asks(self) -> bool:
-        """Whether a coefficient carries a derivative."""
+        """True if a coefficient carries a derivative."""
         given = self.coefficients_um
         return any(map(is_differentiable, given.values())) if isinstance(given, dict) else is_differentiable(given)
 
@@ -157,7 +160,7 @@ class Zernike(Aberration):
         return max((n for (n, _), value in self.modes.items() if value != 0 or self.asks), default=0)
 
     def _coefficient(self, n: int, m: int, value: float, types: Precision) -> Array:
-        """[m]"""
+        """Coefficient [m] of a mode."""
         import drjit as dr
 
         given = self.coefficients_um
@@ -172,8 +175,8 @@ class Zernike(Aberration):
 class WavefrontMap(Aberration):
     """W [m] sampled at cell centres over the square [-radius, radius]², joined by cubic splines (see HeightMap).
 
-    samples: (n, n), (y, x), ahead as in Zernike: of an optical path difference, its negative. Not wrapped; what lies
-        outside the pupil must be finite too, and smoothly so.
+    samples: (n, n), (y, x), positive if ahead, as in Zernike: the negative of an optical path difference. They must be
+        unwrapped, and finite and smooth outside the pupil, too.
     radius: [m], at least the pupil's; None: the pupil's.
 
     A Dr.Jit tensor of samples carries derivatives.
@@ -188,7 +191,7 @@ class WavefrontMap(Aberration):
 
     def __post_init__(self) -> None:
         self._check_radius()
-        values = square_samples(self.samples, "samples", "[m], outside the pupil too")
+        values = square_samples(self.samples, "samples", "[m], also outside the pupil")
         if not is_differentiable(self.samples):
             object.__setattr__(self, "samples", values)
         object.__setattr__(self, "_map", HeightMap(self.samples))
@@ -216,8 +219,10 @@ class WavefrontMap(Aberration):
 
 
 def mode(n: int, m: int, x: Any, y: Any) -> Any:
-    """Z_n^m at (x, y), NumPy or Dr.Jit: ρ^|m| P_k^(0, |m|)(2ρ² - 1) {cos, sin}, k = (n - |m|)/2, by the recurrence of
-    Jacobi's polynomials, which loses no digits at high orders (Abramowitz & Stegun 22.7.1)."""
+    """Z_n^m at (x, y), NumPy or Dr.Jit: ρ^|m| P_k^(0, |m|)(2ρ² - 1) {cos, sin} with k = (n - |m|)/2.
+
+    The recurrence of Jacobi's polynomials loses no digits at high orders (Abramowitz & Stegun 22.7.1).
+    """
     sine, cosine = x * 0, x * 0 + 1.0
     for _ in range(abs(m)):
         cosine, sine = cosine * x - sine * y, cosine * y + sine * x
@@ -250,7 +255,7 @@ def _check_mode(key: Any) -> None:
 
 
 def _of_vector(given: Any) -> dict[tuple[int, int], float]:
-    """By OSA's index."""
+    """Convert a vector with OSA's index to modes."""
     vector = plain(given) if is_differentiable(given) else reals("coefficients_um", given)
     most = (HIGHEST + 1) * (HIGHEST + 2) // 2
     if vector.ndim != 1 or not 0 < vector.size <= most:

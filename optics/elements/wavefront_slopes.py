@@ -1,4 +1,4 @@
-"""Local slopes of a wavefront behind a pupil: where its rays go, and how far pupil and path turn together."""
+"""Local slopes of a wavefront behind a pupil: directions of its rays, and the combined gradient of pupil and path."""
 
 from __future__ import annotations
 
@@ -14,14 +14,15 @@ from optics.numerics.grid import Grid
 __all__ = ["Slopes"]
 
 
-AROUND = 16  # choice: points around the window that paths are looked at to
-# Differences of fourth order at a row's first two places (Fornberg, Mathematics of Computation 51 (1988) 699, table 3).
+AROUND = 16  # choice: points around the window to which paths are evaluated
+# Differences of fourth order at the first two points of a row (Fornberg, Mathematics of Computation 51 (1988) 699,
+# table 3).
 AT_END = np.array([-25, 48, -36, 16, -3]) / 12
 BESIDE_END = np.array([-3, -10, 18, -6, 1]) / 12
 
 
 def _derivative(values: np.ndarray, step: float) -> np.ndarray:
-    """Along axis 0, by differences of fourth order: the ends lie on the soft edge's rim and count, too."""
+    """Derivative along axis 0 by differences of fourth order, also at the ends, on the rim of the soft edge."""
     slope = np.empty_like(values)
     for place, weights in ((0, AT_END), (1, BESIDE_END)):
         slope[place] = weights @ values[:5] / step
@@ -31,7 +32,7 @@ def _derivative(values: np.ndarray, step: float) -> np.ndarray:
 
 
 def _total(points: np.ndarray, to: list[np.ndarray], bend: tuple[float, float]) -> np.ndarray:
-    """|∇L + n (ξ - x) / D| at points (x, y, ∂L/∂x, ∂L/∂y), on the way to places (x, y), (place, point); bend: n, z."""
+    """|∇L + n (ξ - x) / D| at points (x, y, ∂L/∂x, ∂L/∂y), towards target points (x, y), (place, point); bend: n, z."""
     x, y, px, py = points
     dx, dy = x - to[0], y - to[1]
     scale = np.float32(bend[0]) / np.sqrt(dx * dx + dy * dy + np.float32(bend[1] ** 2))
@@ -64,17 +65,20 @@ class Slopes:
 
     @cached_property
     def steepest_inside(self) -> float:
-        """Largest slope over the disk alone."""
+        """Largest slope over the disk."""
         return math.sqrt(self._squared[self.distance_from_axis <= self.radius].max())
 
     def turning(self, distance: float, window: Grid, medium_n: float) -> tuple[float, float]:
-        """Largest slope of the path through the pupil and on to any point of the window in a plane at `distance` [m],
-        |∇L + n (ξ - x) / D|: over the disk and its soft edge, and over the disk alone."""
+        """Largest slope |∇L + n (ξ - x) / D| of the path through the pupil and on to any point of the window.
+
+        The window lies in a plane at `distance` [m]. The first value covers the disk and its soft edge, the second only
+        the disk.
+        """
         soft = self.distance_from_axis <= (1 + EDGE_REACH) * self.radius
         x, y = np.broadcast_arrays(self.grid.x[None, :], self.grid.y[:, None])
-        # Seven digits do: SLOPE_MARGIN is much more.
+        # Seven digits are enough: SLOPE_MARGIN is much larger.
         points = np.stack([part[soft].astype(np.float32) for part in (x, y, self.along_x, self.along_y)])
-        # A cell more than the disk, so that its rim is not missed.
+        # One cell more than the disk, to include its rim.
         inside = self.distance_from_axis[soft] <= self.radius + self.grid.dx
         (cx, cy), outermost = window.centre, window.own_half_diagonal
         angle = np.linspace(0, 2 * np.pi, AROUND, endpoint=False)
@@ -84,7 +88,7 @@ class Slopes:
         ]
         bend = medium_n, distance
         to_centre = _total(points, [at[0] for at in around], bend)
-        # To another place of the window the path's slope differs by no more than n times their distance over z.
+        # Between points of the window, slopes differ by at most n times the distance of the points over z.
         most = medium_n * outermost / distance
         found = []
         for some in (slice(None), inside):
@@ -95,7 +99,7 @@ class Slopes:
         return float(found[0]), float(found[1])
 
     def rays(self, distance: float, medium_n: float) -> tuple[np.ndarray, np.ndarray]:
-        """Where rays from the disk's points meet a plane at `distance` [m]; evanescent ones end at infinity."""
+        """Intersections of rays from the disk's points with a plane at `distance` [m]; infinite for evanescent rays."""
         inside = self.distance_from_axis <= self.radius
         px, py = self.along_x[inside] / medium_n, self.along_y[inside] / medium_n
         axial = np.sqrt(np.maximum(1 - px**2 - py**2, 0))

@@ -1,4 +1,4 @@
-"""How many spectral bands an eye needs: the fewest whose error a receptor cannot tell."""
+"""Choice of the number of spectral bands: the fewest whose predicted error is within the tolerance."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from optics.spectra.spectrum import daylight
 
 __all__ = ["choose_bands"]
 
-# Choice: numbers of bands to try, up to half of `FINEST`, with which they are compared.
+# Choice: numbers of bands to try, up to half of `FINEST`, the reference.
 CANDIDATES = (1, 2, 4, 8, 16, 32)
 
 
@@ -28,17 +28,21 @@ def choose_bands(
     samples_per_receptor: int = 1,
     white: float | None = None,
 ) -> SpectralBands:
-    """The fewest bands, a power of two, that keep the predicted error of a receptor's signal within the tolerance,
-    in units of white's signal. It is the sum of two:
+    """Return the fewest bands that keep the predicted error of a receptor's signal within the tolerance.
 
-    - reflectances (1 + cos(2π λ/Λ + φ))/2 of any phase φ, Λ the whole range: what the bands make of them against
-      quadrature to 1 nm;
-    - kernels(wavelengths) (wave, k, k), cells of 1/samples_per_receptor (None: the same for all wavelengths):
-      the worst scene's difference between white light's kernel from n and from 2n bands; white: what kernels would
-      leave of white's signal if they were as wide as all that light (None: what they do leave).
+    The number is a power of two. The error is in units of white's signal and is the sum of two terms:
+
+    - For reflectances (1 + cos(2π λ/Λ + φ))/2 of any phase φ, with Λ the whole range: the difference between the bands
+      and quadrature to 1 nm.
+    - For kernels: the largest difference, over all scenes, between white light's kernels from n and from 2n bands.
+
+    kernels: function of wavelengths that returns (wave, k, k) with cells of 1/samples_per_receptor. None: the kernel is
+        the same for all wavelengths.
+    white: share of white's signal that remains behind kernels of the width of all this light's. None: the share that
+    remains behind these kernels.
 
     Raises:
-        AccuracyError: 32 bands do not.
+        AccuracyError: 32 bands exceed the tolerance.
     """
     in_range("tolerance", tolerance, 1e-6, 0.5)
     total, coarse = math.inf, None
@@ -58,12 +62,12 @@ def choose_bands(
         coarse = fine
     raise AccuracyError(
         f"tolerance = {tolerance:g}: {CANDIDATES[-1]} bands leave a predicted error of {total:.1e} of white's "
-        "signal; widen the tolerance or give a number of bands"
+        "signal; increase the tolerance or specify a number of bands"
     )
 
 
 def _reflectance_error(chosen: SpectralBands, exact: SpectralBands, range_nm: tuple[float, float]) -> float:
-    """Worst over phases and channels: half of |Σ w d e^{2πiλ/Λ}|'s error."""
+    """Largest error over phases and channels: half of the error of |Σ w d e^{2πiλ/Λ}|."""
     period = (range_nm[1] - range_nm[0]) * 1e-9
 
     def catch(bands: SpectralBands) -> np.ndarray:

@@ -25,46 +25,48 @@ from optics.spectra.bands import SpectralBands
 
 __all__ = ["Eye"]
 
-LIGHT_FROM = ("cells", "centres")  # of the scene
+LIGHT_FROM = ("cells", "centres")  # origin of the light within scene cells
 
 
 @dataclass(frozen=True)
 class Eye(EyeSpec):
     """Pupil, retina and noise. Arrays are in visual-field orientation, row 0 at the top, column 0 on the left.
 
-    pupil: None is the perfect lens: no blur, full throughput.
+    pupil: a Pupil. None is the perfect lens: no blur, full throughput.
     resolution: receptors (height, width); square, pitch = sensor_width / width.
-    fov_deg: horizontal field of view, in [1e-3, 170], before the eye; the retina lies at f = L / (2 tan(fov/2)), and
+    fov_deg: horizontal field of view in front of the eye, in [1e-3, 170]. The retina lies at f = L / (2 tan(fov/2)), or
         n/n₀ times as far behind a pupil between two media.
-    sensor_width: L [m], of the retina, or of a patch of it.
-    full_aperture: diameter [m] of the pupil that gathers a throughput of 1; None: L.
-    eccentricity_deg: (right, up), the direction in the visual field that the middle of the patch looks in.
-    bands: spectral bands, 1 to 64, or "auto": as few as keep a receptor's predicted error within the tolerance; that
-        takes PSFs of many bands, so it is for an eye that will be used often. The field then holds what was chosen.
+    sensor_width: L [m], width of the retina or of a patch of it.
+    full_aperture: diameter [m] of the pupil with a throughput of 1; None: L.
+    eccentricity_deg: (right, up), viewing direction of the middle of the patch in the visual field.
+    bands: spectral bands, 1 to 64, or "auto": the fewest that keep a receptor's predicted error within the tolerance.
+        "auto" computes PSFs of many bands, which pays off for an eye that is used often. The field then contains the
+        choice.
     noise_sigma: standard deviation of a receptor's Gaussian noise, in signal units.
-    photon_budget: the light there is; its shot noise comes before the Gaussian noise (None: no shot noise).
+    photon_budget: illumination. Its shot noise precedes the Gaussian noise (None: no shot noise).
     receptors: types of receptor: "rgb" (three channels, red, green, blue), "lms" (human cones), "honeybee", "goldfish",
-        wavelengths of pigments' peaks [nm], or `Receptors`, which can be a mosaic. The field then holds `Receptors`.
-    waveguide: what receptors are: rhabdoms, each in the middle of its square and pointing at the pupil's centre, which
-        take light in modes (None: they absorb all light on the square).
-    microvilli: which way those of each receptor run, and how dichroic they are: one `Microvilli` for all, or rows of
-        them, repeated over the retina from its top left corner. Azimuths are of the visual field, from right upwards,
-        across the ray through the pupil's centre. They matter for polarised scenes alone; signals of unpolarised light
-        are what they are without (None: receptors know no polarisation).
-    tolerance: relative L2 error asked of the PSF; signal error, relative to white's, of whatever else is chosen.
+        wavelengths of the pigments' peaks [nm], or `Receptors`, which can be a mosaic. The field then contains
+        `Receptors`.
+    waveguide: rhabdom of each receptor, in the middle of its square and pointing at the pupil's centre. It accepts
+        light in modes (None: receptors absorb all light on their square).
+    microvilli: directions and dichroic ratios of the receptors' microvilli: one `Microvilli` for all, or rows of them,
+        repeated over the retina from its top left corner. Azimuths are in the visual field, from right upwards,
+        perpendicular to the ray through the pupil's centre. Microvilli affect only polarised scenes (None: receptors
+        are insensitive to polarisation).
+    tolerance: relative L2 error of the PSF, and signal error, relative to white's, of all other automatic choices.
     dtype: "float32" or "float64", of PSF, kernel and signals.
 
-    Whatever the pupil is made of, fov_deg and distances z may be Dr.Jit arrays that carry derivatives; what comes of
-    them is then a Dr.Jit tensor, otherwise a NumPy array.
+    All parameters of the pupil, fov_deg and distances z may be Dr.Jit arrays that carry derivatives. Results that
+    depend on them are Dr.Jit tensors; all others are NumPy arrays.
 
     Raises:
         ValueError: names argument, value and valid range.
-        AccuracyError: microvilli behind a pupil whose rays are too steep for them to the tolerance.
+        AccuracyError: microvilli behind a pupil whose rays are too steep for the tolerance.
     """
 
     @property
     def white_signal(self) -> Scalar:
-        """Of a receptor that sees white everywhere: the throughput, or what waveguides take of it, mean of types."""
+        """Signal of a receptor that sees white everywhere, mean over types: the throughput or the waveguides' share."""
         if self.waveguide is None:
             return self.throughput
         return number(self.aperture_throughput) * self._guided_share
@@ -74,8 +76,10 @@ class Eye(EyeSpec):
         return white_share(plain(self.kernel(1)), self.spectral_bands)
 
     def psf(self, z: Scalar = math.inf) -> PSFResult:
-        """PSF on the retina (sensor orientation) of a point at distance z [m] along the axis, in the direction that the
-        patch looks in, over the kernel's window. The perfect lens has one sample that holds all power.
+        """Return the PSF on the retina (sensor orientation) of a point at distance z [m] along the axis.
+
+        The point lies in the viewing direction of the patch, and the PSF covers the kernel's window. The perfect lens
+        has one sample with all power.
 
         Raises:
             AccuracyError: see `optics.psf`.
@@ -88,18 +92,22 @@ class Eye(EyeSpec):
     def kernel(
         self, samples_per_receptor: int, z: Scalar = math.inf, direction_deg: tuple[float, float] | None = None
     ) -> np.ndarray | Array:
-        """Receptive kernel (band, ky, kx): the PSF integrated over square cells of pitch / samples_per_receptor, in
-        visual-field orientation (the PSF turned by 180°), ky and kx odd.
+        """Return the receptive kernel (band, ky, kx), in visual-field orientation, ky and kx odd.
 
-        z: the scene's distance along the axis [m]. direction_deg: (right, up) from the axis where the light comes
-        from (None: the patch's eccentricity); the centre cell is its geometric image. The sum is the fraction of the
-        pupil's power that lands inside; the window is as wide as it must be to lose less than the tolerance (limits:
-        see `receptive_field`). The perfect lens has the 1 x 1 kernel 1. Of light from cells' centres, signals are
-        a² Σ_b weights[c, b] (kernel_b ⊗ radiance_b), averaged over receptors; `see` takes it from all over the cells
-        (see `sight`).
+        It is the PSF integrated over square cells of pitch / samples_per_receptor and turned by 180°.
 
-        Waveguides are not averaged over: of them it is what a receptor takes from all over each cell around its
-        direction, ky and kx even where samples_per_receptor is, and the sum is the share of what its square would take.
+        z: distance of the scene along the axis [m].
+        direction_deg: direction (right, up) of the light from the axis (None: the patch's eccentricity). The centre
+            cell is its geometric image.
+
+        The sum is the fraction of the pupil's power that lands inside. The window is wide enough to lose less than the
+        tolerance (limits: see `receptive_field`). The perfect lens has the 1 x 1 kernel 1. If light comes from the
+        cells' centres, signals are a² Σ_b weights[c, b] (kernel_b ⊗ radiance_b), averaged over receptors. `see` takes
+        it from all over the cells (see `sight`).
+
+        With waveguides the kernel is the share that a receptor accepts from all over each cell around its direction. It
+        is not averaged over the receptor; ky and kx are even if samples_per_receptor is. The sum is relative to a
+        square that absorbs all light.
 
         Raises:
             AccuracyError: see `optics.psf`.
@@ -114,7 +122,7 @@ class Eye(EyeSpec):
         return Retina(self.retina_distance, self.spectral_bands.wavelengths, cell, self.tolerance, self.dtype)
 
     def chosen_bands(self) -> SpectralBands:
-        """As few as keep a receptor's predicted error within the tolerance."""
+        """Return the fewest bands that keep a receptor's predicted error within the tolerance."""
         large = self.receptor_pitch / CELLS_FOR_BANDS
         retina = Retina(self.retina_distance, np.empty(0), large, self.tolerance, self.dtype)
         return bands_for(self, retina, tangents(self.eccentricity_deg))
@@ -128,19 +136,24 @@ class Eye(EyeSpec):
         tolerance: float | None = None,
         light_from: str = "cells",
     ) -> KernelBank:
-        """Kernels for a scene in depth and over the field of view; printed, it says what was chosen and why.
+        """Compute the kernels for a scene in depth and over the field of view.
 
-        z: distances [m] that occur: one, or an array whose nearest and farthest count.
-        depth_layers: kernels between nearest and farthest, evenly spaced in 1/z; field_zones: kernels across the
-            field's width (1: the axis serves the whole retina). "auto": as few as the tolerance allows.
-        tolerance: of a receptor's signal, in units of white's, for any scene no brighter than white (None: the eye's).
-        light_from: "cells", exact for pictures, whose radiance is the same all over a cell; "centres" for cells that
-            hold means of finer detail, as rendered ones do: every cell's light comes from its centre, which errs less
-            than half as much there, by O(samples_per_receptor^-2).
+        Printing them shows the choices with reasons.
+
+        z: distances [m] that occur: one, or an array, whose nearest and farthest count.
+        depth_layers: number of kernels between nearest and farthest, evenly spaced in 1/z, or "auto": the fewest within
+            the tolerance.
+        field_zones: number of kernels across the field's width, or "auto". With 1 the kernel on the axis serves the
+            whole retina.
+        tolerance: error of a receptor's signal, in units of white's, for any scene at most as bright as white (None:
+            the eye's).
+        light_from: "cells" is exact for images whose radiance is constant within each cell. "centres" suits cells that
+            contain means of finer detail, such as rendered ones: all light of a cell comes from its centre. Its error
+            is then less than half as large, O(samples_per_receptor^-2).
 
         Raises:
             ValueError: names argument, value and valid range.
-            AccuracyError: see `optics.psf`, or the tolerance needs more kernels than any eye has.
+            AccuracyError: see `optics.psf`, or the tolerance needs more kernels than the limit.
         """
         within = self.tolerance if tolerance is None else in_range("tolerance", tolerance, 1e-6, 0.5)
         s = whole("samples_per_receptor", samples_per_receptor, 1, 64)
@@ -166,21 +179,20 @@ class Eye(EyeSpec):
         sight: KernelBank | None = None,
         polarization: Any = None,
     ) -> np.ndarray | Array:
-        """Signals (channel, h, w) of a scene in the tangent plane, by convolution (the reference).
+        """Return the signals (channel, h, w) of a scene in the tangent plane, by convolution (the reference).
 
-        radiance: (band, Y, X), the same all over each cell of pitch / samples_per_receptor (another reading:
-            `sight`'s light_from), centred on the axis, at least h s x w s cells and larger by even numbers; dark
-            outside.
+        radiance: (band, Y, X), constant within each cell of pitch / samples_per_receptor (alternative: `sight`'s
+            light_from), centred on the axis, at least h s x w s cells and larger by even numbers; dark outside.
         rng: None for signals without noise. Noise carries no derivative.
         z: distance of the scene along the axis [m], a number or one per cell (Y, X).
-        sight: the kernels, as `Eye.sight` makes them for these samples_per_receptor; None makes them. What is nearer
-            or farther than they were made for is seen as their nearest or farthest.
-        polarization: of an eye with microvilli, (degree, angle_deg) of the light: its degree of linear polarisation in
+        sight: kernels from `Eye.sight` with the same samples_per_receptor; None computes them. Objects outside the
+            range of distances are rendered with the kernels of the nearest or farthest distance.
+        polarization: for an eye with microvilli, (degree, angle_deg) of the light: its degree of linear polarisation in
             [0, 1], and the angle of its field, from right upwards. Each is a number, (band,), (Y, X) or (band, Y, X).
-            None: unpolarised, or circularly polarised, which is the same to microvilli.
+            None: unpolarised or circularly polarised, which microvilli do not distinguish.
 
         Raises:
-            ValueError: radiance of another shape, or not finite; polarised light for receptors that know none.
+            ValueError: radiance of another shape, or not finite; polarised light for receptors without microvilli.
         """
         s = whole("samples_per_receptor", samples_per_receptor, 1, 64)
         if rng is not None:
@@ -195,10 +207,13 @@ class Eye(EyeSpec):
         return to_user(found if rng is None else with_noise(self, found, rng))
 
     def in_bands(self, radiance: Any) -> np.ndarray:
-        """(band,): a spectral radiance in this eye's bands, for `see`: each type of receptor then catches of it what it
-        should, if bands are at least as many as types. A band may be negative; see `SpectralBands.of`."""
-        return self.spectral_bands.of(radiance, self.receptors)
+        """Convert a spectral radiance to this eye's bands (band,), for `see`.
+
+        Each receptor type then has the correct quantum catch if there are at least as many bands as types. A band may
+        be negative; see `SpectralBands.band_values`.
+        """
+        return self.spectral_bands.band_values(radiance, self.receptors)
 
     def describe(self, z: Scalar = math.inf) -> Description:
-        """What limits the eye, as a table: see `summary.Description`."""
+        """Table of the eye's limits: see `summary.Description`."""
         return describe(self, number(self.white_signal), self.psf(z), partial(self.kernel, z=z))

@@ -1,4 +1,4 @@
-"""The description of an eye, from which kernels and signals are computed."""
+"""Parameters of an eye, from which kernels and signals are computed."""
 
 from __future__ import annotations
 
@@ -25,12 +25,13 @@ __all__ = ["EyeSpec"]
 
 @dataclass(frozen=True)
 class EyeSpec:
-    """Pupil, retina and noise, and the lengths and throughputs that follow from them without a PSF. `optics.Eye`
-    documents the fields and adds PSFs, kernels and signals.
+    """Pupil, retina and noise, with the lengths and throughputs that follow from them without a PSF.
+
+    `optics.Eye` documents the fields and adds PSFs, kernels and signals.
 
     Raises:
         ValueError: names argument, value and valid range.
-        AccuracyError: microvilli behind a pupil whose rays are too steep for them to the tolerance.
+        AccuracyError: microvilli behind a pupil whose rays are too steep for the tolerance.
     """
 
     pupil: Pupil | None = None
@@ -73,58 +74,60 @@ class EyeSpec:
 
     @property
     def sensor_distance(self) -> Scalar:
-        """f [m], by which receptors see angles: a distance x on the retina is x/f. From pupil to retina, where the
-        media before and behind the pupil are the same."""
+        """Focal length f [m] that relates a distance x on the retina to the angle x/f.
+
+        It is the distance from pupil to retina if the media in front of and behind the pupil are the same.
+        """
         return focal_length(self.sensor_width, self.fov_deg)
 
     @property
     def retina_distance(self) -> Scalar:
-        """[m] from pupil to retina: f n/n₀, at 550 nm."""
+        """Distance [m] from pupil to retina: f n/n₀, at 550 nm."""
         return behind_pupil(self.pupil, self.sensor_distance)
 
     @property
     def widest_pupil(self) -> float:
-        """Diameter [m] that gathers a throughput of 1."""
+        """Diameter [m] of a pupil with a throughput of 1."""
         return self.sensor_width if self.full_aperture is None else self.full_aperture
 
     @property
     def receptor_pitch(self) -> float:
-        """[m]"""
+        """Distance [m] of neighbouring receptors."""
         return self.sensor_width / self.resolution[1]
 
     @property
     def relative_aperture(self) -> Scalar:
-        """a = 2 R / L, or over `full_aperture`; 1 for the perfect lens."""
+        """a = 2 R / L, or 2 R over `full_aperture`; 1 for the perfect lens."""
         return 1.0 if self.pupil is None else 2 * self.pupil.aperture_radius / self.widest_pupil
 
     @property
     def throughput(self) -> Scalar:
-        """a², times the share of the aperture's disk that is open, and of that light what a mask lets through."""
+        """a², times the open share of the aperture's disk, times the mask's transmission."""
         return self.aperture_throughput * (1.0 if self.pupil is None else self.pupil.transmission)
 
     @property
     def aperture_throughput(self) -> Scalar:
-        """The same without the mask: kernels, which are multiplied by it, hold what a mask lets through."""
+        """Throughput without the mask, whose transmission is part of the kernels that are multiplied by this."""
         return throughput(self.relative_aperture, 1.0 if self.pupil is None else self.pupil.aperture.area / math.pi)
 
     @property
     def channels(self) -> int:
-        """Signals at each place of the retina: as many as types of receptor, or one in a mosaic."""
+        """Number of signals at each place of the retina: one per receptor type, or a single one in a mosaic."""
         return self.receptors.channels
 
     @property
     def mosaic(self) -> np.ndarray | None:
-        """Type of every receptor, (h, w) int; None where every receptor has all types."""
+        """Type of every receptor, (h, w) int; None if every receptor has all types."""
         return self.receptors.layout(self.resolution)
 
     @property
     def photons(self) -> np.ndarray | None:
-        """Photons that a signal of 1 stands for, per type of receptor (type,); None without a photon budget."""
+        """Photons that correspond to a signal of 1, per receptor type (type,); None without a photon budget."""
         if self.photon_budget is None:
             return None
         light = etendue(self.widest_pupil, self.receptor_pitch, number(self.sensor_distance))
         return self.photon_budget.photons(self.spectral_bands, light)
 
     def chosen_bands(self) -> SpectralBands:
-        """Spectral bands for `bands="auto"`. The choice needs kernels, so `Eye` makes it."""
+        """Return the spectral bands for `bands="auto"`. The choice needs kernels, so only `Eye` implements it."""
         raise ValueError("bands = 'auto': must be a number of bands, except in an Eye")

@@ -1,4 +1,4 @@
-"""Lengths and directions of an eye: what its retina sees of the world, and how wide its pupil may be."""
+"""Lengths and directions of an eye, and limits on the width of its pupil."""
 
 from __future__ import annotations
 
@@ -15,24 +15,24 @@ WIDEST_DEG = 80
 
 
 def focal_length(width: float, fov_deg: Scalar) -> Scalar:
-    """f [m] at which a retina this wide has this field of view, L / (2 tan(fov/2))."""
+    """Focal length f [m] at which a retina of this width has this field of view, L / (2 tan(fov/2))."""
     if is_differentiable(fov_deg):
         import drjit as dr
 
-        sine, cosine = dr.sincos(dr.deg2rad(fov_deg) / 2)  # dr.tan takes dr.rcp beyond 45 degrees, 1e-6 off on a GPU
+        sine, cosine = dr.sincos(dr.deg2rad(fov_deg) / 2)  # dr.tan uses dr.rcp beyond 45 degrees: error 1e-6 on a GPU
         return width * cosine / (2 * sine)
     return width / (2 * math.tan(math.radians(fov_deg) / 2))
 
 
 def behind_pupil(pupil: Pupil | None, focal: Scalar) -> Scalar:
-    """[m] from pupil to retina, f n/n₀ at 550 nm between two media."""
+    """Distance [m] from pupil to retina, f n/n₀ at 550 nm between two media."""
     if pupil is None or pupil.object_n is None:
         return focal
     return focal * (pupil.index_behind(MIDDLE) / pupil.index_before(MIDDLE))
 
 
 def check_pupil(pupil: Pupil | None, width: float, full_aperture: float | None) -> None:
-    """ValueError unless it is a pupil no wider than what gathers a throughput of 1."""
+    """Refuse anything but a pupil that is at most as wide as one with a throughput of 1."""
     if full_aperture is not None:
         positive("full_aperture", full_aperture)
     if pupil is None:
@@ -48,16 +48,16 @@ def check_pupil(pupil: Pupil | None, width: float, full_aperture: float | None) 
 
 
 def etendue(widest_pupil: float, receptor_pitch: float, focal: float) -> float:
-    """[m² sr] of a receptor behind a pupil that gathers a throughput of 1."""
+    """Etendue [m² sr] of a receptor behind a pupil with a throughput of 1."""
     return math.pi / 4 * (widest_pupil * receptor_pitch / focal) ** 2
 
 
 def direction(name: str, value: Any) -> tuple[float, float]:
-    """(right, up) [degrees] off the axis."""
+    """Return (right, up) [degrees] off the axis, checked."""
     right, up = point_2d(name, value, "angles (right, up) [degrees]")
     return in_range(name, right, -WIDEST_DEG, WIDEST_DEG), in_range(name, up, -WIDEST_DEG, WIDEST_DEG)
 
 
 def tangents(direction_deg: tuple[float, float]) -> tuple[float, float]:
-    """(right, down)."""
+    """Return tangents (right, down) of a direction (right, up) [degrees]."""
     return math.tan(math.radians(direction_deg[0])), -math.tan(math.radians(direction_deg[1]))

@@ -1,8 +1,8 @@
-"""Which directions a receptor sees that is a waveguide: what its modes take of the light on the pupil.
+"""Receptive fields of receptors that are waveguides: the share of the light on the pupil that their modes accept.
 
-With E(v) the share of a point's light that is caught and absorbed, v [m] on the retina, a receptor of a retina with
-pitch p sees E(v)/p² of a scene's radiance: a square that absorbs all light would have the mean over its own area. The
-waveguide stands where the ray through the pupil's centre lands, and points at that centre.
+Let E(v) be the share of a point's light that is accepted and absorbed, with v [m] on the retina. A receptor of a retina
+with pitch p then sees E(v)/p² of a scene's radiance. A square that absorbs all light would see the mean over its own
+area. The waveguide stands at the image point of the ray through the pupil's centre, and points at that centre.
 """
 
 from __future__ import annotations
@@ -27,19 +27,23 @@ from optics.ommatidia.waveguide import Waveguide
 
 __all__ = ["Guide", "check_guide", "guided_kernel"]
 
-FINER = 10.0  # choice: E is sampled for a tenth of the tolerance; it goes through a spline twice
-DEGREE, MARGIN = 5, 8  # of the spline, and samples beyond the window that it needs
-MOST_SAMPLES = 4096  # choice: of E, along an axis
-DEPTHS = 3.0  # choice: of the first mode's evanescent field, beyond the core, that belong to the window
-MORE_DIGITS = 1.5  # choice: of amplitudes, than of the tolerance
-WIDER = 1.5  # choice: steps in which windows are tried
-CELL_DIGITS = 4.0  # choice: of integrals over cells
+FINER = 10.0  # choice: E is sampled for a tenth of the tolerance, since it is interpolated by splines twice
+DEGREE, MARGIN = 5, 8  # degree of the spline, and its samples beyond the window
+MOST_SAMPLES = 4096  # choice: samples of E along an axis
+DEPTHS = 3.0  # choice: decay lengths of the first mode's evanescent field within the window
+MORE_DIGITS = 1.5  # choice: extra digits of amplitudes, relative to the tolerance
+WIDER = 1.5  # choice: growth of successive windows
+CELL_DIGITS = 4.0  # choice: digits of integrals over cells
 
 
 @dataclass(frozen=True)
 class Guide:
-    """A waveguide on a retina: focal: f [m], by which receptors see angles, x/f; cells: along a receptor's side;
-    from_cell: light comes from all over a cell of the scene, instead of from its centre."""
+    """A waveguide on a retina.
+
+    focal: f [m]; receptors see angles x/f.
+    cells: cells along a receptor's side.
+    from_cell: True if light comes from all over a cell of the scene, False if from its centre.
+    """
 
     waveguide: Waveguide
     focal: float
@@ -48,26 +52,27 @@ class Guide:
 
 
 def check_guide(waveguide: Waveguide | None, pupil: Pupil | None, pitch: float) -> None:
-    """ValueError unless it is one that fits between its neighbours, behind a pupil."""
+    """Refuse a waveguide that does not fit between its neighbours, or that has no pupil in front of it."""
     if waveguide is None:
         return
     of_kind("waveguide", waveguide, Waveguide, "Waveguide(2e-6), or None for receptors that are squares")
     if pupil is None:
-        raise ValueError("waveguide is given and pupil = None: must be a Pupil, whose waves the waveguide takes")
+        raise ValueError("waveguide is given and pupil = None: must be a Pupil, which illuminates the waveguide")
     if waveguide.diameter > pitch * (1 + 1e-9):
         raise ValueError(
             f"waveguide.diameter = {waveguide.diameter:g}: must be at most sensor_width / resolution[1] = {pitch:g} m, "
-            "for neighbours to have room"
+            "so that neighbours do not overlap"
         )
 
 
 def guided_kernel(pupil: Pupil, retina: Retina, z: Scalar, direction: tuple[float, float], guide: Guide) -> Array:
-    """What a receptor takes from every cell around its direction: Dr.Jit (band, k, k), k even where `guide.cells` is.
+    """Return the light that a receptor accepts from every cell around its direction: Dr.Jit (band, k, k).
 
-    Turned as a kernel, see `receptive_field.visual_kernel`, which has the other arguments.
+    k is even if `guide.cells` is. The orientation is that of `receptive_field.visual_kernel`, which also documents the
+    other arguments.
 
     Raises:
-        ValueError: the waveguide guides nothing at one of the wavelengths, or something carries a derivative.
+        ValueError: the waveguide has no guided mode at one of the wavelengths, or something carries a derivative.
         AccuracyError: too many samples of E.
     """
     beams = beams_to(pupil, retina, z, (-direction[0], -direction[1]))
@@ -80,7 +85,7 @@ def guided_kernel(pupil: Pupil, retina: Retina, z: Scalar, direction: tuple[floa
 
 
 def _within(beam: Beam, spot: Spot, pitch: float, retina: Retina, guide: Guide) -> np.ndarray:
-    """E over cells of a window that holds all of it but the tolerance, and is no wider than `spot` asks."""
+    """E over the cells of a window that loses at most the tolerance of E and is at most as wide as `spot` requires."""
     most = spot.half + _radius(guide.waveguide, beam)
     diffracted = guide.focal * beam.wavelength / (beam.pupil.radius * beam.pupil.index_before(beam.wavelength))
     half = spot.half_of_rays + most - spot.half + diffracted
@@ -96,7 +101,7 @@ def _within(beam: Beam, spot: Spot, pitch: float, retina: Retina, guide: Guide) 
 
 @dataclass(frozen=True)
 class _Cells:
-    """How many in a row; their side, and the distance of samples that resolve E, as tangents."""
+    """Number of cells in a row, their side, and the sampling distance that resolves E, as tangents."""
 
     count: int
     side: float
@@ -114,20 +119,20 @@ class _Cells:
 
     @property
     def step(self) -> float:
-        """Of samples, as sines."""
+        """Sampling distance, as a sine."""
         return self.pitch * samples_per_cycle(self.tolerance) / samples_per_cycle(self.tolerance / FINER)
 
 
 def _radius(waveguide: Waveguide, beam: Beam) -> float:
-    """[m] within which the field of the best guided mode lies."""
+    """Radius [m] within which the field of the best guided mode lies."""
     modes = waveguide.modes(beam.wavelength)
     if not modes:
-        raise ValueError(f"waveguide: guides nothing at {beam.wavelength:g} m; must be wider, or of a higher index")
+        raise ValueError(f"waveguide: has no guided mode at {beam.wavelength:g} m; must be wider, or of a higher index")
     return modes[0].radius * (1 + min(DEPTHS / modes[0].w, DEPTHS))
 
 
 def _seen(beam: Beam, spot: Spot, guide: Guide, cells: _Cells) -> tuple[np.ndarray, float]:
-    """E over a band's cells, as integrals over tangents; and which share of all that is seen lies among them."""
+    """E over a band's cells, as integrals over tangents, and the share of the total that lies among them."""
     from scipy.ndimage import map_coordinates
 
     middle = [math.tan(angle) for angle in beam.source.angle]
@@ -135,7 +140,7 @@ def _seen(beam: Beam, spot: Spot, guide: Guide, cells: _Cells) -> tuple[np.ndarr
     along_x, along_y = (tangent + at.ravel() for tangent in middle)
     own = 1 / math.hypot(1, *middle)
     cosine = 1 / np.sqrt(1 + along_x**2 + along_y[:, None] ** 2)
-    # Beside the source's own sine, which is in the modes' phase.
+    # Sines are relative to the source's own sine, which the modes' phase already contains.
     sine_x, sine_y = along_x * cosine - middle[0] * own, along_y[:, None] * cosine - middle[1] * own
     sines = _grid_around(sine_x, sine_y, cells.step)
     modes = guide.waveguide.modes(beam.wavelength)
@@ -153,13 +158,13 @@ def _seen(beam: Beam, spot: Spot, guide: Guide, cells: _Cells) -> tuple[np.ndarr
 
 
 def _grid_around(x: np.ndarray, y: np.ndarray, step: float) -> Grid:
-    """Sines that hold all of these, and what a spline needs beyond them."""
+    """Grid of sines that covers all of these, with the margin that a spline needs."""
     centre = tuple(float(axis.min() + axis.max()) / 2 for axis in (x, y))
     sides = [math.ceil(float(np.ptp(axis)) / (2 * step)) for axis in (y, x)]
     shape = tuple(2 * (side + MARGIN) + 1 for side in sides)
     if max(shape) > MOST_SAMPLES:
         raise AccuracyError(
             f"the light needs {max(shape)} samples of a receptor's field along an axis; the limit is {MOST_SAMPLES}: "
-            "narrow the view, or widen the pupil"
+            "reduce the field of view, or widen the pupil"
         )
     return Grid((shape[0], shape[1]), step, (centre[0], centre[1]))

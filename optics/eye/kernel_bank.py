@@ -1,7 +1,8 @@
-"""The kernels of an eye for a scene in depth and over its field of view: as few as the tolerance allows.
+"""Kernels of an eye for a scene in depth and over its field of view: the fewest within the tolerance.
 
-A kernel depends on where the light comes from. It is computed at nodes, evenly spaced in vergence 1/z (defocus is
-linear in it) and over the tangent plane, and interpolated linearly between them (see `kernel_interpolation`):
+A kernel depends on the position of the light source. It is computed at nodes that are evenly spaced in inverse distance
+1/z (defocus is linear in it) and over the tangent plane, and interpolated linearly between them (see
+`kernel_interpolation`):
 
     signal = Σ_l kernel_l ⊗ (share_l · radiance),   Σ_l share_l = 1 at every cell of the scene.
 """
@@ -24,31 +25,35 @@ from optics.numerics.interpolation import linear_weights
 
 __all__ = ["KernelBank", "prepare"]
 
-MOST_NODES = 64  # choice: of a stage, if asked for
-# Choice: node counts to try; each has the nodes of those before it.
+MOST_NODES = 64  # choice: largest number that can be requested for a stage
+# Choice: node counts to try; each contains the nodes of the previous ones.
 DEPTH_COUNTS, FIELD_COUNTS = (1, 3, 5, 9, 17), (1, 3, 5, 9)
 
 
 @dataclass(frozen=True)
 class KernelBank:
-    """The kernels of an eye at all nodes, and what each cell of a scene has of them.
+    """The kernels of an eye at all nodes, and the shares of the nodes in each cell of a scene.
 
-    vergence: (nearest, farthest) 1/z [1/m]; field: (half height, half width) of the retina in cells.
-    kernels: per node (layer, row, column): Dr.Jit (band, k, k). choices: one per stage. averaged: whether a
-    receptor's signal is the mean over its cells; not so with waveguides.
+    inverse_distance: (nearest, farthest) 1/z [1/m].
+    field: (half height, half width) of the retina in cells.
+    kernels: Dr.Jit (band, k, k) per node (layer, row, column).
+    choices: one per stage.
+    averaged: True if a receptor's signal is the mean over its cells, which is not the case with waveguides.
     """
 
-    vergence: tuple[float, float]
+    inverse_distance: tuple[float, float]
     field: tuple[float, float]
     kernels: dict[tuple[int, int, int], Array]
     choices: tuple[Choice, ...]
     averaged: bool = True
 
     def shares(self, shape: tuple[int, int], z: Any) -> list[Any]:
-        """Share of every node in each cell of a scene, (Y, X) per node; distances z [m], a number or (Y, X).
+        """Share of every node in each cell of a scene, (Y, X) per node.
+
+        z: distances [m], a number or (Y, X).
 
         Raises:
-            ValueError: z of another shape, or no distance.
+            ValueError: z of another shape, or invalid distances.
         """
         if is_differentiable(z):
             positive("z", z, infinite=True, carried=True)
@@ -59,7 +64,7 @@ class KernelBank:
         if len(self.kernels) == 1:
             return [1]
         layers, rows, columns = (1 + max(node[axis] for node in self.kernels) for axis in range(3))
-        near, far = self.vergence
+        near, far = self.inverse_distance
         depth = (2 / np.broadcast_to(plain(z), shape) - near - far) / ((near - far) or 1.0)
         down, across = ((np.arange(n) - (n - 1) / 2) / half for n, half in zip(shape, self.field, strict=True))
         by_depth, by_row, by_column = (
@@ -68,7 +73,7 @@ class KernelBank:
         return [by_depth[i] * by_row[j][:, None] * by_column[k] for i, j, k in self.kernels]
 
     def check(self, shape: tuple[int, int], bands: int, *, averaged: bool) -> None:
-        """ValueError unless it was made for a retina of `shape` cells, so many bands, and receptors as they are."""
+        """Check that the bank fits a retina of `shape` cells, these bands and receptors, or raise a ValueError."""
         if (shape[0] / 2, shape[1] / 2) != self.field:
             made = " x ".join(f"{2 * half:g}" for half in self.field)
             raise ValueError(f"sight is for a retina of {made} cells: must be for {shape[0]} x {shape[1]}")
@@ -85,13 +90,13 @@ class KernelBank:
 
 @dataclass(frozen=True)
 class _Range:
-    """Distances from nearest to farthest, by their vergence; a Dr.Jit distance stands for itself."""
+    """Distances from nearest to farthest, by their inverse; a single Dr.Jit distance is used unchanged."""
 
-    vergence: tuple[float, float]
+    inverse_distance: tuple[float, float]
     only: Scalar
 
     @classmethod
-    def of(cls, z: Any) -> _Range:
+    def from_distances(cls, z: Any) -> _Range:
         if is_differentiable(z):
             positive("z", z, infinite=True, carried=True)
             return cls((1 / number(z), 1 / number(z)), z)
@@ -100,10 +105,10 @@ class _Range:
         return cls((1 / near, 1 / far), near if near == far else None)
 
     def distance(self, place: float) -> Scalar:
-        """[m], at a place from -1 (farthest) to 1 (nearest)."""
+        """Distance [m] at a place from -1 (farthest) to 1 (nearest)."""
         if self.only is not None:
             return self.only
-        near, far = self.vergence
+        near, far = self.inverse_distance
         at = (near + far + place * (near - far)) / 2
         return 1 / at if at > 0 else math.inf
 
@@ -119,10 +124,14 @@ def prepare(
     averaged: bool = True,
     white: Callable[[], float] = lambda: 1.0,
 ) -> KernelBank:
-    """Choose how many kernels, and make them. kernel_at(z, right, down): positions in the field from -1 to 1 at the
-    retina's edges; counts of depth layers and of zones across the longer side, or "auto". averaged: whether a
-    receptor's signal is the mean over its cells; white: says what they leave of white's."""
-    s, depths = samples_per_receptor, _Range.of(z)
+    """Choose the number of kernels and compute them.
+
+    kernel_at: function of (z, right, down), with positions in the field from -1 to 1 at the retina's edges.
+    counts: depth layers and zones across the longer side, or "auto".
+    averaged: True if a receptor's signal is the mean over its cells.
+    white: returns the share of white's signal that the kernels transmit.
+    """
+    s, depths = samples_per_receptor, _Range.from_distances(z)
     layers, zones = (
         None if isinstance(count, str) and count == "auto" else whole(name, count, 1, MOST_NODES)
         for name, count in zip(("depth_layers", "field_zones"), counts, strict=True)
@@ -133,23 +142,27 @@ def prepare(
     by_place = [_grid(n, resolution) for n in FIELD_COUNTS]
     across = NodeChoice("field", lambda at: kernel_at(depths.distance(0), at[1], at[0]), by_place, mean, white)
     if depths.only is not None:
-        depth: Choice | None = Choice("depth", (1,), 0.0, "all at one distance")
+        depth: Choice | None = Choice("depth", (1,), 0.0, "a single distance")
     else:
-        depth = None if layers is None else Choice("depth", (layers,), None, "as asked")
-    wide = None if zones is None else Choice("field", _grid(zones, resolution), None, "as asked")
+        depth = None if layers is None else Choice("depth", (layers,), None, "as requested")
+    wide = None if zones is None else Choice("field", _grid(zones, resolution), None, "as requested")
     choices = _choices((along, across), (depth, wide), tolerance)
     deep, down, right = (nodes(n) for choice in choices for n in choice.counts)
     places = itertools.product(range(len(deep)), range(len(down)), range(len(right)))
     kernels = {(i, j, k): kernel_at(depths.distance(deep[i]), right[k], down[j]) for i, j, k in places}
-    return KernelBank(depths.vergence, (resolution[0] * s / 2, resolution[1] * s / 2), kernels, choices, averaged)
+    return KernelBank(
+        depths.inverse_distance, (resolution[0] * s / 2, resolution[1] * s / 2), kernels, choices, averaged
+    )
 
 
 def _choices(
     stages: tuple[NodeChoice, NodeChoice], asked: tuple[Choice | None, Choice | None], tolerance: float
 ) -> tuple[Choice, Choice]:
-    """Depth's and the field's. Where both are to be chosen, depth may err by half of the tolerance, and the field by
-    what is left: at a corner, between two depths, errors add up. Where that is too little for depth, the field's comes
-    first."""
+    """Choices for depth and for the field.
+
+    If both are automatic, depth may use half of the tolerance, and the field the remainder: at a corner, between two
+    depths, errors add up. If half is too little for depth, the field is chosen first.
+    """
     along, across = stages
     if asked[0] is not None or asked[1] is not None:
         spent = None if asked[0] is None else asked[0].predicted_error
@@ -163,13 +176,15 @@ def _choices(
 
 
 def _rest(tolerance: float, spent: float | None) -> float | None:
-    """What is left of a tolerance; None: all of it."""
+    """Remainder of a tolerance; None for all of it."""
     return tolerance - spent if spent else None
 
 
 def _grid(across: int, resolution: tuple[int, int]) -> tuple[int, int]:
-    """(rows, columns) of nodes over the field, no denser one way than the other. Higher counts have the nodes of lower
-    ones."""
+    """Numbers (rows, columns) of nodes over the field, with similar spacing in both directions.
+
+    Higher counts contain the nodes of lower ones.
+    """
     height, width = resolution
     finest = max(across - 1, 0)
 

@@ -1,8 +1,8 @@
-"""How many kernels stand for a whole range of them: the fewest between which a receptor cannot tell interpolation.
+"""Number of kernels for a whole range of distances or directions: the fewest with a negligible interpolation error.
 
-Kernels are computed at nodes, evenly spaced over [-1, 1] along every axis, and interpolated linearly between them: the
-error falls with the square of the nodes' distance. The error of a node count is told by kernels between its nodes; most
-of them are nodes of the next higher count.
+Kernels are computed at nodes, evenly spaced over [-1, 1] along every axis, and interpolated linearly between them. The
+error falls with the square of the nodes' distance. It is measured with kernels between the nodes. Most of these are
+nodes of the next higher count.
 """
 
 from __future__ import annotations
@@ -20,15 +20,18 @@ from optics.numerics.interpolation import linear_weights
 
 __all__ = ["Choice", "NodeChoice", "nodes", "worst_difference"]
 
-MOST_CHECKS = 8  # choice: kernels that tell the error of a node count
-CAUTION = 1.3  # choice, over that error: the worst place may lie between
+MOST_CHECKS = 8  # choice: kernels that measure the error of a node count
+CAUTION = 1.3  # choice, safety factor on that error: the worst place may lie between
 Place = tuple[float, ...]
 
 
 @dataclass(frozen=True)
 class Choice:
-    """What was chosen for one stage, and why. predicted_error: of a receptor's signal, for any scene no brighter than
-    white, in units of white's signal; None where the number was asked for."""
+    """The choice for one stage, with its reason.
+
+    predicted_error: error of a receptor's signal, for any scene at most as bright as white, in units of white's signal;
+        None if the number was requested.
+    """
 
     stage: str
     counts: tuple[int, ...]
@@ -41,13 +44,16 @@ class Choice:
 
 
 def nodes(count: int) -> np.ndarray:
-    """Positions in [-1, 1]."""
+    """Positions of nodes in [-1, 1]."""
     return np.linspace(-1, 1, count) if count > 1 else np.zeros(1)
 
 
 def checks(counts: tuple[int, ...]) -> list[Place]:
-    """Where so many nodes along each axis err most: at the far ends if there is one, else halfway between nodes along
-    every axis. Of many places a few, corners among them."""
+    """Places with the largest error for these numbers of nodes along each axis.
+
+    With a single node these are the far ends, else the points halfway between nodes along every axis. Of many places
+    only a few are used, corners among them.
+    """
     if max(counts) == 1:
         return [place for place in _places([nodes(3)] * len(counts)) if any(place)]
     found = _places((nodes(n)[1:] + nodes(n)[:-1]) / 2 if n > 1 else nodes(1) for n in counts)
@@ -62,11 +68,12 @@ def _places(axes: Iterable[np.ndarray]) -> list[Place]:
 
 @dataclass(frozen=True)
 class NodeChoice:
-    """One stage: how many nodes along each of its axes.
+    """One stage: the number of nodes along each of its axes.
 
-    kernel_at: the kernel at a place in [-1, 1]^axes. candidates: node counts to try, from the fewest on. white: says
-    what kernels leave of the signal of white, by which errors are told: less than 1 behind masks, and of waveguides,
-    where it takes a kernel to know.
+    kernel_at: the kernel at a place in [-1, 1]^axes.
+    candidates: node counts to try, in ascending order.
+    white: returns the share of white's signal that the kernels transmit; errors are relative to it. It is less than 1
+        behind masks, and with waveguides, which need a kernel to compute it.
     """
 
     stage: str
@@ -77,26 +84,26 @@ class NodeChoice:
     known: dict[Place, np.ndarray] = field(default_factory=dict)
 
     def choose(self, tolerance: float, most: float | None = None) -> Choice:
-        """The first candidate whose predicted error is within the tolerance, or the part of it that may be used.
+        """Return the first candidate whose predicted error is within the tolerance, or within its available part.
 
         Raises:
-            AccuracyError: the last is not.
+            AccuracyError: the last candidate exceeds it.
         """
         error = math.inf
         for counts in self.candidates:
             error = CAUTION * self.error(counts)
             if error <= (tolerance if most is None else most):
-                share = "" if most is None else f", of which these may take {most:.2g}"
+                share = "" if most is None else f", of which {most:.2g} is available here"
                 return Choice(self.stage, counts, error, f"fewest within the tolerance of {tolerance:g}{share}")
-        share = "" if most is None else f", of which {self.stage} may take {most:.2g}"
+        share = "" if most is None else f", of which {self.stage} may use {most:.2g}"
         raise AccuracyError(
             f"tolerance = {tolerance:g}{share}: "
             f"{' x '.join(map(str, self.candidates[-1]))} {self.stage} nodes leave {error:.1e} of white's signal; "
-            "widen the tolerance or give a number of nodes"
+            "increase the tolerance or specify a number of nodes"
         )
 
     def error(self, counts: tuple[int, ...]) -> float:
-        """Worst signal error, at `checks`, of what is interpolated between so many nodes, in units of white's."""
+        """Largest signal error at `checks` of interpolation between these nodes, in units of white's."""
         coarse = _places(nodes(n) for n in counts)
         worst = 0.0
         for place in checks(counts):
@@ -113,8 +120,11 @@ class NodeChoice:
 
 
 def worst_difference(terms: Sequence[tuple[float, np.ndarray]], samples_per_receptor: int) -> float:
-    """Largest |signal| that Σ share · kernel, kernels (band, k, k), can make of any scene with radiance in [0, 1]:
-    the sum over what is positive, or negative, in the receptor's receptive field (kernel ⊗ receptor aperture)."""
+    """Largest |signal| of Σ share · kernel, kernels (band, k, k), over all scenes with radiance in [0, 1].
+
+    It is the sum over the positive, or over the negative, part of the receptor's receptive field (kernel ⊗ receptor
+    aperture).
+    """
     side = max(kernel.shape[-1] for _, kernel in terms)
     total = np.zeros((terms[0][1].shape[0], side, side))
     for share, kernel in terms:

@@ -1,4 +1,4 @@
-"""What a photoreceptor makes of the light on it: throughput, spectral weighting, noise."""
+"""Signal of a photoreceptor from the light on it: throughput, spectral weighting, noise."""
 
 from __future__ import annotations
 
@@ -15,10 +15,13 @@ MOST_PHOTONS = 1e18  # a count must fit a 64-bit integer
 
 
 def throughput(relative_aperture: Scalar, open_share: float = 1.0) -> Scalar:
-    """Light gathered, a² times the share of the disk that is open: the pupil's area against that of the widest disk
-    (diameter = sensor width). A Dr.Jit array where relative_aperture is one."""
+    """Relative amount of light gathered: a² times the open share of the disk.
+
+    It is the pupil's open area divided by the area of the widest disk (diameter = sensor width). It is a Dr.Jit array
+    if relative_aperture is one.
+    """
     a = in_range("relative_aperture", relative_aperture, 0.0, 1.0 + 1e-9, carried=True)
-    if a > 1:  # by rounding
+    if a > 1:  # from rounding
         relative_aperture = relative_aperture * (1 / a)
     return relative_aperture * relative_aperture * open_share
 
@@ -32,8 +35,10 @@ def quantum_catch(irradiance: Array, weights: np.ndarray, gathered: Scalar, type
 
 
 def own_type(signals: Array, mosaic: np.ndarray, types: Precision) -> Array:
-    """What each receptor of a mosaic (y, x) reports, of the signals that every type would give there: Dr.Jit
-    (type, y, x) -> (1, y, x)."""
+    """Signal of each receptor's own type in a mosaic (y, x), out of the signals of all types at that place.
+
+    Dr.Jit (type, y, x) -> (1, y, x).
+    """
     import drjit as dr
 
     mine = mosaic == np.arange(signals.shape[0])[:, None, None]
@@ -41,15 +46,16 @@ def own_type(signals: Array, mosaic: np.ndarray, types: Precision) -> Array:
 
 
 def gaussian_noise(signal: np.ndarray, sigma: float, rng: np.random.Generator) -> np.ndarray:
-    """Signal plus noise of fixed standard deviation `sigma` [signal units]: a dim eye is a noisy eye."""
+    """Add noise of a fixed standard deviation `sigma` [signal units], which limits dim eyes most."""
     sigma = in_range("sigma", sigma, 0.0, 1e6)
     return signal + sigma * rng.standard_normal(signal.shape)
 
 
 def photon_noise(signal: np.ndarray, photons: float | np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """Poisson noise where a signal of 1 is `photons` absorbed photons: standard deviation √(signal/photons).
+    """Add Poisson noise if a signal of 1 is `photons` absorbed photons: standard deviation √(signal/photons).
 
-    signal: (channel, y, x); photons: one number, one per channel, or one per receptor (channel, y, x).
+    signal: (channel, y, x).
+    photons: one number, one per channel, or one per receptor (channel, y, x).
     """
     budget = np.atleast_1d(np.asarray(photons, dtype=np.float64))
     positive("photons", float(budget.min()), "1")
@@ -65,7 +71,11 @@ def photon_noise(signal: np.ndarray, photons: float | np.ndarray, rng: np.random
 def noise_on(
     clean: np.ndarray, photons: np.ndarray | None, mosaic: np.ndarray | None, sigma: float, rng: np.random.Generator
 ) -> np.ndarray:
-    """What both kinds of noise add to signals (channel, y, x); photons: per type, or None; mosaic: see `own_type`."""
+    """Sum of both kinds of noise on signals (channel, y, x).
+
+    photons: per type, or None.
+    mosaic: see `own_type`.
+    """
     if photons is not None and mosaic is not None:
         photons = photons[mosaic][None]
     caught = clean if photons is None else photon_noise(np.maximum(clean, 0), photons, rng)

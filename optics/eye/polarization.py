@@ -1,13 +1,13 @@
-"""Receptors that know polarisation: microvilli over a retina, and how polarised a scene is.
+"""Polarisation-sensitive receptors: microvilli over a retina, and polarised scenes.
 
-Where rays are flat, light keeps its polarisation from the pupil to the retina. Of a radiance I that is polarised to a
-degree p at an angle ψ, microvilli at an azimuth φ with a dichroic ratio d absorb, over what they absorb of it
-unpolarised,
+If rays are nearly parallel to the axis, light has the same polarisation on the retina as at the pupil. For a radiance I
+polarised to a degree p at an angle ψ, microvilli at an azimuth φ with a dichroic ratio d absorb, relative to
+unpolarised light of this radiance,
 
     1 + p (d - 1)/(d + 1) cos 2(ψ - φ),
 
-that is 2(d cos² + sin²)/(d + 1) where p = 1. It is linear in Stokes' parameters I, Q = I p cos 2ψ, U = I p sin 2ψ, and
-these are blurred as the radiance is.
+which is 2(d cos² + sin²)/(d + 1) for p = 1. It is linear in Stokes' parameters I, Q = I p cos 2ψ, U = I p sin 2ψ, which
+are blurred like the radiance.
 """
 
 from __future__ import annotations
@@ -27,16 +27,16 @@ __all__ = ["check_rays", "microvilli_of", "polarised_error", "taken_by"]
 
 Tile = tuple[tuple[Microvilli, ...], ...]
 
-# Choice, over the squared sine of the steepest ray: integral of what the vector focus differs from this, over white's.
-# A round pupil in focus has .54 to .59 up to NA .5; tests/optics/eye/test_polarization.py.
+# Choice: integrated difference between the vector focus and this model, relative to white's and to the squared sine of
+# the steepest ray. # A round pupil in focus has 0.54 to 0.59 up to NA 0.5; see tests/optics/eye/test_polarization.py.
 STEEP = 0.62
 
 
 def microvilli_of(given: Any) -> Tile | None:
-    """Rows of microvilli, whatever stands for them: one for all receptors, or rows.
+    """Convert one Microvilli for all receptors, or rows of them, to rows of microvilli.
 
     Raises:
-        ValueError: neither, or rows that are not all as long.
+        ValueError: neither of these, or rows of different lengths.
     """
     if given is None:
         return None
@@ -53,20 +53,19 @@ def microvilli_of(given: Any) -> Tile | None:
 
 
 def polarised_error(pupil: Pupil, distance: float) -> float:
-    """What polarised signals err by at most, in units of white's, where rays to a retina at this distance [m] are not
-    flat."""
+    """Largest error of polarised signals, in units of white's, due to oblique rays to a retina at this distance [m]."""
     squared_sine = pupil.radius**2 / (pupil.radius**2 + distance**2)
     return STEEP * light_spread(pupil) / ROUND * squared_sine
 
 
 def check_rays(pupil: Pupil | None, distance: float, tolerance: float) -> None:
-    """AccuracyError where polarised signals err by more than the tolerance, in units of white's."""
+    """Refuse polarised signals whose error exceeds the tolerance, in units of white's."""
     error = 0.0 if pupil is None else polarised_error(pupil, distance)
     if pupil is not None and error > tolerance:
         sine = pupil.radius / math.hypot(pupil.radius, distance)
         raise AccuracyError(
-            f"microvilli behind a pupil of NA {sine:.2g}: by steep rays polarised signals err by up to {error:.2g} of "
-            f"white's; tolerance = {tolerance:g} allows NA {sine * math.sqrt(tolerance / error):.2g}: widen it, narrow "
+            f"microvilli behind a pupil of NA {sine:.2g}: steep rays change polarised signals by up to {error:.2g} of "
+            f"white's; tolerance = {tolerance:g} allows NA {sine * math.sqrt(tolerance / error):.2g}: raise it, narrow "
             "the pupil, or see Microvilli.signal(vector_focus(...))"
         )
 
@@ -74,17 +73,17 @@ def check_rays(pupil: Pupil | None, distance: float, tolerance: float) -> None:
 def taken_by(
     tile: Tile | None, resolution: tuple[int, int], radiance: np.ndarray, polarization: Any
 ) -> list[tuple[np.ndarray, Any]]:
-    """I, Q and U of a radiance (band, Y, X), each with what receptors take of it, a number or (h, w).
+    """Return I, Q and U of a radiance (band, Y, X), each with the receptors' weights, a number or (h, w).
 
     polarization: degree in [0, 1] and angle [degrees], each a number, (band,), (Y, X) or (band, Y, X); or None.
 
     Raises:
-        ValueError: it is neither, or a degree is outside [0, 1]; or receptors have no microvilli.
+        ValueError: invalid polarization, a degree outside [0, 1], or receptors without microvilli.
     """
     if polarization is None:
         return [(radiance, 1.0)]
     if tile is None:
-        raise ValueError("polarization: receptors of this eye know none; give it microvilli=Microvilli(azimuth_deg)")
+        raise ValueError("polarization: this eye has no microvilli; create it with microvilli=Microvilli(azimuth_deg)")
     try:
         degree, angle = polarization
     except (TypeError, ValueError):
@@ -97,7 +96,7 @@ def taken_by(
 
 
 def _preferences(tile: Tile, resolution: tuple[int, int]) -> np.ndarray:
-    """Of each receptor (d - 1)/(d + 1) times cos 2φ and sin 2φ, (2, h, w)."""
+    """(d - 1)/(d + 1) times cos 2φ and sin 2φ of each receptor, (2, h, w)."""
     contrast = np.array([[_contrast(cell.dichroic_ratio) for cell in row] for row in tile])
     twice = np.radians([[2 * cell.azimuth_deg for cell in row] for row in tile])
     everywhere = np.ix_(*(np.arange(n) % m for n, m in zip(resolution, contrast.shape, strict=True)))

@@ -1,4 +1,4 @@
-"""Which directions a receptor sees through a pupil: how wide a window their light needs, the PSF summed over cells."""
+"""Receptive fields behind a pupil: the window that the light needs, and the PSF integrated over cells."""
 
 from __future__ import annotations
 
@@ -25,16 +25,16 @@ from optics.point_spread.request import Request
 
 __all__ = ["Retina", "perfect_psf", "retinal_psf", "visual_kernel"]
 
-# Choice: light from further off a receptor's direction counts as screened by the eye's rim.
+# Choice: light at larger angles from a receptor's direction counts as blocked by the rim of the eye.
 WIDEST_TANGENT = math.tan(math.radians(50))
-BESIDE = 4  # choice: samples beyond either end of the light, where a spline through them errs most
-MOST_CELLS = 2049  # choice: of a kernel, along an axis
+BESIDE = 4  # choice: samples beyond either end of the light, where a spline is least accurate
+MOST_CELLS = 2049  # choice: cells of a kernel along an axis
 MOST_SECONDS = 3.0  # choice: per band
 
 
 @dataclass(frozen=True)
 class Retina:
-    """Where the PSF is wanted: distance behind the pupil [m], wavelengths [m], cell size [m], tolerance, dtype."""
+    """Properties of the retina that define the PSF: distance [m], wavelengths [m], cell size [m], tolerance, dtype."""
 
     distance: Scalar
     wavelengths: np.ndarray
@@ -45,8 +45,13 @@ class Retina:
 
 @dataclass(frozen=True)
 class _WindowNeeds:
-    """What one wavelength needs: half the window [m] around the geometric image, the pitch [m] that resolves the PSF,
-    and the band [1/m] beyond which there is less light than the tolerance; half the window of its rays alone."""
+    """Requirements of one wavelength.
+
+    half_window: half the window [m] around the geometric image.
+    pitch: pitch [m] that resolves the PSF.
+    band: frequency [1/m] beyond which there is less light than the tolerance.
+    half_of_rays: half the window [m] of the rays without diffraction.
+    """
 
     half_window: float
     pitch: float
@@ -56,8 +61,13 @@ class _WindowNeeds:
 
 @dataclass(frozen=True)
 class Spot:
-    """Where the light of a source lands: its geometric image (x, y) [m] on the sensor, half the side [m] of the square
-    around it that holds the light, the pitch that resolves it, and what each wavelength needs."""
+    """Area on the sensor that the light of a source reaches.
+
+    centre: geometric image (x, y) [m].
+    half: half the side [m] of the square around it that contains the light.
+    pitch: pitch [m] that resolves it.
+    needs: requirements of each wavelength.
+    """
 
     centre: tuple[float, float]
     half: float
@@ -66,11 +76,11 @@ class Spot:
 
     @property
     def half_of_rays(self) -> float:
-        """The same of its rays alone."""
+        """Half the side [m] of the square that contains the rays without diffraction."""
         return min(self.half, max(need.half_of_rays for need in self.needs))
 
     def window(self, pitch: float, beside: int = 0) -> Grid:
-        """Samples around the geometric image that hold the square, and so many beside it at either end."""
+        """Samples around the geometric image that cover the square, with a margin of `beside` samples."""
         side = 2 * (math.ceil(self.half / pitch) + beside) + 1
         return Grid((side, side), pitch, self.centre)
 
@@ -83,16 +93,16 @@ def visual_kernel(
 ) -> Array:
     """PSF integrated over the retina's cells around the geometric image and turned by 180°: Dr.Jit (band, k, k), k odd.
 
-    direction: (right, down) from the axis in the visual field, tangents; the image lies on the other side.
-    from_cell: of light that comes from all over a cell of the scene, instead of from its centre.
+    direction: tangents (right, down) from the axis in the visual field; the image lies on the opposite side.
+    from_cell: True if light comes from all over a cell of the scene, False if from its centre.
     """
     import drjit as dr
 
     if is_differentiable(retina.distance) and direction != (0.0, 0.0):
-        raise ValueError("fov_deg is a Dr.Jit array: must be a number off the axis, where it turns the light as well")
+        raise ValueError("fov_deg is a Dr.Jit array: must be a number off the axis, as it also turns the light")
     beams = beams_to(pupil, retina, z, (-direction[0], -direction[1]))
     spot = spot_of(beams, retina)
-    # Each wavelength on samples of its own: longer ones need fewer.
+    # Each wavelength has its own samples, since longer ones need fewer.
     requests = [
         _request(beam, spot, need, spot.window(_pitch_for_cells(need.pitch, retina), BESIDE), retina)
         for beam, need in zip(beams, spot.needs, strict=True)
@@ -109,11 +119,12 @@ def visual_kernel(
 
 
 def retinal_psf(pupil: Pupil, retina: Retina, z: Scalar, direction: tuple[float, float] = (0.0, 0.0)) -> PSFResult:
-    """PSF of a point at distance z, see `visual_kernel`, on the window that loses less than the tolerance at every
-    wavelength.
+    """PSF of a point at distance z on the window that loses less than the tolerance at every wavelength.
+
+    See `visual_kernel` for the arguments.
 
     Raises:
-        AccuracyError: no method meets the tolerance within the limits on memory and time.
+        AccuracyError: no method reaches the tolerance within the limits on memory and time.
     """
     beams = beams_to(pupil, retina, z, (-direction[0], -direction[1]))
     return _spread(beams, spot_of(beams, retina), retina)
@@ -132,7 +143,7 @@ def spot_of(beams: list[Beam], retina: Retina) -> Spot:
     if _cells_within(half, retina.cell) > MOST_CELLS:
         raise AccuracyError(
             f"the light spreads over {2 * half:.3g} m, {2 * half / retina.cell:.0f} cells of {retina.cell:.3g} m: "
-            f"at most {MOST_CELLS}; widen the field of view or the cells"
+            f"at most {MOST_CELLS}; increase the field of view or the cells"
             + (", or flatten the relief" if beams[0].pupil.height is not None else "")
         )
     half = retina.cell * (_cells_within(half, retina.cell) + 1) / 2
@@ -140,7 +151,7 @@ def spot_of(beams: list[Beam], retina: Retina) -> Spot:
 
 
 def _image(beam: Beam, distance: float) -> tuple[float, float]:
-    """Where (x, y) [m] the ray through the pupil's centre lands, refracted there between two media (Snell's law)."""
+    """Point (x, y) [m] that the ray through the pupil's centre reaches, refracted between two media (Snell's law)."""
     x, y = (math.tan(angle) for angle in beam.source.angle)
     if beam.pupil.object_n is None:
         return distance * x, distance * y
@@ -150,7 +161,7 @@ def _image(beam: Beam, distance: float) -> tuple[float, float]:
 
 
 def _pitch_for_cells(pitch: float, retina: Retina) -> float:
-    """As wide [m] as integrals over cells allow, where `pitch` is what the PSF itself allows."""
+    """Largest pitch [m] that integrals over cells allow, given the `pitch` that the PSF itself allows."""
     each = samples_per_cycle(retina.tolerance)
     return pitch * each / samples_per_cycle(retina.tolerance, retina.cell / (pitch * each))
 
@@ -162,12 +173,12 @@ def _spread(beams: list[Beam], spot: Spot, retina: Retina) -> PSFResult:
 
 def _request(beam: Beam, spot: Spot, need: _WindowNeeds, window: Grid, retina: Retina) -> Request:
     reach = spot.half + math.hypot(*spot.centre)
-    problem = Problem.of(beam, window, retina.tolerance, retina.dtype)
+    problem = Problem.from_beam(beam, window, retina.tolerance, retina.dtype)
     return Request(beam, replace(problem, widest_band=need.band, reach=reach), most_seconds=MOST_SECONDS)
 
 
 def perfect_psf(retina: Retina, radius: float) -> PSFResult:
-    """All power in one cell: a perfect lens of the given aperture radius [m], diffraction left out."""
+    """All power in one cell: a perfect lens of the given aperture radius [m], without diffraction."""
     types = precision(retina.dtype)
     image = types.Tensor(np.full((len(retina.wavelengths), 1, 1), 1 / retina.cell**2))
     pupil = Pupil(radius, thin_lens_focal_length=retina.distance)
@@ -176,19 +187,19 @@ def perfect_psf(retina: Retina, radius: float) -> PSFResult:
 
 
 def _needs(beam: Beam, retina: Retina, centre: tuple[float, float]) -> _WindowNeeds:
-    """What of a retina the light of one wavelength needs; centre: its geometric image (x, y) [m].
+    """Requirements of the light of one wavelength; centre: its geometric image (x, y) [m].
 
-    The window may lose a share of the light, the tolerance: half of that as rays that end outside it, half as what the
-    pupil's edge diffracts off them. What masks, pixels and fine detail diffract has half of the rays' share.
-    Diffraction adds frequencies, and frequencies are sines over λ: from a ray's end the sine goes on by λ times these
-    frequencies, and z tan θ says where that lands.
+    The window may lose a share of the light equal to the tolerance. Half of it is for rays that end outside the window,
+    half for diffraction at the pupil's edge. Diffraction by masks, pixels and fine detail uses half of the rays' share.
+    Diffraction adds frequencies, which are sines over λ. The sine at the end of a ray therefore increases by λ times
+    these frequencies, and z tan θ is the new end.
     """
     pupil, z, radius = beam.pupil, number(retina.distance), beam.pupil.radius
     wavelength = beam.wavelength / beam.index
     scattered = pupil.scatter(beam.wavelength, retina.tolerance / 4)
     diffracted = _beyond_edge(pupil, retina.tolerance / 2) + scattered
     half = WIDEST_TANGENT * z + radius
-    # Through a mask may go the rays that end farthest off, and no others.
+    # In the worst case a mask transmits only the rays that end farthest away.
     share = retina.tolerance * number(pupil.transmission) / (4 if scattered else 2)
     shadow = _half_side(pupil.slopes(beam.wavelength, beam.source), (z, beam.index), centre, 1 - share)
     if math.isfinite(shadow):
@@ -197,16 +208,20 @@ def _needs(beam: Beam, retina: Retina, centre: tuple[float, float]) -> _WindowNe
         sine = outermost / math.hypot(outermost, z) + diffracted * wavelength
         half = min(half, z * sine / math.sqrt(1 - sine * sine) - off_axis if sine < 1 else math.inf)
     band = pupil.slopes(beam.wavelength, beam.source).steepest_inside / beam.wavelength + diffracted
-    # |U|² holds the differences of the field's frequencies. At a point of the sensor, lit from all over the pupil,
-    # these span 2R/(λz); and no two within the band differ by more than twice the band.
+    # |U|² contains the differences of the field's frequencies. At a point of the sensor that the whole pupil
+    # illuminates, these span 2R/(λz). # Two frequencies within the band differ by at most twice the band.
     detail = min(2 * radius / (wavelength * z), 2 * band)
     return _WindowNeeds(half, 1 / (samples_per_cycle(retina.tolerance) * detail), band, shadow)
 
 
 @lru_cache(maxsize=64)
 def _half_side(slopes: Slopes, behind: tuple[float, float], centre: tuple[float, float], share: float) -> float:
-    """Half side [m] of the square about `centre` in which a share of the rays end; behind: distance [m] and index.
-    Wavelengths have the same slopes where glass does not disperse."""
+    """Half side [m] of the square about `centre` that contains this share of the rays' ends.
+
+    Results are cached, because all wavelengths have the same slopes if the glass has no dispersion.
+
+    behind: distance [m] and refractive index.
+    """
     x, y = slopes.rays(*behind)
     farthest = np.fmax(np.abs(x - centre[0]), np.abs(y - centre[1]))
     return float(np.quantile(farthest, share, method="higher"))
@@ -215,9 +230,9 @@ def _half_side(slopes: Slopes, behind: tuple[float, float], centre: tuple[float,
 def _beyond_edge(pupil: Pupil, share: float) -> float:
     """Frequency δ [1/m] off its geometric direction beyond which an aperture's hard edge sends a share of the light.
 
-    A straight edge has 1/(2π²f) of |its spectrum|² per length beyond the frequency f, an aperture of perimeter P and
-    area A thus P/(2π²Aδ) of its light: of a disk 1/(π²Rδ), as Airy's pattern has (Born & Wolf, §8.5.2). A mask that is
-    brighter at the edge than it is on average makes it more.
+    Beyond the frequency f, a straight edge has 1/(2π²f) of |its spectrum|² per length. An aperture of perimeter P and
+    area A thus sends P/(2π²Aδ) of its light there, a disk 1/(π²Rδ), as in the Airy pattern (Born & Wolf, §8.5.2). A
+    mask that is brighter at the edge than on average increases it.
     """
     opening = pupil.aperture
     return _rim(pupil) * opening.outline.length / (2 * math.pi**2 * opening.area * pupil.radius * share)
@@ -225,8 +240,10 @@ def _beyond_edge(pupil: Pupil, share: float) -> float:
 
 @lru_cache(maxsize=64)
 def _rim(pupil: Pupil) -> float:
-    """How much brighter the light is along the edge than on average: 1 without a mask, and where it is darker there,
-    since it may rise steeply from it."""
+    """Ratio of the intensity along the edge to its mean; 1 without a mask.
+
+    It is also 1 if the edge is darker, since the intensity may rise steeply from it.
+    """
     import drjit as dr
 
     if pupil.mask is None or number(pupil.transmission) == 0:

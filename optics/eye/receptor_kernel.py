@@ -1,4 +1,4 @@
-"""A receptor's kernel, whatever the receptor is: a square behind a perfect lens or a pupil, or a waveguide."""
+"""Kernel of any receptor: a square behind a perfect lens or a pupil, or a waveguide."""
 
 from __future__ import annotations
 
@@ -22,7 +22,11 @@ CELLS_FOR_BANDS = 2  # per receptor, along an axis
 
 
 def receptor_kernel(eye: EyeSpec, retina: Retina, z: Scalar, direction: tuple[float, float], from_cell: bool) -> Array:
-    """See `Eye.kernel`; direction: (right, down), tangents; from_cell: of light from all over a cell of the scene."""
+    """Return the kernel of `Eye.kernel`.
+
+    direction: tangents (right, down).
+    from_cell: True if light comes from all over a cell of the scene.
+    """
     if eye.pupil is None:
         return precision(retina.dtype).Tensor(np.ones((len(retina.wavelengths), 1, 1)))
     if eye.waveguide is None:
@@ -34,13 +38,16 @@ def receptor_kernel(eye: EyeSpec, retina: Retina, z: Scalar, direction: tuple[fl
 
 
 def white_share(kernels: np.ndarray, bands: SpectralBands) -> float:
-    """What kernels (band, k, k) leave of the signal of white in daylight, mean of the channels."""
+    """Share of white's signal in daylight that kernels (band, k, k) transmit, averaged over channels."""
     seen = kernels.sum(axis=(1, 2)) * daylight(bands.wavelengths)
     return float((bands.weights @ seen).mean())
 
 
 def bands_for(eye: EyeSpec, retina: Retina, direction: tuple[float, float]) -> SpectralBands:
-    """As few as the eye's tolerance allows, see `choose_bands`; retina: without wavelengths, of large cells."""
+    """Return the fewest bands within the eye's tolerance, see `choose_bands`.
+
+    retina: one without wavelengths, with large cells.
+    """
     if eye.pupil is None:
         return choose_bands(eye.tolerance, eye.receptors)
     guided = eye.waveguide is not None

@@ -1,4 +1,4 @@
-"""Images on the retina: convolution of the padded scene with the kernel. The reference other renderers must meet."""
+"""Images on the retina: convolution of the padded scene with the kernel, the reference for other renderers."""
 
 from __future__ import annotations
 
@@ -19,11 +19,13 @@ __all__ = ["at_receptors", "blur", "centred", "receptor_average", "with_centre"]
 def blur(
     scenes: Sequence[np.ndarray], kernels: Sequence[np.ndarray | Array], shape: tuple[int, int], types: Precision
 ) -> Array:
-    """Σ_l Σ_u kernels[l][b, u] scenes[l][b, v - u], dark outside: the middle `shape` of it, Dr.Jit (band, *shape).
+    """Σ_l Σ_u kernels[l][b, u] scenes[l][b, v - u], dark outside: its middle `shape`, Dr.Jit (band, *shape).
 
-    scenes: (band, Y, X) each; kernels: (band, ky, kx) tensors or arrays, odd, one per scene. A convolution, not a
-    correlation: a point of light at v shows the kernel around v. All are in visual-field orientation; the kernel's
-    centre cell (ky//2, kx//2) is its origin.
+    scenes: (band, Y, X) each.
+    kernels: (band, ky, kx) tensors or arrays, odd, one per scene.
+
+    It is a convolution, not a correlation: a point of light at v produces the kernel around v. All arrays are in
+    visual-field orientation; the kernel's centre cell (ky//2, kx//2) is its origin.
     """
     import drjit as dr
 
@@ -34,10 +36,10 @@ def blur(
 
 
 def _blurred(pairs: list[tuple[np.ndarray, Array]], shape: tuple[int, int], types: Precision) -> Array:
-    """One band, flat. The sums run over one period, long enough that what wraps around lands outside `shape`."""
+    """One band, flat. The sums use one period, long enough that wrapped parts land outside `shape`."""
     if all(kernel.shape == (1, 1) for _, kernel in pairs):
         return sum(_flat(centred(scene, shape), types) * kernel.array for scene, kernel in pairs)
-    # What lies further from the receptors than the kernel reaches is not seen, nor does the kernel's far rim see any.
+    # Parts of the scene beyond the kernel's reach have no effect, nor have parts of the kernel beyond the scene.
     lit = [
         (centred(scene, _within(scene.shape, shape, kernel.shape)), kernel[_middle(kernel.shape, shape, scene.shape)])
         for scene, kernel in pairs
@@ -71,20 +73,20 @@ def _flat(array: np.ndarray, types: Precision) -> Array:
 
 
 def _within(scene: tuple[int, ...], shape: tuple[int, int], kernel: tuple[int, ...]) -> tuple[int, int]:
-    """The scene's middle that the kernel joins to `shape`: no larger than the scene, and of its parity."""
+    """Size of the scene's middle that the kernel connects to `shape`: at most the scene's size, with its parity."""
     height, width = (n - 2 * max(0, (n - m - k + 1) // 2) for n, m, k in zip(scene, shape, kernel, strict=True))
     return height, width
 
 
 def _middle(kernel: tuple[int, ...], shape: tuple[int, int], scene: tuple[int, ...]) -> tuple[slice, slice]:
-    """The kernel's middle that joins some point of the scene to `shape`."""
+    """Slices of the kernel's middle that connects some point of the scene to `shape`."""
     cuts = [max(0, k // 2 - (m + n) // 2) for k, m, n in zip(kernel, shape, scene, strict=True)]
     rows, columns = (slice(cut, k - cut) for cut, k in zip(cuts, kernel, strict=True))
     return rows, columns
 
 
 def centred(image: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
-    """The middle `shape` of (…, Y, X).
+    """Return the middle `shape` of (…, Y, X).
 
     Raises:
         ValueError: the margins around it are not equal on both sides.
@@ -105,17 +107,17 @@ def receptor_average(image: Array, samples_per_receptor: int, types: Precision) 
 
 
 def at_receptors(image: Array, samples_per_receptor: int, types: Precision) -> Array:
-    """What is in each receptor's middle, or, where that lies between cells, in the next: see `with_centre`."""
+    """Values at each receptor's middle, or in the next cell if the middle lies between cells: see `with_centre`."""
     return _of_receptors(image, np.arange(samples_per_receptor) == samples_per_receptor // 2, types)
 
 
 def with_centre(kernel: Array) -> Array:
-    """A kernel (band, k, k) with k odd; of one with k even the middle moves by half a cell, into a cell."""
+    """Return a kernel (band, k, k) with odd k; for even k the middle moves by half a cell, into a cell."""
     side = kernel.shape[-1]
     return kernel if side % 2 else type(kernel)(np.pad(kernel.numpy(), ((0, 0), (1, 0), (1, 0))))
 
 
 def _of_receptors(image: Array, shares: np.ndarray, types: Precision) -> Array:
-    """Sums over each receptor's own cells, by their shares along an axis."""
+    """Weighted sums over each receptor's own cells; shares are the weights along an axis."""
     down, across = (types.Tensor(np.kron(np.eye(n // len(shares)), shares)) for n in image.shape[1:])
     return matmul(down, matmul(image, across, transposed=True))

@@ -1,4 +1,4 @@
-"""From a scene to signals: blurred by an eye's kernels, caught by its receptors, with or without noise."""
+"""Signals of a scene: blurred by an eye's kernels and sampled by its receptors, with or without noise."""
 
 from __future__ import annotations
 
@@ -18,21 +18,23 @@ __all__ = ["signals", "with_noise"]
 
 
 def signals(eye: EyeSpec, parts: Sequence[tuple[np.ndarray, Any]], bank: KernelBank, s: int, z: Any) -> Array:
-    """Signals (channel, h, w) without noise. s: samples_per_receptor; z: see `Eye.see`.
+    """Signals (channel, h, w) without noise.
 
-    parts: of the light, (band, Y, X), each with how receptors take it, a number or (h, w).
+    parts: components of the light, (band, Y, X), each with the receptors' weights, a number or (h, w).
+    s: samples_per_receptor.
+    z: see `Eye.see`.
     """
     types = precision(eye.dtype)
     total: Any = None
     for light, taken in parts:
-        caught = _caught(eye, [light * share for share in bank.shares(light.shape[1:], z)], bank, s, types)
+        caught = _quantum_catch(eye, [light * share for share in bank.shares(light.shape[1:], z)], bank, s, types)
         if np.ndim(taken):
             caught *= types.Tensor(np.broadcast_to(taken, caught.shape).copy())
         total = caught if total is None else total + caught
     return total if eye.mosaic is None else own_type(total, eye.mosaic, types)
 
 
-def _caught(eye: EyeSpec, scenes: list[np.ndarray], bank: KernelBank, s: int, types: Precision) -> Array:
+def _quantum_catch(eye: EyeSpec, scenes: list[np.ndarray], bank: KernelBank, s: int, types: Precision) -> Array:
     shape = eye.resolution[0] * s, eye.resolution[1] * s
     image = blur(scenes, list(bank.kernels.values()), shape, types)
     irradiance = (receptor_average if eye.waveguide is None else at_receptors)(image, s, types)
@@ -40,6 +42,6 @@ def _caught(eye: EyeSpec, scenes: list[np.ndarray], bank: KernelBank, s: int, ty
 
 
 def with_noise(eye: EyeSpec, signal: Array, rng: np.random.Generator) -> Array:
-    """With shot noise, if there is a photon budget, and Gaussian noise; neither carries a derivative."""
+    """Add shot noise, if there is a photon budget, and Gaussian noise; neither carries a derivative."""
     noise = noise_on(plain(signal), eye.photons, eye.mosaic, eye.noise_sigma, rng)
     return signal + precision(eye.dtype).Tensor(noise)

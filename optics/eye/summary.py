@@ -1,4 +1,4 @@
-"""What limits an eye, in one table."""
+"""Limits of an eye, in one table."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ from optics.spectra.spectrum import daylight
 
 __all__ = ["Description", "describe", "noise_of"]
 
-LIMITS = ("diffraction", "sampling", "noise")  # of acuity
-FREQUENCIES = 513  # choice: between 0 and the cut-off, at which the MTF is held against the noise
-CELLS_ACROSS, MOST_CELLS = 8, 64  # choice: of a kernel, across a waveguide; along a receptor's side
+LIMITS = ("diffraction", "sampling", "noise")  # limits of acuity
+FREQUENCIES = 513  # choice: samples between 0 and the cut-off at which the MTF is compared with the noise
+CELLS_ACROSS, MOST_CELLS = 8, 64  # choice: cells of a kernel across a waveguide; along a receptor's side
 FINER = 16  # choice: steps per sample of the PSF, where a receptor's angular sensitivity is measured
 
 
@@ -29,21 +29,28 @@ Kernels = Callable[[int], Array | np.ndarray]  # cells per receptor -> kernel (b
 
 @dataclass(frozen=True)
 class Description:
-    """An eye's limits in white daylight, near its axis. Frequencies [cycles/degree] across the visual field.
+    """An eye's limits in white daylight, near its axis. Frequencies [cycles/degree] are in the visual field.
 
-    relative_aperture: a; throughput: a². f_number: f/2R, f by which receptors see angles, n₀/n of the way to the
-        retina: the image's brightness goes with its inverse square. wavelength: daylight's mean by the receptors'
-        weights [m].
-    diffraction_cpd: cut-off of an aperture this wide, 2 sin θ/λ on the retina. sampling_cpd: Nyquist frequency of the
-        receptors, 1/(2 Δφ). noise_cpd: where the contrast that the optics leave first sinks below the noise.
-    acuity_cpd: the least of the three, NaN where one is not known; binding: which, of those that are.
-    strehl_ratio: of the band nearest `wavelength`; image_quality: see `optics.image_quality`.
-    noise: standard deviation of a receptor that looks at white, of all sources, in units of the signal.
-    photons: absorbed by it per integration time, mean of the channels (None: no photon budget).
-    acceptance_angle_deg: full width at half height of a receptor's angular sensitivity, horizontally;
-        interommatidial_angle_deg: Δφ between neighbours. plan: of the least accurate band's PSF.
-    white_signal: of a receptor that looks at white: the throughput, less what waveguides leave.
-    unknown: what the light cannot tell well enough, a line each with the reason; its number is NaN.
+    relative_aperture: a.
+    throughput: a².
+    f_number: f/2R, with the f of the angles x/f, n₀/n of the distance to the retina. The brightness of the image is
+        proportional to its inverse square.
+    wavelength: mean wavelength of daylight with the receptors' weights [m].
+    diffraction_cpd: cut-off of an aperture of this width, 2 sin θ/λ on the retina.
+    sampling_cpd: Nyquist frequency of the receptors, 1/(2 Δφ).
+    noise_cpd: lowest frequency at which the contrast of the optics falls below the noise.
+    acuity_cpd: smallest of the three; NaN if one is unknown.
+    binding: name of the smallest among the known limits.
+    strehl_ratio: Strehl ratio of the band nearest `wavelength`.
+    image_quality: see `optics.image_quality`.
+    noise: standard deviation of a receptor that sees white, from all sources, in units of the signal.
+    photons: photons that it absorbs per integration time, mean of the channels (None: no photon budget).
+    acceptance_angle_deg: full width at half maximum of a receptor's angular sensitivity, horizontally.
+    interommatidial_angle_deg: Δφ between neighbours.
+    plan: plan of the least accurate band's PSF.
+    white_signal: signal of a receptor that sees white: the throughput, minus the losses of waveguides.
+    unknown: one line for each measure that the light does not determine accurately enough, with the reason; its value
+        is NaN.
     """
 
     relative_aperture: float
@@ -102,7 +109,7 @@ class Description:
 
 
 def noise_of(eye: EyeSpec, white_signal: Scalar) -> float:
-    """Standard deviation of a receptor's signal where it sees white in daylight: its own noise, and that of photons."""
+    """Standard deviation of a receptor's signal for white in daylight, from its own noise and from photon noise."""
     if eye.photons is None:
         return float(eye.noise_sigma)
     light = number(white_signal)
@@ -110,10 +117,13 @@ def noise_of(eye: EyeSpec, white_signal: Scalar) -> float:
 
 
 def describe(eye: EyeSpec, light: float, result: PSFResult, kernel: Kernels) -> Description:
-    """The eye's limits for a scene at one distance. A measure that the light cannot tell well enough is NaN and has a
-    line in `Description.unknown`.
+    """Return the eye's limits for a scene at one distance.
 
-    light: the signal of white · result: PSF for this distance · kernel: of so many cells per receptor, for the same
+    A measure that the light does not determine accurately enough is NaN and has a line in `Description.unknown`.
+
+    light: signal of white.
+    result: PSF for this distance.
+    kernel: returns the kernel for a number of cells per receptor, for the same distance.
     """
     distance = number(eye.sensor_distance)
     white, wavelength = _white(eye, result)
@@ -153,25 +163,25 @@ def describe(eye: EyeSpec, light: float, result: PSFResult, kernel: Kernels) -> 
 
 
 def _known(name: str, measure: Callable[[], float], unknown: list[str]) -> float:
-    """What is measured, or NaN and a line about it."""
+    """Return the measured value, or NaN after adding a line about it."""
     try:
         return measure()
     except AccuracyError as error:
-        # An eye has its own window: who wants another asks for its pupil's PSF.
+        # An eye has a fixed window; a PSF of its pupil can have another.
         remedy = "" if error.remedy is None else f"; of optics.psf(eye.pupil), {error.remedy}"
         unknown.append(f"{name}: {error.what}{remedy}")
         return math.nan
 
 
 def _white(eye: EyeSpec, result: PSFResult) -> tuple[PSFResult, float]:
-    """The PSF of white daylight as the mean of the channels weighs it, and its mean wavelength [m]."""
+    """Return the PSF of white daylight, weighted with the mean of the channels, and its mean wavelength [m]."""
     worth = eye.spectral_bands.weights.mean(axis=0) * daylight(eye.spectral_bands.wavelengths)
     white = result.mean(worth / worth.sum())
     return white, float(white.wavelengths[0])
 
 
 def _noise_limit(white: PSFResult, cutoff: float, floor: float) -> float:
-    """Frequency [1/m] at which the MTF first meets the floor; the cut-off if it never does."""
+    """Lowest frequency [1/m] at which the MTF falls to the floor; the cut-off if it never does."""
     frequency = np.linspace(0, cutoff, FREQUENCIES)
     above = mtf(white).profile(frequency)[0] - floor
     drowned = np.flatnonzero(above <= 0)
@@ -185,8 +195,10 @@ def _noise_limit(white: PSFResult, cutoff: float, floor: float) -> float:
 
 
 def _acceptance(eye: EyeSpec, white: PSFResult, kernel: Kernels) -> float:
-    """Full width [m] at half height, along x through its peak, of what a receptor sees in white daylight: PSF ⊗
-    receptor aperture, or what a waveguide takes."""
+    """Full width [m] at half maximum, along x through the peak, of a receptor's sensitivity in white daylight.
+
+    The sensitivity is PSF ⊗ receptor aperture, or that of a waveguide.
+    """
     if eye.pupil is None:
         return eye.receptor_pitch
     if eye.waveguide is not None:
@@ -203,7 +215,7 @@ def _acceptance(eye: EyeSpec, white: PSFResult, kernel: Kernels) -> float:
 
 
 def _guided_acceptance(eye: EyeSpec, diameter: float, kernel: Kernels) -> float:
-    """The same of a waveguide of a diameter [m], from its kernel, by a spline through cells."""
+    """Full width [m] at half maximum for a waveguide of this diameter [m], from its kernel, by splines."""
     from scipy.interpolate import CubicSpline
 
     cells = min(max(4, math.ceil(CELLS_ACROSS * eye.receptor_pitch / diameter)), MOST_CELLS)
@@ -216,7 +228,7 @@ def _guided_acceptance(eye: EyeSpec, diameter: float, kernel: Kernels) -> float:
 
 
 def _within(x: np.ndarray, image: np.ndarray, at: np.ndarray, half: float) -> np.ndarray:
-    """Integrals along the first axis, of the spline through an image's samples at x, over at ± half."""
+    """Integrals over at ± half, along the first axis, of the spline through an image's samples at x."""
     from scipy.interpolate import CubicSpline
 
     primitive = CubicSpline(x, image).antiderivative()

@@ -1,26 +1,26 @@
-"""Ways to evaluate one diffraction integral, Rayleigh and Sommerfeld's first, or an approximation to it.
+"""Methods that evaluate one diffraction integral, the first Rayleigh-Sommerfeld integral, exactly or approximately.
 
-All but the textbook's take a `Problem` and give `Sampling`s: how they would sample it, with the time and the error to
-expect, and the picture if asked. `optics.point_spread.planner` chooses.
+Every method except the textbook's takes a `Problem` and returns `Sampling`s. A sampling predicts its time and error and
+computes the PSF on request. `optics.point_spread.planner` chooses between them.
 
 textbook             the angular spectrum in plain NumPy: start here
-carrier              the phase of a sphere, split off fields and put back
-problem              Problem: what is to be computed, in numbers
-method_sampling      Sampling: what every method offers
+carrier              the phase of a sphere, removed from fields and restored
+problem              Problem: the parameters of a computation
+method_sampling      Sampling: the interface of all methods
 rayleigh_sommerfeld  the direct sum: the reference
-angular_spectrum     by transforms on grids, whole or with its paraxial part split off
-pixelated_spectrum   the same for pupils made of pixels
-hankel               the same for symmetric pupils, along one radius
-low_rank             by one matrix product
-far_field            by one transform onto directions for each of a few nodes of the window
-far_field_nodes      which nodes, and what each counts in every direction
-fresnel              approximate: Fresnel and Fraunhofer, and how wrong they are
+angular_spectrum     transforms on grids, whole or with the paraxial part split off
+pixelated_spectrum   the angular spectrum of pupils made of pixels
+hankel               the angular spectrum of symmetric pupils, along one radius
+low_rank             one matrix product
+far_field            one transform onto directions for each of a few nodes of the window
+far_field_nodes      the choice of these nodes, and their weights in every direction
+fresnel              approximate: Fresnel and Fraunhofer, with their predicted errors
 geometric            approximate: density of rays; the pinhole
-smythe               vector fields, of what the others propagate
+smythe               vector fields from fields that scalar methods propagate
 vector_sum           vector fields about a focus, as a sum of plane waves
-scalar_theory        how wrong scalar theory is, at most
-rays                 where geometrical optics sends the light
-pupil_sampling       where matrix products sample the pupil
-sine_samples         the same, evenly spaced as seen from the window
-spectral_taper       how a spectrum ends before grazing incidence
+scalar_theory        upper bound of the error of scalar theory
+rays                 end points of rays in geometrical optics
+pupil_sampling       samples of the pupil for matrix products
+sine_samples         samples that are evenly spaced as seen from the window
+spectral_taper       the taper of a spectrum before grazing incidence
 """

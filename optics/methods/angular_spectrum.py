@@ -30,12 +30,12 @@ __all__ = [
 
 
 class SpectrumSampling:
-    """Samples of a spectrum, and of what it becomes.
+    """Samples of a spectrum and of the planes that it is transformed to.
 
-    method: "angular_spectrum" or "split_angular_spectrum". taper: where the spectrum fades out.
-    period: width [m] after which the pupil plane repeats: the spectrum's samples lie 1/period apart.
+    method: "angular_spectrum" or "split_angular_spectrum". taper: fades the spectrum out.
+    period: width [m] after which the pupil plane repeats: the spectrum's samples are 1/period apart.
     output_period: samples over the period of the plane that the last transform starts from or ends on.
-    even: whether the field is the same where x or y is mirrored: a quarter of each plane stands for it.
+    even: whether the field is even in x and y. A quarter of each plane then represents the plane.
     """
 
     method: str
@@ -46,7 +46,7 @@ class SpectrumSampling:
 
     @property
     def is_whole(self) -> bool:
-        """Whether no paraxial part is split off."""
+        """True if no paraxial part is split off."""
         return self.method == "angular_spectrum"
 
     @cached_property
@@ -58,11 +58,11 @@ class SpectrumSampling:
         return Grid.square(self.output_period, self.period / self.output_period)
 
     def part(self, grid: Grid) -> Grid:
-        """The samples of a plane that stand for it."""
+        """Return the samples that represent a plane: a quarter if the field is even, else all."""
         return quarter(grid) if self.even else grid
 
     def sum(self, field: Field, start: Grid, period: Scalar, end: Grid, sign: int) -> Field:
-        """Fourier's, from one plane's samples to another's, see `fourier.dft2`."""
+        """Return the Fourier sum from the samples of one plane to the samples of another, see `fourier.dft2`."""
         if self.even:
             return even_sum(field, start.shape, period, end)
         return dft2(field, period, end.shape, sign, end.dx, end.centre)
@@ -71,14 +71,14 @@ class SpectrumSampling:
         return even_seconds(start.shape, end.shape) if self.even else predicted_seconds(start.shape, period, end.shape)
 
     def seconds_from_spectrum(self, window: Grid) -> float:
-        """What the transforms from the spectrum to the window take."""
+        """Return the time of the transforms from the spectrum to the window."""
         if self.is_whole:
             return self.sum_seconds(self.spectrum, self.output_period, window)
         to_relay = self.sum_seconds(self.spectrum, self.output_period, self.relay)
-        return to_relay + self.sum_seconds(self.relay, 0.5, window)  # no whole period: a matrix
+        return to_relay + self.sum_seconds(self.relay, 0.5, window)  # not a whole period, so a matrix is used
 
     def whole_phase(self, field: Field, beam: Beam, problem: Problem) -> Field:
-        """What `arrived` leaves out of a split spectrum's field: e^{iπr²/λz}/i."""
+        """Return the field with the phase that `arrived` omits for a split spectrum: e^{iπr²/λz}/i."""
         if self.is_whole:
             return field
         types = precision(problem.dtype)
@@ -87,13 +87,13 @@ class SpectrumSampling:
         return field * Field.from_waves(1.0, waves, problem.window, types)
 
     def plane(self, problem: Problem) -> float:
-        """Width [m] over which rounding spreads the pupil's light."""
+        """Return the width [m] over which rounding errors spread the pupil's light."""
         return self.period if self.is_whole else problem.wavelength * problem.distance / self.relay.dx
 
 
 @dataclass(frozen=True)
 class GridSampling(SpectrumSampling):
-    """Of a pupil whose soft edge a grid carries, pupil_period samples to the period."""
+    """Spectrum of a pupil whose soft edge is represented on a grid, with pupil_period samples per period."""
 
     method: str
     edge: PupilEdge
@@ -107,17 +107,17 @@ class GridSampling(SpectrumSampling):
 
     @cached_property
     def pupil(self) -> Grid:
-        """The samples that hold the soft disk."""
+        """Grid that covers the soft disk."""
         pitch = self.period / self.pupil_period
         across = 2 * math.ceil(self.edge.outermost / pitch) + 1
         return Grid.square(min(self.pupil_period, across), pitch)
 
     def field(self, beam: Beam, problem: Problem) -> Field:
-        """U over the window, less the carrier e^{ikz}."""
+        """Return U over the window, without the carrier e^{ikz}."""
         return self.whole_phase(_angular_spectrum(beam, problem, self, precision(problem.dtype)), beam, problem)
 
     def intensity(self, beam: Beam, problem: Problem) -> Array:
-        """|U|² over the window for unit amplitude at the pupil, a flat Dr.Jit array."""
+        """Return |U|² over the window for unit amplitude at the pupil, a flat Dr.Jit array."""
         return _angular_spectrum(beam, problem, self, precision(problem.dtype)).intensity
 
     @property
@@ -137,18 +137,20 @@ class GridSampling(SpectrumSampling):
 
 
 def whole_spectrum(problem: Problem) -> list[GridSampling]:
-    """Samplings by which the whole spectrum meets the problem's tolerance."""
+    """Return samplings with which the whole spectrum meets the problem's tolerance."""
     return _samplings(problem, "angular_spectrum")
 
 
 def split_spectrum(problem: Problem) -> list[GridSampling]:
-    """Samplings by which the split spectrum meets the problem's tolerance."""
+    """Return samplings with which the split spectrum meets the problem's tolerance."""
     return _samplings(problem, "split_angular_spectrum")
 
 
 def _samplings(problem: Problem, method: str) -> list[GridSampling]:
-    """By wider and wider tapers, until one costs more than the last: narrow ones need more frequencies, wide ones more
-    room, and between them costs have one least."""
+    """Return samplings for wider and wider tapers, until one costs more than the one before.
+
+    Narrow tapers need more frequencies and wide ones a longer period, so the cost has a single minimum.
+    """
     found: list[GridSampling] = []
     for taper in tapers(problem):
         found.append(_sampling(problem, taper, method))
@@ -166,10 +168,13 @@ def _sampling(problem: Problem, taper: Taper, method: str) -> GridSampling:
 
 
 def whole_period(problem: Problem, taper: Taper, outermost: float) -> tuple[float, int]:
-    """Period [m], and its samples at the window's pitch, that holds the window and all light that could wrap around
-    into it from a pupil that ends `outermost` [m] from the axis."""
+    """Return the period [m] and the number of its samples at the window's pitch.
+
+    The period covers the window and all light that could wrap around into it from a pupil that ends `outermost` [m]
+    from the axis.
+    """
     beam = outermost + taper.blur + problem.distance * taper.tangent
-    if problem.reach is not None:  # what lies beyond the reach is negligible: it may wrap around to the window's rim
+    if problem.reach is not None:  # light beyond the reach is negligible and may wrap around to the rim of the window
         beam = min(beam, problem.reach + outermost)
     pitch = problem.window.dx
     samples = fast_length(max(problem.window.half_width + beam, 2 * outermost) / pitch)
@@ -177,8 +182,11 @@ def whole_period(problem: Problem, taper: Taper, outermost: float) -> tuple[floa
 
 
 def split_period(problem: Problem, taper: Taper, outermost: float) -> tuple[float, int]:
-    """Period [m] that holds the pupil and the non-paraxial walk-off z (tan θ - sin θ); and its samples, so close that
-    Fresnel's integral, which repeats every λz over their pitch, keeps its copies off the window."""
+    """Return the period [m] and the number of its samples.
+
+    The period covers the pupil and the non-paraxial displacement z (tan θ - sin θ). Fresnel's integral repeats every λz
+    divided by the pitch of the samples. The samples are so dense that these copies stay off the window.
+    """
     relay = outermost + taper.blur + problem.distance * (taper.tangent - taper.sine)
     period = 2 * relay
     reached = problem.window.half_width + relay + problem.distance * taper.sine
@@ -196,8 +204,10 @@ def _timed(sampling: GridSampling, problem: Problem) -> GridSampling:
 
 
 def _angular_spectrum(beam: Beam, problem: Problem, how: GridSampling, types: Precision) -> Field:
-    """U(x) = F⁻¹{F{U₀} H} (Goodman, Introduction to Fourier Optics, §3.10), up to a phase of the split one that
-    intensity forgets."""
+    """Return U(x) = F⁻¹{F{U₀} H} (Goodman, Introduction to Fourier Optics, §3.10).
+
+    A split spectrum omits a phase that does not affect the intensity.
+    """
     u = beam.behind(how.edge.aperture, how.part(how.pupil), types)
     spectrum = how.sum(u, how.pupil, how.pupil_period, how.spectrum, -1)
     found = arrived(spectrum, beam, problem, how).scaled((how.pupil.dx / how.period) ** 2)
@@ -205,7 +215,10 @@ def _angular_spectrum(beam: Beam, problem: Problem, how: GridSampling, types: Pr
 
 
 def arrived(spectrum: Field, beam: Beam, problem: Problem, how: SpectrumSampling) -> Field:
-    """Over the window, of light that has this spectrum at the pupil; up to a phase that intensity forgets."""
+    """Return the field over the window of light with this spectrum at the pupil.
+
+    A phase that does not affect the intensity is omitted.
+    """
     spectrum = spectrum * _transfer(beam, problem, how, precision(problem.dtype))
     if how.is_whole:
         return how.sum(spectrum, how.spectrum, how.output_period, problem.window, +1)
@@ -213,9 +226,9 @@ def arrived(spectrum: Field, beam: Beam, problem: Problem, how: SpectrumSampling
 
 
 def _transfer(beam: Beam, problem: Problem, how: SpectrumSampling, types: Precision) -> Field:
-    """exp(ikz (cos θ - 1)) under the spectral taper; the split method leaves the paraxial -ikz sin²θ/2 for later.
+    """Return exp(ikz (cos θ - 1)) under the spectral taper. The split method omits the paraxial part -ikz sin²θ/2.
 
-    Goodman, eq. 3-74. cos θ - 1 = -q, and with the paraxial part taken out -q²/2.
+    Goodman, eq. 3-74. cos θ - 1 = -q, and without the paraxial part it is -q²/2.
     """
     import drjit as dr
 
@@ -230,8 +243,11 @@ def _transfer(beam: Beam, problem: Problem, how: SpectrumSampling, types: Precis
 
 
 def versine(s2: Array) -> Array:
-    """q = 1 - cos θ of sin²θ, float64. The difference loses digits, of which the distance makes waves; a step towards
-    q (2 - q) = sin²θ brings them back, without a division."""
+    """Return q = 1 - cos θ from sin²θ, in float64.
+
+    The difference loses digits, and multiplication by the distance turns these into waves. One correction step towards
+    q (2 - q) = sin²θ restores the digits without a division.
+    """
     import drjit as dr
 
     q = 1 - dr.sqrt(1 - s2)
@@ -239,7 +255,7 @@ def versine(s2: Array) -> Array:
 
 
 def _paraxial_rest(spectrum: Field, beam: Beam, problem: Problem, how: SpectrumSampling) -> Field:
-    """Fresnel's integral of the relay field."""
+    """Return Fresnel's integral of the relay field."""
     u = how.sum(spectrum, how.spectrum, how.output_period, how.relay, +1)
 
     def onto_window(u: Field, period: Scalar) -> Field:

@@ -1,4 +1,4 @@
-"""The phase of a spherical wave from the pupil's middle, which methods split off a field before they interpolate it."""
+"""The phase of a spherical wave from the pupil's centre, which methods remove from a field before interpolating it."""
 
 from __future__ import annotations
 
@@ -13,7 +13,10 @@ __all__ = ["on_line", "on_window", "with_sphere"]
 
 
 def with_sphere(field: Field, x: Array, y: Array, beam: Beam, problem: Problem, sign: int) -> Field:
-    """Times e^{±ik(ρ - z)} at points (x, y) [m], ρ their distance from the pupil's middle; ρ - z = r²/(ρ + z)."""
+    """Return the field times e^{±ik(ρ - z)} at points (x, y) [m].
+
+    ρ is the distance from the centre of the pupil; ρ - z = r²/(ρ + z).
+    """
     import drjit as dr
 
     types = precision(problem.dtype)
@@ -23,14 +26,16 @@ def with_sphere(field: Field, x: Array, y: Array, beam: Beam, problem: Problem, 
 
 
 def on_window(field: Field, beam: Beam, problem: Problem) -> Field:
-    """A field over the window whose method left the sphere out."""
+    """Return a field over the window with the spherical phase that its method left out."""
     x, y = problem.window.coordinates(precision(problem.dtype))
     return with_sphere(field, x, y, beam, problem, +1)
 
 
 def on_line(profile: Field, line: RadialProfile | DistinctRadii, beam: Beam, problem: Problem) -> Field:
-    """A symmetric field, known on the radii of a line, over the window: without its sphere it is as smooth as the
-    intensity."""
+    """Return a symmetric field over the window, given on the radii of a line.
+
+    Without its spherical phase the field is as smooth as the intensity.
+    """
     types, window = precision(problem.dtype), problem.window
     r = types.Float64(line.positions)
     slow = with_sphere(profile, r, 0 * r, beam, problem, -1)

@@ -21,21 +21,21 @@ from optics.numerics.precision import Precision, opaque, padded_for_packets, pre
 
 __all__ = ["FarFieldSampling", "far_field"]
 
-MOST_DIRECTIONS = 4096  # choice: along an axis, by memory
-STEEPEST_CORNER = 0.95  # choice: sine towards a window's corner
-GRAZING = 0.98  # choice: sine that interpolation beyond the window's rim may reach
-TRIED = 41  # choice: places between, for each of 8 on the rim
-# Choice: counts to try.
+MOST_DIRECTIONS = 4096  # choice: number along an axis, limited by memory
+STEEPEST_CORNER = 0.95  # choice: largest sine towards a corner of the window
+GRAZING = 0.98  # choice: largest sine of interpolation beyond the rim of the window
+TRIED = 41  # choice: test positions between nodes, for each of 8 points on the rim
+# Choice: numbers of nodes to try.
 CHEBYSHEV_NODES = (1, 2, 3, 4, 5, 6, 8, 10, 12, 16)
-FEW = 2  # choice: nodes along an axis of which it does not pay to leave any out
-POINTS = 150  # choice: of the pupil, at which nodes are compared
+FEW = 2  # choice: with this number of nodes along an axis, omitting some saves nothing
+POINTS = 150  # choice: points of the pupil at which nodes are compared
 
 
 @dataclass(frozen=True)
 class FarFieldSampling:
     """Pupil samples, direction cosines (pitch 1/period of their transform), and nodes over the window.
 
-    The nodes are Chebyshev points in the angle atan(x/z): in x the kernel has a pole at ±iz.
+    The nodes are Chebyshev points in the angle atan(x/z), because the kernel has a pole in x at ±iz.
     """
 
     edge: PupilEdge
@@ -48,11 +48,11 @@ class FarFieldSampling:
     model_error: float = 0.0
 
     def intensity(self, beam: Beam, problem: Problem) -> Array:
-        """|U|² over the window for unit amplitude at the pupil, a flat Dr.Jit array."""
+        """Return |U|² over the window for unit amplitude at the pupil, a flat Dr.Jit array."""
         return _far_field(beam, problem, self, precision(problem.dtype))
 
     def plane(self, problem: Problem) -> float:
-        """Width [m] over which rounding spreads the pupil's light."""
+        """Return the width [m] over which rounding errors spread the pupil's light."""
         return problem.wavelength * problem.distance / self.pupil.dx
 
     @property
@@ -69,7 +69,10 @@ class FarFieldSampling:
 
 
 def far_field(problem: Problem) -> list[FarFieldSampling]:
-    """Directions beyond the field's Nyquist rate; as many nodes as the kernel's slow part needs."""
+    """Return samplings with directions beyond the Nyquist rate of the field, and the nodes that the slow factor needs.
+
+    Empty if the method is not suitable for the window.
+    """
     half = problem.window.half_width
     sine = half / math.hypot(half, problem.distance)
     corner = math.sqrt(2) * half / math.hypot(half, half, problem.distance)
@@ -79,12 +82,13 @@ def far_field(problem: Problem) -> list[FarFieldSampling]:
     edge = problem.soft_edge(problem.turning)
     pitch = 1 / (problem.turning + edge.stopband)
     pupil = Grid.square(2 * math.ceil(edge.outermost / pitch) + 1, pitch)
-    oversampling = math.pi / _step(problem.ripple / 2)  # of the field's Nyquist rate
-    # Interpolation reaches over the window's rim, but must not reach grazing incidence.
+    oversampling = math.pi / _step(problem.ripple / 2)  # relative to the Nyquist rate of the field
+    # Interpolation extends beyond the rim of the window, but must not include grazing incidence.
     finest = problem.wavelength * max(TAPS / (GRAZING - sine), TAPS / (GRAZING - corner))
     if finest / pitch >= MOST_DIRECTIONS:
         return []
-    period = fast_length(max(2 * oversampling * edge.outermost, finest) / pitch)  # a whole number, for the FFT
+    # A whole number, so that the FFT can be used.
+    period = fast_length(max(2 * oversampling * edge.outermost, finest) / pitch)
     step = problem.wavelength / (period * pitch)
     directions = Grid.square(2 * (math.ceil(sine / step) + TAPS) + 1, step)
     nodes = _nodes(problem, count)
@@ -103,8 +107,8 @@ def _seconds(how: FarFieldSampling, problem: Problem) -> float:
 
 
 def _nodes(problem: Problem, count: int) -> WindowNodes:
-    """Of so many along each axis those that are needed."""
-    # A single sample has no width of its own, and directions are counted in half angles.
+    """Return the necessary nodes out of `count` along each axis."""
+    # A single sample has zero width, but directions are measured in half angles.
     half_angle = math.atan2(max(problem.window.half_width, problem.window.dx), problem.distance)
     if count <= FEW:
         return all_nodes(count, half_angle)
@@ -117,12 +121,18 @@ def _nodes(problem: Problem, count: int) -> WindowNodes:
 
 
 def _step(error: float) -> float:
-    """Radians per sample at which eight-point Lagrange interpolation of a unit wave errs by `error`; at most 1.5."""
+    """Return the radians per sample at which eight-point Lagrange interpolation of a unit wave has this error.
+
+    The value is at most 1.5.
+    """
     return min(1.5, (error / LAGRANGE_8) ** 0.125)
 
 
 def _nodes_needed(problem: Problem, error: float) -> int | None:
-    """Chebyshev nodes along an axis that interpolate the far-field kernel's slow part, tried on the aperture's rim."""
+    """Return the number of Chebyshev nodes along an axis that interpolate the slow factor of the kernel.
+
+    It is tested on the rim of the aperture.
+    """
     angle = np.linspace(0, 2 * np.pi, 8, endpoint=False)[:, None]
     rim_x, rim_y = problem.radius * np.cos(angle), problem.radius * np.sin(angle)
     half_angle = math.atan2(problem.window.half_width, problem.distance)
@@ -140,15 +150,17 @@ def _nodes_needed(problem: Problem, error: float) -> int | None:
 
 @lru_cache(maxsize=len(CHEBYSHEV_NODES))
 def _between(n: int) -> np.ndarray:
-    """What each of so many Chebyshev points counts at the places that are tried, (point, place)."""
+    """Return the weights of n Chebyshev points at the test positions, (point, position)."""
     return lagrange_basis(np.linspace(-1, 1, TRIED), chebyshev_points(n))
 
 
 def _slow_part(
     problem: Problem, points: tuple[np.ndarray, np.ndarray], angle: np.ndarray, y: np.ndarray | float
 ) -> np.ndarray:
-    """(ρ/D)² (1 + i/(kD)) exp(ik(D - ρ + s·ξ)), D the distance from ξ to (z tan(angle), y, z), ρ that from the axis, s
-    the direction."""
+    """Return (ρ/D)² (1 + i/(kD)) exp(ik(D - ρ + s·ξ)).
+
+    D is the distance from ξ to (z tan(angle), y, z), ρ the distance from the axis to that point, and s the direction.
+    """
     x = problem.distance * np.tan(angle)
     rho = np.sqrt(x * x + y * y + problem.distance**2)
     along = (x * points[0] + y * points[1]) / rho
@@ -161,12 +173,12 @@ def _slow_part(
 
 
 def _far_field(beam: Beam, problem: Problem, how: FarFieldSampling, types: Precision) -> Array:
-    """Rayleigh-Sommerfeld's integral with the plane wave of each direction split off:
+    """Return the Rayleigh-Sommerfeld integral with the plane wave of each direction split off:
 
     U(x) = z/(λρ²) ∫ P(ξ) G(ξ; x) e^{-ik s·ξ} dξ,  G = (ρ/D)² (1/(kD) - i) e^{ik(D - ρ + s·ξ)},
 
-    ρ = |(x, z)|, D = |(x - ξ, z)|, s = x/ρ. G hardly varies with x (it is Fresnel's quadratic phase and less), so it is
-    taken at nodes x_ab and the integrals, one Fourier transform each, are interpolated.
+    ρ = |(x, z)|, D = |(x - ξ, z)|, s = x/ρ. G varies slowly with x, because it contains Fresnel's quadratic phase and
+    smaller terms. It is evaluated at nodes x_ab. The integrals, one Fourier transform each, are interpolated.
     """
     import drjit as dr
 
@@ -174,7 +186,7 @@ def _far_field(beam: Beam, problem: Problem, how: FarFieldSampling, types: Preci
     dr.eval(u.re, u.im)
     s = how.directions.x
     cosine = np.sqrt(np.maximum(1 - s[:, None] ** 2 - s[None, :] ** 2, 1e-6))
-    edge = math.asin(min(float(s[-1]), 0.999))  # a margin beyond the window, for the interpolation that follows
+    edge = math.asin(min(float(s[-1]), 0.999))  # margin beyond the window for the interpolation below
     weights = how.nodes.weights(np.clip(np.arctan2(s[None, :], cosine), -edge, edge), types.dtype)
     total_re, total_im = dr.zeros(types.Float, s.size**2), dr.zeros(types.Float, s.size**2)
     for (across, along), weight in zip(how.nodes.tangents, weights, strict=True):
@@ -187,7 +199,10 @@ def _far_field(beam: Beam, problem: Problem, how: FarFieldSampling, types: Preci
 
 
 def _slow_kernel(tan_x: float, tan_y: float, beam: Beam, grid: Grid, types: Precision) -> Field:
-    """G(ξ; x) on the pupil's grid for x in the direction of the two tangents, less a constant phase."""
+    """Return G(ξ; x) on the pupil's grid for x in the direction of the two tangents.
+
+    A constant phase is omitted.
+    """
     import drjit as dr
 
     px, py = grid.coordinates(types)
@@ -208,7 +223,10 @@ def _slow_kernel(tan_x: float, tan_y: float, beam: Beam, grid: Grid, types: Prec
 def _onto_window(
     parts: tuple[Array, Array], beam: Beam, problem: Problem, how: FarFieldSampling, types: Precision
 ) -> Array:
-    """Eight-point Lagrange interpolation of the field from direction cosines to the window; its intensity there."""
+    """Return the intensity over the window.
+
+    The field is interpolated from direction cosines with eight-point Lagrange polynomials.
+    """
     import drjit as dr
 
     x, y = problem.window.coordinates(types)

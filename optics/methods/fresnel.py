@@ -1,4 +1,4 @@
-"""The paraxial methods: Fresnel's and Fraunhofer's integral, and how wrong they will be."""
+"""The paraxial methods, Fresnel's and Fraunhofer's integral, and their predicted errors."""
 
 from __future__ import annotations
 
@@ -22,16 +22,16 @@ from optics.numerics.precision import opaque, precision
 
 __all__ = ["ParaxialSampling", "fraunhofer", "fresnel", "paraxial_integral"]
 
-RAYS, ENDS = 48, 24  # choice: from whose origins, and at whose ends, the neglected phase is looked at
-# Choice. Of a ray's first Fresnel zone: how far from its origin light still adds up coherently at its end.
+RAYS, ENDS = 48, 24  # choice: rays at whose origins, and at whose ends, the neglected phase is evaluated
+# Choice, in first Fresnel zones of a ray: distance from its origin within which light adds up coherently at its end.
 ZONES = 3.0
-ROUNDING = 1e-15  # of sums of numbers near 1
-MUCH = 0.7  # choice: a field that errs by more is another field
+ROUNDING = 1e-15  # rounding error of sums of numbers near 1
+MUCH = 0.7  # choice: above this error the field has nothing in common with the exact one
 
 
 @dataclass(frozen=True)
 class ParaxialSampling:
-    """Pupil samples. model_error is found when it is asked for: that takes longer than the rest of a plan."""
+    """Pupil samples. model_error is computed on first access, because it takes longer than the rest of a plan."""
 
     method: str
     edge: PupilEdge
@@ -45,13 +45,13 @@ class ParaxialSampling:
         return model_error(self.problem, self.method == "fresnel")
 
     def intensity(self, beam: Beam, problem: Problem) -> Array:
-        """|U|² over the window for unit amplitude at the pupil, a flat Dr.Jit array."""
+        """Return |U|² over the window for unit amplitude at the pupil, a flat Dr.Jit array."""
         u = beam.behind(self.edge.aperture, self.pupil, precision(problem.dtype))
         curved = self.method == "fresnel"
         return paraxial_integral(u, beam.distance, problem.wavelength, problem.window, curved).intensity
 
     def plane(self, problem: Problem) -> float:
-        """Width [m] over which rounding spreads the pupil's light."""
+        """Return the width [m] over which rounding errors spread the pupil's light."""
         return problem.wavelength * problem.distance / self.pupil.dx
 
     @property
@@ -64,7 +64,7 @@ class ParaxialSampling:
 
 
 def fresnel(problem: Problem) -> list[ParaxialSampling]:
-    """Fresnel's integral (Goodman, Introduction to Fourier Optics, eq. 4-17)."""
+    """Return samplings of Fresnel's integral (Goodman, Introduction to Fourier Optics, eq. 4-17)."""
     reach = (1 + EDGE_REACH) * problem.radius + problem.outermost
     excess = reach / problem.distance - reach / math.hypot(reach, problem.distance)
     turning = min(
@@ -75,7 +75,7 @@ def fresnel(problem: Problem) -> list[ParaxialSampling]:
 
 
 def fraunhofer(problem: Problem) -> list[ParaxialSampling]:
-    """Fraunhofer's integral (Goodman, eq. 4-25): the quadratic phase is left out."""
+    """Return samplings of Fraunhofer's integral (Goodman, eq. 4-25), which omits the quadratic phase."""
     return _sampling(
         "fraunhofer", problem, problem.phase_band + problem.outermost / (problem.wavelength * problem.distance)
     )
@@ -96,12 +96,14 @@ def _sampling(method: str, problem: Problem, turning: float) -> list[ParaxialSam
 
 
 def model_error(problem: Problem, curved: bool) -> float:
-    """Relative L2 error of the intensity that the kernel makes, from its ratio q to the exact one,
+    """Return the relative L2 error of the intensity that results from the paraxial kernel.
+
+    It follows from the ratio q of this kernel to the exact one,
 
         q = (D/z)² e^{-ik(D - z - d²/2z)},   d = |x - ξ|, D = √(d² + z²)   (d² without ξ² in Fraunhofer's),
 
-    seen from the places where rays end. What adds up coherently there comes from around the ray's origin: from its
-    Fresnel zone, or from the whole aperture where several rays meet. A phase common to all of it is no error.
+    at the ends of rays. Light that adds up coherently there comes from around the origin of the ray: from its Fresnel
+    zone, or from the whole aperture if several rays meet. A phase common to all this light causes no error.
     """
     rays = problem.rays
     if rays is None or len(rays) == 0 or problem.masked:
@@ -121,14 +123,18 @@ def model_error(problem: Problem, curved: bool) -> float:
     near = np.tile((apart2 <= np.square(zone)) | nearest, (len(x) // len(ends), 1))
     count, size = near.sum(axis=1), size * near
     re, im = ((size * part).sum(axis=1) for part in (np.cos(angle), np.sin(angle)))
-    # Mean of |q - q₀|², q₀ the unit number that is nearest: 1 - 2|Σ q| / n + Σ |q|² / n, rounding on the safe side.
+    # Mean of |q - q₀|², where q₀ is the nearest number of modulus 1: 1 - 2|Σ q| / n + Σ |q|² / n. Rounding is on the
+    # safe side.
     squared = 1 + (np.square(size).sum(axis=1) - 2 * np.hypot(re, im)) / count
     error = 2 * math.sqrt(np.maximum(squared, 0).mean() + ROUNDING)
     return MARGIN * error if error < MUCH or curved else _misplaced(problem)
 
 
 def _misplaced(problem: Problem) -> float:
-    """Without the quadratic phase a wide shadow shrinks to a spot: how much brighter than the truth that is."""
+    """Return the error if a wide shadow shrinks to a spot without the quadratic phase.
+
+    It follows from the brightness of the spot relative to the exact light.
+    """
     rays, cell = problem.rays, problem.window.dx**2
     assert rays is not None
     diffracted = math.pi * (problem.wavelength * problem.distance / (2 * problem.radius)) ** 2
@@ -137,8 +143,11 @@ def _misplaced(problem: Problem) -> float:
 
 
 def _places(problem: Problem, ends: Rays) -> tuple[np.ndarray, np.ndarray]:
-    """Where light is looked at: the ends of rays, and a diffraction width beside them; drawn into the window."""
-    width = 0.6 * problem.wavelength * problem.distance / problem.radius  # about Airy's first dark ring, at 0.61
+    """Return the points at which the error is evaluated.
+
+    They are the ends of rays and points one diffraction width away, clipped to the window.
+    """
+    width = 0.6 * problem.wavelength * problem.distance / problem.radius  # close to Airy's first dark ring at 0.61
     window = problem.window
     x = np.concatenate([ends.to_x + step * width for step in (0, 1, 0, -1, 0)])
     y = np.concatenate([ends.to_y + step * width for step in (0, 0, 1, 0, -1)])
@@ -153,12 +162,12 @@ def paraxial_integral(
     curved: bool = True,
     onto_window: Callable[[Field, Scalar], Field] | None = None,
 ) -> Field:
-    """Field over the window at `distance`, up to a phase that intensity forgets:
+    """Return the field over the window at `distance`, without a phase that does not affect the intensity:
 
     U(x) = 1/(iλz) ∫ u(ξ) e^{iπξ²/λz} e^{-2πi x·ξ/λz} dξ   (Goodman, Introduction to Fourier Optics, eq. 4-17);
 
-    with curved=False the quadratic phase is 1 (eq. 4-25). wavelength [m] in the medium. One Fourier sum of free output
-    pitch. onto_window: how it is taken, of a field and a period (None: by `fourier.dft2`).
+    with curved=False the quadratic phase is 1 (eq. 4-25). wavelength [m] in the medium. The integral is one Fourier sum
+    of arbitrary output pitch. onto_window: function that computes it from a field and a period (None: `fourier.dft2`).
     """
     types, grid = u.types, u.grid
     scale = opaque(types, distance) * opaque(types, wavelength)

@@ -1,4 +1,4 @@
-"""The ray methods: density of rays behind a pupil, and the perfect pinhole. No diffraction, no interference."""
+"""Ray methods: the density of rays behind a pupil, and the ideal pinhole. No diffraction, no interference."""
 
 from __future__ import annotations
 
@@ -19,22 +19,23 @@ from optics.numerics.precision import Precision, opaque, padded_for_packets, pre
 
 __all__ = ["PinholeSampling", "RaySampling", "geometric", "pinhole"]
 
-# Choice. Step of the central differences that give the local slope, in pupil radii: they err by its square times a
-# cubic term.
+# Choice: step, in pupil radii, of the central differences that give the local slope. Their error is the square of the
+# step times a cubic term.
 STEP = 1e-4
-DIGITS = 1.0  # choice: of the rule of nodes, for the fastest that the splats' spectra turn
-# Relative L2 of Fresnel's fringes behind an edge, over a disk of Fresnel number 1: they fall with its fourth root.
+DIGITS = 1.0  # choice: digits of the quadrature rule at the highest frequency of the splats' spectra
+# Relative L2 size of Fresnel's fringes behind an edge, over a disk of Fresnel number 1. It falls with the fourth root
+# of the Fresnel number.
 FRINGES = 0.75
-SPLAT_CELLS = 3.3  # area of a splat, as its inverse mean square: (∫β²)⁻² of the quadratic B-spline β
+SPLAT_CELLS = 3.3  # area of a splat: (∫β²)⁻², with the quadratic B-spline β
 
 
 class NoDerivativesError(ValueError):
-    """A method has no derivatives where it computes."""
+    """A method has no derivatives on this device."""
 
 
 @dataclass(frozen=True)
 class RaySampling:
-    """Edge-fitted rays, and the error of the intensity that rays instead of waves make."""
+    """Edge-fitted rays, and the error of the intensity that results from rays instead of waves."""
 
     rule: tuple[Aperture, float, float]
     count: int
@@ -44,11 +45,11 @@ class RaySampling:
     padding: float = 1.0
 
     def intensity(self, beam: Beam, problem: Problem) -> Array:
-        """Power per area over the window for unit intensity at the pupil, a flat Dr.Jit array.
+        """Return the power per area over the window for unit intensity at the pupil, a flat Dr.Jit array.
 
         Raises:
-            NoDerivativesError: they are asked for on a GPU. Rules of Dr.Jit's that take the reciprocal of a float64
-                err by 1e-6 there, and by 1e-2 in directions, which are differences of paths.
+            NoDerivativesError: derivatives are required on a GPU. Derivatives in Dr.Jit that use the reciprocal of a
+                float64 have errors of 1e-6 there. In directions, which are differences of paths, the errors are 1e-2.
         """
         import drjit as dr
 
@@ -61,12 +62,12 @@ class RaySampling:
         x, y, propagates = _landings(beam, x, y, types)
         if device() == "cuda" and dr.grad_enabled(x, y):
             raise NoDerivativesError(
-                f"method = 'geometric': has no derivatives on a GPU; ask for 'exact', or for {VARIABLE}=cpu"
+                f"method = 'geometric': has no derivatives on a GPU; use 'exact' or {VARIABLE}=cpu"
             )
         return _splat(x, y, dr.select(propagates, weight, 0), problem, types)
 
     def plane(self, problem: Problem) -> float:
-        """Rounding does not spread rays."""
+        """Return infinity: rounding errors do not spread rays."""
         return math.inf
 
     @property
@@ -75,13 +76,13 @@ class RaySampling:
 
     @property
     def largest(self) -> int:
-        """Each ray has four numbers."""
+        """Side of the square array with the same memory: each ray has four numbers."""
         return 2 * math.ceil(math.sqrt(self.count))
 
 
 @dataclass(frozen=True)
 class PinholeSampling:
-    """All light in the cell where the ray through the pupil's centre ends."""
+    """A PSF with all light in the cell where the ray through the pupil's centre ends."""
 
     model_error: float
     seconds: float = CALL["pinhole"]
@@ -91,10 +92,10 @@ class PinholeSampling:
     padding: float = 1.0
 
     def intensity(self, beam: Beam, problem: Problem) -> Array:
-        """Power per area over the window for unit intensity at the pupil, a flat Dr.Jit array.
+        """Return the power per area over the window for unit intensity at the pupil, a flat Dr.Jit array.
 
         Raises:
-            ValueError: derivatives are asked for; a light's cell does not change smoothly.
+            ValueError: derivatives are required, but the cell of the light does not change smoothly.
         """
         import drjit as dr
 
@@ -103,7 +104,7 @@ class PinholeSampling:
         x, y, propagates = _landings(beam, zero, zero, types)
         passed = beam.pupil.transmission
         if dr.grad_enabled(x, y, passed) or is_differentiable(beam.radius):
-            raise ValueError("method = 'pinhole': has no derivatives; ask for 'geometric' or a wave method")
+            raise ValueError("method = 'pinhole': has no derivatives; use 'geometric' or a wave method")
         window = problem.window
         column, row = (round((float(at[0]) - first) / window.dx) for at, first in ((x, window.x[0]), (y, window.y[0])))
         image = np.zeros(window.shape, dtype=types.dtype)
@@ -112,14 +113,15 @@ class PinholeSampling:
         return types.Float(padded_for_packets(image))
 
     def plane(self, problem: Problem) -> float:
-        """Nothing rounds."""
+        """Return infinity, because rounding errors do not occur."""
         return math.inf
 
 
 def geometric(problem: Problem) -> list[RaySampling]:
-    """Enough rays that their splats join to a smooth picture: node spacing after stretching below the window's pitch.
+    """Return a sampling with enough rays for a smooth image.
 
-    A quadratic B-spline's spectrum falls like (πf dx)⁻³: beyond f = error^(-1/3)/(π dx) it is negligible.
+    The distance between the ends of neighbouring rays is below the window's pitch. The spectrum of a quadratic B-spline
+    falls like (πf dx)⁻³. Beyond f = error^(-1/3)/(π dx) it is negligible.
     """
     rays = problem.rays
     if rays is None:
@@ -128,15 +130,18 @@ def geometric(problem: Problem) -> list[RaySampling]:
     error = max(problem.tolerance, model / 10) / 10
     stretch = float(rays.most.max()) if len(rays) else 1.0
     cycles = problem.radius * stretch / (math.pi * problem.window.dx) * error ** (-1 / 3)
-    cycles = 2 ** (math.ceil(4 * math.log2(max(cycles, 1.0))) / 4)  # few different rules, so that they are found again
+    cycles = 2 ** (math.ceil(4 * math.log2(max(cycles, 1.0))) / 4)  # few different rules, so that caches are used
     count = node_count(problem.aperture, cycles, DIGITS)
     seconds = CALL["geometric"] + count * RAY
     return [RaySampling((problem.aperture, cycles, DIGITS), count, model, seconds)]
 
 
 def pinhole(problem: Problem) -> list[PinholeSampling]:
-    """One sample holds all light. Against samples of the exact PSF that is wrong by all of it, however small the PSF
-    is: they are intensities at points, not means over cells. So "auto" never takes it."""
+    """Return the sampling that puts all light into one sample.
+
+    Its error relative to samples of the exact PSF is total, however small the PSF is, because those are intensities at
+    points and not means over cells. "auto" therefore never chooses it.
+    """
     if problem.pixelated is not None:
         return []
     cell = problem.window.dx**2
@@ -144,8 +149,10 @@ def pinhole(problem: Problem) -> list[PinholeSampling]:
 
 
 def _landings(beam: Beam, x: Array, y: Array, types: Precision) -> tuple[Array, Array, Array]:
-    """Where rays from points (x, y) of the pupil meet the sensor: x + z p/√(1 - p²), p the gradient of the path; and
-    which of them propagate."""
+    """Return the hit points on the sensor of rays from points (x, y) of the pupil, and which rays propagate.
+
+    The hit points are x + z p/√(1 - p²), with p the gradient of the path.
+    """
     import drjit as dr
 
     step = opaque(types, STEP * beam.pupil.radius)
@@ -154,14 +161,17 @@ def _landings(beam: Beam, x: Array, y: Array, types: Precision) -> tuple[Array, 
     py = (beam.waves(x, y + step, types) - beam.waves(x, y - step, types)) * scale
     squared = px * px + py * py
     propagates = squared < 1 - 1e-9
-    # dr.rsqrt errs by 1e-6 on a GPU, also in float64.
+    # dr.rsqrt has an error of 1e-6 on a GPU, also in float64.
     tangent = opaque(types, beam.distance) / dr.sqrt(dr.select(propagates, 1 - squared, 1))
     return x + tangent * px, y + tangent * py, propagates
 
 
 def _splat(x: Array, y: Array, weight: Array, problem: Problem, types: Precision) -> Array:
-    """Sum of weights over the window's cells per area, each under a quadratic B-spline three cells wide: its nine
-    shares add up to 1, so that no power is lost but over the window's rim."""
+    """Return the sum of weights per area over the window's cells.
+
+    Each weight is spread by a quadratic B-spline that is three cells wide. Its nine shares add up to 1, so power is
+    lost only beyond the rim of the window.
+    """
     import drjit as dr
 
     window, (height, width) = problem.window, problem.window.shape
@@ -169,7 +179,7 @@ def _splat(x: Array, y: Array, weight: Array, problem: Problem, types: Precision
     places = []
     for at, first, n in ((x, window.x[0], width), (y, window.y[0], height)):
         place = (at - opaque(types, first)) * opaque(types, 1 / window.dx)
-        place = dr.clip(place, -10, n + 10.0)  # far outside, and within the index type
+        place = dr.clip(place, -10, n + 10.0)  # far outside the window, but within the range of the index type
         cell = dr.detach(dr.round(place))
         places.append((cell, _quadratic_basis(place - cell)))
     (column, across), (row, along) = places
@@ -184,15 +194,17 @@ def _splat(x: Array, y: Array, weight: Array, problem: Problem, types: Precision
 
 
 def _quadratic_basis(t: Array) -> tuple[Array, Array, Array]:
-    """The three uniform quadratic B-splines that act within half a cell of a sample, t in [-1/2, 1/2]."""
+    """Return the three uniform quadratic B-splines within half a cell of a sample, t in [-1/2, 1/2]."""
     return (0.5 - t) * (0.5 - t) / 2, 0.75 - t * t, (0.5 + t) * (0.5 + t) / 2
 
 
 def _ray_error(problem: Problem) -> float:
-    """Relative L2 error of the ray density: fringes along the shadow's rim, one Fresnel zone or a cell wide; all of it
-    where rays cross, or end in a place smaller than diffraction or cells allow.
+    """Return the relative L2 error of the ray density.
 
-    Behind an edge stretched by m, light looks as behind an open edge at z/m, magnified by m: a quadratic phase only
+    It stems from fringes along the rim of the shadow, which are as wide as a Fresnel zone or a cell. The error is total
+    if rays cross, or if they end in an area smaller than diffraction or cells allow.
+
+    Behind an edge stretched by m, light has the pattern of an open edge at z/m, magnified by m: a quadratic phase only
     scales Fresnel's integral (Goodman, eq. 4-17).
     """
     rays, cell = problem.rays, problem.window.dx**2
@@ -202,14 +214,14 @@ def _ray_error(problem: Problem) -> float:
         return blurred
     stretch = float(np.mean(1 / np.maximum(rays.least, 1e-12)))
     zone = math.sqrt(problem.wavelength * problem.distance * stretch) + problem.window.dx * stretch
-    # Of a disk R; of narrow or cut openings, twice the area for each length of edge.
+    # For a disk this size is R. For narrow or cut apertures it is twice the area per length of edge.
     narrow = 2 * problem.aperture.area / problem.aperture.outline.length
     size = problem.radius * min(math.sqrt(problem.aperture.area / math.pi), narrow)
     return FRINGES * math.sqrt(zone / size) if zone < size else blurred
 
 
 def _brightness(problem: Problem) -> float:
-    """Of the light where rays and diffraction spread it."""
+    """Return the brightness of the light after rays and diffraction have spread it."""
     assert problem.rays is not None
     diffracted = math.pi * (problem.wavelength * problem.distance / (2 * problem.radius)) ** 2
     return brightness(problem.rays.image_area + diffracted, problem.window.dx**2)

@@ -1,9 +1,9 @@
-"""The angular spectrum of a rotationally symmetric pupil, by two Hankel transforms: the cheapest exact method there is.
+"""The angular spectrum of a rotationally symmetric pupil by two Hankel transforms, the cheapest exact method.
 
     S(f) = 2π ∫ P(r) J₀(2πfr) r dr,   U(x) = 2π ∫ S(f) e^{ikz (cos θ - 1)} J₀(2πfx) f df,   f = sin θ / λ
 
-(Goodman, Introduction to Fourier Optics, §2.1.5 and §3.10). The aperture's edge is where the quadrature in r ends: no
-soft edge is needed. In θ the transfer function is smooth up to grazing incidence.
+(Goodman, Introduction to Fourier Optics, §2.1.5 and §3.10). The quadrature in r ends at the edge of the aperture, so no
+soft edge is necessary. As a function of θ the transfer function is smooth up to grazing incidence.
 """
 
 from __future__ import annotations
@@ -28,13 +28,13 @@ from optics.numerics.radial_profile import DistinctRadii, RadialProfile
 
 __all__ = ["HankelSampling", "hankel"]
 
-# Choice. From this tolerance on J₀ need not be right to the last digit.
+# Choice: from this tolerance on, J₀ is computed to fewer digits.
 LOOSE = 1e-8
 
 
 @dataclass(frozen=True)
 class HankelSampling:
-    """Gauss-Legendre nodes in r, for each open ring, and in θ, and the radii of the picture."""
+    """Gauss-Legendre nodes in r for each open ring, nodes in θ, and the radii of the image."""
 
     taper: Taper
     radii: tuple[int, ...]
@@ -46,17 +46,17 @@ class HankelSampling:
     padding: float = 1.0
 
     def intensity(self, beam: Beam, problem: Problem) -> Array:
-        """|U|² over the window for unit amplitude at the pupil, a flat Dr.Jit array."""
+        """Return |U|² over the window for unit amplitude at the pupil, a flat Dr.Jit array."""
         types = precision(problem.dtype)
         profile = _hankel(beam, problem, self, types).intensity
         return self.line.onto(profile, problem.window, types)
 
     def field(self, beam: Beam, problem: Problem) -> Field:
-        """U over the window, less the carrier e^{ikz}."""
+        """Return U over the window, without the carrier e^{ikz}."""
         return on_line(_hankel(beam, problem, self, precision(problem.dtype)), self.line, beam, problem)
 
     def plane(self, problem: Problem) -> float:
-        """Width [m] over which rounding spreads the pupil's light."""
+        """Return the width [m] over which rounding errors spread the pupil's light."""
         return 2 * (self.line.radius + problem.radius)
 
     @property
@@ -65,19 +65,22 @@ class HankelSampling:
 
     @property
     def largest(self) -> int:
-        """No array is square but the matrix that refines the line."""
+        """Side of a square array of the same size. Only the matrix that refines the line is two-dimensional."""
         return math.isqrt(max(self.line.entries, sum(self.radii), self.angles, self.line.points))
 
 
 def hankel(problem: Problem) -> list[HankelSampling]:
-    """Nodes for the turns that each phase goes through; nothing unless the problem is rotationally symmetric."""
+    """Return samplings with enough nodes for the cycles of each phase.
+
+    Empty unless the problem is rotationally symmetric.
+    """
     if not problem.symmetric:
         return []
     return [_sampling(problem, taper) for taper in tapers(problem)]
 
 
 def _sampling(problem: Problem, taper: Taper) -> HankelSampling:
-    digits = 0.5 - math.log10(problem.tolerance)  # choice: a third of the tolerance to each of the two rules
+    digits = 0.5 - math.log10(problem.tolerance)  # choice: a third of the tolerance for each of the two rules
     cycles = problem.radius * (problem.phase_band_inside + taper.end)
     rings = problem.aperture.rings
     radii = tuple(_round_up(gauss_legendre_count(cycles * (outer - inner), digits)) for inner, outer in rings)
@@ -94,13 +97,13 @@ def _sampling(problem: Problem, taper: Taper) -> HankelSampling:
 
 
 def _round_up(n: int) -> int:
-    """Few different numbers of nodes, so that their tables are found again."""
+    """Return n rounded up to one of a few numbers, so that cached tables are used."""
     step = max(1, 2 ** (n.bit_length() - 4))
     return -(-n // step) * step
 
 
 def _hankel(beam: Beam, problem: Problem, how: HankelSampling, types: Precision) -> Field:
-    """The field on the line's radii, less the carrier e^{ikz}."""
+    """Return the field on the radii of the line, without the carrier e^{ikz}."""
     import drjit as dr
 
     nodes, weights = _on_rings(problem.aperture.rings, how.radii)
@@ -126,7 +129,7 @@ def _hankel(beam: Beam, problem: Problem, how: HankelSampling, types: Precision)
 
 
 def _on_rings(rings: tuple[tuple[float, float], ...], counts: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray]:
-    """Nodes and weights over the open radii, in units of R."""
+    """Return nodes and weights over the open radii, in units of R."""
     parts = [
         (inner + (outer - inner) * nodes, (outer - inner) * weights)
         for (inner, outer), (nodes, weights) in zip(rings, map(gauss_legendre, counts), strict=True)
@@ -136,7 +139,7 @@ def _on_rings(rings: tuple[tuple[float, float], ...], counts: tuple[int, ...]) -
 
 
 def _transform(field: Field, at: Array, to: Array, types: Precision, exactly: bool) -> Field:
-    """Σ_j u_j J₀(2π at_j to_k) for every k."""
+    """Return Σ_j u_j J₀(2π at_j to_k) for every k."""
     import drjit as dr
 
     n, m = dr.width(at), dr.width(to)

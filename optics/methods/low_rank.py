@@ -1,4 +1,4 @@
-"""The Rayleigh-Sommerfeld integral as one matrix product: Fourier's kernel times a slow rest of low rank."""
+"""The Rayleigh-Sommerfeld integral as one matrix product: the Fourier kernel times a slow factor of low rank."""
 
 from __future__ import annotations
 
@@ -25,16 +25,21 @@ __all__ = ["LowRankSampling", "low_rank"]
 
 # Choice: ranks to try.
 RANKS = (1, 2, 3, 4, 5, 6, 7, 8, 10, 12, 14, 16, 20, 24)
-RANK_RIPPLE = 0.4  # choice: error of the rest at the pupil's rim, of the tolerance; test_low_rank.py
-STEEPEST = 8.0  # choice, radii over distance: nearer, the rim on which ranks are tried tells too little
-TRIED = 41  # choice: places along a line through the window
-MOST_BYTES = 288_000_000  # choice, by memory: of the matrix between pupil and window; it takes twice that
+# Choice: allowed error of the slow factor at the pupil's rim, relative to the tolerance; test_low_rank.py.
+RANK_RIPPLE = 0.4
+STEEPEST = 8.0  # choice, radius over distance: nearer to the pupil, a test of ranks on the rim is not sufficient
+TRIED = 41  # choice: positions along a line through the window
+MOST_BYTES = 288_000_000  # choice, limited by memory: size of the matrix between pupil and window; twice that is in use
 
 
 @dataclass(frozen=True)
 class LowRankSampling:
-    """Pupil samples; `rank` Chebyshev points per axis of the window, `half_width` [m] about its centre, and the
-    distance c [m] of Fourier's kernel e^{-ik ξ·u/c}, u the place in the window; 1 where samples are sines already."""
+    """Pupil samples, and the rank of the slow factor over the window.
+
+    rank: Chebyshev points per axis of the window. half_width: range of these points about the window's centre [m].
+    scale: distance c [m] of the Fourier kernel e^{-ik ξ·u/c}, with u the position in the window; 1 if samples are
+        sines.
+    """
 
     pupil: PupilSamples
     rank: int
@@ -46,15 +51,15 @@ class LowRankSampling:
     padding: float = 1.0
 
     def intensity(self, beam: Beam, problem: Problem) -> Array:
-        """|U|² over the window for unit amplitude at the pupil, a flat Dr.Jit array."""
+        """Return |U|² over the window for unit amplitude at the pupil, a flat Dr.Jit array."""
         return _low_rank(beam, problem, self, precision(problem.dtype)).intensity
 
     def field(self, beam: Beam, problem: Problem) -> Field:
-        """U over the window, less the carrier e^{ikz}."""
+        """Return U over the window, without the carrier e^{ikz}."""
         return on_window(_low_rank(beam, problem, self, precision(problem.dtype)), beam, problem)
 
     def plane(self, problem: Problem) -> float:
-        """Width [m] over which rounding spreads the pupil's light."""
+        """Return the width [m] over which rounding errors spread the pupil's light."""
         return problem.wavelength * self.scale / float(np.diff(self.pupil.at).mean())
 
     @property
@@ -69,12 +74,15 @@ class LowRankSampling:
 
     @property
     def largest(self) -> int:
-        return len(self.pupil.at)  # whatever the rank: the matrix has a limit of its own
+        return len(self.pupil.at)  # independent of the rank, because the matrix has its own limit
 
 
 def low_rank(problem: Problem) -> list[LowRankSampling]:
-    """As few pupil samples as the turns of pupil and path together allow, and the rank that the slow rest needs: with
-    samples in sines, or where these crowd, on a grid of places; pixels have nodes of their own."""
+    """Return a sampling with the fewest pupil samples for the combined phase of pupil and path, and the necessary rank.
+
+    The samples are evenly spaced in sines or, if sines are too dense, on a grid of positions. Pixels have their own
+    nodes.
+    """
     if problem.radius > STEEPEST * problem.distance:
         return []
     half = max(problem.window.own_half_width, problem.window.dx)
@@ -84,7 +92,8 @@ def low_rank(problem: Problem) -> list[LowRankSampling]:
         if found is not None:
             return [found]
     pupil = samples_of(problem)
-    # Fourier's kernel for a distance between that to the window's centre and that to its sides. Choice: where between.
+    # The distance of the Fourier kernel lies between the distances to the window's centre and to its sides. Its
+    # position between them is a choice.
     scale = math.hypot(problem.distance, 0.6 * half, *problem.window.centre)
     found = None if pupil is None else _sampling(problem, pupil, half, scale)
     return [] if found is None else [found]
@@ -110,17 +119,20 @@ def _sampling(problem: Problem, pupil: PupilSamples, half: float, scale: float) 
 
 
 def _rank(problem: Problem, pupil: PupilSamples, half: float, scale: float, most: int) -> int | None:
-    """Chebyshev points along an axis that interpolate the slow rest, tried on the soft aperture's rim."""
+    """Return the number of Chebyshev points along an axis that interpolate the slow factor, or None.
+
+    It is tested on the rim of the soft aperture.
+    """
     angle = np.linspace(0, 2 * np.pi, 8, endpoint=False)[:, None]
     rim = pupil.outermost * np.cos(angle), pupil.outermost * np.sin(angle)
     directions = pupil.directions(*rim) if isinstance(pupil, SineSamples) else (rim[0] / scale, rim[1] / scale)
     test = half * np.linspace(-1, 1, TRIED)
-    # On the axis both directions are alike, and so are both sides.
+    # On the axis both directions are equivalent, and so are both sides.
     on_axis = problem.window.centre == (0.0, 0.0)
     lines = [(0, 0.0), (0, half)] if on_axis else [(k, side) for k in (0, 1) for side in (-half, 0, half)]
 
     def rest(at: np.ndarray) -> np.ndarray:
-        """(line, place on the rim, place on the line)"""
+        """Return the slow factor, (line, position on the rim, position on the line)."""
         u, v = np.stack([_line(axis, at, across) for axis, across in lines], axis=1)[:, :, None, :]
         return _rest(problem, rim, directions, (u, v))
 
@@ -136,12 +148,12 @@ def _rank(problem: Problem, pupil: PupilSamples, half: float, scale: float, most
 
 @lru_cache(maxsize=len(RANKS))
 def _between(rank: int) -> np.ndarray:
-    """What each of so many Chebyshev points counts at the places that are tried, (point, place)."""
+    """Return the weights of `rank` Chebyshev points at the test positions, (point, position)."""
     return lagrange_basis(np.linspace(-1, 1, TRIED), chebyshev_points(rank))
 
 
 def _line(along: int, at: np.ndarray, across: float) -> tuple[np.ndarray, np.ndarray]:
-    """Points (x, y) of a line through the window, along x (0) or y (1), from its centre."""
+    """Return points (x, y) of a line through the window, along x (0) or y (1), relative to its centre."""
     beside = np.full_like(at, across)
     return (at, beside) if along == 0 else (beside, at)
 
@@ -152,7 +164,10 @@ def _rest(
     directions: tuple[np.ndarray, np.ndarray],
     window: tuple[np.ndarray, np.ndarray],
 ) -> np.ndarray:
-    """(z/D)² e^{ik(D - ρ + u·s)} between points ξ of the pupil and u of the window, s those of Fourier's kernel."""
+    """Return (z/D)² e^{ik(D - ρ + u·s)} between points ξ of the pupil and u of the window.
+
+    s is the direction in the Fourier kernel.
+    """
     (xi, eta), (u, v), (s, t) = pupil, window, directions
     x, y = u + problem.window.centre[0], v + problem.window.centre[1]
     z = problem.distance
@@ -164,14 +179,14 @@ def _rest(
 
 
 def _low_rank(beam: Beam, problem: Problem, how: LowRankSampling, types: Precision) -> Field:
-    """U(x) = Σ_ab L_a(u) L_b(v) Σ_ξ P(ξ) G(ξ; x_a, y_b) e^{-ik s·u}, up to a phase that intensity forgets:
+    """Return U(x) = Σ_ab L_a(u) L_b(v) Σ_ξ P(ξ) G(ξ; x_a, y_b) e^{-ik s·u}.
 
-        G(ξ; x) = z/(λD²) (1/(kD) - i) e^{ik(D - ρ + s·u)},   D = |(x - ξ, z)|, ρ = |(x, z)|,
+        G(ξ; x) = z/(λD²) (1/(kD) - i) e^{ik(D - ρ + s·u)},   D = |(x - ξ, z)|, ρ = |(x, z)|.
 
-    which varies slowly with x; u is the place in the window, from its centre, and s = ξ/c or the sines of the samples.
-    Sums over a and ξ along one axis are one: A_y W A_xᵀ, two matrix products.
-    Along x both are kept as what is even and what is odd about the middle, with half of the first one's products:
-    A_x stays what it is where window and samples are both mirrored.
+    A phase that cancels in the intensity is omitted. G varies slowly with x. u is the position in the window relative
+    to its centre, and s = ξ/c or the sines of the samples. The sums over a and ξ along one axis are combined: A_y W
+    A_xᵀ, two matrix products. Along x both matrices are split into parts that are even and odd about the middle, which
+    halves the products of the first one. A_x does not change if window and samples are both mirrored.
     """
     window = problem.window
     across_y = _fourier(sample_positions(window.shape[0], window.dx), problem, how)
@@ -184,7 +199,10 @@ def _low_rank(beam: Beam, problem: Problem, how: LowRankSampling, types: Precisi
 
 
 def _halves(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(A[x, j] ± A[x, -j]) / 2 for samples j from the middle on; that in the middle is its own mirror image."""
+    """Return (A[x, j] ± A[x, -j]) / 2 for samples j from the middle on.
+
+    The middle sample is its own mirror image.
+    """
     size = matrix.shape[1]
     ahead, behind = matrix[:, size // 2 :], matrix[:, : size - size // 2][:, ::-1]
     even, odd = (ahead + behind) / 2, (ahead - behind) / 2
@@ -194,7 +212,7 @@ def _halves(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _unfolded(parts: list[tuple[Array, Array]], window: Grid, types: Precision) -> Field:
-    """Over the window, of what is even and what is odd along x."""
+    """Return the field over the window from its even and odd parts along x."""
     import drjit as dr
 
     across = window.shape[1] // 2
@@ -206,8 +224,10 @@ def _unfolded(parts: list[tuple[Array, Array]], window: Grid, types: Precision) 
 
 
 def _kernel(beam: Beam, problem: Problem, how: LowRankSampling, types: Precision) -> list[tuple[Array, Array]]:
-    """W[(b, η), (a, ξ)] ± W[(b, η), -(a, ξ)], W = P(ξ, η) G(ξ, η; x_a, y_b), for (a, ξ) from the middle on: each as
-    two tensors."""
+    """Return W[(b, η), (a, ξ)] ± W[(b, η), -(a, ξ)] for (a, ξ) from the middle on, each as two tensors.
+
+    W = P(ξ, η) G(ξ, η; x_a, y_b).
+    """
     import drjit as dr
 
     u, size = how.pupil.field(beam, types).evaluated(), len(how.pupil.at) * how.rank
@@ -224,7 +244,7 @@ def _kernel(beam: Beam, problem: Problem, how: LowRankSampling, types: Precision
 
 
 def _entries(u: Field, at: tuple[Array, Array], beam: Beam, problem: Problem, how: LowRankSampling) -> Field:
-    """W at columns and rows, float64 indices, half as many columns as rows."""
+    """Return W at columns and rows, which are float64 indices. The number of columns is half the number of rows."""
     import drjit as dr
 
     types, n = u.types, len(how.pupil.at)
@@ -239,7 +259,7 @@ def _entries(u: Field, at: tuple[Array, Array], beam: Beam, problem: Problem, ho
     rho2 = x * x + y * y + z * z
     excess = xi * xi + eta * eta - 2 * (x * xi + y * eta)
     distance = dr.sqrt(rho2 + excess)
-    # Fourier's kernel stays where it is while nodes move with the radius; what they move by is the rest's.
+    # The Fourier kernel is fixed while nodes move with the radius. The slow factor accounts for the movement.
     directions = types.Float64(padded_for_packets(how.directions))
     s, t = (dr.gather(types.Float64, directions, types.Index(index)) for index in (i, j))
     fixed = from_centre[0] * s + from_centre[1] * t
@@ -252,7 +272,7 @@ def _entries(u: Field, at: tuple[Array, Array], beam: Beam, problem: Problem, ho
 
 
 def _split(index: Array, n: int, types: Precision) -> tuple[Array, Array]:
-    """Quotient and remainder of float64 indices by n."""
+    """Return quotient and remainder of float64 indices divided by n."""
     import drjit as dr
 
     by = dr.opaque(types.Float64, n)
@@ -261,7 +281,7 @@ def _split(index: Array, n: int, types: Precision) -> tuple[Array, Array]:
 
 
 def _fourier(at: np.ndarray, problem: Problem, how: LowRankSampling) -> np.ndarray:
-    """A[x, (a, ξ)] = L_a(u) e^{-ik s u} at places u along an axis [m], from the window's centre."""
+    """Return A[x, (a, ξ)] = L_a(u) e^{-ik s u} at positions u along an axis [m] from the window's centre."""
     waves = np.outer(at, how.directions) / -problem.wavelength
     angle = (2 * np.pi * (waves - np.rint(waves))).astype(problem.dtype)
     weight = lagrange_basis(at, how.half_width * chebyshev_points(how.rank)).T.astype(problem.dtype)

@@ -1,4 +1,4 @@
-"""What every method gives: the samples by which it meets a tolerance, and the picture that it makes of them."""
+"""The interface of all methods: the samples with which a method meets a tolerance, and the PSF from these samples."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ __all__ = ["Sampling", "WithField"]
 
 
 class WithField(Protocol):
-    """What exact methods but "far_field" give besides."""
+    """The additional interface of exact methods except "far_field": the complex field."""
 
     def field(self, beam: Beam, problem: Problem) -> Field:
-        """U over the window for unit amplitude at the pupil, less the carrier e^{ikz}."""
+        """Return U over the window for unit amplitude at the pupil, without the carrier e^{ikz}."""
 
 
 class Sampling(Protocol):
-    """How one method samples a problem; its time is predicted for a warm kernel on two cores."""
+    """Samples with which one method solves a problem. The predicted time is for a warm kernel on two cores."""
 
     @property
     def method(self) -> str: ...
@@ -34,7 +34,7 @@ class Sampling(Protocol):
 
     @property
     def padding(self) -> float:
-        """Period of the pupil's transform over its samples; 1 where nothing is periodic."""
+        """Period of the pupil's transform divided by the number of its samples; 1 without a period."""
 
     @property
     def largest(self) -> int:
@@ -42,10 +42,10 @@ class Sampling(Protocol):
 
     @property
     def model_error(self) -> float:
-        """Relative L2 error of the intensity that the method would make with any number of samples: 0 if exact."""
+        """Relative L2 error of the intensity with infinitely many samples; 0 for exact methods."""
 
     def intensity(self, beam: Beam, problem: Problem) -> Array:
-        """|U|² over the window for unit amplitude at the pupil, a flat Dr.Jit array."""
+        """Return |U|² over the window for unit amplitude at the pupil, a flat Dr.Jit array."""
 
     def plane(self, problem: Problem) -> float:
-        """Width [m] over which rounding spreads the pupil's light."""
+        """Return the width [m] over which rounding errors spread the pupil's light."""

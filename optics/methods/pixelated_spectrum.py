@@ -1,7 +1,8 @@
-"""The angular spectrum of a pupil of pixels: exact sums over nodes that are fitted to them, instead of a transform.
+"""The angular spectrum of a pupil of pixels: exact sums over nodes within pixels instead of a transform.
 
-A spectrum that is needed up to a frequency asks for nodes that resolve it within each pixel, and for nothing from the
-light beyond, which jumps send everywhere. From the spectrum on all is as for other pupils (`angular_spectrum`).
+To compute the spectrum up to a given frequency, the nodes must resolve that frequency within each pixel. Light beyond
+it, which jumps send in all directions, needs no samples. All further steps are the same as for other pupils
+(`angular_spectrum`).
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ __all__ = ["PixelSpectrum", "split_pixel_spectrum", "whole_pixel_spectrum"]
 
 @dataclass(frozen=True)
 class PixelSpectrum(SpectrumSampling):
-    """Of a pupil of pixels with nodes fitted to them."""
+    """Spectrum of a pupil of pixels with nodes fitted to them."""
 
     method: str
     pupil: PixelSamples
@@ -38,13 +39,13 @@ class PixelSpectrum(SpectrumSampling):
     padding: float = 1.0
 
     def field(self, beam: Beam, problem: Problem) -> Field:
-        """U over the window, less the carrier e^{ikz}."""
+        """Return U over the window, without the carrier e^{ikz}."""
         types = precision(problem.dtype)
         spectrum = _spectrum(self.pupil.field(beam, types), beam, self, types)
         return self.whole_phase(arrived(spectrum, beam, problem, self).scaled(1 / self.period**2), beam, problem)
 
     def intensity(self, beam: Beam, problem: Problem) -> Array:
-        """|U|² over the window for unit amplitude at the pupil, a flat Dr.Jit array."""
+        """Return |U|² over the window for unit amplitude at the pupil, a flat Dr.Jit array."""
         types = precision(problem.dtype)
         spectrum = _spectrum(self.pupil.field(beam, types), beam, self, types)
         return arrived(spectrum, beam, problem, self).scaled(1 / self.period**2).intensity
@@ -61,12 +62,12 @@ class PixelSpectrum(SpectrumSampling):
 
 
 def whole_pixel_spectrum(problem: Problem) -> list[PixelSpectrum]:
-    """Samplings by which the whole spectrum meets the problem's tolerance."""
+    """Return samplings with which the whole spectrum meets the problem's tolerance."""
     return _samplings(problem, "angular_spectrum")
 
 
 def split_pixel_spectrum(problem: Problem) -> list[PixelSpectrum]:
-    """Samplings by which the split spectrum meets the problem's tolerance."""
+    """Return samplings with which the split spectrum meets the problem's tolerance."""
     return _samplings(problem, "split_angular_spectrum")
 
 
@@ -82,7 +83,7 @@ def _samplings(problem: Problem, method: str) -> list[PixelSpectrum]:
 
 
 def _nodes(problem: Problem, taper: Taper) -> PixelSamples | None:
-    """Enough for the phase and every frequency that is kept, in all pixels."""
+    """Return enough nodes in all pixels for the phase and every frequency that is kept."""
     assert problem.pixelated is not None
     cycles = problem.radius * (problem.phase_band_inside + taper.end)
     return pixel_samples(problem.pixelated, cycles, node_rule(problem)[1], problem.radius)
@@ -98,7 +99,7 @@ def _timed(sampling: PixelSpectrum, problem: Problem) -> PixelSpectrum:
 
 
 def _spectrum(u: Field, beam: Beam, how: PixelSpectrum, types: Precision) -> Field:
-    """Σ u(ξ) e^{-2πi f·ξ} at all frequencies of the grid: two matrix products, W u Wᵀ, W = e^{-2πi f ξ}."""
+    """Return Σ u(ξ) e^{-2πi f·ξ} at all frequencies of the grid: two matrix products W u Wᵀ, W = e^{-2πi f ξ}."""
     import drjit as dr
 
     nodes, grid = len(how.pupil.at), how.spectrum

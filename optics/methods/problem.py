@@ -1,4 +1,4 @@
-"""A propagation in numbers: what decides where a method must sample."""
+"""The parameters of a propagation that determine where a method must sample."""
 
 from __future__ import annotations
 
@@ -21,30 +21,31 @@ from optics.numerics.quadrature import stepped_up
 
 __all__ = ["SLOPE_MARGIN", "Problem", "PupilEdge"]
 
-# Choice, over the steepest slope of a wavefront: the grid on which slopes are seen may miss the steepest place.
+# Choice, relative to the steepest slope of a wavefront: the grid of slopes may miss the steepest point.
 SLOPE_MARGIN = 1.02
-# Choice. Amplitude ripple of the soft aperture and of the spectral taper against the tolerance on intensity.
-# Edge-diffracted light errs by several ripples, its intensity by twice that, and a window may hold no other light: half
-# the tolerance.
+# Choice: amplitude ripple of the soft aperture and of the spectral taper, relative to the tolerance on intensity.
+# Edge-diffracted light has an amplitude error of several ripples, and its intensity has twice that. If a window
+# contains no other light, this error is half the tolerance.
 EDGE_RIPPLE_PER_TOLERANCE = 0.1
 BRIGHT_EDGE_RIPPLE_PER_TOLERANCE = 0.3
 
 
 @dataclass(frozen=True)
 class Problem:
-    """One monochromatic propagation from a pupil to a window, in numbers.
+    """One monochromatic propagation from a pupil to a window, as numbers.
 
-    aperture: its shape. radius, distance [m]; wavelength [m] in the medium; window: output grid.
+    aperture: shape of the pupil. radius, distance [m]; wavelength [m] in the medium; window: output grid.
     phase_band: highest spatial frequency [1/m] in the pupil's phase, over the disk and its soft edge.
-    phase_band_inside: the same over the disk without its soft edge, where a relief may bend steeply.
-    detail: what of the phase the wavefront's slopes do not tell [1/m].
-    symmetric: nothing depends on the azimuth. even: nothing changes where x or y is mirrored.
-    widest_band: frequencies beyond it may be dropped (infinite: whatever reaches the window counts).
-    reach: given where all but a tolerance's share of the light stays within this distance of the axis [m]: what lies
-        beyond may be wrong, and edge-diffracted light less exact (None: the window counts to its corners).
-    slopes: of the wavefront.
+    phase_band_inside: the same over the disk alone, because a relief may be steep in the soft edge.
+    detail: bandwidth [1/m] of the phase that the slopes of the wavefront do not include.
+    symmetric: whether nothing depends on the azimuth. even: whether nothing changes if x or y is mirrored.
+    widest_band: frequencies beyond it may be dropped (infinite: everything that reaches the window counts).
+    reach: distance from the axis [m] that contains all light except a fraction of the tolerance. Samples beyond it may
+        be wrong, and edge-diffracted light may be less accurate (None: the window counts to its corners).
+    slopes: slopes of the wavefront.
     medium_n: index behind the pupil.
-    masked: whether a mask sends light where rays do not tell, so that approximations cannot judge themselves.
+    masked: whether a mask sends light to places that rays do not predict. Approximations then cannot predict their
+        error.
     spread: of the light over the pupil, see `light_spread`.
     """
 
@@ -68,11 +69,11 @@ class Problem:
     even: bool = False
 
     @classmethod
-    def of(cls, beam: Beam, window: Grid, tolerance: float, dtype: str = "float32") -> Problem:
-        """The problem of light that goes through a pupil to a window.
+    def from_beam(cls, beam: Beam, window: Grid, tolerance: float, dtype: str = "float32") -> Problem:
+        """Return the problem of light that passes a pupil and arrives at a window.
 
         Raises:
-            ValueError: the distance is not positive, tolerance not in [1e-12, 0.5], or there is no such dtype.
+            ValueError: the distance is not positive, the tolerance is not in [1e-12, 0.5], or the dtype is invalid.
         """
         distance = positive("sensor_distance", beam.distance, carried=True)
         tolerance = in_range("tolerance", tolerance, 1e-12, 0.5)
@@ -82,13 +83,15 @@ class Problem:
 
     @cached_property
     def turning(self) -> float:
-        """Highest spatial frequency [1/m] in the phase of the pupil and of the path to any point of the window
-        together; for a lens in focus far less than the sum of both."""
+        """Highest spatial frequency [1/m] in the combined phase of the pupil and the path to any point of the window.
+
+        For a lens in focus it is far below the sum of the two.
+        """
         return self._turning[0]
 
     @cached_property
     def turning_inside(self) -> float:
-        """The same over the disk without its soft edge."""
+        """Highest frequency [1/m] of the combined phase over the disk without its soft edge."""
         return self._turning[1]
 
     @cached_property
@@ -99,25 +102,25 @@ class Problem:
 
     @cached_property
     def rays(self) -> Rays | None:
-        """Where geometrical optics sends the light, by which approximations judge themselves; None: pixels scatter."""
+        """Rays of geometrical optics, from which approximations predict their error; None if pixels scatter light."""
         if self.pixelated is not None:
             return None
-        return Rays.of(self.slopes, self.aperture, self.distance, self.medium_n)
+        return Rays.from_slopes(self.slopes, self.aperture, self.distance, self.medium_n)
 
     @property
     def pixelated(self) -> PixelatedAperture | None:
-        """The aperture, if the light behind it jumps from pixel to pixel."""
+        """The aperture if the phase behind it jumps from pixel to pixel, else None."""
         return self.aperture if isinstance(self.aperture, PixelatedAperture) else None
 
     @property
     def ripple(self) -> float:
-        """Amplitude error allowed to the soft aperture's spectrum."""
+        """Allowed amplitude error of the soft aperture's spectrum."""
         return self.tolerance * (EDGE_RIPPLE_PER_TOLERANCE if self.reach is None else BRIGHT_EDGE_RIPPLE_PER_TOLERANCE)
 
     @property
     def fade_ripple(self) -> float:
-        """Amplitude error allowed to light from beyond the band."""
-        return self.ripple if self.reach is None else 0.1  # choice: beyond the band there is next to no light
+        """Allowed amplitude error of light from beyond the band."""
+        return self.ripple if self.reach is None else 0.1  # choice: beyond the band there is hardly any light
 
     @property
     def outermost(self) -> float:
@@ -129,40 +132,40 @@ class Problem:
 
     @property
     def steepest_sine(self) -> float:
-        """Of rays that meet in a point of the window, at most."""
+        """Largest sine of rays that meet in a point of the window."""
         leaving = self.phase_band_inside * self.wavelength + self.wavelength / self.radius
         return steepest_sine(self.radius, self.distance, leaving)
 
     @property
     def scalar_error(self) -> float:
-        """What scalar theory itself errs by, at most."""
+        """Upper bound of the error of scalar theory."""
         return scalar_theory_error(self.steepest_sine, self.spread)
 
     def soft_edge(self, band: float) -> PupilEdge:
-        """The aperture as samples can carry it that leave frequencies up to `band` [1/m] untouched."""
+        """Return the aperture with a soft edge that leaves frequencies up to `band` [1/m] unchanged."""
         return PupilEdge(self.aperture.soften(stepped_up(band * self.radius), self.ripple, EDGE_REACH), self.radius)
 
     def band(self, margin: float = 0.0) -> float:
-        """Highest frequency [1/m] whose light can come within `margin` of the window from anywhere on the disk."""
+        """Return the highest frequency [1/m] of light from the disk that can come within `margin` of the window."""
         reach = (1 + EDGE_REACH) * self.radius + self.outermost + margin
         return min(self.widest_band, reach / math.hypot(reach, self.distance) / self.wavelength)
 
 
 @dataclass(frozen=True)
 class PupilEdge:
-    """A soft aperture on a pupil of the given radius: its numbers in metres."""
+    """A soft aperture on a pupil of the given radius, in metres."""
 
     aperture: SoftAperture
     radius: float
 
     @property
     def outermost(self) -> float:
-        """Distance from the axis [m] beyond which nothing passes."""
+        """Distance from the axis [m] beyond which the aperture is closed."""
         return (1 + self.aperture.reach) * self.radius
 
     @property
     def stopband(self) -> float:
-        """Frequency [1/m] beyond which its spectrum is below the ripple."""
+        """Frequency [1/m] beyond which the spectrum is below the ripple."""
         return self.aperture.stopband / self.radius
 
     @property
@@ -176,7 +179,7 @@ def _problem(beam: Beam, window: Grid, tolerance: float, dtype: str) -> Problem:
     slopes = pupil.slopes(wavelength, beam.source)
     pixels = pupil.pixels if pupil.bends(wavelength) else 0
     on_axis = beam.source.angle == (0.0, 0.0)
-    detail = pupil.bandwidth(wavelength, tolerance / 10)  # choice: a tenth, of the phase [rad]
+    detail = pupil.bandwidth(wavelength, tolerance / 10)  # choice: a tenth of the tolerance, for the phase [rad]
     return Problem(
         aperture=PixelatedAperture(pupil.aperture, pixels) if pixels else pupil.aperture,
         radius=pupil.radius,

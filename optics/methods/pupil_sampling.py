@@ -1,6 +1,6 @@
-"""Where a matrix product samples the pupil: on a grid, its edge softened, or at nodes of pixels between which it jumps.
+"""Samples of the pupil for matrix products: a grid with a softened edge, or nodes within pixels.
 
-Both are rows and columns of places, the same along x and y.
+Both are rows and columns of positions, the same along x and y.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from optics.numerics.precision import Precision, opaque, padded_for_packets
 
 __all__ = ["GridSamples", "PixelSamples", "PupilSamples", "pixel_samples", "samples_of"]
 
-MOST_ACROSS = 1e6  # choice, by memory
+MOST_ACROSS = 1e6  # choice, limited by memory
 
 
 class PupilSamples(Protocol):
@@ -31,27 +31,29 @@ class PupilSamples(Protocol):
 
     @property
     def at(self) -> np.ndarray:
-        """Places along either axis [m], or sines."""
+        """Positions along either axis: in metres or as sines."""
 
     @property
     def outermost(self) -> float:
-        """Distance from the axis [m] beyond which nothing counts."""
+        """Distance from the axis [m] beyond which the pupil is dark."""
 
     @property
     def seconds(self) -> float:
-        """What `field` takes, roughly."""
+        """Approximate time of `field`."""
 
     def places(self, i: Array, j: Array, beam: Beam, types: Precision) -> tuple[Array, Array]:
-        """Points (x, y) [m] of samples i along x and j along y, float64 indices, with the derivatives that the beam's
-        radius carries."""
+        """Return the points (x, y) [m] of samples i along x and j along y, which are float64 indices.
+
+        The points carry the derivatives of the beam's radius.
+        """
 
     def field(self, beam: Beam, types: Precision) -> Field:
-        """Behind the pupil, times the samples' areas [m²]."""
+        """Return the field behind the pupil times the areas of the samples [m²]."""
 
 
 @dataclass(frozen=True)
 class GridSamples:
-    """A grid that carries a soft aperture."""
+    """A grid that represents a soft aperture."""
 
     edge: PupilEdge
     grid: Grid
@@ -80,7 +82,10 @@ class GridSamples:
 
 @dataclass(frozen=True)
 class PixelSamples:
-    """Nodes of an opening in pixels, so many across each; made when they are needed, since plans are kept for long."""
+    """Nodes within the pixels of an aperture, `across` per pixel along each axis.
+
+    They are computed when needed, because plans are cached for a long time.
+    """
 
     aperture: PixelatedAperture
     across: int
@@ -92,7 +97,10 @@ class PixelSamples:
 
     @property
     def outermost(self) -> float:
-        """Cut pixels have nodes beyond the edge, which is itself nowhere further off than the radius."""
+        """Distance from the axis [m] beyond which the pupil is dark.
+
+        Pixels that the edge cuts have nodes beyond it. The edge itself lies within the radius.
+        """
         return self.radius * (1 + math.sqrt(2) * 2 / self.aperture.count)
 
     @property
@@ -103,7 +111,7 @@ class PixelSamples:
         return self.along(i, beam, types), self.along(j, beam, types)
 
     def along(self, index: Array, beam: Beam, types: Precision) -> Array:
-        """The same along one axis."""
+        """Return the positions of samples along one axis."""
         import drjit as dr
 
         return dr.gather(types.Float64, types.Float64(self.aperture.rows(self.across)), types.Index(index)) * opaque(
@@ -121,14 +129,19 @@ class PixelSamples:
 
 
 def pixel_samples(aperture: PixelatedAperture, cycles: float, digits: float, radius: float) -> PixelSamples | None:
-    """As few as are good to so many digits for so many cycles per radius; None where pixels are too coarse."""
+    """Return the fewest nodes that give `digits` digits for `cycles` cycles per radius.
+
+    None if the pixels are too coarse.
+    """
     across = aperture.nodes_across(cycles, digits)
     return None if across is None else PixelSamples(aperture, across, radius)
 
 
 def samples_of(problem: Problem) -> PupilSamples | None:
-    """As few as the turns of pupil and path together allow; None where pixels are too coarse for them, or
-    a grid would be too large."""
+    """Return the fewest samples for the combined phase of pupil and path.
+
+    None if pixels are too coarse for it, or if a grid would be too large.
+    """
     if problem.pixelated is not None:
         return pixel_samples(problem.pixelated, *node_rule(problem), problem.radius)
     edge = problem.soft_edge(problem.turning)

@@ -31,11 +31,12 @@ __all__ = [
     "turns",
 ]
 
-MOST_DIGITS = 14.0  # choice: of float64 sums, which carry 16
-SPARE_DIGITS = 0.5  # choice: the rule of nodes is for the fastest turning anywhere: it leaves digits to spare by itself
-ON_AXIS = 1e-9  # rounding, of the radius
-SMALL_RULE = 5000  # choice, by memory: nodes of a rule of which many are kept
-FAR = 0.25  # choice: radius over distance below which nodes that follow a phase follow the kernel, too
+MOST_DIGITS = 14.0  # choice: digits of float64 sums, which have 16
+# Choice: the quadrature rule is for the highest frequency anywhere and is therefore more accurate than requested.
+SPARE_DIGITS = 0.5
+ON_AXIS = 1e-9  # rounding, relative to the radius
+SMALL_RULE = 5000  # choice, limited by memory: rules with at most this number of nodes have a larger cache
+FAR = 0.25  # choice: radius over distance below which nodes for the phase are sufficient for the kernel
 
 
 Rule = tuple[Aperture, float, float, bool]
@@ -43,9 +44,9 @@ Rule = tuple[Aperture, float, float, bool]
 
 @dataclass(frozen=True)
 class NodeSampling:
-    """Quadrature nodes fitted to the aperture's edge, good to `digits` for `cycles` turns per radius.
+    """Quadrature nodes fitted to the aperture's edge, accurate to `digits` for `cycles` cycles per radius.
 
-    line: where the picture is rotationally symmetric, the radii it is computed on.
+    line: the radii on which a rotationally symmetric image is computed, else None.
     """
 
     aperture: Aperture
@@ -59,7 +60,7 @@ class NodeSampling:
     padding: float = 1.0
 
     def intensity(self, beam: Beam, problem: Problem) -> Array:
-        """|U|² over the window for unit amplitude at the pupil, a flat Dr.Jit array."""
+        """Return |U|² over the window for unit amplitude at the pupil, a flat Dr.Jit array."""
         types = precision(problem.dtype)
         if self.line is None:
             x, y = problem.window.coordinates(types)
@@ -68,7 +69,7 @@ class NodeSampling:
         return self.line.onto(direct_sum(beam, self.rule, r, 0 * r, types).intensity, problem.window, types)
 
     def field(self, beam: Beam, problem: Problem) -> Field:
-        """U over the window, less the carrier e^{ikz}."""
+        """Return U over the window, without the carrier e^{ikz}."""
         types = precision(problem.dtype)
         if self.line is None:
             x, y = problem.window.coordinates(types)
@@ -78,7 +79,10 @@ class NodeSampling:
         return on_line(direct_sum(beam, self.rule, r, 0 * r, types), self.line, beam, problem)
 
     def plane(self, problem: Problem) -> float:
-        """Width [m] over which rounding spreads the pupil's light: the focus, times the root of the summands."""
+        """Return the width [m] over which rounding errors spread the pupil's light.
+
+        It is the width of the focus times the square root of the number of summands.
+        """
         return problem.wavelength * problem.distance / problem.radius * math.sqrt(self.count / math.pi)
 
     @property
@@ -95,7 +99,7 @@ class NodeSampling:
 
 
 def nodes(problem: Problem) -> list[NodeSampling]:
-    """Enough nodes for the cycles that pupil and path together turn through."""
+    """Return a sampling with enough nodes for the cycles of pupil and path together."""
     cycles, digits = node_rule(problem)
     count = node_count(problem.aperture, cycles, digits)
     line, outputs = None, math.prod(problem.window.shape)
@@ -110,16 +114,19 @@ def nodes(problem: Problem) -> list[NodeSampling]:
 
 
 def node_rule(problem: Problem) -> tuple[float, float]:
-    """Cycles per radius and digits that nodes must be good for."""
+    """Return the cycles per radius and the digits that a quadrature rule must provide."""
     digits = min(SPARE_DIGITS - math.log10(problem.tolerance), MOST_DIGITS)
     cycles = turns(problem, digits)
-    return cycles if problem.pixelated else stepped_up(cycles), digits  # pixels' nodes are few already
+    # For pixels there are already few different rules.
+    return cycles if problem.pixelated else stepped_up(cycles), digits
 
 
 def turns(problem: Problem, digits: float) -> float:
-    """Cycles per radius for which the nodes must be enough: the phase's, and near the pupil those that stand for the
-    kernel's poles at height z above the plane: Gauss-Legendre over [0, R] and the trapezoid rule around a ring of
-    radius R converge like e^{-4nz/R} and e^{-nz/R}. In a focus, where no phase turns, these poles alone count.
+    """Return the cycles per radius that the nodes must resolve.
+
+    These are the cycles of the phase. Near the pupil, cycles are added that represent the poles of the kernel at height
+    z above the plane. Gauss-Legendre over [0, R] and the trapezoid rule around a ring of radius R converge like
+    e^{-4nz/R} and e^{-nz/R}. In a focus, where the phase is constant, only these poles count.
     """
     phase, poles = problem.radius * problem.turning_inside, digits * math.log(10) / (2 * math.pi)
     nearness = problem.radius / problem.distance
@@ -127,7 +134,10 @@ def turns(problem: Problem, digits: float) -> float:
 
 
 def node_count(aperture: Aperture, cycles: float, digits: float) -> int:
-    """Number of nodes; beyond a hundred cycles it grows like their square, and is not worth counting."""
+    """Return the number of nodes.
+
+    Beyond a hundred cycles it grows like their square and is extrapolated.
+    """
     most = 100.0
     counted = aperture.node_count(min(cycles, most), digits)
     if counted is None:
@@ -136,7 +146,10 @@ def node_count(aperture: Aperture, cycles: float, digits: float) -> int:
 
 
 def cached_nodes(aperture: Aperture, cycles: float, digits: float, halved: bool = False) -> Nodes:
-    """halved: on one side of the x axis, for sums that are the same on both, at points on that axis."""
+    """Return the nodes of an aperture.
+
+    halved: only nodes on one side of the x axis, for sums that are the same on both sides, at points on that axis.
+    """
     small = (aperture.node_count(cycles, digits) or math.inf) <= SMALL_RULE
     return (_small_rules if small else _large_rules)(aperture, cycles, digits, halved)
 
@@ -155,16 +168,20 @@ _large_rules = lru_cache(maxsize=16)(_made)
 
 
 def _intensity_band(problem: Problem) -> float:
-    """Highest frequency [1/m] of the intensity over the window: rays from the disk's rims interfere there."""
+    """Return the highest frequency [1/m] of the intensity over the window.
+
+    It results from interference of rays from opposite rims of the disk.
+    """
     reach = problem.radius + problem.outermost
     steepest = reach / math.hypot(reach, problem.distance) / problem.wavelength
     return min(2 * steepest, 2 * problem.radius / (problem.wavelength * problem.distance))
 
 
 def direct_sum(beam: Beam, rule: Rule, x: Array, y: Array, types: Precision) -> Field:
-    """First Rayleigh-Sommerfeld integral at points (x, y) [m], nodes after rule = (aperture, cycles, digits, halved):
+    """Return the first Rayleigh-Sommerfeld integral at points (x, y) [m].
 
-    U(x) = ∫ P(ξ) z/(2πD²) (1/D - ik) e^{ikD} dξ (Goodman, §3.5). D - z = d²/(D + z) loses its whole waves in float64.
+    U(x) = ∫ P(ξ) z/(2πD²) (1/D - ik) e^{ikD} dξ (Goodman, §3.5). Whole waves of D - z = d²/(D + z) are subtracted in
+    float64. rule: (aperture, cycles, digits, halved) of the nodes.
     """
     import drjit as dr
 
@@ -178,7 +195,7 @@ def direct_sum(beam: Beam, rule: Rule, x: Array, y: Array, types: Precision) -> 
     waves = beam.waves(nodes_x, nodes_y, types)
     dr.eval(nodes_x, nodes_y, weight, waves, x, y)
     count = dr.opaque(types.Index, len(found.weight))
-    cycles = 1 / wavelength  # per metre: divisions cost most of a node
+    cycles = 1 / wavelength  # per metre: divisions take most of the time per node
     k = 2 * math.pi * cycles
 
     def add(i: Array, re: Array, im: Array) -> tuple[Array, Array, Array]:

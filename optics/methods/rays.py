@@ -1,4 +1,4 @@
-"""Where geometrical optics sends a pupil's light: a few rays, to judge by how wrong the cheap methods are."""
+"""End points of a pupil's rays in geometrical optics, from which approximate methods predict their error."""
 
 from __future__ import annotations
 
@@ -13,17 +13,19 @@ from optics.elements.wavefront_slopes import Slopes
 
 __all__ = ["MARGIN", "Rays", "brightness", "disk_area", "mismatch"]
 
-CELLS = 32  # choice: a side of all places where rays land
-ACROSS = 65  # choice: rays along a diameter, at most
-# Choice. Of predicted model errors, which come from a few rays: test_fresnel.py and test_geometric.py hold what is
-# predicted with it above what is found on random pupils.
+CELLS = 32  # choice: cells along each side of the area that rays hit
+ACROSS = 65  # choice: largest number of rays along a diameter
+# Choice: factor on predicted model errors, which are estimated from a few rays. test_fresnel.py and test_geometric.py
+# check on random pupils that the predictions with it exceed the true errors.
 MARGIN = 1.4
 
 
 @dataclass(frozen=True, eq=False)
 class Rays:
-    """Rays from points (x, y) of the aperture to points (to_x, to_y) of the plane behind it [m]; and of the map between
-    the two half the squared norm of its gradient, and the gradient's determinant."""
+    """Rays from points (x, y) of the aperture to points (to_x, to_y) of the plane behind it [m].
+
+    norm: half the squared norm of the gradient of this map. determinant: of the gradient.
+    """
 
     x: np.ndarray
     y: np.ndarray
@@ -34,19 +36,22 @@ class Rays:
 
     @cached_property
     def most(self) -> np.ndarray:
-        """How far the map stretches at each ray: the larger singular value of its gradient."""
+        """Largest stretch of the map at each ray: the larger singular value of its gradient."""
         root = np.sqrt(np.maximum(np.square(self.norm) - np.square(self.determinant), 0))
         found: np.ndarray = np.sqrt(self.norm + root)
         return found
 
     @cached_property
     def least(self) -> np.ndarray:
-        """The smaller one."""
+        """Smallest stretch of the map at each ray: the smaller singular value of its gradient."""
         return np.abs(self.determinant) / np.maximum(self.most, 1e-30)
 
     @classmethod
-    def of(cls, slopes: Slopes, aperture: Aperture, distance: float, medium_n: float) -> Rays:
-        """Rays that propagate (sine of the angle below 1), by the local slope: tan θ = p/√(1 - p²)."""
+    def from_slopes(cls, slopes: Slopes, aperture: Aperture, distance: float, medium_n: float) -> Rays:
+        """Return the rays that propagate (sine of the angle below 1).
+
+        The angle follows from the local slope p: tan θ = p/√(1 - p²).
+        """
         step = max(1, (slopes.grid.shape[0] - 1) // (ACROSS - 1))
         centred = slice(slopes.grid.shape[0] // 2 % step, None, step)
         x, y = np.meshgrid(slopes.grid.x[centred], slopes.grid.y[centred])
@@ -65,16 +70,16 @@ class Rays:
 
     @property
     def folded(self) -> bool:
-        """Whether some places of the plane may be reached by several rays."""
+        """True if several rays may reach the same point of the plane."""
         return len(self) > 0 and float(np.sign(self.determinant.min())) < float(np.sign(self.determinant.max()))
 
     @property
     def image_area(self) -> float:
-        """Area [m²] of the disk with the same mean square distance from its centre as the rays' ends."""
+        """Area [m²] of the disk whose points have the same mean square distance from the centre as the rays' ends."""
         return disk_area(self.to_x, self.to_y)
 
     def densest(self) -> list[tuple[float, float]]:
-        """Where (x, y) of the plane most land: their median, and the mean of those in the fullest of CELLS² cells."""
+        """Return the median (x, y) of the rays' ends, and their mean in the fullest of CELLS² cells."""
         counts, x, y = np.histogram2d(self.to_x, self.to_y, CELLS)
         i, j = np.unravel_index(counts.argmax(), counts.shape)
         within = (self.to_x >= x[i]) & (self.to_x <= x[i + 1]) & (self.to_y >= y[j]) & (self.to_y <= y[j + 1])
@@ -82,7 +87,10 @@ class Rays:
         return [(float(np.median(self.to_x)), float(np.median(self.to_y))), middle]
 
     def some(self, most: int) -> Rays:
-        """`most` of the rays or all, evenly: steps of the golden section fall into step with no row."""
+        """Return `most` rays, evenly spread, or all if there are fewer.
+
+        Steps of the golden section do not align with the rows of the grid.
+        """
         turns = (np.arange(min(most, len(self))) + 0.5) * (math.sqrt(5) - 1) / 2
         chosen = ((turns % 1) * len(self)).astype(int) if most < len(self) else slice(None)
         parts = (self.x, self.y, self.to_x, self.to_y, self.norm, self.determinant)
@@ -90,17 +98,23 @@ class Rays:
 
 
 def disk_area(x: np.ndarray, y: np.ndarray) -> float:
-    """Area of the disk whose points are, in the mean square, as far from its centre as these are from theirs."""
+    """Return the area of the disk whose points have the same mean square distance from the centre as these."""
     return 2 * math.pi * float(np.var(x) + np.var(y)) if len(x) else 0.0
 
 
 def brightness(area: float, cell: float) -> float:
-    """Sum of squares of the samples, times `cell` [m²] of each, of unit power diffracted into `area` [m²]: 1/area, or
-    the peak's where a sample may hit it but not resolve it (Airy's is π²/4 times the mean over its area)."""
+    """Return the sum of squared samples, times `cell` [m²], of unit power diffracted into `area` [m²].
+
+    This is 1/area. If samples may hit the peak without resolving it, it is the value at the peak (Airy's peak is π²/4
+    times the mean over its area).
+    """
     area = max(area, 1e-30)
     return max(1.0, (math.pi**2 / 4) ** 2 * cell / area) / area
 
 
 def mismatch(wrong: float, exact: float) -> float:
-    """Relative L2 error, with a margin, of light of one brightness in place of another where they hardly overlap."""
+    """Return the relative L2 error, with a margin, if other light replaces the exact light and hardly overlaps it.
+
+    wrong, exact: brightness of both, see `brightness`.
+    """
     return MARGIN * math.sqrt(1 + wrong / exact)

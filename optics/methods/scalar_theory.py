@@ -1,9 +1,9 @@
-"""How wrong scalar theory is at most: known before there is a picture.
+"""An upper bound of the error of scalar theory that is known before the PSF is computed.
 
-Two rays whose unit vectors differ by Δs interfere with the contrast e·e' of their fields. To second order that is
-1 - Δs²/4 in unpolarised light and 1 - (Δs·p)²/2 in light polarised along p, and 1 in scalar theory. So what scalar
-theory errs by goes with the square of the steepest sine, and with how far from each other, in the mean square, points
-of the pupil lie whose light meets. For a round pupil in focus Richards and Wolf's integrals say it to all orders.
+Two rays whose unit vectors differ by Δs interfere with the contrast e·e' of their fields. To second order this is 1 -
+Δs²/4 in unpolarised light, 1 - (Δs·p)²/2 in light polarised along p, and 1 in scalar theory. The error of scalar theory
+therefore depends on the square of the steepest sine. It also depends on the mean square distance between the points of
+the pupil whose light meets. For a round pupil in focus, Richards and Wolf's integrals give the error to all orders.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ from optics.numerics.precision import precision
 
 __all__ = ["IN_FOCUS", "ROUND", "light_spread", "scalar_theory_error", "steepest_sine"]
 
-# Relative L2 error of scalar theory in the focus of a round flat pupil and linearly polarised light (unpolarised light:
-# .82 to .94 of it), over the squared sine of the steepest ray: (sine, error / sine²). test_scalar_theory.py has them
-# from Richards and Wolf's integrals.
+# Relative L2 error of scalar theory in the focus of a round flat pupil and linearly polarised light, divided by the
+# squared sine of the steepest ray: (sine, error / sine²). In unpolarised light it is 0.82 to 0.94 of that.
+# test_scalar_theory.py computes these numbers from Richards and Wolf's integrals.
 IN_FOCUS = (
     (0.0, 0.2562),
     (0.2, 0.2609),
@@ -38,34 +38,39 @@ IN_FOCUS = (
     (0.999, 0.8100),
 )
 ROUND = 0.25  # mean square of x over a disk, in R²
-# Choice, over what a pupil errs by in focus: aberrations and small windows, by test_scalar_theory.py.
+# Choice, relative to the error in focus: covers aberrations and small windows, see test_scalar_theory.py.
 MARGIN = 1.6
-CYCLES, DIGITS = 0.5, 2.0  # choice: of sums over the pupil
-LEVEL = 1e-2  # choice: of a mask's spectrum
+CYCLES, DIGITS = 0.5, 2.0  # choice: quadrature of sums over the pupil
+LEVEL = 1e-2  # choice: neglected level of a mask's spectrum
 
 
 def steepest_sine(radius: float, distance: float, leaving: float) -> float:
-    """Of rays that meet in a point of a window: no steeper than from the rim to the axis, nor than light leaves the
-    pupil, which its edge bends a little, too.
+    """Return the largest sine of rays that meet in a point of a window.
 
-    leaving: sine with which slopes send light on, and a wavelength over the radius.
+    It is at most that of the ray from the rim to the axis, and at most that of light that leaves the pupil, including
+    some diffraction at its edge.
+
+    leaving: largest sine from the slopes of the wavefront, plus a wavelength divided by the radius.
     """
     return min(radius / math.hypot(radius, distance), leaving)
 
 
 def scalar_theory_error(sine: float, spread: float = ROUND) -> float:
-    """Relative L2 error of scalar theory's intensity, at most, where rays up to this sine meet.
+    """Return an upper bound of the relative L2 error of scalar theory's intensity if rays up to this sine meet.
 
-    It holds in light of any polarisation, over windows that hold the brightest place of the light and a few samples
-    around it. spread: see `light_spread`.
+    It is valid for light of any polarisation, over windows that contain the brightest point of the light and a few
+    samples around it. spread: see `light_spread`.
     """
     sines, errors = zip(*IN_FOCUS, strict=True)
     return MARGIN * spread / ROUND * float(np.interp(sine, sines, errors)) * min(sine, 1.0) ** 2
 
 
 def light_spread(pupil: Pupil) -> float:
-    """Mean square [R²] of the distance from the axis, along the direction in which it is largest, of the points that
-    light comes from: a quarter for a disk, a half for a thin ring, 1 for two holes at the rim."""
+    """Return the mean square distance [R²] from the axis of the points that light comes from.
+
+    It is taken along the direction in which it is largest: a quarter for a disk, a half for a thin ring, 1 for two
+    pinholes at the rim.
+    """
     if pupil.mask is None:
         return _open_spread(pupil.aperture)
     types = precision("float64")

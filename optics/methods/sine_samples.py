@@ -1,11 +1,11 @@
 """Samples of a pupil that are evenly spaced as seen from the window: in the sines of the rays to its centre.
 
-A point ξ of the pupil sends its light to points x = c + u of a window about c over the distance
+The distance from a point ξ of the pupil to points x = c + u of a window about c is
 
     |x - ξ| = √(D² - 2 u·(ξ - c) + u²) = D - u·s + (u² - (u·s)²)/2D + ...,   s = (ξ - c)/D,   D = |(ξ - c, z)|.
 
-In s what is linear in u is Fourier's kernel to all orders of the aperture. What is left falls with the distance: the
-curvature that the rays' obliquity gives to the window, of about u²NA²/λD turns.
+In terms of s, the part that is linear in u is the Fourier kernel to all orders of the aperture. The remainder falls
+with the distance. It is the curvature of about u²NA²/λD cycles that the obliquity of the rays adds over the window.
 """
 
 from __future__ import annotations
@@ -27,16 +27,17 @@ from optics.numerics.precision import Precision, opaque, padded_for_packets
 
 __all__ = ["SineSamples", "sine_samples"]
 
-MOST_STRETCH = 3.0  # choice: of the pupil against an even spacing, beyond which it needs too many samples
-RIM = 64  # points of it that tell how far the sines reach
+# Choice: largest stretch of the pupil relative to an even spacing; beyond it too many samples are necessary.
+MOST_STRETCH = 3.0
+RIM = 64  # points on the rim that determine the range of the sines
 
 
 @dataclass(frozen=True)
 class SineSamples:
-    """A grid of sines about those of the pupil's middle; it carries a soft aperture.
+    """A grid of sines about the sines of the pupil's centre. It represents a soft aperture.
 
-    grid: of s - s₀, s₀ the sines of the pupil's middle. centre: of the window (x, y) [m]; distance: to its plane [m].
-    steepest: |s| of the farthest sample that counts.
+    grid: of s - s₀, where s₀ are the sines of the pupil's centre. centre: of the window (x, y) [m]. distance: to its
+        plane [m]. steepest: |s| of the outermost sample with light.
     """
 
     edge: PupilEdge
@@ -47,17 +48,17 @@ class SineSamples:
 
     @property
     def at(self) -> np.ndarray:
-        """Places along either axis: sines, less those of the pupil's middle."""
+        """Positions along either axis: sines minus the sines of the pupil's centre."""
         return self.grid.x
 
     @property
     def outermost(self) -> float:
-        """Distance from the axis [m] beyond which nothing counts."""
+        """Distance from the axis [m] beyond which the pupil is dark."""
         return self.edge.outermost
 
     @property
     def seconds(self) -> float:
-        """What `field` takes, roughly."""
+        """Approximate time of `field`."""
         return self.grid.shape[0] ** 2 * (self.edge.seconds_per_point + PUPIL_SAMPLE / 5)
 
     @cached_property
@@ -65,12 +66,12 @@ class SineSamples:
         return _middle(self.centre, self.distance)
 
     def directions(self, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """s - s₀ of points of the pupil [m]."""
+        """Return s - s₀ of points of the pupil [m]."""
         sx, sy = _sines(x, y, self.centre, self.distance)
         return sx - self._middle[0], sy - self._middle[1]
 
     def places(self, i: Array, j: Array, beam: Beam, types: Precision) -> tuple[Array, Array]:
-        """ξ = c + z s/√(1 - s²) [m] of sample i along x and j along y, float64 indices."""
+        """Return ξ = c + z s/√(1 - s²) [m] of sample i along x and j along y, which are float64 indices."""
         import drjit as dr
 
         at = types.Float64(padded_for_packets(self.at))
@@ -82,13 +83,16 @@ class SineSamples:
         return sx * slant + opaque(types, self.centre[0]), sy * slant + opaque(types, self.centre[1])
 
     def _cosine(self, sx: Array, sy: Array, types: Precision) -> Array:
-        """Of the ray's angle to the axis; beyond all that counts it stays what it is there."""
+        """Return the cosine of the ray's angle to the axis.
+
+        Beyond the outermost sample with light it stays constant.
+        """
         import drjit as dr
 
         return dr.sqrt(1 - dr.minimum(sx * sx + sy * sy, opaque(types, self.steepest**2)))
 
     def field(self, beam: Beam, types: Precision) -> Field:
-        """Behind the pupil, times the samples' areas dξ dη = z²/cos⁴θ ds dt [m²]."""
+        """Return the field behind the pupil times the areas of the samples dξ dη = z²/cos⁴θ ds dt [m²]."""
         import drjit as dr
 
         column, row = self.grid.coordinates(types)
@@ -102,23 +106,25 @@ class SineSamples:
 
 
 def _sines(x: np.ndarray, y: np.ndarray, centre: tuple[float, float], distance: float) -> tuple[np.ndarray, np.ndarray]:
-    """Of the rays from the window's centre to points (x, y) of the pupil."""
+    """Return the sines of the rays from the centre of the window to points (x, y) of the pupil."""
     x, y = x - centre[0], y - centre[1]
     slant = np.sqrt(x * x + y * y + distance * distance)
     return x / slant, y / slant
 
 
 def _middle(centre: tuple[float, float], distance: float) -> tuple[float, float]:
-    """s₀, of the ray from the pupil's middle."""
+    """Return s₀, the sines of the ray from the centre of the pupil."""
     slant = math.hypot(*centre, distance)
     return -centre[0] / slant, -centre[1] / slant
 
 
 def sine_samples(problem: Problem) -> SineSamples | None:
-    """As few as the turns of pupil and path together allow; None where sines crowd too much towards the rim, or the
-    grid would be too large.
+    """Return the fewest samples for the combined phase of pupil and path.
 
-    The map from sines to the pupil stretches by z/cos³θ at most, and turns per sine are as many times those per metre.
+    None if the sines are too dense towards the rim, or if the grid would be too large.
+
+    The map from sines to the pupil stretches by z/cos³θ at most. The number of cycles per unit of sine is the number of
+    cycles per metre times this factor.
     """
     edge = problem.soft_edge(problem.turning)
     angle = np.linspace(0, 2 * np.pi, RIM, endpoint=False)

@@ -1,11 +1,12 @@
-"""The vector field behind a plane pupil, exactly: Smythe's integral, from fields that scalar methods propagate.
+"""The exact vector field behind a plane pupil: Smythe's integral of fields that scalar methods propagate.
 
-W. R. Smythe, Phys. Rev. 72, 1066 (1947): of the field E in the pupil's plane Maxwell's equations make
+W. R. Smythe, Phys. Rev. 72, 1066 (1947) derives the field behind the pupil from the field E in its plane:
 
     E(r) = 1/2π ∇ × ∫ (ẑ × E) e^{ikR}/R dξ.
 
-Its x and y are Rayleigh-Sommerfeld's first integrals of Ex and Ey, and its z is that of -(E·(r - ξ))/z, of which
-r and ξ can be told apart: three fields, each behind a mask, for each of two planes of polarisation.
+The x and y components are the first Rayleigh-Sommerfeld integrals of Ex and Ey. The z component is the integral of
+-(E·(r - ξ))/z, in which r and ξ can be separated. This gives three fields, each behind a mask, for each of two planes
+of polarisation.
 """
 
 from __future__ import annotations
@@ -22,15 +23,15 @@ from optics.numerics.grid import Grid
 
 __all__ = ["ALONG_X", "smythe"]
 
-# Of 1, Ex, ξEx/R, Ey, ηEy/R: see `RayField`.
+# Weights of 1, Ex, ξEx/R, Ey, ηEy/R: see `RayField`.
 ALONG_X, ALONG_Y = (0.0, 1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0, 0.0)
 MOMENT = (0.0, 0.0, 1.0, 0.0, 1.0)
 
 
 def smythe(beam: Beam, window: Grid, propagated: Callable[[Beam], np.ndarray]) -> np.ndarray:
-    """Ex, Ey, Ez of light that is polarised along x before the pupil, and the same of y, (6, y, x).
+    """Return Ex, Ey, Ez of light that is polarised along x before the pupil, and the same for y, (6, y, x).
 
-    propagated: a beam's field over the window, (y, x), by scalar theory.
+    propagated: function that returns the scalar field of a beam over the window, (y, x).
     """
     x, y = window.x[None, :], window.y[:, None]
     radius, z = beam.pupil.radius, number(beam.distance)

@@ -1,12 +1,12 @@
-"""The vector focus of any light, roughly: Debye's sum of plane waves, one from each point of a pupil.
+"""The approximate vector field in a focus: Debye's sum of plane waves, one from each point of a pupil.
 
-The light from ξ, which reaches the image's place c after a distance D, is there taken for a plane wave:
+Light from ξ reaches the image position c after a distance D. There it is approximated by a plane wave:
 
-    E(c + x) = -ik/2π ∫ P(ξ) e^{ik(L + D)} g(ξ) e(ξ) e^{ik s·x} dξ,   s = (c - ξ)/D,   g = z/D²,
+    E(c + x) = -ik/2π ∫ P(ξ) e^{ik(L + D)} g(ξ) e(ξ) e^{ik s·x} dξ,   s = (c - ξ)/D,   g = z/D².
 
-L the path through the pupil, e the field that rays have behind it (`ray_field`). With e = 1 this is Rayleigh-
-Sommerfeld's integral about c, but for ik(|x|² - (s·x)²)/2D in the exponent, which is taken to be that of the pupil's
-middle everywhere. Where all is the same around the axis it is Richards and Wolf's (1959).
+L is the path through the pupil, and e the field of rays behind it (`ray_field`). With e = 1 this is
+Rayleigh-Sommerfeld's integral about c, with one approximation: the term ik(|x|² - (s·x)²)/2D of the exponent has its
+value at the pupil's centre for all points. With rotational symmetry the sum equals Richards and Wolf's integral (1959).
 """
 
 from __future__ import annotations
@@ -26,21 +26,26 @@ from optics.numerics.scattered_sum import ScatteredSum
 
 __all__ = ["VectorSum"]
 
-DIGITS = 8.0  # choice
+DIGITS = 8.0  # choice: digits of the quadrature and of the sum
 
 
 @dataclass(frozen=True)
 class VectorSum:
-    """Light through a pupil to samples about an image's place, window.centre; aplanatic: of a pupil that is seen from c
-    under the sine ξ/z, all rays in phase."""
+    """Light through a pupil to samples about an image position, window.centre.
+
+    aplanatic: whether the pupil is seen from c under the sine ξ/z, with all rays in phase.
+    """
 
     beam: Beam
     window: Grid
     aplanatic: bool = False
 
     def components(self) -> np.ndarray:
-        """Ex, Ey, Ez of light that is polarised along x before the pupil, the same of y, and scalar theory's field:
-        (7, y, x), complex, over the root of the pupil's area and less the carrier e^{ikz}."""
+        """Return Ex, Ey, Ez for light polarised along x, the same for y, and the scalar field, (7, y, x), complex.
+
+        The polarisation is that before the pupil. The fields are divided by the square root of the pupil's area and
+        omit the carrier e^{ikz}.
+        """
         x, y, amplitude = self._pupil()
         (cx, cy), z = self.window.centre, number(self.beam.distance)
         d = z if self.aplanatic else np.sqrt((cx - x) ** 2 + (cy - y) ** 2 + z * z)
@@ -51,13 +56,13 @@ class VectorSum:
         for axis in (0, 1):
             along, before = before_pupil(self.beam.source, axis)
             ex, ey, ez = turned(before, along, rays)
-            # As Maxwell's equations have it of the other two: along its own ray that is the turned field's.
+            # Maxwell's equations give Ez from the other two. Along its own ray it equals Ez of the turned field.
             parts += [ex, ey, ez if self.aplanatic else -(ex * (cx - x) + ey * (cy - y)) / z]
-        found = sums.of(np.array([*parts, np.ones(len(x))]) * amplitude) / math.sqrt(self.beam.pupil.area)
+        found = sums.evaluate(np.array([*parts, np.ones(len(x))]) * amplitude) / math.sqrt(self.beam.pupil.area)
         return found if self.aplanatic else found * self._bend()
 
     def _bend(self) -> np.ndarray:
-        """What the path from the pupil's middle to a sample has beyond a plane wave's, as a phase, (y, x)."""
+        """Return the phase of the path from the pupil's centre to a sample, relative to a plane wave, (y, x)."""
         (cx, cy), z = self.window.centre, number(self.beam.distance)
         x, y, d = self.window.x[None, :], self.window.y[:, None], math.hypot(cx, cy, z)
         longer = np.sqrt(x * x + y * y + z * z) - d - (cx * (x - cx) + cy * (y - cy)) / d
@@ -66,7 +71,7 @@ class VectorSum:
 
     @property
     def nodes(self) -> int:
-        """How many points of the pupil it takes."""
+        """Number of points of the pupil."""
         return node_count(self.beam.pupil.aperture, self._cycles, DIGITS)
 
     def _rays(self, x: np.ndarray, y: np.ndarray) -> Vector:
@@ -80,18 +85,18 @@ class VectorSum:
 
     @property
     def _cycles(self) -> float:
-        """That phases turn through along the pupil's radius."""
+        """Number of phase cycles along the pupil's radius."""
         beam, pupil, z = self.beam, self.beam.pupil, number(self.beam.distance)
         turning = pupil.slopes(beam.wavelength, beam.source).turning(z, self.window, beam.index)[1]
         if self.aplanatic:
             turning = beam.index * self.window.own_half_diagonal / z
         detail = RayField(beam, 0, SCALAR).bandwidth(1e-6, pupil.radius) * pupil.radius
-        # Directions and obliquity turn nothing, but are no polynomials: their poles lie at height z.
+        # Directions and obliquity add no phase, but they are not polynomials: their poles lie at height z.
         poles = DIGITS * math.log(10) / (2 * math.pi) * pupil.radius / z
         return pupil.radius * turning / beam.wavelength + detail + poles
 
     def _pupil(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Points x, y [m], and -ik/2π P g e^{ik(L + D - z)} dξ."""
+        """Return points x, y [m], and -ik/2π P g e^{ik(L + D - z)} dξ."""
         beam, pupil, types = self.beam, self.beam.pupil, precision("float64")
         k, z, radius = 2 * math.pi * beam.index / beam.wavelength, number(beam.distance), pupil.radius
         nodes = cached_nodes(pupil.aperture, self._cycles, DIGITS)

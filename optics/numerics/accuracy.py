@@ -1,4 +1,4 @@
-"""What a result promises: the plan, its predicted error, and the refusal where nothing can meet a tolerance."""
+"""Plans with predicted errors, and the error that is raised if no method meets a tolerance."""
 
 from __future__ import annotations
 
@@ -7,20 +7,22 @@ from dataclasses import dataclass
 __all__ = ["FLOAT_NOISE", "MOST_SAMPLES", "AccuracyError", "Option", "Plan"]
 
 
-# Choice. Largest square array: 4096² complex64 is 134 MB, and a handful of such arrays live at once.
+# Choice: side of the largest square array. 4096² complex64 numbers take 134 MB, and a handful of such arrays exist at
+# once.
 MOST_SAMPLES = 4096
 
 
-FLOAT_NOISE = {"float32": 1e-6, "float64": 3e-13}  # of a method's sums, relative to the field's root mean square
+# Rounding error of a method's sums, relative to the root mean square of the field.
+FLOAT_NOISE = {"float32": 1e-6, "float64": 3e-13}
 
 
-STEEP = 1e-2  # choice: error of scalar theory from which on a plan names it, at NA 0.16
+STEEP = 1e-2  # choice: a plan shows errors of scalar theory from this value on, which is reached at NA 0.16
 
 
 class AccuracyError(ValueError):
-    """Asked for more than any method can give here; the message says what can be had.
+    """No method can meet the requested accuracy. The message states what is possible.
 
-    what: is wrong. remedy: what to ask for instead, where only who asked can.
+    what: the problem. remedy: settings that would work, if only the caller can change them.
     """
 
     def __init__(self, what: str, remedy: str | None = None):
@@ -30,7 +32,10 @@ class AccuracyError(ValueError):
 
 @dataclass(frozen=True)
 class Option:
-    """A method that was weighed: what it would take, how wrong it would be, and why it lost (or "chosen")."""
+    """A method that was compared: its samples, predicted error and time, and the verdict on it.
+
+    The verdict is "chosen" or the reason for the rejection.
+    """
 
     method: str
     samples: tuple[int, int]
@@ -41,16 +46,16 @@ class Option:
 
 @dataclass(frozen=True)
 class Plan:
-    """What was chosen, and why.
+    """The chosen method with its samples and predicted error, and the reason for the choice.
 
     samples: (y, x) samples of the pupil; for nodes (radial, angular) or (count, 1).
-    padding: period of the pupil's transform over its samples, where there is one.
+    padding: period of the pupil's transform divided by the number of its samples; 1 without a period.
     predicted_error: relative L2 error of the intensity over the window.
-    scalar_error: what scalar theory itself errs by, at most, where rays as steep as these meet, in light of any
-        polarisation, which no method here makes less: see `optics.vector_focus`. It is meant for windows that hold the
-        brightest place of the light. Where all is dark nothing is promised.
-    seconds: predicted time of a warm call on two cores; 0 where nobody predicts it.
-    options: every method that was weighed.
+    scalar_error: upper bound of the error of scalar theory for rays as steep as these, in light of any polarisation. No
+        method here reduces it: see `optics.vector_focus`. It applies to windows that contain the brightest point of the
+        light. It does not bound the error in windows that are dark everywhere.
+    seconds: predicted time of a warm call on two cores; 0 without a prediction.
+    options: all methods that were compared.
     """
 
     method: str
@@ -70,7 +75,7 @@ class Plan:
             "padding": f"{self.padding:.2f}",
             "dtype": self.dtype,
             "predicted error": f"{self.predicted_error:.1e}",
-            **({"scalar theory": f"errs by up to {self.scalar_error:.2g}"} if self.scalar_error >= STEEP else {}),
+            **({"scalar theory": f"error up to {self.scalar_error:.2g}"} if self.scalar_error >= STEEP else {}),
             **({"predicted time": f"{self.seconds:.2g} s"} if self.seconds else {}),
             "why": self.why,
         }
@@ -82,7 +87,7 @@ class Plan:
             f"  {option.verdict}"
             for option in self.options
         ]
-        return "\n".join([*head, "weighed", *others])
+        return "\n".join([*head, "compared", *others])
 
 
 def _size(samples: tuple[int, int]) -> str:

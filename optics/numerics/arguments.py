@@ -1,4 +1,4 @@
-"""Checks of arguments: bad input ends in one line that names the argument, its value and the valid range."""
+"""Checks of arguments. Invalid input raises an error that names the argument, its value and the range in one line."""
 
 import math
 from collections.abc import Iterable
@@ -32,16 +32,18 @@ __all__ = [
 ]
 
 
-# Squares of lengths, and their ratios, must stay within double precision.
+# Squares of lengths, and ratios of these squares, must stay within double precision.
 SMALLEST, LARGEST = 1e-15, 1e15
-LONGEST_WAVE = 1.0  # no optics is longer; what is, was meant in nanometres
+LONGEST_WAVE = 1.0  # longer values are most likely meant in nanometres
 UNIT = " (550 nm is 550e-9)"
-LINE = 200  # characters of a message that a value may take
+LINE = 200  # characters that a value may take in a message
 
 
 def shown(value: Any) -> str:
-    """`value` as a reader would type it, whatever NumPy's print options are (colour-science alters them); by its kind
-    and shape where that takes more than a line."""
+    """Return `value` as a user would type it, independent of NumPy's print options (colour-science changes them).
+
+    A value that takes more than one line is described by its type and shape.
+    """
     if isinstance(value, np.generic):
         return repr(value.item())
     if isinstance(value, (tuple, list)):
@@ -55,7 +57,7 @@ def shown(value: Any) -> str:
 
 
 def finite(name: str, value: float, *, carried: bool = False) -> float:
-    """`value` as float; ValueError unless it is a finite number. carried: see `without_derivative`."""
+    """Return `value` as a float; ValueError unless it is a finite number. carried: see `without_derivative`."""
     number = _number(name, value, carried)
     if not math.isfinite(number):
         raise ValueError(f"{name} = {shown(value)}: must be finite")
@@ -63,15 +65,17 @@ def finite(name: str, value: float, *, carried: bool = False) -> float:
 
 
 def flag(name: str, value: Any) -> bool:
-    """`value` as bool; ValueError unless it is True or False."""
+    """Return `value` as a bool; ValueError unless it is True or False."""
     if not isinstance(value, (bool, np.bool_)):
         raise ValueError(f"{name} = {shown(value)}: must be True or False")
     return bool(value)
 
 
 def positive(name: str, value: float, unit: str = "m", *, infinite: bool = False, carried: bool = False) -> float:
-    """`value` as float; ValueError unless it is > 0, within what arithmetic can square, or infinite where it may.
-    carried: see `without_derivative`."""
+    """Return `value` as a float; ValueError unless it is positive and its square is within double precision.
+
+    infinite: whether infinity is allowed. carried: see `without_derivative`.
+    """
     number = _number(name, value, carried)
     if infinite and number == math.inf:
         return number
@@ -83,17 +87,17 @@ def positive(name: str, value: float, unit: str = "m", *, infinite: bool = False
 
 
 def without_derivative(name: str, value: Any) -> Any:
-    """`value`; ValueError if it, or an entry of a list, asks for a derivative: it would be dropped.
+    """Return `value`; ValueError if it, or an entry of a list, requires a derivative, which would be lost.
 
-    The other checks here ask this, too, unless they are told that what they check is carried.
+    The other checks here include this one unless they are called with carried=True.
     """
     if type(value) is float:
-        return value  # asked for thousands of times in planning
+        return value  # fast path: planning calls this thousands of times
     if isinstance(value, (tuple, list)):
         for entry in value:
             without_derivative(name, entry)
     elif getattr(value, "requires_grad", False) or (is_differentiable(value) and _asks(value)):
-        raise ValueError(f"{name} asks for a derivative, which it does not carry to the picture: give a plain number")
+        raise ValueError(f"{name} requires a derivative, but none is propagated through it: pass a plain number")
     return value
 
 
@@ -104,7 +108,10 @@ def _asks(value: Any) -> bool:
 
 
 def vacuum_wavelength(value: Any) -> float:
-    """`value` [m] as float; ValueError unless it is > 0 and no longer than LONGEST_WAVE, as nanometres would be."""
+    """Return `value` [m] as a float; ValueError unless it is positive and at most LONGEST_WAVE.
+
+    The upper limit catches wavelengths in nanometres.
+    """
     wavelength = _number("wavelength", value)
     if not SMALLEST <= wavelength <= LONGEST_WAVE:
         raise ValueError(
@@ -114,7 +121,7 @@ def vacuum_wavelength(value: Any) -> float:
 
 
 def vacuum_wavelengths(values: Any) -> np.ndarray:
-    """`values` [m] as a float64 array of any shape, each checked as by `vacuum_wavelength`."""
+    """Return `values` [m] as a float64 array of any shape; the range is that of `vacuum_wavelength`."""
     wavelengths = reals("wavelengths", values)
     for end in (wavelengths.min(), wavelengths.max()) if wavelengths.size else ():
         vacuum_wavelength(end)
@@ -122,7 +129,7 @@ def vacuum_wavelengths(values: Any) -> np.ndarray:
 
 
 def in_range(name: str, value: float, low: float, high: float, *, carried: bool = False) -> float:
-    """`value` as float; ValueError unless low <= value <= high. carried: see `without_derivative`."""
+    """Return `value` as a float; ValueError unless low <= value <= high. carried: see `without_derivative`."""
     number = _number(name, value, carried)
     if not low <= number <= high:
         raise ValueError(f"{name} = {shown(value)}: must lie in [{low:g}, {high:g}]")
@@ -130,7 +137,7 @@ def in_range(name: str, value: float, low: float, high: float, *, carried: bool 
 
 
 def shape_2d(name: str, value: Any) -> tuple[int, int]:
-    """(height, width) as ints; ValueError unless both are whole and at least 1."""
+    """Return (height, width) as ints; ValueError unless both are whole numbers of at least 1."""
     without_derivative(name, value)
     try:
         height, width = (int(n) for n in value)
@@ -144,7 +151,7 @@ def shape_2d(name: str, value: Any) -> tuple[int, int]:
 
 
 def one_of(name: str, value: Any, options: Iterable[str]) -> str:
-    """`value`; ValueError, with the nearest option, unless it is one of them."""
+    """Return `value`; ValueError, with the most similar option, unless it is one of the options."""
     known = tuple(options)
     if not isinstance(value, str) or value not in known:
         raise ValueError(
@@ -154,14 +161,17 @@ def one_of(name: str, value: Any, options: Iterable[str]) -> str:
 
 
 def did_you_mean(word: Any, known: Iterable[str], cutoff: float = 0.5) -> str:
-    """ "; did you mean 'this'?" where a known word is near, in capitals or not; else nothing."""
+    """Return "; did you mean 'this'?" with the most similar known word, ignoring case, or an empty string."""
     match = close_match(str(word), known, cutoff)
     return f"; did you mean {match!r}?" if match else ""
 
 
 def close_match(word: str, known: Iterable[str], cutoff: float = 0.5) -> str | None:
-    """The known word that is nearest, in capitals or not; None where none is near (difflib's ratio below `cutoff`)."""
-    import difflib  # for messages only
+    """Return the most similar known word, ignoring case.
+
+    None if difflib's ratio is below `cutoff` for all of them.
+    """
+    import difflib  # imported here because only messages need it
 
     plain = {option.lower(): option for option in known}
     near = difflib.get_close_matches(word.lower(), plain, n=1, cutoff=cutoff)
@@ -169,20 +179,20 @@ def close_match(word: str, known: Iterable[str], cutoff: float = 0.5) -> str | N
 
 
 def point_2d(name: str, value: Any, what: str = "lengths (x, y) [m]") -> tuple[float, float]:
-    """(x, y) as finite floats."""
+    """Return (x, y) as finite floats."""
     try:
         x, y = without_derivative(name, value)
     except TypeError:
         raise ValueError(f"{name} = {shown(value)}: must be two {what}") from None
     except ValueError as error:
         raise ValueError(
-            str(error) if " asks " in str(error) else f"{name} = {shown(value)}: must be two {what}"
+            str(error) if " requires " in str(error) else f"{name} = {shown(value)}: must be two {what}"
         ) from None
     return in_range(name, x, -LARGEST, LARGEST), in_range(name, y, -LARGEST, LARGEST)
 
 
 def reals(name: str, values: Any) -> np.ndarray:
-    """`values` as a float64 array of any shape; ValueError unless they are real numbers without derivatives."""
+    """Return `values` as a float64 array of any shape; ValueError unless they are real numbers without derivatives."""
     without_derivative(name, values)
     try:
         given = np.asarray(values)
@@ -195,7 +205,7 @@ def reals(name: str, values: Any) -> np.ndarray:
 
 
 def complexes(name: str, values: Any) -> np.ndarray:
-    """`values` as an array of any shape; ValueError unless they are numbers, real or complex, without derivatives."""
+    """Return `values` as an array of any shape; ValueError unless they are numbers without derivatives."""
     without_derivative(name, values)
     try:
         given = np.asarray(values)
@@ -207,7 +217,11 @@ def complexes(name: str, values: Any) -> np.ndarray:
 
 
 def radiance_cube(value: Any, bands: int, least: tuple[int, int]) -> np.ndarray:
-    """(band, Y, X) float32; ValueError unless it has `bands` bands and at least the shape `least`."""
+    """Return `value` as a float32 array (band, Y, X).
+
+    Raises:
+        ValueError: the array does not have `bands` bands, is smaller than the shape `least`, or is not finite.
+    """
     radiance = reals("radiance", value).astype(np.float32)
     if (
         radiance.ndim != 3
@@ -224,7 +238,7 @@ def radiance_cube(value: Any, bands: int, least: tuple[int, int]) -> np.ndarray:
 
 
 def is_sized(value: Any) -> bool:
-    """Whether `value` has a length: NumPy's arrays without an axis claim one."""
+    """Return whether `len(value)` works. Arrays of zero dimensions have `__len__`, but it fails."""
     try:
         len(value)
     except TypeError:
@@ -233,7 +247,7 @@ def is_sized(value: Any) -> bool:
 
 
 def items(name: str, values: Any, kind: type, example: str) -> tuple[Any, ...]:
-    """`values` as a tuple; ValueError, with an example, unless they can be counted up and all are of the kind."""
+    """Return `values` as a tuple; ValueError, with an example, unless they are iterable and all of the given kind."""
     try:
         found = tuple(values)
     except TypeError:
@@ -244,7 +258,7 @@ def items(name: str, values: Any, kind: type, example: str) -> tuple[Any, ...]:
 
 
 def whole(name: str, value: Any, low: int, high: int) -> int:
-    """`value` as int; ValueError unless it is whole and in [low, high]."""
+    """Return `value` as an int; ValueError unless it is a whole number in [low, high]."""
     without_derivative(name, value)
     try:
         fits = int(value) == value and low <= int(value) <= high
@@ -256,14 +270,15 @@ def whole(name: str, value: Any, low: int, high: int) -> int:
 
 
 def of_kind(name: str, value: Any, kind: type, example: str) -> Any:
-    """`value`; ValueError, with an example of what would be right, unless it is of the kind."""
+    """Return `value`; ValueError, with an example of valid input, unless it is an instance of `kind`."""
     if not isinstance(value, kind):
         raise ValueError(f"{name} = {shown(value)}: must be a kind of {kind.__name__}, such as {example}")
     return value
 
 
 def _number(name: str, value: Any, carried: bool = False) -> float:
-    if not carried or getattr(value, "requires_grad", False):  # PyTorch's would be dropped where Dr.Jit's are carried
+    # A PyTorch derivative would be lost even where Dr.Jit's are propagated.
+    if not carried or getattr(value, "requires_grad", False):
         without_derivative(name, value)
     try:
         if isinstance(value, (str, bytes)):

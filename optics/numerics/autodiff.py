@@ -1,4 +1,4 @@
-"""Parameters that derivatives are asked for: plain numbers to the planner, Dr.Jit arrays to the physics."""
+"""Parameters that may carry derivatives: plain numbers for the planner, Dr.Jit arrays for the physics."""
 
 from __future__ import annotations
 
@@ -11,37 +11,37 @@ from optics.numerics.device import VARIABLE, device
 
 __all__ = ["Array", "Scalar", "is_differentiable", "number", "plain", "to_user"]
 
-# Dr.Jit makes its types when it is first asked for a backend, so that no checker can see them: these names say what an
-# `Any` is meant to be.
+# Dr.Jit creates its types when a backend is first loaded, so type checkers cannot see them. These names document what
+# an `Any` stands for.
 Array = Any  # a Dr.Jit array or tensor
 Scalar = Any  # a number, or a Dr.Jit array of one element that carries a derivative
 
 
 def is_differentiable(value: Any) -> bool:
-    """Whether value is a Dr.Jit array (or tensor), not a Python or NumPy number."""
+    """Return whether `value` is a Dr.Jit array or tensor, and not a Python or NumPy number."""
     return type(value) is not float and type(value).__module__.startswith("drjit")
 
 
 def number(value: Any) -> float:
-    """value as a float; a Dr.Jit array of one element gives its entry, without derivative.
+    """Return `value` as a float without derivative; a Dr.Jit array must have one element.
 
     Raises:
-        TypeError: of a type that is no number's.
-        ValueError: an array of more than one element.
-        BackendError: an array of another device than the one that is asked for.
+        TypeError: the type of `value` is not numeric.
+        ValueError: an array has more than one element.
+        BackendError: an array is on another device than the selected one.
     """
     if type(value) is float:
-        return value  # asked for thousands of times in planning
+        return value  # fast path: planning calls this thousands of times
     if is_differentiable(value):
         return float(plain(value).reshape(()))
     return float(value)
 
 
 def plain(value: Any) -> np.ndarray:
-    """value as a NumPy array, without derivative.
+    """Return `value` as a NumPy array without derivative.
 
     Raises:
-        BackendError: a Dr.Jit array of another device than the one that is asked for.
+        BackendError: a Dr.Jit array is on another device than the selected one.
     """
     if is_differentiable(value):
         import drjit as dr
@@ -57,12 +57,12 @@ def _on_the_device(value: Array) -> None:
     if given.startswith(("drjit.llvm", "drjit.cuda")) and not given.startswith(wanted):
         raise BackendError(
             f"an array of {given}.{type(value).__name__}: must be of {wanted}.ad, because optics computes on {where}; "
-            f"{VARIABLE} chooses"
+            f"{VARIABLE} selects the device"
         )
 
 
 def to_user(tensor: Array) -> np.ndarray | Array:
-    """What a user gets: a NumPy array, or the Dr.Jit tensor itself where it carries derivatives."""
+    """Return the tensor itself if it carries derivatives, else a NumPy array."""
     import drjit as dr
 
     return tensor if dr.grad_enabled(tensor) else np.asarray(tensor.numpy())

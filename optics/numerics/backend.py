@@ -1,8 +1,8 @@
-"""The LLVM library that Dr.Jit compiles with: found, proved in a child process, and named.
+"""The LLVM library that Dr.Jit compiles with: search, test in a child process, and selection.
 
-Dr.Jit loads LLVM as a shared library. Too old a library is refused with an exception, but some (15 and 16 with
-Dr.Jit 1.5) abort the whole process at the first ``maximum``. No exception handler survives that, so the verdict
-comes from a child process and is cached by path, size and modification time.
+Dr.Jit loads LLVM as a shared library. If the library is too old, Dr.Jit raises an exception. Some versions (15 and 16
+with Dr.Jit 1.5) abort the whole process at the first ``maximum``. No exception handler survives that, so a child
+process tests the library. The verdict is cached by path, size and modification time.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ REMEDY = (
     "install LLVM 17 or newer (Debian and Ubuntu: apt-get install libllvm19 libatomic1; "
     f"Fedora: dnf install llvm-libs libatomic; macOS: brew install llvm), or point {VARIABLE} at libLLVM.so"
 )
-# float maximum/minimum is what LLVM 15 and 16 cannot select; the version comes last, as proof that all of it ran.
+# LLVM 15 and 16 fail at float maximum and minimum. The version is printed last, as proof that the whole probe ran.
 PROBE = """
 import drjit as dr
 from drjit.llvm import Float
@@ -38,7 +38,7 @@ assert 0 < y[0] < 8
 print("proved", ".".join(map(str, dr.detail.llvm_version())))
 """
 LIBRARY_PATTERNS = (
-    os.path.join(sys.prefix, "lib", "llvm", "**", "libLLVM*.so*"),  # unpacked beside the virtual environment
+    os.path.join(sys.prefix, "lib", "llvm", "**", "libLLVM*.so*"),  # unpacked into the virtual environment
     "/usr/lib/*-linux-gnu*/libLLVM*.so*",
     "/usr/lib/llvm-*/lib/libLLVM*.so*",
     "/usr/lib64/libLLVM*.so*",
@@ -50,13 +50,15 @@ LIBRARY_PATTERNS = (
 
 
 class BackendError(RuntimeError):
-    """Dr.Jit cannot compute as asked: no LLVM library that it can use, no GPU, or an array of another device. The
-    message is one line with the remedy."""
+    """Dr.Jit cannot compute as requested: it finds no usable LLVM library or no GPU, or an array is on another device.
+
+    The message is one line with the remedy.
+    """
 
 
 @dataclass(frozen=True)
 class Llvm:
-    """What a child process found out about one LLVM library."""
+    """The verdict of a child process on one LLVM library."""
 
     path: str
     verdict: Verdict
@@ -69,7 +71,7 @@ class Llvm:
 
 
 def candidates() -> Iterator[str]:
-    """LLVM libraries to try, in order: the one the user named (then no other), else the newest first."""
+    """Yield the LLVM libraries to try, in order: only the one that the user named, or all, newest first."""
     named = os.environ.get(VARIABLE)
     if named:
         yield named
@@ -84,7 +86,7 @@ def candidates() -> Iterator[str]:
 
 
 def _version_in_name(path: str) -> tuple[int, ...]:
-    """(19, 1) from libLLVM.so.19.1, (15,) from libLLVM-15.so.1; the soname's own ".1" is no version."""
+    """Return (19, 1) for libLLVM.so.19.1 and (15,) for libLLVM-15.so.1, whose last digit belongs to the soname."""
     match = re.search(r"libLLVM(?:-(\d+(?:\.\d+)*))?\.(?:so|dylib)(?:\.(\d+(?:\.\d+)*))?", os.path.basename(path))
     digits = (match.group(1) or match.group(2) or "0") if match else "0"
     return tuple(int(part) for part in digits.split("."))
@@ -94,7 +96,7 @@ def prove(path: str) -> Llvm:
     """Run Dr.Jit with this LLVM library in a child process (0.1-0.2 s)."""
     if os.sep in path and not os.path.exists(path):
         return Llvm(path, "missing", detail="no such file")
-    import subprocess  # once in a machine's life
+    import subprocess  # imported here because it runs once per library
 
     environment = {**os.environ, VARIABLE: path}
     try:
@@ -115,7 +117,8 @@ def prove(path: str) -> Llvm:
     if "backend is inactive" in child.stderr:
         return Llvm(path, "too old", detail="Dr.Jit refuses it")
     lines = child.stderr.strip().splitlines() or ["no message"]
-    missing = [line for line in lines if "cannot open shared object file" in line]  # Dr.Jit's own needs, say libatomic
+    # A dependency of Dr.Jit itself is missing, such as libatomic.
+    missing = [line for line in lines if "cannot open shared object file" in line]
     return Llvm(path, "broken", detail=(missing or lines)[-1])
 
 
@@ -125,15 +128,18 @@ def _cache_file() -> Path:
 
 
 def _cache_key(path: str) -> str:
-    """A verdict holds for this very file and this Dr.Jit."""
+    """Return a key for this file and this version of Dr.Jit; a verdict is valid only for both."""
     stat = os.stat(path) if os.path.exists(path) else None
     size, modified = (stat.st_size, stat.st_mtime_ns) if stat else (0, 0)
     return f"{path}|{size}|{modified}|drjit {_drjit_version()}|python {sys.version_info[:2]}"
 
 
 def _drjit_version() -> str:
-    """By the name of the folder that its installation keeps beside it: importlib.metadata takes as long to import as
-    a picture to compute, and is asked only where there is no such folder."""
+    """Return Dr.Jit's version from the name of its dist-info folder.
+
+    Importing importlib.metadata takes as long as computing a PSF. It is therefore imported only if the folder is
+    missing.
+    """
     found = find_spec("drjit")
     if found is not None and found.origin is not None:
         beside = os.listdir(os.path.dirname(os.path.dirname(found.origin)))
@@ -152,7 +158,7 @@ def _prove_cached(path: str) -> Llvm:
         return Llvm(**known[key])
     except (KeyError, TypeError):
         result = prove(path)
-    if result.verdict in ("good", "aborts"):  # the rest may be mended under the same path
+    if result.verdict in ("good", "aborts"):  # other faults may be repaired under the same path
         _write_cache({**known, key: asdict(result)})
     return result
 
@@ -166,7 +172,7 @@ def _read_cache() -> dict[str, Any]:
 
 
 def _write_cache(content: dict[str, Any]) -> None:
-    """A cache that cannot be written costs 0.2 s a start, so it is no error."""
+    """Write the cache. A failure is ignored, because it only costs 0.2 s per start."""
     cache = _cache_file()
     try:
         cache.parent.mkdir(parents=True, exist_ok=True)
@@ -178,7 +184,7 @@ def _write_cache(content: dict[str, Any]) -> None:
 
 
 def find(paths: Iterable[str] | None = None, cached: bool = True) -> tuple[Llvm | None, list[Llvm]]:
-    """First good LLVM library among `paths` (default: `candidates()`), and every verdict on the way to it."""
+    """Return the first good LLVM library among `paths` (default: `candidates()`), and all verdicts up to it."""
     tried: list[Llvm] = []
     for path in candidates() if paths is None else paths:
         tried.append(_prove_cached(path) if cached else prove(path))
@@ -189,12 +195,12 @@ def find(paths: Iterable[str] | None = None, cached: bool = True) -> tuple[Llvm 
 
 @lru_cache(maxsize=1)
 def require() -> Llvm:
-    """Make sure that Dr.Jit can use LLVM in this process; call it before anything does.
+    """Make sure that Dr.Jit can use LLVM in this process. Call this before anything uses Dr.Jit.
 
     Returns the library and points ``DRJIT_LIBLLVM_PATH`` at it.
 
     Raises:
-        BackendError: no usable library; one line that says what was tried and what to do.
+        BackendError: no library is usable. The message lists the libraries that were tried and the remedy.
     """
     chosen, tried = find()
     if chosen is None:

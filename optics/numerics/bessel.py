@@ -1,6 +1,6 @@
-"""Bessel functions: J₀ on Dr.Jit arrays, and a few J_m on NumPy's that do without the import of SciPy's.
+"""Bessel functions: J₀ on Dr.Jit arrays, and J_m on NumPy arrays without importing SciPy.
 
-Dr.Jit has no Bessel functions; SciPy's values are fitted once by Chebyshev series.
+Dr.Jit has no Bessel functions. Chebyshev series are fitted once to SciPy's values.
 
 Up to x = 8 the series is in x². Beyond, J₀(x) = √(2/(πx)) Re[(P + iQ) e^{i(x - π/4)}] (Watson, Theory of Bessel
 Functions, §7.3), where P + iQ = √(πx/2) H₀⁽¹⁾(x) e^{-i(x - π/4)} is smooth in 8/x.
@@ -20,16 +20,16 @@ from optics.numerics.precision import Precision
 __all__ = ["bessel_j", "bessel_j0"]
 
 SPLIT = 8.0
-FEW = 2_000_000  # choice: cosines that are quicker than the import of scipy.special, a tenth of a second
-# Where the series fall below rounding; and, in float64, below 1e-12, where no more is asked.
+FEW = 2_000_000  # choice: cosines that take less time than the import of scipy.special (0.1 s)
+# Numbers of terms at which the series fall below rounding. The last entry ends them below 1e-12.
 TERMS = {"float32": (12, 5), "float64": (16, 11), "float64 to 1e-12": (14, 7)}
 
 
 def bessel_j(order: np.ndarray | float, x: np.ndarray) -> np.ndarray:
-    """J_m(x) for whole m >= 0 and x >= 0, to about 1e-15.
+    """Return J_m(x) for whole m >= 0 and x >= 0, to about 1e-15.
 
-    The mean of cos(mθ - x sin θ) around a circle (Watson, §2.2): n equidistant points take J_(n-m) for nothing, which
-    beyond n - m = x falls faster than any power.
+    The value is the mean of cos(mθ - x sin θ) around a circle (Watson, §2.2). With n equidistant points, J_(n-m) is
+    neglected. It falls faster than any power beyond n - m = x.
     """
     most, farthest = float(np.max(order)), float(np.max(x, initial=0.0))
     count = int(most + farthest + 14 * farthest ** (1 / 3) + 40)
@@ -38,14 +38,17 @@ def bessel_j(order: np.ndarray | float, x: np.ndarray) -> np.ndarray:
 
         found: np.ndarray = jv(order, x)
         return found
-    # θ and -θ are alike: points between 0 and π.
+    # θ and -θ give the same value, so all points lie between 0 and π.
     angle = (np.arange(count) + 0.5) * (pi / count)
     waves = np.asarray(order)[..., None] * angle - np.asarray(x)[..., None] * np.sin(angle)
     return np.asarray(np.cos(waves).mean(axis=-1))
 
 
 def bessel_j0(waves: Array, types: Precision, exactly: bool = True) -> Array:
-    """J₀(2π waves), waves >= 0 in float64; error about 1e-7 in float32; in float64 1e-15, or 1e-12 if not `exactly`."""
+    """Return J₀(2π waves) for waves >= 0 in float64.
+
+    The error is about 1e-7 in float32. In float64 it is 1e-15, or 1e-12 if not `exactly`.
+    """
     import drjit as dr
 
     near, p, q = _series(types.dtype if exactly or types.dtype == "float32" else f"{types.dtype} to 1e-12")
@@ -62,7 +65,7 @@ def bessel_j0(waves: Array, types: Precision, exactly: bool = True) -> Array:
 
 @lru_cache(maxsize=3)
 def _series(rounding: str) -> tuple[list[float], list[float], list[float]]:
-    """Chebyshev coefficients of J₀ over [0, 8], and of P and Q x/8 beyond, both in the square of the variable."""
+    """Return Chebyshev coefficients of J₀ over [0, 8], and of P and Q x/8 beyond, in the square of the variable."""
     from scipy.special import hankel1e, j0
 
     inner, outer = TERMS[rounding]
@@ -80,7 +83,7 @@ def _series(rounding: str) -> tuple[list[float], list[float], list[float]]:
 
 
 def _fit(function: Any, terms: int) -> list[float]:
-    """Chebyshev coefficients of function(y) in t = 2y² - 1, y in [0, 1]."""
+    """Return Chebyshev coefficients of function(y) in t = 2y² - 1, y in [0, 1]."""
     t = np.cos(pi * (np.arange(64) + 0.5) / 64)
     return [float(c) for c in np.polynomial.chebyshev.chebfit(t, function(np.sqrt((t + 1) / 2)), terms - 1)]
 

@@ -1,7 +1,7 @@
-"""What operations cost: the numbers by which every method predicts its time, and the planner chooses.
+"""Time per operation, from which methods predict their time and the planner chooses a method.
 
-Of warm calls on two cores, rounded to what decides between methods. `python -m validation.benchmarks.fit_costs` times
-the operations and prints what it finds beside these numbers.
+The values are for warm calls on two cores. Their precision is sufficient for choosing between methods. `python -m
+validation.benchmarks.fit_costs` times the operations and prints the results next to these values.
 """
 
 from __future__ import annotations
@@ -33,37 +33,37 @@ __all__ = [
 
 # Arithmetic [1/s].
 MATMUL_FLOPS = {"float32": 45e9, "float64": 22e9}  # additions and multiplications in matrix products
-FFT_FLOPS = 12e9  # the usual 5 n log2 n of a line of n samples
-PAIRS_PER_SECOND = 2.5e8  # nodes times points of the direct sum
+FFT_FLOPS = 12e9  # counted as 5 n log2 n for a line of n samples
+PAIRS_PER_SECOND = 2.5e8  # pairs of node and point in the direct sum
 
-# Seconds of a call, whatever its size.
+# Seconds per call, independent of its size.
 CALL = {
-    "angular_spectrum": 2e-3,  # and with its paraxial part split off
-    "far_field": 2e-3,  # for each node of the window
-    "fresnel": 3e-4,  # and Fraunhofer's
+    "angular_spectrum": 2e-3,  # also with its paraxial part split off
+    "far_field": 2e-3,  # per node of the window
+    "fresnel": 3e-4,  # also Fraunhofer's integral
     "geometric": 1e-3,
     "hankel": 1e-3,
     "low_rank": 1.5e-3,
     "pinhole": 1e-4,
     "rayleigh_sommerfeld": 1e-3,
 }
-DFT_CALL = 2e-4  # of each Fourier sum
+DFT_CALL = 2e-4  # per Fourier sum
 
-# Seconds of each sample, entry, node or pair.
-FFT_LINE_SAMPLE = 5e-9  # on its way into a transform's line
-FOLDED_SAMPLE = 5e-9  # of a sum by matrices of halves
-FFT_COPY = 8e-9  # between Dr.Jit and SciPy
-PUPIL_SAMPLE = 1e-8  # optical path and phase, but for the soft edge
-SOFT_EDGE_SAMPLE = 1e-8  # of a table along one edge
+# Seconds per sample, entry, node or pair.
+FFT_LINE_SAMPLE = 5e-9  # copying a sample into the line of a transform
+FOLDED_SAMPLE = 5e-9  # sample of a sum by even and odd parts
+FFT_COPY = 8e-9  # copying a sample between Dr.Jit and SciPy
+PUPIL_SAMPLE = 1e-8  # optical path and phase, without the soft edge
+SOFT_EDGE_SAMPLE = 1e-8  # soft edge from a table along one edge
 SPECTRUM_SAMPLE = 1e-8  # transfer function
-KERNEL_ENTRY = 2e-8  # of the slow rest between pupil and window
-FOURIER_ENTRY = 1e-8  # of Fourier's kernel between pupil and window, in NumPy
-NODE_FOURIER_ENTRY = 4e-8  # of Fourier's kernel between nodes and frequencies, in Dr.Jit
-WINDOW_SAMPLE = 1e-7  # interpolated from 8 x 8 directions
-BESSEL_PAIR = 1e-8  # of a Hankel transform
-PROFILE_ENTRY = 1e-9  # of the matrix that refines a symmetric picture's radius
-PROFILE_SAMPLE = 1.5e-8  # of a symmetric picture, interpolated from 8 radii
-NODE = 4e-9  # of the direct sum: its path
+KERNEL_ENTRY = 2e-8  # entry of the slow factor between pupil and window
+FOURIER_ENTRY = 1e-8  # entry of the Fourier kernel between pupil and window, in NumPy
+NODE_FOURIER_ENTRY = 4e-8  # entry of the Fourier kernel between nodes and frequencies, in Dr.Jit
+WINDOW_SAMPLE = 1e-7  # sample of the window, interpolated from 8 x 8 directions
+BESSEL_PAIR = 1e-8  # pair of nodes in a Hankel transform
+PROFILE_ENTRY = 1e-9  # entry of the matrix that refines the radius of a symmetric image
+PROFILE_SAMPLE = 1.5e-8  # sample of a symmetric image, interpolated from 8 radii
+NODE = 4e-9  # path at a node of the direct sum
 PIXEL_NODE = 6e-8  # path and phase at a node within a pixel
-PIXEL_NODE_GEOMETRY = 1e-8  # its place and weight
+PIXEL_NODE_GEOMETRY = 1e-8  # position and weight of a node within a pixel
 RAY = 1e-7  # path, four slopes, nine cells

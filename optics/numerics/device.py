@@ -1,8 +1,8 @@
-"""Where Dr.Jit computes: on the processor, through LLVM, unless the environment asks for a GPU.
+"""The device that Dr.Jit computes on: the processor, through LLVM, unless the environment selects a GPU.
 
-RHABDOM_DEVICE=cpu    the processor; the default: sim's physics and evolve's learner work there too
+RHABDOM_DEVICE=cpu    the processor (default); the physics of sim and the learner of evolve also run there
 RHABDOM_DEVICE=cuda   an NVIDIA GPU, for PSFs, eyes and rays
-RHABDOM_DEVICE=auto   a GPU where Dr.Jit finds one, else the processor
+RHABDOM_DEVICE=auto   a GPU if Dr.Jit finds one, else the processor
 """
 
 from __future__ import annotations
@@ -20,10 +20,10 @@ CHOICES = ("auto", "cpu", "cuda")
 
 
 def device() -> Device:
-    """The device that is asked for.
+    """Return the selected device.
 
     Raises:
-        BackendError: RHABDOM_DEVICE names none, or a GPU that Dr.Jit does not find.
+        BackendError: RHABDOM_DEVICE has an invalid value, or selects a GPU and Dr.Jit finds none.
     """
     asked = os.environ.get(VARIABLE, "cpu")
     if asked not in CHOICES:
@@ -38,10 +38,10 @@ def device() -> Device:
 
 
 def make_ready() -> Device:
-    """The same, once Dr.Jit can compute there; call it before anything does.
+    """Prepare Dr.Jit for the selected device and return the device. Call this before anything uses Dr.Jit.
 
     Raises:
-        BackendError: it cannot; one line that says what to do.
+        BackendError: Dr.Jit cannot use the device. The message is one line with the remedy.
     """
     chosen = device()
     if chosen == "cpu":
@@ -50,7 +50,7 @@ def make_ready() -> Device:
 
 
 def has_gpu() -> bool:
-    """Whether Dr.Jit finds an NVIDIA GPU."""
+    """Return whether Dr.Jit finds an NVIDIA GPU."""
     import drjit
 
     return bool(drjit.has_backend(drjit.JitBackend.CUDA))

@@ -1,8 +1,8 @@
-"""Fields that stay the same where x or y is mirrored: kept on a quarter of the plane, and their Fourier sums there.
+"""Fields that are even in x and y, stored on a quarter of the plane, and their Fourier sums.
 
-Of exp(2πi jk/period) only the cosine is left, so that a sum takes a sixteenth of the products, and a phase a quarter
-of the sines. Quarters go from the centre sample on to the last of the longer side: an even number of samples has one
-without a mirror image, which counts half on either side.
+Only the cosine of exp(2πi jk/period) remains. A sum therefore takes a sixteenth of the products, and a phase a quarter
+of the sines. A quarter extends from the centre sample to the last sample of the longer side. An even number of samples
+has one sample without a mirror image. It counts half on either side.
 """
 
 from __future__ import annotations
@@ -20,20 +20,22 @@ Shape = tuple[int, int]
 
 
 def quarter(grid: Grid) -> Grid:
-    """Samples of a centred grid from its centre on, and as far as either side goes."""
+    """Return the samples of a centred grid from its centre to the end of the longer side."""
     height, width = (n // 2 + 1 for n in grid.shape)
     return Grid((height, width), grid.dx, (width // 2 * grid.dx, height // 2 * grid.dx))
 
 
 def even_seconds(shape_in: Shape, shape_out: Shape) -> float:
-    """Time that `even_sum` takes, roughly."""
+    """Return the approximate time of `even_sum`."""
     (ny, nx), (my, mx) = shape_in, shape_out
     return (ny * nx * mx + ny * mx * my) / 2 / MATMUL_FLOPS["float32"] + 2 * DFT_CALL
 
 
 def even_sum(field: Field, shape: Shape, period: Scalar, grid: Grid) -> Field:
-    """Σ_j u[j] exp(± 2πi j·k / period), as `fourier.dft2` has it, of a field on the quarter of a plane of `shape`
-    samples, for the k of a grid's quarter."""
+    """Return Σ_j u[j] exp(± 2πi j·k / period), as in `fourier.dft2`, for k on the quarter of `grid`.
+
+    field: given on the quarter of a plane of `shape` samples.
+    """
     types, (ny, nx), (my, mx) = field.types, shape, grid.shape
     quarters = field.evaluated().grid.shape
     across = down = _cosines(types, mx, nx, period)
@@ -47,7 +49,7 @@ def even_sum(field: Field, shape: Shape, period: Scalar, grid: Grid) -> Field:
 
 
 def _cosines(types: Precision, n_out: int, n_in: int, period: Scalar) -> Array:
-    """What sample j and its mirror image count for frequency k: (k, j), both from 0 on."""
+    """Return the weights of sample j and its mirror image for frequency k: (k, j), both counted from 0."""
     import drjit as dr
 
     entries = Grid((n_out // 2 + 1, n_in // 2 + 1), 1.0)
@@ -61,7 +63,7 @@ def _cosines(types: Precision, n_out: int, n_in: int, period: Scalar) -> Array:
 
 
 def whole(field: Field, grid: Grid) -> Field:
-    """A field on all of a centred grid, whose quarter it is given on."""
+    """Return a field on all of a centred grid, given its quarter."""
     import drjit as dr
 
     types, width = field.types, field.grid.shape[1]

@@ -1,4 +1,4 @@
-"""A sampled complex field, and how it takes up phase."""
+"""A sampled complex field and its phase factors."""
 
 from __future__ import annotations
 
@@ -25,7 +25,10 @@ class Field:
 
     @classmethod
     def from_waves(cls, amplitude: Array, waves: Array, grid: Grid, types: Precision) -> Field:
-        """amplitude · exp(2πi waves), waves in float64; whole waves are dropped before the cast to the field's type."""
+        """Return amplitude · exp(2πi waves), with waves in float64.
+
+        Whole waves are subtracted before the conversion to the type of the field.
+        """
         import drjit as dr
 
         angle = types.Float(waves - dr.round(waves)) * (2 * pi)
@@ -54,7 +57,10 @@ class Field:
         return self.re * self.re + self.im * self.im
 
     def evaluated(self) -> Field:
-        """This field, its parts computed at once: looked at one after the other, each computes what they share."""
+        """Return this field after computing both parts in one kernel.
+
+        Evaluated one after the other, each part would compute their common terms again.
+        """
         import drjit as dr
 
         dr.eval(self.re, self.im)

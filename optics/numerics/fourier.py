@@ -1,12 +1,13 @@
 """Centred two-dimensional Fourier sums of any size and period.
 
-One function, `dft2`, stands for all transforms of this package:
+One function, `dft2`, computes all transforms of this package:
 
     U[k] = Σ_j u[j] exp(± 2πi j·k / period),   j and k counted from the centre sample n//2.
 
-The period is free (a matrix DFT evaluates any output pitch); a whole period may go through the FFT. Which of the two
-runs is decided here by predicted time (optics.numerics.cost): Dr.Jit's matrix product does more operations per second,
-SciPy's FFT needs fewer, so matrices win for small windows and the FFT for large ones. Both are differentiable.
+The period is arbitrary, because a matrix DFT can have any output pitch. If the period is a whole number, the FFT can be
+used. The predicted time (optics.numerics.cost) decides between the two. Dr.Jit's matrix product does more operations
+per second, and SciPy's FFT needs fewer. Matrices are therefore faster for small windows and the FFT for large ones.
+Both are differentiable.
 """
 
 from __future__ import annotations
@@ -36,20 +37,20 @@ __all__ = [
 ]
 
 LONGEST_FFT = 2**31
-AT_A_TIME, FEWEST_LINES = 2**17, 16  # choice: samples that are transformed together, a megabyte; lines, at least
+AT_A_TIME, FEWEST_LINES = 2**17, 16  # choice: samples transformed at once (a megabyte), and the least number of lines
 
 
 def fast_length(least: float) -> int:
-    """Smallest 5-smooth integer >= least: the FFT is fast there."""
+    """Return the smallest 5-smooth integer >= least, a length for which the FFT is fast."""
     if least > LONGEST_FFT:
-        return ceil(least)  # no FFT will be that long
+        return ceil(least)  # longer than any FFT that is used
     lengths = _smooth_numbers()
     return lengths[bisect_left(lengths, max(1, ceil(least)))]
 
 
 @lru_cache(maxsize=1)
 def _smooth_numbers() -> list[int]:
-    """2^a 3^b 5^c up to LONGEST_FFT, rising."""
+    """Return all 2^a 3^b 5^c up to LONGEST_FFT in ascending order."""
     threes_and_fives = [3**b * 5**c for b in range(20) for c in range(14)]
     return sorted(n << a for n in threes_and_fives for a in range(32) if n << a <= LONGEST_FFT)
 
@@ -62,7 +63,7 @@ def dft2(
     pitch: float,
     centre: tuple[float, float] = (0.0, 0.0),
 ) -> Field:
-    """Fourier sum of a field onto `shape` samples (formula above), on a grid of the given output pitch.
+    """Return the Fourier sum of a field onto `shape` samples (formula above), on a grid of the given output pitch.
 
     sign: -1 forward (exp(-2πi...)), +1 inverse; neither is normalised.
     centre: (x, y) of the output's centre sample, in the unit of `pitch`.
@@ -78,7 +79,7 @@ def dft2(
 
 
 def fourier_sum(u: np.ndarray, period: float, shape: tuple[int, int], sign: int) -> np.ndarray:
-    """The same sum of a complex NumPy array, without derivative and without the way through Dr.Jit."""
+    """Return the sum of `dft2` for a complex NumPy array, without derivatives and without Dr.Jit."""
     if _fft_wins(u.shape, period, shape):
         for axis in (1, 0):
             u = _fft_axis(u, int(period), shape[axis], sign, axis)
@@ -89,9 +90,9 @@ def fourier_sum(u: np.ndarray, period: float, shape: tuple[int, int], sign: int)
 
 @lru_cache(maxsize=16)
 def dft_matrix(n_out: int, n_in: int, period: float, sign: int, dtype: str) -> np.ndarray:
-    """The sum along one axis as a matrix, exp(±2πi k j / period) in row k and column j, both counted from n//2.
+    """Return the sum along one axis as a matrix, exp(±2πi k j / period) in row k and column j, both counted from n//2.
 
-    Whole waves are dropped before they lose digits of the rest.
+    Whole waves are subtracted first, because they would cost digits of the remainder.
     """
     k, j = np.arange(n_out) - n_out // 2, np.arange(n_in) - n_in // 2
     waves = np.outer(k, j) / period
@@ -99,9 +100,9 @@ def dft_matrix(n_out: int, n_in: int, period: float, sign: int, dtype: str) -> n
 
 
 def _recentred(field: Field, period: Scalar, by: tuple[float, float]) -> Field:
-    """The field whose sum onto samples k is that of `field` onto samples k + c: u[j] exp(±2πi j·c / period).
+    """Return the field whose sum onto samples k equals that of `field` onto samples k + c: u[j] exp(±2πi j·c / period).
 
-    by: ±c, (x, y) in samples of the output; need not be whole.
+    by: ±c, (x, y) in samples of the output; fractions are allowed.
     """
     types = field.types
     j_x, j_y = Grid(field.grid.shape, 1.0).coordinates(types)
@@ -110,9 +111,11 @@ def _recentred(field: Field, period: Scalar, by: tuple[float, float]) -> Field:
 
 
 def periodic_spectrum(u: np.ndarray, period: int, across: int) -> np.ndarray:
-    """Σ_j u[j] exp(-2πi j·k / period) of a complex NumPy array u (y, x) no larger than a period, as (across fx, period
-    fy): FFT order, along fx only `kept_indices(across)`. Lines that lie in one piece transform twice as fast,
-    hence fy is last."""
+    """Return Σ_j u[j] exp(-2πi j·k / period) of a complex NumPy array u (y, x) that is at most one period wide.
+
+    The result is (across fx, period fy) in FFT order, along fx only `kept_indices(across)`. fy is the last axis,
+    because contiguous lines transform twice as fast.
+    """
     from scipy import fft
 
     rows = fft.fft(_wrap(u, period, 1), axis=1, overwrite_x=True)
@@ -122,8 +125,10 @@ def periodic_spectrum(u: np.ndarray, period: int, across: int) -> np.ndarray:
 
 
 def periodic_sum(spectrum: np.ndarray, period: int, step: int, shape: tuple[int, int]) -> np.ndarray:
-    """Σ_k U[k] exp(2πi j·k / period) of what `periodic_spectrum` returns, at every `step`-th j around the centre, as
-    (y, x)."""
+    """Return Σ_k U[k] exp(2πi j·k / period), as (y, x), at every `step`-th j around the centre.
+
+    spectrum: as returned by `periodic_spectrum`.
+    """
     from scipy import fft
 
     rows, columns = ((np.arange(n) - n // 2) * step % period for n in shape)
@@ -138,13 +143,13 @@ def periodic_sum(spectrum: np.ndarray, period: int, step: int, shape: tuple[int,
 
 
 def kept_indices(across: int) -> np.ndarray:
-    """The `across` indices nearest 0, in FFT order: 0, 1, …, -2, -1, of whatever period."""
+    """Return the `across` indices nearest 0, in FFT order: 0, 1, …, -2, -1. They do not depend on the period."""
     kept = np.arange(across) - across // 2
     return np.roll(kept, -(across // 2))
 
 
 def predicted_seconds(shape_in: tuple[int, int], period: float, shape_out: tuple[int, int]) -> float:
-    """Time one `dft2` takes, roughly."""
+    """Return the approximate time of one `dft2`."""
     if _fft_wins(shape_in, period, shape_out):
         return _fft_seconds(shape_in, int(period), shape_out)
     return matrix_seconds(shape_in, shape_out)
@@ -167,12 +172,15 @@ def _fft(field: Field, period: int, shape: tuple[int, int], sign: int) -> tuple[
     types, shape_in = field.types, field.grid.shape
 
     def transform(re: Array, im: Array, to: tuple[int, int], from_: tuple[int, int], turn: int) -> tuple[Array, Array]:
-        dr.eval(re, im)  # at once: one after the other, each computes what they share
+        dr.eval(re, im)  # both in one kernel; separate kernels would compute their common terms twice
         parts = re.numpy().reshape(from_), im.numpy().reshape(from_)
         return _fft_of_parts(parts, period, to, turn, types)
 
     class FourierSum(dr.CustomOp):
-        """Its adjoint is the sum with the other sign, from the output's samples to the input's."""
+        """The Fourier sum as a differentiable operation.
+
+        Its adjoint is the sum of the other sign, from the samples of the output to the samples of the input.
+        """
 
         def eval(self, re: Array, im: Array) -> tuple[Array, Array]:
             return transform(re, im, shape, shape_in, sign)
@@ -192,7 +200,7 @@ def _fft(field: Field, period: int, shape: tuple[int, int], sign: int) -> tuple[
 def _fft_of_parts(
     parts: tuple[np.ndarray, np.ndarray], period: int, to: tuple[int, int], sign: int, types: Precision
 ) -> tuple[Array, Array]:
-    """The sum over both axes, some lines at a time: a whole plane of periods would not stay in the cache."""
+    """Return the sum over both axes, a block of lines at a time, because a whole padded plane exceeds the cache."""
     from scipy import fft
 
     turned, norm = (fft.fft, None) if sign < 0 else (fft.ifft, "forward")
@@ -219,13 +227,16 @@ def _fft_of_parts(
 
 
 def _lines(n: int, period: int) -> list[slice]:
-    """So many of n lines of a period at a time."""
+    """Return blocks of the n lines, each line one period long."""
     step = max(FEWEST_LINES, AT_A_TIME // period)
     return [slice(start, min(start + step, n)) for start in range(0, n, step)]
 
 
 def _runs(n: int, period: int) -> list[tuple[slice, slice]]:
-    """Where n centred samples are, and where in FFT order, piece by piece; more than a period folds onto itself."""
+    """Return slices of n centred samples and the slices of one period in FFT order that they belong to.
+
+    Samples beyond one period are aliased onto it.
+    """
     found, start = [], 0
     while start < n:
         place = (start - n // 2) % period
@@ -236,7 +247,7 @@ def _runs(n: int, period: int) -> list[tuple[slice, slice]]:
 
 
 def _fft_axis(u: np.ndarray, period: int, n_out: int, sign: int, axis: int) -> np.ndarray:
-    """Sum along one axis: wrap the centred samples into one period, transform, unwrap as many as asked."""
+    """Return the sum along one axis: wrap the centred samples into one period, transform, and unwrap n_out samples."""
     from scipy import fft
 
     wrapped = _wrap(u, period, axis)
@@ -251,7 +262,7 @@ def _fft_axis(u: np.ndarray, period: int, n_out: int, sign: int, axis: int) -> n
 
 
 def _wrap(u: np.ndarray, period: int, axis: int) -> np.ndarray:
-    """Centred samples in FFT order, zero-padded to one period; more than a period folds onto itself."""
+    """Return centred samples in FFT order, zero-padded to one period; samples beyond one period are aliased onto it."""
     n = u.shape[axis]
     start = -(n // 2) % period
     periods = -(-(start + n) // period)
@@ -269,6 +280,6 @@ def _wrap(u: np.ndarray, period: int, axis: int) -> np.ndarray:
 
 
 def _along(axis: int, start: int, stop: int | None) -> tuple[slice, ...]:
-    """Index that cuts one axis of a two-dimensional array."""
+    """Return an index that slices one axis of a two-dimensional array."""
     cut = slice(start, stop)
     return (cut, slice(None)) if axis == 0 else (slice(None), cut)

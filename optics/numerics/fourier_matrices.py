@@ -1,8 +1,8 @@
-"""Fourier sums as matrix products in Dr.Jit, of any period, which may carry a derivative.
+"""Fourier sums as matrix products in Dr.Jit, for any period. The period may carry a derivative.
 
-A wave e^{iθjk} that is counted from the centre is even in its cosine and odd in its sine, along j and along k: large
-sums take u[j] ± u[-j] for j >= 0, two real matrices of a quarter of the entries, and give both ± k, with a quarter of
-the products.
+A wave e^{iθjk} that is counted from the centre has an even cosine and an odd sine, along j and along k. Large sums
+therefore use u[j] ± u[-j] for j >= 0 and two real matrices with a quarter of the entries. They give the results for ± k
+with a quarter of the products.
 """
 
 from __future__ import annotations
@@ -21,13 +21,13 @@ Shape = tuple[int, int]
 
 
 def matrix_sum(field: Field, period: Scalar, shape: Shape, sign: int) -> Parts:
-    """As `fourier.dft2` has it: real and imaginary part, flat."""
+    """Return the sum of `fourier.dft2` as its real and imaginary parts, flat."""
     way = by_halves if halves_pay(field.grid.shape, shape) else by_whole_matrices
     return way(field, period, shape, sign)
 
 
 def matrix_seconds(shape_in: Shape, shape_out: Shape) -> float:
-    """Time that takes, roughly."""
+    """Return the approximate time of `matrix_sum`."""
     halves, whole = _halves_seconds(shape_in, shape_out), _whole_seconds(shape_in, shape_out)
     return DFT_CALL + min(halves, whole)
 
@@ -37,7 +37,7 @@ def halves_pay(shape_in: Shape, shape_out: Shape) -> bool:
 
 
 def _products(shape_in: Shape, shape_out: Shape) -> tuple[int, int]:
-    """Of the numbers, along x and then along y."""
+    """Return the number of products along x and then along y."""
     (ny, nx), (my, mx) = shape_in, shape_out
     return ny * nx * mx, ny * mx * my
 
@@ -53,7 +53,7 @@ def _halves_seconds(shape_in: Shape, shape_out: Shape) -> float:
 
 
 def by_whole_matrices(field: Field, period: Scalar, shape: Shape, sign: int) -> Parts:
-    """A_y u A_xᵀ, one matrix per axis."""
+    """Return A_y u A_xᵀ, with one matrix per axis."""
     types, (ny, nx), (my, mx) = field.types, field.grid.shape, shape
     u = types.Tensor(field.re, (ny, nx)), types.Tensor(field.im, (ny, nx))
     along_x = along_y = _matrix(types, mx, nx, period, sign)
@@ -65,7 +65,10 @@ def by_whole_matrices(field: Field, period: Scalar, shape: Shape, sign: int) -> 
 
 
 def _matrix(types: Precision, n_out: int, n_in: int, period: Scalar, sign: int) -> Parts:
-    """exp(±2πi k j / period) in row k and column j, both counted from n//2: two tensors, real and imaginary part."""
+    """Return exp(±2πi k j / period) in row k and column j, both counted from n//2.
+
+    The two tensors are the real and the imaginary part.
+    """
     entries = Grid((n_out, n_in), 1.0)
     j, k = entries.coordinates(types)
     matrix = Field.from_waves(1.0, j * k / opaque(types, sign * period), entries, types)
@@ -73,7 +76,7 @@ def _matrix(types: Precision, n_out: int, n_in: int, period: Scalar, sign: int) 
 
 
 def by_halves(field: Field, period: Scalar, shape: Shape, sign: int) -> Parts:
-    """The same: along x and then along y, each of u[j] + u[-j] and u[j] - u[-j]."""
+    """Return the same sum, along x and then along y, from u[j] + u[-j] and u[j] - u[-j]."""
     types, (ny, nx), (my, mx) = field.types, field.grid.shape, shape
     cosine, sine = along_y = _quarter(types, mx, nx, period, sign)
     even, odd = _folded_columns(field)
@@ -86,7 +89,7 @@ def by_halves(field: Field, period: Scalar, shape: Shape, sign: int) -> Parts:
 
 
 def _quarter(types: Precision, n_out: int, n_in: int, period: Scalar, sign: int) -> Parts:
-    """cos(2πkj/period) and ± sin(2πkj/period) for k and j from 0 on: row k, column j."""
+    """Return cos(2πkj/period) and ± sin(2πkj/period) in row k and column j, both counted from 0."""
     entries = Grid((n_out // 2 + 1, n_in // 2 + 1), 1.0)
     j, k = _counted(entries.shape, types)
     wave = Field.from_waves(1.0, j * k / opaque(types, sign * period), entries, types)
@@ -95,7 +98,7 @@ def _quarter(types: Precision, n_out: int, n_in: int, period: Scalar, sign: int)
 
 
 def _folded_columns(field: Field) -> tuple[list[Array], list[Array]]:
-    """[re, im] of u[y, j] + u[y, -j] and of u[y, j] - u[y, -j], j from 0 on."""
+    """Return [re, im] of u[y, j] + u[y, -j] and of u[y, j] - u[y, -j], with j counted from 0."""
     types, (ny, nx) = field.types, field.evaluated().grid.shape
     shape = ny, nx // 2 + 1
     j, y = _counted(shape, types)
@@ -107,7 +110,10 @@ def _folded_columns(field: Field) -> tuple[list[Array], list[Array]]:
 
 
 def _folded_rows(across: list[Array], size: Shape, types: Precision) -> tuple[list[Array], list[Array]]:
-    """The same of rows j and -j of (ny, mx) numbers, given as what `_both_sides` reads."""
+    """Return sums and differences of rows j and -j of (ny, mx) numbers.
+
+    across: halves of these numbers in the form that `_both_sides` reads.
+    """
     ny, mx = size
     shape = ny // 2 + 1, mx
     column, j = _counted(shape, types)
@@ -134,7 +140,10 @@ def _unfolded_rows(down: list[Array], shape: Shape, types: Precision) -> Parts:
 
 
 def _both_sides(halves: list[Array], place: Array, k: Array, types: Precision, there: Array = True) -> Parts:
-    """Real and imaginary part of Σ (even cos + i odd sin), for k of either sign; halves: of |k|, even parts first."""
+    """Return real and imaginary part of Σ (even cos + i odd sin), for k of either sign.
+
+    halves: sums for |k|, the even ones first.
+    """
     import drjit as dr
 
     index, sign = types.Index(place), dr.select(k < 0, types.Float(-1), types.Float(1))
@@ -149,6 +158,6 @@ def _read(part: Array, ahead: Array, behind: Array, there: Array) -> Parts:
 
 
 def _counted(shape: Shape, types: Precision) -> Parts:
-    """Column and row of every entry, from 0 on, float64."""
+    """Return column and row of every entry, counted from 0, in float64."""
     x, y = Grid(shape, 1.0).coordinates(types)
     return x + opaque(types, shape[1] // 2), y + opaque(types, shape[0] // 2)

@@ -16,13 +16,13 @@ __all__ = ["Grid", "OnWindow", "sample_positions"]
 
 
 def sample_positions(n: int, dx: float) -> np.ndarray:
-    """Positions [m] of n samples at pitch dx, float64; sample n//2 is at 0."""
+    """Return the positions [m] of n samples at pitch dx, in float64; sample n//2 is at 0."""
     return (np.arange(n) - n // 2) * dx
 
 
 @dataclass(frozen=True)
 class Grid:
-    """A plane's samples: shape (y, x), pitch dx [m] (or [1/m] for spatial frequencies), n//2 at centre (x, y)."""
+    """Samples of a plane: shape (y, x), pitch dx [m] (or [1/m] for spatial frequencies), n//2 at centre (x, y)."""
 
     shape: tuple[int, int]
     dx: float
@@ -30,14 +30,15 @@ class Grid:
 
     def __post_init__(self) -> None:
         if self._is_plain:
-            return  # planning makes hundreds of grids, of numbers that need no care
+            return  # fast path: planning creates hundreds of grids from valid plain numbers
         object.__setattr__(self, "shape", shape_2d("shape", self.shape))
-        object.__setattr__(self, "dx", positive("dx", self.dx))  # a NumPy scalar would take a Dr.Jit array for its own
+        # A NumPy scalar would convert a Dr.Jit array to NumPy in a product.
+        object.__setattr__(self, "dx", positive("dx", self.dx))
         object.__setattr__(self, "centre", point_2d("centre", self.centre))
 
     @property
     def _is_plain(self) -> bool:
-        """Whether all numbers are of Python's own types and in range."""
+        """True if all numbers have Python's own types and are in range."""
         height, width = self.shape if type(self.shape) is tuple and len(self.shape) == 2 else (None, None)
         return (
             type(height) is int
@@ -55,7 +56,7 @@ class Grid:
         return cls((n, n), dx)
 
     def moved(self, centre: tuple[float, float]) -> Grid:
-        """The same samples about another centre (x, y)."""
+        """Return the same samples about another centre (x, y)."""
         return Grid(self.shape, self.dx, centre)
 
     @property
@@ -79,16 +80,16 @@ class Grid:
 
     @property
     def own_half_width(self) -> float:
-        """Largest distance of a sample from the centre along an axis."""
+        """Largest distance of a sample from the grid's centre along an axis."""
         return max(n // 2 for n in self.shape) * self.dx
 
     @property
     def own_half_diagonal(self) -> float:
-        """Largest distance of a sample from the centre."""
+        """Largest distance of a sample from the grid's centre."""
         return float(np.hypot(self.shape[0] // 2, self.shape[1] // 2) * self.dx)
 
     def coordinates(self, precision: Precision) -> tuple[Array, Array]:
-        """x and y of every sample as flat Dr.Jit arrays, float64 (phases need them)."""
+        """Return x and y of every sample as flat Dr.Jit arrays, in float64 because phases need it."""
         import drjit as dr
 
         height, width = self.shape
@@ -103,21 +104,21 @@ class Grid:
 
 
 class HasWindow(Protocol):
-    """What lies on a grid."""
+    """An object with samples on a grid."""
 
     @property
     def window(self) -> Grid: ...
 
 
 class OnWindow:
-    """Where the samples of what has a `window` are."""
+    """Mixin with the sample positions of an object that has a `window`."""
 
     @property
     def x(self: HasWindow) -> np.ndarray:
-        """Of the columns [m]."""
+        """Positions of the columns [m]."""
         return self.window.x
 
     @property
     def y(self: HasWindow) -> np.ndarray:
-        """Of the rows [m]."""
+        """Positions of the rows [m]."""
         return self.window.y

@@ -1,7 +1,6 @@
-"""Interpolation between samples: linear, by Lagrange's polynomials, by cubic B-splines; and a function kept as a table.
+"""Interpolation between samples (linear, Lagrange polynomials, cubic B-splines), and tabulated functions.
 
-Functions of arrays that stand for places take Dr.Jit's arrays and NumPy's alike, but for `linear_weights` and
-`lagrange_basis`, which are NumPy's.
+Functions of positions accept Dr.Jit and NumPy arrays. Only `linear_weights` and `lagrange_basis` require NumPy arrays.
 """
 
 from __future__ import annotations
@@ -28,47 +27,50 @@ __all__ = [
     "linear_weights",
 ]
 
-# Choice: samples that interpolation onto a grid takes, along an axis. Its error falls with the eighth power of their
-# distance; a function's table, which costs its samples only once, does with the sixth.
+# Choice: samples per axis for interpolation onto a grid. The error falls with the eighth power of their distance.
+# Tables of functions, whose samples are computed only once, use six samples and the sixth power.
 TAPS = 8
-# Largest error of eight taps for e^{iφ}, over (radians per sample)⁸: |Π(t - x_j)| / 8!, which is (1·3·5·7)²/2⁸ / 8!
-# halfway between the middle two.
+# Largest error of eight taps for e^{iφ}, divided by (radians per sample)⁸: |Π(t - x_j)| / 8!. Halfway between the
+# middle two samples it is (1·3·5·7)²/2⁸ / 8!.
 LAGRANGE_8 = 1.07e-3
 TABLE_TAPS = 6
-MARGIN = TABLE_TAPS // 2 - 1  # samples beyond either end of a table that it reads
+MARGIN = TABLE_TAPS // 2 - 1  # samples beyond either end of a table that interpolation reads
 
 
 @dataclass(frozen=True, eq=False)
 class Interpolant:
-    """Samples at first + i step, i = -2 ... n + 1; constant beyond its ends."""
+    """Samples of a function at first + i step, i = -2 ... n + 1. The function is constant beyond the ends."""
 
     first: float
     step: float
     samples: np.ndarray
 
     @classmethod
-    def of(
+    def from_function(
         cls, function: Callable[[np.ndarray], np.ndarray], ends: tuple[float, float], cycles: float, error: float
     ) -> Interpolant:
-        """Table of a function that turns through at most `cycles` cycles between the ends, and is constant beyond.
+        """Return a table of a function with at most `cycles` cycles between the ends and constant values beyond.
 
-        The function is evaluated at Chebyshev nodes only, because it is dear. Six-point interpolation of a unit wave
-        errs by (225/64)/720 (2π/N)⁶ with N samples per cycle; a step's spectrum falls with frequency, so 1/20 of that.
+        The function is evaluated at Chebyshev nodes only, because it is expensive. Six-point interpolation of a unit
+        wave has the error (225/64)/720 (2π/N)⁶ with N samples per cycle. The spectrum of a step falls with frequency,
+        so 1/20 of that is assumed.
         """
         per_cycle = 2 * pi * (2.4e-4 / error) ** (1 / 6)
-        n = int(cycles * per_cycle + 64)  # choice: 64 at least
-        # A wave of z = π cycles has Chebyshev coefficients 2 J_m(z), which fall fast beyond m = z. Choice: by how many.
+        n = int(cycles * per_cycle + 64)  # choice: at least 64
+        # A wave of z = π cycles has Chebyshev coefficients 2 J_m(z), which fall fast beyond m = z. The margin beyond m
+        # = z is a choice.
         degree = int(pi * cycles - 3 * np.log10(error) + 12)
         middle, half = (ends[0] + ends[1]) / 2, (ends[1] - ends[0]) / 2
         values = function(middle + half * np.cos(pi * (np.arange(degree) + 0.5) / degree))
         series = np.polynomial.Chebyshev(_cosine_sums(values) / degree * np.where(np.arange(degree) == 0, 0.5, 1))
         step = 2 / (n - 1)
         samples = series(np.clip(np.arange(-MARGIN, n + MARGIN) * step - 1, -1, 1))
-        samples[: MARGIN + 1], samples[-MARGIN - 1 :] = function(np.array(ends))  # exact where it is constant
+        # Exact values where the function is constant.
+        samples[: MARGIN + 1], samples[-MARGIN - 1 :] = function(np.array(ends))
         return cls(ends[0], step * half, samples)
 
     def at(self, place: Array, types: Precision) -> Array:
-        """Interpolated at a flat Dr.Jit Float64 array; differentiable."""
+        """Return interpolated values at a flat Dr.Jit Float64 array; differentiable."""
         import drjit as dr
 
         last = opaque(types, len(self.samples) - 2 * MARGIN - 1)
@@ -82,8 +84,10 @@ class Interpolant:
 
 
 def _cosine_sums(values: np.ndarray) -> np.ndarray:
-    """2 Σ_j v_j cos(πk(2j + 1)/2n) for every k, by one FFT (Makhoul, IEEE Transactions on Acoustics, Speech, and Signal
-    Processing 28 (1980) 27)."""
+    """Return 2 Σ_j v_j cos(πk(2j + 1)/2n) for every k, by one FFT.
+
+    Source: Makhoul, IEEE Transactions on Acoustics, Speech, and Signal Processing 28 (1980) 27.
+    """
     n = len(values)
     turned = np.fft.fft(np.concatenate([values[::2], values[1::2][::-1]]))
     found: np.ndarray = 2 * (turned * np.exp(-0.5j * pi * np.arange(n) / n)).real
@@ -91,12 +95,12 @@ def _cosine_sums(values: np.ndarray) -> np.ndarray:
 
 
 def lagrange_weights(t: Array, taps: int) -> list[Array]:
-    """Lagrange interpolation between `taps` samples 1 apart, an even number: the weights, t in [0, 1] being the place
-    between the middle two.
+    """Return the Lagrange weights of `taps` samples (an even number) at unit distance.
 
-        L_i(t) = Π_{j≠i} (t - x_j) / (x_i - x_j),   x_i = i + 1 - taps/2,   i = 0 ... taps - 1,
+        L_i(t) = Π_{j≠i} (t - x_j) / (x_i - x_j),   x_i = i + 1 - taps/2,   i = 0 ... taps - 1.
 
-    the product over the nodes before i times that over those after, over (-1)^(taps-1-i) i! (taps-1-i)!.
+    t in [0, 1] is the position between the middle two samples. Each weight is the product over the nodes before i times
+    the product over the nodes after i, divided by (-1)^(taps-1-i) i! (taps-1-i)!.
     """
     last = taps - 1
     steps = [t + (taps // 2 - 1 - i) for i in range(taps)]
@@ -109,24 +113,26 @@ def lagrange_weights(t: Array, taps: int) -> list[Array]:
 
 
 def linear_weights(x: np.ndarray, nodes: np.ndarray) -> np.ndarray:
-    """(node, *x.shape): linear interpolation between rising nodes, constant beyond."""
+    """Return weights (node, *x.shape) of linear interpolation between rising nodes; constant beyond the ends."""
     return np.stack([np.interp(x, nodes, row) for row in np.eye(len(nodes))])
 
 
 def cubic_bsplines(t: Array) -> list[Array]:
-    """The four uniform cubic B-splines that act on a knot interval, at t in [0, 1] (Piegl & Tiller, The NURBS Book,
-    ch. 2)."""
+    """Return the four uniform cubic B-splines on a knot interval, at t in [0, 1].
+
+    Source: Piegl & Tiller, The NURBS Book, ch. 2.
+    """
     s = 1 - t
     return [s * s * s / 6, (3 * t * t * t - 6 * t * t + 4) / 6, (3 * s * s * s - 6 * s * s + 4) / 6, t * t * t / 6]
 
 
 def chebyshev_points(n: int) -> np.ndarray:
-    """Chebyshev points of the first kind on [-1, 1]."""
+    """Return the n Chebyshev points of the first kind on [-1, 1]."""
     return np.cos(np.pi * (np.arange(n) + 0.5) / n)
 
 
 def lagrange_basis(x: np.ndarray, nodes: np.ndarray) -> np.ndarray:
-    """(node, *x.shape): the Lagrange polynomials of any nodes at x."""
+    """Return the Lagrange polynomials of arbitrary nodes at x, (node, *x.shape)."""
     basis = np.ones((len(nodes), *np.shape(x)))
     for i, node in enumerate(nodes):
         for other in np.delete(nodes, i):
@@ -135,8 +141,10 @@ def lagrange_basis(x: np.ndarray, nodes: np.ndarray) -> np.ndarray:
 
 
 def chebyshev_basis(x: np.ndarray, n: int) -> np.ndarray:
-    """(*x.shape, node): the polynomial through values at `chebyshev_points(n)`, at x in [-1, 1], by the barycentric
-    formula (Berrut & Trefethen, SIAM Review 46, 501, 2004, eq. 4.2)."""
+    """Return the weights of values at `chebyshev_points(n)` in their polynomial at x in [-1, 1], (*x.shape, node).
+
+    Barycentric formula: Berrut & Trefethen, SIAM Review 46, 501, 2004, eq. 4.2.
+    """
     nodes, angle = chebyshev_points(n), np.pi * (np.arange(n) + 0.5) / n
     apart = np.asarray(x)[..., None] - nodes
     hit = apart == 0

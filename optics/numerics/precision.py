@@ -1,4 +1,4 @@
-"""Dr.Jit's types for one dtype, on the device that is asked for."""
+"""Dr.Jit's types for one dtype, on the selected device."""
 
 from __future__ import annotations
 
@@ -15,12 +15,15 @@ from optics.numerics.device import Device, make_ready
 
 __all__ = ["ROOM", "Precision", "opaque", "padded_for_packets", "precision"]
 
-ROOM = 64  # choice, elements: more than any processor takes at once
+ROOM = 64  # choice, elements: more than any processor reads at once
 
 
 @dataclass(frozen=True)
 class Precision:
-    """Float: type of fields; Float64: type of optical paths, which lose their whole waves before they become Float."""
+    """Dr.Jit types. Float: type of fields. Float64: type of optical paths.
+
+    Whole waves of a path are subtracted before the conversion to Float.
+    """
 
     dtype: str
     Float: Any
@@ -32,11 +35,11 @@ class Precision:
 
 
 def precision(dtype: str = "float32") -> Precision:
-    """The types for "float32" or "float64".
+    """Return the types for "float32" or "float64".
 
     Raises:
         ValueError: any other dtype.
-        BackendError: no LLVM, or no GPU, that Dr.Jit can use.
+        BackendError: Dr.Jit finds no usable LLVM library or GPU.
     """
     if not isinstance(dtype, str) or dtype not in ("float32", "float64"):
         raise ValueError(f"dtype = {shown(dtype)}: must be 'float32' or 'float64'")
@@ -56,11 +59,11 @@ def _precision(dtype: str, place: Device) -> Precision:
 
 
 def padded_for_packets(values: np.ndarray) -> np.ndarray:
-    """The same numbers, flat, in memory that may be read some way past their end.
+    """Return the same numbers, flat, in memory that can be read some way past their end.
 
-    Dr.Jit works on NumPy's memory itself, without a copy, and its kernels take whole packets of numbers, sixteen with
-    AVX-512: those past the end go nowhere, but reading them ends the process where the page after it is not there,
-    as happens to arrays of some megabytes (seen with Dr.Jit 1.5 and 2087 x 2087 numbers).
+    Dr.Jit uses NumPy's memory without a copy. Its kernels read whole packets of numbers, sixteen with AVX-512, and
+    ignore numbers past the end. If the next memory page is not mapped, the process ends there. This happens to arrays
+    of some megabytes (observed with Dr.Jit 1.5 and 2087 x 2087 numbers).
     """
     room = np.empty(values.size + ROOM, values.dtype)
     flat = room[: values.size]
@@ -69,9 +72,9 @@ def padded_for_packets(values: np.ndarray) -> np.ndarray:
 
 
 def opaque(types: Precision, value: Scalar) -> Array:
-    """A float64 scalar that Dr.Jit treats as data: another value does not compile another kernel.
+    """Return a float64 scalar that Dr.Jit treats as data, so that another value does not compile another kernel.
 
-    A Dr.Jit array of one element stays what it is, derivative included.
+    A Dr.Jit array of one element is returned with its derivative.
     """
     import drjit as dr
 

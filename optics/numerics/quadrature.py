@@ -1,9 +1,9 @@
-"""How many quadrature nodes a wave needs, and Gauss-Legendre nodes.
+"""The number of quadrature nodes that a wave needs, and Gauss-Legendre nodes.
 
-Both rules here fail by aliasing. n equidistant nodes on a circle see e^{iz cos φ} as if its harmonics J_n(z) and beyond
-were constant (Jacobi-Anger); n Gauss-Legendre nodes take polynomials up to degree 2n - 1, and the Chebyshev series of a
-wave that turns through z radians either way from the middle has the coefficients 2 J_m(z). So one count serves both:
-the smallest m from which on 2 |J_m(z)| stays below what is asked.
+Both rules here fail by aliasing. n equidistant nodes on a circle treat the harmonics J_n(z) and beyond of e^{iz cos φ}
+as constant (Jacobi-Anger). n Gauss-Legendre nodes are exact for polynomials up to degree 2n - 1. The Chebyshev series
+of a wave whose phase reaches ±z radians at the ends has the coefficients 2 J_m(z). One count therefore serves both: the
+smallest m from which on 2 |J_m(z)| stays below the requested error.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ from optics.numerics.bessel import bessel_j
 
 __all__ = ["gauss_legendre", "gauss_legendre_count", "harmonics", "stepped_up"]
 
-NEWTON_STEPS = 10  # far more than it takes
-STEPS = 16  # choice: to an octave; half a step, 2 %, is what is taken too much of in the mean
+NEWTON_STEPS = 10  # far more than necessary
+STEPS = 16  # choice: steps per octave; on average a number is half a step (2 %) too large
 
 
 def harmonics(z: np.ndarray, digits: float) -> np.ndarray:
-    """Smallest m with 2 |J_m| <= 10^-digits from there on and for all arguments up to z, by bisection."""
+    """Return the smallest m with 2 |J_m| <= 10^-digits from there on and for all arguments up to z, by bisection."""
     z = np.asarray(z, dtype=np.float64)
     # |J_m(z)| falls steadily in m beyond m = z, and is below (ez/2m)^m, which bounds the search: e/2 is 1.36.
     low, high = np.floor(z), np.ceil(1.36 * z + 3 * digits + 4)
@@ -34,15 +34,21 @@ def harmonics(z: np.ndarray, digits: float) -> np.ndarray:
 
 
 def gauss_legendre_count(cycles: float, digits: float, degree: int = 0) -> int:
-    """Nodes for an integrand that turns through this many cycles between the ends, times a polynomial."""
+    """Return the number of nodes for an integrand with this many cycles between the ends, times a polynomial.
+
+    degree: of the polynomial.
+    """
     return ceil((int(harmonics(np.array(pi * cycles), digits)) + degree) / 2)
 
 
 @lru_cache(maxsize=256)
 def gauss_legendre(n: int) -> tuple[np.ndarray, np.ndarray]:
-    """Nodes and weights on [0, 1]: roots of Legendre's polynomial by Newton's steps from Tricomi's estimate, and
-    weights 2 / ((1 - x²) P'²) (Davis & Rabinowitz, Methods of Numerical Integration, §2.7)."""
-    half = (n + 1) // 2  # the others are the same with the other sign
+    """Return Gauss-Legendre nodes and weights on [0, 1].
+
+    The nodes are the roots of Legendre's polynomial, by Newton's method from Tricomi's estimate. The weights are 2 /
+    ((1 - x²) P'²) (Davis & Rabinowitz, Methods of Numerical Integration, §2.7).
+    """
+    half = (n + 1) // 2  # the other half mirrors these
     x = (1 - (n - 1) / (8.0 * n**3)) * np.cos(pi * (4 * np.arange(1, half + 1) - 1) / (4 * n + 2))
     if n % 2:
         x[-1] = 0.0
@@ -64,7 +70,7 @@ def gauss_legendre(n: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _legendre(n: int, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """P_n and P_(n-1) at x, by k P_k = (2k - 1) x P_(k-1) - (k - 1) P_(k-2)."""
+    """Return P_n and P_(n-1) at x, by k P_k = (2k - 1) x P_(k-1) - (k - 1) P_(k-2)."""
     value, before = x, np.ones_like(x)
     for k in range(2, n + 1):
         value, before = ((2 * k - 1) / k) * x * value - ((k - 1) / k) * before, value
@@ -72,5 +78,8 @@ def _legendre(n: int, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def stepped_up(cycles: float) -> float:
-    """The next of a few numbers, so that problems that are almost alike share what is made ready for them."""
+    """Return `cycles` rounded up to one of a few values.
+
+    Similar problems then share cached tables.
+    """
     return 2.0 ** (ceil(STEPS * log2(cycles) - 1e-9) / STEPS) if cycles > 0 else 0.0

@@ -1,4 +1,4 @@
-"""Rotationally symmetric pictures: computed along one radius, shown on a grid."""
+"""Rotationally symmetric images: computed along one radius and interpolated onto a grid."""
 
 from __future__ import annotations
 
@@ -17,18 +17,21 @@ from optics.numerics.quadrature import harmonics
 
 __all__ = ["DistinctRadii", "RadialProfile"]
 
-# Choice. Entries of the matrix from points to table: 128 MB in float64. Longer lines are computed at its places.
+# Choice: entries of the matrix from points to table; 128 MB in float64. Longer lines are computed directly at the
+# positions of the table.
 LARGEST_MATRIX = 2**24
-BESIDE = TAPS // 2 - 1  # places of the table beyond either end, but one more beyond the rim
+BESIDE = TAPS // 2 - 1  # positions of the table beyond either end; one more beyond the rim
 
 
 @dataclass(frozen=True)
 class RadialProfile:
-    """A picture that is even in r, wanted up to `rim` [m]: Chebyshev points on [0, radius], and a finer even spacing,
-    the table, for the way to a grid. A line of very many zones is computed at the table's places themselves.
+    """An image that is even in r, needed up to `rim` [m].
 
-    An even function is a polynomial in r²; its Chebyshev points are radius · cos of a quarter turn's angles. The radius
-    exceeds the rim by what local interpolation reaches beyond it.
+    It is computed at Chebyshev points on [0, radius] and interpolated to a finer, evenly spaced table. The table is
+    interpolated onto the grid. A line of very many zones is computed at the positions of the table themselves.
+
+    An even function is a polynomial in r²; its Chebyshev points are radius · cos of the angles in a quarter turn. The
+    radius exceeds the rim by the range of local interpolation.
     """
 
     rim: float
@@ -38,10 +41,10 @@ class RadialProfile:
 
     @classmethod
     def resolving(cls, rim: float, band: float, distance: float, error: float) -> RadialProfile:
-        """Points that carry intensity frequencies up to `band` [1/m] with a relative error of about `error`.
+        """Return points that represent intensity frequencies up to `band` [1/m] with a relative error of about `error`.
 
-        A wave of r over [-R, R] has the Chebyshev coefficients 2 J_m(2πbR); obliquity has poles at ±i distance, whose
-        coefficients fall like e^{-m asinh(distance / R)}. Eight-point interpolation errs by LAGRANGE_8 (2πbh)⁸.
+        A wave of r over [-R, R] has the Chebyshev coefficients 2 J_m(2πbR). Obliquity has poles at ±i distance, whose
+        coefficients fall like e^{-m asinh(distance / R)}. The error of eight-point interpolation is LAGRANGE_8 (2πbh)⁸.
         """
         digits = -math.log10(error)
         turns = 2 * math.pi * band * rim + 2 * rim / distance
@@ -55,27 +58,33 @@ class RadialProfile:
 
     @property
     def is_table(self) -> bool:
-        """Whether it is computed at the table's places."""
+        """True if the image is computed at the positions of the table."""
         return self.points == self.table + TAPS - 1
 
     def pays(self, outputs: int) -> bool:
-        """Whether it saves anything: a window far off the axis is a short piece of a long line."""
+        """Return whether the line has fewer points than the window has samples.
+
+        A window far off the axis covers only a short piece of a long line.
+        """
         return self.points < outputs
 
     @property
     def entries(self) -> int:
-        """Of the matrix from points to table."""
+        """Number of entries of the matrix from points to table."""
         return 0 if self.is_table else self.points * self.table
 
     @property
     def positions(self) -> np.ndarray:
-        """Radii [m]: from the rim inwards; or those of the table, from beyond the axis outwards."""
+        """Radii [m]: from the rim inwards, or the positions of the table from beyond the axis outwards."""
         if self.is_table:
             return np.abs(self.rim * _places(self.table))
         return self.radius * np.cos(np.pi * (np.arange(self.points) + 0.5) / (2 * self.points))
 
     def onto(self, values: Array, window: Grid, types: Precision, signed: bool = False) -> Array:
-        """Values at `positions` carried to the window's samples, flat: at least 0 unless signed, 0 beyond the rim."""
+        """Return values at `positions` interpolated to the samples of the window, flat.
+
+        They are at least 0 unless signed, and 0 beyond the rim.
+        """
         import drjit as dr
 
         table = values if self.is_table else self._refined(values, types)
@@ -91,15 +100,17 @@ class RadialProfile:
         return dr.select(within, total if signed else dr.maximum(total, 0), 0)
 
     def _refined(self, values: Array, types: Precision) -> Array:
-        """The table, of values at Chebyshev points."""
+        """Return the table from values at Chebyshev points."""
         matrix = types.Tensor(_refinement(self.points, self.table, self.rim / self.radius, types.dtype))
         return matmul(matrix, types.Tensor(values, (self.points, 1))).array
 
 
 @dataclass(frozen=True)
 class DistinctRadii:
-    """The radii that a window's samples have, each once: for few samples of many zones. Of a square about the axis they
-    are fewer than an eighth of the samples."""
+    """The distinct radii of a window's samples, for few samples of many zones.
+
+    A square about the axis has fewer distinct radii than an eighth of its samples.
+    """
 
     window: Grid
 
@@ -109,21 +120,21 @@ class DistinctRadii:
 
     @property
     def positions(self) -> np.ndarray:
-        """Radii [m], rising."""
+        """Radii [m] in ascending order."""
         return _distinct(self.window)[0]
 
     @property
     def radius(self) -> float:
-        """The largest [m]."""
+        """Largest radius [m]."""
         return float(self.positions[-1])
 
     @property
     def entries(self) -> int:
-        """Nothing is interpolated."""
+        """Number of matrix entries: 0, because nothing is interpolated."""
         return 0
 
     def onto(self, values: Array, window: Grid, types: Precision, signed: bool = False) -> Array:
-        """Values at `positions` at the window's samples, flat."""
+        """Return values at `positions` at the samples of the window, flat."""
         import drjit as dr
 
         return dr.gather(types.Float, types.Float(values), types.Index(_distinct(self.window)[1]))
@@ -131,22 +142,25 @@ class DistinctRadii:
 
 @lru_cache(maxsize=8)
 def _distinct(window: Grid) -> tuple[np.ndarray, np.ndarray]:
-    """Distinct radii [m], and of every sample which it has, flat."""
+    """Return the distinct radii [m] and, for every sample, the index of its radius, flat."""
     squared = np.add.outer(np.square(window.y), np.square(window.x)).ravel() / window.dx**2
-    found, which = np.unique(np.round(squared, 6), return_inverse=True)  # rounded: one ring stays one
+    # Rounded so that equal radii are not split by rounding errors.
+    found, which = np.unique(np.round(squared, 6), return_inverse=True)
     return np.sqrt(found) * window.dx, padded_for_packets(which.ravel().astype(np.uint32))
 
 
 def _places(table: int) -> np.ndarray:
-    """Of the table, in units of the rim."""
+    """Return the positions of the table in units of the rim."""
     found: np.ndarray = np.arange(-BESIDE, table + BESIDE + 1) / (table - 1)
     return found
 
 
 @lru_cache(maxsize=32)
 def _refinement(points: int, table: int, rim: float, dtype: str) -> np.ndarray:
-    """(table + 7, points): even Chebyshev interpolation to places -3 ... table + 3 of an even spacing, the rim (in
-    units of the line's radius) at table - 1."""
+    """Return even Chebyshev interpolation to positions -3 ... table + 3 of an even spacing, (table + 7, points).
+
+    The rim (in units of the line's radius) is at position table - 1.
+    """
     radius = rim * _places(table)
     nodes = np.cos(np.pi * (np.arange(points) + 0.5) / (2 * points))
     degrees = 2 * np.arange(points)

@@ -1,9 +1,9 @@
-"""Fourier sums between scattered points and a grid: each point is spread over a few cells, and these are transformed.
+"""Fourier sums between scattered points and a grid: points are spread over a few cells, which are then transformed.
 
     S(k) = Σ_j u_j e^{2πi (p_j k_x + q_j k_y)},   u(j) = Σ_k S_k e^{2πi (p_j k_x + q_j k_y)},   k counted from n//2.
 
-The spread is e^{β(√(1 - z²) - 1)} (Barnett, Magland & af Klinteberg, SIAM J. Sci. Comput. 41, C479, 2019), on a period
-of twice as many cells as the sum has samples; its own transform is divided out.
+The spreading kernel is e^{β(√(1 - z²) - 1)} (Barnett, Magland & af Klinteberg, SIAM J. Sci. Comput. 41, C479, 2019).
+The period has two cells per sample of the sum. The result is divided by the transform of the kernel.
 """
 
 from __future__ import annotations
@@ -22,12 +22,16 @@ from optics.numerics.quadrature import gauss_legendre
 __all__ = ["ScatteredSum", "sums_at"]
 
 FINER = 2.0  # choice: cells of the period per sample of the sum
-SLOPE = 2.30  # β per cell of the spread, at that (eq. 4.5)
+SLOPE = 2.30  # β per cell of the spreading kernel, for this ratio (eq. 4.5)
 TRANSFORM_NODES = 40
 
 
 class ScatteredSum:
-    """Points p, q [turns per sample], flat; shape: (y, x) of the sums; digits: of them, relative to Σ|u|."""
+    """Fourier sums over scattered points.
+
+    p, q: coordinates of the points [turns per sample], flat. shape: (y, x) of the sums. digits: accuracy of the sums
+        relative to Σ|u|.
+    """
 
     def __init__(self, p: np.ndarray, q: np.ndarray, shape: tuple[int, int], digits: float = 6.0) -> None:
         from scipy.sparse import csr_array
@@ -37,7 +41,7 @@ class ScatteredSum:
         (first_x, by_x), (first_y, by_y) = (_spread(at, self.period, self.width) for at in (p, q))
         across, down = (np.arange(self.width) + first[:, None] for first in (first_x, first_y))
         low_x, low_y = int(across.min()), int(down.min())
-        # Points that lie within less than a period are held on as many cells as they need.
+        # Points that cover less than a period are spread over no more cells than they need.
         self.held = int(down.max()) - low_y + 1, int(across.max()) - low_x + 1
         cells = (down[:, :, None] - low_y) * self.held[1] + (across[:, None, :] - low_x)
         weights = by_y[:, :, None] * by_x[:, None, :]
@@ -45,21 +49,21 @@ class ScatteredSum:
         self.cells = csr_array((weights.ravel(), cells.ravel(), index), shape=(len(first_x), math.prod(self.held)))
         self.first = low_y + self.held[0] // 2, low_x + self.held[1] // 2
 
-    def of(self, u: np.ndarray) -> np.ndarray:
-        """S (sum, y, x), complex, of amplitudes (sum, point)."""
+    def evaluate(self, u: np.ndarray) -> np.ndarray:
+        """Return S (sum, y, x), complex, for amplitudes (sum, point)."""
         held = (self.cells.T @ np.ascontiguousarray(u.T)).T.reshape(len(u), *self.held)
         found = np.stack([fourier_sum(np.ascontiguousarray(one), self.period, self.shape, 1) for one in held])
         return found * self._factor()
 
     def at(self, samples: np.ndarray) -> np.ndarray:
-        """u (sum, point), complex, of samples (sum, y, x): the transpose of `of`."""
+        """Return u (sum, point), complex, for samples (sum, y, x): the transpose of `evaluate`."""
         parts = samples * self._factor()
         held = np.stack([fourier_sum(np.ascontiguousarray(one), self.period, self.held, 1) for one in parts])
         found: np.ndarray = (self.cells @ held.reshape(len(samples), -1).T).T
         return found
 
     def _factor(self) -> np.ndarray:
-        """(y, x): of the cells' place, over the spread's transform."""
+        """Return the phase of the cells' position divided by the transform of the spreading kernel, (y, x)."""
         axes = []
         for first, n in zip(self.first, self.shape, strict=True):
             turns = (np.arange(n) - n // 2) * first / self.period
@@ -68,13 +72,16 @@ class ScatteredSum:
 
 
 def sums_at(sums: ScatteredSum, samples: Array) -> tuple[Array, Array]:
-    """Real and imaginary parts of `sums.at` of real samples, flat Float64 arrays (sum, point); with derivatives."""
+    """Return real and imaginary parts of `sums.at` for real samples, with derivatives.
+
+    Both are flat Float64 arrays (sum, point).
+    """
     import drjit as dr
 
     types = precision("float64")
 
     class SumsAt(dr.CustomOp):
-        """Its adjoint is the sum onto the samples, of which the real part is kept."""
+        """Sums at the points. The adjoint is the real part of the sum onto the samples."""
 
         def eval(self, samples: Array) -> tuple[Array, Array]:
             found = sums.at(samples.numpy().reshape(-1, *sums.shape))
@@ -86,13 +93,13 @@ def sums_at(sums: ScatteredSum, samples: Array) -> tuple[Array, Array]:
         def backward(self) -> None:
             grad: Any = self.grad_out()
             re, im = (part.numpy().reshape(-1, sums.cells.shape[0]) for part in grad)
-            self.set_grad_in("samples", types.Float(padded_for_packets(sums.of(re - 1j * im).real)))
+            self.set_grad_in("samples", types.Float(padded_for_packets(sums.evaluate(re - 1j * im).real)))
 
     return dr.custom(SumsAt, samples)
 
 
 def _spread(turns: np.ndarray, period: int, width: int) -> tuple[np.ndarray, np.ndarray]:
-    """First cell of each point's spread, and its weights (point, cell)."""
+    """Return the first cell of each point's spreading kernel and its weights (point, cell)."""
     place = np.asarray(turns, dtype=np.float64) * period
     first = np.ceil(place - width / 2).astype(np.int64)
     z = (np.arange(width) + first[:, None] - place[:, None]) * (2 / width)
@@ -101,7 +108,7 @@ def _spread(turns: np.ndarray, period: int, width: int) -> tuple[np.ndarray, np.
 
 @lru_cache(maxsize=64)
 def _transform(width: int, period: int, n: int) -> np.ndarray:
-    """Of the spread, at the sum's n samples."""
+    """Return the transform of the spreading kernel at the n samples of the sum."""
     node, weight = gauss_legendre(TRANSFORM_NODES)
     z, weight = 2 * node - 1, width * weight
     shape = weight * np.exp(SLOPE * width * (np.sqrt(1 - z * z) - 1))

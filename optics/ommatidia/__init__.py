@@ -1,9 +1,9 @@
-"""Compound eyes: facets, and the rhabdoms behind them as waveguides.
+"""Compound eyes: facets with rhabdoms as waveguides behind them.
 
-waveguide   Waveguide: a rhabdom, and its modes
-facet       FacetLens: thick and curved
-radiation   what a mode sends back to the pupil
-coupling    how much light a pupil sends into a mode, for every direction
+waveguide   Waveguide: a rhabdom with its modes
+facet       FacetLens: a thick lens
+radiation   radiation of a mode at the pupil
+coupling    coupling of a pupil's light into modes, for every direction
 ommatidium  Ommatidium: angular sensitivity, acceptance angle
-mosaic      AppositionEye: ommatidia side by side
+mosaic      AppositionEye: an array of ommatidia
 """

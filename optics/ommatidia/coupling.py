@@ -1,12 +1,12 @@
-"""How much light a pupil sends into a mode, for every direction that it may come from.
+"""Coupling of the light on a pupil into a waveguide's modes, for every direction of incidence.
 
 The amplitude of a mode is the overlap of its field with the light in its plane. That light is a Rayleigh-Sommerfeld
-integral over the pupil, and the two integrals may change places:
+integral over the pupil, and the order of the two integrals may be exchanged:
 
-    c(s) = ∫ ψ(x) U_s(x) dx = ∫ P(ξ) e^{ik n₀ s·ξ} Ψ(ξ) dξ,   Ψ(ξ) = ∫ ψ(x) z/(2πD²) (1/D - ik) e^{ikD} dx,
+    c(s) = ∫ ψ(x) U_s(x) dx = ∫ P(ξ) e^{ik n₀ s·ξ} Ψ(ξ) dξ,   Ψ(ξ) = ∫ ψ(x) z/(2πD²) (1/D - ik) e^{ikD} dx.
 
-so that a mode is sent back to the pupil once, and all directions s (sines) are one Fourier sum.
-A waveguide off the pupil's axis points at the pupil's centre. What it radiates is in `radiation`.
+A mode is thus propagated back to the pupil once, and all directions s (sines) are one Fourier sum. A waveguide off the
+pupil's axis points at the pupil's centre. The field that it radiates is computed in `radiation`.
 """
 
 from __future__ import annotations
@@ -28,15 +28,17 @@ from optics.ommatidia.waveguide import Mode
 
 __all__ = ["ModesAtPupil", "modes_at_pupil"]
 
-TOGETHER = 8  # choice, by memory: modes
-PAIRS = 4_000_000  # choice, by memory: of nodes at once
+TOGETHER = 8  # choice, by memory: modes at once
+PAIRS = 4_000_000  # choice, by memory: pairs of nodes at once
 
 
 @dataclass(frozen=True, eq=False)
 class ModesAtPupil:
-    """Modes as the pupil sends their light: nodes x, y [m], and weights P Ψ dξ, (mode, node).
+    """Back-propagated modes at the pupil: nodes x, y [m], and weights P Ψ dξ, (mode, node).
 
-    area_of: dξ of each node [m²]. wavenumber: k n₀ [1/m], before the pupil. area: [m²], of the open pupil.
+    area_of: dξ of each node [m²].
+    wavenumber: k n₀ [1/m], in front of the pupil.
+    area: open area of the pupil [m²].
     """
 
     x: np.ndarray
@@ -47,8 +49,10 @@ class ModesAtPupil:
     area: float
 
     def power(self, sine_x: np.ndarray, sine_y: np.ndarray) -> np.ndarray:
-        """Share of the light on the pupil that goes into each mode, (mode, direction), from directions of these
-        sines, beside those of the source."""
+        """Share of the light on the pupil that enters each mode, (mode, direction), from directions with these sines.
+
+        Sines are relative to the source's.
+        """
         sx, sy = np.ravel(sine_x), np.ravel(sine_y)
         found = np.empty((len(self.weights), sx.size))
         step = max(1, PAIRS // self.x.size)
@@ -59,20 +63,22 @@ class ModesAtPupil:
         return found
 
     def power_on(self, sines: Grid, taken: np.ndarray, digits: float = DIGITS) -> np.ndarray:
-        """Share of the light on the pupil that all modes take, (y, x), from directions on a grid of sines; taken: what
-        each mode's light counts."""
+        """Share of the light on the pupil that all modes accept, (y, x), from directions on a grid of sines.
+
+        taken: weight of each mode's light.
+        """
         per_sample = self.wavenumber / (2 * math.pi) * sines.dx
         sums = ScatteredSum(self.x * per_sample, self.y * per_sample, sines.shape, digits)
         middle = np.exp(1j * self.wavenumber * (self.x * sines.centre[0] + self.y * sines.centre[1]))
         found = np.zeros(sines.shape)
         for start in range(0, len(taken), TOGETHER):
             some = slice(start, start + TOGETHER)
-            for amplitude, share in zip(sums.of(self.weights[some] * middle), taken[some], strict=True):
+            for amplitude, share in zip(sums.evaluate(self.weights[some] * middle), taken[some], strict=True):
                 found += share * (amplitude.real**2 + amplitude.imag**2)
         return found / self.area
 
     def total(self, taken: np.ndarray) -> float:
-        """The integral of `power_on` over all sines, by Parseval: (λ/n₀)² Σ |P Ψ|² dξ over the area."""
+        """Integral of `power_on` over all sines, by Parseval: (λ/n₀)² Σ |P Ψ|² dξ over the area."""
         squares = (np.abs(self.weights) ** 2 / self.area_of).sum(axis=1)
         return float(taken @ squares) * (2 * math.pi / self.wavenumber) ** 2 / self.area
 
@@ -84,9 +90,12 @@ def modes_at_pupil(
     place: tuple[float, float] = (0.0, 0.0),
     digits: float = DIGITS,
 ) -> ModesAtPupil:
-    """Modes of a waveguide whose end lies in a beam's plane, for directions up to a sine from that of its source.
+    """Back-propagate modes of a waveguide whose end lies in a beam's plane.
 
-    place: of the end (x, y) [m] off the axis. digits: of the sums over the pupil.
+    steepest: largest sine of a direction, relative to that of the beam's source.
+
+    place: position (x, y) [m] of the end off the axis.
+    digits: accuracy of the sums over the pupil.
 
     Raises:
         ValueError: a relief of pixels, or anything with a derivative.
@@ -95,7 +104,7 @@ def modes_at_pupil(
     if pupil.pixels:
         raise ValueError("height is a PixelRelief: must be smooth before a waveguide, or None")
     k, types = 2 * math.pi * beam.index / wavelength, precision("float64")
-    # Turns per radius of pupil, mode and direction together: what a lens bends, the path unbends.
+    # Cycles per radius of pupil, mode and direction together: the curvature of a lens and that of the path cancel.
     window = Grid((3, 3), reach(modes), place)
     residue = pupil.slopes(wavelength, beam.source).turning(z, window, beam.index)[1] / wavelength
     cycles = pupil.radius * (residue + pupil.index_before(wavelength) * steepest / wavelength)

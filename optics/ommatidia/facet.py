@@ -1,4 +1,4 @@
-"""A facet's lens: thick, curved on both sides, between air and the crystalline cone."""
+"""Facet lenses: thick, curved on both sides, between air and the crystalline cone."""
 
 from __future__ import annotations
 
@@ -20,12 +20,16 @@ SHAPES = ("hexagon", "circle")
 
 @dataclass(frozen=True)
 class FacetLens:
-    """A thick lens of two spherical surfaces (Stavenga, J. Comp. Physiol. A 189, 1, 2003, appendix 1).
+    """A thick lens with two spherical surfaces (Stavenga, J. Comp. Physiol. A 189, 1, 2003, appendix 1).
 
-    diameter: [m], of a hexagon between opposite sides. radius_front, radius_back: of curvature [m], positive where the
-        centre lies behind the surface: a lens that bulges to both sides has a negative back. thickness: [m].
-    n: of the lens. object_n: of what is before it; medium_n: of the cone behind it; numbers or curves. Foci of colours
-        lie apart where `Ommatidium` holds the lens; its `pupil` has one for all.
+    diameter: width [m] of the hexagon between opposite sides, or of the circle.
+    radius_front, radius_back: radii of curvature [m], positive if the centre lies behind the surface. A biconvex lens
+        has a negative radius_back.
+    thickness: [m].
+    n: refractive index of the lens.
+    object_n: index in front of it.
+    medium_n: index of the cone behind it. All indices are numbers or curves. With curves, an `Ommatidium` that holds
+        the lens has chromatic foci; the lens' `pupil` has one focus for all wavelengths.
     shape: "hexagon", with corners along y, or "circle".
 
     Raises:
@@ -69,7 +73,7 @@ class FacetLens:
         return self._index("object_n", wavelength) / self.power(wavelength)
 
     def principal_planes(self, wavelength: float = MIDDLE) -> tuple[float, float]:
-        """Where [m] behind the front vertex the first and the second principal plane lie."""
+        """Distances [m] of the first and the second principal plane behind the front vertex."""
         front, back, n = self._surfaces(wavelength)
         power, thickness = self.power(wavelength), self.thickness
         first = self._index("object_n", wavelength) * thickness * back / (n * power)
@@ -77,8 +81,12 @@ class FacetLens:
         return first, second
 
     def pupil(self, wavelength: float = MIDDLE, **others: Any) -> Pupil:
-        """In the principal planes: the facet with an ideal lens, of this lens' focal length at one wavelength [m] for
-        light of all. others: of `Pupil`, as a wavefront for the lens' aberrations."""
+        """Equivalent pupil in the principal planes: the facet with an ideal lens.
+
+        The lens has this lens' focal length at one wavelength [m], for light of all wavelengths.
+
+        others: further arguments of `Pupil`, such as a wavefront for the lens' aberrations.
+        """
         corners = 2 / math.sqrt(3) if self.shape == "hexagon" else 1.0
         return Pupil(
             corners * self.diameter / 2,
@@ -93,7 +101,7 @@ class FacetLens:
         return Polygon.regular(6, 90.0) if self.shape == "hexagon" else Circle()
 
     def _surfaces(self, wavelength: float) -> tuple[float, float, float]:
-        """Powers [1/m] of both, and the index between them."""
+        """Powers [1/m] of both surfaces, and the index between them."""
         before, n, behind = (self._index(name, wavelength) for name in ("object_n", "n", "medium_n"))
         return (n - before) / self.radius_front, (behind - n) / self.radius_back, n
 

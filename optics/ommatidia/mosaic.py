@@ -1,4 +1,4 @@
-"""Apposition eyes: ommatidia side by side, each with its own direction."""
+"""Apposition eyes: arrays of ommatidia, each with its own direction."""
 
 from __future__ import annotations
 
@@ -15,14 +15,15 @@ from optics.ommatidia.ommatidium import Ommatidium
 __all__ = ["AppositionEye", "hexagonal_directions"]
 
 MOST_RINGS = 60
-PER_CYCLE = 4  # choice: directions per λ/D, of which a facet's sensitivity has detail no finer than one
-WIDTHS = 3.0  # choice: half a field, in acceptance angles
+PER_CYCLE = 4  # choice: directions per λ/D, the finest detail of a facet's sensitivity
+WIDTHS = 3.0  # choice: half width of a field, in acceptance angles
 FINEST = 0.5  # sine of the widest direction
 
 
 def hexagonal_directions(rings: int, interommatidial_deg: float) -> np.ndarray:
-    """(n, 2) angles [rad] along x and y of ommatidia in hexagonal rings about the axis, neighbours Δφ apart, rows along
-    x.
+    """Angles (n, 2) [rad] along x and y of ommatidia in hexagonal rings about the axis.
+
+    Neighbours are Δφ apart, and rows run along x.
 
     Raises:
         ValueError: rings outside 0 to 60, or an angle that is not positive.
@@ -38,9 +39,11 @@ def hexagonal_directions(rings: int, interommatidial_deg: float) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class AppositionEye:
-    """Equal ommatidia that look in hexagonally arranged directions.
+    """Identical ommatidia with hexagonally arranged viewing directions.
 
-    ommatidium: of which there are many. rings: about the one on the axis. interommatidial_deg: Δφ between neighbours.
+    ommatidium: model of all ommatidia.
+    rings: rings about the one on the axis.
+    interommatidial_deg: Δφ between neighbours.
 
     Raises:
         ValueError: names argument, value and valid range.
@@ -57,11 +60,11 @@ class AppositionEye:
 
     @cached_property
     def directions(self) -> np.ndarray:
-        """(ommatidium, 2) angles [rad] along x and y."""
+        """Angles (ommatidium, 2) [rad] along x and y."""
         return hexagonal_directions(self.rings, self.interommatidial_deg)
 
     def field(self, wavelength: float = 500e-9) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Directions x, y [rad] about an ommatidium's own, flat, and what each counts; these weights sum to 1."""
+        """Directions x, y [rad] relative to an ommatidium's own, flat, and their weights, which sum to 1."""
         eye, at = self.ommatidium, vacuum_wavelength(wavelength)
         half = WIDTHS * max(eye.acceptance_angle(at), eye.acceptance_angle(at, 90.0))
         half = min(half, math.asin(FINEST) / 1.5)
@@ -72,7 +75,7 @@ class AppositionEye:
         return x, y, weights / weights.sum()
 
     def see(self, radiance: Callable[[np.ndarray, np.ndarray], np.ndarray], wavelength: float = 500e-9) -> np.ndarray:
-        """(ommatidium,) signals of a scene: its radiance over angles x, y [rad]; a field of radiance 1 gives 1.
+        """Return signals (ommatidium,) of a scene, a radiance over angles x, y [rad]; a uniform radiance 1 gives 1.
 
         Raises:
             ValueError: the radiance is not finite, or of another shape than its angles.
@@ -88,12 +91,13 @@ class AppositionEye:
         return found
 
     def contrast(self, cycles_per_degree: float, wavelength: float = 500e-9, azimuth_deg: float = 0.0) -> float:
-        """Of a sine grating as an ommatidium sees it, the transform of its angular sensitivity: what falls as the
-        grating becomes finer; none beyond 2R n/λ cycles per radian, n before the lens. (Neighbours tell gratings
-        apart up to 1/(√3 Δφ).)
+        """Contrast of a sine grating in an ommatidium's signal: the transform of its angular sensitivity.
+
+        It falls as the grating becomes finer, and is 0 beyond 2R n/λ cycles per radian, n in front of the lens. (The
+        array resolves gratings up to 1/(√3 Δφ).)
 
         Raises:
-            ValueError: a frequency below 0, or numbers that are not finite.
+            ValueError: a negative frequency, or numbers that are not finite.
         """
         in_range("cycles_per_degree", cycles_per_degree, 0.0, 1e9)
         turn = math.radians(finite("azimuth_deg", azimuth_deg))

@@ -1,4 +1,4 @@
-"""An ommatidium: a facet's lens before a rhabdom that is a waveguide, and the directions it sees."""
+"""Ommatidia: a facet's lens in front of a rhabdom as a waveguide, and the directions from which it receives light."""
 
 from __future__ import annotations
 
@@ -18,18 +18,20 @@ from optics.ommatidia.waveguide import Mode, Waveguide
 
 __all__ = ["Ommatidium", "snyder_acceptance"]
 
-STEEPEST = (0.03, 0.06, 0.12, 0.25, 0.5)  # sines of directions that are asked about, the last the widest
-ALONG = 121  # choice: directions in which an acceptance angle is looked for
-WIDE = 6.0  # choice: of them, times the sum of diffraction's and the rhabdom's angle
+STEEPEST = (0.03, 0.06, 0.12, 0.25, 0.5)  # sines of directions, in ascending order, for which modes are prepared
+ALONG = 121  # choice: directions in the search for an acceptance angle
+WIDE = 6.0  # choice: their range, over the sum of the diffraction angle and the rhabdom's angle
 
 
 @dataclass(frozen=True, eq=False)
 class Ommatidium:
     """A lens and the waveguide on its axis.
 
-    lens: a FacetLens, or any Pupil. rhabdom: the waveguide. distance: [m] from the lens' (second principal) plane to
-        the rhabdom's end; None: the lens' focus. Both are those at 550 nm. The rhabdom stays there, and light of other
-        wavelengths is in focus where a FacetLens of curves has it.
+    lens: a FacetLens, or any Pupil.
+    rhabdom: the waveguide.
+    distance: distance [m] from the lens' (second principal) plane to the rhabdom's end; None: the lens' focal length.
+        Both are values at 550 nm. The rhabdom's position is fixed; the focus of other wavelengths follows from a
+        FacetLens with dispersion curves.
 
     Raises:
         ValueError: names argument, value and valid range.
@@ -48,11 +50,11 @@ class Ommatidium:
 
     @property
     def pupil(self) -> Pupil:
-        """Of a FacetLens that at 550 nm."""
+        """Pupil of the lens; for a FacetLens the one at 550 nm."""
         return self.lens.pupil() if isinstance(self.lens, FacetLens) else self.lens
 
     def _beam(self, wavelength: float) -> Beam:
-        """Light from straight ahead at a vacuum wavelength [m], to the rhabdom's end.
+        """Axial light of a vacuum wavelength [m], up to the rhabdom's end.
 
         Raises:
             ValueError: the lens' principal plane lies behind that end.
@@ -64,15 +66,17 @@ class Ommatidium:
         return Beam(self.lens.pupil(wavelength), PointSource(), wavelength, distance)
 
     def modes(self, wavelength: float = 500e-9) -> tuple[Mode, ...]:
-        """What the rhabdom guides at a vacuum wavelength [m]: see `Waveguide.modes`."""
+        """Guided modes of the rhabdom at a vacuum wavelength [m]: see `Waveguide.modes`."""
         return self.rhabdom.modes(wavelength)
 
     def mode_power(self, angle_x: np.ndarray, angle_y: np.ndarray, wavelength: float = 500e-9) -> np.ndarray:
-        """Share of the light on the facet that each mode takes, (mode, ...), of a point far away at these angles [rad]
-        along the lens' x and y off the axis. It sends its light the other way: as `PointSource`'s, their negatives.
+        """Share of the light on the facet that enters each mode, (mode, ...), from a far point at these angles [rad].
+
+        Angles are the point's direction along the lens' x and y off the axis. The light travels in the opposite
+        direction: its `PointSource` has the negative angles.
 
         Raises:
-            ValueError: an angle whose sine is above 0.5, angles of different shapes, or the rhabdom guides nothing.
+            ValueError: an angle whose sine is above 0.5, angles of different shapes, or a rhabdom without guided modes.
         """
         x, y = reals("angle_x", angle_x), reals("angle_y", angle_y)
         try:
@@ -90,7 +94,7 @@ class Ommatidium:
         return found.reshape(len(found), *x.shape)
 
     def sensitivity(self, angle_x: np.ndarray, angle_y: np.ndarray, wavelength: float = 500e-9) -> np.ndarray:
-        """Share of the light on the facet that the rhabdom absorbs, of a point at these angles [rad], any shape.
+        """Share of the light on the facet that the rhabdom absorbs, from a point at these angles [rad], any shape.
 
         Raises:
             ValueError: see `mode_power`.
@@ -99,8 +103,9 @@ class Ommatidium:
         return np.asarray(np.tensordot(taken, self.mode_power(angle_x, angle_y, wavelength), axes=1))
 
     def acceptance_angle(self, wavelength: float = 500e-9, azimuth_deg: float = 0.0) -> float:
-        """Δρ [rad]: full width at half of its peak of the sensitivity, along a line through the axis at an azimuth from
-        x. The outermost angles of half the peak count, where there are several lobes.
+        """Δρ [rad]: full width at half maximum of the sensitivity, along a line through the axis at an azimuth from x.
+
+        With several lobes the outermost angles at half maximum count.
 
         Raises:
             ValueError: see `mode_power`.
@@ -123,13 +128,13 @@ class Ommatidium:
 
     @staticmethod
     def _top(at: np.ndarray, seen: np.ndarray) -> float:
-        """Where a parabola through three is highest."""
+        """Position of the maximum of a parabola through three points."""
         (left, middle, right), step = seen, float(at[1] - at[0])
         bend = left - 2 * middle + right
         return float(at[1]) if bend >= 0 else float(at[1]) + step * (left - right) / (2 * bend)
 
     def _half(self, low: float, high: float, peak: float, turn: float, wavelength: float) -> float:
-        """Where between two angles the sensitivity is half the peak's, by a cubic through four."""
+        """Angle between two others at which the sensitivity is half the peak's, by a cubic through four points."""
         at = np.linspace(low, high, 4)
         seen = self.sensitivity(at * math.cos(turn), at * math.sin(turn), wavelength)
         return float(np.polynomial.polynomial.polyval(peak / 2, np.polynomial.polynomial.polyfit(seen, at, 3)))
@@ -147,8 +152,11 @@ def _coupled(eye: Ommatidium, wavelength: float, steepest: float) -> ModesAtPupi
 
 
 def snyder_acceptance(diameter: float, focal_length: float, rhabdom: float, wavelength: float) -> float:
-    """Δρ [rad] after Snyder (J. Comp. Physiol. 116, 161, 1977), √((λ/D)² + (d/f)²): diffraction and rhabdom as if both
-    were Gaussian and no waveguide. focal_length: the object's, n₀/P [m].
+    """Δρ [rad] after Snyder (J. Comp. Physiol. 116, 161, 1977), √((λ/D)² + (d/f)²).
+
+    This treats diffraction and rhabdom as Gaussians, and the rhabdom not as a waveguide.
+
+    focal_length: focal length of the object space, n₀/P [m].
 
     Raises:
         ValueError: a length that is not positive.

@@ -1,12 +1,12 @@
-"""What a waveguide's modes radiate, at a pupil's points.
+"""Radiation of a waveguide's modes at a pupil's points.
 
-Seen from the waveguide that is cos lφ or sin lφ times a function of the angle θ from its axis and of the distance D:
+Seen from the waveguide it is cos lφ or sin lφ times a function of the angle θ from its axis and of the distance D:
 
     Ψ(ξ) = z e^{ikD} cos lφ G(sin θ, D),   G = ∫ ψ(x) (1/d - ik)/(2πd²) e^{ik(d - D)} dx,   d = |ξ - x|.
 
 z is the distance of the waveguide's end from the pupil's plane. Off the pupil's axis the end is oblique to that plane,
-and Ψ errs by up to 5e-3 of its largest value. G is integrated at Chebyshev points in sin θ and 1/D; between them it is
-a polynomial. On the pupil's axis D is z/cos θ, and G a function of sin θ alone.
+and the error of Ψ reaches 5e-3 of its largest value. G is integrated at Chebyshev points in sin θ and 1/D and
+interpolated by a polynomial between them. On the pupil's axis D is z/cos θ, and G a function of sin θ alone.
 """
 
 from __future__ import annotations
@@ -23,21 +23,21 @@ from optics.ommatidia.waveguide import Mode
 
 __all__ = ["DIGITS", "radiated", "reach"]
 
-DIGITS = 6.0  # choice: of all sums
-FAR = 14.0  # choice: a mode's field ends where e^{-Wr/b} does, at e^-14 of the edge's
-# Choice: or so many core radii away, for modes near their cut-off. A hundred take up to seven times as long, for 2e-4.
+DIGITS = 6.0  # choice: digits of all sums
+FAR = 14.0  # choice: a mode's field is cut at a decay of e^-14 from the core's edge
+# Choice: limit in core radii, for modes near their cut-off. 100 radii take up to seven times as long and change 2e-4.
 FARTHEST = 40.0
-PAIRS = 4_000_000  # choice, by memory: of points and nodes at once
+PAIRS = 4_000_000  # choice, by memory: pairs of points and nodes at once
 SPARE_POINTS = 10, 5  # choice: Chebyshev points in sin θ and 1/D beyond the radians of half their range
-LINE = 5e-3  # choice: radians between close points, for DIGITS
-CLEAR = 1e-9  # rounding, at the ranges' ends
+LINE = 5e-3  # choice: radians between points of linear interpolation, for DIGITS
+CLEAR = 1e-9  # margin for rounding at the ends of ranges
 
 Ends = tuple[float, float]
 OfMode = Callable[[int], np.ndarray]
 
 
 def reach(modes: tuple[Mode, ...]) -> float:
-    """[m] from the axis, beyond which there is nothing of these modes' fields."""
+    """Distance [m] from the axis beyond which these modes' fields are negligible."""
     return max(mode.radius * _radii(mode) for mode in modes)
 
 
@@ -48,9 +48,11 @@ def _radii(mode: Mode) -> float:
 def radiated(
     modes: tuple[Mode, ...], x: np.ndarray, y: np.ndarray, end: tuple[float, float, float], k: float
 ) -> np.ndarray:
-    """Ψ of each mode at a pupil's points, less a constant phase, (mode, point).
+    """Ψ of each mode at a pupil's points, up to a constant phase, (mode, point).
 
-    end: where the waveguide ends (x, y, z) [m], the pupil's centre at 0; its axis runs through both. k: [1/m].
+    end: position (x, y, z) [m] of the waveguide's end, with the pupil's centre at 0. The waveguide's axis passes
+        through both.
+    k: [1/m].
     """
     sine, phi, distance = _seen_from(x, y, end)
     function = (_along_axis if end[:2] == (0.0, 0.0) else _aside)(modes, sine, distance, k)
@@ -64,7 +66,7 @@ def radiated(
 
 
 def _along_axis(modes: tuple[Mode, ...], sine: np.ndarray, distance: np.ndarray, k: float) -> OfMode:
-    """G D² where D = z/cos θ, of each mode by its number: in straight lines between close points."""
+    """G D² for D = z/cos θ, as a function of the mode's number; linear interpolation between close points."""
     z = float((distance * np.sqrt(1 - sine**2)).mean())
     sines = 0.0, float(sine.max()) * (1 + CLEAR)
     radians = k * reach(modes) * sines[1] / 2
@@ -80,7 +82,7 @@ def _along_axis(modes: tuple[Mode, ...], sine: np.ndarray, distance: np.ndarray,
 
 
 def _aside(modes: tuple[Mode, ...], sine: np.ndarray, distance: np.ndarray, k: float) -> OfMode:
-    """The same of any sines and distances."""
+    """G D² for arbitrary sines and distances, as a function of the mode's number."""
     sines = 0.0, float(sine.max()) * (1 + CLEAR)
     nearness = (1 - CLEAR) / float(distance.max()), (1 + CLEAR) / float(distance.min())
     far = reach(modes)
@@ -94,8 +96,10 @@ def _aside(modes: tuple[Mode, ...], sine: np.ndarray, distance: np.ndarray, k: f
 
 
 def _seen_from(x: np.ndarray, y: np.ndarray, end: tuple[float, float, float]) -> tuple[np.ndarray, ...]:
-    """sin θ, φ and D of a pupil's points from a waveguide's end; its frame is the pupil's, turned by the shortest way
-    from the pupil's axis to its own."""
+    """sin θ, φ and D of a pupil's points, seen from a waveguide's end.
+
+    Its frame is the pupil's, rotated along the shortest arc from the pupil's axis to the waveguide's.
+    """
     there = np.stack([x - end[0], y - end[1], np.full(len(x), -end[2])])
     axis, normal = -np.array(end) / math.hypot(*end), np.array([0.0, 0.0, -1.0])
     between = axis + normal
@@ -106,20 +110,20 @@ def _seen_from(x: np.ndarray, y: np.ndarray, end: tuple[float, float, float]) ->
 
 
 def _scaled(at: np.ndarray, ends: Ends) -> np.ndarray:
-    """From a range to [-1, 1]."""
+    """Map a range to [-1, 1]."""
     found: np.ndarray = (2 * at - ends[0] - ends[1]) / (ends[1] - ends[0])
     return found
 
 
 def _between(ends: Ends, radians: float, spare: int) -> np.ndarray:
-    """Chebyshev points for what turns through so many radians over half a range."""
+    """Chebyshev points for a function whose phase changes by this many radians over half a range."""
     return (ends[0] + ends[1] + (ends[1] - ends[0]) * chebyshev_points(math.ceil(1.2 * radians) + spare)) / 2
 
 
 def _integrated(modes: tuple[Mode, ...], sine: np.ndarray, distance: np.ndarray, k: float) -> np.ndarray:
     """G D² at places (sin θ, D), (mode, place)."""
     u, v, weight = _mode_nodes(modes, k * float(sine.max()))
-    # A sine mode's function is its twin's, which alone shows at φ = 0.
+    # A sine mode has the same function as its cosine twin, and only the twin is nonzero at φ = 0.
     amplitude = np.stack([weight * replace(mode, sine=False).field(u, v) for mode in modes], axis=1)
     found = np.empty((len(sine), len(modes)), dtype=complex)
     step = max(1, PAIRS // u.size)
@@ -133,11 +137,13 @@ def _integrated(modes: tuple[Mode, ...], sine: np.ndarray, distance: np.ndarray,
 
 
 def _mode_nodes(modes: tuple[Mode, ...], k: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """x, y [m] and weights over the modes' fields, for light of transverse wavenumbers up to k [1/m] along x: what is
-    the same on both sides of that axis is summed on one."""
+    """x, y [m] and weights over the modes' fields, for light of transverse wavenumbers up to k [1/m] along x.
+
+    Only one side of that axis has nodes, because the integrand is symmetric.
+    """
     b, parts = modes[0].radius, []
     fastest, farthest, most = max(mode.u for mode in modes), max(map(_radii, modes)), max(mode.l for mode in modes)
-    steep = max(mode.w for mode in modes) * (farthest - 1)  # of the fields' decay: a polynomial of about this degree
+    steep = max(mode.w for mode in modes) * (farthest - 1)  # degree of a polynomial that approximates the fields' decay
     for low, high, turns, degree in ((0.0, b, fastest, 0), (b, b * farthest, 0.0, int(steep) + 8)):
         cycles = (k * (high - low) + turns) / (2 * math.pi)
         u, weight = gauss_legendre(gauss_legendre_count(cycles, DIGITS, 2 + degree))

@@ -1,4 +1,4 @@
-"""A rhabdom as a waveguide: the modes in which light travels along a thin cylinder of higher index."""
+"""A rhabdom as a waveguide: guided modes of a thin cylinder of higher refractive index."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from optics.numerics.arguments import positive, reals, vacuum_wavelength
 
 __all__ = ["Mode", "Waveguide"]
 
-MOST_V = 60.0  # choice: about a thousand modes, where rays do as well
-EDGE = 1e-9  # rounding, beside the poles of the equation
+MOST_V = 60.0  # choice: about a thousand modes, where ray optics is accurate enough
+EDGE = 1e-9  # margin for rounding next to the poles of the equation
 
 
 @dataclass(frozen=True)
@@ -23,7 +23,7 @@ class Mode:
     """A linearly polarised mode LP_lm of a step-index cylinder (Gloge, Appl. Opt. 10, 2252, 1971; Snyder & Love,
     Optical Waveguide Theory, ch. 14), with l dark planes through its axis and m - 1 dark rings.
 
-    u, w: roots, U² + W² = V². radius: b of the core [m]. sine: for l >= 1 every mode is two, as cos lφ and sin lφ.
+    u, w: roots, U² + W² = V². radius: b of the core [m]. sine: modes with l >= 1 come in pairs, with cos lφ and sin lφ.
     """
 
     l: int
@@ -48,8 +48,10 @@ class Mode:
 
     @property
     def core_share(self) -> float:
-        """Share of the mode's light that travels within the core, and can be absorbed there: with κ = K_l²/(K_{l-1}
-        K_{l+1}), (W² + U²κ)/V² (Gloge's eq. 17)."""
+        """Share of the mode's light that travels within the core and can be absorbed.
+
+        It is (W² + U²κ)/V² with κ = K_l²/(K_{l-1} K_{l+1}) (Gloge's eq. 17).
+        """
         square = self.u**2 + self.w**2
         return 1 - self.u**2 / square * (1 - self._kappa())
 
@@ -60,7 +62,7 @@ class Mode:
         return here * here / (below * above)
 
     def _square(self) -> float:
-        """∫ of the square of the field that is 1 at the core's edge: there all is known by κ."""
+        """∫ of the squared field, normalised to 1 at the core's edge, in closed form with κ."""
         azimuth = math.pi * (2 if self.l == 0 else 1)
         outside = self.radius**2 / 2 * (1 / self._kappa() - 1)
         return azimuth * outside / (1 - self.core_share)
@@ -70,10 +72,12 @@ class Mode:
 class Waveguide:
     """A straight cylinder: a rhabdom, or a rhabdomere.
 
-    diameter: [m]. n_core, n_clad: refractive indices, constant or dispersive, the core's a little larger: modes are
-        those of weak guiding. length: [m] along which light is absorbed (None: all that is caught counts).
-    absorption: of the core, per length of it [1/m], at the pigment's peak: 1 - exp(-absorption · share · length) of a
-        mode's light is absorbed.
+    diameter: [m].
+    n_core, n_clad: refractive indices, constant or dispersive. The core's should be slightly larger, because modes are
+        computed for weak guiding.
+    length: length [m] along which light is absorbed (None: all guided light counts).
+    absorption: absorption coefficient of the core [1/m] at the pigment's peak. A mode loses 1 - exp(-absorption · share
+        · length) of its light.
 
     Raises:
         ValueError: names argument, value and valid range.
@@ -94,10 +98,10 @@ class Waveguide:
         positive("absorption", self.absorption, "1/m")
 
     def v_number(self, wavelength: float) -> float:
-        """V = πd/λ √(n_core² - n_clad²) at a vacuum wavelength [m]: below 2.405 there is one mode.
+        """V = πd/λ √(n_core² - n_clad²) at a vacuum wavelength [m]; below 2.405 there is one mode.
 
         Raises:
-            ValueError: the core's index is not above that around it, or V is above 60.
+            ValueError: the core's index is not above the surrounding index, or V is above 60.
         """
         at = vacuum_wavelength(wavelength)
         core, clad = (index_of(name, getattr(self, name)).at(at) for name in ("n_core", "n_clad"))
@@ -109,7 +113,7 @@ class Waveguide:
         return v
 
     def modes(self, wavelength: float) -> tuple[Mode, ...]:
-        """All that are guided at a vacuum wavelength [m], the best confined first; those with l >= 1 as two.
+        """Guided modes at a vacuum wavelength [m], the best confined first; those with l >= 1 come in pairs.
 
         Raises:
             ValueError: see `v_number`.
@@ -128,8 +132,10 @@ class Waveguide:
 
 @lru_cache(maxsize=4096)
 def _roots(l: int, v: float) -> tuple[float, ...]:
-    """U of all guided modes of azimuthal order l: U J_{l+1}(U)/J_l(U) = W K_{l+1}(W)/K_l(W), one between each two zeros
-    of J_l and of J_{l-1}, from its cut-off on."""
+    """U of all guided modes of azimuthal order l, roots of U J_{l+1}(U)/J_l(U) = W K_{l+1}(W)/K_l(W).
+
+    From its cut-off there is one between each two zeros of J_l and of J_{l-1}.
+    """
     from scipy.optimize import brentq
     from scipy.special import jn_zeros, jv, kve
 

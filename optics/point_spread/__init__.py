@@ -1,21 +1,21 @@
-"""The point spread function of a pupil: which method computes it, whether it was right, and what it is worth.
+"""The point spread function of a pupil: choice of the method, check of the result, and measures of image quality.
 
 psf            psf, plan
-psf_result     PSFResult: a picture, and how to look again
-request        Request: what is asked
+psf_result     PSFResult: a PSF that can be recomputed over other windows
+request        Request: the parameters of one PSF
 planner        the cheapest method within the tolerance
-pictures       requests answered, and what becomes of a wrong picture
-spot_check     a picture held against the direct sum at a few points
+pictures       computation of requested PSFs, repeated if a check fails
+spot_check     comparison of a PSF with the direct sum at a few points
 vector_focus   vector_focus: beyond scalar theory
-converging     VectorFocus: polarised light on its way, and its field
-disk_sum       what falls on a round receptor
-microvilli     Microvilli: receptors that know polarisation
+converging     VectorFocus: a polarised field behind a pupil
+disk_sum       light on a round receptor
+microvilli     Microvilli: receptors with polarisation sensitivity
 population     one plan for many pupils
-population_members  what it takes of each
-batch          psf_batch: many eyes at once
+population_members  parameters of each pupil for this plan
+batch          psf_batch: PSFs of many eyes at once
 modulation_transfer  MTF: contrast at any frequency
 contrast       mtf, image_quality
 mixture        sums over wavelengths
-white          white_psf: a lamp's light as receptors weigh it
+white          white_psf: light of a lamp, weighted by receptors
 concentration  strehl_ratio, encircled_energy
 """

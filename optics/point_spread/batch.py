@@ -1,4 +1,4 @@
-"""PSFs of many eyes at many wavelengths and source depths, at once."""
+"""PSFs of many eyes at many wavelengths and source depths at once."""
 
 from __future__ import annotations
 
@@ -36,9 +36,10 @@ __all__ = ["PSFBatch", "psf_batch"]
 
 @dataclass(frozen=True, eq=False)
 class PSFBatch(OnWindow):
-    """tensor: PSFs [1/m²] in Dr.Jit, (eye, depth, wavelength, y, x), with derivatives; psf: the same in NumPy.
+    """PSFs of many eyes.
 
-    plans: of the same order, flat, and members, of which they are pictures. setup: how all were asked for.
+    tensor: PSFs [1/m²] in Dr.Jit, (eye, depth, wavelength, y, x), with derivatives; psf: the same in NumPy.
+    plans: in the same order, flat. members: the eyes of these PSFs, also flat. setup: common parameters of all PSFs.
     See PSFResult.
     """
 
@@ -58,10 +59,10 @@ class PSFBatch(OnWindow):
         return self.setup.window
 
     def result(self, eye: int, depth: int = 0) -> PSFResult:
-        """One eye's PSFs at one depth, as `optics.psf` would give them: for `optics.strehl_ratio` and other measures.
+        """Return one eye's PSFs at one depth as a result of `optics.psf`, for `optics.strehl_ratio` and other measures.
 
         Raises:
-            ValueError: there is no such eye or depth.
+            ValueError: the eye or depth does not exist.
         """
         eyes, depths, waves = self.tensor.shape[:3]
         eye, depth = whole("eye", eye, 0, eyes - 1), whole("depth", depth, 0, depths - 1)
@@ -85,7 +86,7 @@ class PSFBatch(OnWindow):
 
     @property
     def plan(self) -> Plan:
-        """The least accurate."""
+        """The least accurate plan."""
         return max(self.plans, key=lambda plan: plan.predicted_error)
 
 
@@ -101,16 +102,19 @@ def psf_batch(
     method: str = "auto",
     dtype: str = "float32",
 ) -> PSFBatch:
-    """`optics.psf` of every pupil, source on the axis at every distance [m] and vacuum wavelength [m], over one window.
+    """Return `optics.psf` of every pupil over one window, for every source distance and wavelength.
+
+    Sources are on the axis, at distances [m]. Wavelengths are in vacuum [m].
 
     sensor_distance: None: where each pupil's ideal lens images the first source; see `optics.psf`.
 
-    Pupils with smooth reliefs of 4 x 4 points or none, wavefronts of Zernike's modes, masks and two media share one
-    plan and one stack of matrix products where the tolerance is 1e-3 or more and that is good enough: thousands a
-    second. The others are all planned before any is computed, and each is being computed while the next is prepared.
+    One plan and one stack of matrix products serve all pupils with smooth reliefs of 4 x 4 points or none, Zernike
+    wavefronts, masks and two media. This computes thousands of PSFs per second. It is used if the tolerance is 1e-3 or
+    more and the plan is accurate enough. The other PSFs are all planned before any is computed, and each is computed
+    while the next one is prepared.
 
     Raises:
-        ValueError: a bad argument, or an empty sequence.
+        ValueError: an argument is invalid, or a sequence is empty.
         AccuracyError: see `optics.psf`.
     """
     for name, values in (("pupils", pupils), ("wavelengths", wavelengths), ("source_distances", source_distances)):
@@ -145,7 +149,7 @@ def _members(
     sensor_distance: Scalar | None,
     source_distances: Sequence[Scalar],
 ) -> Iterator[Member]:
-    """Eyes, depths, wavelengths, the last fastest."""
+    """Yield all combinations of eyes, depths and wavelengths; the last index varies fastest."""
     if sensor_distance is not None:
         positive("sensor_distance", sensor_distance, carried=True)
     lambdas = [vacuum_wavelength(wavelength) for wavelength in wavelengths]
@@ -161,7 +165,7 @@ def _members(
 def _joined(
     known: dict[int, tuple[np.ndarray, Plan]], rest: dict[int, tuple[Array, Plan]], types: Precision
 ) -> tuple[Array, list[Plan]]:
-    """All pictures in a row, and their plans."""
+    """Return all PSFs in one array, and their plans."""
     import drjit as dr
 
     both = {**known, **rest}

@@ -1,6 +1,6 @@
-"""How concentrated the light is: its peak, and what lands within a circle.
+"""Concentration of the light: the peak of a PSF, and the power within a circle.
 
-Where the PSF carries derivatives, so do these numbers: they are Dr.Jit arrays then, NumPy arrays otherwise.
+If the PSF carries derivatives, so do these numbers: they are then Dr.Jit arrays, otherwise NumPy arrays.
 """
 
 from __future__ import annotations
@@ -22,37 +22,37 @@ from optics.point_spread.psf_result import SUM_ERROR, PSFResult
 
 __all__ = ["encircled_energy", "strehl_ratio"]
 
-AT_A_PEAK = 1 / 32  # choice: of 1/cutoff, the pitch whose paraboloid errs by PARABOLOID_ERROR
-LOBES = 0.4  # choice: of 1/cutoff, the coarsest pitch between whose samples no lobe is lost
-BETWEEN = 1 / 16  # choice: of 1/cutoff, at which the spline through them is looked at
-MOST_SPLINED = 20_000  # choice, by time: samples about which is looked, the brightest
-NOT_YET = 0.9  # choice: of the bound below which no sample is beside the peak; the picture errs, too
-CLIMBS = 8  # choice: windows that are moved to their brightest sample
-NEIGHBOURHOOD = 9  # choice: samples a side of such a window
+AT_A_PEAK = 1 / 32  # choice: pitch in units of 1/cutoff at which a paraboloid has the error PARABOLOID_ERROR
+LOBES = 0.4  # choice: coarsest pitch in units of 1/cutoff at which samples miss no lobe
+BETWEEN = 1 / 16  # choice: pitch in units of 1/cutoff at which the spline is evaluated
+MOST_SPLINED = 20_000  # choice, limited by time: number of brightest samples around which the spline is evaluated
+NOT_YET = 0.9  # choice: factor on the least value next to the peak, because the PSF has errors, too
+CLIMBS = 8  # choice: largest number of windows that are moved to their brightest sample
+NEIGHBOURHOOD = 9  # choice: samples along a side of such a window
 PARABOLOID_ERROR = 3e-5
-OF_A_MASK = 1e-6  # choice: of its spectrum, which the unaberrated peak is good to
-RIPPLE = 1e-5  # choice: of the circle's spectrum
-DIGITS = 10.0  # choice: of the peak without aberration
-FINE = 1 / 3  # choice: of 1/cutoff, the coarsest pitch for circles; the finer, the less they need around them
+OF_A_MASK = 1e-6  # choice: neglected level of a mask's spectrum in the unaberrated peak
+RIPPLE = 1e-5  # choice: ripple of the circle's spectrum
+DIGITS = 10.0  # choice: digits of the peak without aberration
+FINE = 1 / 3  # choice: coarsest pitch for circles in units of 1/cutoff; finer samples extend less beyond them
 
 
 def strehl_ratio(result: PSFResult | Mixture, with_error: bool = False) -> Any:
-    """Peak of the PSF over the peak that the same aperture makes without aberration, (wavelength,); of a `WhitePSF`
-    (type,).
+    """Return the peak of the PSF relative to the peak of the same aperture without aberration, (wavelength,).
 
-    Unaberrated is the spherical wave that converges on the sensor's axis; with L = √(z² + r²) its field there is
+    The result for a `WhitePSF` is (type,). The unaberrated wave is the spherical wave that converges on the sensor's
+    axis. With L = √(z² + r²), its field there is
 
         U = ∫ z/(2πL²) (1/L - ik) dξ
 
-    (first Rayleigh-Sommerfeld integral of exp(-ikL(r)); for a circle |1 - z/L - ikz ln(L/z)|). The peak is that of the
-    brightest sample's surroundings, which are looked at more finely where samples are coarse. That of a mean over
-    wavelengths (`PSFResult.mean`) is compared with the mean of their unaberrated peaks.
+    (first Rayleigh-Sommerfeld integral of exp(-ikL(r)); for a circle |1 - z/L - ikz ln(L/z)|). The peak is the maximum
+    near the brightest sample. If samples are coarse, finer ones are computed there. The peak of a mean over wavelengths
+    (`PSFResult.mean`) is compared with the mean of the unaberrated peaks.
 
     with_error: whether to return (value, predicted error), each (wavelength,).
 
     Raises:
-        AccuracyError: the peak lies outside the window, or rays land outside, where it is brighter; or the samples are
-            too coarse for it and finer ones cannot be had; says which would do.
+        AccuracyError: the peak lies outside the window, or rays land at a brighter point outside; or the samples are
+            too coarse and finer ones cannot be computed. The message states which samples would be sufficient.
     """
     import drjit as dr
 
@@ -64,7 +64,7 @@ def strehl_ratio(result: PSFResult | Mixture, with_error: bool = False) -> Any:
     for index, found in enumerate(peaks):
         _refuse_brighter_outside(result, index, number(found) * (1 + errors[index]))
     peak = types.Float(peaks[0] if len(peaks) == 1 else dr.concat(list(peaks)))
-    mixed = result.shares is not None and result.can_be_seen_anew
+    mixed = result.shares is not None and result.can_recompute
     waves = [request.beam.wavelength for request in result.requests] if mixed else result.wavelengths
     ideal = _unaberrated(result, np.array(waves))
     if mixed:
@@ -74,13 +74,13 @@ def strehl_ratio(result: PSFResult | Mixture, with_error: bool = False) -> Any:
 
 
 def _unaberrated(result: PSFResult, wavelengths: np.ndarray) -> Array:
-    """Peak that the same aperture makes without aberration, (wavelength,), flat."""
+    """Return the peak of the same aperture without aberration, (wavelength,), flat."""
     import drjit as dr
 
     types = precision("float64")
     mask, own = result.pupil.mask, result.pupil.radius
     bends = 0.0 if mask is None else mask.bandwidth(OF_A_MASK, own) * own
-    # Slants turn nothing, but are no polynomials: their poles lie at height z.
+    # Slants add no phase, but they are not polynomials: their poles lie at height z.
     poles = DIGITS * np.log(10) / (2 * np.pi) * own / number(result.sensor_distance)
     nodes = result.pupil.aperture.nodes(0.5 + bends + poles, DIGITS)
     radius, z = opaque(types, result.pupil.aperture_radius), opaque(types, result.sensor_distance)
@@ -97,18 +97,18 @@ def _unaberrated(result: PSFResult, wavelengths: np.ndarray) -> Array:
 
 
 def _peak(result: PSFResult, index: int) -> tuple[Array, float]:
-    """Highest value near the brightest sample at one wavelength, and its relative error."""
+    """Return the highest value near the brightest sample at one wavelength, and its relative error."""
     fine = AT_A_PEAK / float(result.cutoff[index])
     image, wanted = result.psf[index], "the Strehl ratio"
     if result.holds_cells or (min(image.shape) > 2 and result.dx <= fine and not _at_rim(image)):
         return _vertex(result, index)
-    if not (result.can_be_seen_anew or _at_rim(image)) and result.dx * float(result.cutoff[index]) <= LOBES:
+    if not (result.can_recompute or _at_rim(image)) and result.dx * float(result.cutoff[index]) <= LOBES:
         return _vertex(result, index)
     seen = result.with_pitch(LOBES / result.highest_cutoff, wanted)
     centre, pitch = _brightest(seen, index), min(seen.dx, fine)
     for _ in range(CLIMBS):
         _check_inside(result, centre)
-        seen = result.through(Grid.square(NEIGHBOURHOOD, pitch).moved(centre), wanted, slice(index, index + 1))
+        seen = result.recompute_on(Grid.square(NEIGHBOURHOOD, pitch).moved(centre), wanted, slice(index, index + 1))
         if not _at_rim(seen.psf[0]):
             return _vertex(seen, 0)
         row, column = np.unravel_index(seen.psf[0].argmax(), seen.psf[0].shape)
@@ -117,10 +117,11 @@ def _peak(result: PSFResult, index: int) -> tuple[Array, float]:
 
 
 def _brightest(result: PSFResult, index: int) -> tuple[float, float]:
-    """Where (x, y) the spline through the samples is brightest: of two lobes the higher may have the lower sample.
+    """Return the point (x, y) at which the spline through the samples is brightest.
 
-    What is nowhere negative, has no frequency beyond the cutoff f and a peak p is at least p cos²(πfd) at a distance
-    d < 1/(2f) from it (M. Riesz 1914): a sample beside the peak is as bright as that.
+    Of two lobes, the higher one may have the lower sample. A non-negative function with no frequency beyond the cutoff
+    f and a peak p is at least p cos²(πfd) at a distance d < 1/(2f) from it (M. Riesz 1914). A sample next to the peak
+    is at least that bright.
     """
     from scipy.ndimage import map_coordinates, spline_filter
 
@@ -151,14 +152,14 @@ def _check_inside(result: PSFResult, at: tuple[float, float]) -> None:
     for place, samples in zip(at, (result.x, result.y), strict=True):
         if not samples[0] - room <= place <= samples[-1] + room:
             raise AccuracyError(
-                f"the light grows towards ({at[0]:.3g}, {at[1]:.3g}) m, beyond the window's rim: the Strehl ratio "
-                "needs a window that holds the peak; widen it or move its centre"
+                f"the intensity increases towards ({at[0]:.3g}, {at[1]:.3g}) m, outside the window: the Strehl ratio "
+                "needs a window that contains the peak; widen it or move its centre"
             )
 
 
 def _refuse_brighter_outside(result: PSFResult, index: int, peak: float) -> None:
-    """Of an image that lies beside the window, a side lobe within it would pass for the peak."""
-    rays = result.requests[index].problem.rays if result.can_be_seen_anew and not result.holds_cells else None
+    """Check that the window contains more than a side lobe of an image outside (AccuracyError)."""
+    rays = result.requests[index].problem.rays if result.can_recompute and not result.holds_cells else None
     if rays is None or not len(rays):
         return
     pitch = LOBES / result.highest_cutoff
@@ -167,16 +168,16 @@ def _refuse_brighter_outside(result: PSFResult, index: int, peak: float) -> None
         if max(beyond) <= result.dx:
             continue
         window = Grid.square(NEIGHBOURHOOD, pitch).moved(at)
-        there = result.through(window, "the Strehl ratio", slice(index, index + 1))
+        there = result.recompute_on(window, "the Strehl ratio", slice(index, index + 1))
         if float(there.psf.max()) > peak * (1 + there.plan.predicted_error):
             raise AccuracyError(
-                f"rays land around ({at[0]:.3g}, {at[1]:.3g}) m, outside of the window, and there it is brighter: the "
-                "Strehl ratio needs a window that holds the peak; widen it or move its centre"
+                f"rays land around ({at[0]:.3g}, {at[1]:.3g}) m, outside the window, where the PSF is brighter: the "
+                "Strehl ratio needs a window that contains the peak; widen it or move its centre"
             )
 
 
 def _vertex(result: PSFResult, index: int) -> tuple[Array, float]:
-    """Of the paraboloid through the brightest sample and its neighbours; with the relative error."""
+    """Return the maximum of the paraboloid through the brightest sample and its neighbours, and its relative error."""
     import drjit as dr
 
     types, (_, height, width) = precision("float64"), result.tensor.shape
@@ -191,7 +192,7 @@ def _vertex(result: PSFResult, index: int) -> tuple[Array, float]:
     if not result.holds_cells:
         left, right, below, above = (value(row + i, column + j) for i, j in ((0, -1), (0, 1), (-1, 0), (1, 0)))
         corners = [value(row + i, column + j) * (i * j / 4) for i in (-1, 1) for j in (-1, 1)]
-        # p + g·x - xᵀBx/2 is highest at x = B⁻¹g, by gᵀB⁻¹g/2.
+        # p + g·x - xᵀBx/2 has its maximum at x = B⁻¹g, which is higher than p by gᵀB⁻¹g/2.
         gx, gy, bxy = (right - left) / 2, (above - below) / 2, -sum(corners[1:], corners[0])
         bxx, byy = 2 * peak - left - right, 2 * peak - below - above
         determinant = bxx * byy - bxy * bxy
@@ -199,7 +200,7 @@ def _vertex(result: PSFResult, index: int) -> tuple[Array, float]:
         peak = peak + dr.select((determinant > 0) & (bxx > 0), rise, 0)
     around = float(np.linalg.norm(image)) / float(image[row, column])
     plan = result.plans[index if len(result.plans) > 1 else 0]
-    # What a cosine at the cut-off would err by, half way between samples.
+    # Error for a cosine at the cutoff, halfway between samples.
     coarse = (2 * math.pi * result.dx * float(result.cutoff[index])) ** 4 / 170
     return peak, plan.predicted_error * around + max(PARABOLOID_ERROR, 0.0 if result.holds_cells else coarse)
 
@@ -210,19 +211,19 @@ def encircled_energy(
     centre: tuple[float, float] | None = None,
     with_error: bool = False,
 ) -> Any:
-    """Fraction of the pupil's power within `radii` [m] of `centre` (x, y) [m] on the sensor, (wavelength, radius); of a
-    `WhitePSF` (type, radius).
+    """Return the fraction of the pupil's power within `radii` [m] of `centre` (x, y) [m], (wavelength, radius).
 
-    A sum over samples, each with the share of it that lies within the circle. The circle is convolved with a kernel
-    whose spectrum is 1 where the intensity has one, and 0 beyond what samples can tell apart: the sum is then that of
-    the sharp circle. It takes samples beyond the circle, which are computed where the window has none.
+    The result for a `WhitePSF` is (type, radius). It is a sum over samples, weighted with the fraction of each that
+    lies within the circle. The circle is convolved with a kernel whose spectrum is 1 at all frequencies of the
+    intensity and 0 at frequencies that alias onto them. The sum then equals that of the sharp circle. It includes
+    samples beyond the circle, which are computed if the window does not contain them.
 
     centre: None for the middle of the PSF's window. with_error: whether to return (value, predicted error).
 
     Raises:
-        ValueError: a radius that is negative or leaves the window.
-        AccuracyError: the samples are too coarse, or too few around the circle, and others cannot be had; says which
-            would do.
+        ValueError: a radius is negative or extends beyond the window.
+        AccuracyError: the samples are too coarse, or too few around the circle, and others cannot be computed. The
+            message states which would be sufficient.
     """
     import drjit as dr
 
@@ -272,21 +273,21 @@ def encircled_energy(
 
 
 def _kernel(dx: float, cutoff: float) -> SoftEdge:
-    """In units of 1/cutoff: lets the intensity's frequencies pass, and none that samples fold onto them."""
+    """Return a kernel in units of 1/cutoff that passes the intensity's frequencies and blocks their aliases."""
     return SoftEdge(1.0, 1 / (dx * cutoff) - 1, RIPPLE)
 
 
 def _around(result: PSFResult, middle: tuple[float, float], radius: float, edge: float, cutoff: float) -> PSFResult:
-    """With samples fine enough, and as far beyond the circle as the kernel reaches."""
+    """Return a PSF whose samples are fine enough and extend beyond the circle by the reach of the kernel."""
     if result.dx <= FINE / cutoff and radius + _kernel(result.dx, cutoff).reach / cutoff <= edge:
         return result
     pitch = min(result.dx, FINE / cutoff)
     half = math.ceil((radius + _kernel(pitch, cutoff).reach / cutoff) / pitch)
-    return result.through(Grid((2 * half + 1, 2 * half + 1), pitch, middle), "encircled energy")
+    return result.recompute_on(Grid((2 * half + 1, 2 * half + 1), pitch, middle), "encircled energy")
 
 
 def _within(distance: np.ndarray, radius: float, result: PSFResult, cutoff: float) -> np.ndarray:
-    """Share of each sample that lies within the circle."""
+    """Return the fraction of each sample that lies within the circle."""
     if radius == 0:
         return np.zeros(distance.shape)
     if result.holds_cells:

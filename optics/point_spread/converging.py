@@ -1,4 +1,4 @@
-"""Polarised light on its way to a focus, and its field over a window: it can be looked at again."""
+"""Polarised light on its way to a focus, and its field over a window, which can be recomputed over other windows."""
 
 from __future__ import annotations
 
@@ -26,17 +26,20 @@ from optics.point_spread.spot_check import spot_check
 __all__ = ["Converging", "VectorFocus"]
 
 PLANE_WAVES = "plane_waves"
-MOST_NODES = 400_000  # choice, by memory: of a sum of plane waves, each of which is spread over 81 cells
-SUM_ERROR = 1e-8  # of such a sum
-CHECK_SECONDS = 0.5  # choice: what a picture counts for; a check takes a third of it at most
-MOST_SECONDS, FIELDS = 60.0, 7  # choice, and what it is shared by
-SINGLE = 1e-4  # choice: tolerance from which on float32 will do
+MOST_NODES = 400_000  # choice, limited by memory: number of plane waves in a sum; each is spread over 81 cells
+SUM_ERROR = 1e-8  # error of a sum of plane waves
+CHECK_SECONDS = 0.5  # choice: assumed time of a field; a check takes at most a third of it
+MOST_SECONDS, FIELDS = 60.0, 7  # choice: time limit, and the number of fields that share it
+SINGLE = 1e-4  # choice: tolerance from which on float32 is sufficient
 
 
 @dataclass(frozen=True, eq=False)
 class Converging:
-    """Light behind a pupil. jones: of its parts that do not interfere, (part, 2). stokes: of it all, over the first.
-    tolerance: relative L2 error of the intensity over a window."""
+    """Light behind a pupil.
+
+    jones: Jones vectors of its parts that do not interfere, (part, 2). stokes: Stokes parameters of all light, divided
+        by the first. tolerance: relative L2 error of the intensity over a window.
+    """
 
     beam: Beam
     aplanatic: bool
@@ -46,7 +49,7 @@ class Converging:
 
     @property
     def image(self) -> tuple[float, float]:
-        """Where (x, y) [m] the ray through the pupil's centre lands (Snell's law)."""
+        """Point (x, y) [m] where the ray through the pupil's centre lands (Snell's law)."""
         beam = self.beam
         x, y = (math.tan(angle) for angle in beam.source.angle)
         bent = beam.pupil.index_before(beam.wavelength) / beam.index / math.hypot(1, x, y)
@@ -55,14 +58,16 @@ class Converging:
 
     @property
     def cutoff(self) -> float:
-        """Frequency [1/m] beyond which the intensity has none: light from opposite rims interferes, whose directions
-        differ most on the axis."""
+        """Highest frequency [1/m] of the intensity.
+
+        It results from interference of light from opposite rims, whose directions differ most on the axis.
+        """
         radius, z = self.beam.pupil.radius, number(self.beam.distance)
         sine = radius / z if self.aplanatic else radius / math.hypot(radius, z)
         return 2 * sine * self.beam.index / self.beam.wavelength
 
     def onto(self, window: Grid) -> VectorFocus:
-        """Its field there; the window lies about the image.
+        """Return the field over a window about the image.
 
         Raises:
             AccuracyError: no method meets the tolerance within the limits on memory and time.
@@ -74,31 +79,34 @@ class Converging:
         return VectorFocus(intensity, scalar, window.dx, pure, parts, window.centre, self.stokes, plan, self)
 
     def _aplanatic(self, window: Grid) -> tuple[np.ndarray, Plan]:
-        """A sum of plane waves is what such a lens is defined by."""
+        """Return the sum of plane waves, by which an aplanatic lens is defined."""
         rule = VectorSum(self.beam, window, True)
         if (nodes := rule.nodes) > MOST_NODES:
             far = f"{window.own_half_diagonal:.3g} m from the image"
             raise AccuracyError(f"the window reaches {far}: must be smaller for an aplanatic lens")
         if self.tolerance < SUM_ERROR:
             raise AccuracyError(f"tolerance = {self.tolerance:g}: must be at least {SUM_ERROR:g} for an aplanatic lens")
-        why = "which an aplanatic lens is defined by"
+        why = "an aplanatic lens is defined by this sum"
         return rule.components(), Plan(PLANE_WAVES, (nodes, 1), "float64", SUM_ERROR, why)
 
     def _plane_waves(self, window: Grid) -> tuple[np.ndarray, Plan] | None:
-        """None where they err by more than the tolerance, or nothing tells by how much."""
+        """Return the sum of plane waves, or None if its error exceeds the tolerance or is unknown."""
         rule = VectorSum(self.beam, window)
         if window.own_half_diagonal > number(self.beam.distance) or (nodes := rule.nodes) > MOST_NODES:
             return None
         found = rule.components()
-        problem = Problem.of(self._behind(SCALAR), window, self.tolerance, "float64")
+        problem = Problem.from_beam(self._behind(SCALAR), window, self.tolerance, "float64")
         error = self._errors(problem, {SCALAR: found[6], ALONG_X: found[0]})
         if error is None or (error := error + self._crossed(found[6], window)) > self.tolerance:
             return None
-        return found, Plan(PLANE_WAVES, (nodes, 1), "float64", error, "right by a check against the direct sum")
+        return found, Plan(PLANE_WAVES, (nodes, 1), "float64", error, "confirmed by a check against the direct sum")
 
     def _crossed(self, scalar: np.ndarray, window: Grid) -> float:
-        """What components of light from both planes of polarisation err by, which no check of one plane sees: plane
-        waves have paths that bend alike all over the pupil, and the share s² of fields that rays turn interferes."""
+        """Return the error of field components to which both planes of polarisation contribute.
+
+        A check of one plane of polarisation does not include it. Plane waves use the same curvature of the path for the
+        whole pupil. The fraction s² of the fields, which rays turn, interferes.
+        """
         z, bright = number(self.beam.distance), np.abs(scalar) ** 2
         off = np.add.outer((window.y - self.image[1]) ** 2, (window.x - self.image[0]) ** 2)
         reach = self.beam.pupil.radius + math.hypot(*self.image)
@@ -107,7 +115,7 @@ class Converging:
         return bend * math.sqrt(float((bright * off**2).sum() / bright.sum())) * squared / 2
 
     def _exact(self, window: Grid) -> tuple[np.ndarray, Plan]:
-        """By Smythe's integral, all fields by the method that does for the scalar one."""
+        """Return the field from Smythe's integral. All fields use the method that is suitable for the scalar one."""
         made = self._scalar(window, "float32" if self.tolerance >= SINGLE else "float64")
         sampling, root = cast(WithField, made.sampling), math.sqrt(self.beam.pupil.area)
 
@@ -119,14 +127,14 @@ class Converging:
         checked = self._errors(made.problem, {ALONG_X: found[0]})
         error = max(made.plan.predicted_error, checked or 0.0)
         if error > self.tolerance:
-            raise AccuracyError(f"tolerance = {self.tolerance:g}: a check finds Ex to err by {error:.1g}; widen it")
+            raise AccuracyError(f"tolerance = {self.tolerance:g}: a check finds an error of {error:.1g} in Ex")
         why, seconds = f"Smythe's integral; {made.plan.why}", FIELDS * made.plan.seconds
         return found, replace(made.plan, predicted_error=error, why=why, seconds=seconds, scalar_error=0.0)
 
     def _scalar(self, window: Grid, dtype: str) -> PSFPicture:
-        """The scalar field, planned and checked; in float64 if float32 will not do."""
+        """Return the scalar field, planned and checked; in float64 if float32 is not sufficient."""
         beam = self._behind(SCALAR)
-        problem = Problem.of(beam, window, self.tolerance, dtype)
+        problem = Problem.from_beam(beam, window, self.tolerance, dtype)
         try:
             return pictures([Request(beam, problem, most_seconds=MOST_SECONDS / FIELDS, keeps_field=True)])[0]
         except AccuracyError:
@@ -138,7 +146,10 @@ class Converging:
         return replace(self.beam, pupil=RayField(self.beam, 0, weights).pupil)
 
     def _errors(self, problem: Problem, fields: dict[Weights, np.ndarray]) -> float | None:
-        """The largest, relative, that the direct sum finds in fields (y, x) behind such masks; None: it is too dear."""
+        """Return the largest relative error of fields (y, x) behind these masks, by comparison with the direct sum.
+
+        None if the comparison is too expensive.
+        """
         errors = [
             spot_check(self._behind(weights), problem, np.abs(field.ravel()) ** 2, CHECK_SECONDS)
             for weights, field in fields.items()
@@ -148,12 +159,17 @@ class Converging:
 
 @dataclass(frozen=True, eq=False)
 class VectorFocus:
-    """intensity: |Ex|², |Ey|², |Ez|² over the pupil's area, (3, y, x) [1/m²]; what a molecule sees whose dipole lies
-    along x, y or z. scalar: what scalar theory says, (y, x). field: Ex, Ey, Ez, (3, y, x), less the carrier e^{ikz};
-    None unless the light is fully polarised. parts: fields that do not interfere and together are the light,
-    (part, 3, y, x): one, or two. centre: (x, y) [m] of the middle sample. polarization: of the light before the pupil,
-    Stokes' parameters over the first. plan: how it was computed, and its predicted error, relative L2 of the intensity
-    over the window. towards: by which it can be looked at again; None for a field from elsewhere.
+    """The electric field about an image.
+
+    intensity: |Ex|², |Ey|², |Ez|² over the pupil's area, (3, y, x) [1/m²]: the excitation of a molecule whose dipole
+        lies along x, y or z.
+    scalar: the PSF of scalar theory, (y, x).
+    field: Ex, Ey, Ez, (3, y, x), without the carrier e^{ikz}; None unless the light is fully polarised.
+    parts: one or two fields that do not interfere and together are the light, (part, 3, y, x).
+    centre: (x, y) [m] of the middle sample.
+    polarization: Stokes parameters of the light before the pupil, divided by the first.
+    plan: method and predicted error, relative L2 of the intensity over the window.
+    towards: the light from which the field can be recomputed; None if the field was not made by `vector_focus`.
     """
 
     intensity: np.ndarray
@@ -175,17 +191,17 @@ class VectorFocus:
 
     @cached_property
     def psf(self) -> np.ndarray:
-        """Of all components, (y, x) [1/m²]."""
+        """Intensity of all components, (y, x) [1/m²]."""
         total: np.ndarray = self.intensity.sum(axis=0)
         return total
 
     @property
     def grid(self) -> Grid:
-        """Where the samples lie [m]."""
+        """Positions of the samples [m]."""
         height, width = self.scalar.shape
         return Grid((height, width), self.dx, self.centre)
 
     @property
     def scalar_error(self) -> float:
-        """Relative L2 error that scalar theory makes over the window."""
+        """Relative L2 error of scalar theory over the window."""
         return float(np.linalg.norm(self.scalar - self.psf) / np.linalg.norm(self.psf))

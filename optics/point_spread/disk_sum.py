@@ -1,4 +1,4 @@
-"""What falls on a round receptor: sums over samples that are those of a sharp disk, and what they err by."""
+"""Light on a round receptor: sums over samples that equal those over a sharp disk, and their errors."""
 
 from __future__ import annotations
 
@@ -16,15 +16,19 @@ from optics.point_spread.converging import Converging, VectorFocus
 
 __all__ = ["DiskSum"]
 
-RIPPLE = 1e-5  # choice: of a disk's spectrum
-SUM_ERROR = 0.1  # choice: ripples that a sum errs by, at most: test_microvilli.py
-FINE = 1 / 3  # choice: of 1/cutoff, the coarsest pitch; the finer, the less they need around a disk
-MOST_AGAIN = 1025  # choice: samples along a side of a window that is looked at again
+RIPPLE = 1e-5  # choice: ripple of a disk's spectrum
+SUM_ERROR = 0.1  # choice: largest error of a sum in units of the ripple: test_microvilli.py
+FINE = 1 / 3  # choice: coarsest pitch in units of 1/cutoff; finer samples extend less beyond a disk
+MOST_AGAIN = 1025  # choice: samples along a side of a recomputed window
 
 
 @dataclass(frozen=True, eq=False)
 class DiskSum:
-    """light: over samples that can be added up. share: of each that counts, (y, x). radius [m] of the disk."""
+    """A sum over a disk.
+
+    light: light over samples that are fine enough for sums. share: weight of each sample, (y, x). radius [m] of the
+        disk.
+    """
 
     light: VectorFocus
     share: np.ndarray
@@ -32,15 +36,15 @@ class DiskSum:
 
     @classmethod
     def over(cls, light: VectorFocus, radius: float, centre: tuple[float, float] | None = None) -> DiskSum:
-        """Over a disk in the light's window; centre: (x, y) [m], None for the window's middle.
+        """Return the sum over a disk in the light's window; centre: (x, y) [m], None for the window's middle.
 
-        The disk is convolved with a kernel whose spectrum is 1 where the intensity has one, and 0 beyond what samples
-        can tell apart: see `optics.encircled_energy`. Where samples are too coarse for that, or too few around the
-        disk, the light is looked at again.
+        The disk is convolved with a kernel whose spectrum is 1 at all frequencies of the intensity and 0 at frequencies
+        that alias onto them: see `optics.encircled_energy`. If samples are too coarse, or too few around the disk, the
+        light is recomputed.
 
         Raises:
-            ValueError: the disk leaves the window.
-            AccuracyError: such samples cannot be had; says which would do.
+            ValueError: the disk extends beyond the window.
+            AccuracyError: such samples cannot be computed; the message states which would be sufficient.
         """
         positive("radius", without_derivative("radius", radius))
         middle = light.centre if centre is None else point_2d("centre", centre)
@@ -51,7 +55,7 @@ class DiskSum:
             raise ValueError(f"radius = {radius:.3g} m: must end within the window, {room:.3g} m from its centre")
         towards = light.towards
         if towards is None:
-            raise AccuracyError("light is not from vector_focus: it is not known how fine its samples must be")
+            raise AccuracyError("light is not from vector_focus: the required distance of its samples is unknown")
         seen = _around(light, towards, middle, radius)
         x, y = seen.grid.x - middle[0], seen.grid.y - middle[1]
         distance, kernel, unit = np.hypot(x[None, :], y[:, None]), _kernel(seen.dx, towards.cutoff), towards.cutoff
@@ -60,32 +64,35 @@ class DiskSum:
         share[near] = disk_profile(kernel, radius * unit, distance[near] * unit)
         return cls(seen, share, radius)
 
-    def of(self, picture: np.ndarray) -> tuple[float, float]:
-        """Integral over the disk of an intensity (y, x) [1/m²] that is the light's, or a part of it; and its error."""
+    def integrate(self, picture: np.ndarray) -> tuple[float, float]:
+        """Return the integral over the disk of (a part of) the light's intensity (y, x) [1/m²], and its error."""
         found = float((picture * self.share).sum()) * self.light.dx**2
         bright = min(math.pi * self.radius**2 * float(self.light.psf.max()), 1.0)
         return found, self.light_error + SUM_ERROR * RIPPLE * bright
 
     @property
     def light_error(self) -> float:
-        """Of any such integral at most, by Cauchy and Schwarz, from what the light errs by over its window."""
+        """Upper bound of the error of such an integral that results from the error of the light over its window.
+
+        By the Cauchy-Schwarz inequality.
+        """
         norms = float(np.linalg.norm(self.light.psf) * np.linalg.norm(self.share))
         return self.light.plan.predicted_error * norms * self.light.dx**2
 
 
 def _room(light: VectorFocus, middle: tuple[float, float]) -> float:
-    """From a place to the outermost samples [m]."""
+    """Return the distance from a point to the outermost samples [m]."""
     x, y = light.grid.x - middle[0], light.grid.y - middle[1]
     return float(min(-x[0], x[-1], -y[0], y[-1]))
 
 
 def _kernel(dx: float, cutoff: float) -> SoftEdge:
-    """In units of 1/cutoff: lets the intensity's frequencies pass, and none that samples fold onto them."""
+    """Return a kernel in units of 1/cutoff that passes the intensity's frequencies and blocks their aliases."""
     return SoftEdge(1.0, 1 / (dx * cutoff) - 1, RIPPLE)
 
 
 def _around(light: VectorFocus, towards: Converging, middle: tuple[float, float], radius: float) -> VectorFocus:
-    """With samples fine enough, and as far beyond the disk as the kernel reaches."""
+    """Return light whose samples are fine enough and extend beyond the disk by the reach of the kernel."""
     pitch, cutoff = FINE / towards.cutoff, towards.cutoff
     if light.dx <= pitch and radius + _kernel(light.dx, cutoff).reach / cutoff <= _room(light, middle):
         return light
@@ -94,7 +101,7 @@ def _around(light: VectorFocus, towards: Converging, middle: tuple[float, float]
     height, width = (2 * math.ceil((abs(off) + wide) / pitch) + 1 for off in (y - cy, x - cx))
     if max(height, width) > MOST_AGAIN:
         raise AccuracyError(
-            f"radius = {radius:.3g} m: needs more than {MOST_AGAIN} samples a side: ask for a smaller receptor, or "
-            f"vector_focus for dx={pitch:.3g}, shape=({height}, {width})"
+            f"radius = {radius:.3g} m: needs more than {MOST_AGAIN} samples along a side: use a smaller receptor, or "
+            f"vector_focus with dx={pitch:.3g}, shape=({height}, {width})"
         )
     return towards.onto(Grid((height, width), pitch, towards.image))

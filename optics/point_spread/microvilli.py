@@ -1,4 +1,4 @@
-"""Receptors that know polarisation: pigment in microvilli absorbs light that swings along them."""
+"""Receptors with polarisation sensitivity: pigment in microvilli absorbs light that is polarised along them."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ __all__ = ["Microvilli"]
 
 @dataclass(frozen=True)
 class Microvilli:
-    """Parallel microvilli across the light's axis, as those of a rhabdomere.
+    """Parallel microvilli across the light's axis, as in a rhabdomere.
 
-    azimuth_deg: their direction, from x to y. dichroic_ratio: what they absorb of light that swings along them, over
-        what they absorb of light that swings across; from 1, no preference, to infinite.
+    azimuth_deg: their direction, from x to y. dichroic_ratio: absorption of light polarised along them, divided by
+        absorption of light polarised across them; from 1 (no preference) to infinite.
 
     Raises:
         ValueError: names argument, value and valid range.
@@ -36,8 +36,10 @@ class Microvilli:
             in_range("dichroic_ratio", ratio, 1.0, 1e12)
 
     def absorbed(self, light: VectorFocus) -> np.ndarray:
-        """Light that is absorbed, (y, x) [1/m²], where all of it would be that swings along the microvilli:
-        |E·m|² + (|E|² - |E·m|²)/ratio."""
+        """Return the absorbed light, (y, x) [1/m²], if all light polarised along the microvilli is absorbed.
+
+        It is |E·m|² + (|E|² - |E·m|²)/ratio.
+        """
         of_kind("light", light, VectorFocus, "vector_focus(pupil)")
         along = (np.abs(self._along(light)) ** 2).sum(axis=0)
         found: np.ndarray = along + (light.psf - along) / self.dichroic_ratio
@@ -50,30 +52,31 @@ class Microvilli:
         centre: tuple[float, float] | None = None,
         with_error: bool = False,
     ) -> Any:
-        """Share of the light on the pupil that a round receptor of a radius [m] absorbs.
+        """Return the fraction of the pupil's light that a round receptor of a radius [m] absorbs.
 
-        It does not depend on the light's samples: where they are too coarse, or too few around the receptor, the light
-        is looked at again. centre: (x, y) [m] of the receptor, None for the window's middle. with_error: whether to
-        return (value, predicted error), both of what the sum errs by and of `vector_focus` itself.
+        It does not depend on the light's samples. If these are too coarse, or too few around the receptor, the light is
+        recomputed. centre: (x, y) [m] of the receptor, None for the window's middle. with_error: whether to return
+        (value, predicted error); the error includes that of the sum and that of `vector_focus`.
 
         Raises:
-            ValueError: the receptor leaves the window.
-            AccuracyError: it is too large for samples as fine as it needs.
+            ValueError: the receptor extends beyond the window.
+            AccuracyError: the receptor is too large for the required samples.
         """
         of_kind("light", light, VectorFocus, "vector_focus(pupil)")
         flag("with_error", with_error)
         disk = DiskSum.over(light, radius, centre)
-        found = disk.of(self.absorbed(disk.light))
+        found = disk.integrate(self.absorbed(disk.light))
         return found if with_error else found[0]
 
     def polarization_sensitivity(
         self, light: VectorFocus, radius: float, centre: tuple[float, float] | None = None
     ) -> float:
-        """Largest over least signal as the plane of linear polarisation turns before the pupil: the dichroic ratio
-        where rays are flat, and less where they are steep. See `signal`.
+        """Return the largest signal divided by the smallest over all planes of linear polarisation before the pupil.
+
+        It equals the dichroic ratio if rays are flat, and is smaller if they are steep. See `signal`.
 
         Raises:
-            ValueError: light that is not unpolarised, of which alone both planes are known.
+            ValueError: the light is polarised. Only for unpolarised light are both planes of polarisation known.
         """
         of_kind("light", light, VectorFocus, "vector_focus(pupil)")
         if any(light.polarization[1:]):
@@ -86,7 +89,7 @@ class Microvilli:
         return float(most / least)
 
     def _along(self, light: VectorFocus) -> np.ndarray:
-        """E·m of each part, (part, y, x)."""
+        """Return E·m of each part, (part, y, x)."""
         turn = math.radians(self.azimuth_deg)
         found: np.ndarray = math.cos(turn) * light.parts[:, 0] + math.sin(turn) * light.parts[:, 1]
         return found

@@ -1,4 +1,4 @@
-"""Sums over wavelengths, and what has measures of its own because it is one."""
+"""Sums over wavelengths, and the interface of mixtures with their own measures."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ __all__ = ["Mixture", "a_mixture", "flat", "mixed"]
 
 
 class Mixture(Protocol):
-    """Light of several wavelengths at once, such as a WhitePSF; see the functions of these names."""
+    """Light of several wavelengths at once, such as a WhitePSF; see the functions of the same names."""
 
     def mtf(self, tolerance: float = 0.02) -> Any: ...
 
@@ -28,7 +28,7 @@ class Mixture(Protocol):
 
 
 def a_mixture(result: Any) -> Mixture:
-    """ValueError where there is nothing to measure: a batch, or numbers."""
+    """Return `result`; ValueError if it has no measures, for example a batch or a plain array."""
     if not hasattr(result, "strehl_ratio"):
         batch = ", as its `result(eye)` is" if hasattr(result, "result") else ""
         raise ValueError(f"result is a {type(result).__name__}: must be a PSFResult{batch}, or a WhitePSF")
@@ -37,7 +37,7 @@ def a_mixture(result: Any) -> Mixture:
 
 
 def mixed(tensor: np.ndarray | Array, weights: np.ndarray) -> Array:
-    """Σ_λ weights[row, λ] tensor[λ, …], (row, …) in Dr.Jit, with derivatives."""
+    """Return Σ_λ weights[row, λ] tensor[λ, …], (row, …) in Dr.Jit, with derivatives."""
     import drjit as dr
 
     types = precision("float64")
@@ -49,7 +49,7 @@ def mixed(tensor: np.ndarray | Array, weights: np.ndarray) -> Array:
 
 
 def flat(tensor: np.ndarray | Array) -> Array:
-    """Row by row, Dr.Jit or NumPy."""
+    """Return a Dr.Jit or NumPy tensor as a flat array, row by row."""
     import drjit as dr
 
     return padded_for_packets(tensor) if isinstance(tensor, np.ndarray) else dr.ravel(tensor)

@@ -1,6 +1,6 @@
-"""Contrast by spatial frequency: on a grid, and anywhere.
+"""Contrast by spatial frequency: on a grid and at any other frequency.
 
-Where the PSF carries derivatives, so do contrasts: they are Dr.Jit arrays then, NumPy arrays otherwise.
+If the PSF carries derivatives, so do contrasts: they are then Dr.Jit arrays, otherwise NumPy arrays.
 """
 
 from __future__ import annotations
@@ -22,11 +22,14 @@ from optics.point_spread.mixture import flat
 
 __all__ = ["MTF"]
 
-ORIENTATIONS = 16  # choice: within half a turn, of which a profile is a mean at first; contrasts at f and -f are alike
+# Choice: initial number of orientations in the mean of a profile, within half a turn, because contrasts at f and -f are
+# equal.
+ORIENTATIONS = 16
 MOST_ORIENTATIONS = 1024
-PART = 0.1  # choice: of the predicted error, within which means over half of the orientations must agree
-FINEST = 1e-5  # choice: such means are not asked to agree more closely
-DIGITS = 7.0  # choice: of sums over the PSF
+# Choice: fraction of the predicted error within which means over the two halves of the orientations must agree.
+PART = 0.1
+FINEST = 1e-5  # choice: these means need not agree more closely than this
+DIGITS = 7.0  # choice: digits of sums over the PSF
 AT_A_TIME = 2**17  # choice: frequencies that are summed at once, each spread over 64 cells: some hundred megabytes
 
 
@@ -36,9 +39,9 @@ class MTF:
 
     tensor: (wavelength, fy, fx) in Dr.Jit, 1 at zero frequency; mtf: the same as a NumPy array.
     fx, fy: cycles per metre on the sensor, 1 / (widest side of the window) apart.
-    cutoff: (wavelength,) frequency [1/m] beyond which a pupil of this size passes nothing, 2 sin θ / λ.
+    cutoff: (wavelength,) highest frequency [1/m] that a pupil of this size transmits, 2 sin θ / λ.
     predicted_error: (wavelength,) of any contrast, at the grid's frequencies and between them.
-    shares: (wavelength, y, x) in Dr.Jit, of all the light that arrives what each of the PSF's samples holds.
+    shares: (wavelength, y, x) in Dr.Jit, fraction of all arriving light in each of the PSF's samples.
     """
 
     tensor: Array
@@ -49,8 +52,8 @@ class MTF:
     shares: Array
 
     @classmethod
-    def of(cls, shares: Array, dx: float, cutoff: np.ndarray, error: np.ndarray) -> MTF:
-        """Of samples that lie dx [m] apart."""
+    def from_shares(cls, shares: Array, dx: float, cutoff: np.ndarray, error: np.ndarray) -> MTF:
+        """Return the MTF of samples that are dx [m] apart."""
         import drjit as dr
 
         types = precision("float64")
@@ -76,25 +79,27 @@ class MTF:
         return np.asarray(self.tensor.numpy())
 
     def first(self, count: int) -> MTF:
-        """The first `count` of its wavelengths.
+        """Return the MTF of the first `count` wavelengths.
 
         Raises:
-            ValueError: there are fewer, or count is no whole number.
+            ValueError: there are fewer, or count is not a whole number.
         """
         count = whole("count", count, 1, self.tensor.shape[0])
         tensor, shares = (_first(part, count) for part in (self.tensor, self.shares))
         return MTF(tensor, self.fx, self.fy, self.cutoff[:count], self.predicted_error[:count], shares)
 
     def profile(self, frequencies: np.ndarray) -> np.ndarray | Array:
-        """Mean over all orientations at radial `frequencies` [1/m], (wavelength, frequency), whether they lie on the
-        grid or not; 0 beyond what samples this far apart tell, half a cycle for each.
+        """Return the mean over all orientations at radial `frequencies` [1/m], (wavelength, frequency).
+
+        The frequencies need not lie on the grid. Contrasts are 0 beyond the Nyquist frequency of the PSF's samples
+        (half a cycle per sample).
 
         Raises:
-            ValueError: the MTF of a single sample, or frequencies that are none.
-            AccuracyError: contrasts change with orientation so fast that a mean of 1024 may err by more than predicted.
+            ValueError: the PSF has a single sample, or the frequencies are invalid.
+            AccuracyError: contrasts change so fast with orientation that a mean of 1024 may exceed the predicted error.
         """
         if self.fx.size < 2:
-            raise ValueError("a PSF of one sample has no frequencies but 0: must be at least 2 x 2")
+            raise ValueError("the PSF has one sample and therefore only the frequency 0: must be at least 2 x 2")
         f = np.atleast_1d(reals("frequencies", frequencies)).ravel()
         if f.size == 0 or not np.isfinite(f).all():
             raise ValueError(f"frequencies = {shown(frequencies)}: must be finite, and at least one")
@@ -108,12 +113,15 @@ class MTF:
                 return to_user(found)
         if unsure > 1:
             raise AccuracyError(
-                f"frequencies: a mean over {n} orientations errs by {unsure:.2g} times what is predicted", "see `mtf`"
+                f"frequencies: a mean over {n} orientations has {unsure:.2g} times the predicted error", "see `mtf`"
             )
         return to_user(found)
 
     def _mean(self, f: np.ndarray, n: int, shift: float) -> Array:
-        """Over n orientations within half a turn, which begin at `shift` of a step, (wavelength, frequency)."""
+        """Return the mean over n orientations within half a turn, (wavelength, frequency).
+
+        shift: of the first orientation, in steps.
+        """
         import drjit as dr
 
         types, waves = precision("float64"), self.shares.shape[0]
@@ -123,7 +131,7 @@ class MTF:
         return types.Tensor(dr.select(types.Float(np.tile(f == 0, waves)) > 0, 1, mean), (waves, f.size))
 
     def _sum(self, f: np.ndarray, angle: np.ndarray) -> Array:
-        """Over directions, flat (wavelength, frequency)."""
+        """Return the sum over directions, flat (wavelength, frequency)."""
         import drjit as dr
 
         types, waves = precision("float64"), self.shares.shape[0]

@@ -1,4 +1,4 @@
-"""Requests answered: planned, computed, held against the direct sum, and computed anew where that shows them wrong."""
+"""Computation of requested PSFs: planning, evaluation, comparison with the direct sum, and repetition if it fails."""
 
 from __future__ import annotations
 
@@ -21,15 +21,19 @@ from optics.point_spread.spot_check import spot_check
 
 __all__ = ["PSFPicture", "pictures"]
 
-TRIES = 3  # choice: pictures that are computed before a tolerance is given up
-# Choice: after an error f times too large, ask for a tolerance f / 0.3 times smaller, so that one more try is enough.
+TRIES = 3  # choice: number of attempts to meet a tolerance
+# Choice: after an error f times too large, the next tolerance is f / 0.3 times smaller, so that one more attempt is
+# sufficient.
 NEXT_TOLERANCE = 0.3
-LAST_TOLERANCE = 1e-2  # choice: of that, once nothing is tried after it
+LAST_TOLERANCE = 1e-2  # choice: additional factor for the last attempt
 
 
 class PSFPicture(NamedTuple):
-    """A PSF, flat; its plan; the field whose square it is, carrier included, where that was wanted; and by which
-    samples of which problem it was made."""
+    """A PSF, flat, and its plan.
+
+    field: complex amplitude whose square it is, including the carrier, if it was requested. sampling, problem: samples
+        and problem that it was computed from.
+    """
 
     image: Array
     plan: Plan
@@ -40,9 +44,9 @@ class PSFPicture(NamedTuple):
 
 @dataclass(frozen=True)
 class _Attempt:
-    """A picture, and what it was made by.
+    """A PSF and the parameters that it was computed from.
 
-    request: what it answers; its tolerance may be smaller than what was first asked. image: the PSF, flat.
+    request: its tolerance may be smaller than that of the original request. image: the PSF, flat.
     """
 
     request: Request
@@ -53,8 +57,10 @@ class _Attempt:
 
     @classmethod
     def at(cls, request: Request, planned: tuple[Plan, Sampling]) -> _Attempt:
-        """The picture as planned, or exact where what was picked has no derivatives. Dr.Jit has then recorded it, and
-        computes it when it is first looked at."""
+        """Return the PSF as planned, or by an exact method if the planned one has no derivatives.
+
+        Dr.Jit records the computation and executes it on first access.
+        """
         import drjit as dr
 
         plan, sampling = planned
@@ -72,26 +78,28 @@ class _Attempt:
             return cls.at(request, request.planned())
         whole = cast(WithField, sampling).field(beam, problem)
         waves = opaque(types, beam.distance) * opaque(types, 1 / problem.wavelength)
-        # dr.rsqrt errs by 1e-6 on a GPU, also in float64.
+        # dr.rsqrt has an error of 1e-6 on a GPU, also in float64.
         field = whole * Field.from_waves(1 / dr.sqrt(area), waves, whole.grid, types)
         return cls(request, plan, sampling, field.intensity, field)
 
     @property
     def approximates(self) -> bool:
-        """Whether the method errs however many samples it takes."""
+        """True if the method has an error even with infinitely many samples."""
         return self.sampling.model_error > 0
 
     def stated(self, error: float) -> PSFPicture:
-        """The picture, and the plan with the error that is now known."""
+        """Return the PSF and its plan with the error that is now known."""
         plan = replace(self.plan, predicted_error=error)
         return PSFPicture(self.image, plan, self.field, self.sampling, self.request.problem)
 
     def repeated(self, error: float, tolerance: float, last: bool) -> _Attempt | None:
-        """What to try after the check saw an error above the tolerance: an exact method, or else a smaller tolerance,
-        because a dark window needs more digits than a bright one. None where the dtype carries no more digits.
+        """Return the next attempt after the check found an error above the tolerance.
 
-        last: nothing is tried after it, so that it may cost what it takes: rules of nodes come in steps, and a little
-            smaller tolerance may get the same nodes
+        It uses an exact method or else a smaller tolerance, because a dark window needs more digits than a bright one.
+        None if the dtype has no more digits.
+
+        last: this is the last attempt, so the tolerance is reduced further. Quadrature rules come in steps, and a
+            slightly smaller tolerance may give the same nodes.
         """
         request, problem = self.request, self.request.problem
         if self.approximates:
@@ -101,20 +109,23 @@ class _Attempt:
             smaller = max(share * problem.tolerance * tolerance / error, 10 * FLOAT_NOISE[problem.dtype])
             if smaller >= problem.tolerance:
                 return None
-            # Stated anew: fine detail of the relief counts for more, too.
-            problem = Problem.of(request.beam, problem.window, smaller, problem.dtype)
+            # The problem is derived again, because fine detail of the relief also has more weight at a smaller
+            # tolerance.
+            problem = Problem.from_beam(request.beam, problem.window, smaller, problem.dtype)
             request = replace(request, problem=problem)
         return _Attempt.at(request, request.planned())
 
 
 def pictures(requests: Sequence[Request], alike: bool = False) -> list[PSFPicture]:
-    """PSFs, flat, and their plans. All are planned before any is computed, so that one that cannot be had is refused at
-    once; and all are started before any is waited for.
+    """Return PSFs, flat, and their plans.
 
-    alike: whether what does for one request may do for the next, unasked.
+    All are planned before any is computed, so an impossible request is refused at once. All are started before any
+    result is awaited.
+
+    alike: whether each request may reuse the method of the one before.
 
     Raises:
-        AccuracyError: no method meets a tolerance, or a window is so dark that rounding breaks it.
+        AccuracyError: no method meets a tolerance, or a window is so dark that rounding errors exceed it.
     """
     import drjit as dr
 
@@ -126,18 +137,18 @@ def pictures(requests: Sequence[Request], alike: bool = False) -> list[PSFPictur
     for attempt in started:
         dr.eval(
             attempt.image, attempt.field and (attempt.field.re, attempt.field.im)
-        )  # one launch each: one kernel for all would be compiled anew for every number of them
+        )  # one kernel launch per PSF; a joint kernel would be compiled again for every number of PSFs
     return [_checked(attempt, attempt.request, TRIES) for attempt in started]
 
 
 def _checked(attempt: _Attempt, asked: Request, tries: int) -> PSFPicture:
-    """The picture, or a better one, and its plan with the error that a spot check tells.
+    """Return the PSF, or a better one, and its plan with the error from the spot check.
 
-    asked: the request in its first form; an approximation that it names stays, however wrong it is seen to be.
-    tries: attempts that are left, this one included.
+    asked: the original request. An approximation that it names is used regardless of its error.
+    tries: number of remaining attempts, including this one.
 
     Raises:
-        AccuracyError: the check finds more than the tolerance all the same.
+        AccuracyError: the last attempt also exceeds the tolerance.
     """
     problem, tolerance = attempt.request.problem, asked.problem.tolerance
     image = attempt.image.numpy()
@@ -155,26 +166,27 @@ def _checked(attempt: _Attempt, asked: Request, tries: int) -> PSFPicture:
         better = attempt.repeated(error, tolerance, tries == 2) if tries > 1 else None
     except AccuracyError as refused:
         needs = str(refused).partition(": ")[0].partition(" needs ")[2]
-        more = f", and to do better needs {needs}" if needs else ""
+        more = f", and a smaller error needs {needs}" if needs else ""
         raise AccuracyError(f"{found}{more}; widen the tolerance or shrink the window") from None
     if better is None:
-        raise AccuracyError(f"{found}; widen the tolerance or ask for another method or dtype")
+        raise AccuracyError(f"{found}; widen the tolerance or use another method or dtype")
     return _checked(better, asked, tries - 1)
 
 
 def _predicted_error(image: np.ndarray, sampling: Sampling, problem: Problem) -> float:
-    """The error that the picture itself tells, where no check was made.
+    """Return the error that follows from the PSF itself if no check was made.
 
-    Sampling takes half the tolerance. Rounding adds δU to the field U, as large in a dark window as in a bright one:
-    its mean square is ε² times the mean intensity that the pupil's light has where the transform spreads it evenly,
-    which is 1/W² in a PSF's units over a plane of width W. The intensity then errs by 2|U| |δU| + |δU|², so that
+    Sampling has half the tolerance. Rounding adds an error δU to the field U that is as large in a dark window as in a
+    bright one. Its mean square is ε² times the mean intensity of the pupil's light if the transform spreads it evenly.
+    In a PSF's units this intensity is 1/W² over a plane of width W. The error of the intensity is then 2|U| |δU| +
+    |δU|², so
 
         rounding = (2 ε √(mean PSF / W²) + ε² / W²) / √(mean PSF²).
 
-    A model that leaves the window dark misses all its light.
+    An approximation that leaves the window dark misses all its light.
 
     Raises:
-        AccuracyError: the window is so dark that rounding breaks the tolerance.
+        AccuracyError: the window is so dark that rounding errors exceed the tolerance.
     """
     mean, mean_square = float(image.mean(dtype=np.float64)), float(np.mean(np.square(image, dtype=np.float64)))
     if mean_square == 0 and sampling.model_error:

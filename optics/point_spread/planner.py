@@ -1,20 +1,20 @@
-"""Which method, how many samples: the cheapest choice whose predicted error meets the tolerance.
+"""The choice of method and samples: the cheapest combination whose predicted error is within the tolerance.
 
 All methods evaluate the same integral (the angular spectrum of the thin-element field, equal to the first
-Rayleigh-Sommerfeld integral); they differ in where they sample it:
+Rayleigh-Sommerfeld integral). They differ in their samples:
 
 - "hankel": a rotationally symmetric pupil on its axis needs two one-dimensional transforms and no soft edge.
-- "low_rank": Fourier's kernel times a slow rest of low rank, one matrix product. Best for lenses near their focus and
-  for small pupils. The pupil is sampled for the phase that lens and path have together, far less than either.
-- "far_field": one Fourier transform onto direction cosines for each of a few nodes of the window, between which the
-  slow rest of the kernel is interpolated. Best for small pupils and wide windows. Intensity only.
-- "angular_spectrum": pupil -> spectrum -> sensor plane, both planes within one period. Best at short distance.
+- "low_rank": the Fourier kernel times a slow factor of low rank, one matrix product. Best for lenses near their focus
+  and for small pupils. The pupil is sampled for the combined phase of lens and path, which is far below either alone.
+- "far_field": one Fourier transform onto direction cosines for each of a few nodes of the window. The slow factor of
+  the kernel is interpolated between the nodes. Best for small pupils and wide windows. Intensity only.
+- "angular_spectrum": pupil -> spectrum -> sensor plane, both planes within one period. Best at short distances.
 - "split_angular_spectrum": exp(ikz cos θ) is split into its paraxial part, whose Fourier transform is known, and the
-  rest, whose spectrum is narrow. Period and samples no longer grow with the distance.
+  rest, whose spectrum is narrow. Period and number of samples no longer grow with the distance.
 - "rayleigh_sommerfeld": the direct sum over edge-fitted nodes; needs no grid, costs nodes x outputs. The reference.
 
-The cheap methods approximate it and predict by how much; "auto" takes them only where that fits the tolerance too,
-while by name they run always and their plan tells the error:
+The cheap methods approximate this integral and predict their error. "auto" uses them only if this error is within the
+tolerance, too. If one is requested by name, it always runs, and its plan states the error:
 
 - "fresnel": the paraxial integral. "fraunhofer": the paraxial far field.
 - "geometric": density of rays, for shadows and coarse windows. "pinhole": all light in one cell.
@@ -43,7 +43,7 @@ from optics.numerics.cost import CALL, DFT_CALL, PAIRS_PER_SECOND, WINDOW_SAMPLE
 __all__ = ["APPROXIMATE", "EXACT", "FIELDS", "METHODS", "choose"]
 
 
-# Each maps a problem to the samplings by which it meets the tolerance: none, one or several.
+# Each function maps a problem to the samplings with which it meets the tolerance: none, one or several.
 EXACT: dict[str, Callable[[Problem], Sequence[Sampling]]] = {
     "hankel": hankel,
     "low_rank": low_rank,
@@ -59,14 +59,14 @@ APPROXIMATE: dict[str, Callable[[Problem], Sequence[Sampling]]] = {
     "pinhole": pinhole,
 }
 METHODS = EXACT | APPROXIMATE
-FIELDS = tuple(name for name in EXACT if name != "far_field")  # whose pictures have a phase
-# Why a method may have no sampling at all.
+FIELDS = tuple(name for name in EXACT if name != "far_field")  # methods with a complex field
+# Reasons why a method may have no sampling at all.
 UNSUITED = {
-    "hankel": "for circles and rings with reliefs that are the same all around, lit along the axis: this pupil is not",
-    "low_rank": "the matrix between this pupil and so wide a window has more entries than are allowed",
-    "far_field": "this window is too wide, too near to the pupil or too finely asked for to be interpolated in angle",
+    "hankel": "requires a circle or ring with a rotationally symmetric relief and light along the axis",
+    "low_rank": "the matrix between this pupil and this wide window exceeds the limit on entries",
+    "far_field": "for interpolation in angle, the window is too wide or too near, or the tolerance too small",
 }
-# Have nodes where light jumps from pixel to pixel; no grid has.
+# Methods with nodes within pixels. A grid cannot represent light that jumps from pixel to pixel.
 FOR_PIXELS: dict[str, Callable[[Problem], Sequence[Sampling]]] = {
     "low_rank": low_rank,
     "angular_spectrum": whole_pixel_spectrum,
@@ -77,19 +77,23 @@ FOR_PIXELS: dict[str, Callable[[Problem], Sequence[Sampling]]] = {
 
 @dataclass(frozen=True)
 class Weighing:
-    """What is known of a method before it is asked: the least time [s] that a picture takes, and each of its samples;
-    and what the method takes to say how much it really is (choice)."""
+    """The cost of a method as known before it is evaluated.
+
+    least: shortest possible time of a PSF [s]. per_sample: time per sample of the window [s]. asking: time to evaluate
+        the method's true cost (choice).
+    """
 
     least: float
     per_sample: float = 0.0
     asking: float = 0.0
 
     def pays(self, best: float, outputs: int) -> bool:
-        """Whether so much less than `best` [s] is possible that asking may pay."""
+        """Return whether the method may save more time relative to `best` [s] than its evaluation takes."""
         return self.least + outputs * self.per_sample + self.asking < best
 
 
-# In this order. Choice, for approximations: three times what asking takes, since it is in vain more often than not.
+# Methods are evaluated in this order. Choice for approximations: three times the time of an evaluation, because most
+# evaluations of them are in vain.
 WEIGHING = {
     "hankel": Weighing(CALL["hankel"]),
     "low_rank": Weighing(CALL["low_rank"]),
@@ -106,15 +110,17 @@ WEIGHING = {
 
 @lru_cache(maxsize=256)
 def choose(problem: Problem, method: str = "auto", most_seconds: float = 60.0) -> tuple[Plan, Sampling]:
-    """The cheapest sampling that meets the problem's tolerance. Planning takes as long as a small PSF: the same
-    problem is planned once.
+    """Return the cheapest sampling that meets the problem's tolerance.
 
-    method: "auto" weighs all that may pay, "exact" those that approximate nothing, "field" those of them that have a
-        phase; a method's name asks for it alone, and then only its sampling has to meet the tolerance, not its model.
+    Planning takes as long as a small PSF, so plans are cached.
+
+    method: "auto" compares all methods that may save time, "exact" only exact ones, "field" only exact ones with a
+        phase. A method's name selects that method. Its sampling then has to meet the tolerance, but its model error
+        does not.
 
     Raises:
         ValueError: unknown method.
-        AccuracyError: nothing within the limits on memory and time meets the tolerance.
+        AccuracyError: no sampling within the limits on memory and time meets the tolerance.
     """
     asked = {"auto": tuple(METHODS), "exact": tuple(EXACT), "field": FIELDS}.get(method, (method,))
     if asked[0] not in METHODS:
@@ -129,7 +135,7 @@ def choose(problem: Problem, method: str = "auto", most_seconds: float = 60.0) -
         if best is not None and not WEIGHING[name].pays(best.seconds, outputs):
             continue
         if name == "fraunhofer" and "fresnel" in weighed and weighed["fresnel"].model_error > allowed:
-            continue  # it leaves out the same and more
+            continue  # Fraunhofer's integral neglects more than Fresnel's
         samplings = known[name](problem)
         if not samplings:
             continue
@@ -146,12 +152,12 @@ def choose(problem: Problem, method: str = "auto", most_seconds: float = 60.0) -
 def _check_dtype(problem: Problem) -> None:
     floor = 10 * FLOAT_NOISE[problem.dtype]
     if problem.tolerance < floor:
-        remedy = f"; dtype='float64' carries {10 * FLOAT_NOISE['float64']:g}" if problem.dtype == "float32" else ""
-        raise AccuracyError(f"tolerance = {problem.tolerance:g}: {problem.dtype} carries {floor:g}{remedy}")
+        remedy = f"; dtype='float64' allows {10 * FLOAT_NOISE['float64']:g}" if problem.dtype == "float32" else ""
+        raise AccuracyError(f"tolerance = {problem.tolerance:g}: {problem.dtype} allows at least {floor:g}{remedy}")
 
 
 def _model_tolerance(problem: Problem) -> float:
-    """What sampling and rounding leave of the tolerance."""
+    """Return the part of the tolerance that sampling and rounding do not use."""
     return problem.tolerance - _sampling_error(problem)
 
 
@@ -185,7 +191,7 @@ def _plan(problem: Problem, best: Sampling, weighed: dict[str, Sampling], most_s
     why = (
         f"Fresnel number {problem.fresnel_number:.3g}, sine of the steepest ray kept "
         f"{problem.band() * problem.wavelength:.2g}; "
-        + ("cheapest of those that meet the tolerance" if len(weighed) > 1 else "asked for")
+        + ("cheapest method that meets the tolerance" if len(weighed) > 1 else "requested")
     )
     error = _sampling_error(problem) + best.model_error
     sampled = best.method, best.samples, problem.dtype, error, why, best.seconds, tuple(options), best.padding
@@ -200,7 +206,7 @@ def _verdict(option: Sampling, best: Sampling, problem: Problem, most_seconds: f
     if option.seconds > most_seconds:
         return f"too slow: at most {most_seconds:g} s"
     if option.model_error > _model_tolerance(problem):
-        return f"approximates too much: errs by {option.model_error:.1g}"
+        return f"approximation with an error of {option.model_error:.1g}"
     return f"{option.seconds / best.seconds:.1f} times as slow"
 
 
@@ -208,16 +214,16 @@ def _refusal(problem: Problem, found: list[Sampling], most_seconds: float, metho
     width = 2 * problem.window.half_width
     if not found and problem.pixelated is not None:
         return (
-            "this method cannot sample a pixelated relief within its limits; ask for method='auto' or one of "
+            "this method cannot sample a pixelated relief within its limits; use method='auto' or one of "
             f"{', '.join(FOR_PIXELS)}"
         )
     if not found and method in UNSUITED and not (method == "hankel" and problem.symmetric):
-        return f"method = {method!r}: {UNSUITED[method]}; ask for method='auto' or 'exact'"
+        return f"method = {method!r}: {UNSUITED[method]}; use method='auto' or 'exact'"
     if not found:
         return (
             f"tolerance = {problem.tolerance:g} over a window of {width:.3g} m at a distance of "
             f"{problem.distance:.3g} m reaches rays too close to grazing for a sampled spectrum: shrink the window or "
-            "ask for method='rayleigh_sommerfeld'"
+            "use method='rayleigh_sommerfeld'"
         )
     least = min(found, key=_seconds)
     return (

@@ -1,12 +1,12 @@
 """One plan for a whole population: pupils of any size and relief over one window, as one stack of matrix products.
 
-Each picture is low_rank's of rank 1: a Fourier kernel times a slow rest that is taken at the window's centre,
+Each PSF is a low_rank PSF of rank 1: a Fourier kernel times a slow factor that is evaluated at the window's centre,
 
-    U(x) ≈ (z/ρ)² Σ_ξ P(ξ) z/(λD²) e^{ik(D - z)} Π (1 + 2ξx/z²) e^{-ik ξ·x/c},   D = √(ξ² + z²), ρ = √(x² + z²),
+    U(x) ≈ (z/ρ)² Σ_ξ P(ξ) z/(λD²) e^{ik(D - z)} Π (1 + 2ξx/z²) e^{-ik ξ·x/c},   D = √(ξ² + z²), ρ = √(x² + z²).
 
-with pupils sampled in units of their own radius, so that all share a soft edge, positions, B-splines and powers. What
-the rest's phase does away from the centre is this method's own error: it is told for each picture from its own light,
-and who asks for less gets the picture in the ordinary way.
+Pupils are sampled in units of their own radius, so all share a soft edge, positions, B-splines and powers. The phase of
+the slow factor away from the centre is neglected. This error is predicted for each PSF from its own light. If it
+exceeds the tolerance, the PSF is computed in the ordinary way.
 """
 
 from __future__ import annotations
@@ -31,37 +31,40 @@ from optics.point_spread.population_members import Member, powers
 
 __all__ = ["population_pictures"]
 
-LOOSEST = 1e-3  # choice: tolerance from which on float32 and rank 1 are worth trying
-FEW_WAVES = 3000.0  # choice: that float32 may carry
-FAR = 200.0  # choice: kz from which on the kernel's near term is nothing
-RIPPLE = 0.3  # choice: of the soft edge, of the tolerance; test_population.py
-SAMPLING = 0.2  # choice: of the tolerance, what the soft edge may make of it
-# Choice: light that passes, as a share of a mask's brightest beside the opening, that SAMPLING holds for;
-# test_population_members.py. Where masks are bright and the aperture is shut, less passes than the soft edge errs by.
+LOOSEST = 1e-3  # choice: tolerance from which on float32 and rank 1 may be sufficient
+FEW_WAVES = 3000.0  # choice: largest number of waves in float32
+FAR = 200.0  # choice: kz from which on the near-field term of the kernel is negligible
+RIPPLE = 0.3  # choice: ripple of the soft edge relative to the tolerance; test_population.py
+SAMPLING = 0.2  # choice: error due to the soft edge, relative to the tolerance
+# Choice: transmitted light, relative to the brightest light of a mask next to the aperture, for which SAMPLING is
+# valid; test_population_members.py. If masks are bright where the aperture is closed, the soft edge has a larger error
+# than this light.
 LEAST_LIGHT = 1e-2
 SPREAD = 1.1  # choice: error of the intensity per spread of the phase; test_population.py, test_population_members.py
-TURNS = 1.3  # choice: steps between numbers of samples: neighbours share a plan
-STACK = 2_000_000  # choice, by memory: pupil samples in a stack
-SECONDS = 3e-4  # that a picture takes, roughly
-RINGS = 12  # choice: of the window, over which the error is told
-SLOPES = np.linspace(-1, 1, 9) * (1 + EDGE_REACH)  # places where a relief's slope is looked at
-PER_ORDER = 4  # choice: and a wavefront's, for each order
-STEP = 1e-4  # choice [radii]: of a wavefront's differences
+TURNS = 1.3  # choice: ratio between numbers of samples, so that similar pupils share a plan
+STACK = 2_000_000  # choice, limited by memory: pupil samples in a stack
+SECONDS = 3e-4  # approximate time per PSF
+RINGS = 12  # choice: rings of the window over which the error is predicted
+SLOPES = np.linspace(-1, 1, 9) * (1 + EDGE_REACH)  # positions where the slope of a relief is evaluated
+PER_ORDER = 4  # choice: positions for the slope of a wavefront, per order
+STEP = 1e-4  # choice [radii]: step of a wavefront's differences
 
 
 def population_pictures(
     members: Sequence[Member], window: Grid, tolerance: float
 ) -> Iterator[tuple[int, np.ndarray, Plan]]:
-    """Of a population those pictures that one plan answers well enough: which, the PSF (y, x) [1/m²], the plan.
+    """Yield the PSFs for which one plan is accurate enough: index of the member, PSF (y, x) [1/m²], plan.
 
-    window: about the axis. A tolerance below LOOSEST is nobody's.
+    window: about the axis. With a tolerance below LOOSEST there are none.
     """
     groups: dict[tuple[Aperture, int], list[int]] = defaultdict(list)
     plain = [index for index, member in enumerate(members) if member.plain]
     if tolerance < LOOSEST or window.centre != (0.0, 0.0) or not plain:
         return
     leaving = {}
-    for index, turns, sine in zip(plain, *_turns(_Stack.of([members[index] for index in plain]), window), strict=True):
+    for index, turns, sine in zip(
+        plain, *_turns(_Stack.from_members([members[index] for index in plain]), window), strict=True
+    ):
         leaving[index] = float(sine)
         if math.isfinite(turns):
             step = math.ceil(math.log(max(turns, 1.0)) / math.log(TURNS))
@@ -73,7 +76,7 @@ def population_pictures(
         size = max(1, STACK // max(samples.at.size**2, math.prod(window.shape)))
         for start in range(0, len(group), size):
             part = group[start : start + size]
-            stack = _Stack.of([members[index] for index in part])
+            stack = _Stack.from_members([members[index] for index in part])
             masks = _masks(stack, samples)
             images = _images(stack, samples, masks, window) / np.float32(aperture.area)
             errors = _model_errors(stack, images, window) + SAMPLING * tolerance
@@ -93,8 +96,7 @@ def _plan(member: Member, samples: _Samples, error: float, leaving: float) -> Pl
 
 @dataclass(frozen=True, eq=False)
 class _Stack:
-    """Numbers of many members, each (member, 1, 1) float32, and reliefs (member, 4, 4); the highest order of their
-    wavefronts, and what powers count in these (member, term); the members."""
+    """Parameters of many members, each (member, 1, 1) float32."""
 
     radius: np.ndarray
     wavelength: np.ndarray
@@ -103,13 +105,13 @@ class _Stack:
     focal: np.ndarray
     before: np.ndarray
     waist: np.ndarray
-    relief: np.ndarray
-    order: int
-    powers: np.ndarray
+    relief: np.ndarray  # (member, 4, 4)
+    order: int  # highest order of the wavefronts
+    powers: np.ndarray  # coefficients of powers in the wavefronts, (member, term)
     members: Sequence[Member]
 
     @classmethod
-    def of(cls, members: Sequence[Member]) -> _Stack:
+    def from_members(cls, members: Sequence[Member]) -> _Stack:
         columns = np.array([member.numbers for member in members], np.float32).T[:, :, None, None]
         relief = np.array([member.relief for member in members], np.float32)
         order = max(member.order for member in members)
@@ -122,7 +124,7 @@ class _Stack:
 
 @dataclass(frozen=True, eq=False)
 class _Samples:
-    """Of a soft aperture, in radii: places along an axis, their pitch, transmittance (y, x), B-splines (place, 4)."""
+    """Samples of a soft aperture, in radii: positions, pitch, transmittance (y, x), B-splines (position, 4)."""
 
     at: np.ndarray
     pitch: float
@@ -132,7 +134,7 @@ class _Samples:
 
 @lru_cache(maxsize=64)
 def _samples(aperture: Aperture, turns: float, ripple: float) -> _Samples:
-    """As few as carry so many turns per radius."""
+    """Return the fewest samples for this number of cycles per radius."""
     types, soft = precision("float64"), aperture.soften(turns, ripple, EDGE_REACH)
     pitch = 1 / (turns + soft.stopband)
     grid = Grid.square(2 * math.ceil((1 + soft.reach) / pitch) + 1, pitch)
@@ -143,8 +145,7 @@ def _samples(aperture: Aperture, turns: float, ripple: float) -> _Samples:
 
 
 def _turns(stack: _Stack, window: Grid) -> tuple[np.ndarray, np.ndarray]:
-    """Turns per radius of pupil and path to any point of the window together, (member,), infinite where float32 or the
-    far kernel does not do; and the sine with which light leaves the pupil, at most."""
+    """Return cycles per radius of the combined phase to any point of the window, and the largest leaving sine."""
     slopes = SLOPES if stack.order < 2 else np.linspace(-1, 1, PER_ORDER * stack.order + 1) * (1 + EDGE_REACH)
     r = stack.radius * np.hypot(slopes[:, None], slopes[None, :]).astype(np.float32)
     outward = stack.before * r / np.hypot(r, stack.source) - np.sign(stack.focal) * r / np.hypot(r, stack.focal)
@@ -157,7 +158,7 @@ def _turns(stack: _Stack, window: Grid) -> tuple[np.ndarray, np.ndarray]:
         x, y = np.meshgrid(slopes, slopes)
         for along, (dx, dy) in ((along_x, (STEP, 0.0)), (along_y, (0.0, STEP))):
             rise = powers(x + dx, y + dy, stack.order) - powers(x - dx, y - dy, stack.order)
-            # In the corners, beyond all light, high powers would count most.
+            # High powers would dominate in the corners, where the pupil is dark.
             rise = np.where(np.hypot(x, y) <= 1 + EDGE_REACH, rise / (2 * STEP), 0)
             along += np.tensordot(stack.powers, rise, 1).astype(np.float32)
     detail = np.array([member.detail for member in stack.members], np.float32)
@@ -169,26 +170,27 @@ def _turns(stack: _Stack, window: Grid) -> tuple[np.ndarray, np.ndarray]:
     found += detail
     waves = np.abs(found) + (np.square(stack.radius) / (stack.distance * stack.wavelength))[:, 0, 0]
     near = (stack.distance / stack.wavelength)[:, 0, 0] * 2 * math.pi < FAR
+    # Infinite if float32 or the far-field kernel is not sufficient.
     turns = np.where((waves > FEW_WAVES) | near | ~np.isfinite(found), math.inf, found)
     return turns, (leaving + 1) * (stack.wavelength / stack.radius)[:, 0, 0]
 
 
 def _splines_and_slopes(t: np.ndarray) -> tuple[list[np.ndarray], list[np.ndarray]]:
-    """B-splines at t and their slopes by x, t = (x + 1)/2."""
+    """Return B-splines at t and their slopes by x, t = (x + 1)/2."""
     s = 1 - t
     slopes = [-s * s / 2, (3 * t * t - 4 * t) / 2, -(3 * s * s - 4 * s) / 2, t * t / 2]
     return list(cubic_bsplines(t)), [slope / 2 for slope in slopes]
 
 
 def _sine(stack: _Stack, window: Grid, at: np.ndarray) -> np.ndarray:
-    """Of the ray from ξ along one axis, ξ/c(ξ): c² = z² + ξ² + what the other axis and the window have on average."""
+    """Return the sine ξ/c(ξ) along one axis; c² is z² + ξ² + an average over the other axis and the window."""
     elsewhere = np.square(stack.radius) / 4 + np.float32((0.4 * window.own_half_width) ** 2)
     found: np.ndarray = at / np.sqrt(np.square(stack.distance) + np.square(at) + elsewhere)
     return found
 
 
 def _masks(stack: _Stack, samples: _Samples) -> np.ndarray:
-    """Amplitudes that masks let through, (member or 1, y, x)."""
+    """Return the amplitudes that masks transmit, (member or 1, y, x)."""
     found = np.ones((1, *samples.soft.shape), np.float32)
     if np.isfinite(stack.waist).any():
         r2 = np.square(samples.at)[:, None] + np.square(samples.at)[None, :]
@@ -200,14 +202,14 @@ def _masks(stack: _Stack, samples: _Samples) -> np.ndarray:
 
 
 def _light(samples: _Samples, masks: np.ndarray) -> np.ndarray:
-    """What passes, as a share of the brightest that masks are beside the opening, (member or 1,)."""
+    """Return the transmitted light relative to a mask's brightest light next to the aperture, (member or 1,)."""
     power, soft = np.square(masks).reshape(len(masks), -1), samples.soft.ravel()
     passed, brightest = power @ np.square(soft) / np.square(soft).sum(), power[:, soft < 0.5].max(axis=1)
     return np.asarray(passed / np.maximum(brightest, 1e-30))
 
 
 def _images(stack: _Stack, samples: _Samples, masks: np.ndarray, window: Grid) -> np.ndarray:
-    """|U|²/R², (member, y, x)."""
+    """Return |U|²/R², (member, y, x)."""
     u = samples.at
     r2 = np.square(stack.radius) * (np.square(u)[:, None] + np.square(u)[None, :])
     square_z = np.square(stack.distance)
@@ -228,7 +230,7 @@ def _images(stack: _Stack, samples: _Samples, masks: np.ndarray, window: Grid) -
     down = across if window.shape[0] == window.shape[1] else _fourier(stack, u, window, window.y)
     out = np.matmul(np.matmul(down, field), across.swapaxes(1, 2))
     found: np.ndarray = np.square(out.real) + np.square(out.imag)
-    # The rest's size, which falls with the distance from the pupil's centre.
+    # Modulus of the slow factor, which falls with the distance from the pupil's centre.
     nearness = square_z / (square_z + np.square(window.x)[None, None, :] + np.square(window.y)[None, :, None])
     found *= np.square(nearness, dtype=np.float32)
     return found
@@ -241,14 +243,14 @@ def _powers(at: bytes, order: int) -> np.ndarray:
 
 
 def _fourier(stack: _Stack, u: np.ndarray, window: Grid, at: np.ndarray) -> np.ndarray:
-    """Along one axis, (member, place, sample): Fourier's kernel, and z²/D² as far as it tells a place's side."""
+    """Return the Fourier kernel times the linear part of z²/D² along one axis, (member, place, sample)."""
     xi, places = stack.radius * u, at.astype(np.float32)[None, :, None]
     sines = _sine(stack, window, xi) / stack.wavelength
     return _turned(1 + 2 * xi * places / np.square(stack.distance), -sines * places)
 
 
 def _turned(size: np.ndarray, waves: np.ndarray) -> np.ndarray:
-    """size · exp(2πi waves); sines of small float32 angles are many times faster than complex exponentials."""
+    """Return size · exp(2πi waves). Float32 sines are many times faster than complex exponentials."""
     angle = (waves - np.rint(waves)) * np.float32(2 * math.pi)
     found = np.empty(waves.shape, np.complex64)
     np.multiply(size, np.cos(angle), out=found.real)
@@ -257,13 +259,13 @@ def _turned(size: np.ndarray, waves: np.ndarray) -> np.ndarray:
 
 
 def _model_errors(stack: _Stack, images: np.ndarray, window: Grid) -> np.ndarray:
-    """Relative L2 error that the fixed rest makes, (member,): its spread over the pupil at each radius of the window,
-    as an error of the amplitude, weighed with the light there and that of its ring."""
+    """Return the relative L2 error due to the constant slow factor, (member,)."""
     ring, count = _rings(window)
     flat = images.reshape(len(images), -1)
     squares = np.stack([np.bincount(ring, np.square(image), RINGS) for image in flat.astype(np.float64)])
     means = np.stack([np.bincount(ring, image, RINGS) for image in flat.astype(np.float64)]) / count
     spread = _spread(stack, window)
+    # The phase spread is an error of the amplitude, weighted with the light of the sample and of its ring.
     wrong = np.square(SPREAD * spread) * (squares + count * np.square(means))
     found: np.ndarray = np.sqrt(wrong.sum(axis=1) / squares.sum(axis=1))
     return found
@@ -271,21 +273,21 @@ def _model_errors(stack: _Stack, images: np.ndarray, window: Grid) -> np.ndarray
 
 @lru_cache(maxsize=8)
 def _rings(window: Grid) -> tuple[np.ndarray, np.ndarray]:
-    """Ring of each sample, flat, by its distance from the axis, and how many samples each ring has."""
+    """Return the ring of each sample, flat, by its distance from the axis, and the number of samples per ring."""
     radius = np.hypot(window.x[None, :], window.y[:, None]).ravel()
     ring = np.minimum((radius / max(window.half_diagonal, window.dx) * RINGS).astype(np.intp), RINGS - 1)
     return ring, np.maximum(np.bincount(ring, minlength=RINGS), 1)
 
 
 def _spread(stack: _Stack, window: Grid) -> np.ndarray:
-    """Root mean square phase [rad] over the pupil, less its mean, that the rest has at the outer end of each ring more
-    than at the centre, (member, ring): along an axis and along a diagonal, whichever is more."""
+    """Return the spread [rad] of the slow factor's phase over the pupil, for each ring's outer end, (member, ring)."""
     turns = (np.arange(40) + 0.5) * (math.sqrt(5) - 1) / 2
     r = np.sqrt((np.arange(40) + 0.5) / 40)
     xi = stack.radius[:, 0, :, None].astype(np.float64) * (r * np.exp(2j * np.pi * turns))
     out = np.arange(1, RINGS + 1) / RINGS * max(window.half_diagonal, window.dx)
     z = stack.distance.astype(np.float64)[:, 0, :, None]
     sines = _sine(stack, window, xi.real) + 1j * _sine(stack, window, xi.imag)
+    # Root mean square, without the mean and relative to the window's centre: the larger one of axis and diagonal.
     worst = np.zeros((len(stack.radius), RINGS))
     for angle in (0.0, math.pi / 4):
         x = (out * np.exp(1j * angle))[None, :, None]

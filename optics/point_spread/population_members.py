@@ -1,4 +1,4 @@
-"""Members of a population: what the plan for all takes of each, in numbers."""
+"""Members of a population: the parameters of each that the common plan uses."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from optics.numerics.autodiff import Scalar, is_differentiable
 
 __all__ = ["HIGHEST_ORDER", "Member", "powers"]
 
-HIGHEST_ORDER = 12  # choice: of Zernike's polynomials; as sums of powers higher ones lose digits
-MASK_LEVEL = 1e-3  # choice: amplitude beyond whose frequencies a mask has nothing
+HIGHEST_ORDER = 12  # choice: highest order of Zernike polynomials; as sums of powers, higher ones lose digits
+MASK_LEVEL = 1e-3  # choice: neglected amplitude in a mask's spectrum
 
 
 @dataclass(frozen=True, eq=False)
 class Member:
-    """One picture of a population. wavelength in vacuum, distances [m]."""
+    """One PSF of a population. wavelength in vacuum, distances [m]."""
 
     pupil: Pupil
     wavelength: float
@@ -31,8 +31,11 @@ class Member:
 
     @property
     def plain(self) -> bool:
-        """Whether its relief has 4 x 4 points at most, its wavefront is Zernike's of orders that are not too high, and
-        it asks for no derivative."""
+        """True if the common plan supports the member.
+
+        It requires a relief of at most 4 x 4 points, a Zernike wavefront up to HIGHEST_ORDER, a known kind of mask and
+        no derivatives.
+        """
         pupil = self.pupil
         numbers = (pupil.aperture_radius, self.distance, self.source, pupil.thin_lens_focal_length)
         if pupil.n.is_differentiable or any(is_differentiable(value) for value in numbers):
@@ -62,8 +65,11 @@ class Member:
 
     @property
     def numbers(self) -> tuple[float, ...]:
-        """Radius, wavelength in the medium behind, distances of sensor and source, focal length [m]; index before the
-        pupil over that behind; waist of a mask [m]."""
+        """Parameters as plain numbers.
+
+        Radius, wavelength in the medium behind, distances of sensor and source, focal length [m]; index before the
+        pupil divided by that behind; waist of a mask [m].
+        """
         pupil, vacuum = self.pupil, self.wavelength
         focal = math.inf if pupil.thin_lens_focal_length is None else pupil.thin_lens_focal_length
         waist = pupil.mask.waist if isinstance(pupil.mask, GaussianMask) else math.inf
@@ -73,7 +79,10 @@ class Member:
 
     @property
     def relief(self) -> np.ndarray:
-        """Control points of its waves, less what all have in common: no light differs by that, but float32's would."""
+        """Control points of the relief in waves, without their mean.
+
+        The mean does not affect the light, but it would cost digits in float32.
+        """
         if self.pupil.height is None:
             return np.zeros((4, 4))
         heights = self.pupil.height.control_points - np.mean(self.pupil.height.control_points)
@@ -82,7 +91,7 @@ class Member:
 
     @property
     def powers(self) -> np.ndarray:
-        """Of its wavefront's waves: what `powers` count, (term,)."""
+        """Coefficients of `powers` in the wavefront in waves, (term,)."""
         wavefront, known = self._wavefront, _indices(HIGHEST_ORDER)
         found = np.zeros(len(known))
         if wavefront is None:
@@ -93,17 +102,17 @@ class Member:
                 continue
             for power, share in _radial(n, m):
                 found[known[power, m]] -= value * UM / self.wavelength * share * scale**power
-        found[known[0, 0]] = 0.0  # as of a relief: what all of the pupil has in common
+        found[known[0, 0]] = 0.0  # the phase common to the whole pupil, as for a relief
         return found
 
     @property
     def order(self) -> int:
-        """Highest of its wavefront."""
+        """Highest order of the wavefront."""
         return 0 if self._wavefront is None else self._wavefront.order
 
     @property
     def detail(self) -> float:
-        """Turns per radius that slopes do not tell: a wavefront's, and a mask's."""
+        """Cycles per radius of a wavefront and a mask that slopes do not include."""
         pupil, found = self.pupil, 0.0
         if pupil.wavefront is not None:
             found = pupil.wavefront.bandwidth(0.0)
@@ -111,7 +120,7 @@ class Member:
         return found if pupil.mask is None else found + pupil.mask.bandwidth(MASK_LEVEL, pupil.radius) * pupil.radius
 
     def mask(self, at: np.ndarray) -> np.ndarray | None:
-        """Amplitudes of a map at places in radii along either axis, (y, x)."""
+        """Return the amplitudes of a map at positions in radii along either axis, (y, x)."""
         mask = self.pupil.mask
         if not isinstance(mask, MaskMap):
             return None
@@ -119,7 +128,7 @@ class Member:
 
 
 def powers(x: np.ndarray, y: np.ndarray, order: int) -> np.ndarray:
-    """(term, *x.shape): ρ^k cos mθ and, for m < 0, ρ^k sin |m|θ, all |m| <= k <= order with k - m even."""
+    """Return ρ^k cos mθ and, for m < 0, ρ^k sin |m|θ for all |m| <= k <= order with k - m even, (term, *x.shape)."""
     turned, square = [np.ones(x.shape, complex)], x * x + y * y
     for _ in range(order):
         turned.append(turned[-1] * (x + 1j * y))
@@ -131,14 +140,14 @@ def powers(x: np.ndarray, y: np.ndarray, order: int) -> np.ndarray:
 
 @lru_cache(maxsize=HIGHEST_ORDER + 1)
 def _indices(order: int) -> dict[tuple[int, int], int]:
-    """Place of every (k, m), lower k first: those of a lower order come before."""
+    """Return the index of every (k, m), in ascending order of k, so that lower orders come first."""
     pairs = [(k, m) for k in range(order + 1) for m in range(-k, k + 1, 2)]
     return {pair: place for place, pair in enumerate(pairs)}
 
 
 @lru_cache(maxsize=(HIGHEST_ORDER + 1) * (HIGHEST_ORDER + 2))
 def _radial(n: int, m: int) -> list[tuple[int, float]]:
-    """Powers of ρ in Z_n^m, and what they count (Thibos et al. 2002, eq. 3)."""
+    """Return the powers of ρ in Z_n^m and their coefficients (Thibos et al. 2002, eq. 3)."""
     m, norm = abs(m), math.sqrt((2 - (m == 0)) * (n + 1))
     return [
         (

@@ -35,21 +35,22 @@ def psf(
     centre: tuple[float, float] = (0.0, 0.0),
     field: bool = False,
 ) -> PSFResult:
-    """|U|² / (pupil area) of the field U that a unit-amplitude wave makes behind the pupil.
+    """Return |U|² / (pupil area) of the field U that a unit-amplitude wave produces behind the pupil.
 
-    wavelengths: in vacuum [m], one or a row of them; eight and more are planned as the first is, where that will do.
+    wavelengths: in vacuum [m], one or a row of them; eight and more use the plan of the first one if it is accurate
+        enough.
     sensor_distance: [m] behind the pupil; None: where an ideal lens images the source, or 240 µm without such a lens.
     source_distance, source_angle: [m], (x, y) [rad]: see PointSource.
     dx, shape, centre: of the window: pitch [m], samples (y, x), position of sample n//2 (x, y) [m].
     tolerance: relative L2 error of the intensity over the window.
-    method: "auto", "exact" (nothing approximate), or one of planner.METHODS. An approximation asked for by its name
-        answers however wrong it is: the tolerance is then that of its sampling, and the plan tells the error.
-    field: whether the complex amplitude is wanted, too, for the PSF's price (`PSFResult.field`); then only methods that
-        have a phase are weighed.
-    Both distances, as what the pupil is made of, may be Dr.Jit arrays that carry derivatives: see PSFResult.tensor.
+    method: "auto", "exact" (no approximations), or one of planner.METHODS. An approximation that is requested by name
+        always runs. The tolerance then applies to its sampling only, and the plan states the error.
+    field: whether to return the complex amplitude as well, at no additional cost (`PSFResult.field`). Only methods with
+        a phase are then compared.
+    Both distances and all parameters of the pupil may be Dr.Jit arrays that carry derivatives: see PSFResult.tensor.
 
     Raises:
-        ValueError: bad argument, named with its value and valid range.
+        ValueError: an argument is invalid; the message names it with its value and valid range.
         AccuracyError: no method meets the tolerance within the limits on memory and time.
     """
     source = PointSource(source_distance, source_angle)
@@ -81,7 +82,7 @@ def plan(
     dtype: str = "float32",
     centre: tuple[float, float] = (0.0, 0.0),
 ) -> Plan:
-    """What `psf` would do at one wavelength, without doing it: see there for arguments and errors."""
+    """Return the plan of `psf` at one wavelength without computing the PSF. Arguments and errors: see `psf`."""
     source = PointSource(source_distance, source_angle)
     at = _placed(pupil, sensor_distance, source)
     setup = Setup(at, source, Grid(shape, dx, centre), tolerance, method, dtype)

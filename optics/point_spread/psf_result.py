@@ -1,9 +1,9 @@
-"""A PSF over a window, and the same light looked at anew where a measure needs finer or wider samples.
+"""A PSF over a window, which can be recomputed over other windows if a measure needs finer or wider samples.
 
-A point of the sensor at distance z sees a pupil of radius R under rays whose sines differ by 2R/√(R² + z²) at most,
-so that the intensity there has no frequency beyond f_c = 2R/(λ√(R² + z²)), whatever the pupil does to the light.
-Samples dx apart repeat its spectrum every 1/dx: sums over them are right from dx < 1/f_c on (about λz/2R), and every
-contrast from dx <= 1/(2 f_c) on.
+A point of the sensor at distance z sees a pupil of radius R under rays whose sines differ by at most 2R/√(R² + z²). The
+highest frequency of the intensity there is therefore f_c = 2R/(λ√(R² + z²)), independent of the pupil's relief. Samples
+dx apart repeat the spectrum every 1/dx. Sums over them are correct for dx < 1/f_c (about λz/2R), and all contrasts for
+dx <= 1/(2 f_c).
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from optics.numerics.arguments import reals, shown
 from optics.numerics.autodiff import Array, Scalar, number, to_user
 from optics.numerics.grid import Grid, OnWindow
 from optics.numerics.precision import precision
+from optics.numerics.renamed import renamed
 from optics.point_spread.mixture import mixed
 from optics.point_spread.pictures import pictures
 from optics.point_spread.planner import APPROXIMATE
@@ -29,26 +30,26 @@ from optics.point_spread.request import Request
 
 __all__ = ["PSFResult", "spread"]
 
-MOST_AGAIN = 2049  # choice: samples along a side of a window that a measure asks for by itself
-MANY = 8  # choice: wavelengths of which each by itself would be planned longer than computed
-MOST_SECONDS = 20.0  # choice: that such a window may take
-SUM_ERROR = 3.0  # choice: how much more than the picture a sum may err, relatively: test_measure_errors.py
+MOST_AGAIN = 2049  # choice: samples along a side of a recomputed window
+MANY = 8  # choice: number of wavelengths from which on separate planning would take longer than computing
+MOST_SECONDS = 20.0  # choice: time limit for a recomputed window [s]
+SUM_ERROR = 3.0  # choice: relative error of a sum divided by that of the PSF: test_measure_errors.py
 OF_CELLS = ("pinhole", "geometric", "perfect_lens")  # methods whose samples are means over cells
 
 
 @dataclass(frozen=True, eq=False)
 class PSFResult(OnWindow):
-    """PSF on a grid of sensor positions, sample n//2 at `centre` (x, y) [m], row and y growing together.
+    """PSF on a grid of sensor positions, sample n//2 at `centre` (x, y) [m], with y increasing with the row.
 
-    tensor: the PSF as a Dr.Jit tensor (wavelength, y, x) that carries the derivatives of what it was made from.
+    tensor: the PSF as a Dr.Jit tensor (wavelength, y, x) that carries the derivatives of the parameters.
     psf: the same as a NumPy array [1/m²]; its integral over an unbounded plane is the fraction of the pupil's power
         that arrives (evanescent light does not). Never renormalised.
     plans: one per wavelength; `plan` is the least accurate of them.
-    requests: what was asked, one per wavelength, so that measures may look again; none for a picture from elsewhere.
-    shares: (request,) of which a picture is the mean, see `mean`; None: one picture per request.
+    requests: one per wavelength, from which measures recompute the PSF; empty for a PSF that `psf` did not compute.
+    shares: (request,) weights of a mean over wavelengths, see `mean`; None: one PSF per request.
     field_parts: real and imaginary part of the complex amplitude, Dr.Jit tensors (wavelength, y, x) with derivatives,
-        where `psf` was asked for it; `field`: both in one NumPy array. Its square is the PSF, and it has the carrier
-        exp(ikz).
+        if `psf` was called with field=True; `field`: both in one NumPy array. Its squared modulus is the PSF, and it
+        includes the carrier exp(ikz).
     """
 
     tensor: Array
@@ -70,7 +71,7 @@ class PSFResult(OnWindow):
         return re + 1j * im
 
     def __repr__(self) -> str:
-        """Short: requests hold grids of slopes."""
+        """Return a short description, because requests contain grids of slopes."""
         count, height, width = self.tensor.shape
         planes = f"{count} wavelength{'s' * (count > 1)}, {height} x {width} samples {self.dx:.3g} m apart"
         return f"<PSFResult {planes}, predicted error {self.plan.predicted_error:.1e}>"
@@ -89,18 +90,24 @@ class PSFResult(OnWindow):
 
     @property
     def power(self) -> np.ndarray | Array:
-        """Fraction of the pupil's power inside the window, (wavelength,): of its cells, half of one beyond the
-        outermost samples. Where the samples are too coarse to be added up, finer ones are.
+        """Fraction of the pupil's power inside the window, (wavelength,).
+
+        The window extends half a cell beyond the outermost samples. If the samples are too coarse for a sum, finer ones
+        are computed.
 
         Raises:
-            AccuracyError: they are too coarse, and finer ones cannot be had; says which would do.
+            AccuracyError: the samples are too coarse, and finer ones cannot be computed; the message states which would
+                be sufficient.
         """
-        return self._resolved.held
+        return self._resolved.window_sums
 
     @property
     def power_error(self) -> np.ndarray:
-        """Predicted error of `power`, (wavelength,): of the picture, and half of what lies at the window's rim, where
-        samples cut no sharper than a cell."""
+        """Predicted error of `power`, (wavelength,).
+
+        It includes the error of the PSF, and half of the power at the window's rim, whose position samples define only
+        to a cell.
+        """
         seen = self._resolved
         image = seen.psf.astype(np.float64)
         total, inner = (part.sum(axis=(1, 2)) * seen.dx**2 for part in (image, image[:, 1:-1, 1:-1]))
@@ -109,7 +116,7 @@ class PSFResult(OnWindow):
 
     @property
     def cutoff(self) -> np.ndarray:
-        """Frequency [1/m] beyond which the intensity has none, 2R/√(R² + z²) n/λ, (wavelength,)."""
+        """Highest frequency [1/m] of the intensity, 2R/√(R² + z²) n/λ, (wavelength,)."""
         radius, distance = self.pupil.radius, number(self.sensor_distance)
         index = np.array([self.pupil.index_behind(float(wavelength)) for wavelength in self.wavelengths])
         found: np.ndarray = 2 * radius / math.hypot(radius, distance) * index / self.wavelengths
@@ -117,12 +124,12 @@ class PSFResult(OnWindow):
 
     @property
     def holds_cells(self) -> bool:
-        """Whether samples are means over cells, whose sums miss nothing, and not values at points."""
+        """True if samples are means over cells, whose sum is the whole power, and not values at points."""
         return all(plan.method in OF_CELLS for plan in self.plans)
 
     @property
-    def held(self) -> np.ndarray | Array:
-        """Sum over the samples times their area, (wavelength,), whatever their pitch."""
+    def window_sums(self) -> np.ndarray | Array:
+        """Sum over the samples times their area, (wavelength,), for any pitch."""
         import drjit as dr
 
         waves, flat = self.tensor.shape[0], self.psf.reshape(len(self.psf), -1)
@@ -134,15 +141,17 @@ class PSFResult(OnWindow):
 
     @property
     def sum_error(self) -> np.ndarray:
-        """What the picture's own error makes of sums over it, in shares of the pupil's power, (wavelength,)."""
+        """Error of sums over the PSF due to its own error, as fractions of the pupil's power, (wavelength,)."""
         errors = [plan.predicted_error for plan in self.plans]
         own = np.array(errors if len(errors) == len(self.psf) else [max(errors)] * len(self.psf))
         found: np.ndarray = SUM_ERROR * own * self.psf.sum(axis=(1, 2), dtype=np.float64) * self.dx**2
         return found
 
+    can_be_seen_anew, through, held = renamed("can_recompute"), renamed("recompute_on"), renamed("window_sums")
+
     @property
-    def can_be_seen_anew(self) -> bool:
-        """Whether it is known how the PSF was made: of a picture from elsewhere it is not."""
+    def can_recompute(self) -> bool:
+        """True if the requests of the PSF are known; False for a PSF that `psf` did not compute."""
         asked = [request.beam.wavelength for request in self.requests]
         if self.shares is None:
             return asked == list(self.wavelengths)
@@ -150,27 +159,27 @@ class PSFResult(OnWindow):
 
     @property
     def highest_cutoff(self) -> float:
-        """Frequency [1/m] beyond which no picture has any, nor any that it is the mean of."""
-        if self.shares is None or not self.can_be_seen_anew:
+        """Highest frequency [1/m] of all PSFs, including the components of a mean."""
+        if self.shares is None or not self.can_recompute:
             return float(self.cutoff.max())
         shortest = min(request.beam.wavelength for request in self.requests)
         return float(self.cutoff.max() * self.wavelengths.max() / shortest)
 
     def mean(self, shares: np.ndarray) -> PSFResult:
-        """The PSF of light of all wavelengths at once, (1, y, x), at their mean wavelength, with derivatives.
+        """Return the PSF of light of all wavelengths at once, (1, y, x), at their mean wavelength, with derivatives.
 
-        shares: (wavelength,) of each in the light; they sum to 1.
+        shares: (wavelength,) fraction of each in the light; they sum to 1.
 
         Raises:
             ValueError: shares has another shape or sum.
         """
         parts = reals("shares", shares)
         if parts.shape != self.wavelengths.shape or not math.isclose(float(parts.sum()), 1, rel_tol=1e-6):
-            raise ValueError(f"shares = {shown(shares)}: must be {self.wavelengths.size} that sum to 1")
+            raise ValueError(f"shares = {shown(shares)}: must be {self.wavelengths.size} numbers that sum to 1")
         if self.shares is not None:
-            return self  # of one picture, which is a mean already
+            return self  # this PSF is already a mean
         image = mixed(self.tensor, parts[None])
-        wavelength, asked = np.array([parts @ self.wavelengths]), self.requests if self.can_be_seen_anew else ()
+        wavelength, asked = np.array([parts @ self.wavelengths]), self.requests if self.can_recompute else ()
         return replace(
             self,
             tensor=image,
@@ -181,61 +190,65 @@ class PSFResult(OnWindow):
             field_parts=None,
         )
 
-    def through(self, window: Grid, what: str, waves: slice = slice(None)) -> PSFResult:
-        """The same light through another window, to the same tolerance, of some of the wavelengths.
+    def recompute_on(self, window: Grid, what: str, waves: slice = slice(None)) -> PSFResult:
+        """Return the PSF of the same light over another window, to the same tolerance, for some of the wavelengths.
 
-        what: is measured, for the message.
+        what: name of the measure, for the message.
 
         Raises:
-            AccuracyError: it is not known how the PSF was made, or the window is too large.
+            AccuracyError: the requests of the PSF are unknown, or the window is too large.
         """
         height, width = window.shape
         here = f"{self.tensor.shape[1]} x {self.tensor.shape[2]} samples {self.dx:.3g} m apart"
         needs = f"{what} needs {height} x {width} samples {window.dx:.3g} m apart, and this PSF has {here}"
-        if not self.can_be_seen_anew or max(window.shape) > MOST_AGAIN:
-            raise AccuracyError(needs, f"ask for dx={window.dx:.3g}, shape=({height}, {width})")
+        if not self.can_recompute or max(window.shape) > MOST_AGAIN:
+            raise AccuracyError(needs, f"set dx={window.dx:.3g}, shape=({height}, {width})")
         try:
             if self.shares is not None:
                 return spread([_through(request, window) for request in self.requests]).mean(self.shares)
             return spread([_through(request, window) for request in self.requests[waves]])
         except AccuracyError as error:
-            raise AccuracyError(f"{needs}; those are refused: {error}") from None
+            raise AccuracyError(f"{needs}, which fails: {error}") from None
 
     def with_pitch(self, coarsest: float, what: str) -> PSFResult:
-        """The PSF itself where its samples are no more than `coarsest` [m] apart; else over the same window an odd
-        number for each, so that they fill the same cells.
+        """Return a PSF whose samples are at most `coarsest` [m] apart.
+
+        It is this PSF if its samples are fine enough. Otherwise each sample is replaced by an odd number of samples
+        along each axis, which fill the same cell.
 
         Raises:
-            AccuracyError: see `through`.
+            AccuracyError: see `recompute_on`.
         """
         if self.dx <= coarsest or self.holds_cells:
             return self
         parts = 2 * math.ceil((self.dx / coarsest - 1) / 2 - 1e-9) + 1
         pitch, (height, width) = self.dx / parts, self.tensor.shape[1:]
-        # Of an even number the middle sample's cell begins at the window's middle: so does its middle part.
+        # With an even number of samples, the cell of the middle sample begins at the middle of the window. Its middle
+        # part must begin there, too.
         shift = pitch * (parts - 1) / 2
         x, y = (at - shift * (n % 2 == 0) for at, n in zip(self.centre, (width, height), strict=True))
-        return self.through(Grid((parts * height, parts * width), pitch, (x, y)), what)
+        return self.recompute_on(Grid((parts * height, parts * width), pitch, (x, y)), what)
 
     @cached_property
     def _resolved(self) -> PSFResult:
-        """With samples that can be added up."""
+        """The PSF over samples that are fine enough for sums."""
         return self.with_pitch(0.5 / self.highest_cutoff, "power")
 
 
 def _through(request: Request, window: Grid) -> Request:
     asked = request.problem
-    problem = Problem.of(request.beam, window, asked.tolerance, asked.dtype)
+    problem = Problem.from_beam(request.beam, window, asked.tolerance, asked.dtype)
     method = request.method if request.method in APPROXIMATE else "auto"
     return replace(request, problem=problem, method=method, most_seconds=MOST_SECONDS, keeps_field=False)
 
 
 def spread(requests: Sequence[Request]) -> PSFResult:
-    """PSFs of one pupil at several wavelengths, over one window; MANY are planned as the first is, where that
-    will do.
+    """Return PSFs of one pupil at several wavelengths over one window.
+
+    From MANY wavelengths on, all use the plan of the first one if it is accurate enough.
 
     Raises:
-        AccuracyError: no method meets the tolerance, or a window is so dark that rounding breaks it.
+        AccuracyError: no method meets the tolerance, or a window is so dark that rounding errors exceed it.
     """
     import drjit as dr
 

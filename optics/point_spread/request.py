@@ -1,4 +1,4 @@
-"""What is asked of a PSF."""
+"""The parameters of a PSF."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ from optics.point_spread.planner import EXACT, METHODS, choose
 
 __all__ = ["Request", "Setup"]
 
-MOST_SECONDS_OF_JUMPS = 2.0  # choice
-GROWN = 1.25  # choice: time, of the wavelength before, from which on all methods are weighed anew
+MOST_SECONDS_OF_JUMPS = 2.0  # choice: time limit for a height map with jumps
+GROWN = 1.25  # choice: time relative to the previous wavelength from which on all methods are compared again
 
 
 @dataclass(frozen=True)
 class Request:
-    """One monochromatic picture that somebody wants.
+    """One monochromatic PSF that is to be computed.
 
-    beam: the light; problem: the same in numbers, with the window and the tolerance.
-    method: "auto", "exact" or a method's name. most_seconds: what the picture may take. keeps_field: whether its
-        complex amplitude is wanted, too. like: a plan whose method to try before all are weighed.
+    beam: the light; problem: the same as numbers, with the window and the tolerance.
+    method: "auto", "exact" or a method's name. most_seconds: time limit of the PSF. keeps_field: whether to return its
+        complex amplitude as well. like: a plan whose method is tried before all methods are compared.
     """
 
     beam: Beam
@@ -38,15 +38,18 @@ class Request:
     like: Plan | None = None
 
     def after(self, other: Request, plan: Plan) -> Request:
-        """This request, told what another was answered by that differs by its wavelength and samples alone: what did
-        for one wavelength does for the next, and weighing takes as long as a small picture."""
+        """Return this request with the plan of another one that differs only in wavelength and samples.
+
+        A method that is suitable for one wavelength is suitable for the next, and comparing methods takes as long as a
+        small PSF.
+        """
         mine, its = self.beam, other.beam
         same = mine.pupil is its.pupil and mine.source == its.source and mine.distance is its.distance
         alike = self.method == other.method == "auto" and self.keeps_field == other.keeps_field
         return replace(self, like=plan) if same and alike and plan.method in EXACT else self
 
     def planned(self) -> tuple[Plan, Sampling]:
-        """How it is best answered.
+        """Return the plan and the samples of the PSF.
 
         Raises:
             AccuracyError: no method meets the tolerance within the limits on memory and time.
@@ -76,19 +79,19 @@ class Request:
             return None
         if plan.seconds > GROWN * self.like.seconds:
             return None
-        return replace(plan, why=plan.why.replace("asked for", "as at the wavelength before")), sampling
+        return replace(plan, why=plan.why.replace("requested", "same method as at the previous wavelength")), sampling
 
 
 def _wrapped(jump: float) -> str:
     return (
-        f"height jumps by {jump:.3g} m from sample to sample, as where a lens is wrapped, and HeightMap joins them by "
-        "steep slopes: optics.PixelRelief(height) has the steps themselves"
+        f"height jumps by {jump:.3g} m from sample to sample, as in a wrapped lens, and HeightMap connects them by "
+        "steep slopes: optics.PixelRelief(height) represents the steps"
     )
 
 
 @dataclass(frozen=True)
 class Setup:
-    """Where a pupil's light comes from, where it is looked at and how exactly: all but the pupil and the wavelength.
+    """Parameters of a PSF except the pupil and the wavelength.
 
     sensor_distance: [m] behind the pupil. window: the samples on the sensor. See `optics.psf` for the others.
     """
@@ -104,10 +107,10 @@ class Setup:
         one_of("method", self.method, ("auto", "exact", *METHODS))
 
     def request(self, pupil: Pupil, wavelength: float) -> Request:
-        """Of a pupil's light at a vacuum wavelength [m].
+        """Return the request for a pupil at a vacuum wavelength [m].
 
         Raises:
-            ValueError: a bad argument, named with its value and valid range.
+            ValueError: an argument is invalid; the message names it with its value and valid range.
         """
         beam = Beam(pupil, self.source, wavelength, self.sensor_distance)
-        return Request(beam, Problem.of(beam, self.window, self.tolerance, self.dtype), self.method)
+        return Request(beam, Problem.from_beam(beam, self.window, self.tolerance, self.dtype), self.method)

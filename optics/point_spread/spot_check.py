@@ -1,4 +1,4 @@
-"""A picture held against the direct sum at a few of its points: the error that no prediction can hide."""
+"""Comparison of a PSF with the direct sum at a few of its points, which finds errors that predictions miss."""
 
 from __future__ import annotations
 
@@ -19,22 +19,23 @@ from optics.numerics.quadrature import stepped_up
 
 __all__ = ["CAUTION", "spot_check"]
 
-# Choice, over the estimate's own spread: 40 points see the root mean square within a factor of about two. What is said
-# then bounds the error: tests/optics/point_spread/test_robustness.py holds it to that.
+# Choice, to cover the spread of the estimate: 40 points give the root mean square within a factor of about two. With
+# this factor, the stated error bounds the true error: tests/optics/point_spread/test_robustness.py checks this.
 CAUTION = 3.5
 
 
-DIGITS_STEP = 0.25  # choice: few different rules of nodes, so that they are found again
+DIGITS_STEP = 0.25  # choice: step of the digits of a rule, so that cached rules are used
 
 
 @dataclass(frozen=True)
 class Effort:
-    """How much a check may take; all are choices.
+    """Limits on the effort of a check; all are choices.
 
-    points: looked at; points_along_radius: of a symmetric picture, which is the same all around.
-    fewest: with fewer, the estimate is worth nothing.
-    spare_digits: that the direct sum is better than the picture is asked to be: the first that can be afforded.
-    share: of the time that the picture took; seconds: that any check may take.
+    points: number of points; points_along_radius: number of points of a rotationally symmetric PSF.
+    fewest: with fewer points, the estimate is useless.
+    spare_digits: additional digits of the direct sum relative to the requested accuracy; the first affordable value is
+        used.
+    share: fraction of the time of the PSF; seconds: time that any check may take.
     """
 
     points: int = 40
@@ -50,7 +51,10 @@ EFFORT = Effort()
 
 @dataclass(frozen=True)
 class _DirectSum:
-    """The reference at so many points: nodes for `cycles` turns per radius, good to `digits`."""
+    """The reference at a number of points.
+
+    Its nodes are for `cycles` cycles per radius and accurate to `digits`.
+    """
 
     points: int
     cycles: float
@@ -58,13 +62,14 @@ class _DirectSum:
 
 
 def spot_check(beam: Beam, problem: Problem, image: np.ndarray, seconds: float) -> float | None:
-    """Relative L2 error of the intensity over the window, from the direct sum at points drawn as `_chances` says;
-    None where that would cost too much.
+    """Return the relative L2 error of the intensity over the window, estimated from the direct sum.
 
-    image: flat, |U|² / (pupil area); seconds: what it took. Σ (δI)² is estimated by Σ (δI_k)² / (n p_k).
+    The points are drawn with the probabilities of `_chances`. None if the check would be too expensive.
+
+    image: flat, |U|² / (pupil area); seconds: time of its computation. Σ (δI)² is estimated by Σ (δI_k)² / (n p_k).
     """
     if problem.reach is not None:
-        return None  # the picture is not meant to be right everywhere
+        return None  # such a PSF is not accurate everywhere by design
     total = float(np.sum(np.square(image, dtype=np.float64)))
     if total == 0:
         return None
@@ -75,25 +80,28 @@ def spot_check(beam: Beam, problem: Problem, image: np.ndarray, seconds: float) 
     drawn, chance = _drawn(problem, image, reference.points)
     exact = _exact(beam, problem, reference, drawn)
     squared = float(np.mean(np.square(image[drawn] - exact) / chance))
-    if squared > 0.01 * total:  # choice, a tenth: then it is an approximation, perhaps much brighter than the truth
+    # Choice, an error of a tenth: the PSF is then an approximation and may be much brighter than the exact one.
+    if squared > 0.01 * total:
         total = min(total, float(np.mean(np.square(exact) / chance)))
     rounding = max(FLOAT_NOISE["float64"], float(np.finfo(precision(problem.dtype).dtype).eps))
-    # The direct sum's own error: 10^-digits of the amplitude that nodes could add up to, twice that of the intensity.
+    # The error of the direct sum itself: 10^-digits of the amplitude that nodes could add up to, and twice that for the
+    # intensity.
     return CAUTION * math.sqrt(squared / total) + rounding + 2 * 10.0 ** (darkness - reference.digits)
 
 
 def _darkness(beam: Beam, problem: Problem, mean: float) -> float:
-    """Digits by which the window's amplitude, its root mean square PSF `mean`, falls short of all light in phase.
+    """Return the digits by which the window's amplitude is below that of all light in phase.
 
-    Nodes err in proportion to the light of the whole aperture of area A. In phase that makes U = A/(λz), and a PSF
-    U²/A = A/(λz)²; amplitudes are roots, hence half the digits.
+    mean: root mean square of the PSF over the window. The error of the nodes is proportional to the light of the whole
+        aperture of area A. In phase this light gives U = A/(λz) and a PSF of U²/A = A/(λz)². Amplitudes are square
+        roots, hence half the digits.
     """
     in_phase = beam.pupil.area / (problem.wavelength * problem.distance) ** 2
     return max(0.0, 0.5 * math.log10(in_phase / mean))
 
 
 def _affordable(problem: Problem, darkness: float, seconds: float, samples: int) -> _DirectSum:
-    """As many points and digits as the picture's time allows."""
+    """Return the direct sum with the points and digits that the time of the PSF allows."""
     pairs = max(EFFORT.share * seconds, EFFORT.seconds) * PAIRS_PER_SECOND
     wanted = min(EFFORT.points_along_radius if problem.symmetric else EFFORT.points, samples)
     for spare in EFFORT.spare_digits:
@@ -108,9 +116,9 @@ def _affordable(problem: Problem, darkness: float, seconds: float, samples: int)
 
 
 def _drawn(problem: Problem, image: np.ndarray, points: int) -> tuple[np.ndarray, np.ndarray]:
-    """Flat indices of the points to look at, and the chance with which each was drawn.
+    """Return the flat indices of the points to compare, and the probability with which each was drawn.
 
-    They are drawn evenly along the sum of all chances: none that is likely is left out.
+    They are drawn evenly along the cumulative probability, so that no likely point is omitted.
     """
     if points == image.size:
         chance = np.full(points, 1 / points)  # every point once
@@ -123,7 +131,7 @@ def _drawn(problem: Problem, image: np.ndarray, points: int) -> tuple[np.ndarray
 
 
 def _exact(beam: Beam, problem: Problem, reference: _DirectSum, drawn: np.ndarray) -> np.ndarray:
-    """The PSF at the points drawn, by the direct sum in float64."""
+    """Return the PSF at the drawn points, by the direct sum in float64."""
     import drjit as dr
 
     row, column = np.divmod(drawn, problem.window.shape[1])
@@ -138,17 +146,19 @@ def _exact(beam: Beam, problem: Problem, reference: _DirectSum, drawn: np.ndarra
     return exact
 
 
-KINDS = 6  # of points, as `_chances` counts them
+KINDS = 6  # kinds of points in `_chances`
 
 
 def _chances(bright: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
-    """With which each point is drawn, flat: a sixth each evenly, in proportion to the intensity, to its square, to the
-    nearness of a side, of a corner, and to the intensity near sides and corners.
+    """Return the probability with which each point is drawn, flat.
 
-    An even error of the amplitude weighs as the intensity's root: the second sixth sees it where a focus leaves the
-    others blind. A focus of one sample has its errors beside it: the square is spread over its neighbours. Phases turn
-    fastest at the sides and the corners: a quadrature fails there first, and within a few samples; of a slit's light
-    few places at the sides have any, and errors are where there is light.
+    It is the sum of six equal parts: even; in proportion to the intensity; to its square; to the nearness of a side; to
+    the nearness of a corner; and to the intensity near sides and corners.
+
+    An even error of the amplitude has an effect proportional to the root of the intensity. The second part detects it
+    if a focus hides it from the others. A focus of one sample has its errors next to it, so the square is spread over
+    its neighbours. Phases change fastest at sides and corners. Quadratures fail there first, and within a few samples.
+    The light of a slit reaches few places at the sides, and errors occur in bright places.
     """
     height, width = shape
     squares = np.zeros((height + 2, width + 2))
@@ -163,21 +173,26 @@ def _chances(bright: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
 
 @lru_cache(maxsize=16)
 def _by_radius(window: Grid) -> np.ndarray:
-    """Flat indices by their distance from the axis: evenly drawn from those, no ring that counts is left out."""
+    """Return flat indices in order of the distance from the axis.
+
+    If points are drawn evenly from these, no important ring is omitted.
+    """
     radii = np.add.outer(np.square(window.y), np.square(window.x)).ravel()
-    return np.argsort(np.round(radii / window.dx**2, 6), kind="stable")  # rounded: one ring stays one
+    # Rounded so that equal radii are not split by rounding errors.
+    return np.argsort(np.round(radii / window.dx**2, 6), kind="stable")
 
 
-# Choice: u² to this power, u in [-1, 1] across the window, is half at 1 - |u| = ln 2 / 24, a seventieth of its width.
+# Choice: exponent of u², with u in [-1, 1] across the window. The power is one half at 1 - |u| = ln 2 / 24, a
+# seventieth of the window's width.
 STEEP = 12
 
 
 @lru_cache(maxsize=16)
 def _fixed_chances(shape: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
-    """The nearness of sides and corners, flat; and the sum of the three chances that do not depend on the picture."""
+    """Return the nearness of sides and corners, flat, and the sum of the three parts that do not depend on the PSF."""
     height, width = shape
     y, x = (np.square(np.linspace(-1, 1, n)) if n > 1 else np.ones(1) for n in shape)
-    # Each pair of sides has its share, however short: half of it the outermost samples alone.
+    # Each pair of sides has equal weight, regardless of its length. Half of it belongs to the outermost samples alone.
     sides = np.zeros(shape)
     for steepness in (STEEP, math.inf):
         across, along = x**steepness, y**steepness

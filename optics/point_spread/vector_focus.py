@@ -1,4 +1,4 @@
-"""The focus as Maxwell's equations have it: three components of the electric field."""
+"""The focus according to Maxwell's equations: three components of the electric field."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ __all__ = ["vector_focus"]
 
 FEWEST_ZONES = 20.0  # choice: Fresnel number of an aplanatic lens from which on rays meet in a point
 ROUNDING = 1e-9
-STEEPEST = 0.98  # choice: sine of rays behind the pupil, near 1 of which fields change abruptly
+STEEPEST = 0.98  # choice: largest sine of rays behind the pupil, because fields change abruptly near 1
 
 
 def vector_focus(
@@ -37,23 +37,26 @@ def vector_focus(
     shape: tuple[int, int] = (65, 65),
     tolerance: float = 1e-3,
 ) -> VectorFocus:
-    """Electric field behind a pupil of any shape about the image of a point far away.
+    """Return the electric field behind a pupil of any shape about the image of a distant point.
 
-    Rays give the field in the pupil's plane, perpendicular to each, and Smythe's integral (1947) what Maxwell's
-    equations make of it. A sum of plane waves, one for each point of the pupil (Debye's integral), is much faster, and
-    is taken where it meets the tolerance: about foci of high Fresnel number.
+    Rays give the field in the pupil's plane, perpendicular to each ray. Smythe's integral (1947) gives the field behind
+    it according to Maxwell's equations. A sum of plane waves, one for each point of the pupil (Debye's integral), is
+    much faster. It is used if it meets the tolerance, as near foci of high Fresnel number.
 
-    sensor_distance: [m]; None: the lens' focus. polarization: of the light before the pupil, Jones' vector (x, y) or
-        Stokes' parameters (S0, S1, S2, S3) with S1 = |Ex|² - |Ey|², S2 = 2 Re(Ex* Ey), S3 = 2 Im(Ex* Ey); None:
-        unpolarised. In light aslant x and y are turned with it. source_angle: (x, y) [rad], as of `optics.psf`; the
-        window then lies about the image. apodization: "flat", even light over a flat pupil; "aplanatic", as behind a
-        corrected objective and on its axis: the pupil is then seen from the focus under the sine ξ/z, and the light is
-        plane waves (Richards and Wolf 1959). tolerance: relative L2 error of the intensity over the window.
+    sensor_distance: [m]; None: the focus of the lens.
+    polarization: of the light before the pupil. Jones vector (x, y), or Stokes parameters (S0, S1, S2, S3) with S1 =
+        |Ex|² - |Ey|², S2 = 2 Re(Ex* Ey), S3 = 2 Im(Ex* Ey); None: unpolarised. In oblique light, x and y are rotated
+        with it.
+    source_angle: (x, y) [rad], as in `optics.psf`; the window then lies about the image.
+    apodization: "flat", uniform light over a flat pupil; "aplanatic", as behind a corrected objective and on its axis.
+        The pupil is then seen from the focus under the sine ξ/z, and the light is a sum of plane waves (Richards and
+        Wolf 1959).
+    tolerance: relative L2 error of the intensity over the window.
 
     Raises:
-        ValueError: a bad argument, a relief of pixels, or a derivative.
-        AccuracyError: no method meets the tolerance within the limits on memory and time; an aplanatic lens with a
-            Fresnel number below 20, whose rays do not meet in a point.
+        ValueError: an argument is invalid, the relief is pixelated, or a parameter carries derivatives.
+        AccuracyError: no method meets the tolerance within the limits on memory and time; or an aplanatic lens has a
+            Fresnel number below 20, so that its rays do not meet in a point.
     """
     of_kind("pupil", pupil, Pupil, "Pupil(25e-6)")
     lambda_, source = vacuum_wavelength(wavelength), PointSource(math.inf, source_angle)
@@ -71,7 +74,7 @@ def vector_focus(
 
 
 def _check_plain(pupil: Pupil, wavelength: float) -> None:
-    """ValueError if the pupil carries a derivative."""
+    """Check that the pupil carries no derivative (ValueError)."""
     types = precision("float64")
     at, middle = types.Float64(0.5), types.Float64(0.0)
     path = pupil.path(at * pupil.radius, middle, wavelength, PointSource(), types)
@@ -80,7 +83,7 @@ def _check_plain(pupil: Pupil, wavelength: float) -> None:
 
 
 def _check_rays(beam: Beam) -> None:
-    """AccuracyError if rays go no further than the pupil: an evanescent wave has no direction."""
+    """Check that rays propagate behind the pupil (AccuracyError): evanescent waves have no direction."""
     steepest = beam.pupil.slopes(beam.wavelength, beam.source).steepest_inside / beam.index
     if steepest > STEEPEST:
         raise AccuracyError(
@@ -103,7 +106,7 @@ def _check_aplanatic(beam: Beam) -> None:
 
 
 def _polarised(polarization: Any) -> tuple[np.ndarray, tuple[float, float, float, float]]:
-    """Jones vectors of light's parts that do not interfere, (part, 2), and Stokes' parameters over the first."""
+    """Return Jones vectors of parts that do not interfere, (part, 2), and Stokes parameters divided by the first."""
     without_derivative("polarization", polarization)
     try:
         given = np.asarray((1, 0, 0, 0) if polarization is None else polarization, dtype=complex)
@@ -120,7 +123,7 @@ def _polarised(polarization: Any) -> tuple[np.ndarray, tuple[float, float, float
     if not known or given.shape == (2,) or given.imag.any() or real[0] <= 0 or polarised > real[0] * (1 + ROUNDING):
         raise ValueError(
             f"polarization = {shown(polarization)}: must be a Jones vector (x, y), not (0, 0), or Stokes' parameters "
-            "(S0, S1, S2, S3), S0 positive and the others together no longer"
+            "(S0, S1, S2, S3), with S0 positive and not below the norm of the others"
         )
     _, s1, s2, s3 = (float(part) for part in real / real[0])
     coherency = np.array([[1 + s1, s2 - 1j * s3], [s2 + 1j * s3, 1 - s1]]) / 2

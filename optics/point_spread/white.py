@@ -1,4 +1,4 @@
-"""White light: PSF and its measures as each type of receptor weighs the wavelengths of a lamp."""
+"""White light: the PSF and its measures, with the wavelengths of a lamp weighted by each type of receptor."""
 
 from __future__ import annotations
 
@@ -27,21 +27,21 @@ from optics.spectra.spectrum import Spectrum, illuminant
 
 __all__ = ["WhitePSF", "white_psf"]
 
-FIRST, MOST_WAVES = 9, 513  # choice: wavelengths that are tried, and that are ever taken
-# Choice: what fewer wavelengths change, half of them, and what is left of it. A fifteenth, where splines converge as
-# their fourth power; tests/optics/point_spread/test_white.py.
+FIRST, MOST_WAVES = 9, 513  # choice: initial and largest number of wavelengths
+# Choice: error relative to the change if only every second wavelength is used. It is a fifteenth for splines that
+# converge with the fourth power of the step; tests/optics/point_spread/test_white.py.
 LEFT = 0.25
-OF_PICTURES = 0.5  # choice: of the tolerance; the rest is the spectrum's
+OF_PICTURES = 0.5  # choice: part of the tolerance for the PSFs; the rest is for the spectrum
 
 
 @dataclass(frozen=True, eq=False)
 class WhitePSF(OnWindow):
     """PSF of each type of receptor, Σ_λ w(λ) PSF_λ with weights that sum to 1.
 
-    waves: the PSFs (wavelength, y, x) it is made of. weights: (type, wavelength); between wavelengths PSFs are cubic
-    splines, so that a weight may be a little below 0. coarse: the same of every second wavelength, and 0 between.
-    spectral_error: (type,) predicted relative L2 error of so few wavelengths, a quarter of the difference from every
-        second one: it falls with the fourth power of their number.
+    waves: the PSFs (wavelength, y, x) of the sum. weights: (type, wavelength). Between wavelengths PSFs are cubic
+        splines, so a weight may be slightly negative. coarse: weights for every second wavelength, and 0 between.
+    spectral_error: (type,) predicted relative L2 error due to the number of wavelengths: a quarter of the difference
+        from the result of every second one. It falls with the fourth power of their number.
     """
 
     waves: PSFResult
@@ -64,22 +64,24 @@ class WhitePSF(OnWindow):
 
     @cached_property
     def tensor(self) -> Array:
-        """(type, y, x) in Dr.Jit, with derivatives."""
+        """PSFs in Dr.Jit, (type, y, x), with derivatives."""
         return mixed(self.waves.tensor, self.weights)
 
     @cached_property
     def psf(self) -> np.ndarray:
-        """(type, y, x) [1/m²]."""
+        """PSFs [1/m²], (type, y, x)."""
         return np.asarray(self.tensor.numpy())
 
     @property
     def predicted_error(self) -> np.ndarray:
-        """(type,) relative L2 error over the window, of spectrum and pictures."""
+        """Relative L2 error over the window due to the spectrum and to the PSFs, (type,)."""
         found: np.ndarray = self.spectral_error + self.waves.plan.predicted_error * np.abs(self.weights).sum(axis=1)
         return found
 
     def mtf(self, tolerance: float = 0.02) -> MTF:
-        """|Σ_λ w(λ) OTF_λ| of each type, (type, fy, fx): shifts between colours blur, too. See `optics.mtf`.
+        """Return |Σ_λ w(λ) OTF_λ| of each type, (type, fy, fx), including the blur from shifts between colours.
+
+        See `optics.mtf`.
 
         Raises:
             AccuracyError: see `optics.mtf`.
@@ -90,7 +92,9 @@ class WhitePSF(OnWindow):
         return replace(found.first(count), predicted_error=error)
 
     def strehl_ratio(self, with_error: bool = False) -> np.ndarray | Array:
-        """White peak over that of the same light without aberration, (type,). See `optics.strehl_ratio`.
+        """Return the peak in white light relative to that of the same light without aberration, (type,).
+
+        See `optics.strehl_ratio`.
 
         Raises:
             AccuracyError: see `optics.strehl_ratio`.
@@ -115,7 +119,7 @@ class WhitePSF(OnWindow):
         centre: tuple[float, float] | None = None,
         with_error: bool = False,
     ) -> np.ndarray | Array:
-        """Σ_λ w(λ) of what each wavelength holds, (type, radius). See `optics.encircled_energy`.
+        """Return Σ_λ w(λ) times the encircled energy of each wavelength, (type, radius). See `optics.encircled_energy`.
 
         Raises:
             ValueError: see `optics.encircled_energy`.
@@ -141,28 +145,30 @@ def white_psf(
     tolerance: float = 1e-2,
     **asked: Any,
 ) -> WhitePSF:
-    """PSF in white light, as types of receptors see it: w(λ) ∝ light(λ) λ sensitivity(λ), since they count photons.
+    """Return the PSF in white light for each type of receptor.
+
+    Receptors count photons, so w(λ) ∝ light(λ) λ sensitivity(λ).
 
     light: name of an illuminant, a Spectrum, or spectral power as a function of wavelengths [m].
     receptors: see `optics.receptors_of`; their types, in order.
-    waves: "auto", as few wavelengths over the receptors' range as the tolerance allows; or an odd number of them.
-        Between them PSFs are cubic splines. All are planned as the first one is, where that will do.
-    tolerance: relative L2 error over the window, of the pictures and of the spectrum together. asked: all else that
-        `optics.psf` takes.
+    waves: "auto", the fewest wavelengths over the receptors' range that meet the tolerance; or an odd number of them.
+        Between them PSFs are cubic splines. All use the plan of the first one if it is accurate enough.
+    tolerance: relative L2 error over the window, of PSFs and spectrum together.
+    asked: all other arguments of `optics.psf`.
 
     Raises:
-        ValueError: a bad argument, or light that no receptor of a type sees.
-        AccuracyError: too few wavelengths, with how many would do; or see `optics.psf`.
+        ValueError: an argument is invalid, or a type of receptor does not absorb the light.
+        AccuracyError: there are too few wavelengths (the message states a sufficient number); or see `optics.psf`.
     """
     by_itself = isinstance(waves, str) and waves == "auto"
     count = FIRST if by_itself else whole("waves", waves, 5, MOST_WAVES)
     if count % 2 == 0:
-        raise ValueError(f"waves = {waves}: must be odd, so that every second wavelength reaches as far")
+        raise ValueError(f"waves = {waves}: must be odd, so that every second wavelength covers the same range")
     if "wavelengths" in asked:
-        raise ValueError("wavelengths: those of white light are the receptors' range, in `waves` steps")
+        raise ValueError("wavelengths: must not be given; white light covers the receptors' range in `waves` steps")
     within = in_range("tolerance", tolerance, 1e-12, 0.5) * OF_PICTURES
     kinds = receptors_of(receptors)
-    caught, ends = _caught(light, kinds), kinds.limits_nm
+    caught, ends = _quantum_catch(light, kinds), kinds.limits_nm
     result = psf(pupil, np.linspace(*ends, count) * 1e-9, tolerance=within, **asked)
     while True:
         found = _weighed(result, caught, ends)
@@ -172,8 +178,8 @@ def white_psf(
         if not by_itself or 2 * count - 1 > MOST_WAVES:
             more = 2 * math.ceil(count * (1.2 * worst / within) ** 0.25 / 2) + 1
             raise AccuracyError(
-                f"tolerance = {tolerance:g}: {count} wavelengths carry the spectrum to {worst:.2g}; ask for "
-                f"waves={more}, or 'auto'"
+                f"tolerance = {tolerance:g}: {count} wavelengths resolve the spectrum to {worst:.2g}; use "
+                f"waves={more} or 'auto'"
             )
         count = 2 * count - 1
         result = _with_middles(result, psf(pupil, np.linspace(*ends, count)[1::2] * 1e-9, tolerance=within, **asked))
@@ -189,11 +195,11 @@ def _weighed(result: PSFResult, caught: np.ndarray, ends: tuple[float, float]) -
     return WhitePSF(result, weights, coarse, error)
 
 
-def _caught(light: Any, kinds: Any) -> np.ndarray:
-    """(type, nm): what each type catches, to 1 nm, in shares of all that it does."""
+def _quantum_catch(light: Any, kinds: Any) -> np.ndarray:
+    """Return the normalised quantum catch of each type, to 1 nm, (type, nm)."""
     source = illuminant(light) if isinstance(light, str) else light
     if not isinstance(source, Spectrum) and not callable(source):
-        raise ValueError(f"light = {shown(light)}: must be an illuminant's name, a Spectrum, or a function of [m]")
+        raise ValueError(f"light = {shown(light)}: must be an illuminant's name, a Spectrum or a function of λ [m]")
     nm = _nanometres(kinds.limits_nm)
     given = source.at(nm * 1e-9) if isinstance(source, Spectrum) else reals("light", source(nm * 1e-9))
     power = np.broadcast_to(given, nm.shape)
@@ -203,7 +209,7 @@ def _caught(light: Any, kinds: Any) -> np.ndarray:
     caught[:, [0, -1]] /= 2  # trapezoid rule
     total = caught.sum(axis=1, keepdims=True)
     if not (total > 0).all():
-        raise ValueError(f"light: receptors of type {int(np.argmin(total))} see nothing of it")
+        raise ValueError(f"light: receptors of type {int(np.argmin(total))} absorb none of it")
     found: np.ndarray = caught / total
     return found
 
@@ -213,7 +219,7 @@ def _nanometres(ends: tuple[float, float]) -> np.ndarray:
 
 
 def _splines(nodes: np.ndarray, ends: tuple[float, float]) -> np.ndarray:
-    """(nm, wavelength): the cubic spline that is 1 at one of the nodes [nm] and 0 at the others, for each of them."""
+    """Return cubic splines that are 1 at one of the nodes [nm] and 0 at the others, (nm, wavelength)."""
     from scipy.interpolate import CubicSpline
 
     found: np.ndarray = CubicSpline(nodes, np.eye(len(nodes)))(_nanometres(ends))
@@ -221,7 +227,7 @@ def _splines(nodes: np.ndarray, ends: tuple[float, float]) -> np.ndarray:
 
 
 def _with_middles(result: PSFResult, between: PSFResult) -> PSFResult:
-    """Both, the second's wavelengths between the first's."""
+    """Return both results as one, with the wavelengths of the second between the wavelengths of the first."""
     import drjit as dr
 
     def braided(first: Any, second: Any) -> list[Any]:

@@ -1,8 +1,8 @@
-"""Sampled fields carried from plane to plane. (The integrals behind a PSF are in optics/methods.)
+"""Propagation of sampled fields from plane to plane. (The integrals behind a PSF are in optics/methods.)
 
-propagate           propagate: one stretch of free space
+propagate           propagate: free space between two planes
 system              propagate_through: pupils and free space
-planes              the planes between, sampled for what follows
+planes              intermediate planes, sampled for the light that they transmit
 transfer_function   free space as a filter of plane waves
-transform_sampling  how long a transform's period must be
+transform_sampling  the period of a transform
 """

@@ -1,7 +1,8 @@
-"""A plane of a system, sampled for the light that it has to pass on.
+"""A plane of a system, sampled for the light that it transmits.
 
-A pupil's aperture is softened so that frequencies that can reach the next plane are exact (optics.apertures.aperture),
-and its samples lie so close that what folds back stays beyond them. Sums over samples then converge spectrally.
+The aperture of a pupil is softened such that frequencies that can reach the next plane are exact
+(optics.apertures.aperture). Its samples are so dense that aliases stay beyond these frequencies. Sums over samples then
+converge spectrally.
 """
 
 from __future__ import annotations
@@ -24,12 +25,12 @@ from optics.propagation.transfer_function import kept_band, kept_square
 
 __all__ = ["PlaneField", "PupilSampling", "StepSettings", "Stop"]
 
-REACH_MARGIN = 1.02  # choice, over the planes' half widths: `propagate` adds a sample to each of them
+REACH_MARGIN = 1.02  # choice, relative to the planes' half widths: `propagate` adds a sample to each of them
 
 
 @dataclass(frozen=True)
 class PlaneField:
-    """Samples of a plane; band [1/m]: the highest frequency in them."""
+    """Samples of a plane; band [1/m]: their highest frequency."""
 
     u: np.ndarray
     dx: float
@@ -46,7 +47,7 @@ class PlaneField:
 
 @dataclass(frozen=True)
 class Stop:
-    """A pupil, or the output window (None), `distance` [m] after the stop before, negative backwards."""
+    """A pupil, or the output window (None), `distance` [m] after the previous stop; negative backwards."""
 
     distance: float
     pupil: Pupil | None
@@ -55,7 +56,7 @@ class Stop:
 
 @dataclass(frozen=True)
 class StepSettings:
-    """What is the same at every plane. tolerance: each step's; wavelength: vacuum [m]."""
+    """Settings that are the same at every plane. tolerance: of each step; wavelength: vacuum [m]."""
 
     wavelength: float
     medium_n: float
@@ -69,12 +70,16 @@ class StepSettings:
 
     @property
     def edge_ripple(self) -> float:
-        """The same of soft edges, which rounding keeps from less."""
+        """Ripple of soft edges, which rounding bounds from below."""
         return max(self.ripple, LEAST_RIPPLE)
 
     def reaching(self, half_widths: float, distance: float) -> float:
-        """Highest frequency [1/m] that `propagate` keeps between planes whose half widths add up to so much, its fade
-        included; infinite within one plane. Next to a plane evanescent waves count until they have decayed."""
+        """Return the highest frequency [1/m] that `propagate` keeps between planes, including its fade.
+
+        It is infinite within one plane. Close to a plane, evanescent waves count until they have decayed.
+
+        half_widths: sum of the half widths of the two planes [m].
+        """
         z, wavelength = abs(distance), self.wavelength / self.medium_n
         if z == 0:
             return math.inf
@@ -87,7 +92,7 @@ class StepSettings:
         return math.hypot(1 / wavelength, math.log(1 / self.ripple) / (2 * math.pi * z))
 
     def carried(self, field: PlaneField, distance: float, window: Grid) -> PropagationResult:
-        """Through free space onto a plane's samples."""
+        """Return the field after propagation through free space onto the samples of a plane."""
         return propagate(
             field.u,
             dx=field.dx,
@@ -103,7 +108,7 @@ class StepSettings:
 
 @dataclass(frozen=True)
 class PupilSampling:
-    """A pupil's samples, its soft aperture, and the band [1/m] that they pass on."""
+    """Samples of a pupil, its soft aperture, and the band [1/m] that they transmit."""
 
     pupil: Pupil
     source: PointSource
@@ -112,45 +117,47 @@ class PupilSampling:
     band: float
 
     @classmethod
-    def of(
+    def for_stop(
         cls, stop: Stop, following: Stop, settings: StepSettings, source: PointSource, arriving: float
     ) -> PupilSampling:
-        """arriving: the highest frequency [1/m] of the light that arrives.
+        """Return the sampling of the pupil at a stop.
 
-        That and the pupil's phase turn, and meet the edge's frequencies; what they make together beyond the band may
-        fold back, but not into the band.
+        The frequencies of the arriving light, of the pupil's phase and of its edge add up. Sums beyond the band may
+        alias, but not into the band.
+
+        arriving: highest frequency [1/m] of the arriving light.
 
         Raises:
-            AccuracyError: more samples than there may be.
+            AccuracyError: more samples are necessary than the limit allows.
         """
         pupil = stop.pupil
         assert pupil is not None
         if pupil.pixels:
             raise ValueError(
-                "elements: a PixelRelief jumps, which the grids between planes cannot carry: use psf for one"
+                "elements: a PixelRelief has jumps, which the grids between planes cannot represent: use psf for it"
             )
         slope = SLOPE_MARGIN * pupil.slopes(settings.wavelength, source).steepest / settings.wavelength
         turns = arriving + slope + pupil.bandwidth(settings.wavelength, settings.edge_ripple)
         band = settings.reaching(stop.half_width + following.half_width, following.distance)
         if math.isinf(band):
-            band = turns  # seen in its own plane: an edge as soft as the light's own detail
+            band = turns  # the next plane is this plane: the edge is as soft as the finest detail of the light
         soft = pupil.aperture.soften((turns + band) * pupil.radius, settings.edge_ripple, EDGE_REACH)
         pitch = 1 / (turns + band + soft.stopband / pupil.radius)
         across = 2 * math.ceil((1 + soft.reach) * pupil.radius / pitch) + 1
         if across > MOST_SAMPLES:
             raise AccuracyError(
                 f"a pupil of radius {pupil.radius:.3g} m needs {across} samples across; the limit is {MOST_SAMPLES}: "
-                "widen the tolerance, flatten its relief, or move the planes beside it further away"
+                "widen the tolerance, flatten its relief, or move the adjacent planes further away"
             )
         return cls(pupil, source, Grid.square(across, pitch), soft, band)
 
     def transmitted(self, u: np.ndarray | float, settings: StepSettings) -> PlaneField:
-        """The field u on the grid, times the pupil's transmittance (its conjugate backwards)."""
+        """Return the field u on the grid times the pupil's transmittance (its conjugate backwards)."""
         import drjit as dr
 
         beam = Beam(self.pupil, self.source, settings.wavelength, math.inf)
         field = beam.behind(self.soft, self.grid, precision(settings.dtype))
         if dr.grad_enabled(field.re, field.im):
-            raise ValueError("elements: a system carries no derivatives; use psf for a single pupil")
+            raise ValueError("elements: a system has no derivatives; use psf for a single pupil")
         transmittance = field.numpy()
         return PlaneField(u * (transmittance.conj() if settings.backward else transmittance), self.grid.dx, self.band)

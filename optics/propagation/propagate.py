@@ -1,13 +1,13 @@
-"""A sampled field carried from plane to plane by its angular spectrum.
+"""Propagation of a sampled field from plane to plane by its angular spectrum.
 
-The samples stand for the band-limited function through them, zero outside. Their spectrum is multiplied by the transfer
-function of free space and summed again wherever the result is wanted:
+The samples represent the band-limited function through them, zero outside. Their spectrum is multiplied by the transfer
+function of free space and summed at the output samples:
 
     U(x, y; z) = F⁻¹{F{U₀} H}     (Goodman, §3.10.2; H in optics.propagation.transfer_function)
 
-A finite transform repeats the field every period. The period is chosen so that light aimed anywhere near the window
-lands there once; light aimed farther is faded out before it can wrap around, and what the spectrum holds too near to
-grazing for either is counted into the predicted error.
+A finite transform repeats the field every period. The period is chosen such that light that lands near the window is
+represented once. Light that lands farther away is faded out before it can wrap around. Light that is too near grazing
+incidence for either is included in the predicted error.
 """
 
 from __future__ import annotations
@@ -30,23 +30,29 @@ from optics.propagation.transform_sampling import TransformSampling, blur_left, 
 __all__ = ["PROPAGATION_METHODS", "WRAP_RIPPLE_PER_TOLERANCE", "PropagationResult", "propagate"]
 
 PROPAGATION_METHODS = ("angular_spectrum", "fresnel")
-# Choice. Share of faded light that strays into the window: small, because the window may hold far less than is faded.
+# Choice: fraction of faded light that strays into the window. It is small, because the window may contain far less
+# light than is faded.
 WRAP_RIPPLE_PER_TOLERANCE = 3e-3
-# Choice. First room for the blur of light cut at Nyquist's frequency [√(λz)].
+# Choice: initial padding for the blur of light truncated at the Nyquist frequency [√(λz)].
 SPARE = 1.0
-# Choice. The estimate of that blur is good to a factor of two or three: carried again is only what is clearly too much.
+# Choice: factor on the allowed blur before a field is propagated again. The estimate of the blur is accurate to a
+# factor of two or three.
 CLEARLY = 1.5
-# Choice. So many times the light that arrives may be missing and cost next to nothing of the tolerance.
+# Choice: light that is missing, relative to the light that arrives, from which on the evanescent part is subtracted.
+# Less light uses next to nothing of the tolerance.
 MUCH = 100.0
 
-HELD = (1e-20, 1e30)  # powers [Σ|u|²] of which float32 holds the parts that errors are told by, too
-ONE = np.ones(1)  # the weight of what counts whole
+HELD = (1e-20, 1e30)  # powers [Σ|u|²] for which float32 also represents the terms of the error estimate
+ONE = np.ones(1)  # marks a sum without weights
 
 
 @dataclass(frozen=True, eq=False)
 class PropagationResult(OnWindow):
-    """u: complex field (…, y, x) at pitch dx [m], centre sample n//2. plan: how it was computed, and how well. window:
-    its samples, also `x` and `y` [m]."""
+    """A propagated field.
+
+    u: complex field (…, y, x) at pitch dx [m], centre sample n//2. plan: method and predicted error. window: the
+        samples of u, also `x` and `y` [m].
+    """
 
     u: np.ndarray
     dx: float
@@ -62,8 +68,11 @@ class PropagationResult(OnWindow):
 
     @cached_property
     def evanescent_power(self) -> float:
-        """Fraction of the input's power in waves that do not propagate (of several planes, the largest). Forwards they
-        decay; backwards they are dropped, since undoing the decay would amplify noise without bound."""
+        """Fraction of the input's power in waves that do not propagate (for several planes, the largest).
+
+        Forwards these waves decay. Backwards they are dropped, because undoing the decay would amplify noise without
+        bound.
+        """
         return max(_evanescent_share(plane, self._sampling) for plane in self._source)
 
 
@@ -81,17 +90,17 @@ def propagate(
     method: str = "auto",
     dtype: str = "float32",
 ) -> PropagationResult:
-    """Field at `distance` [m] behind (or, negative, before) the plane in which it is u, carrier exp(ikz) included.
+    """Return the field at `distance` [m] behind (or, negative, before) the plane of u, including the carrier exp(ikz).
 
     u: complex (…, y, x), pitch dx [m], centre sample n//2. wavelength: vacuum [m].
-    out_dx, out_shape, out_centre: pitch, shape (y, x) and centre (x, y) [m] wanted; default as u's, on the axis.
-    tolerance: relative L2 error of the intensity over the window, beyond that of the sampling of u itself;
-        where what u holds at Nyquist's frequency errs by more, the plan says so.
+    out_dx, out_shape, out_centre: pitch, shape (y, x) and centre (x, y) [m] of the output; default as u's, on the axis.
+    tolerance: relative L2 error of the intensity over the window, in addition to that of the sampling of u itself. If
+        light at the Nyquist frequency of u causes a larger error, the plan states it.
     method: "auto" and "angular_spectrum" are exact; "fresnel" is the paraxial approximation, only on request.
 
     Raises:
-        ValueError: bad argument, named with its value and valid range.
-        AccuracyError: the tolerance cannot be met; says what can.
+        ValueError: an argument is invalid; the message names it with its value and valid range.
+        AccuracyError: the tolerance cannot be met; the message states which one can.
     """
     if not isinstance(method, str) or method not in ("auto", *PROPAGATION_METHODS):
         raise ValueError(f"method = {shown(method)}: must be 'auto' or one of {', '.join(PROPAGATION_METHODS)}")
@@ -102,7 +111,7 @@ def propagate(
     lit = _lit(given)
     source = Grid(lit.shape[-2:], dx)
     sources = lit.reshape(-1, *source.shape)
-    if np.may_share_memory(sources, u):  # the result keeps them, whatever becomes of u
+    if np.may_share_memory(sources, u):  # the result stores them, so later changes of u must not affect them
         sources = sources.copy()
     in_range("tolerance", tolerance, 10 * FLOAT_NOISE[precision(dtype).dtype], 0.5)
     passage = Passage(
@@ -118,8 +127,8 @@ def propagate(
     error = max(plane.error for plane in planes)
     if not error <= tolerance:
         raise AccuracyError(
-            f"tolerance = {tolerance:g}: too much of the light leaves so flat, or so little of it meets the window, "
-            f"that the error reaches {error:.1g}; ask for that, or for a larger out_shape"
+            f"tolerance = {tolerance:g}: the error reaches {error:.1g}, because too much of the light is near grazing "
+            "incidence or too little of it hits the window; widen the tolerance or enlarge out_shape"
         )
     plan = _plan(how, error, _untold(planes, tolerance), dtype)
     return PropagationResult(out, window.dx, plan, window, sources, how)
@@ -135,8 +144,10 @@ def _field(u: np.ndarray) -> np.ndarray:
 
 
 def _lit(field: np.ndarray) -> np.ndarray:
-    """The smallest part around the centre sample that holds all light: darkness around it would be carried at the same
-    cost."""
+    """Return the smallest part around the centre sample that contains all light.
+
+    Darkness around it would be propagated at the same cost.
+    """
     for axis in (-2, -1):
         n = field.shape[axis]
         lit = np.flatnonzero(field.any(axis=tuple(a for a in range(field.ndim) if a != field.ndim + axis)))
@@ -148,8 +159,11 @@ def _lit(field: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class _Carried:
-    """u (y, x): the propagated plane; error: predicted, of its intensity; blur: beyond that, by what the samples
-    hold at Nyquist's frequency."""
+    """A propagated plane.
+
+    u: (y, x). error: predicted error of its intensity. blur: additional error from light at the Nyquist frequency of
+        the samples.
+    """
 
     u: np.ndarray
     error: float
@@ -159,10 +173,10 @@ class _Carried:
 def _with_room(
     sources: np.ndarray, passage: Passage, grids: tuple[Grid, Grid], tolerance: float, types: Precision
 ) -> tuple[TransformSampling, list[_Carried]]:
-    """The planes, carried with as much room as their light at Nyquist's frequency asks for.
+    """Return the planes, propagated with the padding that the light at the Nyquist frequency requires.
 
-    None is made where even all that is worth making would not do: what blurs so far belongs to the error of the
-    samples themselves, and more room brings them no nearer to what they stand for.
+    No padding is added if even the largest useful padding is insufficient. Such a blur is an error of the samples
+    themselves, and more padding would not reduce it.
     """
     most = most_spare(passage, grids[0])
     spare = min(SPARE * math.sqrt(passage.wavelength * abs(passage.z)), most)
@@ -171,7 +185,7 @@ def _with_room(
     blur = max(plane.blur for plane in planes)
     allowed = CLEARLY * (tolerance - max(plane.error for plane in planes))
     if spare < most and blur > allowed and blur * blur_left(how, sampling(passage, *grids, most)) < allowed:
-        # The blur falls like 1 / spare. Choice: a fifth more room than that asks for.
+        # The blur falls like 1 / spare. Choice: a fifth more padding than this implies.
         how = sampling(passage, *grids, min(1.2 * CLEARLY * blur / allowed * spare, most))
         planes = [_one(plane, how, types) for plane in sources]
     return how, planes
@@ -182,7 +196,7 @@ def _one(plane: np.ndarray, how: TransformSampling, types: Precision) -> _Carrie
     with np.errstate(over="ignore"):
         plane = np.ascontiguousarray(given, dtype=types.complex_dtype)
         total = _power(plane)
-    if not HELD[0] < total < HELD[1]:  # in parts of the brightest, of which float32 holds the powers
+    if not HELD[0] < total < HELD[1]:  # divided by the brightest sample, so that float32 can represent the powers
         brightest = float(np.abs(given).max(initial=0.0))
         if brightest == 0:
             return _Carried(np.zeros(how.window.shape, types.complex_dtype), 0.0, 0.0)
@@ -196,8 +210,8 @@ def _one(plane: np.ndarray, how: TransformSampling, types: Precision) -> _Carrie
     grazing = _power(spectrum, space.grazing) / how.period**2
     blurred = blurred_back(spectrum, how)
     spectrum *= space.transfer
-    # Parseval: what does not pass was faded or evanescent. In float32 the difference is rounding, which is little
-    # beside what the fade leaves of it.
+    # By Parseval's theorem, missing power was faded or evanescent. In float32 the difference is a rounding error, which
+    # is small compared with the remainder of the fade.
     faded = max(total - _power(spectrum) * how.period**2, 0.0) if how.passage.band.fade else 0.0
     if how.step:
         result = periodic_sum(spectrum, how.period, how.step, how.window.shape)
@@ -215,7 +229,7 @@ def _one(plane: np.ndarray, how: TransformSampling, types: Precision) -> _Carrie
 
 
 def _evanescent_share(plane: np.ndarray, how: TransformSampling) -> float:
-    """Of a plane's power."""
+    """Return the evanescent fraction of a plane's power."""
     total = _power(plane)
     if total == 0 or how.passage.paraxial:
         return 0.0
@@ -226,7 +240,7 @@ def _evanescent_share(plane: np.ndarray, how: TransformSampling) -> float:
 
 
 def _power(u: np.ndarray, weight: np.ndarray | None = ONE) -> float:
-    """Σ w |u|², weights of real and imaginary parts; 0 without a weight."""
+    """Return Σ w |u|² with weights of real and imaginary parts; 0 if the weight is None."""
     if weight is None:
         return 0.0
     if weight is ONE:
@@ -237,10 +251,12 @@ def _power(u: np.ndarray, weight: np.ndarray | None = ONE) -> float:
 
 @lru_cache(maxsize=4)
 def _free_space(how: TransformSampling, dtype: str) -> TransferFunction:
-    """Over the spectrum, with the sums' scale. The same distance is often travelled again; the transfer function costs
-    more than the transforms."""
+    """Return the transfer function over the spectrum, including the scale of the sums.
+
+    It is cached, because the same distance is often used again and it costs more than the transforms.
+    """
     step = 1 / (how.period * how.source.dx)
-    if how.step:  # the spectrum is (fx, fy)
+    if how.step:  # the axes of the spectrum are (fx, fy)
         fx, fy = (kept_indices(n) * step for n in (how.across, how.period))
         space = replace(how.passage, centre=how.passage.centre[::-1]).over(fy, fx, precision(dtype))
     else:
@@ -251,18 +267,23 @@ def _free_space(how: TransformSampling, dtype: str) -> TransferFunction:
 
 
 def _untold(planes: list[_Carried], tolerance: float) -> str:
-    """What the samples themselves err by, if it is more than the tolerance: that is not in the predicted error."""
+    """Return a note on the error of the samples themselves if it exceeds the tolerance, else an empty string.
+
+    The predicted error does not include it.
+    """
     blur = max(plane.blur for plane in planes)
     if blur <= tolerance:
         return ""
-    return f"; u's light at Nyquist's frequency blurs by about {blur:.1g}: sample u more finely, or soften its edges"
+    return (
+        f"; light at u's Nyquist frequency adds an error of about {blur:.1g}: sample u more finely or soften its edges"
+    )
 
 
 def _plan(how: TransformSampling, error: float, untold: str, dtype: str) -> Plan:
     band = how.passage.band
     kept = f"band {band.kept * how.passage.wavelength:.2g} n/λ" if band.fade else "the whole spectrum of u"
     period = how.period * how.source.dx
-    why = f"period {period:.3g} m, {kept}" + ("; paraxial, as asked" if how.passage.paraxial else "") + untold
+    why = f"period {period:.3g} m, {kept}" + ("; paraxial, as requested" if how.passage.paraxial else "") + untold
     spectrum = how.across, how.across
     seconds = predicted_seconds(how.source.shape, how.period, spectrum)
     seconds += predicted_seconds(spectrum, period / how.window.dx, how.window.shape)

@@ -1,4 +1,4 @@
-"""A field carried plane to plane through pupils and free space, forwards or backwards."""
+"""Propagation of a field from plane to plane through pupils and free space, forwards or backwards."""
 
 from __future__ import annotations
 
@@ -39,12 +39,12 @@ class FreeSpace:
 
 @dataclass(frozen=True)
 class SystemStep:
-    """What happened on the way to one plane.
+    """Power and accuracy of the propagation to one plane.
 
     distance [m], negative backwards. plan: how it was computed; its error is relative to the light within the window.
-    power_in, power_out [intensity m²]: what set out, and what arrived within the window.
+    power_in, power_out [intensity m²]: light that starts, and light that arrives within the window.
     evanescent_power: fraction of power_in in waves that do not propagate (see PropagationResult), as far as the samples
-        carry them: what cannot reach the next plane was not sampled.
+        include them. Waves that cannot reach the next plane are not sampled.
     """
 
     distance: float
@@ -56,8 +56,11 @@ class SystemStep:
 
 @dataclass(frozen=True, eq=False)
 class StackResult(OnWindow):
-    """u: complex field (y, x) at pitch dx [m], centre sample n//2. predicted_error: relative L2 of its intensity.
-    window: its samples, also `x` and `y` [m]."""
+    """A field behind a system.
+
+    u: complex field (y, x) at pitch dx [m], centre sample n//2. predicted_error: relative L2 error of its intensity.
+        window: its samples, also `x` and `y` [m].
+    """
 
     u: np.ndarray
     dx: float
@@ -84,19 +87,19 @@ def propagate_through(
     dtype: str = "float32",
     backward: bool = False,
 ) -> StackResult:
-    """Field behind a system of pupils and free space, carrier exp(ikz) included.
+    """Return the field behind a system of pupils and free space, including the carrier exp(ikz).
 
-    elements: in the order in which light meets them when it goes forwards; all in one medium.
-    u: complex (y, x) in the plane before the first element, pitch dx [m], zero outside; or None: the first element is
-        a pupil that `source` shines on (by default a plane wave of unit amplitude).
-    wavelength: vacuum [m]. out_dx, out_shape: pitch and shape (y, x) wanted; default as u's.
-    tolerance: relative L2 error of the intensity over the window, beyond that of the sampling of u itself.
-    backward: u lies behind the last element and is carried back to before the first, undoing distances and phases;
-        what apertures blocked and what decayed does not come back.
+    elements: in the order in which light passes them forwards; all in one medium.
+    u: complex (y, x) in the plane before the first element, pitch dx [m], zero outside. If u is None, the first element
+        is a pupil that `source` illuminates (by default a plane wave of unit amplitude).
+    wavelength: vacuum [m]. out_dx, out_shape: pitch and shape (y, x) of the output; default as u's.
+    tolerance: relative L2 error of the intensity over the window, in addition to that of the sampling of u itself.
+    backward: u lies behind the last element and is propagated back to the plane before the first one. Distances and
+        phases are undone. Light that apertures blocked or that decayed is not restored.
 
     Raises:
-        ValueError: bad argument, named with its value and valid range; or a parameter that carries derivatives.
-        AccuracyError: the tolerance cannot be met; says what can.
+        ValueError: an argument is invalid (named with its value and valid range), or a parameter carries derivatives.
+        AccuracyError: the tolerance cannot be met; the message states which one can.
     """
     if isinstance(elements, str) or not isinstance(elements, Sequence):
         raise ValueError(f"elements = {shown(elements)}: must be a list of Pupil and FreeSpace")
@@ -104,10 +107,10 @@ def propagate_through(
         of_kind("source", source, PointSource, "PointSource(), a plane wave")
     field, window, brightest = _start(u, dx, out_dx, out_shape)
     if backward and field is None:
-        raise ValueError("u = None: must be given, behind the last element, to be carried back")
+        raise ValueError("u = None: must be given, behind the last element, for backward propagation")
     stops = _stops(elements, backward, window)
     if field is None and (stops[0].pupil is None or stops[0].distance != 0):
-        raise ValueError("u = None: must be given, unless the first element is a Pupil for a source to shine on")
+        raise ValueError("u = None: must be given unless the first element is a Pupil, which a source can illuminate")
     if field is not None and source is not None:
         raise ValueError("source: must not be given with u")
     each = in_range("tolerance", tolerance, 10 * FLOAT_NOISE[precision(dtype).dtype], 0.5) / (2 * len(stops))
@@ -119,7 +122,7 @@ def propagate_through(
         sampling = None
         if stop.pupil is not None:
             at = source or PointSource() if field is None else PointSource()
-            sampling = PupilSampling.of(stop, stops[i + 1], settings, at, _arriving(field, stop, settings))
+            sampling = PupilSampling.for_stop(stop, stops[i + 1], settings, at, _arriving(field, stop, settings))
         grid = window if sampling is None else sampling.grid
         if field is not None:
             out = settings.carried(field, stop.distance, grid)
@@ -137,11 +140,14 @@ def propagate_through(
 def _start(
     u: np.ndarray | None, dx: float | None, out_dx: float | None, out_shape: tuple[int, int] | None
 ) -> tuple[PlaneField | None, Grid, float]:
-    """The field before the first stop (None: a source's, on the first pupil) in parts of its brightest sample, the
-    output window, and the size of that sample: float32 does not hold powers of all fields."""
+    """Return the field before the first stop, the output window, and the modulus of the brightest sample.
+
+    The field is None if a source illuminates the first pupil. It is divided by its brightest sample, because float32
+    cannot represent the power of every field.
+    """
     if u is None:
         if out_dx is None or out_shape is None:
-            raise ValueError("out_dx, out_shape: must be given where u is not")
+            raise ValueError("out_dx, out_shape: must be given if u is not")
         return None, Grid(shape_2d("out_shape", out_shape), positive("out_dx", out_dx)), 1.0
     samples = complexes("u", u)
     if samples.ndim != 2 or samples.size == 0 or not np.isfinite(samples).all():
@@ -156,7 +162,10 @@ def _start(
 
 
 def _stops(elements: Sequence[Pupil | FreeSpace], backward: bool, window: Grid) -> list[Stop]:
-    """Pupils with the distances before them, ending with the output window. Free space adds up: that is exact."""
+    """Return the pupils with the distances before them, and the output window as the last stop.
+
+    Adjacent stretches of free space are added, which is exact.
+    """
     if not elements:
         raise ValueError("elements is empty: must hold at least one Pupil or FreeSpace")
     stops: list[Stop] = []
@@ -179,7 +188,9 @@ def _medium(elements: Sequence[Pupil | FreeSpace]) -> float:
     for element in elements:
         index = element.medium_n
         if isinstance(index, Dispersion) or (isinstance(element, Pupil) and element.object_n is not None):
-            raise ValueError("elements: media that differ before and behind a pupil, or disperse, are psf's alone")
+            raise ValueError(
+                "elements: only psf supports dispersive media, and media that differ before and behind a pupil"
+            )
         found.add(float(index))
     media = sorted(found)
     if len(media) > 1:
@@ -188,17 +199,22 @@ def _medium(elements: Sequence[Pupil | FreeSpace]) -> float:
 
 
 def _arriving(field: PlaneField | None, stop: Stop, settings: StepSettings) -> float:
-    """Highest frequency [1/m] of the light that arrives at a stop; a source's counts with the pupil's own phase."""
+    """Return the highest frequency [1/m] of the light that arrives at a stop.
+
+    The frequencies of a source are part of the pupil's own phase.
+    """
     if field is None:
         return 0.0
     return min(field.band, settings.reaching(field.half_width + stop.half_width, stop.distance))
 
 
 def _error(steps: list[SystemStep], tolerance: float, settings: StepSettings) -> float:
-    """Errors of the steps, and of the soft edges between them, each as much larger as the light since has dwindled.
+    """Return the sum of the errors of the steps and of the soft edges between them.
+
+    Each error is multiplied by the loss of light since.
 
     Raises:
-        AccuracyError: they exceed the tolerance.
+        AccuracyError: the sum exceeds the tolerance.
     """
     last = steps[-1].power_out
     if last == 0:
@@ -208,7 +224,7 @@ def _error(steps: list[SystemStep], tolerance: float, settings: StepSettings) ->
     error += sum(edges * math.sqrt(max(step.power_in / last, 1)) for step in steps)
     if not error <= tolerance:
         raise AccuracyError(
-            f"tolerance = {tolerance:g}: so little of the light meets the last window that the error reaches "
-            f"{error:.1g}; ask for that, or for a larger out_shape"
+            f"tolerance = {tolerance:g}: the error reaches {error:.1g}, because too little of the light hits the last "
+            "window; widen the tolerance or enlarge out_shape"
         )
     return error

@@ -1,10 +1,10 @@
-"""Free space between two planes as a filter: which frequencies may matter, and the transfer function over them.
+"""Free space between two planes as a filter: the frequencies that may matter, and the transfer function over them.
 
     H = exp(2πi z √((n/λ)² - fx² - fy²))     (Goodman, §3.10.2)
 
-Light of a frequency walks z tan θ to the side. What walks farther than from one plane's far edge to the other's is
-faded out before it can wrap around: a narrow fade blurs far, so that the band must reach as far outside the window; a
-wide one lets light walk far before it is gone.
+Light of a frequency moves z tan θ to the side. Light that moves farther than from the far edge of one plane to the far
+edge of the other is faded out before it can wrap around. A narrow fade blurs over a large distance, so the band must
+include light that far outside the window. A wide fade keeps light that moves far to the side.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ from optics.numerics.precision import Precision, opaque, padded_for_packets
 
 __all__ = ["PERIOD_MAX_SINE", "Band", "TransferFunction", "evanescent", "kept_band", "kept_square", "walk"]
 
-# Choice. Steepest light that a period makes room for, as sin θ; z tan θ has no bound beyond.
+# Choice: steepest light that a period allows for, as sin θ; beyond it z tan θ has no bound.
 PERIOD_MAX_SINE = 0.995
-# Choice. Steepest fade along the axes, one by one: towards grazing they would be ever narrower.
+# Choice: steepest fade along each axis; towards grazing incidence fades would become ever narrower.
 STEEPEST_SQUARE = 0.8
-# Choice, in parts of the blur: what a fade blurs lands outside its own walk as well, though less, its last part being
-# dark.
+# Choice, relative to the blur: a fade also blurs beyond the distance that its own light moves. That part is smaller,
+# because the end of a fade is dark.
 OUTWARDS = 0.6
 # Choice: widths of the fade to try, as sines.
 FADE_SINES = np.geomspace(0.003, 0.6, 33)
@@ -37,10 +37,12 @@ FADE_SINES = np.geomspace(0.003, 0.6, 33)
 
 @dataclass(frozen=True)
 class Band:
-    """Light kept whole up to `kept` [1/m], gone at kept + fade; kept is infinite where nothing may fade.
+    """Light that is kept up to `kept` [1/m] and faded out from there to kept + fade.
 
-    square: along each axis by itself, whatever the frequency along the other; else by the angle to the axis.
-    walk: how far [m] to the side the last of it goes, blur included.
+    kept is infinite if nothing may fade.
+    square: whether the fade acts along each axis separately, independent of the frequency along the other; else it acts
+        on the angle to the axis.
+    walk: distance [m] that the outermost kept light moves to the side, including the blur.
     """
 
     kept: float
@@ -53,7 +55,10 @@ class Band:
         return self.kept + self.fade
 
     def diagonal(self, wavelength: float) -> float:
-        """Highest frequency [1/m] of a square band, along its diagonal: fx = fy and fx / √(1 - λ²fy²) = end."""
+        """Return the highest frequency [1/m] of a square band.
+
+        It lies on the diagonal: fx = fy and fx / √(1 - λ²fy²) = end.
+        """
         return math.sqrt(2) * self.end / math.hypot(1, self.end * wavelength)
 
 
@@ -61,22 +66,24 @@ EVERYTHING = Band(math.inf, 0.0, math.inf)
 
 
 def walk(frequency: float, wavelength: float, z: float, paraxial: bool = False) -> float:
-    """How far [m] to the side light of a spatial frequency [1/m] travels."""
+    """Return the distance [m] that light of a spatial frequency [1/m] moves to the side."""
     sine = frequency * wavelength
     return z * (sine if paraxial else sine / math.sqrt(1 - sine * sine))
 
 
 def kept_band(corner: float, wavelength: float, z: float, ripple: float, paraxial: bool = False) -> Band:
-    """Band kept whole for light that may walk `corner` [m] to the side over z, and the fade beyond it, that need the
-    shortest period; `EVERYTHING` where nothing may fade."""
+    """Return the band for light that may move `corner` [m] to the side over z, with the shortest period.
+
+    The band includes the fade beyond it. `EVERYTHING` if nothing may fade.
+    """
     return _shortest(corner, wavelength, z, ripple, paraxial, square=False)
 
 
 def kept_square(half: float, wavelength: float, z: float, ripple: float, paraxial: bool = False) -> Band:
-    """The same for light that may walk `half` [m] along each axis: a window's side is nearer than its corner.
+    """Return the band for light that may move `half` [m] along each axis, because sides are nearer than corners.
 
-    Along x it is fx / √(1 - λ²fy²) that tells how far light walks, so that the fade follows that. Its gradient blurs
-    farther than a fade in fx alone would.
+    Along x the distance depends on fx / √(1 - λ²fy²), so the fade acts on this expression. Because of its gradient the
+    blur is larger than that of a fade in fx alone.
     """
     return _shortest(half, wavelength, z, ripple, paraxial, square=True)
 
@@ -87,7 +94,8 @@ def _shortest(distance: float, wavelength: float, z: float, ripple: float, parax
     best = EVERYTHING
     for fade in FADE_SINES / wavelength if z else ():
         band = 0.0
-        for _ in range(3 if square and not paraxial else 1):  # the band and its fade's gradient depend on each other
+        # The band and the gradient of its fade depend on each other.
+        for _ in range(3 if square and not paraxial else 1):
             sine = (band + fade) * wavelength
             if not paraxial and sine >= steepest:
                 break
@@ -104,15 +112,18 @@ def _walk(band: Band) -> float:
 
 
 def _gradient(sine: float) -> float:
-    """Largest |∇(fx / √(1 - λ²fy²))| where both axes' values stay below `sine`."""
+    """Return the largest |∇(fx / √(1 - λ²fy²))| for values below `sine` along both axes."""
     cosine2 = 1 - sine * sine
     return math.sqrt((1 + sine**4 / cosine2) / cosine2)
 
 
 @lru_cache(maxsize=4)
 def evanescent(samples: int, dx: float, wavelength: float) -> np.ndarray:
-    """How much of each frequency of a whole spectrum, (samples, samples) in FFT order, does not propagate. A cell of
-    frequencies on the circle f = n/λ counts by how far it reaches outside: an error of its width squared."""
+    """Return the fraction of each frequency of a whole spectrum that does not propagate.
+
+    The result is (samples, samples) in FFT order. A cell on the circle f = n/λ has the fraction of it that lies
+    outside, approximated by a straight edge. The error is of the order of the cell's width squared.
+    """
     f = np.fft.fftfreq(samples) * wavelength / dx
     share: np.ndarray = np.clip((np.hypot(f[None, :], f[:, None]) - 1) * samples * dx / wavelength + 0.5, 0, 1)
     return share
@@ -120,7 +131,10 @@ def evanescent(samples: int, dx: float, wavelength: float) -> np.ndarray:
 
 @lru_cache(maxsize=8)
 def _fade_table(ripple: float) -> Interpolant:
-    """1 at 0, 0 at 1: the rest of a Kaiser window's integral. It blurs by β/(π fade) and, beyond, by `ripple`."""
+    """Return a fade from 1 at 0 to 0 at 1: the complement of the integral of a Kaiser window.
+
+    It blurs by β/(π fade); beyond that, `ripple` remains.
+    """
     beta = kaiser_beta(ripple)
     nodes, weights = np.polynomial.legendre.leggauss(math.ceil(beta) + 24)
 
@@ -132,13 +146,17 @@ def _fade_table(ripple: float) -> Interpolant:
         return whole
 
     total = left(np.zeros(1))[0]
-    return Interpolant.of(lambda t: left(t) / total, (0.0, 1.0), beta / math.pi, 0.1 * ripple)
+    return Interpolant.from_function(lambda t: left(t) / total, (0.0, 1.0), beta / math.pi, 0.1 * ripple)
 
 
 @dataclass(frozen=True, eq=False)
 class TransferFunction:
-    """Over a spectrum: the transfer function, with everything that does not depend on the field, and how much of each
-    frequency is too near grazing, for real and imaginary parts (fy, 2 fx) (None: nothing is)."""
+    """Factors over a spectrum.
+
+    transfer: the transfer function, with all factors that do not depend on the field.
+    grazing: fraction of each frequency that is too near grazing incidence, for real and imaginary parts (fy, 2 fx);
+        None if all are 0.
+    """
 
     transfer: np.ndarray
     grazing: np.ndarray | None
@@ -146,8 +164,11 @@ class TransferFunction:
 
 @dataclass(frozen=True)
 class Passage:
-    """What a transfer function is of. centre: where the window is (x, y) [m]; ripple: what a fade leaves of the light
-    beyond it; evanescent waves decay forwards and are dropped backwards (z < 0)."""
+    """Parameters of a transfer function.
+
+    centre: position of the window (x, y) [m]. ripple: remainder of the light beyond a fade. Evanescent waves decay
+        forwards and are dropped backwards (z < 0).
+    """
 
     wavelength: float
     z: float
@@ -157,7 +178,7 @@ class Passage:
     centre: tuple[float, float]
 
     def over(self, fx: np.ndarray, fy: np.ndarray, types: Precision) -> TransferFunction:
-        """At frequencies fx (column), fy (row) [1/m]."""
+        """Return the transfer function at frequencies fx (column), fy (row) [1/m]."""
         grazing = None
         if math.isinf(self.band.kept) and self.z != 0 and not self.paraxial:
             sine = np.hypot(fx[None, :], fy[:, None]) * self.wavelength
@@ -166,7 +187,10 @@ class Passage:
         return TransferFunction(self._transfer(fx, fy, types), weight)
 
     def _transfer(self, fx: np.ndarray, fy: np.ndarray, types: Precision) -> np.ndarray:
-        """H under the fade, with the way to the window's centre; whole waves are dropped in float64."""
+        """Return H under the fade, including the displacement to the window's centre.
+
+        Whole waves are subtracted in float64.
+        """
         import drjit as dr
 
         grid = Grid((len(fy), len(fx)), 1.0)

@@ -1,17 +1,18 @@
-"""The period of a finite transform: long enough that what walks out of it does not come back into the window.
+"""The period of a finite transform: long enough that light does not wrap around into the window.
 
-A finite transform repeats the field every period. Light aimed anywhere near the window has to land there once; light
-aimed farther is faded out before it can wrap around. Light of frequency f walks z tan θ to the side, sin θ = λ|f|.
+A finite transform repeats the field every period. Light that lands near the window must be represented once. Light that
+lands farther away is faded out before it can wrap around. Light of frequency f moves z tan θ to the side, sin θ = λ|f|.
 
-Where nothing can fade, the spectrum ends at Nyquist's frequency f_N as if cut there, and what is cut blurs. Along one
-axis the field is ∫ S(f) e^{2πi (f x + z √(1/λ² - f²))} df up to f_N, and the end of the integral alone gives
+If nothing can be faded, the spectrum is truncated at the Nyquist frequency f_N, which causes a blur. Along one axis the
+field is ∫ S(f) e^{2πi (f x + z √(1/λ² - f²))} df up to f_N, and the end of the integral alone gives
 
     |b(x)| = |S(f_N)| / (2π d),   d = |x - walk(f_N)|,                                                             (1)
 
-2πd being the derivative of the phase there (the first term of an integral's expansion about its end; Bleistein &
-Handelsman, Asymptotic Expansions of Integrals, §3.2). That falls slowly: the next period's blur reaches the window. A
-source of width L that holds such light evenly and incoherently, repeated so that a gap g is left between its walked
-light and a window of width W, brings into the window, per power |S|² of the spectrum's end,
+where 2πd is the derivative of the phase (the first term of an integral's expansion about its end; Bleistein &
+Handelsman, Asymptotic Expansions of Integrals, §3.2). This decreases so slowly that the blur of the next period reaches
+the window. Consider a source of width L that emits such light evenly and incoherently. Between its displaced light in
+the next period and a window of width W lies a gap g. Per power |S|² at the end of the spectrum, the source contributes
+to the window
 
     ∫_0^L ds/L ∫_0^W dx / (2π (g + s + x))² = ln(1 + L W / (g (g + L + W))) / (4π² L).                             (2)
 """
@@ -31,17 +32,20 @@ from optics.propagation.transfer_function import EVERYTHING, PERIOD_MAX_SINE, Pa
 
 __all__ = ["TransformSampling", "blur_left", "blurred_back", "most_spare", "sampling"]
 
-# Rounding: pitches are the same where they differ by less than this share of a sample over the whole window.
+# Rounding: pitches are equal if they differ by less than this fraction of a sample over the whole window.
 SAME_PITCH = 1e-9
-# Choice: how much of the spectrum, and how many of its lines, tell its power about Nyquist's frequency.
+# Choice: fraction of the spectrum, and number of its lines, that determine the power about the Nyquist frequency.
 NYQUIST_SHARE, NYQUIST_LINES = 1 / 16, 9
 
 
 @dataclass(frozen=True)
 class TransformSampling:
-    """period: in samples of the source; across: frequencies kept along each axis; step: the window's pitch in samples
-    of the source where it is a whole number of them, else 0; reach [m]: from one plane's far edge to the other's along
-    the longer axis."""
+    """Sampling of a transform between two planes.
+
+    period: in samples of the source. across: frequencies kept along each axis. step: the window's pitch in samples of
+        the source if it is a whole number, else 0. reach [m]: distance from the far edge of one plane to the far edge
+        of the other along the longer axis.
+    """
 
     passage: Passage
     source: Grid
@@ -58,13 +62,16 @@ class TransformSampling:
 
 @lru_cache(maxsize=64)
 def sampling(passage: Passage, source: Grid, window: Grid, spare: float) -> TransformSampling:
-    """The shortest period for a passage (its band is found here). spare [m]: room for the blur of what is cut.
+    """Return the sampling with the shortest period for a passage, and determine the band of the passage.
+
+    spare [m]: padding for the blur of a truncated spectrum.
 
     Raises:
-        AccuracyError: the period takes more samples than there is room for.
+        AccuracyError: the period needs more samples than the limit.
     """
     wavelength, z, ripple, paraxial = passage.wavelength, abs(passage.z), passage.ripple, passage.paraxial
-    # From the source's far edge (its samples, and one for the function through them) to the window's, across the axis.
+    # Distance from the source's far edge (its samples, and one for the function through them) to the window's, across
+    # the axis.
     reach = max(
         (n // 2 + 1) * source.dx + (m // 2) * window.dx + abs(middle)
         for n, m, middle in zip(source.shape, window.shape, window.centre[::-1], strict=True)
@@ -76,13 +83,14 @@ def sampling(passage: Passage, source: Grid, window: Grid, spare: float) -> Tran
     )
     band = min(bands, key=lambda band: band.walk)
     far, nyquist = band.walk, 0.5 / source.dx
-    # Where nothing can fade, all that the samples hold may matter.
+    # If nothing can fade, all frequencies of the samples may matter.
     if band.end >= (nyquist if band.square else math.sqrt(2) * nyquist):
         band, far = EVERYTHING, _farthest(nyquist, wavelength, z, paraxial) + spare
-    # What walks `far` from the source's far edge must not come round to the window's; and the source must fit in.
+    # Light that moves `far` from the source's far edge must not wrap around to the window's edge, and the source must
+    # fit into the period.
     least = max(reach + far, 2 * (max(source.shape) // 2 + 1) * source.dx)
     samples = fast_length(least / source.dx)
-    half = band.end * samples * source.dx  # as a float: it may be infinite
+    half = band.end * samples * source.dx  # a float, because it may be infinite
     across = 2 * math.ceil(half) + 1 if band.fade and 2 * half + 2 < samples else samples
     if max(across, *window.shape) > MOST_SAMPLES:
         raise AccuracyError(
@@ -97,8 +105,11 @@ def sampling(passage: Passage, source: Grid, window: Grid, spare: float) -> Tran
 
 
 def most_spare(passage: Passage, source: Grid) -> float:
-    """Room [m] worth making for what is cut: as if the light that walks farthest, from the spectrum's corner at √2 f_N,
-    walked along an axis instead of the diagonal."""
+    """Return the largest useful padding [m] for the blur of a truncated spectrum.
+
+    It assumes that the light with the largest displacement, at the spectrum's corner √2 f_N, moves along an axis
+    instead of the diagonal.
+    """
     nyquist, z, paraxial = 0.5 / source.dx, abs(passage.z), passage.paraxial
     end = math.sqrt(2) * nyquist
     whole = walk(end if paraxial else min(end, PERIOD_MAX_SINE / passage.wavelength), passage.wavelength, z, paraxial)
@@ -106,10 +117,11 @@ def most_spare(passage: Passage, source: Grid) -> float:
 
 
 def _farthest(nyquist: float, wavelength: float, z: float, paraxial: bool) -> float:
-    """How far [m] along an axis anything walks that a square of frequencies up to f_N holds.
+    """Return the largest distance [m] along an axis that light with frequencies up to f_N along each axis moves.
 
-    Light walks in the direction of (fx, fy): along x by z tan θ fx/|f|. That is largest where fx = f_N and tan θ is, in
-    the corner |f| = √2 f_N, or where the period's steepest light ends. Paraxially it is zλ fx, whatever fy.
+    Light moves in the direction of (fx, fy): along x by z tan θ fx/|f|. This is largest for fx = f_N and the largest
+    tan θ, in the corner |f| = √2 f_N or at the steepest light that a period allows for. Paraxially it is zλ fx for
+    every fy.
     """
     if paraxial:
         return walk(nyquist, wavelength, z, paraxial)
@@ -118,18 +130,20 @@ def _farthest(nyquist: float, wavelength: float, z: float, paraxial: bool) -> fl
 
 
 def blurred_back(spectrum: np.ndarray, how: TransformSampling) -> float:
-    """Power (of u's samples) that the end of the spectrum at Nyquist's frequency brings back into the window, if the
-    source holds such light everywhere alike. The spectrum is of the field at the source: (fx, fy) in FFT order where
-    the window's pitch is a number of samples, else centred (fy, fx)."""
+    """Return the power (of u's samples) that the truncation at the Nyquist frequency brings back into the window.
+
+    It is assumed that the source emits such light evenly. spectrum: of the field at the source, (fx, fy) in FFT order
+    if the window's pitch is a whole number of samples, else centred (fy, fx).
+    """
     nyquist = 0.5 / how.source.dx
     if how.passage.band.fade or not (how.passage.paraxial or nyquist * how.passage.wavelength < PERIOD_MAX_SINE):
-        return 0.0  # what ends by fading, or by decaying, does not end as if cut
+        return 0.0  # a spectrum that fades or decays is not truncated
     width = max(round(NYQUIST_SHARE * how.period), 1)
     lines = np.unique(np.linspace(-width, width, NYQUIST_LINES).round().astype(int))
     lines = (lines + (how.period // 2 if how.step else 0)) % how.period
     total = 0.0
-    for axis in (0, 1):  # along which the blur comes back: y, x
-        across = axis if how.step else 1 - axis  # of the spectrum, the axis of the other frequency
+    for axis in (0, 1):  # axis along which the blur comes back: y, x
+        across = axis if how.step else 1 - axis  # axis of the spectrum with the other frequency
         u = np.take(spectrum, lines, axis=1 - across)
         power = u.real**2 + u.imag**2
         total += float(power.mean(axis=1 - across) @ _blur_weights(how, axis))
@@ -137,18 +151,21 @@ def blurred_back(spectrum: np.ndarray, how: TransformSampling) -> float:
 
 
 def blur_left(how: TransformSampling, roomier: TransformSampling) -> float:
-    """What a roomier sampling leaves of the blur's amplitude, if the power at Nyquist's frequency is the same for all
-    frequencies along the other axis."""
+    """Return the blur's amplitude in a sampling with more padding, relative to `how`.
+
+    It is assumed that the power at the Nyquist frequency is the same for all frequencies along the other axis.
+    """
     power, left = (sum(float(_blur_weights(sampling, axis).sum()) for axis in (0, 1)) for sampling in (how, roomier))
     return math.sqrt(left / power) if power else 1.0
 
 
 @lru_cache(maxsize=8)
 def _blur_weights(how: TransformSampling, axis: int) -> np.ndarray:
-    """Of the power |U|² at Nyquist's frequency along one axis, per frequency along the other: what comes back.
+    """Return the fraction of the power |U|² at the Nyquist frequency along one axis that comes back into the window.
 
-    In samples: U = Σ u e^{-2πi...} is S/dx, so that (2) times dx² |U|² is the power ∫|b|² dx, and that over dx the sum
-    over samples along the one axis. Parseval's 1/period sums along the other. The spectrum has two ends, ±f_N.
+    There is one weight per frequency along the other axis. In samples, U = Σ u e^{-2πi...} is S/dx. (2) times dx² |U|²
+    is therefore the power ∫|b|² dx, and divided by dx it is the sum over samples along the axis. Parseval's 1/period
+    sums along the other axis. The spectrum has two ends, ±f_N.
     """
     source, window = how.source, how.window
     others = (np.arange(how.period) - how.period // 2) / (how.period * source.dx)
@@ -162,8 +179,11 @@ def _blur_weights(how: TransformSampling, axis: int) -> np.ndarray:
 
 
 def _share_that_meets(walks: np.ndarray, how: TransformSampling, axis: int) -> np.ndarray:
-    """Share of a source's light that walks so far [m] along an axis (0: y) and lands beside the window: the overlap of
-    two intervals, `lit` and `seen` wide, whose centres are `missed` apart."""
+    """Return the fraction of a source's light that lands within the window's range along an axis (0: y).
+
+    walks: displacement of the light along this axis [m]. The fraction is the overlap of two intervals of widths `lit`
+        and `seen` whose centres are `missed` apart.
+    """
     lit, seen = (grid.shape[axis] * grid.dx for grid in (how.source, how.window))
     missed = np.maximum(walks - abs(how.window.centre[1 - axis]), 0)
     share: np.ndarray = np.clip((lit + seen) / 2 - missed, 0, min(lit, seen)) / lit
@@ -171,8 +191,10 @@ def _share_that_meets(walks: np.ndarray, how: TransformSampling, axis: int) -> n
 
 
 def _walks(fx: float, fy: np.ndarray, how: TransformSampling) -> tuple[np.ndarray, np.ndarray]:
-    """How far [m] along x and along y light of (fx, fy) walks, z tan θ fx/|f| = z λ fx / cos θ; infinite where it is
-    too near grazing."""
+    """Return the distances [m] that light of (fx, fy) moves along x and along y, z tan θ fx/|f| = z λ fx / cos θ.
+
+    They are infinite too near grazing incidence.
+    """
     wavelength, z = how.passage.wavelength, abs(how.passage.z)
     sine2 = 0 * fy if how.passage.paraxial else (fx**2 + fy**2) * wavelength**2
     steep = sine2 >= PERIOD_MAX_SINE**2

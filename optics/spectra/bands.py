@@ -1,4 +1,4 @@
-"""Spectral bands: light as a few numbers, and what each is worth to each type of receptor."""
+"""Spectral bands: light as a few numbers, with a weight for each receptor type."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import numpy as np
 
 from optics.numerics.arguments import flag, shown, whole
 from optics.numerics.interpolation import linear_weights
+from optics.numerics.renamed import renamed
 from optics.spectra.pigment import pigment_absorptance
 from optics.spectra.receptors import Receptors, receptors_of
 from optics.spectra.spectrum import Spectrum, cie_1931, daylight
@@ -17,18 +18,18 @@ from optics.spectra.spectrum import Spectrum, cie_1931, daylight
 __all__ = ["SpectralBands", "cie_1931", "daylight", "pigment_absorptance"]
 
 FINEST = 64  # choice
-CATCHES_FIRST = 1e4  # choice: how much more than means they weigh in least squares
+CATCHES_FIRST = 1e4  # choice: weight of catches over means in least squares
 
 
 @dataclass(frozen=True)
 class SpectralBands:
-    """Bands of light and what each is worth to each receptor channel.
+    """Bands of light and their weights for each receptor channel.
 
     wavelengths: (band,) [m], the bands' centres.
     weights: (channel, band); Σ_b weights[c, b] daylight(wavelengths[b]) = 1 for every channel c, so that a white
         surface in unit daylight gives 1.
-    white_catch: (channel,) ∫ daylight(λ) λ S_c(λ) dλ [m²], S_c the pigment's quantal sensitivity with peak 1: what a
-        white surface in unit daylight is worth before the weights are normalised.
+    white_catch: (channel,) ∫ daylight(λ) λ S_c(λ) dλ [m²], with S_c the pigment's quantal sensitivity with peak 1: the
+        quantum catch from a white surface in unit daylight before the weights are normalised.
     """
 
     wavelengths: np.ndarray
@@ -37,10 +38,12 @@ class SpectralBands:
 
     @classmethod
     def uniform(cls, bands: int, receptors: Any = "rgb") -> SpectralBands:
-        """Equal bands over the receptors' range; the weights integrate sensitivity x daylight exactly (to 1 nm) for
-        every reflectance that is linear between the bands' centres: error O(bands⁻²) for smooth ones.
+        """Return equal bands over the receptors' range.
 
-        receptors: `Receptors`, or what stands for them (see `receptors_of`).
+        The weights integrate sensitivity x daylight exactly (to 1 nm) for every reflectance that is linear between the
+        bands' centres. The error is O(bands⁻²) for smooth reflectances.
+
+        receptors: `Receptors`, or any argument of `receptors_of`.
         """
         kinds = receptors_of(receptors)
         edges = np.linspace(*kinds.limits_nm, whole("bands", bands, 1, FINEST) + 1)
@@ -49,19 +52,22 @@ class SpectralBands:
         weights = (catch @ linear_weights(nm, centres).T) / catch.sum(axis=1, keepdims=True) / daylight(centres * 1e-9)
         return cls(centres * 1e-9, weights, catch.sum(axis=1) * 1e-18)
 
-    def of(
+    of = renamed("band_values")
+
+    def band_values(
         self, radiance: Spectrum | Callable[[np.ndarray], np.ndarray], receptors: Any, nonnegative: bool = False
     ) -> np.ndarray:
-        """(band,): a spectral radiance in these bands, in units of daylight's at 560 nm; of any shape, such as a
-        fluorescent lamp's lines, which samples at the bands' centres hit or miss.
+        """Convert a spectral radiance to these bands (band,), in units of daylight's at 560 nm.
 
-        Means over the bands, as far as receptors see them and in parts of daylight, changed by as little as makes
-        Σ_b weights[c, b] radiance[b] what receptor type c catches (quadrature to 1 nm): exactly, if bands are at least
-        as many as types, else as nearly as they can. Lines in few bands may leave one below 0.
+        The spectrum may have any shape, such as a fluorescent lamp's lines, which samples at the bands' centres hit or
+        miss. The values are means over the bands, weighted by the receptors' sensitivity and relative to daylight. They
+        receive the smallest change that makes Σ_b weights[c, b] radiance[b] the quantum catch of receptor type c
+        (quadrature to 1 nm). This is exact unless there are fewer bands than types, and a least-squares solution
+        otherwise. Lines in few bands may make a value negative.
 
-        radiance: a Spectrum, or a function of wavelengths [m] (of a surface: reflectance times illuminant).
-        receptors: those that these bands were made for.
-        nonnegative: no band below 0; what is caught is then as near as that allows.
+        radiance: a Spectrum, or a function of wavelengths [m] (for a surface: reflectance times illuminant).
+        receptors: the receptors for which these bands were made.
+        nonnegative: True for values of at least 0, with the nearest possible catches.
         """
         if not isinstance(radiance, Spectrum) and not callable(radiance):
             raise ValueError(
@@ -75,19 +81,19 @@ class SpectralBands:
         seen = catch.sum(axis=0)
         shares = linear_weights(nm, self.wavelengths * 1e9) * (
             seen + 1e-6 * seen.max()
-        )  # what nobody sees has a mean, too
+        )  # invisible light has a mean, too
         means = daylight(self.wavelengths) * (shares @ of_daylight) / shares.sum(axis=1)
         caught = catch @ of_daylight
         found: np.ndarray = means + np.linalg.pinv(self.weights) @ (caught - self.weights @ means)
         return _nonnegative(self.weights, caught, means) if nonnegative and found.min() < 0 else found
 
     def white_light(self, kernels: np.ndarray) -> np.ndarray:
-        """(channel, k, k): what a scene without colour in daylight has of kernels (band, k, k)."""
+        """Kernels (channel, k, k) for a colourless scene in daylight, from kernels (band, k, k)."""
         return np.tensordot(self.weights * daylight(self.wavelengths), kernels, axes=1)
 
 
 def _nonnegative(weights: np.ndarray, caught: np.ndarray, means: np.ndarray) -> np.ndarray:
-    """x >= 0 with weights @ x as near to what is caught as can be, and of those the nearest to the means."""
+    """x >= 0 with weights @ x as close as possible to the catches, and among these the closest to the means."""
     from scipy.optimize import lsq_linear
 
     equations = np.concatenate([weights * CATCHES_FIRST, np.eye(len(means))])
@@ -97,7 +103,7 @@ def _nonnegative(weights: np.ndarray, caught: np.ndarray, means: np.ndarray) -> 
 
 
 def _values(found: Any, shape: tuple[int, ...]) -> np.ndarray:
-    """What a function said of wavelengths."""
+    """Values that a function returned for wavelengths, checked."""
     try:
         values = np.broadcast_to(np.asarray(found, np.float64), shape)
     except (TypeError, ValueError, OverflowError):
@@ -108,7 +114,7 @@ def _values(found: Any, shape: tuple[int, ...]) -> np.ndarray:
 
 
 def _catch(kinds: Receptors) -> tuple[np.ndarray, np.ndarray]:
-    """Wavelengths [nm] over the receptors' range, and what each type catches there of daylight, ready to be summed."""
+    """Wavelengths [nm] over the receptors' range, and each type's catch of daylight there, weighted for summation."""
     low, high = kinds.limits_nm
     nm = np.arange(low, high + 0.5)
     catch = kinds.catch(nm)

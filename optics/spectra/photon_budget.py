@@ -1,4 +1,4 @@
-"""Photons that a receptor absorbs: how bright a signal of 1 is."""
+"""Photons that a receptor absorbs: the light level that corresponds to a signal of 1."""
 
 from __future__ import annotations
 
@@ -19,11 +19,12 @@ LUMENS_PER_WATT = 683.0  # CIE 018: K_m, to 0.002 %
 
 @dataclass(frozen=True)
 class PhotonBudget:
-    """Light on the scene, and how long and how well receptors catch it.
+    """Illumination of the scene, and integration time and efficiency of the receptors.
 
     illuminance: E_v [lx] of daylight (CIE D65) on the scene: 1e5 in the sun, 1e4 under an overcast sky, 10 at dusk.
-    integration_time: Δt [s] over which a receptor sums what it catches; 10 to 50 ms in insects and vertebrates.
-    quantum_efficiency: η, the share of photons at its pigment's peak that a receptor absorbs, losses in front included.
+    integration_time: Δt [s] over which a receptor integrates; 10 to 50 ms in insects and vertebrates.
+    quantum_efficiency: η, the share of photons at its pigment's peak that a receptor absorbs, including losses in
+        front.
 
     Raises:
         ValueError: names argument, value and valid range.
@@ -40,7 +41,7 @@ class PhotonBudget:
 
     @property
     def spectral_irradiance(self) -> float:
-        """Daylight on the scene at 560 nm [W/m³]: E_v = K_m E_560 ∫ daylight(λ) ȳ(λ) dλ."""
+        """Spectral irradiance of daylight on the scene at 560 nm [W/m³]: E_v = K_m E_560 ∫ daylight(λ) ȳ(λ) dλ."""
         wavelengths = np.arange(360, 781, 5) * 1e-9
         visible = daylight(wavelengths) * cie_1931(wavelengths)[:, 1]
         return self.illuminance / (LUMENS_PER_WATT * float(visible.sum()) * 5e-9)
@@ -50,9 +51,9 @@ class PhotonBudget:
 
             N_c = η Δt G ∫ E_λ/π · λ/(hc) · S_c(λ) dλ
 
-        etendue: G [m² sr], pupil area times the solid angle from which a receptor takes light. With
-        G = (π/4) D² (d/f)² it is Land's sensitivity (Warrant & Nilsson 1998, Vision Research 38:195, eq. 1) with
-        daylight's spectrum instead of one wavelength, for square receptors of side d.
+        etendue: G [m² sr], pupil area times the solid angle from which a receptor receives light. With G = (π/4) D²
+            (d/f)² it is Land's sensitivity (Warrant & Nilsson 1998, Vision Research 38:195, eq. 1) with daylight's
+            spectrum instead of one wavelength, for square receptors of side d.
 
         Raises:
             ValueError: names argument, value and valid range.

@@ -1,4 +1,4 @@
-"""Visual pigments: spectral sensitivity from the wavelength of the peak alone.
+"""Visual pigments: spectral sensitivity from the wavelength of the peak.
 
 Templates after Govardovskii, Fyhrquist, Reuter, Kuzmin & Donner (2000), "In search of the visual pigment template",
 Visual Neuroscience 17:509-528: absorbance of pigments with retinal (A1) or 3,4-didehydroretinal (A2), measured for
@@ -23,7 +23,7 @@ LAMBDA_MAX_NM = (330.0, 700.0)
 class _Template:
     """α band, eq. 1: 1 / (exp A(a - x) + exp B(b - x) + exp C(c - x) + D), x = λmax/λ; β band, eq. 4: a Gaussian.
 
-    A, a, beta_peak [nm] and beta_width [nm] are functions of λmax [nm], the rest are numbers.
+    A, a, beta_peak [nm] and beta_width [nm] are functions of λmax [nm]; the other parameters are numbers.
     """
 
     A: Callable[[float], float]
@@ -67,7 +67,7 @@ CHROMOPHORES = {
 
 
 def pigment_absorptance(wavelengths: np.ndarray, lambda_max: float, chromophore: str = "A1") -> np.ndarray:
-    """A visual pigment's quantal sensitivity at `wavelengths` [m]: α band, its peak 1 at `lambda_max` [m], and β band.
+    """Quantal sensitivity of a visual pigment at `wavelengths` [m]: α band with peak 1 at `lambda_max` [m], and β band.
 
     Raises:
         ValueError: lambda_max outside 330-700 nm, or another chromophore than "A1" and "A2".
@@ -83,10 +83,10 @@ def pigment_absorptance(wavelengths: np.ndarray, lambda_max: float, chromophore:
 
 @dataclass(frozen=True)
 class Pigment:
-    """A receptor type that is what its visual pigment makes it.
+    """A receptor type whose sensitivity is that of its visual pigment.
 
-    lambda_max_nm: the α band's peak [nm], in [330, 700]
-    chromophore: "A1" (retinal) or "A2" (3,4-didehydroretinal, of freshwater fish and amphibians)
+    lambda_max_nm: peak of the α band [nm], in [330, 700].
+    chromophore: "A1" (retinal) or "A2" (3,4-didehydroretinal, of freshwater fish and amphibians).
 
     Raises:
         ValueError: names argument, value and valid range.
@@ -101,7 +101,7 @@ class Pigment:
 
     @property
     def peak_nm(self) -> float:
-        """Where it is most sensitive [nm]."""
+        """Wavelength of the highest sensitivity [nm]."""
         return self.lambda_max_nm
 
     def at(self, wavelengths: np.ndarray) -> np.ndarray:

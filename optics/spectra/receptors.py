@@ -1,4 +1,4 @@
-"""Receptor types: how sensitive they are to which wavelengths, and which receptor of a retina is of which type."""
+"""Receptor types: spectral sensitivities, and the arrangement of types over a retina."""
 
 from __future__ import annotations
 
@@ -15,25 +15,25 @@ from optics.spectra.spectrum import LIMITS_NM, Spectrum, cone_fundamentals, dayl
 
 __all__ = ["RECEPTORS", "Receptors", "receptors_of"]
 
-# Light beyond the range taken into account, on either side, as a share of each type's catch from white in daylight.
+# Light beyond either end of the range, as a share of each type's catch from white in daylight, that is neglected.
 NEGLIGIBLE = 1e-3
-STEP_NM = 10  # the range's ends are multiples of it
+STEP_NM = 10  # ends of the range are multiples of it
 
 
 @dataclass(frozen=True)
 class Receptors:
     """The receptor types of an eye, one channel of signals each, or a mosaic of them.
 
-    types: of one or more kinds each: a `Pigment`; a number, the λmax [nm] of an A1 pigment; or a `Spectrum`, a quantal
-        sensitivity as measured. Their order is that of the channels.
-    mosaic: None: every receptor has all types, as pixels have: signals are (type, h, w). Or rows of indices into
-        `types`, ((0, 1), (1, 2)), repeated over the retina from its top left corner: every receptor has one type, as in
-        a real retina, and signals are (1, h, w).
-    range_nm: (low, high) [nm], whole numbers within 300-780: light taken into account, divided into bands. None: as
-        wide as it must be to leave out less than 1e-3 of any type's catch from white in daylight at either end.
+    types: a `Pigment`; a number, the λmax [nm] of an A1 pigment; or a `Spectrum`, a measured quantal sensitivity, for
+        each type. Their order is that of the channels.
+    mosaic: None: every receptor has all types, like the pixels of a camera, and signals are (type, h, w). Or rows of
+        indices into `types`, ((0, 1), (1, 2)), repeated over the retina from its top left corner: every receptor has
+        one type, as in a real retina, and signals are (1, h, w).
+    range_nm: (low, high) [nm], whole numbers within 300-780: range of light that is divided into bands. None: wide
+        enough to omit less than 1e-3 of any type's catch from white in daylight at either end.
 
     Raises:
-        ValueError: names argument, value and what is allowed.
+        ValueError: names argument, value and valid choices.
     """
 
     types: tuple[Any, ...]
@@ -49,20 +49,20 @@ class Receptors:
             seen = self.catch(np.arange(self.range_nm[0], self.range_nm[1] + 1)).max(axis=1) > 0
             if not seen.all():
                 dark = int(np.argmin(seen))
-                raise ValueError(f"range_nm = {shown(self.range_nm)}: type {dark} sees nothing within")
+                raise ValueError(f"range_nm = {shown(self.range_nm)}: type {dark} has no sensitivity within it")
 
     @cached_property
     def limits_nm(self) -> tuple[float, float]:
-        """Range of the light taken into account [nm]."""
+        """Range of the light that counts [nm]."""
         return _range_of(self) if self.range_nm is None else self.range_nm
 
     @property
     def channels(self) -> int:
-        """Signals at each place of the retina."""
+        """Number of signals at each place of the retina."""
         return len(self.types) if self.mosaic is None else 1
 
     def arranged(self, mosaic: Sequence[Sequence[int]] | np.ndarray | None) -> Receptors:
-        """The same types as this mosaic."""
+        """Return the same types arranged in this mosaic."""
         return replace(self, mosaic=None if mosaic is None else _mosaic(mosaic, len(self.types)))
 
     def layout(self, resolution: tuple[int, int]) -> np.ndarray | None:
@@ -73,12 +73,13 @@ class Receptors:
         return tile[np.ix_(*(np.arange(n) % m for n, m in zip(resolution, tile.shape, strict=True)))]
 
     def catch(self, nm: np.ndarray) -> np.ndarray:
-        """What each type catches of unit daylight per wavelength [nm], (type, wavelength), up to a common factor.
+        """Catch of each type from unit daylight per wavelength [nm], (type, wavelength), up to a common factor.
 
-        Receptors count photons, radiance is energy: hence the factor λ beside the quantal sensitivity, whose peak is 1.
+        Receptors count photons while radiance is energy; hence the factor λ in addition to the quantal sensitivity,
+        whose peak is 1.
 
         Raises:
-            ValueError: wavelengths that are none.
+            ValueError: invalid wavelengths.
         """
         nm = reals("nm", nm)
         light = daylight(nm * 1e-9)
@@ -91,11 +92,11 @@ def _types(types: Any) -> tuple[Pigment | Spectrum, ...]:
     if isinstance(types, str) or not is_sized(types):
         types = (types,)
     if not len(types):
-        raise ValueError("receptors: there is no type; an eye needs at least one")
+        raise ValueError("receptors: no type is given; an eye needs at least one")
     found = tuple(kind if isinstance(kind, (Pigment, Spectrum)) else _pigment(kind) for kind in types)
     for i, kind in enumerate(found):
         if not kind.at(np.arange(*LIMITS_NM) * 1e-9).max() > 0:
-            raise ValueError(f"receptors: type {i} sees nothing between {LIMITS_NM[0]:g} and {LIMITS_NM[1]:g} nm")
+            raise ValueError(f"receptors: type {i} has no sensitivity between {LIMITS_NM[0]:g} and {LIMITS_NM[1]:g} nm")
     return found
 
 
@@ -131,7 +132,7 @@ def _range(range_nm: Any) -> tuple[float, float]:
 
 
 def _range_of(receptors: Receptors) -> tuple[float, float]:
-    """The light that any type catches, but for NEGLIGIBLE of it at either end."""
+    """Range of the light that any type catches, except for NEGLIGIBLE of it at either end."""
     nm = np.arange(LIMITS_NM[0], LIMITS_NM[1] + 1)
     so_far = np.cumsum(receptors.catch(nm), axis=1)
     so_far /= so_far[:, -1:]
@@ -140,8 +141,8 @@ def _range_of(receptors: Receptors) -> tuple[float, float]:
     return float(first // STEP_NM * STEP_NM), float(-(-last // STEP_NM) * STEP_NM)
 
 
-# Red, green and blue, as swallowtail butterflies have them (Arikawa 2003, J. Comp. Physiol. A 189:791): far enough
-# apart to tell colours as three RGB channels do, which human cones (566, 541, 441 nm) are not.
+# Red, green and blue, as in swallowtail butterflies (Arikawa 2003, J. Comp. Physiol. A 189:791). They are far enough
+# apart to # separate colours like three RGB channels; human cones (566, 541, 441 nm) are not.
 _RGB_NM = (600.0, 520.0, 460.0)
 
 RECEPTORS: Mapping[str, Callable[[], Receptors]] = {
@@ -155,10 +156,10 @@ RECEPTORS: Mapping[str, Callable[[], Receptors]] = {
 
 
 def receptors_of(receptors: Any) -> Receptors:
-    """Receptors from whatever may stand for them: themselves, one of RECEPTORS' names, or their types.
+    """Convert an argument to Receptors: Receptors themselves, one of RECEPTORS' names, or receptor types.
 
     Raises:
-        ValueError: an unknown name, with the nearest; no types, or types that are none.
+        ValueError: an unknown name, with the nearest one; no types, or invalid types.
     """
     if isinstance(receptors, Receptors):
         return receptors

@@ -1,6 +1,6 @@
-"""Spectra as tables: illuminants, reflectances, cone fundamentals, and whatever else was measured.
+"""Spectra as tables: illuminants, reflectances, cone fundamentals, and user data.
 
-The tables are frozen from colour-science (its own sources are named with each); tests compare them with it.
+The tables are copied from colour-science (its sources are named with each); tests compare them with it.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ __all__ = [
 ]
 
 LIMITS_NM = (300.0, 780.0)  # CIE D65 is tabulated from here; no eye's receptors reach beyond
-SHORTEST_NM = 1.0  # of a table; what is shorter was meant in metres
+SHORTEST_NM = 1.0  # shortest entry of a table; smaller numbers are probably metres
 NORMAL_NM = 560.0  # illuminants are 1 here
 
 
@@ -35,10 +35,13 @@ NORMAL_NM = 560.0  # illuminants are 1 here
 class Spectrum:
     """A quantity over wavelength: linear between the table's entries, constant beyond its ends (as CIE 15 advises).
 
-    wavelengths_nm: rising [nm] · values: as many, finite and not negative. Equal tables are equal spectra.
+    wavelengths_nm: ascending [nm].
+    values: one per wavelength, finite and not negative.
+
+    Equal tables are equal spectra.
 
     Raises:
-        ValueError: names argument, value and what is allowed.
+        ValueError: names argument, value and valid choices.
     """
 
     wavelengths_nm: tuple[float, ...]
@@ -47,7 +50,7 @@ class Spectrum:
     def __post_init__(self) -> None:
         nm, values = (_row(name, getattr(self, name)) for name in ("wavelengths_nm", "values"))
         if len(nm) != len(values):
-            raise ValueError(f"values: {len(values)} for {len(nm)} wavelengths_nm: must be as many")
+            raise ValueError(f"values: {len(values)} for {len(nm)} wavelengths_nm: must be equal in number")
         if not np.all(np.diff(nm) > 0) or not nm[0] >= SHORTEST_NM:
             raise ValueError(f"wavelengths_nm: must rise from one entry to the next, from {SHORTEST_NM:g} nm on")
         if min(values) < 0:
@@ -57,7 +60,7 @@ class Spectrum:
 
     @property
     def peak_nm(self) -> float:
-        """Where it is largest [nm]."""
+        """Wavelength of the largest value [nm]."""
         return self.wavelengths_nm[int(np.argmax(self.values))]
 
     def at(self, wavelengths: np.ndarray) -> np.ndarray:
@@ -119,8 +122,8 @@ def _nanometres(wavelengths: np.ndarray) -> np.ndarray:
     return nm
 
 
-# CIE 15: incandescent light, phases of daylight, fluorescent lamps and a phosphor-converted white LED (the last three
-# are tabulated from 380 nm and taken as dark below), and equal energy.
+# CIE 15: incandescent light, phases of daylight, fluorescent lamps and a phosphor-converted white LED, and equal
+# energy. The tables of # the lamps and the LED start at 380 nm; they are dark below.
 ILLUMINANTS = ("A", "D50", "D55", "D65", "D75", "E", "FL2", "FL11", "LED-B3")
 
 
@@ -140,7 +143,7 @@ def illuminant(name: str) -> Spectrum:
     return _spectrum(nm, power / np.interp(NORMAL_NM, nm, power))
 
 
-# The 24 patches of the ColorChecker as Ohta (1997) measured them, which ISO 17321-1 took over.
+# The 24 patches of the ColorChecker, measured by Ohta (1997) and adopted by ISO 17321-1.
 REFLECTANCES = (
     *("dark skin", "light skin", "blue sky", "foliage", "blue flower", "bluish green"),
     *("orange", "purplish blue", "moderate red", "purple", "yellow green", "orange yellow"),
@@ -150,7 +153,7 @@ REFLECTANCES = (
 
 
 def reflectance(name: str) -> Spectrum:
-    """Reflectance of a patch of the ColorChecker, measured on 380-780 nm (below, it stays what it is at 380 nm).
+    """Reflectance of a patch of the ColorChecker, measured on 380-780 nm (constant below 380 nm).
 
     Raises:
         ValueError: an unknown name.
@@ -160,8 +163,11 @@ def reflectance(name: str) -> Spectrum:
 
 
 def cone_fundamentals() -> tuple[Spectrum, Spectrum, Spectrum]:
-    """Human L, M and S cones at the cornea, quantal, peaks 1: Stockman & Sharpe (2000), Vision Research 40:1711, for 2°
-    fields; CIE 170-1:2006 took them over. They begin at 390 nm; below, lens and cornea let next to nothing through."""
+    """Quantal sensitivities of human L, M and S cones at the cornea, with peaks of 1, for 2° fields.
+
+    Source: Stockman & Sharpe (2000), Vision Research 40:1711, adopted by CIE 170-1:2006. They start at 390 nm; below,
+    lens and cornea transmit almost no light.
+    """
     nm = _table("cone_fundamentals.csv")[1][0]
     cones = (energy / nm for energy in _columns("cone_fundamentals.csv").values())
     long, middle, short = (Spectrum((nm[0] - 1, *nm), (0.0, *(quantal / quantal.max()))) for quantal in cones)

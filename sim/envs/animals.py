@@ -1,4 +1,4 @@
-"""All agents of many worlds: those who learn, and those whose policies are frozen."""
+"""All agents of many worlds: learning agents, and agents with frozen policies."""
 
 from __future__ import annotations
 
@@ -15,23 +15,24 @@ from sim.tasks.outcome import NOWHERE, Step
 from sim.tasks.per_world import PerWorld
 from sim.tasks.simulation import Simulation
 
-Pending = list[dict[str, PendingFrame]]  # of all who look, by kind of eyes
+Pending = list[dict[str, PendingFrame]]  # for each agent with eyes: frames by kind of eyes
 
 
 @dataclass(frozen=True)
 class Advanced:
-    """An action has been taken: what it led to, and frames that are being rendered."""
+    """The outcome of an action, and frames that are still being rendered."""
 
     step: Step
     pending: Pending
 
 
 class Animals:
-    """Worlds, and observations of the agents in them.
+    """All agents of a batch of worlds, and their observations.
 
-    renderers: of every agent's eyes; None for those who look at nothing
-    memory: frames in the observations of those who learn
-    learners: senses of those who learn · seeing: of all who look, learners first
+    renderers: renderers of every agent's eyes; None for agents without eyes in use.
+    memory: number of frames in the observations of learning agents.
+    learners: senses of the learning agents.
+    seeing: senses of all agents that see, learners first.
     """
 
     def __init__(self, simulation: Simulation, renderers: Sequence[AgentRenderers | None], memory: int) -> None:
@@ -49,19 +50,19 @@ class Animals:
                 _require_fit(other, senses)
 
     def seed(self, seed: int) -> None:
-        """Begin all chance again."""
+        """Restart all random streams."""
         self.simulation.seed(seed)
         for senses in self.seeing:
             senses.restart()
 
     def reset(self) -> list[Arrays]:
-        """Begin all episodes; observations of those who learn."""
+        """Start all episodes; return the observations of the learning agents."""
         everyone = np.arange(self.simulation.n)
-        pending = self.begin_again(everyone)
+        pending = self.start_episodes(everyone)
         return self.remember(_waited(pending), everyone)
 
     def advance(self, actions: Sequence[np.ndarray]) -> Advanced:
-        """One action further; actions (world, number) of each that learns."""
+        """Take one action; actions: (world, number) for each learning agent."""
         simulation = self.simulation
         everyones = self._everyones(actions)
         failed = simulation.move(np.concatenate(everyones, axis=1) if len(everyones) > 1 else everyones[0])
@@ -80,14 +81,14 @@ class Animals:
         return Advanced(step, pending)
 
     def seen(self, advanced: Advanced) -> list[Arrays]:
-        """Frames after the action; worlds that the task changed meanwhile are rendered again."""
+        """Return the frames after the action. Worlds that the task changed after the action are rendered again."""
         frames, changed = _waited(advanced.pending), advanced.step.changed
         if len(changed):
             _put(frames, changed, _waited(self.launch(changed)))
         return frames
 
-    def begin_again(self, worlds: np.ndarray) -> Pending:
-        """Start new episodes in these worlds, and begin to render them."""
+    def start_episodes(self, worlds: np.ndarray) -> Pending:
+        """Start new episodes in these worlds, and launch their rendering."""
         self.simulation.restart(worlds)
         for senses in self.seeing:
             senses.action = senses.action.copy()
@@ -96,42 +97,44 @@ class Animals:
         for senses in self.seeing:
             senses.tell(poses, worlds)
         everyone = len(worlds) == self.simulation.n
-        return [senses.begin(poses, None if everyone else worlds) for senses in self.seeing]
+        return [senses.launch(poses, None if everyone else worlds) for senses in self.seeing]
 
     def remember(self, seen: Sequence[Arrays], fresh: np.ndarray) -> list[Arrays]:
-        """Observations of those who learn; fresh: worlds that have just begun."""
+        """Add frames to the memories and return the learners' observations; fresh: worlds whose episode has just
+        begun."""
         known = [senses.observation(frames, fresh) for senses, frames in zip(self.seeing, seen, strict=True)]
         return known[: len(self.learners)]
 
     @staticmethod
     def replace(seen: Sequence[Arrays], worlds: np.ndarray, pending: Pending) -> None:
-        """New episodes' frames take the place of the last ones in these worlds."""
+        """Replace the last frames of these worlds by the first frames of their new episodes."""
         _put(seen, worlds, _waited(pending))
 
-    def state(self) -> Arrays:
-        """All that the future depends on; each array's first axis is the world."""
-        found = self.simulation.held()
+    def get_state(self) -> Arrays:
+        """Return everything that the future depends on; each array's first axis is the world."""
+        found = self.simulation.get_state()
         for number, senses in enumerate(self.seeing):
-            found |= {self._key(number, name): array for name, array in senses.state().items()}
+            found |= {self._key(number, name): array for name, array in senses.get_state().items()}
         return found
 
-    def bring_back(self, state: Mapping[str, np.ndarray], chosen: np.ndarray) -> None:
-        """These worlds as they were."""
-        self.simulation.hold(state, chosen)
+    def set_state(self, state: Mapping[str, np.ndarray], chosen: np.ndarray) -> None:
+        """Restore the stored state of these worlds."""
+        self.simulation.set_state(state, chosen)
         for number, senses in enumerate(self.seeing):
-            now = senses.state()
+            now = senses.get_state()
             for name, array in now.items():
                 array[chosen] = state[self._key(number, name)][chosen]
-            senses.bring_back(now)
+            senses.set_state(now)
 
     @property
     def _of_agents(self) -> list[Senses | None]:
         return [*self.learners, *(senses for _, senses in self._frozen)]
 
     def launch(self, worlds: np.ndarray | None = None) -> Pending:
-        """Begin to render these worlds (None: all); all eyes are begun before any is waited for."""
+        """Launch the rendering of these worlds (None: all). All eyes are launched before the first result is
+        awaited."""
         poses = self.simulation.poses()
-        return [senses.begin(poses, worlds) for senses in self.seeing]
+        return [senses.launch(poses, worlds) for senses in self.seeing]
 
     def _everyones(self, actions: Sequence[np.ndarray]) -> list[np.ndarray]:
         found = list(actions)
@@ -155,10 +158,10 @@ def _put(seen: Sequence[Arrays], worlds: np.ndarray, fresh: Sequence[Arrays]) ->
 
 
 def _require_fit(other: Frozen, senses: Senses) -> None:
-    """Its policy takes what its eyes see, where it says what it takes.
+    """Compare the observation space of a frozen policy, if it has one, with the observations of its task.
 
     Raises:
-        ValueError: it takes something else.
+        ValueError: they differ.
     """
     learnt = getattr(other.policy, "observation_space", None)
     if learnt is None:

@@ -1,4 +1,4 @@
-"""World, task, physics and eyes put together: the makers of environments."""
+"""Factories of environments: they combine world, task, physics and eyes."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 AUTO = "auto"
 OF_ENVIRONMENTS = {"task", "n_envs", "seed", "memory", "mode", "least_return", "episode_steps", "render_mode"}
-MOST = 1_000_000  # choice: of worlds and of frames, more than memory holds
+MOST = 1_000_000  # chosen limit for numbers of worlds and of frames, beyond what memory can hold
 
 
 def make_vec_env(
@@ -58,29 +58,31 @@ def make_vec_env(
 ) -> EyesVecEnv:
     """A batched environment of one task.
 
-    task: one of `sim.TASKS`, or a `sim.Task` of one's own, which says all but n_envs, seed, memory, episode_steps
-        and render_mode itself; a `sim.Encounter` of animals that are alike learns one policy, with a row for each
-        animal of each world
-    eyes: of every agent; default Eyes()
+    task: one of `sim.TASKS`, or a user-defined `sim.Task`. A user task defines everything except n_envs, seed, memory,
+        episode_steps and render_mode itself. A `sim.Encounter` of animals that are alike learns a single policy, with
+        one row for each animal of each world.
+    eyes: the eyes of every agent; default Eyes()
     n_envs: number of worlds
-    seed: of episodes and noise; None draws one
-    memory: frames in an observation
-    mode: "training", or "evaluation" (objects respawn; rewards weighted as fitness)
-    rays_per_receptor: rays traced for each receptor, in direct light; "auto": as few as its noise allows, and light
-        that was reflected twice where it counts: `sim.choose_fidelity(world, eyes, bands="own")`
-    fidelity: all of how finely it is rendered, in the place of rays_per_receptor (which takes one, too); "auto": as
-        that has it
-    world_seed, mazes, course: of the layout that all worlds share, see `sim.build_world`
-    least_return: in training, an episode whose rewards add up to no more is truncated; None: none is
-    episode_steps: actions after which an episode is truncated; None: as many as the task has
-    spectra: of materials and lights, by name, in the place of their colours: see `sim.build_world`
-    vary: {"light": (low, high)}: each episode has its own level of light, drawn evenly over its logarithm; full
-        daylight is 1, and the most
-    auxiliary: of "depth", "ids" and "flow": what observations hold of each receptor beside its signal, docs/tasks.md
-    render_mode: "rgb_array": the agent seen from behind, with its eyes' fields of view; "eyes": what each eye reports,
-        side by side
+    seed: seed of episodes and noise; None: a random seed
+    memory: number of frames in an observation
+    mode: "training", or "evaluation" (objects respawn; rewards have the weights of the fitness)
+    rays_per_receptor: rays traced for each receptor, in direct light; "auto": the fewest rays that the receptors' noise
+        allows, plus light that was reflected twice if it matters, as chosen by `sim.choose_fidelity(world, eyes,
+        bands="own")`
+    fidelity: a complete `sim.Fidelity`, used instead of rays_per_receptor (which also accepts one); "auto": as with
+        rays_per_receptor="auto"
+    world_seed, mazes, course: the layout that all worlds share, see `sim.build_world`
+    least_return: in training, an episode is truncated once its rewards sum to this value or less; None: never
+    episode_steps: number of actions after which an episode is truncated; None: the task's default
+    spectra: spectra of materials and lights by name, used instead of their colours: see `sim.build_world`
+    vary: {"light": (low, high)}: each episode has its own light level, uniform in its logarithm; 1 is full daylight and
+        the maximum
+    auxiliary: any of "depth", "ids" and "flow": quantities that an observation contains for each receptor in addition
+        to its signal, see docs/tasks.md
+    render_mode: "rgb_array": the agent from behind, with the fields of view of its eyes; "eyes": the signals of all
+        eyes, side by side
 
-    Physics takes as many threads as Dr.Jit has: limit both with drjit.set_thread_count.
+    Physics uses the same number of threads as Dr.Jit; drjit.set_thread_count limits both.
 
     Raises:
         ValueError: a bad argument.
@@ -114,9 +116,10 @@ def make_parallel_env(
 ) -> EncounterEnv:
     """Several animals in one world, as a PettingZoo parallel environment; see `sim.Encounter`.
 
-    seed: of episodes and noise, until `reset` is given one; None draws one
-    memory: frames in an observation
-    render_mode: "rgb_array": the model with all animals' eyes; "eyes": what they report, a picture of each animal
+    seed: seed of episodes and noise, until `reset` receives one; None: a random seed
+    memory: number of frames in an observation
+    render_mode: "rgb_array": the model with all animals' eyes; "eyes": the signals of their eyes, one image for each
+        animal
 
     Raises:
         ValueError: a bad argument.
@@ -135,7 +138,7 @@ def make_parallel_env(
 
 
 def in_bands(eyes: Eyes | Mapping[str, Eyes], bands: int) -> Any:
-    """The same eyes with this number of spectral bands."""
+    """Return the same eyes with this number of spectral bands."""
     if isinstance(eyes, Eyes):
         return replace(eyes, bands=bands)
     return {name: replace(of_kind, bands=bands) for name, of_kind in eyes.items()}
@@ -148,17 +151,17 @@ def _require_eyes(eyes: Any) -> None:
 
 
 def _refuse_for_tasks(given: Mapping[str, Any]) -> None:
-    """What a task of one's own says itself."""
+    """Refuse arguments that a user task defines itself."""
     defaults = {name: p.default for name, p in inspect.signature(make_vec_env).parameters.items()}
     for name in set(defaults) - OF_ENVIRONMENTS:
         if given[name] != defaults[name]:
-            raise ValueError(f"{name} = {given[name]!r}: must be left out, a sim.Task says it itself")
+            raise ValueError(f"{name} = {given[name]!r}: must be left out, a sim.Task defines it itself")
 
 
 def _fidelity_of(
     rays_per_receptor: float | str | Fidelity, fidelity: Fidelity | str | None, eyes: Eyes | Mapping[str, Eyes]
 ) -> Fidelity | None:
-    """What was asked for by either name; None: to be chosen."""
+    """Return the requested fidelity, from either argument; None: to be chosen automatically."""
     chosen = isinstance(fidelity, str) and fidelity == AUTO
     if not (fidelity is None or chosen or isinstance(fidelity, Fidelity)):
         raise ValueError(f"fidelity = {shown(fidelity)}: must be a sim.Fidelity, {AUTO!r} or None")
@@ -170,7 +173,7 @@ def _fidelity_of(
     if fidelity is None:
         return asked
     if asked is not None:
-        raise ValueError(f"rays_per_receptor = {shown(rays_per_receptor)}: must be left out where a fidelity is given")
+        raise ValueError(f"rays_per_receptor = {shown(rays_per_receptor)}: must be left out if a fidelity is given")
     return fidelity if isinstance(fidelity, Fidelity) else None
 
 
@@ -179,7 +182,7 @@ def _first(eyes: Eyes | Mapping[str, Eyes]) -> Eyes:
 
 
 def _check(n_envs: int, seed: int | None, memory: int, mode: str, render_mode: str | None) -> None:
-    """Refuse bad arguments before anything expensive is done."""
+    """Refuse bad arguments before any expensive work."""
     for name, number in (("n_envs", n_envs), ("memory", memory)):
         _require_whole(name, number, 1)
         whole(name, number, 1, MOST)

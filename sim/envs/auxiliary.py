@@ -1,6 +1,7 @@
-"""What an observation may hold beside signals: how far what each receptor looks at is, which geom, and how it moves.
+"""Auxiliary observations for each receptor: depth, geom id and optic flow of the visible surface.
 
-No animal knows these. They are exact, and for whoever trains: targets of auxiliary losses, or a critic's privilege.
+Animals cannot sense these quantities. They have no noise. They serve training: as targets of auxiliary losses, or as
+additional input of a critic.
 """
 
 from __future__ import annotations
@@ -19,15 +20,17 @@ DEPTH, IDS, FLOW = AUXILIARY
 
 
 class Auxiliary:
-    """Of one kind of eyes, in all worlds, for each receptor's centre.
+    """Auxiliary observations of one kind of eyes in all worlds, at the centre of each receptor.
 
-    renderer: the eyes · names: of AUXILIARY, what is wanted · prefix: of what these are called
-    spaces: of what one world's observation holds, by name:
-        depth: along the eye's axis [m], (eye, height, width) float32; 0 where there is nothing
-        ids: of the geom, (eye, height, width) int32; -1 where there is nothing
-        flow: how far it has moved on the retina since the last observation, to the right and down [receptors],
-            (eye, 2, height, width) float32; 0 in an episode's first, where there is nothing, and where what is seen now
-            was not before the eye then
+    renderer: renders depth and ids for these eyes.
+    names: the requested quantities, out of AUXILIARY.
+    prefix: prefix of their names in an observation.
+    spaces: spaces of the entries in one world's observation, by name:
+        depth: distance along the eye's axis [m], (eye, height, width) float32; 0 if nothing is visible
+        ids: id of the geom, (eye, height, width) int32; -1 if nothing is visible
+        flow: motion on the retina since the last observation, to the right and down [receptors], (eye, 2, height,
+            width) float32; 0 in the first observation of an episode, if nothing is visible, and if the visible point
+            was not in front of the eye at the last observation
     """
 
     def __init__(self, renderer: Labels, names: Sequence[str], prefix: str = "") -> None:
@@ -41,8 +44,8 @@ class Auxiliary:
         self.spaces = {prefix + name: known[name] for name in self._names}
         self._before: Poses | None = None
 
-    def look(self, poses: Poses, fresh: np.ndarray) -> dict[str, np.ndarray]:
-        """Arrays (world, ...) by name; fresh: numbers of the worlds whose episode has just begun."""
+    def render(self, poses: Poses, fresh: np.ndarray) -> dict[str, np.ndarray]:
+        """Return arrays (world, ...) by name; fresh: numbers of the worlds whose episode has just begun."""
         depth = self._renderer.depth(poses)
         ids = self._renderer.ids(poses) if {IDS, FLOW} & {*self._names} else None
         found = {DEPTH: np.where(np.isfinite(depth), depth, 0).astype(np.float32)}
@@ -55,11 +58,11 @@ class Auxiliary:
         return {self._prefix + name: found[name] for name in self._names}
 
     def go_on_from(self, poses: Poses) -> None:
-        """Everything stood here when it was last looked at."""
+        """Set the poses of the previous observation."""
         self._before = poses
 
     def _flow(self, now: Poses, depth: np.ndarray, ids: np.ndarray) -> np.ndarray:
-        """Backwards in time, and its sign changed: of what is seen now."""
+        """Optic flow of the points that are visible now: computed backwards in time, with the sign reversed."""
         before = now if self._before is None else self._before
         frames = self._renderer.eye_frames(now), self._renderer.eye_frames(before)
         return -np.nan_to_num(flow_between(self._renderer.eye, depth, ids, (now, before), frames), nan=0.0)

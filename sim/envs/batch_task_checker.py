@@ -1,4 +1,4 @@
-"""Whether a batch task keeps to the protocol: what environments rely on, tried out in a few worlds."""
+"""Test of a batch task against the protocol that environments rely on, in a few worlds."""
 
 from __future__ import annotations
 
@@ -15,32 +15,37 @@ SEED = 0
 
 
 def check_batch_task(task: BatchTask, n_envs: int = 4, steps: int = 12) -> None:
-    """Play random actions in a few worlds, and compare what the task does with the description of `sim.BatchTask`, as
-    Gymnasium's `check_env` does for environments.
+    """Play random actions in a few worlds, and compare the task's behaviour with the description of `sim.BatchTask`.
 
-    n_envs: number of worlds, at least 2 · steps: actions
+    It is the counterpart of Gymnasium's `check_env` for tasks.
 
-    Checked are: settings; shapes, finite numbers and worlds of everything that methods return; that `reset` changes
-    only the worlds that it was given; that a world's episode depends on neither its neighbours nor their number; that
-    the same seed repeats an episode; that `judge` moves nothing in worlds that it does not name; and that a state that
-    was stored can be restored.
+    n_envs: number of worlds, at least 2
+    steps: number of actions
+
+    The following are checked:
+
+    - the settings
+    - shapes, finite numbers and world indices in everything that the methods return
+    - `reset` changes only the worlds that it was given
+    - a world's episode depends neither on its neighbours nor on their number
+    - the same seed repeats an episode
+    - `judge` moves nothing in worlds that it does not name
+    - a stored state can be restored
 
     Raises:
-        ValueError: one line: which method, which array, which world, and what would be right.
+        ValueError: one line that states the method, the array, the world, and the correct behaviour.
         RuntimeError: a method fails.
     """
     if not isinstance(task, BatchTask):
         raise ValueError(f"task = {task!r:.80}: must be a sim.BatchTask")
     if n_envs < 2:
-        raise ValueError(f"n_envs = {n_envs!r}: must be at least 2, to tell worlds apart")
+        raise ValueError(f"n_envs = {n_envs!r}: must be at least 2, to compare worlds")
     with (
         contextlib.closing(Simulation(task, n_envs, SEED)) as many,
         contextlib.closing(Simulation(task, 1, SEED)) as one,
     ):
         trace = _played(many, steps)
-        _require_equal(
-            "the same seed", trace, _played(many, steps), "must repeat every episode: draw from `rngs` alone"
-        )
+        _require_equal("the same seed", trace, _played(many, steps), "must repeat every episode: draw only from `rngs`")
         single = _played(one, steps)
         own = [{name: array[:1] for name, array in moment.items()} for moment in trace]
         _require_equal("world 0", own, single, "must not depend on other worlds or on their number")
@@ -49,7 +54,7 @@ def check_batch_task(task: BatchTask, n_envs: int = 4, steps: int = 12) -> None:
 
 
 def _actions(simulation: Simulation, steps: int) -> list[np.ndarray]:
-    """The same for each world, whatever the number of worlds."""
+    """Return the same actions for each world, for any number of worlds."""
     size = sum(agent.n_actions for agent in simulation.agents)
     random = np.random.default_rng(SEED)
     return [np.tile(random.uniform(-1, 1, size), (simulation.n, 1)).astype(np.float32) for _ in range(steps)]
@@ -80,24 +85,25 @@ def _step(simulation: Simulation, action: np.ndarray) -> dict[str, np.ndarray]:
 
 
 def _require_own_reset(simulation: Simulation) -> None:
-    before = simulation.held()
+    before = simulation.get_state()
     last = simulation.n - 1
     simulation.restart(np.array([last]))
-    for name, array in simulation.held().items():
-        others = [w for w in range(last) if before[name][w].tobytes() != array[w].tobytes()]  # NaN equals itself so
+    for name, array in simulation.get_state().items():
+        # Compared as bytes, so that NaN equals NaN.
+        others = [w for w in range(last) if before[name][w].tobytes() != array[w].tobytes()]
         if others:
             raise ValueError(
-                f"reset: was given world {last} and changed {name} of world {others[0]}: must leave it alone"
+                f"reset: was given world {last} and changed {name} of world {others[0]}: must not change it"
             )
 
 
 def _require_restored(simulation: Simulation, steps: int) -> None:
     _played(simulation, 1)
-    stored = simulation.held()
+    stored = simulation.get_state()
     first = [_step(simulation, action) for action in _actions(simulation, steps)]
-    simulation.hold(stored, np.arange(simulation.n))
+    simulation.set_state(stored, np.arange(simulation.n))
     again = [_step(simulation, action) for action in _actions(simulation, steps)]
-    _require_equal("a restored state", first, again, "must lead where it led before: keep episodes in worlds' arrays")
+    _require_equal("a restored state", first, again, "must lead to the same future: store episodes in worlds' arrays")
 
 
 def _require_equal(what: str, one: list[dict[str, np.ndarray]], other: list[dict[str, np.ndarray]], right: str) -> None:

@@ -1,4 +1,4 @@
-"""One world as a Gymnasium environment: the batched environment with a batch of one."""
+"""One world as a Gymnasium environment, implemented as a batch of one."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from sim.tasks.batch_task import BatchTask
 from sim.tasks.encounter import Encounter
 from sim.tasks.task import Task
 
-_OF_BATCHES = {"seed": "it goes to reset(seed=...)", "n_envs": "this is one world: make_vec_env has several"}
+_OF_BATCHES = {"seed": "pass it to reset(seed=...)", "n_envs": "this is one world: make_vec_env has several"}
 
 
 class EyesEnv(gymnasium.Env[dict[str, np.ndarray], np.ndarray]):
-    """One agent with eyes in one world. Spaces, rewards, endings and `info` are in docs/tasks.md.
+    """One agent with eyes in one world. Spaces, rewards, endings and `info` are documented in docs/tasks.md.
 
     task, eyes, memory, mode, rays_per_receptor, fidelity, world_seed, mazes, course, least_return, episode_steps,
-        spectra, render_mode: as in `sim.make_vec_env`
+        spectra, render_mode: see `sim.make_vec_env`
 
     Raises:
         ValueError: a bad argument.
@@ -35,7 +35,7 @@ class EyesEnv(gymnasium.Env[dict[str, np.ndarray], np.ndarray]):
     ) -> None:
         if isinstance(task, Encounter):
             raise ValueError(
-                "task: several animals learn in a sim.Encounter: must be its `alone`, or make_parallel_env"
+                "task: several animals learn in a sim.Encounter: use the result of `alone`, or make_parallel_env"
             )
         for name, why in _OF_BATCHES.items():
             if name in options:
@@ -47,7 +47,8 @@ class EyesEnv(gymnasium.Env[dict[str, np.ndarray], np.ndarray]):
 
     @property
     def state(self) -> Any:
-        """The world as it is now, a batch of one, in its physics' own type: of the built-in tasks a `WorldState`."""
+        """Current state of the world, as a batch of one, in the type of its physics: `WorldState` for the built-in
+        tasks."""
         return self._batch.state
 
     def reset(
@@ -55,7 +56,7 @@ class EyesEnv(gymnasium.Env[dict[str, np.ndarray], np.ndarray]):
     ) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
         super().reset(seed=seed)
         if options:
-            raise ValueError(f"reset: options = {options!r}: must be left out, nothing can be set here")
+            raise ValueError(f"reset: options = {options!r}: must be left out, reset has no options")
         if seed is not None:
             self._batch.seed(seed)
         observation = self._batch.reset()
@@ -63,11 +64,11 @@ class EyesEnv(gymnasium.Env[dict[str, np.ndarray], np.ndarray]):
 
     def step(self, action: np.ndarray) -> tuple[dict[str, np.ndarray], float, bool, bool, dict[str, Any]]:
         observation, reward, terminated, truncated, info = self._batch.step_once(np.asarray(action)[None])
-        info[0].pop("episode", None)  # Stable-Baselines3's; a Gymnasium environment leaves that name to its wrappers
+        info[0].pop("episode", None)  # entry of Stable-Baselines3; Gymnasium reserves this name for its wrappers
         return _only(observation), float(reward[0]), bool(terminated[0]), bool(truncated[0]), info[0]
 
     def render(self) -> np.ndarray | None:
-        """A picture (y, x, 3) uint8 as `render_mode` asks.
+        """Return an image (y, x, 3) uint8 as set by `render_mode`; None without a mode.
 
         Raises:
             RuntimeError: before the first reset.
@@ -79,7 +80,7 @@ class EyesEnv(gymnasium.Env[dict[str, np.ndarray], np.ndarray]):
 
 
 def make_env(task: str | Task | BatchTask, eyes: Eyes | None = None, **options: Any) -> EyesEnv:
-    """A single environment; see `EyesEnv`."""
+    """Return a single environment; see `EyesEnv`."""
     return EyesEnv(task, eyes, **options)
 
 

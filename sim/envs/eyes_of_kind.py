@@ -1,4 +1,4 @@
-"""Signals of one kind of eyes of one agent, in all worlds, noise included."""
+"""Signals of one kind of an agent's eyes in all worlds, including noise."""
 
 from __future__ import annotations
 
@@ -14,58 +14,62 @@ from sim.tasks.simulation import Simulation
 
 
 class EyesOfKind:
-    """Renderer, noise and memory of these eyes.
+    """Renderer, noise and memory of one kind of eyes.
 
-    simulation: worlds · renderer: the eyes · keys: of their noise, one for each world
-    memory: frames in an observation
-    space: of one world's observation of them
+    simulation: the worlds
+    renderer: renderer of the eyes
+    keys: keys of the noise, one for each world
+    memory: number of frames in an observation
+    space: space of these signals in one world's observation
     """
 
     def __init__(self, simulation: Simulation, renderer: EyeRenderer, keys: np.ndarray, memory: int) -> None:
         self.renderer, self._simulation = renderer, simulation
         self._wavelengths = np.asarray(renderer.eye.spectral_bands.wavelengths)
-        self.memory, self._noise = Memory(memory), NoiseModel.of(renderer.eye)
+        self.memory, self._noise = Memory(memory), NoiseModel.from_eye(renderer.eye)
         frame = (len(renderer.mounts), renderer.eye.channels, *renderer.eye.resolution)
         self._normals = Normals(keys, frame)
         self.space = self._space((memory, *frame))
 
     def restart(self, keys: np.ndarray) -> None:
-        """Draw noise from its beginning."""
+        """Restart the noise with these keys."""
         self._normals.restart(keys)
 
-    def begin(self, poses: Poses, worlds: np.ndarray | None = None) -> PendingFrame:
-        """Begin to render these worlds (None: all), noise included; no other world's noise goes on."""
+    def launch(self, poses: Poses, worlds: np.ndarray | None = None) -> PendingFrame:
+        """Launch the rendering of these worlds (None: all), including noise. The noise of other worlds does not
+        advance."""
         light = self._simulation.light(self._wavelengths)
         if worlds is None:
-            seen = self.renderer.begin(poses, light)
+            seen = self.renderer.launch(poses, light)
             worlds = np.arange(self._simulation.n)
         else:
-            seen = self.renderer.begin_some(poses, worlds, light)
+            seen = self.renderer.launch_some(poses, worlds, light)
         noise = self._noise
         if noise is None:
             return seen
-        normals = self._normals.begin(worlds)
+        normals = self._normals.launch(worlds)
         return seen.then(lambda signals: noise(signals, normals.wait()))
 
-    def state(self) -> dict[str, np.ndarray]:
-        """All that future signals depend on, beside the worlds."""
-        return {"remembered": self.memory.held, "noise": self._normals.place}
+    def get_state(self) -> dict[str, np.ndarray]:
+        """Return everything that future signals depend on, apart from the worlds."""
+        return {"remembered": self.memory.frames_held, "noise": self._normals.place}
 
-    def bring_back(self, remembered: np.ndarray, noise: np.ndarray) -> None:
-        """Inverse of `state`."""
-        self.memory.hold(remembered)
+    def set_state(self, remembered: np.ndarray, noise: np.ndarray) -> None:
+        """Restore what `get_state` returned."""
+        self.memory.restore(remembered)
         self._normals.go_on_from(noise)
 
     def _space(self, frames: tuple[int, ...]) -> spaces.Box:
         brightest = self._brightest()
         spread = 0.0 if self._noise is None else self._noise.largest(brightest)
         margin = SIGMAS * spread + ROUNDING * brightest
-        # Lights at points are brighter the nearer they are.
+        # The signal of a point light has no upper bound: it grows as the distance decreases.
         high = 2 * brightest + margin if self.renderer.only_directional else np.inf
         return spaces.Box(-margin if np.isfinite(high) else -np.inf, high, frames, np.float32)
 
     def _brightest(self) -> float:
-        """Signal of a white surface that faced all directional lights at once, in the brightest of episodes."""
+        """Signal of a white surface that faces all directional lights at once, under the brightest light that can be
+        drawn."""
         variation = self._simulation.variation
         if variation is None or not variation.of_light:
             return self.renderer.brightest

@@ -1,8 +1,6 @@
-"""What eyes look at, drawn into a picture of their world: the eyes, their fields of view on their own level, and
-receptors' rays.
+"""Overlay that shows the eyes, their fields of view at eye height, and rays of receptors in an image of the world.
 
-The camera follows the agent, so that in the picture the fields are always in the same place: what changes is how far
-one sees, and what hides them.
+The camera follows the agent, so the fields of view have a fixed place in the image. Only their occlusion changes.
 """
 
 from __future__ import annotations
@@ -17,25 +15,28 @@ from sim.eyes.eyes import BODY_RADIUS, EYE_HEIGHT, Eyes, eye_positions
 from sim.pictures.camera_rays import plane_coordinates
 from sim.scene.cameras import Viewpoint
 
-# One colour per eye, from left to right, then again (Okabe and Ito 2008: told apart by the colour-blind, too).
+# Colours of the eyes, from left to right, repeated if necessary (Okabe and Ito 2008: distinguishable by colour-blind
+# readers).
 COLORS = np.array(
     [[0, 158, 115], [230, 159, 0], [86, 180, 233], [204, 121, 167], [240, 228, 66], [0, 114, 178], [213, 94, 0]]
 )
 FILL, RAY, RIM = 0.22, 0.55, 0.95  # opacities
-FARTHEST = 30.0  # [m] of a ray that meets nothing
-MOST_RAYS = 15  # drawn of one eye, beside the rims
-FAN = 64  # rays that find out how far a field reaches
+FARTHEST = 30.0  # [m] length of a ray that hits nothing
+MOST_RAYS = 15  # drawn for one eye, in addition to the edges of its field
+FAN = 64  # rays that sample the extent of a field
 LINE = 1.2  # [pixels] width
-IRIS, PUPIL = 0.07, 0.045  # [m] radii of an eye: of its colour, and of the black in it
+IRIS, PUPIL = 0.07, 0.045  # [m] radii of the coloured disc and of the black disc in it
 
-Nearness = Callable[[np.ndarray], np.ndarray]  # of pixels, counted row by row: 1 / depth of what is seen [1/m]
+Nearness = Callable[[np.ndarray], np.ndarray]  # of pixel indices, row by row: 1 / depth of the visible surface [1/m]
 
 
 @dataclass(frozen=True)
 class _Level:
-    """The level of the eyes, where the camera looks at it; all in the agent's frame.
+    """The horizontal plane at eye height, at the pixels that show it; all in the agent's frame.
 
-    pixels: (n,) · depth: along the camera's axis [m], (n,) · points: (n, 2) [m]
+    pixels: (n,)
+    depth: along the camera's axis [m], (n,)
+    points: (n, 2) [m]
     pixel: size of a pixel there [m], (n,)
     """
 
@@ -47,8 +48,13 @@ class _Level:
 
 @dataclass(frozen=True)
 class _Field:
-    """One eye's field as it is if nothing ends it. pixels, depth: as of _Level, (n,) · opacity, distance [m]: there,
-    (n,) · ray, share: the ray of the fan to the right of a pixel, and how far it is to the next one, (n,)"""
+    """Pixels of one eye's field of view, without occlusion.
+
+    pixels, depth: as in _Level, (n,)
+    opacity, distance: opacity and distance from the eye [m], (n,)
+    ray, share: index of the fan's ray to the right of a pixel, and the pixel's position between it and the next ray,
+        from 0 to 1, (n,)
+    """
 
     pixels: np.ndarray
     depth: np.ndarray
@@ -58,7 +64,7 @@ class _Field:
     share: np.ndarray
 
     def visible(self, reach: np.ndarray) -> np.ndarray:
-        """Which of it lies no farther than the rays of the fan reach [m], (n,) bool."""
+        """Return which pixels are not farther away than the reach of the fan's rays [m], (n,) bool."""
         end = np.diff(reach).take(self.ray)
         end *= self.share
         end += reach.take(self.ray)
@@ -67,7 +73,12 @@ class _Field:
 
 @dataclass(frozen=True)
 class _Dot:
-    """One eye as it is if nothing hides it. pixels: (n,) · iris, pupil: opacities (n,) · depth: of the eye [m]"""
+    """Pixels of one eye, without occlusion.
+
+    pixels: (n,)
+    iris, pupil: opacities, (n,)
+    depth: depth of the eye [m]
+    """
 
     pixels: np.ndarray
     iris: np.ndarray
@@ -76,9 +87,10 @@ class _Dot:
 
 
 class FieldsOfView:
-    """Draws the fields of view of one agent's eyes into pictures.
+    """Overlay of the fields of view of one agent's eyes.
 
-    view: of the camera, in the agent's frame, whose origin is on the floor · size: of the pictures (height, width)
+    view: the camera, in the agent's frame, whose origin is on the floor
+    size: size of the images (height, width)
     """
 
     def __init__(self, eyes: Eyes, view: Viewpoint, size: tuple[int, int]) -> None:
@@ -89,7 +101,7 @@ class FieldsOfView:
         self._dots = [_dot(eye + np.array([0, 0, EYE_HEIGHT]), view, size, _radius(eyes)) for eye in places]
 
     def draw(self, picture: np.ndarray, nearness: Nearness, model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
-        """A picture (y, x, 3) uint8 with the field of every eye where nothing hides it; data: where everything is."""
+        """Return the image (y, x, 3) uint8 with the visible part of every eye's field of view; data: current poses."""
         shown = picture.reshape(-1, 3).copy()
         heading = float(data.joint("agent_heading").qpos[0])
         azimuths = self.eyes.azimuths() + heading
@@ -108,7 +120,7 @@ class FieldsOfView:
 
 
 def _draw_dot(shown: np.ndarray, dot: _Dot, nearness: Nearness, color: np.ndarray) -> None:
-    """In place; an agent's own body does not hide its eyes, so that one sees where it looks."""
+    """Draw an eye in place. The agent's own body does not occlude it, so that the eye's position is always visible."""
     free = nearness(dot.pixels) * (dot.depth - 2 * BODY_RADIUS) < 1
     under = shown[dot.pixels].astype(np.float32)
     colored = under + (free * dot.iris)[:, None] * (color - under)
@@ -132,7 +144,7 @@ def _level(view: Viewpoint, size: tuple[int, int]) -> _Level:
 
 
 def _field(level: _Level, eyes: Eyes, azimuth: float, eye: np.ndarray) -> _Field:
-    """That of the eye at `eye` (2,) [m]."""
+    """Return the field of view of the eye at `eye` (2,) [m]."""
     half = np.radians(eyes.fov_deg) / 2
     offset = level.points - eye
     distance = np.linalg.norm(offset, axis=-1)
@@ -152,13 +164,13 @@ def _field(level: _Level, eyes: Eyes, azimuth: float, eye: np.ndarray) -> _Field
 
 
 def _fan(eyes: Eyes) -> np.ndarray:
-    """Azimuths from the eye's axis."""
+    """Azimuths of the fan's rays, relative to the eye's axis."""
     half = np.radians(eyes.fov_deg) / 2
     return np.linspace(-half, half, FAN)
 
 
 def _receptor_rays(eyes: Eyes) -> np.ndarray:
-    """Azimuths of columns of receptors from the eye's axis, not all if there are many; positive to the left."""
+    """Azimuths of receptor columns relative to the eye's axis, positive to the left; a subset if there are many."""
     columns = eyes.resolution[1]
     shown = np.arange(columns)[:: -(-columns // MOST_RAYS)]
     across = np.tan(np.radians(eyes.fov_deg) / 2)
@@ -166,7 +178,7 @@ def _receptor_rays(eyes: Eyes) -> np.ndarray:
 
 
 def _radius(eyes: Eyes) -> float:
-    """Of an iris [m]: such that eyes do not overlap."""
+    """Radius of an iris [m], small enough that eyes do not overlap."""
     apart = np.abs(np.diff(eyes.azimuths())).min(initial=np.pi)
     return float(min(IRIS, BODY_RADIUS * np.sin(apart / 2)))
 
@@ -182,7 +194,7 @@ def _dot(eye: np.ndarray, view: Viewpoint, size: tuple[int, int], radius: float)
 
 
 def _reach(azimuths: np.ndarray, eye: np.ndarray, model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
-    """How far one sees along these azimuths [m], looking through the agent's own body."""
+    """Distance to the first surface along these azimuths [m], ignoring the agent's own body."""
     n = len(azimuths)
     rays = np.stack([np.cos(azimuths), np.sin(azimuths), np.zeros(n)], axis=-1)
     hit, distance = np.full(n, -1, np.int32), np.full(n, -1.0)

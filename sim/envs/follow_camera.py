@@ -1,4 +1,4 @@
-"""Pictures for people: the agent seen from behind, in the mirror of its world, and where its eyes look."""
+"""Images for human viewers: the agent from behind, with the fields of view of its eyes."""
 
 from __future__ import annotations
 
@@ -16,10 +16,11 @@ from sim.scene.mirror import Mirror, mirror
 from sim.worlds.state import WorldState, pose
 from sim.worlds.world import World
 
-# [m] of the camera from the agent, and of its target ahead of it; steep enough to look over a wall behind.
+# Offsets [m] of the camera from the agent, and of its target ahead of the agent; steep enough to look over a wall
+# behind.
 BEHIND, ABOVE, AHEAD = 4.0, 5.0, 3.0
 FOVY_DEG = 50.0
-WAVELENGTHS = np.linspace(430e-9, 660e-9, 8)  # [m] of slow pictures
+WAVELENGTHS = np.linspace(430e-9, 660e-9, 8)  # [m] of slow images
 SIZE = (360, 480)  # pixels (height, width)
 
 
@@ -27,7 +28,7 @@ RENDER_MODES = ("rgb_array", "eyes")
 
 
 def check_render_mode(render_mode: str | None) -> None:
-    """Refuse what nothing can be drawn by.
+    """Refuse an unknown render mode.
 
     Raises:
         ValueError: neither one of RENDER_MODES nor None.
@@ -38,11 +39,11 @@ def check_render_mode(render_mode: str | None) -> None:
 
 
 class FollowCamera:
-    """A camera that follows the agent; it holds its own mirror of the world.
+    """A camera that follows the agent. It has its own mirror of the world.
 
-    eyes: that are drawn, with their fields of view; None: no one's
-    samples: None: quick pictures (`sim.pictures.quick_camera`); a number: so many rays through every pixel, traced by
-        Mitsuba at eight wavelengths, which takes twenty to fifty times as long
+    eyes: eyes that are drawn with their fields of view; None: no eyes
+    samples: None: fast images (`sim.pictures.quick_camera`); a number: rays per pixel, traced by Mitsuba at eight
+        wavelengths, which takes twenty to fifty times as long
 
     Raises:
         ValueError: samples below 1.
@@ -50,7 +51,7 @@ class FollowCamera:
 
     def __init__(self, world: World, eyes: Eyes | None = None, samples: int | None = None) -> None:
         if samples is not None and (isinstance(samples, bool) or samples != int(samples) or samples < 1):
-            raise ValueError(f"samples = {samples!r}: must be a whole number, at least 1, or None, quick pictures")
+            raise ValueError(f"samples = {samples!r}: must be a whole number, at least 1, or None, for fast images")
         self.world, self.eyes, self.samples = world, eyes, samples
         self._data = mujoco.MjData(world.model)
         self._quick = QuickCamera(world.model, world.spectra) if samples is None else None
@@ -58,15 +59,15 @@ class FollowCamera:
         self._fields: dict[tuple[int, int], FieldsOfView] = {}
 
     def picture(self, state: WorldState, index: int = 0, size: tuple[int, int] = SIZE) -> np.ndarray:
-        """sRGB picture (height, width, 3) uint8 of one world of a state."""
+        """Return an sRGB image (height, width, 3) uint8 of one world of a state."""
         pose(self._data, self.world, state, index)
         height, width = size
         view = _follow(state, index)
         nearness: Nearness
         if self._mirror is None:
             assert self._quick is not None
-            look = self._quick.look(self._data, view, width, height)
-            picture, nearness = look.picture, look.nearness
+            look = self._quick.render(self._data, view, width, height)
+            picture, nearness = look.picture, look.inverse_distance
         else:
             picture, nearness = self._slow_look(self._mirror, view, size)
         if self.eyes is None:
@@ -86,7 +87,8 @@ class FollowCamera:
 
 
 def _sampler(spp: int) -> str:
-    """Multijitter makes less noise; it lays samples out in rows, and rounds numbers for which it cannot."""
+    """Return the name of Mitsuba's sampler. Multijitter has less noise, but rounds sample counts that do not fit its
+    grid."""
     return "multijitter" if spp % math.isqrt(spp) == 0 else "independent"
 
 
@@ -95,7 +97,7 @@ def _follow(state: WorldState, index: int) -> Viewpoint:
 
 
 def _behind(position: np.ndarray, heading: float) -> Viewpoint:
-    """Where an agent there is seen from."""
+    """Return the viewpoint behind an agent with this position and heading."""
     x, y = position
     cos, sin = np.cos(heading), np.sin(heading)
     origin = np.array([x - BEHIND * cos, y - BEHIND * sin, ABOVE])

@@ -1,4 +1,4 @@
-"""States of environments, as `get_state` returns them, checked before they are restored."""
+"""Checks of stored states of environments, before they are restored."""
 
 from __future__ import annotations
 
@@ -11,11 +11,13 @@ from sim.physics.mujoco_worlds import MODELS
 
 
 def checked(state: Any, like: Mapping[str, np.ndarray]) -> Mapping[str, np.ndarray]:
-    """A state as `like`, of the same shapes. An only world's model may be its own in one of them: it was changed on the
-    way.
+    """Return a stored state after comparing its entries and their shapes with `like`.
+
+    If there is only one world, the entry of its model is optional, because a single world gets its own model only when
+    a task changes it.
 
     Raises:
-        ValueError: it has other entries, or an entry of another shape.
+        ValueError: the state has other entries, or an entry of another shape.
     """
     optional = {MODELS} if len(like["steps"]) == 1 else set()
     if not isinstance(state, Mapping) or (state.keys() ^ like.keys()) - optional:
@@ -29,10 +31,10 @@ def checked(state: Any, like: Mapping[str, np.ndarray]) -> Mapping[str, np.ndarr
 
 
 def chosen_worlds(worlds: Any, n: int) -> np.ndarray:
-    """Numbers of worlds; None: all.
+    """Return indices of worlds; None: all.
 
     Raises:
-        ValueError: they are no numbers of worlds.
+        ValueError: not indices of worlds.
     """
     if worlds is None:
         return np.arange(n)

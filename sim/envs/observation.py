@@ -1,19 +1,19 @@
-"""What an agent knows: its eyes' noisy signals over the past frames, touch, and its last action."""
+"""Memory of an agent's past frames, as part of its observations."""
 
 from __future__ import annotations
 
 import numpy as np
 
-# Standard deviations of noise within which signals are said to stay: 1 in 1e23 draws does not.
+# Bounds of the signals, in standard deviations of their noise: 1 in 1e23 draws exceeds them.
 SIGMAS = 10.0
-ROUNDING = 1e-4  # of float32, as a share of the brightest signal
+ROUNDING = 1e-4  # error of float32, as a share of the brightest signal
 
 
 class Memory:
     """The last `frames` frames of every world, newest last.
 
-    A world that starts anew has its first frame in every place: it has always seen what it sees now, rather than
-    having come out of darkness.
+    In a world that starts a new episode, the first frame fills the whole memory, as if the agent had seen the same
+    frame before. A memory that started with zeros would mean an agent that comes out of darkness.
     """
 
     def __init__(self, frames: int) -> None:
@@ -23,9 +23,10 @@ class Memory:
         self._past: list[np.ndarray] = []
 
     def remember(self, frame: np.ndarray, fresh: np.ndarray) -> np.ndarray:
-        """Add a frame (env, ...); `fresh`: numbers of the worlds that have just started.
+        """Add a frame (env, ...); `fresh`: indices of the worlds whose episode has just started.
 
-        Returns (env, memory, ...), the caller's own, which may be written to; `frame` no longer is.
+        Returns a new array (env, memory, ...), which the caller may modify. `frame` itself must not be modified
+        afterwards.
         """
         if self.frames == 1:
             self._past = [frame.copy()]
@@ -40,16 +41,16 @@ class Memory:
 
     @property
     def begun(self) -> bool:
-        """Whether there is anything to remember."""
+        """True if the memory contains a frame."""
         return bool(self._past)
 
     @property
-    def held(self) -> np.ndarray:
-        """All that is remembered, (env, memory, ...)."""
+    def frames_held(self) -> np.ndarray:
+        """All stored frames, (env, memory, ...)."""
         return np.stack(self._past, axis=1)
 
-    def hold(self, frames: np.ndarray) -> None:
-        """Remember these instead, (env, memory, ...)."""
+    def restore(self, frames: np.ndarray) -> None:
+        """Replace the stored frames by these, (env, memory, ...)."""
         self._past = [frames[:, k].copy() for k in range(self.frames)]
 
     @property
@@ -58,7 +59,7 @@ class Memory:
         return self._past[-1]
 
     def preview(self, frame: np.ndarray, worlds: np.ndarray) -> np.ndarray:
-        """What these worlds' memory would hold with this frame (len(worlds), ...) added; nothing is remembered."""
+        """Return the memory of these worlds with a frame (len(worlds), ...) added, without storing it."""
         if self.frames == 1:
             return frame[:, None]
         return np.stack([*(past[worlds] for past in self._past[1:]), frame], axis=1)

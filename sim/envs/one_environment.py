@@ -1,4 +1,4 @@
-"""What stable-baselines3 asks of a VecEnv, answered where one environment stands behind all indices."""
+"""Methods of a stable-baselines3 VecEnv that are the same for all indices, because all worlds share one environment."""
 
 from __future__ import annotations
 
@@ -11,23 +11,25 @@ from stable_baselines3.common.vec_env.base_vec_env import tile_images
 
 
 class OneEnvironment(VecEnv):
-    """Worlds that share one environment: attributes and methods are everybody's."""
+    """Worlds that share one environment, and therefore its attributes and methods."""
 
     def __reduce__(self) -> NoReturn:
         """Refuse to be pickled or copied."""
         raise TypeError(
-            f"{type(self).__name__} cannot be pickled or copied: it holds compiled kernels and physics; build one in "
-            "every process that needs it"
+            f"{type(self).__name__} cannot be pickled or copied, since it contains compiled kernels and physics; "
+            "build one in every process that needs it"
         )
 
     def seed(self, seed: int | None = None) -> Sequence[int | None]:
-        """Seed all random streams at the next reset. World i draws from streams derived from (seed, i)."""
+        """Seed all random streams at the next reset. World i uses streams derived from (seed, i)."""
         self._seeds = [seed] * self.num_envs
         return self._seeds
 
     def render(self, mode: str | None = None) -> np.ndarray | None:
-        """All worlds' pictures, tiled. Stable-baselines3 asks each environment for a mode that it does not know, and
-        they are all this one.
+        """Return the images of all worlds, tiled.
+
+        Stable-baselines3 delegates modes that it does not support to each environment. Here all of them are this one,
+        so the mode "eyes" is handled directly.
 
         Raises:
             RuntimeError: before the first reset.

@@ -21,10 +21,14 @@ from sim.tasks.user_tasks import batched
 
 
 class EncounterEnv(ParallelEnv[str, dict[str, np.ndarray], np.ndarray]):
-    """All animals act at once, each by its own policy. Observations and `info` of each are those of `make_vec_env`.
+    """Several animals that act at the same time, each by its own policy, as a PettingZoo parallel environment.
 
-    encounter: who meets · seed: of episodes and noise until `reset` is given one
-    memory: frames in an observation · render_mode: "rgb_array", "eyes" or None
+    Each animal's observations and `info` are as in `make_vec_env`.
+
+    encounter: the animals
+    seed: seed of episodes and noise until `reset` receives one
+    memory: number of frames in an observation
+    render_mode: "rgb_array", "eyes" or None
     """
 
     metadata = {"render_modes": [*RENDER_MODES], "name": "rhabdom_encounter"}  # noqa: RUF012 (PettingZoo's declaration)
@@ -50,11 +54,11 @@ class EncounterEnv(ParallelEnv[str, dict[str, np.ndarray], np.ndarray]):
     def reset(
         self, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[dict[str, dict[str, np.ndarray]], dict[str, dict[str, Any]]]:
-        """Begin an episode; there are no options, and PettingZoo's tests want any to be taken."""
+        """Start an episode. Options are accepted, because PettingZoo's tests pass some, but have no effect."""
         if seed is not None:
             self._animals.seed(seed)
         self.agents, self._begun = list(self.possible_agents), True
-        observations, varied = self._observed(self._animals.reset()), self._animals.simulation.told(0)
+        observations, varied = self._observed(self._animals.reset()), self._animals.simulation.variation_info(0)
         return observations, {name: {"reward_terms": {}, "is_success": False, **varied} for name in self.agents}
 
     def step(
@@ -66,10 +70,10 @@ class EncounterEnv(ParallelEnv[str, dict[str, np.ndarray], np.ndarray]):
         dict[str, bool],
         dict[str, dict[str, Any]],
     ]:
-        """One action of everybody; without agents, after an episode's end, nothing happens.
+        """Take one action of every animal. Steps after the end of an episode have no effect.
 
         Raises:
-            ValueError: an action is missing, or somebody's who is not there, or has another shape.
+            ValueError: an action is missing, belongs to an unknown animal, or has another shape.
             RuntimeError: before the first reset.
         """
         self._require_begun()
@@ -81,19 +85,24 @@ class EncounterEnv(ParallelEnv[str, dict[str, np.ndarray], np.ndarray]):
         terminated, truncated = self._named(step.terminated.tolist()), self._named(step.truncated.tolist())
         rewards = self._named(step.reward.tolist())
         if any(terminated.values()) or any(truncated.values()):
-            self.agents = []  # an episode ends for all
+            self.agents = []  # an episode ends for all animals at once
         failure = {"failure": step.failure[0]} if step.failure else {}
         infos = {
-            name: {"reward_terms": terms, "is_success": success, **failure, **self._animals.simulation.told(0)}
+            name: {
+                "reward_terms": terms,
+                "is_success": success,
+                **failure,
+                **self._animals.simulation.variation_info(0),
+            }
             for name, terms, success in zip(self.possible_agents, step.terms.rows, step.success.tolist(), strict=True)
         }
         return observations, rewards, terminated, truncated, infos
 
     def render(self) -> np.ndarray | list[np.ndarray] | None:
-        """A picture (y, x, 3) uint8 of the world, or what each animal's eyes see, as `render_mode` asks.
+        """Return an image (y, x, 3) uint8 of the world, or one of each animal's signals, as set by `render_mode`.
 
         Raises:
-            RuntimeError: before the first reset, if there is anything to show.
+            RuntimeError: before the first reset, if there is a render mode.
         """
         if self.render_mode is None:
             return None
@@ -115,7 +124,7 @@ class EncounterEnv(ParallelEnv[str, dict[str, np.ndarray], np.ndarray]):
         return self._named([{name: array[0] for name, array in known.items()} for known in observations])
 
     def _commanded(self, actions: Mapping[str, np.ndarray]) -> list[np.ndarray]:
-        """(1, number) of each."""
+        """Return the actions of each animal, (1, number)."""
         for name in actions:
             if name not in self.agents:
                 known = did_you_mean(name, self.agents) or f": there are {', '.join(self.agents)}"
@@ -123,7 +132,7 @@ class EncounterEnv(ParallelEnv[str, dict[str, np.ndarray], np.ndarray]):
         found = []
         for name in self.agents:
             if name not in actions:
-                raise ValueError(f"actions: {name!r} has none: must be one of each, {', '.join(self.agents)}")
+                raise ValueError(f"actions: {name!r} has none: must have one for each of {', '.join(self.agents)}")
             action, shape = np.asarray(actions[name], np.float32), self.action_spaces[name].shape
             if action.shape != shape:
                 raise ValueError(f"actions: {name!r} has shape {action.shape}: must be {shape}")

@@ -1,4 +1,4 @@
-"""A task made ready for several environments: its scenes are built and its fidelities chosen once."""
+"""A task prepared for several environments: its scenes are built and its fidelities chosen only once."""
 
 from __future__ import annotations
 
@@ -22,22 +22,23 @@ from sim.tasks.task_fidelity import fidelities_among
 
 __all__ = ["PreparedTask"]
 
-Fidelities = Mapping[str, Fidelity]  # by kind of eyes
+Fidelities = Mapping[str, Fidelity]  # for each kind of eyes
 
 
 class PreparedTask:
     """A task, its scenes, and the fidelity of all eyes.
 
-    task: what is done · fidelity: of the learners' eyes, in the place of the task's own
-    fidelities: of every agent's eyes by kind; None for agents that look at nothing
+    task: the task
+    fidelity: fidelity of the learners' eyes, instead of the task's own
+    fidelities: fidelities of every agent's eyes, by kind; None for agents whose eyes are not used
 
     Raises:
-        ValueError: what the task's settings, model and eyes raise.
+        ValueError: the task's settings, model or eyes are invalid.
     """
 
     def __init__(self, task: BatchTask, fidelity: Fidelity | None = None) -> None:
         self.task, agents = task, task.agents()
-        layout = isinstance(task, AgentTask) and not (task.vary and Variation(task.vary).of_looks)
+        layout = isinstance(task, AgentTask) and not (task.vary and Variation(task.vary).of_appearances)
         self._scenes = scenes_for(task) if layout and isinstance(task, AgentTask) else None
         self.fidelities: list[Fidelities | None] = [
             self._fidelities(number, agent, fidelity) if agent.learns or agent.policy is not None else None
@@ -58,13 +59,13 @@ class PreparedTask:
 
     @property
     def fidelity(self) -> Fidelity:
-        """Of the first learner's first kind of eyes."""
+        """Fidelity of the first learner's first kind of eyes."""
         first = self.fidelities[0]
         assert first is not None
         return next(iter(first.values()))
 
     def at_most(self, rays_per_receptor: float) -> PreparedTask:
-        """The same task, whose learners' eyes trace no more rays per receptor than this."""
+        """Return the same task with at most this number of rays per receptor for the learners' eyes."""
         found = copy.copy(self)
         found.fidelities = [
             {name: _at_most(fidelity, rays_per_receptor) for name, fidelity in of.items()}
@@ -75,13 +76,13 @@ class PreparedTask:
         return found
 
     def in_mode(self, mode: str) -> PreparedTask:
-        """The same task in another mode."""
+        """Return the same task in another mode."""
         found = copy.copy(self)
         found.task = self.task.in_mode(mode)
         return found
 
     def elsewhere(self, task: BatchTask) -> PreparedTask:
-        """The same eyes, with the same fidelities, in another layout."""
+        """Return another layout with the same eyes and the same fidelities."""
         found = copy.copy(self)
         found.task = task
         found._scenes = None if self._scenes is None or not isinstance(task, AgentTask) else scenes_for(task)
@@ -97,21 +98,23 @@ class PreparedTask:
         episode_steps: int | None = None,
         render_mode: str | None = None,
     ) -> EyesVecEnv:
-        """A batched environment; arguments as `sim.make_vec_env` has them."""
+        """Return a batched environment; see `sim.make_vec_env` for the arguments."""
         threads = min(dr.thread_count(), n_envs)
         simulation = Simulation(self.task, n_envs, seed, threads, least_return, episode_steps)
         renderers = renderers_for(simulation, simulation.agents, self.fidelities, self._scenes)
         return EyesVecEnv(simulation, renderers, memory, render_mode)
 
     def renderer(self, simulation: Simulation) -> EyeRenderer:
-        """Of the first agent's eyes in these worlds, which may be of the same task with other eyes."""
+        """Return the renderer of the first agent's first kind of eyes, for the worlds of a simulation. The simulation's
+        task may be the same task with other eyes."""
         (first,) = renderers_for(simulation, self.task.agents()[:1], self.fidelities[:1], self._scenes)
         assert first is not None
         return next(iter(first.eyes.values()))
 
 
 def _at_most(fidelity: Fidelity, rays_per_receptor: float) -> Fidelity:
-    """Of rays; if these are fewer than those that look for edges, the same everywhere."""
+    """Limit the rays per receptor. Below the number of rays with which adaptive edge sampling starts, all receptors get
+    the same number of rays."""
     rays = min(fidelity.rays_per_receptor, rays_per_receptor)
     samples = RAYS if fidelity.samples == EDGES and rays < FIRST else fidelity.samples
     return replace(fidelity, rays_per_receptor=rays, samples=samples)

@@ -1,7 +1,8 @@
-"""Environments as Gymnasium makes them by their ids: how long an episode lasts is what Gymnasium is told.
+"""Environments that Gymnasium makes by their ids. Gymnasium's `max_episode_steps` sets the length of episodes.
 
-`gymnasium.make` tells its own wrapper `TimeLimit` alone, which can end an episode earlier than the environment and not
-later. So the environment within does not end any, but where a course says its own number of actions.
+`gymnasium.make` passes this length only to its wrapper `TimeLimit`. The wrapper can end an episode earlier than the
+environment inside, but not later. The environment inside therefore truncates no episode, unless a course defines its
+own number of actions.
 """
 
 from __future__ import annotations
@@ -16,14 +17,14 @@ from sim.tasks.task_settings import MOST_STEPS
 from sim.worlds.course import Course
 from sim.worlds.navigation import course_named
 
-ENDLESS = -1  # Gymnasium's word for episodes that are not truncated
+ENDLESS = -1  # Gymnasium's value for episodes without truncation
 
 
 class RegisteredEnv(EyesEnv):
-    """An `EyesEnv` within Gymnasium's `TimeLimit`.
+    """An `EyesEnv` for Gymnasium's `TimeLimit`.
 
     Raises:
-        ValueError: a bad argument, and `episode_steps`, which Gymnasium calls `max_episode_steps`.
+        ValueError: a bad argument, or `episode_steps`, which Gymnasium calls `max_episode_steps`.
     """
 
     def __init__(self, task: str | Task | type[Task], *args: Any, **options: Any) -> None:
@@ -31,10 +32,10 @@ class RegisteredEnv(EyesEnv):
 
 
 class RegisteredVectorEnv(EyesVectorEnv):
-    """An `EyesVectorEnv`, whose episodes are as long.
+    """An `EyesVectorEnv` with episodes of the same length.
 
     Raises:
-        ValueError: a bad argument, and `episode_steps`, which Gymnasium calls `max_episode_steps`.
+        ValueError: a bad argument, or `episode_steps`, which Gymnasium calls `max_episode_steps`.
     """
 
     def __init__(
@@ -48,11 +49,11 @@ def _begun(task: str | Task | type[Task]) -> str | Task:
 
 
 def _steps(asked: int, options: dict[str, Any]) -> int:
-    """Actions in an episode: as many as were asked for, but no more than the course has."""
+    """Number of actions in an episode: the requested number, limited by that of the course."""
     if "episode_steps" in options:
         raise ValueError(
-            f"episode_steps = {options['episode_steps']!r}: must be left out where Gymnasium makes the environment; it "
-            "calls it max_episode_steps"
+            f"episode_steps = {options['episode_steps']!r}: must be left out if Gymnasium makes the environment; "
+            "its name there is max_episode_steps"
         )
     course: str | Course | None = options.get("course")
     own = None if course is None else course_named(course).episode_steps

@@ -1,7 +1,7 @@
 """Gymnasium ids, one for each task: `gymnasium.make("rhabdom/Detection-v0")`.
 
-`import sim` registers them, and so does Gymnasium itself in "sim:rhabdom/Detection-v0". `gymnasium.make_vec` has all
-worlds in one kernel.
+`import sim` registers them. Gymnasium imports the module itself if the id is "sim:rhabdom/Detection-v0".
+`gymnasium.make_vec` runs all worlds in one kernel.
 """
 
 from __future__ import annotations
@@ -19,21 +19,22 @@ IDS = {f"rhabdom/{task.capitalize()}-v0": task for task in TASKS}
 
 
 def register() -> None:
-    """Make the ids known; twice is once."""
+    """Register the ids that are not registered yet."""
     for id_, task in IDS.items():
         if id_ not in gymnasium.registry:
             _register(id_, EPISODE_STEPS, {"task": task})
 
 
 def register_task(id_: str, task: Task | type[Task], **options: Any) -> None:
-    """Give a task of one's own an id, for `gymnasium.make` and `gymnasium.make_vec`; twice is the last time.
+    """Register a user task, for `gymnasium.make` and `gymnasium.make_vec`. An existing registration of the id is
+    replaced.
 
-    id_: such as "FindBall-v0"
-    task: it, or its class; without `max_episode_steps`, episodes are as long as it says
-    options: as in `sim.make_vec_env`, such as memory
+    id_: id, such as "FindBall-v0"
+    task: the task, or its class; its `episode_steps` is the length of episodes, unless `max_episode_steps` is passed
+    options: arguments of `sim.make_vec_env`, such as memory
 
     Raises:
-        ValueError: it is no task, or says no length.
+        ValueError: not a task, or one without a valid length of episodes.
     """
     from optics.numerics.arguments import whole
     from sim.tasks.task import Task
@@ -46,7 +47,7 @@ def register_task(id_: str, task: Task | type[Task], **options: Any) -> None:
 
 
 def _register(id_: str, episode_steps: int, options: dict[str, Any]) -> None:
-    """Gymnasium's `TimeLimit` truncates episodes, so that who makes the environment may say another number."""
+    """Register an id. Gymnasium's `TimeLimit` truncates the episodes, so that callers can choose another length."""
     gymnasium.register(
         id_,
         entry_point="sim.envs.registered_env:RegisteredEnv",

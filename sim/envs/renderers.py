@@ -21,14 +21,18 @@ __all__ = ["AgentRenderers", "renderers_for", "scenes_for"]
 
 @dataclass(frozen=True)
 class AgentRenderers:
-    """Of one agent. eyes: by kind · auxiliary: of depth, ids and flow, in the same order, where these are wanted"""
+    """Renderers of one agent.
+
+    eyes: renderers by kind of eyes
+    auxiliary: renderers of depth, ids and flow in the same order, if the agent's observations contain any of these
+    """
 
     eyes: Mapping[str, EyeRenderer]
     auxiliary: tuple[Labels, ...] = ()
 
 
 def scenes_for(task: AgentTask) -> dict[str, WorldScene]:
-    """The task's world made ready for each kind of its eyes."""
+    """Return the task's world as a prepared scene, for each kind of its eyes."""
     kinds = task.eyes if isinstance(task.eyes, Mapping) else {EYES: task.eyes}
     return {name: WorldScene(task.world, eyes) for name, eyes in kinds.items() if eyes is not None}
 
@@ -39,10 +43,11 @@ def renderers_for(
     fidelities: Sequence[Mapping[str, Fidelity] | None],
     scenes: Mapping[str, WorldScene] | None,
 ) -> list[AgentRenderers | None]:
-    """Of all agents; None for those that look at nothing.
+    """Return the renderers of all agents; None for agents whose eyes are not used.
 
-    agents: of the simulation, maybe with other eyes
-    fidelities: of every agent's eyes by kind · scenes: of a built-in layout by kind of eyes; None: of other models
+    agents: agents of the simulation, possibly with other eyes
+    fidelities: fidelities of every agent's eyes, by kind
+    scenes: scenes of a built-in layout, by kind of eyes; None for other models
     """
     return [
         None if of is None else _of_agent(simulation, agent, of, scenes)
@@ -59,13 +64,13 @@ def _of_agent(
         if scenes is None:
             renderer = EyeRenderer(_scene_of_model(simulation, kind, fidelity), simulation.n, fidelity)
         else:
-            renderer = BatchedRenderer.of(scenes[kind.name], simulation.n, fidelity)
+            renderer = BatchedRenderer.from_scene(scenes[kind.name], simulation.n, fidelity)
         eyes[kind.name] = renderer
     return AgentRenderers(eyes, tuple(renderer.labels for renderer in eyes.values()) if agent.auxiliary else ())
 
 
 def _scene_of_model(simulation: Simulation, kind: EyeKind, fidelity: Fidelity) -> PreparedScene:
-    """A model as these eyes see it; rays are traced by Mitsuba."""
+    """Return a model prepared for these eyes; rays are traced by Mitsuba."""
     task, physics = simulation.task, simulation.physics
     return PreparedScene(
         physics.model,

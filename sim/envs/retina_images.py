@@ -1,4 +1,4 @@
-"""What eyes report, as pictures for people: receptors as squares, types of receptor as colours."""
+"""Signals of eyes as images for human viewers: receptors as squares, receptor types as colours."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ from optics import Eye
 from optics.spectra.receptors import Receptors
 from sim.scene.color import encode_srgb
 
-SIZE = (240, 960)  # pixels that the pictures of all eyes fill at most, if a receptor needs no more than one
+SIZE = (240, 960)  # pixels that the images of all eyes fill at most, unless one pixel per receptor is already more
 GAP = 4  # pixels between eyes
 BETWEEN = 200  # grey level of the gaps
 
 
 def side_by_side(signals: np.ndarray, eye: Eye) -> np.ndarray:
-    """sRGB picture (y, x, 3) uint8 of all eyes' signals (eye, channel, h, w), from left to right.
+    """Return an sRGB image (y, x, 3) uint8 of all eyes' signals (eye, channel, h, w), from left to right.
 
-    White in full daylight is white, however small the pupil. Types of receptor are shown as colours in the order of
-    their peaks: the longest as red, the shortest as blue, those between as what lies between; a single one as grey. In
-    a mosaic every receptor has its type's colour.
+    White in full daylight is shown as white, for any size of the pupil. Receptor types are shown as colours in the
+    order of their peaks: the longest wavelength as red, the shortest as blue, the others in between. A single type is
+    shown as grey. In a mosaic every receptor has the colour of its type.
     """
     linear = np.einsum("ecyx,cyxk->eyxk", signals / eye.white_signal, _palette(eye))
     pixels = np.rint(255 * encode_srgb(np.clip(linear, 0, 1))).astype(np.uint8)
@@ -32,7 +32,7 @@ def side_by_side(signals: np.ndarray, eye: Eye) -> np.ndarray:
 
 
 def one_above_another(pictures: Sequence[np.ndarray]) -> np.ndarray:
-    """Rows of one width, filled up with gaps' grey."""
+    """Return the images stacked vertically, padded to the same width with the grey of the gaps."""
     width = max(picture.shape[1] for picture in pictures)
     rows = [np.pad(p, ((GAP, 0), (0, width - p.shape[1]), (0, 0)), constant_values=BETWEEN) for p in pictures]
     return np.concatenate(rows)[GAP:]
@@ -48,7 +48,7 @@ def _palette(eye: Eye) -> np.ndarray:
 
 
 def _hues(receptors: Receptors) -> np.ndarray:
-    """(type, 3): red to green to blue from the longest peak to the shortest."""
+    """Colours (type, 3): from red through green to blue, from the longest to the shortest peak."""
     types = receptors.types
     if len(types) == 1:
         return np.ones((1, 3))
@@ -58,6 +58,7 @@ def _hues(receptors: Receptors) -> np.ndarray:
 
 
 def _shares(hues: np.ndarray) -> np.ndarray:
-    """(type, 3): weights that make white of all types' white; a primary that no type has gets a bit of all."""
+    """Weights (type, 3) with which equal signals of all types give white. A primary that no type has gets equal parts
+    of all types."""
     sums = hues.sum(axis=0)
     return np.where(sums > 0, hues / np.where(sums > 0, sums, 1), 1 / len(hues))

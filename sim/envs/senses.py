@@ -1,4 +1,4 @@
-"""Observations of one agent in all worlds: noisy signals of its eyes, what it feels, and what it did last."""
+"""Observations of one agent in all worlds: noisy signals of its eyes, proprioception, and its last action."""
 
 from __future__ import annotations
 
@@ -15,15 +15,18 @@ from sim.render.pending_frame import PendingFrame
 from sim.scene.poses import Poses
 from sim.tasks.simulation import Simulation
 
-Arrays = dict[str, np.ndarray]  # by name; the first axis is the world
+Arrays = dict[str, np.ndarray]  # arrays by name; the first axis is the world
 
 
 class Senses:
-    """Of one agent of these worlds.
+    """Observations of one agent.
 
-    number: of the agent · renderers: of its eyes · memory: frames in an observation
-    sights: its eyes, by their kind · action: what it did last, (world, number) float32
-    observation_space, action_space: of one world
+    number: index of the agent
+    renderers: renderers of its eyes
+    memory: number of frames in an observation
+    sights: its eyes, by kind
+    action: its last action, (world, number) float32
+    observation_space, action_space: spaces of one world
     """
 
     def __init__(self, simulation: Simulation, number: int, renderers: AgentRenderers, memory: int) -> None:
@@ -46,23 +49,23 @@ class Senses:
 
     @property
     def renderer(self) -> EyeRenderer:
-        """Its eyes of the first kind."""
+        """Renderer of its first kind of eyes."""
         return next(iter(self.sights.values())).renderer
 
     def restart(self) -> None:
-        """Draw noise from its beginning, as the worlds' seed has it."""
+        """Restart the noise from the seed of the worlds."""
         for sight, keys in zip(self.sights.values(), self._simulation.streams.noise_keys[self._number], strict=True):
             sight.restart(keys)
 
-    def begin(self, poses: Poses, worlds: np.ndarray | None = None) -> dict[str, PendingFrame]:
-        """Begin to render these worlds (None: all) with eyes of every kind."""
-        return {name: sight.begin(poses, worlds) for name, sight in self.sights.items()}
+    def launch(self, poses: Poses, worlds: np.ndarray | None = None) -> dict[str, PendingFrame]:
+        """Launch the rendering of these worlds (None: all) with all kinds of eyes."""
+        return {name: sight.launch(poses, worlds) for name, sight in self.sights.items()}
 
     def tell(self, poses: Poses, fresh: np.ndarray) -> None:
-        """Update what an observation holds beside signals; fresh: worlds whose episode has just begun. In these alone,
-        if there are any."""
+        """Update the auxiliary entries of the observation; fresh: worlds whose episode has just begun. If there are
+        any, only these worlds are updated."""
         for auxiliary in self._auxiliary:
-            for name, array in auxiliary.look(poses, fresh).items():
+            for name, array in auxiliary.render(poses, fresh).items():
                 if len(fresh) and name in self._told:
                     self._told[name][fresh] = array[fresh]
                 else:
@@ -70,46 +73,49 @@ class Senses:
 
     @property
     def tells(self) -> bool:
-        """Whether observations hold more than signals of receptors."""
+        """True if observations contain auxiliary entries."""
         return bool(self._auxiliary)
 
     def observation(self, seen: Arrays, fresh: np.ndarray) -> Arrays:
-        """With new frames of all worlds; fresh: those that have just begun."""
+        """Return the observations with new frames of all worlds; fresh: worlds whose episode has just begun."""
         remembered = {name: sight.memory.remember(seen[name], fresh) for name, sight in self.sights.items()}
-        return {**remembered, **self.beside(slice(None))}
+        return {**remembered, **self.other_entries(slice(None))}
 
     def preview(self, seen: Arrays, worlds: np.ndarray) -> Arrays:
-        """Frames of these worlds with the new ones of all worlds; nothing is remembered."""
+        """Return the frames of these worlds with the new frames (of all worlds) added, without storing them."""
         return {name: sight.memory.preview(seen[name][worlds], worlds) for name, sight in self.sights.items()}
 
-    def beside(self, worlds: Any) -> Arrays:
-        """Copies of what it knows in these worlds beside its eyes' signals."""
+    def other_entries(self, worlds: Any) -> Arrays:
+        """Return copies of the entries other than signals of eyes, in these worlds."""
         known = {**self._told, "previous_action": self.action, **self._simulation.felt[self._number]}
         return {name: array[worlds].copy() for name, array in known.items()}
 
     @property
     def begun(self) -> bool:
-        """Whether it has seen anything yet."""
+        """True after the first frame."""
         return all(sight.memory.begun for sight in self.sights.values())
 
     @property
     def now(self) -> Arrays:
-        """Its present observation."""
-        return {**{name: sight.memory.held for name, sight in self.sights.items()}, **self.beside(slice(None))}
+        """The current observation."""
+        return {
+            **{name: sight.memory.frames_held for name, sight in self.sights.items()},
+            **self.other_entries(slice(None)),
+        }
 
-    def state(self) -> Arrays:
-        """All that its future observations depend on, beside its worlds."""
+    def get_state(self) -> Arrays:
+        """Return everything that future observations depend on, apart from the worlds."""
         parts = {
             _part(k, name, what): array
             for k, (name, sight) in enumerate(self.sights.items())
-            for what, array in sight.state().items()
+            for what, array in sight.get_state().items()
         }
         return {**parts, **{name: array.copy() for name, array in self._told.items()}, "action": self.action.copy()}
 
-    def bring_back(self, state: Arrays) -> None:
-        """Inverse of `state`."""
+    def set_state(self, state: Arrays) -> None:
+        """Restore what `get_state` returned."""
         for k, (name, sight) in enumerate(self.sights.items()):
-            sight.bring_back(*(state[_part(k, name, what)] for what in ("remembered", "noise")))
+            sight.set_state(*(state[_part(k, name, what)] for what in ("remembered", "noise")))
         self.action = state["action"]
         self._told = {name: state[name] for name in self._told}
         for auxiliary in self._auxiliary:
@@ -121,11 +127,11 @@ class Senses:
             found |= auxiliary.spaces
         found["previous_action"] = spaces.Box(-1.0, 1.0, self.action_space.shape, np.float32)
         for name, felt in self._simulation.felt[self._number].items():
-            low, high = self._simulation.task.feel_ranges.get(name, (-np.inf, np.inf))
+            low, high = self._simulation.task.proprioception_ranges.get(name, (-np.inf, np.inf))
             found[name] = spaces.Box(low, high, felt.shape[1:], np.float32)
         return spaces.Dict(found)
 
 
 def _part(number: int, kind: str, what: str) -> str:
-    """Name of a kind's part of a state."""
+    """Name of an entry of one kind of eyes in a state."""
     return what if number == 0 else f"{kind}.{what}"

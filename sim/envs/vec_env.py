@@ -1,4 +1,4 @@
-"""The natively batched stable-baselines3 VecEnv: all worlds move together, and all eyes are rendered together."""
+"""Natively batched stable-baselines3 VecEnv: all worlds are stepped together, and all eyes are rendered together."""
 
 from __future__ import annotations
 
@@ -23,20 +23,23 @@ from sim.tasks.simulation import LEAST_RETURN, Simulation
 
 
 class EyesVecEnv(OneEnvironment):
-    """Many worlds of a task: a built-in one, a `sim.BatchTask`, a `sim.Task`, or a `sim.Encounter` whose animals are
-    alike and learn one policy.
+    """Many worlds of one task: a built-in one, a `sim.BatchTask`, a `sim.Task`, or a `sim.Encounter` whose animals are
+    alike and learn a single policy.
 
-    Observations, rewards, endings and `info` are in docs/tasks.md. Worlds start new episodes by themselves: the
-    observation returned is then the first of the new episode, info["terminal_observation"] is the last of the old one,
-    and `reset_infos` are of the episodes' beginnings. A world's episodes depend on the seed and its number alone, not
-    on the number of worlds. Of an encounter, the first animal of all worlds comes first, then the second.
+    Observations, rewards, endings and `info` are documented in docs/tasks.md. When an episode ends, its world starts
+    the next one automatically. The returned observation is then the first of the new episode, and
+    info["terminal_observation"] is the last of the old one. `reset_infos` describes the beginnings of the episodes. A
+    world's episodes depend only on the seed and on the world's index, not on the number of worlds. In an encounter, the
+    rows of the first animal in all worlds come first, followed by the second animal.
 
-    simulation: worlds in motion · renderers: of every agent's eyes · memory: frames in an observation
+    simulation: the worlds
+    renderers: renderers of every agent's eyes
+    memory: number of frames in an observation
     render_mode: "rgb_array", "eyes" or None
-    failures: why worlds could not go on, and how many episodes each reason has ended
+    failures: number of episodes that each reason for failure has ended
 
     Raises:
-        ValueError: animals that learn together are not alike.
+        ValueError: animals that learn a single policy are not alike.
     """
 
     def __init__(
@@ -60,7 +63,7 @@ class EyesVecEnv(OneEnvironment):
 
     @property
     def state(self) -> Any:
-        """All worlds as they are now, in their physics' own type: of the built-in tasks a `WorldState`.
+        """Current state of all worlds, in the type of their physics: `WorldState` for the built-in tasks.
 
         Raises:
             RuntimeError: before the first reset.
@@ -69,22 +72,22 @@ class EyesVecEnv(OneEnvironment):
 
     @property
     def batch_task(self) -> BatchTask:
-        """The task, for arrays of all worlds."""
+        """The task on arrays of all worlds."""
         return self.simulation.task
 
     @property
     def eyes(self) -> Any:
-        """`sim.Eyes` of a built-in task's agent; None if a user's task says where eyes are."""
+        """`sim.Eyes` of a built-in task's agent; None if a user task places the eyes."""
         return getattr(self.simulation.task, "eyes", None)
 
     @property
     def worlds(self) -> Any:
-        """What moves the worlds."""
+        """The physics of the worlds."""
         return self.simulation.physics
 
     @property
     def renderer(self) -> EyeRenderer:
-        """The eyes of the agent that learns; of the first, if several do, and of the first kind it has."""
+        """Renderer of the first learning agent's first kind of eyes."""
         return self._learners[0].renderer
 
     def reset(self) -> Arrays:
@@ -104,8 +107,10 @@ class EyesVecEnv(OneEnvironment):
         self._commanded = actions
 
     def step_once(self, actions: np.ndarray) -> tuple[Arrays, np.ndarray, np.ndarray, np.ndarray, list[dict[str, Any]]]:
-        """One action without starting ended worlds again, as a single environment needs it: observation, reward,
-        terminated, truncated, info."""
+        """Take one action without restarting ended worlds, as a single environment requires.
+
+        Returns observation, reward, terminated, truncated, info.
+        """
         self.step_async(actions)
         advanced = self._advance()
         step = advanced.step
@@ -118,37 +123,39 @@ class EyesVecEnv(OneEnvironment):
         step = advanced.step
         infos, done = self._infos(step), step.done
         ended = np.flatnonzero(done[: len(self._everyone)])  # an episode ends for all its agents at once
-        last = [senses.beside(ended) for senses in self._learners] if len(ended) else []
-        # First frames of new episodes are rendered beside the last frames of all, but not beside those of worlds that
-        # the task has changed.
+        last = [senses.other_entries(ended) for senses in self._learners] if len(ended) else []
+        # The first frames of new episodes are rendered together with the last frames of all worlds, unless the task has
+        # changed worlds after the action.
         early = bool(len(ended)) and not len(step.changed)
-        beginning = self._begin_again(ended) if early else None
+        beginning = self._start_episodes(ended) if early else None
         seen = self.animals.seen(advanced)
         if len(ended):
             self._add_terminal_observations(infos, seen, ended, last)
-            self.animals.replace(seen, ended, beginning or self._begin_again(ended))
+            self.animals.replace(seen, ended, beginning or self._start_episodes(ended))
         return _rows(self.animals.remember(seen, ended)), step.reward.astype(np.float32), done, infos
 
     def get_state(self) -> dict[str, np.ndarray]:
-        """Where all worlds stand, as plain arrays whose first axis is the world: what follows from here depends on them
-        and on the actions alone. What a task keeps in itself is the task's own business.
+        """Return the state of all worlds as plain arrays whose first axis is the world.
+
+        Everything that follows depends only on this state and on the actions. It does not include values that a task
+        stores in itself.
 
         Raises:
-            RuntimeError: before the first reset, and if bodies may sleep.
+            RuntimeError: before the first reset, or if the model lets bodies sleep.
         """
         self._require_begun()
-        return self.animals.state()
+        return self.animals.get_state()
 
     def set_state(self, state: Mapping[str, np.ndarray], worlds: Sequence[int] | None = None) -> Arrays:
-        """Go on from where these worlds (None: all) stood; returns the observation they had there.
+        """Restore a stored state in these worlds (None: all); return the observation that belongs to it.
 
         Raises:
-            ValueError: the state is of another task or number of worlds, or there are no such worlds.
-            RuntimeError: before the first reset, and if bodies may sleep.
+            ValueError: the state is of another task or number of worlds, or an index of `worlds` is out of range.
+            RuntimeError: before the first reset, or if the model lets bodies sleep.
         """
         held_state.checked(state, self.get_state())
         chosen = held_state.chosen_worlds(worlds, len(self._everyone))
-        self.animals.bring_back(state, chosen)
+        self.animals.set_state(state, chosen)
         self._returns.reshape(len(self._learners), -1)[:, chosen] = state["returns"][chosen].T
         return _rows([senses.now for senses in self._learners])
 
@@ -156,7 +163,7 @@ class EyesVecEnv(OneEnvironment):
         self.simulation.close()
 
     def get_images(self) -> list[np.ndarray]:
-        """Pictures (y, x, 3) uint8 of every world, as `render_mode` has them; none without.
+        """Return images (y, x, 3) uint8 of every world, as set by `render_mode`; an empty list without a mode.
 
         Raises:
             RuntimeError: before the first reset.
@@ -165,7 +172,7 @@ class EyesVecEnv(OneEnvironment):
         return self._pictures.taken()
 
     def _advance(self) -> Advanced:
-        """One action later.
+        """Take one action.
 
         Raises:
             RuntimeError: before the first reset.
@@ -174,11 +181,11 @@ class EyesVecEnv(OneEnvironment):
         learners = len(self._learners)
         return self.animals.advance(np.split(self._commanded, learners) if learners > 1 else [self._commanded])
 
-    def _begin_again(self, ended: np.ndarray) -> Any:
-        """Start new episodes in these worlds, and begin to render them."""
+    def _start_episodes(self, ended: np.ndarray) -> Any:
+        """Start new episodes in these worlds, and launch their rendering."""
         n = len(self._everyone)
         self._returns.reshape(len(self._learners), n)[:, ended] = 0.0
-        pending = self.animals.begin_again(ended)
+        pending = self.animals.start_episodes(ended)
         for k, info in enumerate(self._first_infos(ended)):
             self.reset_infos[k // len(ended) * n + ended[k % len(ended)]] = info
         return pending
@@ -206,7 +213,7 @@ class EyesVecEnv(OneEnvironment):
         n = len(self._everyone)
         if self.simulation.varied:
             for row, info in enumerate(infos):
-                info |= self.simulation.told(row % n)
+                info |= self.simulation.variation_info(row % n)
         for row in np.flatnonzero(step.done).tolist():
             infos[row]["TimeLimit.truncated"] = bool(step.truncated[row])
             steps = self.simulation.steps[row % n]
@@ -220,30 +227,30 @@ class EyesVecEnv(OneEnvironment):
         return infos
 
     def _first_infos(self, worlds: np.ndarray) -> list[dict[str, Any]]:
-        """Before the first action of episodes in these worlds, for each learner in turn."""
+        """Infos before the first action of an episode in these worlds, for each learner in turn."""
         simulation = self.simulation
         more = simulation.task.first_info(simulation.physics, worlds) or [{}] * len(worlds)
         return [
-            {"reward_terms": {}, "is_success": False, **extra, **simulation.told(world)}
+            {"reward_terms": {}, "is_success": False, **extra, **simulation.variation_info(world)}
             for _ in self._learners
             for world, extra in zip(worlds, more, strict=True)
         ]
 
     def _count(self, failure: str) -> None:
-        """And warn once of each."""
+        """Count a failure, and warn at its first occurrence."""
         self.failures[failure] += 1
         if self.failures[failure] == 1:
             warnings.warn(f"{type(self.task).__name__}: {failure}; its episode ends here", stacklevel=5)
 
 
 def _rows(observations: Sequence[Arrays]) -> Arrays:
-    """Of all who learn, one after the other."""
+    """Concatenate the observations of all learners."""
     first, *more = observations
     return {name: np.concatenate([of[name] for of in observations]) for name in first} if more else first
 
 
 def _require_alike(encounter: Encounter, learners: Sequence[Senses]) -> None:
-    """They can have one policy."""
+    """Check that all learners can share one policy."""
     shapes = [
         {**{name: space.shape for name, space in one.observation_space.items()}, "action": one.action_space.shape}
         for one in learners
@@ -252,5 +259,5 @@ def _require_alike(encounter: Encounter, learners: Sequence[Senses]) -> None:
         if shape != shapes[0]:
             raise ValueError(
                 f"Encounter: {encounter.names[0]} has {shapes[0]}, {name} has {shape}: must be alike to learn one "
-                "policy; `alone` lets one of them learn, sim.make_parallel_env each its own"
+                "policy; use `alone` to train one of them, or sim.make_parallel_env for separate policies"
             )

@@ -16,13 +16,13 @@ from sim.tasks.task import Task
 
 
 class EyesVectorEnv(VectorEnv[dict[str, np.ndarray], np.ndarray, np.ndarray]):
-    """The batched environment behind Gymnasium's own face.
+    """The batched environment with Gymnasium's vector interface.
 
-    Worlds start anew in the step that ends them (`AutoresetMode.SAME_STEP`): what is returned is then the first
-    observation of the new episode, and what `reset` would say of it, while info["final_obs"] and info["final_info"]
-    have the last of the old one: as Gymnasium's own `SyncVectorEnv` has it.
+    Worlds restart in the step that ends their episode (`AutoresetMode.SAME_STEP`), as in Gymnasium's `SyncVectorEnv`.
+    The returned observation and info are then the first of the new episode. info["final_obs"] and info["final_info"]
+    contain the last of the old episode.
 
-    task, eyes, memory, mode ...: as in `sim.make_vec_env`
+    task, eyes, memory, mode ...: see `sim.make_vec_env`
 
     Raises:
         ValueError: a bad argument.
@@ -37,7 +37,7 @@ class EyesVectorEnv(VectorEnv[dict[str, np.ndarray], np.ndarray, np.ndarray]):
     def __init__(self, num_envs: int = 1, *, task: str | Task, eyes: Eyes | None = None, **options: Any) -> None:
         if isinstance(task, Encounter):
             raise ValueError(
-                "task: several animals learn in a sim.Encounter: give what its `alone` returns, or use sim.make_vec_env"
+                "task: several animals learn in a sim.Encounter: pass the result of `alone`, or use sim.make_vec_env"
             )
         self._batch = make_vec_env(task, eyes, n_envs=num_envs, seed=None, **options)
         self.num_envs, self.render_mode = num_envs, self._batch.render_mode
@@ -50,9 +50,9 @@ class EyesVectorEnv(VectorEnv[dict[str, np.ndarray], np.ndarray, np.ndarray]):
         self, *, seed: int | list[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
         if options:
-            raise ValueError(f"reset: options = {options!r}: must be left out, nothing can be set here")
+            raise ValueError(f"reset: options = {options!r}: must be left out, reset has no options")
         if isinstance(seed, list):
-            raise ValueError("reset: seed: must be one number; world i draws from streams of its own, derived from it")
+            raise ValueError("reset: seed: must be one number; every world derives its own random streams from it")
         if seed is not None:
             self._batch.seed(seed)
         return self._batch.reset(), self._together(self._batch.reset_infos)
@@ -65,20 +65,20 @@ class EyesVectorEnv(VectorEnv[dict[str, np.ndarray], np.ndarray, np.ndarray]):
         last: dict[str, Any] = {}
         for world in np.flatnonzero(done):
             ended, infos[world] = infos[world], self._batch.reset_infos[world]
-            ended.pop("episode")  # stable-baselines3's; Gymnasium leaves that name to its wrappers
+            ended.pop("episode")  # entry of stable-baselines3; Gymnasium reserves this name for its wrappers
             seen = ended.pop("terminal_observation")
             last = self._add_info(last, {"final_obs": seen, "final_info": ended}, world)
         return observation, reward, done & ~truncated, done & truncated, last | self._together(infos)
 
     def render(self) -> tuple[np.ndarray, ...] | None:
-        """A picture (y, x, 3) uint8 of every world as `render_mode` asks."""
+        """Return an image (y, x, 3) uint8 of every world, as set by `render_mode`."""
         return None if self.render_mode is None else tuple(self._batch.get_images())
 
     def close_extras(self, **kwargs: Any) -> None:
         self._batch.close()
 
     def _together(self, infos: list[dict[str, Any]]) -> dict[str, Any]:
-        """One array for each key, and which worlds have it."""
+        """Return one array for each key, with a mask of the worlds that have it."""
         found: dict[str, Any] = {}
         for world, info in enumerate(infos):
             found = self._add_info(found, info, world)

@@ -1,4 +1,4 @@
-"""Pictures of worlds for people: the model with all agents' eyes in it, or the signals of their eyes."""
+"""Images of worlds for human viewers: the model with all agents' eyes, or the signals of these eyes."""
 
 from __future__ import annotations
 
@@ -20,18 +20,19 @@ from sim.scene.poses import Poses
 from sim.tasks.built_in import AgentTask
 
 PICTURE = (360, 480)  # pixels (height, width)
-RIMS = 0.15  # of the model's extent: how far the rims of fields of view are drawn
+RIMS = 0.15  # length of the drawn edges of fields of view, in units of the model's extent
 
 
 class WorldPictures:
-    """Pictures as `render_mode` has them: "rgb_array", "eyes" of those who learn, or None."""
+    """Images as set by `render_mode`: "rgb_array", "eyes" of the learning agents, or None."""
 
     def __init__(self, animals: Animals, render_mode: str | None) -> None:
         self._animals, self._mode = animals, render_mode
         self._photographer: Callable[[int], np.ndarray] | None = None
 
     def taken(self) -> list[np.ndarray]:
-        """(y, x, 3) uint8: one of every world, or of the eyes of each that learns in every world; none without mode."""
+        """Return images (y, x, 3) uint8: one of every world, or one of each learner's eyes in every world; none without
+        a mode."""
         if self._mode == "eyes":
             learners = self._animals.learners
             return [picture for senses in learners for picture in _of_all_kinds(senses)]
@@ -60,7 +61,7 @@ class _Follower:
 
 
 class _ModelCameras:
-    """The task's own camera, or one that looks at the whole model."""
+    """The task's own camera, or one that shows the whole model."""
 
     def __init__(self, animals: Animals) -> None:
         self._animals, self._simulation = animals, animals.simulation
@@ -72,8 +73,11 @@ class _ModelCameras:
         return self._picture(self._camera_of(world, physics), physics.datas[world])
 
     def _camera_of(self, world: int, physics: MujocoWorlds) -> QuickCamera:
-        """One for all; where bodies differ, each world's own, made again with its episode and no earlier: a camera's
-        materials have all eyes' kernels recorded once more."""
+        """Return the camera of a world: a common one, or one for each world if bodies differ between worlds.
+
+        A world's camera is rebuilt only when the appearance of its bodies changes. New materials of a camera cause all
+        eyes' kernels to be recorded again.
+        """
         bodies = physics.bodies
         model = bodies.models[world]
         looks = model.geom_size.tobytes() + model.geom_rgba.tobytes() + model.geom_matid.tobytes()
@@ -88,7 +92,7 @@ class _ModelCameras:
         model = self._simulation.physics.model
         named = self._simulation.task.camera or _overview(model)
         picture, view = camera.picture(data, named, PICTURE[1], PICTURE[0]), camera.mirror.viewpoint(named)
-        reach, poses = RIMS * float(model.stat.extent), Poses.of([data])
+        reach, poses = RIMS * float(model.stat.extent), Poses.from_data([data])
         for renderer in (sight.renderer for senses in self._animals.seeing for sight in senses.sights.values()):
             pupils, frames = renderer.eye_frames(poses)
             picture = with_eyes(picture, view, (pupils[0], frames[0]), renderer.eye.fov_deg, reach)
@@ -96,7 +100,7 @@ class _ModelCameras:
 
 
 def _of_all_kinds(senses: Senses) -> list[np.ndarray]:
-    """A picture of each world: a row for each kind of eyes."""
+    """Return an image of each world, with a row for each kind of eyes."""
     rows = [
         [side_by_side(frame, sight.renderer.eye) for frame in sight.memory.newest] for sight in senses.sights.values()
     ]
@@ -104,6 +108,6 @@ def _of_all_kinds(senses: Senses) -> list[np.ndarray]:
 
 
 def _overview(model: mujoco.MjModel) -> Viewpoint:
-    """From the side, above."""
+    """Return a viewpoint from the side and above."""
     centre, extent = np.array(model.stat.center), float(model.stat.extent)
     return Viewpoint.looking_at(centre + extent * np.array([-0.9, -1.6, 1.2]), centre, 45.0)

@@ -1,4 +1,4 @@
-"""What may be wrong of a receptor's signal before an animal could tell."""
+"""Error of a receptor's signal that is small compared with the receptors' noise."""
 
 from __future__ import annotations
 
@@ -6,15 +6,18 @@ import math
 
 import optics
 
-# Errors beside noise add up as squares: half of it makes √(1 + 1/4) = 1.12 of it.
+# Independent errors add in quadrature: an error of half the noise increases the total to √(1 + 1/4) = 1.12 times the
+# noise.
 SHARE_OF_NOISE = 0.5
-# Chosen: errors of less than this share of white's signal never cost rays, however little noise there is.
+# Chosen: smaller errors, as a share of white's signal, are never reduced by more rays, even if the noise is lower.
 LEAST_TOLERANCE = 5e-3
 
 
 def allowed_error(eye: optics.Eye, tolerance: float | None) -> float:
-    """Of a signal (root mean square), where None is asked for: half of the receptors' noise, but no less than
-    LEAST_TOLERANCE of what white is worth behind the eye's pupil.
+    """Return the error allowed to a signal (root mean square).
+
+    The default, for tolerance=None, is half of the receptors' noise, but at least LEAST_TOLERANCE times the signal of
+    white behind the eye's pupil.
 
     Raises:
         ValueError: a tolerance that is not positive.

@@ -1,4 +1,4 @@
-"""Depth layers: light from objects at different distances is blurred differently by one eye."""
+"""Depth layers: an eye blurs light from different distances differently."""
 
 from __future__ import annotations
 
@@ -12,10 +12,13 @@ from optics.numerics.autodiff import Array
 
 @dataclass(frozen=True)
 class DepthLayers:
-    """Distances for which an eye has a kernel, evenly spaced in vergence 1/z, in which defocus is linear. Light from
-    between two of them is shared linearly, light from beyond the ends goes to the ends.
+    """Distances for which an eye has a PSF, evenly spaced in inverse distance 1/z, in which defocus is linear.
 
-    farthest, nearest: [m], farthest may be infinite · count: with a single layer it is at the mean vergence
+    Light from between two layers is divided between them linearly. Light from beyond the ends belongs to the nearest
+    layer.
+
+    farthest, nearest: distances [m]; farthest may be infinite
+    count: number of layers; a single layer is at the mean inverse distance
     """
 
     farthest: float = math.inf
@@ -34,13 +37,13 @@ class DepthLayers:
 
     @property
     def distances(self) -> tuple[float, ...]:
-        """[m], farthest first, (layer,)."""
+        """Distances of the layers [m], farthest first, (layer,)."""
         far, near = 1 / self.farthest, 1 / self.nearest
         places = [i / (self.count - 1) for i in range(self.count)] if self.count > 1 else [0.5]
         return tuple(1 / v if (v := far + place * (near - far)) > 0 else math.inf for place in places)
 
     def shares(self, vergence: Array) -> list[Array]:
-        """Share of each layer in light from 1/z [1/m], Dr.Jit arrays; they sum to 1."""
+        """Return the share of each layer in light from 1/z [1/m], as Dr.Jit arrays; they sum to 1."""
         if self.count == 1:
             return [1.0]
         far, near = 1 / self.farthest, 1 / self.nearest

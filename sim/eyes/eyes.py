@@ -1,7 +1,7 @@
-"""The agent's eyes: how many, where on its body, and which optics.
+"""The eyes of the built-in agent: their number, their positions on its body, and their optics.
 
-The body is a sphere that stands on the floor; the eyes sit on its equator and look outwards.
-Azimuths are measured in the agent's frame (x forward, y left, z up), positive to the left.
+The body is a sphere that stands on the floor. The eyes sit on its equator and look outwards. Azimuths are measured in
+the agent's frame (x forward, y left, z up), positive to the left.
 """
 
 from __future__ import annotations
@@ -22,33 +22,33 @@ if TYPE_CHECKING:
     from optics import Eye, Pupil, Waveguide
 
 BODY_RADIUS = 0.2  # [m]
-MOST = 10**6  # of anything that is counted; memory ends long before
+MOST = 10**6  # chosen limit for all counts, beyond what memory can hold
 EYE_HEIGHT = BODY_RADIUS  # [m] above the floor: the equator of a sphere that stands on it
 
 
 @dataclass(frozen=True)
 class Eyes:
-    """The eyes of one agent, all alike but for their azimuth.
+    """The eyes of one agent. They differ only in azimuth.
 
     n_eyes: number of eyes, >= 1
     resolution: receptors of one eye (height, width), each >= 1
     fov_deg: horizontal field of view of one eye [deg], in [0.001, 170]
-    placement_range_deg: azimuth from the leftmost to the rightmost eye [deg], in [0, 360]: at 360 these two look the
-        same way
-    optics: pupil of every eye; None is the perfect lens
+    placement_range_deg: azimuth from the leftmost to the rightmost eye [deg], in [0, 360]; at 360 these two look in the
+        same direction
+    optics: pupil of every eye; None: a perfect lens
     sensor_width: width of the retina [m]
     noise_sigma: standard deviation of a receptor's noise, in units of its signal
-    bands: spectral bands, 1 to 64
-    receptors: types of receptor: "rgb" (three channels), "lms" (human cones), "honeybee", "goldfish", wavelengths of
-        visual pigments' peaks [nm] such as (350, 440, 530), or `optics.Receptors`, which can be a mosaic; the field
-        then holds optics.Receptors
-    photon_budget: optics.PhotonBudget: how much light there is and how long receptors gather it; its shot noise comes
-        beside `noise_sigma`. None: light is no object
-    waveguide: optics.Waveguide: receptors are rhabdoms, which take light in modes (behind a pupil only). None: each
-        takes all light on its square
+    bands: number of spectral bands, 1 to 64
+    receptors: receptor types: "rgb" (three channels), "lms" (human cones), "honeybee", "goldfish", peak wavelengths of
+        visual pigments [nm] such as (350, 440, 530), or `optics.Receptors`, which can describe a mosaic. The attribute
+        is then an optics.Receptors.
+    photon_budget: optics.PhotonBudget: the amount of light and the integration time of the receptors. Its shot noise is
+        added to `noise_sigma`. None: unlimited light, without shot noise.
+    waveguide: optics.Waveguide: receptors are rhabdoms, which receive light in waveguide modes (only behind a pupil).
+        None: each receptor receives all light on its square.
 
     Raises:
-        ValueError: values outside these ranges and for unknown receptors, with the nearest name.
+        ValueError: values outside these ranges, or unknown receptors; the message suggests the nearest name.
     """
 
     n_eyes: int = 2
@@ -100,7 +100,7 @@ class Eyes:
             self._check_waveguide()
 
     def eye(self) -> Eye:
-        """One eye's optics and retina."""
+        """Return the optics and retina of one eye."""
         from optics import Eye
 
         return Eye(
@@ -124,15 +124,18 @@ class Eyes:
             raise ValueError(f"Eyes: {error}") from None
 
     def azimuths(self) -> np.ndarray:
-        """Azimuth of each optical axis [rad], (n_eyes,), from left (+) to right (-), evenly over the placement
-        range: three eyes over 90° look to 45°, 0° and -45°; a single eye looks ahead."""
+        """Return the azimuth of each optical axis [rad], (n_eyes,), from left (+) to right (-).
+
+        The axes are spaced evenly over the placement range: three eyes over 90° look to 45°, 0° and -45°. A single eye
+        looks ahead.
+        """
         if self.n_eyes == 1:
             return np.zeros(1)
         half = math.radians(self.placement_range_deg) / 2
         return np.linspace(half, -half, self.n_eyes)
 
     def names(self) -> tuple[str, ...]:
-        """What a picture of each eye's view is called, left to right: ("left", "right") for two eyes."""
+        """Return the labels of the eyes' views from left to right: ("left", "right") for two eyes."""
         special = {1: ("center",), 2: ("left", "right"), 3: ("left", "center", "right")}
         return special.get(self.n_eyes, tuple(f"eye_{i}" for i in range(self.n_eyes)))
 
@@ -143,7 +146,7 @@ class Eyes:
 
 
 def _is_pupil(value: Any) -> bool:
-    """None is one, too."""
+    """Return whether the value is a Pupil or None."""
     if value is None:
         return True
     from optics import Pupil

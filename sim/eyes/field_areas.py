@@ -1,9 +1,9 @@
-"""Rectangles of the visual field that cover what an eye behind a pupil sees, and how much of each receptor's field lies
-in each.
+"""Rectangles of the visual field for an eye behind a pupil, and the share of each receptor's field in each of them.
 
-A receptor's signal is the sum over rectangles of the mean light in one times the share of its field in it: exact where
-nothing but the field changes within a rectangle. Where fields are hardly wider than receptors, as behind a lens in
-focus, one rectangle per receptor does: sharp fields are the rectangles themselves.
+A receptor's signal is a sum over rectangles: the mean light in a rectangle times the share of the receptive field in
+it. The result is exact if only the field, and not the light, varies within a rectangle. If fields are hardly wider than
+receptors, as behind a lens in focus, one rectangle per receptor is enough, since sharp fields are the rectangles
+themselves.
 """
 
 from __future__ import annotations
@@ -15,9 +15,10 @@ import numpy as np
 
 from sim.eyes.receptive_fields import ReceptiveFields
 
-# Chosen: of all receptors' light, what may come from beyond either side of the lattice, at most; it is then looked for
-# within. Behind a lens in focus, a quarter as wide as the retina, that is .012 for 1 x 4 receptors and .004 for
-# 15 x 15: these have no rim, and one would change their errors by less than a tenth.
+# Chosen: the largest share of all receptors' light that may come from beyond either side of the lattice. This light is
+# then attributed to the rectangles within. Behind a lens in focus, a quarter as wide as the retina, the share is 0.012
+# for 1 x 4 receptors and 0.004 for 15 x 15. These lattices have no rim, and a rim would change their errors by less
+# than a tenth.
 BEYOND = 0.015
 
 
@@ -25,16 +26,21 @@ BEYOND = 0.015
 class FieldAreas:
     """A lattice of rectangles, row by row.
 
-    edges: of its rows and of its columns, from the eye's axis [receptor pitches], y down
+    edges: edges of its rows and of its columns, relative to the eye's axis [receptor pitches], y down
     """
 
     edges: tuple[np.ndarray, np.ndarray]
 
     @classmethod
-    def of(cls, fields: ReceptiveFields, parts: tuple[float, float], beyond: float = BEYOND) -> FieldAreas:
-        """Each receptor's square in so many rows and columns, and as many more around them as its light comes from, but
-        for such a share beyond either side. Half a row is one that two receptors share; those at the ends may reach
-        beyond the last receptors."""
+    def from_fields(cls, fields: ReceptiveFields, parts: tuple[float, float], beyond: float = BEYOND) -> FieldAreas:
+        """Divide each receptor's square into rows and columns, and add a rim of rectangles around the receptors.
+
+        The rim is wide enough that at most the share `beyond` of the light comes from beyond it, on either side. With
+        half a row per receptor, two receptors share a row; the outermost rows may then reach beyond the outermost
+        receptors.
+
+        parts: rows and columns per receptor
+        """
         found = []
         for axis, (n, per_receptor) in enumerate(zip(fields.resolution, parts, strict=True)):
             field = fields.field.sum(axis=2 - axis)
@@ -47,19 +53,19 @@ class FieldAreas:
 
     @property
     def middles(self) -> np.ndarray:
-        """x right, y down [receptor pitches], (rectangle, 2)."""
+        """Centres of the rectangles, x right, y down [receptor pitches], (rectangle, 2)."""
         y, x = ((e[1:] + e[:-1]) / 2 for e in self.edges)
         return np.stack(np.broadcast_arrays(x[None], y[:, None]), axis=-1).reshape(-1, 2)
 
     @property
     def size(self) -> tuple[float, float]:
-        """Of a rectangle, width and height [receptor pitches]."""
+        """Width and height of a rectangle [receptor pitches]."""
         y, x = self.edges
         return float(x[1] - x[0]), float(y[1] - y[0])
 
     def weights(self, fields: ReceptiveFields, receptors: np.ndarray) -> np.ndarray:
-        """What each rectangle's mean counts for some receptors (row by row), (plane, receptor, rectangle); a receptor's
-        sum to its field's power."""
+        """Return the weights of the rectangles' mean light for some receptors (numbered row by row), (plane, receptor,
+        rectangle). A receptor's weights sum to the power of its field."""
         size, cells = fields.field.shape[1], fields.cells
         rows, columns = np.divmod(receptors, fields.resolution[1])
         down, across = (
@@ -74,16 +80,20 @@ class FieldAreas:
 
 
 def _within(n: int, per_receptor: float) -> int:
-    """Rectangles that n receptors in a line take."""
+    """Number of rectangles that n receptors in a line occupy."""
     return math.ceil(n * per_receptor - 1e-9)
 
 
 def _rim(profile: np.ndarray, line: tuple[int, float], cells: int, beyond: float) -> int:
-    """How many rectangles lie before the first receptor's: so few that no more than this share of the light of a line
-    of receptors comes from before; profile: of a receptor's field along that line, line: its receptors, and rectangles
-    of each."""
+    """Number of rectangles before the first receptor's rectangle.
+
+    It is the smallest number that leaves at most the share `beyond` of a line's light outside.
+
+    profile: profile of a receptor's field along the line
+    line: number of receptors in the line, and rectangles per receptor
+    """
     n, per_receptor = line
-    # Of a field that begins so many cells before the line's first receptor, what is before that, per receptor.
+    # Share of a field's power in its first cells, as a function of their number.
     before = np.concatenate([[0.0], np.cumsum(profile)])
     start = (len(profile) - cells) / 2
     overhang = (_within(n, per_receptor) / per_receptor - n) / 2
@@ -94,6 +104,7 @@ def _rim(profile: np.ndarray, line: tuple[int, float], cells: int, beyond: float
 
 
 def _shares(edges: np.ndarray, centre: float, size: int, cells: int) -> np.ndarray:
-    """How much of each of a field's cells lies between edges, (rectangle, cell); centre: of the field, edges' units."""
+    """Return the share of each of a field's cells that lies between successive edges, (rectangle, cell); centre: centre
+    of the field, in units of the edges."""
     places = (edges - centre) * cells + size / 2
     return np.diff(np.clip(places[:, None] - np.arange(size), 0, 1), axis=0)

@@ -1,4 +1,4 @@
-"""How deep a point lies inside of a geom."""
+"""Depth of a point inside a geom."""
 
 from __future__ import annotations
 
@@ -6,17 +6,19 @@ import mujoco
 import numpy as np
 
 _TYPES = mujoco.mjtGeom
-# Unit vectors all around, by the golden angle, so that few edges of meshes are met: openings are found that take up
-# 20 degrees to all sides.
+# Unit vectors in all directions, spaced by the golden angle, so that few of them hit edges of meshes. Openings of a
+# mesh are found if they extend over 20 degrees in all directions.
 _N_WAYS = 64
 _HEIGHTS, _AROUND = 1 - (2 * np.arange(_N_WAYS) + 1) / _N_WAYS, np.arange(_N_WAYS) * np.pi * (3 - np.sqrt(5))
 _WAYS = np.column_stack([np.sqrt(1 - _HEIGHTS**2) * f(_AROUND) for f in (np.cos, np.sin)] + [_HEIGHTS])
-_BEYOND = 1e-9  # of a mesh's radius: where a ray goes on behind a crossing, far above rounding
+_BEYOND = 1e-9  # offset at which a ray continues behind a crossing, in units of a mesh's radius; far above rounding
 
 
 def depth_inside(model: mujoco.MjModel, data: mujoco.MjData, geom: int, point: np.ndarray) -> float:
-    """Below the surface of a primitive or a closed mesh [m], at most, for ellipsoids and meshes about; 0 outside, and
-    for all other geoms."""
+    """Return the depth of a point below the surface of a primitive or a closed mesh [m].
+
+    The depth is 0 outside, and for all other geoms. For ellipsoids and meshes it is approximate.
+    """
     p = data.geom_xmat[geom].reshape(3, 3).T @ (point - data.geom_xpos[geom])
     size, kind = model.geom_size[geom], model.geom_type[geom]
     if kind == _TYPES.mjGEOM_SPHERE:
@@ -37,7 +39,7 @@ def depth_inside(model: mujoco.MjModel, data: mujoco.MjData, geom: int, point: n
 
 
 def _inside_mesh(model: mujoco.MjModel, data: mujoco.MjData, geom: int, point: np.ndarray) -> float:
-    """How far the nearest crossing is, where rays all around leave a mesh; 0 where one does not."""
+    """Return the distance to the nearest crossing if rays in all directions leave the mesh; 0 if one does not."""
     if np.linalg.norm(point - data.geom_xpos[geom]) > model.geom_rbound[geom]:
         return 0.0
     nearest = np.inf
@@ -52,7 +54,7 @@ def _inside_mesh(model: mujoco.MjModel, data: mujoco.MjData, geom: int, point: n
 def _crossings(
     model: mujoco.MjModel, data: mujoco.MjData, geom: int, point: np.ndarray, way: np.ndarray
 ) -> list[float]:
-    """Where a ray crosses a mesh [m], nearest first."""
+    """Return the distances at which a ray crosses a mesh [m], nearest first."""
     found: list[float] = []
     so_far, beyond = 0.0, _BEYOND * model.geom_rbound[geom]
     while (further := mujoco.mj_rayMesh(model, data, geom, point + so_far * way, way)) >= 0:

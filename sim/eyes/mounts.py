@@ -1,4 +1,4 @@
-"""Where eyes are on a model."""
+"""Places of eyes on a model."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ import numpy as np
 from optics.numerics.arguments import did_you_mean, finite, items, of_kind, reals, shown, whole
 
 EXAMPLE = "sim.Mount('head')"
-MOST_EYES = 10_000  # choice: of a fan, more than any animal has
-KINDS = ("site", "camera", "body")  # what a name is looked for among, in this order
-# Axes (ahead, left, up) in the frame of what an eye is on, as rows: x ahead and z up, but for MuJoCo's cameras, which
-# look along -z with x to the right.
+MOST_EYES = 10_000  # chosen limit for a fan, more than any animal has
+KINDS = ("site", "camera", "body")  # the kinds among which a name is searched, in this order
+# Axes (ahead, left, up) in the frame of the object that carries the eye, as rows. In general x points ahead and z up.
+# MuJoCo's cameras look along -z with x to the right.
 _AXES = {
     "site": np.eye(3),
     "body": np.eye(3),
@@ -25,16 +25,18 @@ _AXES = {
 
 @dataclass(frozen=True)
 class Mount:
-    """An eye's place: it looks along +x of a body or site, or as a camera looks, turned by these angles.
+    """Place of an eye on a model. The eye looks along +x of a body or site, or in a camera's direction, turned by these
+    angles.
 
     on: name of a site, a camera or a body of the model
-    azimuth_deg: to the left, about the frame's z axis (a camera's up) · elevation_deg: up, after that
-    roll_deg: about the eye's own axis, its top towards its left, last of all
-    offset: of the pupil from the frame's origin [m], (ahead, left, up) before the eye is turned
-    kind: "site", "camera" or "body", where several have that name; None: the first of these
+    azimuth_deg: rotation to the left, about the frame's z axis (a camera's up)
+    elevation_deg: rotation upwards, applied after the azimuth
+    roll_deg: rotation about the eye's own axis, its top towards its left, applied last
+    offset: offset of the pupil from the frame's origin [m], (ahead, left, up), not turned by the angles
+    kind: "site", "camera" or "body", if several of them have that name; None: the first of these
 
     Raises:
-        ValueError: no name, angles or offsets that are not finite, and an unknown kind.
+        ValueError: not a name, angles or offsets that are not finite, or an unknown kind.
     """
 
     on: str
@@ -57,15 +59,15 @@ class Mount:
             raise ValueError(f"Mount: kind = {shown(self.kind)}: must be one of {', '.join(map(repr, KINDS))}, or None")
 
     def mirrored(self) -> Mount:
-        """The eye on the other side of the body: left and right exchanged."""
+        """Return the mirror image on the other side of the body: left and right exchanged."""
         ahead, left, up = self.offset
         return replace(self, azimuth_deg=-self.azimuth_deg, roll_deg=-self.roll_deg, offset=(ahead, -left, up))
 
     def found_in(self, model: mujoco.MjModel) -> tuple[str, int]:
-        """Of which kind the thing is that it is on, and its id.
+        """Return the kind and id of the object that carries the eye.
 
         Raises:
-            ValueError: there is none of that name.
+            ValueError: the model has no such object.
         """
         for kind in KINDS if self.kind is None else (self.kind,):
             index = mujoco.mj_name2id(model, getattr(mujoco.mjtObj, f"mjOBJ_{kind.upper()}"), self.on)
@@ -76,7 +78,8 @@ class Mount:
         raise ValueError(f"Mount: no {what} {self.on!r} in the model{did_you_mean(self.on, names)}")
 
     def local(self, kind: str) -> tuple[np.ndarray, np.ndarray]:
-        """Pupil [m] (3,) and eye's frame (3, 3) in the frame of what it is on; columns (right, up, ahead)."""
+        """Return the pupil [m] (3,) and the eye's frame (3, 3), with columns (right, up, ahead), in the frame of the
+        object that carries it."""
         ahead, left, up = _AXES[kind]
         azimuth, elevation, roll = np.radians([self.azimuth_deg, self.elevation_deg, self.roll_deg])
         level = np.cos(azimuth) * ahead + np.sin(azimuth) * left
@@ -89,10 +92,10 @@ class Mount:
 
 
 def mounts_of(where: str, said: Any) -> tuple[Mount, ...]:
-    """Several places of eyes.
+    """Check and return a sequence of mounts.
 
     Raises:
-        ValueError: `said` is one mount, or something else.
+        ValueError: `said` is a single mount, or something else.
     """
     if not isinstance(said, Sequence) or not all(isinstance(mount, Mount) for mount in said):
         raise ValueError(f"{where} = {said!r:.80}: must be several of sim.Mount, such as (sim.Mount('head'),)")
@@ -100,13 +103,16 @@ def mounts_of(where: str, said: Any) -> tuple[Mount, ...]:
 
 
 def both_sides(mounts: Iterable[Mount]) -> tuple[Mount, ...]:
-    """Each of them and its mirror image: left, right, left, right ..."""
+    """Return each mount and its mirror image: left, right, left, right ..."""
     return tuple(one for mount in items("mounts", mounts, Mount, EXAMPLE) for one in (mount, mount.mirrored()))
 
 
 def ring(on: str, n_eyes: int, placement_range_deg: float, radius: float) -> tuple[Mount, ...]:
-    """Eyes in a circle around a body's z axis that look outwards, left to right, as `Eyes` has them on our agent: the
-    range is from the first to the last, and 360 (n - 1) / n closes a circle of n evenly.
+    """Return eyes in a circle around a body's z axis that look outwards, left to right, as `Eyes` places them on the
+    built-in agent.
+
+    The placement range is measured from the first to the last eye. A range of 360 (n - 1) / n closes a circle of n eyes
+    evenly.
 
     Raises:
         ValueError: less than one eye.
@@ -115,8 +121,10 @@ def ring(on: str, n_eyes: int, placement_range_deg: float, radius: float) -> tup
 
 
 def fan(mount: Mount, n_eyes: int, placement_range_deg: float, elevation_deg: float = 0.0) -> tuple[Mount, ...]:
-    """Eyes left to right, evenly over a range of azimuths: each is this one, with its offset, turned about the upward
-    axis of what it is on, and then further up by `elevation_deg`; one eye is where this one is.
+    """Return eyes from left to right, evenly spaced over a range of azimuths.
+
+    Each eye is a copy of `mount`, including its offset, turned about the upward axis of the object that carries it, and
+    then turned upwards by `elevation_deg`. A single eye keeps the azimuth of `mount`.
 
     Raises:
         ValueError: less than one eye.

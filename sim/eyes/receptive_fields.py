@@ -1,4 +1,4 @@
-"""The receptive fields of an eye behind a pupil, and how directions are drawn from all of them at once.
+"""Receptive fields of an eye behind a pupil, and random directions drawn from all of them together.
 
 Fields are tabulated on square cells of the visual field's tangent plane, in the coordinates of `sim.eyes.sensor`.
 """
@@ -13,20 +13,22 @@ import numpy as np
 import optics
 from sim.eyes.depth_layers import ONE_PSF, DepthLayers
 
-# Chosen: cells across the eye, at least, on which receptive fields are tabulated (validation/C1_receptive_fields.py
-# says what of the error is this).
+# Chosen: the least number of cells across the eye on which receptive fields are tabulated.
+# validation/sim/receptive_field_sampling.py reports the resulting part of the error.
 MIN_CELLS = 32
-CELLS_ACROSS, MOST_CELLS = 4, 64  # chosen: across a waveguide, at least; along a receptor's side, at most
+CELLS_ACROSS, MOST_CELLS = 4, 64  # chosen: least number across a waveguide; largest number along a receptor's side
 
 
 class NoRaysError(ValueError):
-    """So few rays that a receptor has none in its receptive field."""
+    """The number of rays is too small: a receptor has no ray in its receptive field."""
 
 
 @dataclass(frozen=True)
 class Draw:
-    """points: on the tangent plane [receptor pitches], x right, y down, (ray, 2), in order of y
-    rows, columns: of the cells that hold them, counted from the first cell of the mixture, (ray,)
+    """Random directions.
+
+    points: points on the tangent plane [receptor pitches], x right, y down, (ray, 2), in order of y
+    rows, columns: the cells that contain them, counted from the first cell of the mixture, (ray,)
     """
 
     points: np.ndarray
@@ -39,10 +41,13 @@ class Draw:
 
 @dataclass(frozen=True)
 class ReceptiveFields:
-    """field: power per cell of one receptor's field: the turned PSF convolved with its square, or what a waveguide
-        takes; (plane, y, x), a plane for every depth layer's every band
-    density: probability per cell of the mean over all receptors and planes, each with the same weight, (Y, X)
-    resolution: receptors (height, width) · cells: along a receptor's side
+    """Tabulated receptive fields of an eye.
+
+    field: power per cell of one receptor's field, (plane, y, x), with a plane for every band of every depth layer. It
+        is the PSF, rotated by 180° and convolved with the receptor's square, or the acceptance of a waveguide.
+    density: probability per cell of the mean over all receptors and planes with equal weights, (Y, X)
+    resolution: receptors (height, width)
+    cells: cells along a receptor's side
     """
 
     field: np.ndarray
@@ -51,38 +56,42 @@ class ReceptiveFields:
     cells: int
 
     @classmethod
-    def of(cls, eye: optics.Eye, cells: int, depth: DepthLayers = ONE_PSF) -> ReceptiveFields:
-        """Those of an eye.
+    def from_eye(cls, eye: optics.Eye, cells: int, depth: DepthLayers = ONE_PSF) -> ReceptiveFields:
+        """Tabulate the receptive fields of an eye.
 
         Raises:
             optics.AccuracyError: see `optics.Eye.kernel`.
         """
-        # (K ⊗ L)(r) = Σ_v K(r - v) L(v): as weights around the receptor, the convolution's kernel is turned about.
+        # (K ⊗ L)(r) = Σ_v K(r - v) L(v): as weights around the receptor, the kernel is rotated by 180°.
         kernels = _as_wide([eye.kernel(cells, z)[:, ::-1, ::-1] for z in depth.distances])
         field = _averaged(kernels, cells) if eye.waveguide is None else kernels.astype(np.float64)
         everyone = np.arange(np.prod(eye.resolution))
         return cls(field, _mixture(field, eye.resolution, cells, everyone), eye.resolution, cells)
 
     def drawn_for(self, receptors: np.ndarray) -> ReceptiveFields:
-        """The same fields, and the mixture of some receptors' alone."""
+        """Return the same fields with the mixture of only these receptors."""
         return replace(self, density=_mixture(self.field, self.resolution, self.cells, receptors))
 
     @property
     def power(self) -> np.ndarray:
-        """Fraction of the pupil's power inside a field, and of that what waveguides take, (plane,)."""
+        """Fraction of the pupil's power inside a field, times the fraction that a waveguide accepts, (plane,)."""
         power: np.ndarray = self.field.sum(axis=(1, 2))
         return power
 
     @property
     def widths(self) -> tuple[float, float]:
-        """Of the narrowest plane's field, height and width [receptor pitches]: as wide as one would be that takes the
-        same from everywhere and is as concentrated, (sum p)² / sum p² of its profile; 1 for a receptor's square."""
+        """Height and width of the narrowest plane's field [receptor pitches].
+
+        They are the widths (sum p)² / sum p² of the profiles p, that is, the width of a uniform field with the same
+        concentration. The width is 1 for a receptor's square.
+        """
         profiles = (self.field.sum(axis=axis) for axis in (2, 1))
         height, width = (((p.sum(axis=1) ** 2) / (p**2).sum(axis=1)).min() / self.cells for p in profiles)
         return float(height), float(width)
 
     def draw(self, n: int) -> Draw:
-        """n low-discrepancy draws from the mixture: inverts the marginal over rows, then each row's cumulative."""
+        """Return n low-discrepancy draws from the mixture, by inverting the marginal over rows and then each row's
+        cumulative distribution."""
         density, points = self.density, low_discrepancy(n)
         rows = np.concatenate([[0.0], np.cumsum(density.sum(axis=1))])
         rows /= rows[-1]
@@ -100,7 +109,8 @@ class ReceptiveFields:
         return Draw(cells / self.cells - np.array(density.shape)[::-1] / (2 * self.cells), ys, xs)
 
     def weights(self, draw: Draw, receptors: np.ndarray) -> np.ndarray:
-        """What each ray counts for some receptors (row by row), (plane, receptor, ray); a receptor's sum to `power`.
+        """Return the weights of the rays for some receptors (numbered row by row), (plane, receptor, ray). A receptor's
+        weights sum to `power`.
 
         Raises:
             NoRaysError: a receptor has no ray in its field.
@@ -109,7 +119,7 @@ class ReceptiveFields:
         y = draw.rows[None] - row[:, None] * self.cells
         x = draw.columns[None] - column[:, None] * self.cells
         inside = (y >= 0) & (y < self.field.shape[1]) & (x >= 0) & (x < self.field.shape[2])
-        # Outside, the cell after the last: a field is 0 there.
+        # Rays outside the field get the index after the last cell, where the padded table is 0.
         index = np.where(inside, y * self.field.shape[2] + x, self.field[0].size)
         table = np.pad(self.field.reshape(len(self.field), -1), ((0, 0), (0, 1)))
         weights = table[:, index] / self.density[draw.rows, draw.columns]
@@ -126,7 +136,7 @@ def cells_per_receptor(resolution: tuple[int, int]) -> int:
 
 
 def cells_for(eye: optics.Eye) -> int:
-    """The same, and enough across a waveguide that is narrower."""
+    """Return the same number, increased if a narrower waveguide needs finer cells."""
     fewest = cells_per_receptor(eye.resolution)
     if eye.waveguide is None:
         return fewest
@@ -134,37 +144,37 @@ def cells_for(eye: optics.Eye) -> int:
 
 
 def receptive_fields_of(eye: optics.Eye, depth: DepthLayers = ONE_PSF) -> ReceptiveFields:
-    """The fields of an eye on cells as fine as its PSF can be had on.
+    """Return the fields of an eye on the finest cells on which its PSF can be computed.
 
     Raises:
-        optics.AccuracyError: a pupil whose light spreads too far for the coarsest.
+        optics.AccuracyError: a pupil that spreads light too far even for the coarsest cells.
     """
     cells = cells_for(eye)
     while True:
         try:
-            return ReceptiveFields.of(eye, cells, depth)
+            return ReceptiveFields.from_eye(eye, cells, depth)
         except optics.AccuracyError:
-            # Light that spreads over too many cells for a PSF is smooth on the scale of coarser ones.
+            # A PSF that extends over too many cells is smooth on the scale of coarser cells.
             if cells == 1:
                 raise
             cells //= 2
 
 
 def low_discrepancy(n: int) -> np.ndarray:
-    """n points in the unit square, (n, 2): the Hammersley set (van der Corput in base 2 against i/n), moved to the
-    strata's centres."""
+    """Return n points in the unit square, (n, 2): the Hammersley set (van der Corput in base 2 against i/n), shifted to
+    the centres of the strata."""
     first_dyadic = 2.0 ** -np.ceil(np.log2(max(n, 2)))
     return np.stack([(np.arange(n) + 0.5) / n, van_der_corput(n, 2) + first_dyadic / 2], axis=-1)
 
 
 def bounce_samples(n: int) -> np.ndarray:
-    """n more points in the unit square, (n, 2), that together with `low_discrepancy` fill the hypercube evenly: the
-    next bases of Halton's sequence, from 1 on."""
+    """Return n more points in the unit square, (n, 2), that together with `low_discrepancy` fill the hypercube evenly:
+    the next bases of Halton's sequence, starting from index 1."""
     return np.stack([van_der_corput(n + 1, 3), van_der_corput(n + 1, 5)], axis=-1)[1:]
 
 
 def van_der_corput(n: int, base: int) -> np.ndarray:
-    """0 ... n - 1 with their digits mirrored at the point, (n,)."""
+    """Return 0 ... n - 1 with their digits mirrored at the radix point, (n,)."""
     inverse, scale, rest = np.zeros(n), 1 / base, np.arange(n)
     while rest.any():
         inverse += scale * (rest % base)
@@ -174,7 +184,7 @@ def van_der_corput(n: int, base: int) -> np.ndarray:
 
 
 def _as_wide(kernels: list[np.ndarray]) -> np.ndarray:
-    """All kernels' planes, (plane, y, x), dark rims around the narrower ones."""
+    """Return all kernels' planes, (plane, y, x), with narrower ones padded by zeros."""
     side = max(kernel.shape[-1] for kernel in kernels)
     margins = [(side - kernel.shape[-1]) // 2 for kernel in kernels]
     return np.concatenate([np.pad(k, ((0, 0), (m, m), (m, m))) for k, m in zip(kernels, margins, strict=True)])

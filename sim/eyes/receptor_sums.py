@@ -1,8 +1,8 @@
-"""From rays to receptors: weighted sums as matrix products, one per row of receptors.
+"""Sums over samples for each receptor: matrix products, one per row of receptors.
 
-Rays come in order of their height in the visual field, so a row of receptors looks at a stretch of them; the narrower
-the receptive fields, the shorter the stretch. Weights are multiplied with the bands' weights beforehand where light
-has few components (`sim.tracing.closed_form_tracer`).
+Rays are ordered by their height in the visual field, so each row of receptors uses a contiguous range of rays. The
+narrower the receptive fields, the shorter the range. If light has few components (`sim.tracing.closed_form_tracer`),
+the weights are multiplied with the bands' weights in advance.
 """
 
 from __future__ import annotations
@@ -13,11 +13,11 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse
 
-# Views of one product, at most. Their number never depends on that of worlds, so that a world's signals are
-# bit-identical whatever the number of its neighbours: BLAS rounds differently for different shapes.
+# Largest number of views in one product. It never depends on the number of worlds, so that a world's signals are
+# bit-identical for any number of neighbours: BLAS rounds differently for different shapes.
 BLOCK = 32
-# Multiplications of one product that OpenBLAS certainly leaves to one thread. Its threads wait for each other spinning;
-# where Dr.Jit's or another process's want the cores, that has taken a hundred times as long as the product.
+# Number of multiplications in a product that OpenBLAS certainly computes on one thread. Its threads busy-wait for each
+# other. If Dr.Jit or another process uses the cores, this has taken a hundred times as long as the product itself.
 ONE_THREAD = 2**18
 
 
@@ -25,7 +25,7 @@ ONE_THREAD = 2**18
 class RowProduct:
     """signal[view, channel, i, j] = sum over rays of radiance[view, ray] W[channel, receptor (i, j), ray].
 
-    stretches: per row of receptors: the first ray, and weights (ray, channel * width) float32
+    stretches: for each row of receptors, the first ray and the weights (ray, channel * width) float32
     """
 
     stretches: tuple[tuple[int, np.ndarray], ...]
@@ -33,8 +33,8 @@ class RowProduct:
     width: int
 
     @classmethod
-    def of(cls, weights: Sequence[scipy.sparse.csr_array], resolution: tuple[int, int]) -> RowProduct:
-        """From one sparse matrix (receptor, ray) per channel."""
+    def from_weights(cls, weights: Sequence[scipy.sparse.csr_array], resolution: tuple[int, int]) -> RowProduct:
+        """Build the products from one sparse matrix (receptor, ray) per channel."""
         height, width = resolution
         stretches = []
         for row in range(height):
@@ -46,7 +46,7 @@ class RowProduct:
         return cls(tuple(stretches), len(weights), width)
 
     def __call__(self, radiance: np.ndarray) -> np.ndarray:
-        """(view, ray) -> (view, channel, height, width), float32."""
+        """Map radiance (view, ray) to signals (view, channel, height, width), float32."""
         views, rays = radiance.shape
         n_blocks = -(-views // BLOCK)
         if views % BLOCK:
@@ -60,18 +60,19 @@ class RowProduct:
 
 
 def _views_at_once(weights: np.ndarray) -> int:
-    """As many as one thread may do; where that is next to nothing, the products are large enough for several."""
+    """Largest number of views that one thread can multiply; BLOCK if that number is small, since the products are then
+    large enough for several threads."""
     return next((n for n in (BLOCK, BLOCK // 2, BLOCK // 4, BLOCK // 8) if n * weights.size <= ONE_THREAD), BLOCK)
 
 
-# What turns components of light, (component, view, ...), into signals, (view, channel, ...), as matrices say:
-# signals_c = sum_b mixing[c, b] sum_k basis[k, b] (light of component k, gathered by the weights of band b).
-# Every sum is in a fixed order: the same rounding for any number of worlds.
+# Function that maps components of light, (component, view, ...), to signals, (view, channel, ...):
+# signals_c = sum_b mixing[c, b] sum_k basis[k, b] (light of component k, weighted by band b).
+# Every sum has a fixed order, and therefore the same rounding for any number of worlds.
 ReceptorSums = Callable[[np.ndarray], np.ndarray]
 
 
 def of_receptors(factors: np.ndarray) -> ReceptorSums:
-    """From light summed over each receptor already: factors (channel, component)."""
+    """Return sums for light that is already summed over each receptor: factors (channel, component)."""
     factors = factors.astype(np.float32)
 
     def signals(light: np.ndarray) -> np.ndarray:
@@ -86,9 +87,11 @@ def of_receptors(factors: np.ndarray) -> ReceptorSums:
 def of_components(
     weights: Sequence[scipy.sparse.csr_array], resolution: tuple[int, int], mixing: np.ndarray, basis: np.ndarray
 ) -> ReceptorSums:
-    """From light along rays, bands and channels multiplied into the weights: a product per component and channel."""
+    """Return sums for light along rays, with one product per component and channel; bands and channels are multiplied
+    into the weights."""
     products = [
-        RowProduct.of([_mixed(weights, channel * component) for channel in mixing], resolution) for component in basis
+        RowProduct.from_weights([_mixed(weights, channel * component) for channel in mixing], resolution)
+        for component in basis
     ]
 
     def signals(light: np.ndarray) -> np.ndarray:
@@ -101,7 +104,8 @@ def of_components(
 
 
 def of_bands(products: Sequence[RowProduct], mixing: np.ndarray, basis: np.ndarray) -> ReceptorSums:
-    """From light along rays, a product per band: cheaper where components are as many as bands."""
+    """Return sums for light along rays, with one product per band. This is cheaper if the number of components equals
+    the number of bands."""
     mixing, basis = mixing.astype(np.float32), basis.astype(np.float32)
     every = np.array_equal(basis, np.eye(len(basis)))
 
@@ -127,14 +131,18 @@ def _in_band(light: np.ndarray, factors: np.ndarray, is_component: bool, band: i
 def within_stretches(
     weights: Sequence[scipy.sparse.csr_array], resolution: tuple[int, int], share: float
 ) -> tuple[scipy.sparse.csr_array, ...]:
-    """Weights (receptor, ray) per band without those of the first and last rays: the longest ends that all receptors
-    of a row can spare, `share` of each one's sum at most. The rest is scaled to keep the sum."""
+    """Return weights (receptor, ray) per band without the first and last rays of each row of receptors.
+
+    The ends are the longest that remove at most `share` of each receptor's sum. The remaining weights are scaled to
+    keep the sum.
+    """
     height, width = resolution
     rows: list[list[scipy.sparse.csr_array]] = [[] for _ in weights]
     for row in range(height):
         mine = [w[row * width : (row + 1) * width].toarray().astype(np.float64) for w in weights]
         sums = [w.sum(axis=1, keepdims=True) for w in mine]
-        # Rays up to which no receptor has got more than half of the share; the other half is for the other end.
+        # Number of rays at an end that contribute at most half of the share to every receptor; the other end has the
+        # other half.
         ends = [
             min(
                 int((np.cumsum(w[:, ::step], axis=1) <= share / 2 * s).sum(axis=1).min())

@@ -1,6 +1,6 @@
-"""Which samples of the visual field an eye looks along, as many as asked for: rays or areas.
+"""Choice of the samples of an eye's visual field: rays or areas, in the requested number.
 
-Coordinates are those of `sim.eyes.sensor`.
+`sim.eyes.sensor` defines the coordinates.
 """
 
 from __future__ import annotations
@@ -27,15 +27,20 @@ from sim.eyes.receptive_fields import (
 from sim.eyes.receptor_sums import within_stretches
 from sim.eyes.sensor import BoxSensor, ReceptiveFieldSensor, Sensor
 
-# Chosen: weights that together change no signal by more than this share of the receptors' noise are left out; beside
-# it, that makes √(1 + 0.1²) = 1.005 of it.
+# Chosen: weights are omitted if together they change no signal by more than this share of the receptors' noise. The
+# total error is then at most √(1 + 0.1²) = 1.005 times the noise.
 NEGLIGIBLE = 0.1
 
 
 @dataclass(frozen=True)
 class Trial:
-    """Some receptors of a sensor that need not be built: directions (ray, 3), bounce samples (ray, 2), weights
-    (layer * band, receptor, ray), and of areas their extent."""
+    """Samples for some receptors only, without building the whole sensor.
+
+    directions: (ray, 3)
+    bounce_samples: (ray, 2)
+    weights: (layer * band, receptor, ray)
+    extent: width and height of areas; None for rays
+    """
 
     directions: np.ndarray
     bounce_samples: np.ndarray
@@ -45,25 +50,30 @@ class Trial:
 
 @dataclass(frozen=True)
 class BoxSampling:
-    """Every receptor's square sampled by the same low-discrepancy points, each receptor's shifted (on the torus)
-    by its own fixed random offset so that the errors of neighbours are independent; a whole number of points each."""
+    """Samples of an eye with a perfect lens.
+
+    Every receptor's square is sampled by the same low-discrepancy points, a whole number of them. Each receptor's
+    points are shifted (on the torus) by a fixed random offset, so that the errors of neighbours are independent.
+    """
 
     eye: optics.Eye
     depth: DepthLayers = ONE_PSF
 
     def sensor(self, rays_per_receptor: float) -> BoxSensor:
-        """The sensor with so many rays per receptor."""
+        """Return the sensor with this number of rays per receptor."""
         rays = max(1, round(rays_per_receptor))
         return BoxSensor(*self._rays(rays, np.arange(np.prod(self.eye.resolution))), rays)
 
     def areas(self, per_receptor: float, *, in_rows: bool = True) -> BoxSensor:
-        """The sensor whose samples are all of a receptor's square, cut into so many rectangles: one row of them, or, in
-        rows, as many rows as columns or fewer."""
+        """Return the sensor whose samples divide each receptor's square into this number of rectangles.
+
+        The rectangles form one row, or, with `in_rows`, a grid in which rows do not outnumber columns.
+        """
         count = max(1, round(per_receptor))
         return BoxSensor(*self._areas(count, in_rows, np.arange(np.prod(self.eye.resolution))))
 
     def area_trial(self, per_receptor: float, receptors: np.ndarray, *, in_rows: bool = True) -> Trial:
-        """What that sensor has for these receptors (numbered row by row)."""
+        """Return the samples of that sensor for these receptors (numbered row by row)."""
         count = max(1, round(per_receptor))
         plane, unused, _, _, extent = self._areas(count, in_rows, receptors)
         return Trial(plane, unused, self._means(len(receptors), count), extent)
@@ -79,13 +89,13 @@ class BoxSampling:
         return plane, _unused(plane), count, self.depth, _extent(self.eye, (1 / columns, 1 / rows))
 
     def trial(self, rays_per_receptor: float, receptors: np.ndarray) -> Trial:
-        """What that sensor has for these receptors (numbered row by row)."""
+        """Return the samples of that sensor for these receptors (numbered row by row)."""
         rays = max(1, round(rays_per_receptor))
         return Trial(*self._rays(rays, receptors), self._means(len(receptors), rays))
 
     def beyond_rim(self, rays: int) -> np.ndarray:
-        """Directions through squares as large as the receptors', one beyond every one at the field's rim, corners too;
-        row by row, (square * rays, 3)."""
+        """Return directions through squares of a receptor's size around the field: one beyond every receptor at its
+        rim, and one at each corner; row by row, (square * rays, 3)."""
         rows, columns = (side + 2 for side in self.eye.resolution)
         row, column = np.nonzero(beyond_rim_of(self.eye.resolution))
         corners = np.stack([column - columns / 2, row - rows / 2], axis=-1)[:, None]
@@ -93,12 +103,12 @@ class BoxSampling:
         return directions_of(self.eye, ((low_discrepancy(rays) + shifts) % 1.0 + corners).reshape(-1, 2))
 
     def _means(self, receptors: int, samples: int) -> np.ndarray:
-        """Weights of so many samples each, (band, receptor, sample)."""
+        """Return weights that average this number of samples for each receptor, (band, receptor, sample)."""
         weights = np.kron(np.eye(receptors), np.full((1, samples), 1 / samples))
         return np.broadcast_to(weights, (self.eye.bands, *weights.shape))
 
     def _rays(self, rays: int, receptors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Directions and places."""
+        """Return directions and bounce samples."""
         height, width = self.eye.resolution
         shifts, turns = (np.random.default_rng(seed).random((height * width, 1, 2))[receptors] for seed in (0, 1))
         corners = self._corners()[receptors]
@@ -106,7 +116,7 @@ class BoxSampling:
         return directions, ((bounce_samples(rays) + turns) % 1.0).reshape(-1, 2).astype(np.float32)
 
     def _corners(self) -> np.ndarray:
-        """Of every receptor's square, upper left, (receptor, 1, 2)."""
+        """Return the upper left corner of every receptor's square, (receptor, 1, 2)."""
         height, width = self.eye.resolution
         row, column = (index.ravel() for index in np.indices((height, width)))
         return np.stack([column - width / 2, row - height / 2], axis=-1)[:, None]
@@ -114,9 +124,13 @@ class BoxSampling:
 
 @dataclass(frozen=True)
 class FieldSampling:
-    """Directions drawn from the mixture of all receptive fields; as many as asked for, or as it takes until every
-    receptor has one. tolerance: error allowed to a signal, see `sim.eyes.allowed_error`; white beyond the lattice of
-    areas is worth no more, on either side."""
+    """Samples of an eye behind a pupil: directions drawn from the mixture of all receptive fields.
+
+    If the requested number leaves a receptor without a ray, more are drawn until every receptor has one.
+
+    tolerance: error allowed to a signal, see `sim.eyes.allowed_error`; white beyond the lattice of areas, on either
+        side, contributes at most this signal
+    """
 
     eye: optics.Eye
     fields: ReceptiveFields
@@ -124,7 +138,7 @@ class FieldSampling:
     tolerance: float | None = None
 
     def sensor(self, rays_per_receptor: float) -> ReceptiveFieldSensor:
-        """The sensor with so many rays per receptor, on average."""
+        """Return the sensor with this number of rays per receptor, on average."""
         rays = self._rays(rays_per_receptor)
         while True:
             try:
@@ -133,7 +147,7 @@ class FieldSampling:
                 rays += max(1, rays // 4)
 
     def trial(self, rays_per_receptor: float, receptors: np.ndarray) -> Trial:
-        """What that sensor has for these receptors.
+        """Return the samples of that sensor for these receptors.
 
         Raises:
             NoRaysError: one of them has no ray.
@@ -146,8 +160,11 @@ class FieldSampling:
         return max(1, round(rays_per_receptor * np.prod(self.eye.resolution)))
 
     def areas(self, per_receptor: float, *, in_rows: bool = True) -> ReceptiveFieldSensor:
-        """The sensor whose samples are rectangles: as many of each receptor's square as `BoxSampling.areas` has, or
-        less than one, and of what more its receptors see."""
+        """Return the sensor whose samples are rectangles.
+
+        Each receptor's square is divided as in `BoxSampling.areas`, or, with less than one rectangle per receptor,
+        several receptors share a rectangle. More rectangles cover the rest of the receptors' fields.
+        """
         lattice = self._lattice(per_receptor, in_rows)
         plane = on_tangent_plane(self.eye, lattice.middles).astype(np.float32)
         weights = self._in_rows(lambda receptors: lattice.weights(self.fields, receptors))
@@ -155,20 +172,20 @@ class FieldSampling:
         return ReceptiveFieldSensor(plane, _unused(plane), weights, self.eye.resolution, self.depth, extent)
 
     def may_share(self, per_receptor: float, *, in_rows: bool = True) -> bool:
-        """Whether areas of several receptors, so many for each, are no wider than half of what one receptor sees: else
-        neighbours that differ would see the same."""
+        """Return whether shared areas, with this number per receptor, are at most half as wide as one receptor's field.
+        Wider areas would give different neighbours the same signal."""
         sides = (1 / n for n in _parts_or_share(per_receptor, in_rows))
         return all(side <= max(1, width / 2) for side, width in zip(sides, self.fields.widths, strict=True))
 
     def area_trial(self, per_receptor: float, receptors: np.ndarray, *, in_rows: bool = True) -> Trial:
-        """What that sensor has for these receptors."""
+        """Return the samples of that sensor for these receptors."""
         lattice = self._lattice(per_receptor, in_rows)
         plane = on_tangent_plane(self.eye, lattice.middles).astype(np.float32)
         return Trial(plane, _unused(plane), lattice.weights(self.fields, receptors), _extent(self.eye, lattice.size))
 
     def _lattice(self, per_receptor: float, in_rows: bool) -> FieldAreas:
         beyond = min(allowed_error(self.eye, self.tolerance) / self.eye.aperture_throughput, BEYOND)
-        return FieldAreas.of(self.fields, _parts_or_share(per_receptor, in_rows), beyond)
+        return FieldAreas.from_fields(self.fields, _parts_or_share(per_receptor, in_rows), beyond)
 
     def _sensor(self, rays: int) -> ReceptiveFieldSensor:
         draw = self.fields.draw(rays)
@@ -177,7 +194,7 @@ class FieldSampling:
         return ReceptiveFieldSensor(directions, _bounce_samples(draw), weights, self.eye.resolution, self.depth)
 
     def _in_rows(self, of: Callable[[np.ndarray], np.ndarray]) -> tuple[scipy.sparse.csr_array, ...]:
-        """Weights of all receptors, found row by row, without what changes no signal."""
+        """Return the weights of all receptors, computed row by row, without negligible ones."""
         height, width = self.eye.resolution
         rows: list[list[scipy.sparse.csr_array]] = []
         for i in range(height):
@@ -188,25 +205,26 @@ class FieldSampling:
 
 
 def parts_of(count: int, in_rows: bool) -> tuple[int, int]:
-    """Rows and columns of a receptor that is cut into so many parts."""
+    """Return the rows and columns of a receptor that is divided into this number of parts."""
     rows = max(n for n in range(1, math.isqrt(count) + 1) if count % n == 0) if in_rows else 1
     return rows, count // rows
 
 
 def _parts_or_share(per_receptor: float, in_rows: bool) -> tuple[float, float]:
-    """Rows and columns of a receptor, in all a whole number; less than one is its share of larger areas."""
+    """Return the rows and columns of a receptor, a whole number in total. Less than one is its share of a larger
+    area."""
     if per_receptor >= 1:
         return parts_of(round(per_receptor), in_rows)
     return (math.sqrt(per_receptor), math.sqrt(per_receptor)) if in_rows else (1.0, per_receptor)
 
 
 def _unused(plane: np.ndarray) -> np.ndarray:
-    """Bounce samples of areas, which have a table instead."""
+    """Return placeholders for the bounce samples of areas, for which a table of reflected light is used instead."""
     return np.zeros((len(plane), 2), np.float32)
 
 
 def _extent(eye: optics.Eye, size: tuple[float, float]) -> tuple[float, float]:
-    """A rectangle's width and height on the plane at distance 1, from those in receptor pitches."""
+    """Return a rectangle's width and height on the plane at distance 1, from its size in receptor pitches."""
     side = eye.receptor_pitch / eye.sensor_distance
     return side * size[0], side * size[1]
 
@@ -215,45 +233,47 @@ def _bounce_samples(draw: Draw) -> np.ndarray:
     return bounce_samples(len(draw)).astype(np.float32)
 
 
-# Makes sensors of one eye, with any number of rays.
+# Builds sensors of one eye, with any number of rays.
 EyeSampling = BoxSampling | FieldSampling
 
 
 def beyond_rim_of(resolution: tuple[int, int]) -> np.ndarray:
-    """Which squares of a field that is wider by one on every side are beyond its rim, (height + 2, width + 2)."""
+    """Mask of the squares beyond the rim of a field that is extended by one square on every side, (height + 2, width +
+    2)."""
     return np.pad(np.zeros(resolution, bool), 1, constant_values=True)
 
 
 def eye_sampling(eye: optics.Eye, depth: DepthLayers = ONE_PSF) -> EyeSampling:
-    """How an eye is sampled.
+    """Return the sampling of an eye.
 
     Raises:
-        optics.AccuracyError: a pupil whose light spreads too far to be computed.
+        optics.AccuracyError: a pupil that spreads light too far to be computed.
     """
     return BoxSampling(eye) if eye.pupil is None else FieldSampling(eye, receptive_fields_of(eye, depth), depth)
 
 
 def build_sensor(eye: optics.Eye, rays_per_receptor: float, depth: DepthLayers = ONE_PSF) -> Sensor:
-    """The sensor of an eye.
+    """Return the sensor of an eye.
 
     Raises:
-        optics.AccuracyError: a pupil whose light spreads too far to be computed.
+        optics.AccuracyError: a pupil that spreads light too far to be computed.
     """
     return eye_sampling(eye, depth).sensor(rays_per_receptor)
 
 
 def directions_of(eye: optics.Eye, plane: np.ndarray) -> np.ndarray:
-    """Unit vectors (ray, 3) in the eye's frame of points (x right, y down) [receptor pitches] on the tangent plane."""
+    """Return unit vectors (ray, 3) in the eye's frame, from points (x right, y down) [receptor pitches] on the tangent
+    plane."""
     v = on_tangent_plane(eye, plane)
     return (v / np.linalg.norm(v, axis=-1, keepdims=True)).astype(np.float32)
 
 
 def on_tangent_plane(eye: optics.Eye, plane: np.ndarray) -> np.ndarray:
-    """The same points in the eye's frame, on the plane at distance 1, (ray, 3)."""
+    """Return the same points in the eye's frame, on the plane at distance 1, (ray, 3)."""
     side = eye.receptor_pitch / eye.sensor_distance
     return np.stack([plane[:, 0] * side, -plane[:, 1] * side, np.ones(len(plane))], axis=-1)
 
 
 def negligible_share(eye: optics.Eye) -> float:
-    """Share of a receptor's weights that can be left out: a share s changes a signal by a² s at most."""
+    """Share of a receptor's weights that can be omitted: a share s changes a signal by at most a² s."""
     return min(NEGLIGIBLE * eye.noise_sigma / eye.aperture_throughput, eye.tolerance)

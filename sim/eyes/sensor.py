@@ -1,10 +1,11 @@
-"""Where an eye looks and what each receptor makes of the light: ray directions and their weights.
+"""Ray directions of an eye, and the receptors' weights for the light along them.
 
-`sim.eyes.sampling` says which these are.
+`sim.eyes.sampling` chooses the samples. All directions are fixed when the sensor is built, so that the same kernel
+renders every step.
 
-All directions are fixed when the sensor is built, so that rendering is the same kernel every step. Coordinates
-are the visual field's tangent plane, in receptor pitches: x to the right, y *down* as rows run, origin on the
-optical axis; receptor (i, j) covers [j - w/2, j + 1 - w/2] x [i - h/2, i + 1 - h/2].
+Coordinates refer to the visual field's tangent plane, in receptor pitches: x to the right, y *down* in the
+direction of increasing rows, origin on the optical axis. Receptor (i, j) covers [j - w/2, j + 1 - w/2] x [i - h/2, i +
+1 - h/2].
 """
 
 from __future__ import annotations
@@ -21,15 +22,16 @@ from sim.eyes.receptor_sums import ReceptorSums, RowProduct, of_bands, of_compon
 
 @dataclass(frozen=True)
 class BoxSensor:
-    """Perfect lens: a receptor's signal is the mean over the square it covers.
+    """An eye with a perfect lens: a receptor's signal is the mean over the square that it covers.
 
     directions: unit vectors in the eye's frame (x right, y up, z optical axis), (ray, 3) float32; ray = receptor *
         rays_per_receptor + sample
-    bounce_samples: of each ray, on the unit square: which way light that bounces goes on, (ray, 2) float32
+    bounce_samples: points in the unit square, one for each ray, that set the direction of reflected light, (ray, 2)
+        float32
     rays_per_receptor: samples of one receptor; the renderer sums them in its kernel
-    depth: nothing is blurred, whatever its distance
-    extent: where samples are rectangles of the tangent plane at distance 1, their width and height; directions are then
-        those of their middles, up to that plane. None: samples are rays
+    depth: a single layer, since nothing is blurred at any distance
+    extent: width and height of areas, as rectangles of the tangent plane at distance 1. The directions then end at the
+        areas' centres on that plane. None: the samples are rays.
     """
 
     directions: np.ndarray
@@ -39,37 +41,39 @@ class BoxSensor:
     extent: tuple[float, float] | None = None
 
     def receptor_radiance(self, sums: np.ndarray) -> np.ndarray:
-        """Mean radiance of each receptor from the sums over its rays: (band, view, receptor), both ways."""
+        """Return the mean radiance of each receptor, (band, view, receptor), from the sums over its rays in the same
+        shape."""
         return sums * np.float32(1.0 / self.rays_per_receptor)
 
     def receptor_sums(self, mixing: np.ndarray, basis: np.ndarray) -> ReceptorSums:
-        """Signals from sums of components over receptors' rays, see sim.eyes.receptor_sums."""
+        """Return the map from sums of components over receptors' rays to signals, see sim.eyes.receptor_sums."""
         return of_receptors(mixing @ basis.T / self.rays_per_receptor)
 
 
 @dataclass(frozen=True)
 class ReceptiveFieldSensor:
-    """An eye behind a pupil: one set of directions, drawn from the mixture of all receptive fields, serves all
-    receptors and bands; a receptor's signal is a weighted sum (importance sampling, self-normalised):
+    """An eye behind a pupil. One set of directions, drawn from the mixture of all receptive fields, serves all
+    receptors and bands. A receptor's signal is a weighted sum (self-normalised importance sampling):
 
         signal_r = sum_p W_b[r, p] radiance_b(p),   W_b[r, p] ∝ RF_{r,b}(p) / q(p),   sum_p W_b[r, p] = power_b
 
-    with RF the turned PSF kernel convolved with the receptor's square, q the density that directions were drawn from
-    and power_b the fraction of the pupil's power inside the kernel. With several depth layers there is such a W for
-    each of them, for its share of the light along a ray.
+    RF is the PSF, rotated by 180° and convolved with the receptor's square. q is the density of the directions, and
+    power_b is the fraction of the pupil's power inside the kernel. With several depth layers, each has its own W for
+    its share of the light along a ray.
 
-    Where samples are areas of the visual field and not rays, W_b[r, p] is the share of the field in area p.
+    If the samples are areas of the visual field instead of rays, W_b[r, p] is the share of the field in area p.
 
-    Weights far above and below a row of receptors are 0 where they are too small to matter: together they are less than
-    the tolerance asked of the PSF, and change no signal of a scene up to white in full daylight by more than
+    Small weights far above and below a row of receptors are set to 0. Together they are less than the requested
+    tolerance of the PSF. They change no signal of a scene up to white in full daylight by more than
     `sim.eyes.sampling.NEGLIGIBLE` of the receptors' noise.
 
     directions: unit vectors in the eye's frame, (ray, 3) float32
-    bounce_samples: of each ray, on the unit square: which way light that bounces goes on, (ray, 2) float32
-    weights: per plane, a band of a depth layer, sparse (receptor, ray)
+    bounce_samples: points in the unit square, one for each ray, that set the direction of reflected light, (ray, 2)
+        float32
+    weights: sparse matrices (receptor, ray), one for each band of each depth layer
     resolution: receptors (height, width)
     depth: the layers
-    extent: as of `BoxSensor`
+    extent: see `BoxSensor`
     """
 
     directions: np.ndarray
@@ -78,16 +82,17 @@ class ReceptiveFieldSensor:
     resolution: tuple[int, int]
     depth: DepthLayers = ONE_PSF
     extent: tuple[float, float] | None = None
-    rays_per_receptor: int = 1  # summed in the kernel: none
+    rays_per_receptor: int = 1  # the kernel sums no rays
 
     def receptor_radiance(self, radiance: np.ndarray) -> np.ndarray:
-        """(layer * band, view, ray) -> (band, view, receptor)."""
+        """Map radiance (layer * band, view, ray) to (band, view, receptor)."""
         planes = [product(plane) for product, plane in zip(self._products, radiance, strict=True)]
         layers = np.stack([plane.reshape(len(plane), -1) for plane in planes])
         return layers.reshape(self.depth.count, -1, *layers.shape[1:]).sum(axis=0)
 
     def receptor_sums(self, mixing: np.ndarray, basis: np.ndarray) -> ReceptorSums:
-        """Signals from components along rays (layer * component, view, ray), see sim.eyes.receptor_sums."""
+        """Return the map from components along rays (layer * component, view, ray) to signals, see
+        sim.eyes.receptor_sums."""
         count, k = self.depth.count, len(basis)
         bands = len(self.weights) // count
         sums_of_layers = [self._sums_of_layer(layer * bands, bands, mixing, basis) for layer in range(count)]
@@ -103,7 +108,7 @@ class ReceptiveFieldSensor:
 
     @cached_property
     def _products(self) -> list[RowProduct]:
-        return [RowProduct.of([w], self.resolution) for w in self.weights]
+        return [RowProduct.from_weights([w], self.resolution) for w in self.weights]
 
     @property
     def density(self) -> float:

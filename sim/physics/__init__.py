@@ -1,13 +1,13 @@
-"""What moves worlds on by one action.
+"""Physics of worlds: the motion during one action.
 
 physics         Physics: the protocol
 sliding_agents  SlidingAgents: the built-in worlds
 agent_motion    motion of their agents, in closed form or by MuJoCo
-free_motion     agents that touch nothing
-local_contacts  agents that may touch something near
+free_motion     motion of agents that touch nothing
+local_contacts  motion of agents near something they may touch
 mujoco_batch    MuJoCo's own step for many of these worlds
-varied_looks    sizes, colours and materials that differ between them
+varied_appearances  sizes, colours and materials that differ between worlds
 mujoco_worlds   MujocoWorlds: any MuJoCo model
-array_worlds    ArrayWorlds: the same, as arrays
-controls        which controls belong to which actuators
+array_worlds    ArrayWorlds: any MuJoCo model, with its state as arrays
+controls        assignment of a model's controls to its actuators
 """

@@ -1,9 +1,9 @@
-"""The batched MuJoCo step: every world one action further, on as many threads as this process owns.
+"""Batched motion of the built-in agents: all worlds advance by one action, on all threads of this process.
 
-The agent is a heavy body on two slide joints driven by velocity actuators; its heading is set, not simulated.
-Objects are mocap bodies that collide with nothing, so that physics need not know where they are. Agents that surely
-touch nothing during the action move in closed form (`sim.physics.free_motion`); the others are MuJoCo's, among the few
-geoms that they could touch (`sim.physics.local_contacts`).
+The agent is a heavy body on two slide joints driven by velocity actuators. Its heading is set, not simulated. Objects
+are mocap bodies that collide with nothing, so physics does not need their positions. Agents that certainly touch
+nothing during the action move in closed form (`sim.physics.free_motion`). MuJoCo moves the others, among the few geoms
+that they could touch (`sim.physics.local_contacts`).
 """
 
 from __future__ import annotations
@@ -20,18 +20,19 @@ from sim.physics.mujoco_batch import BatchedStep
 from sim.worlds.state import WorldState
 from sim.worlds.world import MAX_SPEED, World
 
-SUBSTEPS = 10  # of the model's timestep per action, as published
-UNSTABLE_SPEED = 10 * MAX_SPEED  # [m/s]: no actuator can do that
-FEW_GEOMS = 200  # so few are sooner gone through one by one than by MuJoCo's tree of boxes
+SUBSTEPS = 10  # number of the model's timesteps per action, as published
+UNSTABLE_SPEED = 10 * MAX_SPEED  # [m/s], more than any actuator can cause
+FEW_GEOMS = 200  # up to this number, testing all geoms is faster than MuJoCo's bounding volume tree
 
 
 @dataclass(frozen=True)
 class Motion:
-    """One action's motion of the agents.
+    """Motion of the agents during one action.
 
-    path: at the end of each substep [m], (n, substep, 2) · velocity at the last [m/s], (n, 2)
-    contact: touched anything in any substep, (n,) bool
-    unstable: the simulation broke down: path and velocity are the last good ones, (n,) bool
+    path: positions at the end of each substep [m], (n, substep, 2)
+    velocity: velocity at the last substep [m/s], (n, 2)
+    contact: the agent touched something in any substep, (n,) bool
+    unstable: the simulation broke down, so path and velocity are the last valid ones, (n,) bool
     """
 
     path: np.ndarray
@@ -40,14 +41,14 @@ class Motion:
     unstable: np.ndarray
 
     def put(self, worlds: np.ndarray, motion: Motion) -> None:
-        """Set the motion of these worlds, in place: only while the whole is being put together."""
+        """Set the motion of these worlds in place; only for use while a result is being assembled."""
         for name, array in vars(self).items():
             array[worlds] = getattr(motion, name)
 
 
 @dataclass(frozen=True)
 class Agents:
-    """Where agents are [m], (n, 2), their headings [rad], (n,), and velocities [m/s], (n, 2)."""
+    """Positions [m], (n, 2), headings [rad], (n,), and velocities [m/s], (n, 2), of agents."""
 
     position: np.ndarray
     heading: np.ndarray
@@ -60,20 +61,20 @@ class Agents:
 class AgentPhysics:
     """Batched physics of the agents in one world's model.
 
-    threads: of MuJoCo's batched step, see `sim.physics.mujoco_batch`
-    closed_form: whether agents out of reach of everything move in closed form, and those near something among that
-        alone (`.free_motion`, `.local_contacts`: how, None where they cannot); otherwise everything is MuJoCo's, in the
-        whole world
+    threads: threads of MuJoCo's batched step, see `sim.physics.mujoco_batch`
+    closed_form: if True, agents out of reach of everything move in closed form (`free_motion`), and agents near
+        something are simulated among only those geoms (`local_contacts`). Either attribute is None if the model does
+        not allow it. If False, MuJoCo simulates everything in the whole world.
 
     Raises:
-        ValueError: a model without the agent's joints, actuators and touch sensor, and for objects that could collide.
+        ValueError: a model without the agent's joints, actuators or touch sensor, or with objects that could collide.
     """
 
     def __init__(self, world: World, threads: int, closed_form: bool = True) -> None:
         model = _without_detours(world.model)
         self._model = model
         self._step_batch = BatchedStep(model, threads)
-        self._columns = _Columns.of(model)
+        self._columns = _Columns.from_model(model)
         self._actuators = [_actuator(model, joint) for joint in ("agent_x", "agent_y")]
         self._touch = _touch_columns(model)
         _check_objects(model, world.objects)
@@ -85,13 +86,13 @@ class AgentPhysics:
         self.local_contacts = local_contacts_of(world, model, self.free_motion, threads)
 
     def step(self, agents: Agents | WorldState, velocity: np.ndarray) -> Motion:
-        """One action: SUBSTEPS with the commanded velocity [m/s] (n, 2) held."""
+        """Take one action: SUBSTEPS substeps with a constant commanded velocity [m/s] (n, 2)."""
         if self.free_motion is None:
             return self._simulate(agents, velocity)
         path, speed = self.free_motion(agents.velocity, velocity)
-        met = self.free_motion.met(agents.position, path)
+        met = self.free_motion.obstacles_in_reach(agents.position, path)
         free = ~met.any(axis=1) & self.free_motion.obeys(velocity)
-        # False for NaN, too: MuJoCo tells what it makes of that.
+        # Also false for NaN, so that MuJoCo handles these agents.
         free &= (np.abs(agents.velocity) < UNSTABLE_SPEED).all(axis=-1)
         n = len(velocity)
         motion = Motion(agents.position[:, None] + path, speed, np.zeros(n, bool), np.zeros(n, bool))
@@ -101,8 +102,11 @@ class AgentPhysics:
         return motion
 
     def _near(self, agents: Agents | WorldState, velocity: np.ndarray, met: np.ndarray) -> Motion:
-        """Of agents that may touch something, each among what it may meet. Where that is too much, where something
-        turns it aside to where it could meet more, and where it breaks down, it is done again in the whole world."""
+        """Simulate agents that may touch something, each among only the geoms within its reach.
+
+        The motion is repeated in the whole world in three cases: too many geoms are within reach, a contact deflects
+        the agent towards further geoms, or the simulation breaks down.
+        """
         if self.local_contacts is None:
             return self._simulate(agents, velocity)
         few = self.local_contacts.few(met)
@@ -114,12 +118,13 @@ class AgentPhysics:
         return motion
 
     def _simulate(self, agents: Agents | WorldState, velocity: np.ndarray) -> Motion:
-        """MuJoCo's step, in the whole world."""
+        """Step the agents in the whole world with MuJoCo."""
         models = [self._model] * len(velocity)
         return self._motion(agents.position, *self._step_batch(models, *self._start_of(agents, velocity)))
 
     def _start_of(self, agents: Agents | WorldState, velocity: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """MuJoCo's states (n, ...), and controls (n, substep, nu) that hold a commanded velocity [m/s] (n, 2)."""
+        """Return MuJoCo's states (n, ...), and controls (n, substep, nu) for a constant commanded velocity [m/s] (n,
+        2)."""
         initial = self._initial(len(velocity))
         initial[:, self._columns.position] = agents.position - self._columns.origin
         initial[:, self._columns.heading] = agents.heading
@@ -137,7 +142,8 @@ class AgentPhysics:
     def _untouched(
         self, speed: np.ndarray, command: np.ndarray, displacement: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """What MuJoCo makes of speeds and commands (n, 2) with contacts off: see sim.physics.free_motion.Run."""
+        """Return MuJoCo's path and velocity for these speeds and commands (n, 2) with contacts disabled; see
+        sim.physics.free_motion.FreeSteps."""
         model = copy.copy(self._model)
         model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT
         initial = self._initial(len(speed))
@@ -156,9 +162,9 @@ class AgentPhysics:
     def _motion(self, position: np.ndarray, states: np.ndarray, sensors: np.ndarray) -> Motion:
         path = states[:, :, self._columns.position] + self._columns.origin
         velocity = states[:, -1, self._columns.velocity].copy()
-        # MuJoCo resets a world that broke down, and its clock with it.
+        # MuJoCo resets a world that broke down, including its clock.
         due = self._start[0] + self.seconds
-        unstable = ~np.isfinite(states[:, -1]).all(axis=-1)  # an earlier state that is not sets the clock back
+        unstable = ~np.isfinite(states[:, -1]).all(axis=-1)  # an earlier state that is not finite resets the clock
         unstable |= np.abs(states[:, -1, 0] - due) > self._model.opt.timestep / 2
         unstable |= ~(np.abs(velocity) < UNSTABLE_SPEED).all(axis=-1)
         contact = np.asarray((sensors[:, :, self._touch] > 0).reshape(len(states), -1).any(axis=1))
@@ -171,7 +177,8 @@ class AgentPhysics:
 
 @dataclass(frozen=True)
 class _Columns:
-    """Where the agent is in MuJoCo's full physics state, and where its slide joints are zero [m]."""
+    """Entries of MuJoCo's full physics state that contain the agent's position, and the positions at which its slide
+    joints are zero [m]."""
 
     position: slice | list[int]
     heading: int
@@ -179,7 +186,7 @@ class _Columns:
     origin: np.ndarray
 
     @classmethod
-    def of(cls, model: mujoco.MjModel) -> _Columns:
+    def from_model(cls, model: mujoco.MjModel) -> _Columns:
         qpos = mujoco.mj_stateSize(model, mujoco.mjtState.mjSTATE_TIME)
         qvel = qpos + mujoco.mj_stateSize(model, mujoco.mjtState.mjSTATE_QPOS)
         joints = [_joint(model, name) for name in ("agent_x", "agent_y", "agent_heading")]
@@ -193,8 +200,11 @@ class _Columns:
 
 
 def _without_detours(model: mujoco.MjModel) -> mujoco.MjModel:
-    """The same model, without two of MuJoCo's preparations that pay only where much is in contact: a tenth to a fifth
-    of an agent's time at a wall, and the same motion bit for bit."""
+    """Return the same model with two of MuJoCo's preparation steps disabled.
+
+    They save time only with many contacts. Without them, an agent at a wall takes a tenth to a fifth less time, and
+    moves bit-identically.
+    """
     lean = copy.copy(model)
     lean.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_ISLAND
     if model.ngeom <= FEW_GEOMS:
@@ -220,7 +230,7 @@ def _actuator(model: mujoco.MjModel, joint_name: str) -> int:
 
 
 def _columns(wanted: list[int]) -> slice | list[int]:
-    """Columns of an array; where they are side by side, without a copy."""
+    """Return columns of an array, as a slice if they are adjacent, which avoids a copy."""
     side_by_side = wanted == list(range(wanted[0], wanted[0] + len(wanted)))
     return slice(wanted[0], wanted[-1] + 1) if side_by_side else wanted
 
@@ -239,4 +249,4 @@ def _check_objects(model: mujoco.MjModel, names: tuple[str, ...]) -> None:
             raise ValueError(f"object {name!r} is not a mocap body of the model")
         geoms = model.geom_bodyid == body
         if (model.geom_contype[geoms] | model.geom_conaffinity[geoms]).any():
-            raise ValueError(f"object {name!r} collides; physics moves the agent alone")
+            raise ValueError(f"object {name!r} can collide: must have no contacts, since physics moves only the agent")

@@ -1,4 +1,4 @@
-"""Worlds of any MuJoCo model whose state is arrays: what a batch task reads and writes."""
+"""Worlds of any MuJoCo model whose state is available as arrays, for batch tasks."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from sim.scene.variation import Drawn
 __all__ = ["ArrayWorlds"]
 
 _ALL = mujoco.mjtState.mjSTATE_INTEGRATION
-# Parts of MuJoCo's state that are arrays of their own, and fields of MjModel that say how large they are.
+# Parts of MuJoCo's state that are separate arrays, with the fields of MjModel that give their sizes.
 _WRITABLE = {"time": "TIME", "qpos": "QPOS", "qvel": "QVEL", "act": "ACT", "ctrl": "CTRL", "userdata": "USERDATA"}
 _MOCAP = {"mocap_pos": ("MOCAP_POS", 3), "mocap_quat": ("MOCAP_QUAT", 4)}
 
@@ -22,9 +22,10 @@ _MOCAP = {"mocap_pos": ("MOCAP_POS", 3), "mocap_quat": ("MOCAP_QUAT", 4)}
 class ArrayWorlds(MujocoWorlds):
     """`n` worlds of one model, as arrays whose first axis is the world.
 
-    qpos, qvel, act, ctrl, mocap_pos, mocap_quat, userdata, time: may be written to, in `reset` and `act`
-    All other arrays of mjData (`xpos`, `geom_xpos`, `site_xpos`, `sensordata`, `cvel` ...) are read-only: stacked when
-    they are first read after a step.
+    qpos, qvel, act, ctrl, mocap_pos, mocap_quat, userdata, time: writable, in `reset` and `act`
+
+    All other arrays of mjData (`xpos`, `geom_xpos`, `site_xpos`, `sensordata`, `cvel` ...) are read-only. They are
+    stacked when they are first read after a step.
     """
 
     qpos: np.ndarray
@@ -41,7 +42,7 @@ class ArrayWorlds(MujocoWorlds):
         self._stacked: dict[str, np.ndarray] = {}
         self._rows = np.zeros((self.n, mujoco.mj_stateSize(self.model, _ALL)))
         start = 0
-        # In the order in which MuJoCo lays out a state.
+        # MuJoCo lays out a state in this order.
         for part in (getattr(mujoco.mjtState, name) for name in _parts()):
             if not int(part) & int(_ALL):
                 continue
@@ -60,17 +61,17 @@ class ArrayWorlds(MujocoWorlds):
         return self
 
     def __getattr__(self, name: str) -> np.ndarray:
-        """An array of mjData, stacked over worlds."""
+        """Return an array of mjData, stacked over worlds."""
         if name.startswith("_") or not isinstance(getattr(mujoco.MjData, name, None), property):
-            raise AttributeError(f"ArrayWorlds has no attribute {name!r}, and neither has mjData")
+            raise AttributeError(f"ArrayWorlds and mjData have no attribute {name!r}")
         if name not in self._stacked:
             found = np.stack([np.asarray(getattr(data, name)) for data in self.datas])
             found.flags.writeable = False
             self._stacked[name] = found
         return self._stacked[name]
 
-    def begin(self, world: int, drawn: Mapping[str, Drawn]) -> None:
-        super().begin(world, drawn)
+    def start_episode(self, world: int, drawn: Mapping[str, Drawn]) -> None:
+        super().start_episode(world, drawn)
         self._pull([world])
 
     def settle(self, worlds: np.ndarray) -> None:
@@ -86,12 +87,12 @@ class ArrayWorlds(MujocoWorlds):
         self._pull(range(self.n))
         return broken
 
-    def held(self) -> dict[str, np.ndarray]:
+    def get_state(self) -> dict[str, np.ndarray]:
         self._push(range(self.n))
-        return super().held()
+        return super().get_state()
 
-    def hold(self, state: Mapping[str, np.ndarray], worlds: np.ndarray) -> None:
-        super().hold(state, worlds)
+    def set_state(self, state: Mapping[str, np.ndarray], worlds: np.ndarray) -> None:
+        super().set_state(state, worlds)
         self._pull(worlds)
 
     def _push(self, worlds: Collection[int] | np.ndarray) -> None:
@@ -106,6 +107,6 @@ class ArrayWorlds(MujocoWorlds):
 
 
 def _parts() -> list[str]:
-    """Names of the single parts of a state, in MuJoCo's order."""
+    """Return the names of the single parts of a state, in MuJoCo's order."""
     kinds = {name: int(getattr(mujoco.mjtState, name)) for name in dir(mujoco.mjtState) if name.startswith("mjSTATE_")}
     return sorted((name for name, bits in kinds.items() if bits.bit_count() == 1), key=lambda name: kinds[name])

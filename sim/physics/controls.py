@@ -1,7 +1,7 @@
-"""Which controls of a model belong to which actuators: an actuator may take several, or none.
+"""Assignment of a model's controls to its actuators.
 
-MuJoCo counts actuators and controls apart: a servo of position and velocity takes two controls, a motor of a ball joint
-three, and a passive motor none.
+MuJoCo counts actuators and controls separately: a servo of position and velocity has two controls, a motor of a ball
+joint three, and a passive motor none.
 """
 
 from __future__ import annotations
@@ -13,12 +13,12 @@ import numpy as np
 
 
 def actuator_names(model: mujoco.MjModel) -> list[str]:
-    """Of all of a model's actuators, in its order; "" of those without one."""
+    """Names of all of a model's actuators, in its order; "" for actuators without a name."""
     return [str(model.actuator(i).name) for i in range(model.nactuator)]
 
 
 def controls_of(model: mujoco.MjModel, named: Sequence[str] | None) -> np.ndarray:
-    """Places in `data.ctrl` of what these actuators take, (k,) int: one actuator's after the other's; None: of all.
+    """Return the indices in `data.ctrl` of these actuators' controls, (k,) int, in the order of the names; None: all.
 
     Raises:
         KeyError: the model has no such actuator.

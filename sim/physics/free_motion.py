@@ -1,8 +1,8 @@
-"""How agents move where nothing is near enough to touch: linearly, with coefficients that MuJoCo itself is asked for.
+"""Motion of agents that touch nothing: linear, with coefficients measured in MuJoCo.
 
-Far from walls, an agent on slide joints with velocity servos answers linearly to its speed and to the command, so one
-action is a product with a few numbers. They are what the model does with its contacts switched off, so that whatever
-integrator, damping or servo it has is in them; a model that answers otherwise than linearly has none.
+Far from walls, an agent on slide joints with velocity servos responds linearly to its speed and to the command. One
+action is then a product with a few numbers. They are measured in the model with its contacts disabled, so they include
+its integrator, damping and servo. A model that responds nonlinearly has no such coefficients.
 """
 
 from __future__ import annotations
@@ -14,24 +14,25 @@ from functools import cached_property
 import mujoco
 import numpy as np
 
-# A model counts as linear where superposition holds to this many metres: rounding, over ten substeps of metres.
+# Largest deviation [m] from superposition in a linear model: rounding, over ten substeps of metres.
 ROUNDING = 1e-11
 
-# Path (run, substep, 2) [m] from where it begins, and velocity after each substep, of runs that start at speeds
-# (run, 2) [m/s] under commands (run, 2), (run, 2) [m] from where the model has its agent, with all contacts off.
+# Function that simulates runs with all contacts disabled. Arguments: initial speeds (run, 2) [m/s], commands (run, 2),
+# and displacements from the agent's position in the model (run, 2) [m]. Results: path relative to its beginning, (run,
+# substep, 2) [m], and velocity after each substep.
 FreeSteps = Callable[[np.ndarray, np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
 
 
 @dataclass(frozen=True)
 class FreeMotion:
-    """One action of an agent that touches nothing.
+    """Motion of an agent that touches nothing, during one action.
 
-    response: of path [m] and velocity [m/s] after each substep to a speed of 1 m/s and a command of 1, per axis: (path
-        | velocity, substep, speed | command, 2)
+    response: response of path [m] and velocity [m/s] after each substep to a speed of 1 m/s and to a command of 1, per
+        axis: (path | velocity, substep, speed | command, 2)
     obstacles: ids of the geoms that could be touched (n,)
-    lower, upper: upright boxes around them (n, 2) [m]
-    reach: how near the agent's centre may come to them and still touch nothing [m]
-    strongest: command beyond which the servo saturates
+    lower, upper: axis-aligned bounding boxes of the obstacles in the horizontal plane (n, 2) [m]
+    reach: least distance of the agent's centre from a box at which it touches nothing [m]
+    strongest: largest command that does not saturate the servo
     """
 
     response: np.ndarray
@@ -42,8 +43,9 @@ class FreeMotion:
     strongest: float
 
     def __call__(self, velocity: np.ndarray, command: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Path from where the agents are (n, substep, 2) [m], and their velocity at its end (n, 2) [m/s]."""
-        # Summed by hand: a product of matrices rounds differently with the number of worlds.
+        """Return the path relative to the agents' positions (n, substep, 2) [m], and the velocity at its end (n, 2)
+        [m/s]."""
+        # Summed explicitly, since the rounding of a matrix product depends on the number of worlds.
         paths, speeds = self.response
         path = paths[:, 0] * velocity[:, None] + paths[:, 1] * command[:, None]
         speed = speeds[-1, 0] * velocity + speeds[-1, 1] * command
@@ -51,15 +53,15 @@ class FreeMotion:
 
     @cached_property
     def _within(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Between which x, and which y, a centre is within reach of each box [m]."""
+        """Limits of x and y between which a centre is within reach of each box [m]."""
         return (*(self.lower - self.reach).T.copy(), *(self.upper + self.reach).T.copy())
 
-    def met(self, position: np.ndarray, path: np.ndarray) -> np.ndarray:
-        """What agents on `path` from `position` (n, 2) [m] come within reach of, (n, obstacle) bool."""
+    def obstacles_in_reach(self, position: np.ndarray, path: np.ndarray) -> np.ndarray:
+        """Return the obstacles within reach of agents on `path` from `position` (n, 2) [m], (n, obstacle) bool."""
         low = position + np.minimum(np.minimum.reduce(path, axis=1), 0.0)
         high = position + np.maximum(np.maximum.reduce(path, axis=1), 0.0)
         x_from, y_from, x_to, y_to = self._within
-        # An axis at a time: NumPy's inner loop is over the boxes then.
+        # One axis at a time, so that NumPy's inner loop is over the boxes.
         met: np.ndarray = low[:, :1] < x_to
         met &= high[:, :1] > x_from
         met &= low[:, 1:] < y_to
@@ -67,14 +69,14 @@ class FreeMotion:
         return met
 
     def obeys(self, command: np.ndarray) -> np.ndarray:
-        """Whether the servos do not saturate, (n,) bool."""
+        """Return whether the servos do not saturate, (n,) bool."""
         obeys: np.ndarray = (np.abs(command) <= self.strongest).all(axis=-1)
         return obeys
 
 
 def free_motion_of(model: mujoco.MjModel, agent: int, run: FreeSteps, strongest: float) -> FreeMotion | None:
-    """What `model` does to the body `agent` away from everything; None where that is not linear, or where something
-    it can touch moves or has no end."""
+    """Return the free motion of the body `agent` in `model`; None if the motion is not linear, or if an obstacle moves
+    or is infinite."""
     obstacles = _obstacles(model, agent)
     if obstacles is None:
         return None
@@ -94,8 +96,8 @@ def free_motion_of(model: mujoco.MjModel, agent: int, run: FreeSteps, strongest:
 
 
 def _obstacles(model: mujoco.MjModel, agent: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, float] | None:
-    """Ids of all geoms that the agent can touch, lower and upper corners (n, 2) [m] of upright boxes around them, and
-    their largest margin [m]; None where one of them moves or has no end."""
+    """Return all geoms that the agent can touch: their ids, lower and upper corners (n, 2) [m] of axis-aligned boxes
+    around them, and their largest margin [m]. None if one of them moves or is infinite."""
     mine = model.geom_bodyid == agent
     meets = np.zeros(model.ngeom, bool)
     for geom in np.flatnonzero(mine):

@@ -1,8 +1,9 @@
-"""Physics among the few geoms that an agent could touch during one action, instead of among all of a world's.
+"""Physics among the few geoms that an agent could touch during one action, instead of all geoms of a world.
 
-MuJoCo poses every geom of a model in every substep and asks of each whether the agent is near it. What an agent does
-at a wall depends on that wall alone, and so does each number of MuJoCo's that leads to it: bit for bit, but for the
-order of several contacts in models of so many geoms that MuJoCo goes through a tree of them.
+In every substep MuJoCo updates the poses of all geoms of a model and tests each of them for contacts. The motion of an
+agent at a wall depends only on this wall, and so does every number in MuJoCo's computation. The results are therefore
+bit-identical. The only exception is the order of several contacts in models large enough for MuJoCo to use a tree
+of bounding volumes.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from sim.physics.free_motion import FreeMotion
 from sim.physics.mujoco_batch import BatchedStep
 from sim.worlds.world import World
 
-MOST = 1024  # models that are kept, 50 kB each; a maze has two or three hundred places that differ
+MOST = 1024  # cached models, 50 kB each; a maze has two or three hundred distinct places
 _NOT_OF_A_SHAPE = ("geom_bodyid", "geom_dataid", "geom_matid", "geom_user")
 _SHAPES = [
     getattr(mujoco.mjtGeom, f"mjGEOM_{shape}") for shape in ("SPHERE", "CAPSULE", "ELLIPSOID", "CYLINDER", "BOX")
@@ -24,18 +25,19 @@ _SHAPES = [
 
 
 class LocalContacts:
-    """Models of the agent among some of a world's geoms, made when first asked for, and their steps.
+    """Models of the agent among some of a world's geoms, built on demand, and their steps.
 
-    whole: the world's model, as it is stepped
-    alone: its agent by itself (`sim.worlds.agent_model`)
-    free_motion: knows what the agent can touch, and from where
-    threads: of the steps, see `sim.physics.mujoco_batch`
+    whole: the world's model that is simulated
+    alone: the model of its agent without the world (`sim.worlds.agent_model`)
+    free_motion: obstacles of the agent, and the distance at which it may touch them
+    threads: number of threads, see `sim.physics.mujoco_batch`
     """
 
     def __init__(self, whole: mujoco.MjModel, alone: mujoco.MjModel, free_motion: FreeMotion, threads: int) -> None:
         self._alone = copy.copy(alone)
         self._alone.opt.disableflags = whole.opt.disableflags | mujoco.mjtDisableBit.mjDSBL_MIDPHASE
-        for name in ("body_contype", "body_conaffinity", "body_margin"):  # of all geoms of the world's body together
+        # These fields summarise all geoms of the world's body.
+        for name in ("body_contype", "body_conaffinity", "body_margin"):
             getattr(self._alone, name)[0] = getattr(whole, name)[0]
         self._whole, self._free_motion = whole, free_motion
         self._slots = np.flatnonzero(alone.geom_bodyid == 0)
@@ -44,12 +46,13 @@ class LocalContacts:
         self._step = BatchedStep(self._alone, threads)
 
     def few(self, met: np.ndarray) -> np.ndarray:
-        """The obstacles met (n, obstacle) bool; none where they are more than there is room for."""
+        """Return the obstacles within reach (n, obstacle) bool; none for agents with more obstacles than the small
+        model can contain."""
         few: np.ndarray = met & (met.sum(axis=1, keepdims=True) <= len(self._slots))
         return few
 
     def step(self, few: np.ndarray, initial: np.ndarray, control: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Steps of each agent among these of the obstacles, (n, obstacle) bool: see `BatchedStep`."""
+        """Step each agent among these obstacles, (n, obstacle) bool; see `BatchedStep`."""
         if len(self._models) > MOST:
             self._models.clear()
         keys = [row.tobytes() for row in np.packbits(few, axis=1)]
@@ -57,9 +60,9 @@ class LocalContacts:
         return self._step(models, initial, control)
 
     def strayed(self, position: np.ndarray, path: np.ndarray, few: np.ndarray) -> np.ndarray:
-        """Whether agents whose models had these `few` (n, obstacle) bool came within reach of another obstacle on their
-        path from `position` (n, 2) [m], (n,) bool: turned aside by one thing, an agent can meet the next."""
-        strayed: np.ndarray = (self._free_motion.met(position, path) & ~few).any(axis=1)
+        """Return whether agents came within reach of obstacles other than `few` (n, obstacle) bool on their path from
+        `position` (n, 2) [m], (n,) bool. An agent that one obstacle deflects can hit the next one."""
+        strayed: np.ndarray = (self._free_motion.obstacles_in_reach(position, path) & ~few).any(axis=1)
         return strayed
 
     def close(self) -> None:
@@ -77,9 +80,14 @@ class LocalContacts:
 def local_contacts_of(
     world: World, whole: mujoco.MjModel, free_motion: FreeMotion | None, threads: int
 ) -> LocalContacts | None:
-    """None where models of a part cannot stand for the whole: where agents have no free motion or nothing to touch,
-    obstacles are on bodies of their own or of other shapes than MuJoCo's simple ones, more moves than the agent, or
-    the world's model is not the one that it was compiled to. `whole`: that model, as it is stepped."""
+    """Return the local contacts of a world's agent; None if small models cannot replace the whole model.
+
+    This is so if agents have no free motion or no obstacles, if obstacles belong to other bodies than the world's or
+    are not simple primitives, if more bodies than the agent move, or if the world's model has been changed since it was
+    compiled.
+
+    whole: the world's model that is simulated
+    """
     alone = world.alone
     if alone is None or free_motion is None or not len(free_motion.obstacles) or not alone.stands_for(world.model):
         return None

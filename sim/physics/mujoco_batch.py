@@ -1,4 +1,4 @@
-"""MuJoCo's batched step for small batches: nothing checked twice, and threads only where there is work for them."""
+"""MuJoCo's batched step for small batches, without repeated checks, and with threads only for large batches."""
 
 from __future__ import annotations
 
@@ -13,15 +13,16 @@ import mujoco
 import mujoco.rollout
 import numpy as np
 
-# So many worlds are taken to be worth waking a pool of threads: on two cores 64 took no less time on two than on one.
+# Chosen: smallest number of worlds for which a pool of threads is used. On two cores, 64 worlds were not faster on two
+# threads than on one.
 POOLED = 128
 
 
 class BatchedStep:
-    """Open-loop steps of many worlds whose models differ by numbers alone.
+    """Open-loop steps of many worlds whose models differ only in numbers.
 
-    like: a model of their sizes
-    threads: that POOLED worlds or more are shared among; fewer are stepped on the calling thread
+    like: a model of the same sizes
+    threads: number of threads for batches of at least POOLED worlds; smaller ones are stepped on the calling thread
     """
 
     def __init__(self, like: mujoco.MjModel, threads: int) -> None:
@@ -30,19 +31,19 @@ class BatchedStep:
         self._like, self._threads = like, threads
         self._data = [mujoco.MjData(like)]
         self._alone = mujoco.rollout.Rollout(nthread=0)
-        self._pool: mujoco.rollout.Rollout | None = None  # not before it is needed
+        self._pool: mujoco.rollout.Rollout | None = None  # created on demand
 
     def __call__(
         self, models: Sequence[mujoco.MjModel], initial: np.ndarray, control: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """States (n, step, ...) and sensors (n, step, ...) after each step from `initial` (n, ...) under `control`
-        (n, step, nu); one model per world."""
+        """Return the states (n, step, ...) and sensors (n, step, ...) after each step from `initial` (n, ...) under
+        `control` (n, step, nu), with one model per world."""
         n, steps = control.shape[:2]
         rollout = self._pooled() if self._threads > 1 and n >= POOLED else self._alone
         data = self._data[: max(rollout.nthread, 1)]
         states, sensors = np.empty((n, steps, self._state_size)), np.empty((n, steps, self._sensors))
         with _clock_stopped:
-            # Shapes and types are known to be right: for small batches looking at every model again is dear.
+            # Shapes and types are known to be correct. Checking every model again is expensive for small batches.
             rollout.rollout(
                 models, data, initial, control, skip_checks=True, nstep=steps, state=states, sensordata=sensors
             )
@@ -62,9 +63,11 @@ class BatchedStep:
 
 
 class _ClockStopped:
-    """MuJoCo without the clock that it reads a score of times per step for MjData.timer: a fifth of so small a step.
+    """Context manager that disables MuJoCo's clock, which it reads about twenty times per step for MjData.timer. This
+    takes a fifth of the time of such a small step.
 
-    The clock is the process's: it stands still while any rollout is at work, and goes on when the last one is done.
+    The clock belongs to the process. It is disabled while any rollout runs, and restored when the last one has
+    finished.
     """
 
     def __init__(self) -> None:
@@ -86,8 +89,8 @@ class _ClockStopped:
 
 @cache
 def _clock() -> ctypes.c_void_p:
-    """MuJoCo's pointer to its clock, mjcb_time (mujoco.set_mjcb_time cannot clear it); one that nobody reads where its
-    library is not found beside the package."""
+    """Return MuJoCo's pointer to its clock, mjcb_time (mujoco.set_mjcb_time cannot clear it), or an unused pointer if
+    MuJoCo's library is not in the folder of its package."""
     for library in Path(mujoco.__file__).parent.glob("*mujoco*.*"):
         with contextlib.suppress(OSError, ValueError):
             return ctypes.c_void_p.in_dll(ctypes.CDLL(str(library)), "mjcb_time")

@@ -17,7 +17,7 @@ from sim.scene.world_models import WorldModels
 
 __all__ = ["MujocoWorlds"]
 
-MODELS = "models"  # entry of a state for worlds with models of their own
+MODELS = "models"  # entry of a state that contains the models, if each world has its own
 _ALL = mujoco.mjtState.mjSTATE_INTEGRATION
 _UNSTABLE = (mujoco.mjtWarning.mjWARN_BADQPOS, mujoco.mjtWarning.mjWARN_BADQVEL, mujoco.mjtWarning.mjWARN_BADQACC)
 
@@ -25,8 +25,10 @@ _UNSTABLE = (mujoco.mjtWarning.mjWARN_BADQPOS, mujoco.mjtWarning.mjWARN_BADQVEL,
 class MujocoWorlds:
     """`n` worlds of one model; see `sim.physics.physics.Physics`.
 
-    given: what the model was compiled from · substeps: of physics in one action
-    datas: mjData of every world · bodies: their models, where these differ
+    given: the source that the model was compiled from
+    substeps: physics steps per action
+    datas: mjData of every world
+    bodies: models of the worlds, if these differ
     """
 
     def __init__(
@@ -49,12 +51,12 @@ class MujocoWorlds:
 
     @property
     def state(self) -> list[mujoco.MjData]:
-        """Data of all worlds as they are now; not a copy."""
+        """mjData of all worlds; not a copy."""
         return self.datas
 
-    def begin(self, world: int, drawn: Mapping[str, Drawn]) -> None:
+    def start_episode(self, world: int, drawn: Mapping[str, Drawn]) -> None:
         data, model = self.datas[world], self.bodies.models[world]
-        self.bodies.begin(world, drawn)
+        self.bodies.start_episode(world, drawn)
         mujoco.mj_resetData(model, data)
         self.bodies.place(data, drawn)
 
@@ -67,8 +69,8 @@ class MujocoWorlds:
             self.bodies.separate()
             self.datas = [mujoco.MjData(model) for model in self.bodies.models]
             return True
-        # What eyes are made for: as the first `reset` leaves it, which may paint or light what stands still. If worlds
-        # share the model, it is theirs: what is changed of it outside, is changed for all of them.
+        # Renderers are built for the model as the first `reset` leaves it, which may change colours or lights of static
+        # objects. If worlds share one model, `self.model` is that model, so that later changes apply to all of them.
         if not self.bodies.varied:
             self.model = copy.copy(self.bodies.models[0]) if self.bodies.own else self.bodies.models[0]
         return False
@@ -86,34 +88,34 @@ class MujocoWorlds:
         return {world: words for world in moving if (words := _broken(self.datas[world])) is not None}
 
     def require_places(self, world: int) -> None:
-        """Reset a world whose bodies are nowhere: rendering it would end all worlds."""
+        """Reset a world whose poses are not finite, since rendering it would end all worlds."""
         data = self.datas[world]
         if not _has_place(data):
             mujoco.mj_resetData(data.model, data)
             mujoco.mj_forward(data.model, data)
 
     def poses(self) -> Poses:
-        return Poses.of(self.datas)
+        return Poses.from_data(self.datas)
 
-    def held(self) -> dict[str, np.ndarray]:
+    def get_state(self) -> dict[str, np.ndarray]:
         if self.model.opt.enableflags & mujoco.mjtEnableBit.mjENBL_SLEEP:
-            raise RuntimeError("get_state: the model has <flag sleep>, and who sleeps is in no state: must be disabled")
+            raise RuntimeError("get_state: the model has <flag sleep>, which no state contains: must be disabled")
         physics = np.empty((self.n, mujoco.mj_stateSize(self.model, _ALL)))
         for row, data in zip(physics, self.datas, strict=True):
             mujoco.mj_getState(self.model, data, row, _ALL)
-        held = [np.frombuffer(self.bodies.held(i), np.uint8) for i in range(self.n) if self.bodies.own]
+        held = [np.frombuffer(self.bodies.get_state(i), np.uint8) for i in range(self.n) if self.bodies.own]
         return {"physics": physics, **({MODELS: np.stack(held)} if held else {})}
 
-    def hold(self, state: Mapping[str, np.ndarray], worlds: np.ndarray) -> None:
+    def set_state(self, state: Mapping[str, np.ndarray], worlds: np.ndarray) -> None:
         for i in worlds:
             if MODELS in state:
                 self.bodies.own = True
-                self.bodies.hold(i, np.asarray(state[MODELS][i], np.uint8).tobytes())
+                self.bodies.set_state(i, np.asarray(state[MODELS][i], np.uint8).tobytes())
             data, model, row = self.datas[i], self.bodies.models[i], np.ascontiguousarray(state["physics"][i])
             mujoco.mj_resetData(model, data)
             mujoco.mj_setState(model, data, row, _ALL)
             mujoco.mj_forward(model, data)
-            mujoco.mj_setState(model, data, row, _ALL)  # the solver's warm start, which mj_forward has moved
+            mujoco.mj_setState(model, data, row, _ALL)  # restores the solver's warm start, which mj_forward has changed
 
     def close(self) -> None:
         if self._pool:
@@ -126,22 +128,23 @@ class MujocoWorlds:
 
 
 def _broken(data: mujoco.MjData) -> str | None:
-    """How its physics broke down, if it did. MuJoCo has begun it anew by then, unless its model forbids that."""
+    """Return the reason why a world's physics broke down, or None. By then MuJoCo has reset it, unless the model
+    disables that."""
     warned = data.warning.number
     if warned.any() and any(warned[int(kind)] for kind in _UNSTABLE):
         return (
             "physics is unstable: positions, speeds or accelerations are huge or not finite; a shorter timestep or "
             "the integrator implicitfast may help"
         )
-    if warned[int(mujoco.mjtWarning.mjWARN_BADCTRL)]:  # MuJoCo has taken all controls of the world for 0
-        return "controls are huge or not finite: what `act` writes must be numbers, of 1e10 at most"
+    if warned[int(mujoco.mjtWarning.mjWARN_BADCTRL)]:  # MuJoCo has set all controls of the world to 0
+        return "controls are huge or not finite: `act` must write numbers of at most 1e10"
     if not _has_place(data):
-        return "physics is unstable: places of bodies are not finite; what `act` writes must be"
+        return "physics is unstable: positions of bodies are not finite; `act` must write finite numbers"
     return None
 
 
 def _has_place(data: mujoco.MjData) -> bool:
-    """Whether everything that is seen is somewhere."""
-    # NaN and infinity survive any sum, and one test of a sum costs less than one of every term.
+    """Return whether all visible poses are finite."""
+    # NaN and infinity propagate through sums, and testing one sum is cheaper than testing every term.
     total = np.add.reduce
     return math.isfinite(total(data.xpos, None) + total(data.xmat, None) + total(data.geom_xpos, None))

@@ -1,4 +1,4 @@
-"""What moves the worlds of a batch: the protocol that tasks, environments and renderers rely on."""
+"""Protocol of the physics of a batch of worlds, on which tasks, environments and renderers rely."""
 
 from __future__ import annotations
 
@@ -15,11 +15,13 @@ __all__ = ["Physics"]
 
 
 class Physics(Protocol):
-    """All worlds of a batch: where everything is, and how it moves on.
+    """All worlds of a batch, with their motion and their poses.
 
-    model: that renderers are built of · n: number of worlds · seconds: that one action lasts
-    chance: random streams of the worlds, set by whoever seeds them
-    varied: names of geoms whose size, colour or material differs between worlds, and of their materials
+    model: model for which renderers are built
+    n: number of worlds
+    seconds: duration of one action
+    chance: random streams of the worlds, set when they are seeded
+    varied: names of geoms whose size, colour or material differs between worlds, with the materials that they may have
     """
 
     model: mujoco.MjModel
@@ -30,42 +32,42 @@ class Physics(Protocol):
 
     @property
     def state(self) -> Any:
-        """All worlds as they are now, in this physics' own type."""
+        """Current state of all worlds, in this physics' own type."""
 
-    def begin(self, world: int, drawn: Mapping[str, Drawn]) -> None:
-        """Reset one world before its task starts an episode; drawn: values of what varies between episodes."""
+    def start_episode(self, world: int, drawn: Mapping[str, Drawn]) -> None:
+        """Reset one world before its task starts an episode; drawn: values of the varied quantities."""
 
     def settle(self, worlds: np.ndarray) -> None:
-        """Compute where everything is after the task has started episodes in these worlds."""
+        """Compute the poses after the task has started episodes in these worlds."""
 
     def adopt_changed_model(self) -> bool:
-        """Whether the first episode's start changed the model; each world then gets a model of its own."""
+        """Return whether the first episode's start changed the model; each world then gets its own model."""
 
     def watch(self) -> None:
-        """Remember what a task must not change during a step."""
+        """Store the settings that a task must not change during a step."""
 
     def check(self, whose: str) -> None:
-        """Compare with what `watch` remembered.
+        """Compare the settings with those stored by `watch`.
 
         Raises:
             RuntimeError: the task changed the model that all worlds share.
         """
 
     def step(self, skipped: Collection[int]) -> dict[int, str]:
-        """Move all worlds on by one action, except skipped ones; returns why worlds broke down, by world."""
+        """Advance all worlds by one action, except skipped ones; return reasons of failures, by world."""
 
     def poses(self) -> Poses:
-        """Where everything is now."""
+        """Return the current poses."""
 
-    def held(self) -> dict[str, np.ndarray]:
-        """All that the future depends on, as arrays whose first axis is the world.
+    def get_state(self) -> dict[str, np.ndarray]:
+        """Return everything that the future depends on, as arrays whose first axis is the world.
 
         Raises:
             RuntimeError: the model has features whose state MuJoCo does not report.
         """
 
-    def hold(self, state: Mapping[str, np.ndarray], worlds: np.ndarray) -> None:
-        """Inverse of `held`, for these worlds."""
+    def set_state(self, state: Mapping[str, np.ndarray], worlds: np.ndarray) -> None:
+        """Restore what `get_state` returned, for these worlds."""
 
     def close(self) -> None:
-        """Stop threads."""
+        """Stop all threads."""

@@ -1,4 +1,4 @@
-"""Agents that slide over a floor among walls, and objects that are moved by their task: the built-in worlds."""
+"""Physics of the built-in worlds: agents that slide over a floor among walls, and objects that their task moves."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from sim.physics.agent_motion import AgentPhysics, Agents, Motion
-from sim.physics.varied_looks import varied_looks
+from sim.physics.varied_appearances import varied_appearances
 from sim.scene.moved_bodies import MovedBodies, ReferencePose
 from sim.scene.poses import Poses
 from sim.scene.variation import Drawn, Variation
@@ -25,8 +25,9 @@ UNSTABLE = "unstable physics"
 class SlidingAgents:
     """`n` worlds of one layout. Each has an agent on two slide joints, and objects that collide with nothing.
 
-    world: layout, model and places to start from
-    before, state: all worlds before and after the last action · motion: of the agents during that action
+    world: layout, model and starting positions
+    before, state: all worlds before and after the last action
+    motion: motion of the agents during that action
     chance: random streams of the worlds
     """
 
@@ -34,8 +35,8 @@ class SlidingAgents:
         self.world, self.n, self.model = world, n, world.model
         self.agents = AgentPhysics(world, threads)
         self.seconds = self.agents.seconds
-        self._looks = None if variation is None else varied_looks(world.model, n, variation)
-        self.varied: Mapping[str, tuple[str, ...]] = {} if self._looks is None else self._looks.varied
+        self._appearances = None if variation is None else varied_appearances(world.model, n, variation)
+        self.varied: Mapping[str, tuple[str, ...]] = {} if self._appearances is None else self._appearances.varied
         self._heights = np.array([world.model.body(name).pos[2] for name in world.objects])
         bodies = [int(world.model.body(name).id) for name in ("agent", *world.objects)]
         self._reference = ReferencePose(world.model, bodies)
@@ -50,7 +51,7 @@ class SlidingAgents:
 
     @property
     def state(self) -> WorldState:
-        """All worlds as they are now.
+        """Current state of all worlds.
 
         Raises:
             RuntimeError: before the first reset.
@@ -63,16 +64,18 @@ class SlidingAgents:
     def state(self, state: WorldState | None) -> None:
         self._state = state
 
-    def begin(self, world: int, drawn: Mapping[str, Drawn]) -> None:
-        if self._looks is not None:
-            self._looks.begin(world, drawn)
+    def start_episode(self, world: int, drawn: Mapping[str, Drawn]) -> None:
+        if self._appearances is not None:
+            self._appearances.start_episode(world, drawn)
 
     def place(
         self, worlds: np.ndarray, agents: np.ndarray, headings: np.ndarray, objects: np.ndarray, courses: np.ndarray
     ) -> None:
-        """Start episodes.
+        """Start episodes with these positions.
 
-        agents: (world, 2) [m] · headings: (world,) [rad] · objects: (world, k, 2) [m]
+        agents: (world, 2) [m]
+        headings: (world,) [rad]
+        objects: (world, k, 2) [m]
         courses: headings of the objects, (world, k) [rad]
         """
         n, k = len(worlds), len(self.world.objects)
@@ -93,19 +96,19 @@ class SlidingAgents:
         self._state = fresh if n == self.n else others.put(worlds, fresh)
 
     def steer(self, actions: np.ndarray) -> None:
-        """Command forward speed and change of heading, (n, 2) in [-1, 1], for the next step."""
+        """Set the commands of forward speed and change of heading, (n, 2) in [-1, 1], for the next step."""
         self._command = actions
 
     def move_objects(self, objects: np.ndarray, courses: np.ndarray) -> None:
-        """Where the objects are after the next step, (n, k, 3) [m], and their headings (n, k) [rad]."""
+        """Set the positions of the objects after the next step, (n, k, 3) [m], and their headings (n, k) [rad]."""
         self._moved = objects, courses
 
     def put_objects(self, objects: np.ndarray) -> None:
-        """Put objects elsewhere after an action, (n, k, 3) [m]."""
+        """Move objects to new positions after an action, (n, k, 3) [m]."""
         self._state = replace(self.state, objects=objects)
 
     def count(self, goals: np.ndarray, adversaries: np.ndarray) -> None:
-        """Add to the numbers of goals and adversaries that each agent has reached, (n,) each."""
+        """Increase the numbers of goals and adversaries that each agent has reached, (n,) each."""
         state = self.state
         self._state = replace(
             state,
@@ -114,16 +117,16 @@ class SlidingAgents:
         )
 
     def settle(self, worlds: np.ndarray) -> None:
-        """Nothing is left to compute."""
+        """Do nothing, since no poses remain to be computed."""
 
     def adopt_changed_model(self) -> bool:
         return False
 
     def watch(self) -> None:
-        """Nothing can be changed."""
+        """Do nothing, since a task cannot change the model."""
 
     def check(self, whose: str) -> None:
-        """Nothing can be changed."""
+        """Do nothing, since a task cannot change the model."""
 
     def step(self, skipped: Collection[int]) -> dict[int, str]:
         self.before = before = self.state
@@ -153,12 +156,13 @@ class SlidingAgents:
         rotations, (cos, sin) = self._turns.copy(), (np.cos(state.heading), np.sin(state.heading))
         rotations[:, 0, 0, 0] = rotations[:, 0, 1, 1] = cos
         rotations[:, 0, 1, 0], rotations[:, 0, 0, 1] = sin, -sin
-        return MovedBodies(self._reference, positions, rotations, None if self._looks is None else self._looks.models)
+        models = None if self._appearances is None else self._appearances.models
+        return MovedBodies(self._reference, positions, rotations, models)
 
-    def held(self) -> dict[str, np.ndarray]:
+    def get_state(self) -> dict[str, np.ndarray]:
         return {name: array.copy() for name, array in vars(self.state).items()}
 
-    def hold(self, state: Mapping[str, np.ndarray], worlds: np.ndarray) -> None:
+    def set_state(self, state: Mapping[str, np.ndarray], worlds: np.ndarray) -> None:
         names = vars(self.state)
         self._state = self.state.put(worlds, WorldState(**{name: np.asarray(state[name])[worlds] for name in names}))
 
@@ -167,7 +171,7 @@ class SlidingAgents:
 
 
 def _steered(heading: np.ndarray, actions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Headings [rad] (n,) after turning, and commanded velocities [m/s] (n, 2)."""
+    """Return headings [rad] (n,) after turning, and commanded velocities [m/s] (n, 2)."""
     speed, turn = actions.astype(np.float64).T
     heading = wrap_angle(heading + MAX_TURN * turn)
     speed = MAX_SPEED * (speed + 1.0) / 2.0

@@ -1,8 +1,8 @@
-"""The rays of a picture as one frozen Dr.Jit kernel, and the direct light that they find.
+"""The rays of an image as one frozen Dr.Jit kernel, and the direct light along them.
 
-A ray is given by a whole number: 8 times its pixel, plus which of the pixel's samples it is. Every light is asked for
-once per ray, whereas Mitsuba's `direct` draws one of them at random: lights that shine from a point or in one direction
-then make no noise. Skies and glowing geoms do, but the fixed samples of a pixel keep theirs in place.
+A ray is specified by a whole number: 8 times its pixel, plus the number of its sample within the pixel. Every light is
+sampled once per ray, whereas Mitsuba's `direct` draws one of them at random. Points and directional lights therefore
+cause no noise. Skies and glowing geoms do, but the fixed samples of a pixel make this noise the same in every frame.
 """
 
 from __future__ import annotations
@@ -22,10 +22,11 @@ from sim.scene.device_arrays import aligned, floats, whole_numbers
 from sim.scene.frozen_kernels import garbage_kept
 from sim.scene.variant import MitsubaObject, variant
 
-# Four wavelengths are one mi.Spectrum. Of all sets of them, 5 nm apart and at least 25 nm from each other, these come
-# closest to `sim.scene.color.preview` at the eight of the slow picture, over colours and white in daylight.
+# Four wavelengths fill one mi.Spectrum. All sets on a grid of 5 nm with distances of at least 25 nm were compared.
+# This set comes closest to `sim.scene.color.preview` at the eight wavelengths of the slow image, over colours and white
+# in daylight.
 WAVELENGTHS_NM = (450.0, 525.0, 590.0, 630.0)
-SRGB = np.array(  # linear sRGB per radiance at these, (3, wavelength); fitted such that daylight is white
+SRGB = np.array(  # linear sRGB per radiance at these wavelengths, (3, wavelength); fitted so that daylight is white
     [
         [0.01277, -0.38566, 0.82772, 0.79327],
         [-0.05517, 0.81225, 0.31464, -0.09293],
@@ -33,23 +34,23 @@ SRGB = np.array(  # linear sRGB per radiance at these, (3, wavelength); fitted s
     ]
 )
 
-# A pixel's samples, from its middle [pixels]: the middle first, and no two in one column or row of fifths.
+# A pixel's samples, relative to its middle [pixels]: first the middle, and no two in one column or row of fifths.
 SAMPLES = np.array([[0, 0], [0.2, 0.4], [0.4, -0.2], [-0.2, -0.4], [-0.4, 0.2]])
-CODES = 8  # per pixel
-NESTED = 64  # bodies in each other that a camera may be inside of
-# Rays of a packet go through neighbouring pixels, and on towards one sun: Embree walks its tree once for all of them.
+CODES = 8  # codes per pixel
+NESTED = 64  # largest number of nested bodies that a camera may be inside of
+# Rays of a packet go through neighbouring pixels, and then towards one sun. Embree traverses its tree once for them.
 COHERENT = True
-WANTED = int(mi.RayFlags.UV) | int(mi.RayFlags.ShadingFrame)  # no texture of a mirror asks for derivatives
-_VIEW = 5  # rows of four of a view: position, columns of the rotation, (half, near, width, height)
+WANTED = int(mi.RayFlags.UV) | int(mi.RayFlags.ShadingFrame)  # no texture of a mirror needs derivatives
+_VIEW = 5  # rows of four floats of a view: position, columns of the rotation, (half, near, width, height)
 
 
 @dataclass(frozen=True)
 class RayLight:
-    """What rays found.
+    """Light along rays, and the planes that they hit.
 
     linear: sRGB, not clipped, (3, ray)
-    plane: 1 / depth [1/m] = plane @ (across, above, 1) of the plane that touches what was met, for all rays of the
-        picture (`plane_coordinates`); 0 where nothing was met, (3, ray)
+    plane: 1 / depth [1/m] = plane @ (across, above, 1) of the tangent plane at the hit point, for all rays of the image
+        (`plane_coordinates`); 0 without a hit, (3, ray)
     """
 
     linear: np.ndarray
@@ -58,10 +59,11 @@ class RayLight:
 
 @dataclass(frozen=True)
 class CameraInputs:
-    """Inputs of kernels that are the same for every picture of a mirror.
+    """Inputs of kernels that are the same for every image of a mirror.
 
-    samples: of a pixel, in twos [pixels] · weights: of the suns, in fours · closed: of each shape, whether a
-    camera within looks out of it · bsdfs: unused; BSDFs among the inputs make the recording collect their textures
+    samples: of a pixel, in twos [pixels] · weights: of the suns, in fours
+    closed: for each shape, whether a camera inside looks out of it
+    bsdfs: unused; BSDFs among the inputs make the recording collect their textures
     """
 
     samples: Array
@@ -71,7 +73,7 @@ class CameraInputs:
 
 
 class CameraRays:
-    """Traces rays of cameras through one mirror, in the pose that the mirror has when it is asked."""
+    """A tracer of camera rays through one mirror, in the mirror's current pose."""
 
     def __init__(self, mirror: MergedMirror) -> None:
         self.mirror = mirror
@@ -95,7 +97,7 @@ class CameraRays:
             self._inside: Any = dr.freeze(lambda *args: self._trace(True, *args))
 
     def trace(self, view: Viewpoint, size: tuple[int, int], codes: np.ndarray) -> RayLight:
-        """Light along rays of a picture of size (height, width)."""
+        """Return the light along rays of an image of size (height, width)."""
         traced = self._inside if self.mirror.surrounds(view.position) else self._outside
         suns = {k: self.mirror.towards(name, view) for k, name in self._suns.items()}
         with variant(self.mirror.variant), garbage_kept():
@@ -108,7 +110,7 @@ class CameraRays:
 
     @property
     def recordings(self) -> int:
-        """How often the kernels were recorded."""
+        """Number of times that the kernels were recorded."""
         return int(self._outside.n_recordings + self._inside.n_recordings)
 
     def _trace(
@@ -139,7 +141,7 @@ class CameraRays:
                 drawn = mi.Point2f(mi.sample_tea_float32(codes, 2 * k), mi.sample_tea_float32(codes, 2 * k + 1))
                 sample, weight = light.sample_direction(si, drawn, valid)
                 towards, reaches, shadow = sample.d, valid & (sample.pdf != 0), si.spawn_ray_to(sample.p)
-            # New arrays: Dr.Jit's `&=` would change what both names stand for.
+            # New arrays, because Dr.Jit's `&=` would change the array of both names.
             if reflected is not None:
                 value = reflected * dr.abs(dr.dot(si.sh_frame.n, towards))
                 reaches = reaches & (dr.dot(si.n, towards) * seen_from > 0)
@@ -152,7 +154,7 @@ class CameraRays:
 
 
 def _looked_out_of(scene: MitsubaObject, si: Array, ray: Array, closed: Array) -> Array:
-    """What rays meet that go through the inner sides of closed shapes."""
+    """Return the first hits of rays that pass through the inner sides of closed shapes."""
 
     def leaving(si: Array, ray: Array, turn: Array) -> Array:
         out = si.is_valid() & (dr.dot(si.n, ray.d) > 0) & (turn < NESTED)
@@ -160,10 +162,10 @@ def _looked_out_of(scene: MitsubaObject, si: Array, ray: Array, closed: Array) -
         return out & (dr.gather(mi.UInt32, closed, shape, out) == 1)
 
     def further(si: Array, ray: Array, turn: Array) -> tuple[Array, ...]:
-        # As `sim.scene.rays` has it: along the ray alone.
+        # As in `sim.scene.rays`, the step is along the ray only.
         step = si.t * (1 + 1e-5) + 4e-6 * (1 + dr.max(dr.abs(ray.o)))
-        onwards = mi.Ray3f(ray(step), ray.d)
-        return scene.ray_intersect(onwards, WANTED, COHERENT), onwards, turn + 1
+        next_ray = mi.Ray3f(ray(step), ray.d)
+        return scene.ray_intersect(next_ray, WANTED, COHERENT), next_ray, turn + 1
 
     return dr.while_loop((si, ray, mi.UInt32(0)), leaving, further, label="inner sides")[0]
 
@@ -181,7 +183,7 @@ def _ray(codes: Array, pose: Array, samples: Array) -> tuple[Array, _Axes]:
     half, near, width, height = more
     pixel = codes // CODES
     offset = dr.gather(mi.Point2f, samples, codes - pixel * CODES)
-    # In floats: whole numbers divided by 0 in a packet's idle lanes end the process.
+    # In floats, because a division of whole numbers by 0 in a packet's idle lanes would end the process.
     row = dr.floor((mi.Float(pixel) + 0.5) / width)
     x, y = mi.Float(pixel) - row * width + 0.5 + offset.x, row + 0.5 + offset.y
     rightwards, upwards, ahead = (mi.Vector3f(*list(axis)[:3]) for axis in (right, up, -back))
@@ -192,7 +194,7 @@ def _ray(codes: Array, pose: Array, samples: Array) -> tuple[Array, _Axes]:
 
 
 def plane_coordinates(fovy_deg: float, size: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
-    """How far the rays through pixels' middles go to the right (x,) and up (y,) per unit of depth."""
+    """Return the slopes of the rays through pixels' middles: to the right (x,) and up (y,) per unit of depth."""
     height, width = size
     half = np.tan(np.radians(fovy_deg) / 2)
     across = (2 * (np.arange(width) + 0.5) - width) / height * half
@@ -202,7 +204,7 @@ def plane_coordinates(fovy_deg: float, size: tuple[int, int]) -> tuple[np.ndarra
 def _pose(
     view: Viewpoint, size: tuple[int, int], near: float, suns: Mapping[int, np.ndarray], n_lights: int
 ) -> np.ndarray:
-    """All that changes from frame to frame, in fours."""
+    """Return everything that changes between frames, in fours."""
     rows = aligned(4 * (_VIEW + n_lights), np.float32).reshape(-1, 4)
     rows[0, :3], rows[1:4, :3] = view.position, view.rotation.T
     rows[4] = np.tan(np.radians(view.fovy_deg) / 2), near, size[1], size[0]
@@ -212,13 +214,13 @@ def _pose(
 
 
 def _closed(mirror: MergedMirror) -> np.ndarray:
-    """By the shapes' ids: whether a camera within looks out of it."""
+    """Return by the shapes' ids whether a camera inside a shape looks out of it."""
     names = mirror.shape_names
     return np.array([names.get(i, "") in mirror.closed for i in range(max(names) + 1)], np.uint32)
 
 
 def _is_delta(light: MitsubaObject) -> bool:
-    """Whether it shines from a point or in one direction."""
+    """Return whether a light shines from a point or in one direction."""
     return bool(int(light.flags()) & (int(mi.EmitterFlags.DeltaPosition) | int(mi.EmitterFlags.DeltaDirection)))
 
 
@@ -227,7 +229,7 @@ def _is_sun(light: MitsubaObject) -> bool:
 
 
 def _sun_weight(light: MitsubaObject) -> np.ndarray:
-    """Irradiance on a surface that faces it, (wavelength,)."""
+    """Return the irradiance on a surface that faces a sun, (wavelength,)."""
     si: Array = dr.zeros(mi.SurfaceInteraction3f)
     si.wavelengths = mi.Spectrum(*WAVELENGTHS_NM)
     _, weight = light.sample_direction(si, mi.Point2f(0.5))
@@ -235,6 +237,6 @@ def _sun_weight(light: MitsubaObject) -> np.ndarray:
 
 
 def _is_matt(bsdf: MitsubaObject) -> bool:
-    """Whether it is a Lambertian reflector, on one side or both."""
+    """Return whether a BSDF is a Lambertian reflector, on one side or both."""
     sides = int(mi.BSDFFlags.FrontSide) | int(mi.BSDFFlags.BackSide) | int(mi.BSDFFlags.SpatiallyVarying)
     return int(bsdf.flags()) & ~sides == int(mi.BSDFFlags.DiffuseReflection)

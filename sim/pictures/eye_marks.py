@@ -1,4 +1,4 @@
-"""Eyes on pictures of a model: a dot for each, and the rims of its field of view, for people to see where they look."""
+"""Marks of eyes on images of a model: a dot for each eye, and the borders of its field of view."""
 
 from __future__ import annotations
 
@@ -6,22 +6,22 @@ import numpy as np
 
 from sim.scene.cameras import Viewpoint
 
-# One colour per eye, then again (Okabe and Ito 2008: told apart by the colour-blind, too).
+# One colour per eye, repeated (Okabe and Ito 2008: distinguishable for colour-blind readers, too).
 COLORS = np.array(
     [[0, 158, 115], [230, 159, 0], [86, 180, 233], [204, 121, 167], [240, 228, 66], [0, 114, 178], [213, 94, 0]]
 )
-NEAREST = 1e-6  # of the scene's extent: what lies nearer to the camera's plane is not drawn
-RIM, IRIS, PUPIL = 1.2, 3.5, 1.8  # radii [pixels of a picture 360 high]
+NEAREST = 1e-6  # share of `reach`: points closer to the camera's plane are not drawn
+RIM, IRIS, PUPIL = 1.2, 3.5, 1.8  # width of borders and radii of dots [pixels of an image that is 360 pixels high]
 OPACITY = 0.8
 
 
 def with_eyes(
     picture: np.ndarray, view: Viewpoint, eyes: tuple[np.ndarray, np.ndarray], fov_deg: float, reach: float
 ) -> np.ndarray:
-    """A picture (y, x, 3) uint8 of a model, with its eyes.
+    """Return an image (y, x, 3) uint8 of a model with marks of its eyes.
 
     eyes: pupils [m] (eye, 3) and frames (eye, 3, 3), columns (right, up, ahead)
-    fov_deg: their horizontal field of view · reach: how far its rims are drawn [m]
+    fov_deg: horizontal field of view of the eyes · reach: length of the borders that are drawn [m]
     """
     shown, half = picture.astype(np.float64), np.radians(fov_deg) / 2
     scale = picture.shape[0] / 360
@@ -42,7 +42,7 @@ def with_eyes(
 
 
 def _pixel(point: np.ndarray, view: Viewpoint, size: tuple[int, int], reach: float) -> np.ndarray | None:
-    """(x, y) in a picture; None for what is behind the camera."""
+    """Return a point's (x, y) in an image; None behind the camera."""
     right, up, back = (point - view.position) @ view.rotation
     if -back < NEAREST * reach:
         return None
@@ -51,7 +51,7 @@ def _pixel(point: np.ndarray, view: Viewpoint, size: tuple[int, int], reach: flo
 
 
 def _off(start: np.ndarray, end: np.ndarray, size: tuple[int, int]) -> np.ndarray:
-    """How far pixels' middles are off a line [pixels], (y, x)."""
+    """Return the distance of pixels' middles from a line [pixels], (y, x)."""
     y, x = np.indices(size) + 0.5
     along = end - start
     length = float(along @ along)
@@ -61,6 +61,6 @@ def _off(start: np.ndarray, end: np.ndarray, size: tuple[int, int]) -> np.ndarra
 
 
 def _paint(shown: np.ndarray, off: np.ndarray, radius: float, color: np.ndarray) -> None:
-    """In place, with smooth edges."""
+    """Paint in place, with smooth edges."""
     opacity = OPACITY * np.clip(radius + 0.5 - off, 0, 1)[..., None]
     shown += opacity * (color - shown)

@@ -1,7 +1,7 @@
-"""A mirror of fewer shapes: what never moves is one mesh per material.
+"""A mirror of fewer shapes: all static geoms of one material are one mesh.
 
-Every shape costs time in every launch of a kernel, and every geom in every `sync`. Which geom is seen can no longer be
-told.
+Every shape costs time in every launch of a kernel, and every geom in every `sync`. Static geoms cannot be identified in
+the image.
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ from sim.scene.variant import variant as in_variant
 
 
 class MergedMirror(Mirror):
-    """A Mitsuba scene that mirrors all of a model; shapes that move are "geom_<geom id>_<part>", others "still_<n>".
+    """A Mitsuba scene that mirrors all of a model; moving shapes are "geom_<geom id>_<part>", others "still_<n>".
 
-    closed: names of the shapes that a camera within them looks out of
+    closed: names of the shapes from which a camera inside looks out
     """
 
     def __init__(self, model: mujoco.MjModel, spectra: Mapping[str, Spectrum | str] | None = None) -> None:
@@ -42,23 +42,23 @@ class MergedMirror(Mirror):
 
     @property
     def shape_names(self) -> Mapping[int, str]:
-        """Of the scene's shapes, by the ids that Dr.Jit gave them."""
+        """Names of the scene's shapes, by their ids in Dr.Jit."""
         return self._names
 
     @property
     def near(self) -> float:
-        """How far from a camera anything is seen [m], along its axis."""
+        """Smallest distance from a camera, along its axis, at which surfaces are visible [m]."""
         return self._near()
 
     def face(self, view: Viewpoint) -> None:
-        """Turn the camera's headlight, if there is one, to where the camera looks."""
+        """Turn the headlight, if there is one, into the camera's direction."""
         if any(emitter.name == lights.HEADLIGHT for emitter in self._emitters):
             with in_variant(self.variant):
                 self._move_light(lights.HEADLIGHT, lights.aimed(view.position, -view.rotation[:, 2]))
                 self._params.update()
 
     def towards(self, name: str, view: Viewpoint) -> np.ndarray:
-        """Unit vector (3,) towards a light that shines in one direction; the headlight shines as the camera looks."""
+        """Return the unit vector (3,) towards a directional light; the headlight shines along the camera's axis."""
         if name == lights.HEADLIGHT:
             return view.rotation[:, 2]
         (light,) = (emitter.light for emitter in self._emitters if emitter.name == name)
@@ -66,7 +66,7 @@ class MergedMirror(Mirror):
         return np.asarray(direction / np.linalg.norm(direction))
 
     def surrounds(self, point: np.ndarray) -> bool:
-        """Whether a point may be inside of a geom: whether it is inside of one's bounding sphere or box."""
+        """Return whether a point may be inside a geom: whether it is inside a geom's bounding box."""
         sizes, bounded = self.model.geom_rbound[self.geoms], self.model.geom_rbound[self.geoms] > 0
         offset = point - self._places.geom_xpos[self.geoms]
         local = np.einsum("gij,gi->gj", self._places.geom_xmat[self.geoms].reshape(-1, 3, 3), offset)

@@ -1,8 +1,8 @@
-"""Pictures with smooth edges, from few rays.
+"""Images with smooth edges, from few rays.
 
-First a fifth of the pixels is looked at, through their middles (`Lattice`). What lies between two that look the same
-looks like them; between others, all pixels are looked at. Where these differ from their neighbours, four more rays per
-pixel smooth the edge.
+First a fifth of the pixels is traced, through their middles (`Lattice`). A pixel between two pixels of the same colour
+gets this colour. Between other pixels, all pixels are traced. If one differs from its neighbours, four more rays smooth
+the edge.
 """
 
 from __future__ import annotations
@@ -24,17 +24,17 @@ from sim.scene.color import encode_srgb
 from sim.scene.mirror import MirrorWarning
 from sim.scene.rays import check_size
 
-# Of 255. Steps between neighbours up to EDGE are not seen to be jagged; what differs by up to SAME is the same.
+# Of 255. Steps of up to EDGE between neighbours do not look jagged; pixels that differ by up to SAME count as equal.
 EDGE, SAME = 8, 1
-LEVELS = 1 << 14  # of linear light in the table of sRGB values: finer than the steps of 8 bits where it is dark
+LEVELS = 1 << 14  # levels of linear light in the table of sRGB values: finer than 8 bits in dark colours
 _DISPLAYED = np.rint(255 * encode_srgb(np.arange(LEVELS) / (LEVELS - 1))).astype(np.uint8)
 
 
 @dataclass(frozen=True)
-class Look:
+class QuickImage:
     """picture: sRGB, (y, x, 3) uint8
-    planes: that rays' ends lie in, see `RayLight`, (3, ray)
-    ray: which of them shows what a pixel's middle does, (pixel,)
+    planes: that rays hit, see `RayLight`, (3, ray)
+    ray: number of the ray for each pixel's middle, (pixel,)
     fovy_deg: of the camera
     """
 
@@ -43,8 +43,8 @@ class Look:
     ray: np.ndarray
     fovy_deg: float
 
-    def nearness(self, pixels: np.ndarray) -> np.ndarray:
-        """1 / depth along the camera's axis through the middles of pixels, counted row by row [1/m], 0 for none."""
+    def inverse_distance(self, pixels: np.ndarray) -> np.ndarray:
+        """Return 1 / depth along the camera's axis at the middles of pixels, counted row by row [1/m]; 0: no hit."""
         across, above = plane_coordinates(self.fovy_deg, self.picture.shape[:2])
         y, x = np.divmod(pixels, self.picture.shape[1])
         ray = self.ray.take(pixels)
@@ -53,9 +53,9 @@ class Look:
 
 
 class QuickCamera:
-    """Looks at any MuJoCo model as its mirror shows it in direct light (`sim.mirror`), without OpenGL.
+    """A camera for any MuJoCo model, without OpenGL: images of its mirror in direct light (`sim.mirror`).
 
-    model, spectra: as `sim.mirror` has them
+    model, spectra: see `sim.mirror`
 
     Warns (`sim.MirrorWarning`) of transparent geoms, which are dark and opaque here.
     """
@@ -65,27 +65,27 @@ class QuickCamera:
         self._rays = CameraRays(self.mirror)
         if glass := [int(g) for g in self.mirror.geoms if surfaces.rgba(model, int(g))[3] < 1]:
             listed = inventory.listed_geoms(model, glass)
-            warnings.warn(f"quick pictures do not show what is behind the transparent {listed}", MirrorWarning, 2)
+            warnings.warn(f"quick images do not show what is behind the transparent {listed}", MirrorWarning, 2)
         self._lattices: dict[tuple[int, int], Lattice] = {}
 
     def picture(self, data: mujoco.MjData, camera: str | int | Viewpoint, width: int, height: int) -> np.ndarray:
-        """sRGB picture (height, width, 3) uint8 of where data has everything.
+        """Return an sRGB image (height, width, 3) uint8 of the poses in data.
 
         camera: name or id of a camera of the model, or a Viewpoint
 
         Raises:
-            ValueError: an unknown camera, less than one pixel, and what `Mirror.sync` refuses.
+            ValueError: an unknown camera, less than one pixel, or data that `Mirror.sync` refuses.
         """
-        return self.look(data, camera, width, height).picture
+        return self.render(data, camera, width, height).picture
 
-    def look(self, data: mujoco.MjData, camera: str | int | Viewpoint, width: int, height: int) -> Look:
-        """The same, and how near everything is."""
+    def render(self, data: mujoco.MjData, camera: str | int | Viewpoint, width: int, height: int) -> QuickImage:
+        """Return the same image, with inverse distances."""
         check_size(width, height, 1)
         self.mirror.sync(data)
         view, size = self.mirror.viewpoint(camera), (height, width)
         self.mirror.face(view)
         if size not in self._lattices:
-            self._lattices[size] = Lattice.of(size)
+            self._lattices[size] = Lattice.for_size(size)
         lattice = self._lattices[size]
         look, linear = self._middles(view, lattice)
         edges = np.flatnonzero(_on_edges(look.picture))
@@ -96,8 +96,8 @@ class QuickCamera:
             look.picture.reshape(-1, 3)[edges] = _displayed(mean).T
         return look
 
-    def _middles(self, view: Viewpoint, lattice: Lattice) -> tuple[Look, np.ndarray]:
-        """What the middles of all pixels show, and linear sRGB along the rays that were traced, (3, ray)."""
+    def _middles(self, view: Viewpoint, lattice: Lattice) -> tuple[QuickImage, np.ndarray]:
+        """Return an image of all pixels' middles, and linear sRGB along the traced rays, (3, ray)."""
         found = self._rays.trace(view, lattice.size, CODES * lattice.pixels)
         linear, planes, ray, shown = found.linear, found.plane, lattice.nearest, _displayed(found.linear)
         picture = shown.T.copy().take(ray, axis=0)
@@ -109,7 +109,7 @@ class QuickCamera:
             ray = ray.copy()
             ray[between] = planes.shape[1] + np.arange(len(between))
             planes, linear = np.concatenate([planes, more.plane], axis=1), np.concatenate([linear, more.linear], axis=1)
-        return Look(picture.reshape(*lattice.size, 3), planes, ray, view.fovy_deg), linear
+        return QuickImage(picture.reshape(*lattice.size, 3), planes, ray, view.fovy_deg), linear
 
 
 def _displayed(linear: np.ndarray) -> np.ndarray:
@@ -119,7 +119,7 @@ def _displayed(linear: np.ndarray) -> np.ndarray:
 
 
 def _on_edges(picture: np.ndarray) -> np.ndarray:
-    """Pixels unlike a neighbour beside, above or below, (y, x)."""
+    """Return pixels that differ from a horizontal or vertical neighbour, (y, x)."""
     across, along = _step(picture[:, 1:], picture[:, :-1]), _step(picture[1:], picture[:-1])
     found = np.zeros(picture.shape[:2], bool)
     found[:, 1:] |= across
@@ -130,6 +130,6 @@ def _on_edges(picture: np.ndarray) -> np.ndarray:
 
 
 def _step(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Where pixels (y, x, 3) uint8 differ by more than EDGE."""
+    """Return which pixels (y, x, 3) uint8 differ by more than EDGE."""
     seen = np.maximum(a, b) - np.minimum(a, b) > EDGE
     return np.asarray(seen[..., 0] | seen[..., 1] | seen[..., 2])

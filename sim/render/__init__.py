@@ -1,29 +1,29 @@
-"""What all eyes of all worlds see. Begin with one_ray: the others do the same, faster.
+"""Rendering of all eyes in all worlds. Start with one_ray: the other renderers do the same, faster.
 
 one_ray             see: one world, one ray for each receptor
 eye_renderer        EyeRenderer: all eyes of all worlds of any scene as one wavefront
 prepared_scene      PreparedScene: a model and its eyes, built once for choosing a fidelity and for rendering
-ray_kernel          the kernel: lanes, rays, light, depth layers, sums
-area_kernel         the same where areas are seen
-eye_rays            rays that leave upright eyes, and eyes that may be anywhere
-edge_rays           many rays at edges, few elsewhere
-light_factors       what the light of each world is multiplied by
+ray_kernel          kernel of rays: lanes, rays, light, depth layers, sums
+area_kernel         kernel of area sampling
+eye_rays            rays of upright eyes, and of eyes that may be anywhere
+edge_rays           adaptive edge sampling: many rays at edges, few in other places
+light_factors       factors of the light of each world
 labels              Labels: depth, ids and optic flow
 optic_flow          motion on the retina
 batched_renderer    BatchedRenderer: eyes of the agents in a built-in world
-world_scene         WorldScene: such a world, prepared
+world_scene         WorldScene: a built-in world, prepared
 model_renderer      ModelRenderer: eyes mounted on any MuJoCo model
-renderable          which fidelities an eye can have
-reference_renderer  ReferenceRenderer: Mitsuba's integrators, slowly
-fidelity            Fidelity: how finely, and why
-fidelity_choice     cheapest: as little work as noise allows, of what a scene offers
-world_fidelity      choose_fidelity: what a built-in world offers
-fidelity_stages     its bands, depth layers and light
-sample_choice       its rays or areas
-fidelity_trials     how their errors are found
-random_views        the views that they are tried at
-model_fidelity      choose_model_fidelity: what any other model offers, tried at given moments
-memory_budget       whether there is memory for it
+renderable          check of a fidelity against an eye
+reference_renderer  ReferenceRenderer: Mitsuba's integrators, slow
+fidelity            Fidelity: samples, bands, depth layers and light, and the reasons for them
+fidelity_choice     cheapest: the cheapest fidelity that receptor noise allows
+world_fidelity      choose_fidelity: fidelity of a built-in world
+fidelity_stages     choice of its bands, depth layers and light
+sample_choice       choice of its rays or areas
+fidelity_trials     trials that measure the errors of these choices
+random_views        random views for the trials
+model_fidelity      choose_model_fidelity: fidelity of any other model, tried at given moments
+memory_budget       check of the memory that rendering needs
 receptor_noise      noise for all worlds at once
-pending_frame       frames that are begun early and waited for late
+pending_frame       frames that are launched early and read late
 """

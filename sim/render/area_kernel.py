@@ -1,4 +1,4 @@
-"""The kernel that sees by areas: what areas of one world or of one column share is found first, once."""
+"""The kernel of area sampling. Results that the areas of a world or of a column share are computed once, beforehand."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from sim.render.ray_kernel import Frame, KernelInputs, RayKernel
 from sim.scene.device_arrays import counted, floats, whole_numbers
 from sim.tracing.areas.area_tracer import AreaTracer
 from sim.tracing.areas.borders import Borders
-from sim.tracing.areas.illumination import Moment
+from sim.tracing.areas.illumination import FrameState
 from sim.tracing.areas.patch import Area
 
 
 @dataclass(frozen=True)
 class BorderInputs:
-    """Level ways along the borders that areas share. lanes: of all borders of all eyes · sizes: borders and eyes ·
-    sides: number of each area's left and right border."""
+    """Level directions to the borders that areas share. lanes: of all borders of all eyes · sizes: numbers of borders
+    and of eyes · sides: numbers of each area's left and right border."""
 
     lanes: Array
     sizes: Array
@@ -33,8 +33,8 @@ class BorderInputs:
 
 @dataclass(frozen=True)
 class AreaInputs(KernelInputs):
-    """extent: width and height of areas on the tangent plane · borders: None: areas share none
-    places: lanes of the places of all worlds' bodies; None: light that they reflect is not followed
+    """extent: width and height of areas on the tangent plane · borders: None: areas share no borders
+    places: lanes of the places of all worlds' bodies; None: light that bodies reflect is not followed
     """
 
     extent: Array | None = None
@@ -43,19 +43,19 @@ class AreaInputs(KernelInputs):
 
 
 class AreaKernel(RayKernel):
-    """Sees areas.
+    """A kernel for the light in areas.
 
-    areas: the tracer · eyes: upright ones
+    areas: tracer · eyes: upright eyes
     """
 
     def __init__(self, areas: AreaTracer, eyes: EyeRays, sensor: Sensor, n_envs: int, n_eyes: int) -> None:
         super().__init__(areas.rays, eyes, n_envs, n_eyes, sensor.depth)
         assert sensor.extent is not None
         self._areas, self._extent = areas, sensor.extent
-        self._borders = Borders.of(sensor.directions[:, 0], sensor.extent[0])
+        self._borders = Borders.from_middles(sensor.directions[:, 0], sensor.extent[0])
 
     def inputs(self, ways: np.ndarray, bounces: np.ndarray | None = None) -> AreaInputs:
-        """See RayKernel; ways go to the middles of areas."""
+        """See RayKernel; ways: directions to the middles of areas."""
         whole, places = super().inputs(ways), self._areas.places
         return AreaInputs(
             whole.lanes,
@@ -78,44 +78,44 @@ class AreaKernel(RayKernel):
         )
 
     def layers(self, scenes: Any, frame: Frame, inputs: AreaInputs) -> list[Array]:  # type: ignore[override]
-        """Components of the mean light in each lane's area, for each depth layer."""
+        """Return the components of the mean light in each lane's area, for each depth layer."""
         lit = self._lit(frame, inputs)
         lane = self.lane(inputs)
         seen = self.eyes.ray(frame.eyes, inputs.along, lane, dr.gather(mi.UInt32, inputs.sizes, 0))
         width, height = (dr.gather(mi.Float, inputs.extent, i) for i in range(2))
-        area = Area.of(seen.ray, seen.axis.xy, (width, height))
+        area = Area.from_extent(seen.ray, seen.axis.xy, (width, height))
         borders = inputs.borders
         met = self._areas.met_by(area, inputs.tables) if borders is None else self._met_at(frame, inputs, borders, lane)
         bodies = self._areas.bodies(frame.things, lane.world, seen.body)
-        return self._areas.radiance(area, met, Moment(bodies, inputs.tables, lane.world, lit), self.depth)
+        return self._areas.radiance(area, met, FrameState(bodies, inputs.tables, lane.world, lit), self.depth)
 
     def _lit(self, frame: Frame, inputs: AreaInputs) -> list[Array]:
-        """What share of each light reaches which place of each world's bodies, flat (world, place)."""
+        """Return the share of each light that reaches each place of each world's bodies, flat (world, place)."""
         if inputs.places is None:
             return []
         world = inputs.places // self._areas.places
         nothing = mi.UInt32(0)
         at = self.eyes.ray(frame.eyes, inputs.along, Lane(world, nothing, nothing, nothing), nothing)
         bodies = self._areas.bodies(frame.things, world, at.body)
-        lit = self._areas.lit(inputs.places - world * self._areas.places, bodies, inputs.tables)
+        lit = self._areas.body_light(inputs.places - world * self._areas.places, bodies, inputs.tables)
         dr.eval(lit)
         return lit
 
     def _met_at(self, frame: Frame, inputs: AreaInputs, borders: BorderInputs, lane: Lane) -> tuple[Array, Array]:
-        """Faces at the left and right border of a lane's area."""
+        """Return the faces at the left and right border of a lane's area."""
         faces = self._faces(frame, inputs, borders)
         n, eyes = (dr.gather(mi.UInt32, borders.sizes, i) for i in range(2))
         first, sides = (lane.world * eyes + lane.eye) * n, dr.gather(mi.Vector2u, borders.sides, lane.sample)
         return dr.gather(mi.UInt32, faces, first + sides.x), dr.gather(mi.UInt32, faces, first + sides.y)
 
     def _faces(self, frame: Frame, inputs: AreaInputs, borders: BorderInputs) -> Array:
-        """Which face is met at each border of each eye, flat (world, eye, border)."""
-        # Lanes that only fill up a packet read 0, and to divide by that ends the process.
+        """Return the face that is hit at each border of each eye, flat (world, eye, border)."""
+        # Lanes that only fill up a packet read 0, and a division by 0 would end the process.
         n, eyes = (dr.maximum(dr.gather(mi.UInt32, borders.sizes, i), 1) for i in range(2))
         row = borders.lanes // n
         world = row // eyes
         lane = Lane(world, row - world * eyes, borders.lanes - row * n, row)
         ray = self.eyes.ray(frame.eyes, borders.along, lane, n).ray
-        faces = self._areas.met(ray.o, ray.d.xy, inputs.tables)
+        faces = self._areas.first_faces(ray.o, ray.d.xy, inputs.tables)
         dr.eval(faces)
         return faces

@@ -1,4 +1,4 @@
-"""All eyes of all agents in a built-in world, as one wavefront."""
+"""Rendering of all eyes of all agents in a built-in world, as one wavefront."""
 
 from __future__ import annotations
 
@@ -18,21 +18,21 @@ from sim.worlds.world import World
 
 
 class BatchedRenderer(EyeRenderer):
-    """Sees `n_envs` worlds with the same eyes.
+    """A renderer of `n_envs` worlds with the same eyes.
 
     world: geometry, materials and lights; shared by all worlds
     eyes: of every agent
     n_envs: number of worlds in a state
-    fidelity: how finely, with its own number of bands: `Fidelity(4, bands=4)` traces 4 rays for each receptor; None:
-        `choose_fidelity(world, eyes, bands="own")`, as finely as the receptors' noise asks for. The one in use is in
-        `.fidelity`
-    tracer: "closed_form" (worlds of upright walls, a floor and spheres), "mitsuba" (any shapes), or "auto"; the one in
-        use is in `.tracer.name`, why in `.tracer.why`
-    brightest: signal of a white surface that faced all lights at once
+    fidelity: samples and bands: `Fidelity(4, bands=4)` traces 4 rays for each receptor in 4 bands; None:
+        `choose_fidelity(world, eyes, bands="own")`, the cheapest that the receptors' noise allows. The fidelity in use
+        is in `.fidelity`
+    tracer: "closed_form" (worlds of upright walls, a floor and spheres), "mitsuba" (any shapes), or "auto"; the tracer
+        in use is in `.tracer.name`, and the reason for its choice in `.tracer.why`
+    brightest: signal of a white surface that faces all lights at once
 
     Raises:
-        ValueError: less than one world, more rays than there is memory for, a fidelity that the world cannot have, and
-            a world that has no closed form where that is asked for.
+        ValueError: less than one world, more rays than fit into memory, a fidelity that the world does not support, or
+            a requested closed form that the world does not have.
     """
 
     def __init__(
@@ -44,11 +44,11 @@ class BatchedRenderer(EyeRenderer):
         self._open(scene, n_envs, fidelity or chosen_fidelity(scene))
 
     @classmethod
-    def of(cls, scene: WorldScene, n_envs: int, fidelity: Fidelity) -> BatchedRenderer:
-        """The renderer of a scene that has been prepared.
+    def from_scene(cls, scene: WorldScene, n_envs: int, fidelity: Fidelity) -> BatchedRenderer:
+        """Return the renderer of a prepared scene.
 
         Raises:
-            ValueError: as the constructor, and a fidelity for another number of bands than the scene's.
+            ValueError: as in the constructor, or a fidelity for another number of bands than the scene's.
         """
         renderer = cls.__new__(cls)
         renderer._open(scene, n_envs, fidelity)
@@ -65,7 +65,10 @@ class BatchedRenderer(EyeRenderer):
 
 
 def in_whole_rays(fidelity: Fidelity, eye: optics.Eye) -> Fidelity:
-    """With as many samples as each receptor has of its own; behind a pupil they share rays, and may share areas."""
+    """Return the fidelity with a whole number of samples per receptor, unless receptors share their samples.
+
+    Behind a pupil, receptors share rays, and areas if there are fewer areas than receptors.
+    """
     asked = fidelity.rays_per_receptor
     if eye.pupil is None or (fidelity.samples == AREAS and asked >= 1):
         return replace(fidelity, rays_per_receptor=float(max(1, round(asked))))

@@ -1,10 +1,10 @@
-"""Many rays where a receptor sees an edge, few elsewhere: perfect lenses on models of one's own.
+"""Adaptive edge sampling: many rays for receptors that see an edge, few for others. For perfect lenses on user models.
 
-Four rays through a receptor's square tell whether all of it looks alike (Whitted 1980 asks a pixel's corners); where
-they differ, all rays are traced. An edge may pass between them and cut off a corner, a quarter of the square at most.
-Whatever is beyond it fills a neighbour, so receptors that are very unlike a neighbour get all rays, too. For that, the
-first rays also look at squares beyond the rim of the field. Missed is what is smaller than the gaps between four rays
-and fills no neighbour.
+Four rays through a receptor's square show whether the square is uniform (Whitted 1980 compares a pixel's corners). If
+they differ, all rays are traced. An edge may pass between the four rays and cut off a corner, at most a quarter of the
+square. The surface beyond such an edge fills a neighbour, so receptors that differ strongly from a neighbour get all
+rays, too. For this comparison, the first rays include squares beyond the rim of the field. An object is missed if it is
+smaller than the gaps between the four rays and fills no neighbour.
 """
 
 from __future__ import annotations
@@ -23,17 +23,17 @@ from sim.render.ray_kernel import Frame, KernelInputs, RayKernel
 from sim.scene.device_arrays import as_whole_numbers
 from sim.scene.frozen_kernels import FrozenKernel
 
-Launch = Callable[[Any, KernelInputs], Callable[[], np.ndarray]]  # starts a frozen kernel; that waits for it
-FIRST = 4  # rays through every receptor's square
+Launch = Callable[[Any, KernelInputs], Callable[[], np.ndarray]]  # starts a frozen kernel; the result waits for it
+FIRST = 4  # first rays, through every receptor's square
 
 
 class EdgeRays:
-    """What `RayKernel.sums` finds with so many rays, from fewer.
+    """The sums of `RayKernel.sums` over many rays per receptor, estimated from fewer rays.
 
     kernel: follows the rays
     sampling: of the receptors · rays: per receptor, at edges
-    signals: what a component is worth to each type of receptor, (channel, component)
-    noticed: rays whose signals differ by no more are alike
+    signals: contribution of a component to the signal of each type of receptor, (channel, component)
+    noticed: largest difference between the signals of rays that count as equal
     """
 
     def __init__(
@@ -48,15 +48,17 @@ class EdgeRays:
         self._first, self._along = kernel.inputs(first), kernel.inputs(fine.directions)
 
     def launch(self, launch: Launch) -> Callable[[], np.ndarray]:
-        """Start to look; what is returned waits for it: sums over FIRST rays, flat (component, world, eye, receptor),
-        as if so many were traced everywhere. launch: starts a frozen kernel in worlds that stay as they are until
-        then."""
+        """Start rendering, and return a function that waits for the sums, flat (component, world, eye, receptor).
+
+        All sums are scaled to FIRST rays. launch: starts a frozen kernel; the worlds must not change before the sums
+        are read
+        """
         found = launch(self._coarse, self._first)
         return lambda: self._refined(found(), launch)
 
     @property
     def recordings(self) -> int:
-        """How often the kernels were recorded."""
+        """Number of times that the kernels were recorded."""
         return self._coarse.n_recordings + self._fine.n_recordings
 
     def _refined(self, found: np.ndarray, launch: Launch) -> np.ndarray:
@@ -71,8 +73,10 @@ class EdgeRays:
         return light.ravel()
 
     def _beside_edges(self, light: np.ndarray) -> np.ndarray:
-        """Receptors so unlike a neighbour that an edge may run between the first rays of either, flat; light:
-        (component, view, receptor or beyond)."""
+        """Return the receptors, flat, that differ strongly from a neighbour: an edge may run between their first rays.
+
+        light: (component, view, receptor or square beyond the rim)
+        """
         means = np.tensordot(np.array(self._signals), light, 1) / FIRST
         field = np.empty((*means.shape[:2], *self._beyond.shape), means.dtype)
         field[..., ~self._beyond], field[..., self._beyond] = np.split(means, [np.count_nonzero(~self._beyond)], axis=2)
@@ -86,10 +90,10 @@ class EdgeRays:
         return found[:, 1:-1, 1:-1].ravel()
 
     def _look_once(self, scenes: Any, frame: Frame, inputs: KernelInputs) -> tuple[Array, ...]:
-        """Sums over each receptor's rays, per component, and how far apart their signals are."""
+        """Return the sums over each receptor's rays, per component, and the spread of the rays' signals."""
         components = self._kernel.layers(scenes, frame, inputs)
         signals = [sum(w * c for w, c in zip(worth, components, strict=True)) for worth in self._signals]
-        dr.eval(components, signals)  # once, as sums of neighbours would trace all rays again for every component
+        dr.eval(components, signals)  # otherwise the sums of each component would trace all rays again
         spread = mi.Float(0)
         for signal in signals:
             highest, lowest = (dr.block_reduce(op, signal, FIRST) for op in (dr.ReduceOp.Max, dr.ReduceOp.Min))
@@ -97,14 +101,14 @@ class EdgeRays:
         return *_sums(components, FIRST), spread
 
     def _look_again(self, scenes: Any, frame: Frame, inputs: KernelInputs) -> tuple[Array, ...]:
-        """Sums over the rays of the receptors that are looked at again, per component."""
+        """Return the sums over the rays of the receptors that are rendered again, per component."""
         components = self._kernel.layers(scenes, frame, inputs)
         dr.eval(components)
         return _sums(components, self._rays)
 
 
 def _shifted(y: int, x: int) -> tuple[slice, slice]:
-    """All but the last rows and columns; from the other end where a shift is negative."""
+    """Return slices of all but the last rows and columns, or of all but the first for a negative shift."""
     return slice(max(-y, 0), -y if y > 0 else None), slice(max(-x, 0), -x if x > 0 else None)
 
 
@@ -113,6 +117,8 @@ def _sums(components: list[Array], rays: int) -> tuple[Array, ...]:
 
 
 def edges_pay(resolution: tuple[int, int], rays: float) -> bool:
-    """Whether the first rays, those beyond the rim among them, are half as many as so many everywhere, or fewer: more
-    save nothing, where a few receptors want all."""
+    """Return whether the first rays, including those beyond the rim, are at most half of all rays.
+
+    With more first rays, nothing is saved if a few receptors need all rays.
+    """
     return 2 * FIRST * beyond_rim_of(resolution).size <= rays * resolution[0] * resolution[1]

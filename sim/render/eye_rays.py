@@ -1,6 +1,6 @@
-"""Two ways to place rays: from eyes that stand upright on one body, and from eyes that may be anywhere.
+"""Two ways to generate rays: from eyes that stand upright on one body, and from eyes that may be anywhere.
 
-Upright eyes take four floats of each world, free ones sixteen for each eye.
+Upright eyes read four floats per world, free eyes sixteen floats per eye.
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ from sim.scene.poses import Poses
 from sim.tracing.eye_places import EyePlaces, LevelStand
 from sim.tracing.eye_ray import EyeRay
 
-EYE_ROWS = 4  # of four floats: the pupil, right, up and ahead
+EYE_ROWS = 4  # rows of four floats: the pupil, right, up and ahead
 
 
 @dataclass(frozen=True)
 class Lane:
-    """What one lane of a kernel is: a sample of an eye in a world · row: of the eye among all eyes of all worlds."""
+    """One lane of a kernel: a sample of an eye in a world. row: number of the eye among all eyes of all worlds."""
 
     world: Array
     eye: Array
@@ -33,8 +33,8 @@ class Lane:
 
 @dataclass(frozen=True)
 class Directions:
-    """ways: of all samples, in fours, in the eyes' frames or, of upright eyes, in their body's, with cosines
-    origins: of upright eyes' pupils in their body's frame, in fours, and their axes; None: of free eyes
+    """ways: directions of all samples, in fours, in the eyes' frames; of upright eyes in their body's, with cosines
+    origins, axes: pupils of upright eyes in their body's frame, and their axes, in fours; None for free eyes
     """
 
     ways: Array
@@ -46,16 +46,16 @@ class EyeRays(Protocol):
     """Eyes of a number of worlds, and the rays that leave them."""
 
     def fill(self, poses: Poses) -> None:
-        """Put the eyes of these worlds where the kernel reads them."""
+        """Write the eyes of these worlds to the kernel's buffer."""
 
     def array(self) -> Array:
-        """What the kernel reads."""
+        """Return the array that the kernel reads."""
 
     def directions(self, ways: np.ndarray) -> Directions:
-        """Of samples (ray, 3) in an eye's frame."""
+        """Return the directions of samples (ray, 3), given in an eye's frame."""
 
     def ray(self, rows: Array, along: Directions, lane: Lane, samples: Array) -> EyeRay:
-        """A lane's, in the kernel; samples: of an eye."""
+        """Return the ray of a lane, inside the kernel; samples: number of samples of an eye."""
 
 
 class UprightEyes:

@@ -1,7 +1,6 @@
-"""All eyes of all worlds as one wavefront: one frozen kernel, whichever tracer a scene has.
+"""Rendering of all eyes in all worlds as one wavefront: one frozen kernel, with any tracer.
 
-Directions and wavelengths are fixed, so a call does nothing but upload poses and launch the kernel that the first call
-recorded.
+Directions and wavelengths are fixed, so a call only uploads poses and launches the kernel that the first call recorded.
 """
 
 from __future__ import annotations
@@ -15,6 +14,7 @@ import numpy as np
 
 import optics
 from optics.numerics.arguments import whole
+from optics.numerics.renamed import renamed
 from optics.spectra.spectrum import Spectrum
 from sim.eyes.allowed_error import allowed_error
 from sim.eyes.sampling import BoxSampling
@@ -40,17 +40,19 @@ MOST_ENVS = 2**31 - 1
 
 
 class EyeRenderer:
-    """Sees `n_envs` worlds of one scene with the same eyes.
+    """A renderer of `n_envs` worlds of one scene with the same eyes.
 
-    scene: the model and its eyes · n_envs: number of worlds · fidelity: how finely, in the scene's own bands
+    scene: the model and its eyes · n_envs: number of worlds · fidelity: samples, depth layers and light; its bands are
+        the scene's
     eye, mounts, model: of the scene
-    sensor: what is looked along · tracer: the way in which rays are traced: its name, why, light and basis
-    brightest: signal of a white surface that faced all directional lights at once
+    sensor: the sampled directions · tracer: the method of tracing rays, with its name, why, light and basis
+    brightest: signal of a white surface that faces all directional lights at once
 
-    Warns (`sim.MirrorWarning`) once of what eyes do not see of the model, and of lamps with lines in too few bands.
+    Warns (`sim.MirrorWarning`) once of features of the model that are not rendered, and of lamps with spectral lines
+    in too few bands.
 
     Raises:
-        ValueError: less than one world, more rays than there is memory for, and a fidelity that the scene cannot have.
+        ValueError: less than one world, more rays than fit into memory, or a fidelity that the scene does not support.
     """
 
     def __init__(self, scene: PreparedScene, n_envs: int, fidelity: Fidelity) -> None:
@@ -58,7 +60,7 @@ class EyeRenderer:
         self.scene, self.eye, self.model, self.mounts = scene, scene.eye, scene.model, scene.mounts
         self.fidelity, sampling = fidelity, scene.sampling(fidelity.depth, fidelity.tolerance)
         self.tracer: Tracer | AreaTracer
-        self.tracer = (scene.areas if fidelity.samples == AREAS else scene.tracers.of)(fidelity.light)
+        self.tracer = (scene.areas if fidelity.samples == AREAS else scene.tracers.tracer_for)(fidelity.light)
         self._check_memory(n_envs, fidelity.rays_per_receptor)
         scene.tell(fidelity.light)
         asked = fidelity.rays_per_receptor
@@ -77,7 +79,7 @@ class EyeRenderer:
         self._set_width(n_envs)
 
     def resized(self, n_envs: int) -> Self:
-        """The same eyes and scene for another number of worlds; the scene is shared, not loaded again."""
+        """Return a renderer of another number of worlds with the same eyes; the scene is shared, not loaded again."""
         other = copy.copy(self)
         other._check_memory(n_envs, other._samples_per_receptor)
         for of_width in ("_few", "labels"):
@@ -87,7 +89,7 @@ class EyeRenderer:
 
     @property
     def _samples_per_receptor(self) -> float:
-        """Behind a pupil with areas around the receptors', too."""
+        """Number of samples per receptor; behind a pupil it includes areas around the receptors' own."""
         return len(self.sensor.directions) / float(np.prod(self.eye.resolution))
 
     def _check_memory(self, n_envs: int, samples_per_receptor: float) -> None:
@@ -118,43 +120,47 @@ class EyeRenderer:
         signals = self._mixing @ self.tracer.basis.T
         return EdgeRays(kernel, self._sampling, self.fidelity.rays_per_receptor, signals, noticed)
 
-    # --- what is seen
+    # --- signals and labels
 
     def signals(self, poses: Placed, light: np.ndarray | None = None) -> np.ndarray:
-        """Noise-free photoreceptor signals, (env, eye, channel, height, width) float32:
+        """Return noise-free photoreceptor signals, (env, eye, channel, height, width) float32:
         a² sum_b weights[channel, b] radiance_b.
 
-        poses: of every world, after mj_forward or mj_step: its data, or arrays stacked over worlds; the data of an only
-            world need not be in a list; of built-in worlds their state, too
-        light: what all lights of each world are multiplied by, (env, band); None: nothing
+        poses: of every world, after mj_forward or mj_step: its data, or arrays stacked over worlds; the data of a
+            single world need not be in a list; for built-in worlds, the state is also accepted
+        light: factors of all lights of each world, (env, band); None: lights as in the model
 
         Raises:
-            ValueError: another number of worlds, another model's poses, poses that are not finite or not known yet,
-                what differs from the model and is not in `varied`, or light of another shape.
+            ValueError: another number of worlds, another model's poses, poses that are not finite or not computed yet,
+                a difference from the model that is not in `varied`, or light of another shape.
         """
-        return self.begin(poses, light).wait()
+        return self.launch(poses, light).wait()
 
-    def begin(self, poses: Placed, light: np.ndarray | None = None) -> PendingFrame:
-        """Begin to see; it runs beside whatever comes next, until the signals are waited for."""
-        factors = None if light is None else LightFactors.of(light, (self.n_envs, self.eye.bands))
+    begin, begin_some = renamed("launch"), renamed("launch_some")
+
+    def launch(self, poses: Placed, light: np.ndarray | None = None) -> PendingFrame:
+        """Start rendering. It runs asynchronously until the signals are waited for."""
+        factors = None if light is None else LightFactors.from_light(light, (self.n_envs, self.eye.bands))
         return self._launched(poses).then(lambda found: self._signals(found, factors))
 
-    def begin_some(self, poses: Placed, worlds: np.ndarray, light: np.ndarray | None = None) -> PendingFrame:
-        """Begin to see these of the worlds alone, (len(worlds), eye, channel, height, width); if they are few, beside a
-        look at all that is under way."""
+    def launch_some(self, poses: Placed, worlds: np.ndarray, light: np.ndarray | None = None) -> PendingFrame:
+        """Start rendering only some of the worlds, (len(worlds), eye, channel, height, width).
+
+        A few worlds have their own buffers, so they can be rendered while a frame of all worlds is pending.
+        """
         if not len(worlds) <= FEW < self.n_envs:
-            return self.begin(poses, light).then(lambda seen: seen[worlds])
+            return self.launch(poses, light).then(lambda seen: seen[worlds])
         few = np.resize(worlds, FEW)
-        seen = self._few.begin(self.scene.placed(poses).take(few), None if light is None else np.asarray(light)[few])
+        seen = self._few.launch(self.scene.placed(poses).take(few), None if light is None else np.asarray(light)[few])
         return seen.then(lambda signals: signals[: len(worlds)])
 
     @cached_property
     def _few(self) -> Self:
-        """For a few of the worlds."""
+        """Renderer of a few of the worlds."""
         return self.resized(FEW)
 
     def receptor_radiance(self, poses: Placed) -> np.ndarray:
-        """Spectral radiance averaged over every receptor's field, (band, env, eye, height, width) float32."""
+        """Return spectral radiance averaged over every receptor's field, (band, env, eye, height, width) float32."""
         bands, (height, width) = self.eye.bands, self.eye.resolution
         layers = self._components(self._launched(poses).wait())
         sums = np.einsum("lkn,kb->lbn", layers, self.tracer.basis.astype(np.float32))
@@ -162,18 +168,18 @@ class EyeRenderer:
         return self.sensor.receptor_radiance(sums).reshape(bands, self.n_envs, len(self.mounts), height, width)
 
     def radiance(self, poses: Placed) -> np.ndarray:
-        """Spectral radiance along every ray, (env, eye, ray, band) float32."""
+        """Return the spectral radiance along every ray, (env, eye, ray, band) float32."""
         layers = self._components(self._launched(poses, self._rays).wait())
         rays = np.einsum("lkn,kb->nb", layers, self.tracer.basis.astype(np.float32))
         return rays.reshape(self.n_envs, len(self.mounts), -1, self.eye.bands)
 
     def eye_frames(self, poses: Placed) -> EyeFrames:
-        """Where the eyes are."""
+        """Return the eyes' frames in the world."""
         return self.scene.places.frames(self.scene.placed(poses))
 
     @cached_property
     def labels(self) -> Labels:
-        """What receptors look at, as exact numbers."""
+        """Depth, geom ids and optic flow at the receptors' centres, as exact numbers."""
         return Labels(self.scene, self.n_envs)
 
     def depth(self, poses: Placed) -> np.ndarray:
@@ -189,33 +195,33 @@ class EyeRenderer:
         return self.labels.flow(poses, later)
 
     def brightest_in(self, light: np.ndarray) -> float:
-        """`brightest` where all lights are multiplied by this, (band,)."""
+        """Return `brightest` with all lights multiplied by these factors, (band,)."""
         return float((self.eye.throughput * self.eye.spectral_bands.weights @ (self._white * light)).max())
 
     @property
     def bands(self) -> optics.SpectralBands:
-        """Of the eyes."""
+        """Spectral bands of the eyes."""
         return self.eye.spectral_bands
 
     @property
     def moving(self) -> int:
-        """How many geoms move."""
+        """Number of moving geoms."""
         return len(self.scene.scene.moving)
 
     @property
     def only_directional(self) -> bool:
-        """Whether there are no points, which light what is near more brightly, no sky, and nothing that glows."""
+        """True if all light is directional: no points or spots, whose light depends on distance, no sky, no glow."""
         scene = self.scene.scene
         return all(light.kind == "directional" for light in scene.lights.found) and not (scene.has_sky or scene.glows)
 
     @property
     def spectra(self) -> Mapping[str, Spectrum]:
-        """Measured ones of materials and lights, by name."""
+        """Measured spectra of materials and lights, by name."""
         return self.scene.scene.spectra
 
     @property
     def recordings(self) -> int:
-        """How often the kernels were recorded: once per kernel in use, up to three times where meshes move."""
+        """Number of times that kernels were recorded: once per kernel in use, up to three times if meshes move."""
         edges = 0 if self._edges is None else self._edges.recordings
         labels = vars(self).get("labels")
         recorded = self._rays.n_recordings + self._sums.n_recordings + edges
@@ -224,7 +230,7 @@ class EyeRenderer:
     # --- kernels
 
     def _launched(self, poses: Placed, frozen: Any = None) -> PendingFrame:
-        """Kernels at work on these worlds: receptors' sums, or another frozen one."""
+        """Launch the kernels for receptors' sums, or another frozen kernel, on these worlds."""
         placed = self.scene.placed(poses)
         self.scene.check_poses(placed, self.n_envs)
 
@@ -237,7 +243,7 @@ class EyeRenderer:
                 return self._edges.launch(start)
             return start(self._sums if frozen is None else frozen, self._inputs)
 
-        return self._slot.begin(launch)
+        return self._slot.launch(launch)
 
     def _signals(self, found: np.ndarray, factors: LightFactors | None) -> np.ndarray:
         sums, layers = self._receptor_sums, self._components(found)
@@ -256,14 +262,14 @@ class EyeRenderer:
 
     @cached_property
     def _has_components(self) -> bool:
-        """Whether light comes in others than the bands."""
+        """True if the components of light are not the bands."""
         return not np.array_equal(self.tracer.basis, np.eye(self.eye.bands))
 
     @cached_property
     def _sums_of_bands(self) -> Any:
-        """Signals from light in bands."""
+        """Function that returns signals from light in bands."""
         return self.sensor.receptor_sums(self._mixing, np.eye(self.eye.bands))
 
     def _components(self, found: np.ndarray) -> np.ndarray:
-        """(layer, component, all rays of all views, or their sums)"""
+        """Return a kernel's output as (layer, component, all rays of all views, or their sums)."""
         return found.reshape(self.sensor.depth.count, len(self.tracer.basis), -1)

@@ -1,4 +1,4 @@
-"""How finely a world is rendered for given eyes, and why so."""
+"""The fidelity with which a world is rendered for given eyes, and the reasons for it."""
 
 from __future__ import annotations
 
@@ -12,14 +12,17 @@ from sim.eyes.eyes import Eyes
 from sim.tracing.lighting import ALL, DIRECT, LEVELS
 
 RAYS, AREAS, EDGES = SAMPLES = ("rays", "areas", "edges")
-MOST_RAYS = 1e7  # per receptor: what is more was a slip, and its arithmetic overflows
+MOST_RAYS = 1e7  # per receptor; larger numbers are mistakes, and their arithmetic overflows
 MOST_BANDS = 4096
 
 
 @dataclass(frozen=True)
 class Level:
-    """What was chosen for one stage, and why. predicted_error: of a signal, root mean square (of the eyes' own bands a
-    bound: the worst measured reflectance and type of receptor, which may exceed any tolerance); None where unknown."""
+    """The level that was chosen for one stage, and the reason.
+
+    predicted_error: of a signal (root mean square); None if unknown. For the eyes' own bands it is a bound: the largest
+        error over measured reflectances and types of receptors, which may exceed any tolerance
+    """
 
     stage: str
     level: str
@@ -29,23 +32,25 @@ class Level:
 
 @dataclass(frozen=True)
 class Fidelity:
-    """How finely a world is rendered for given eyes; printed, it is a table.
+    """Accuracy with which a world is rendered for given eyes. Printing it gives a table.
 
-    rays_per_receptor: on average; behind a pupil it may be below 1, since receptors share rays and may share areas
-    bands: spectral bands, in the place of the eye's own
+    rays_per_receptor: average number of samples per receptor. Behind a pupil it may be below 1, since receptors share
+        rays and may share areas.
+    bands: number of spectral bands, used instead of the eye's own
     depth: distances for which the eye has a PSF
-    light: what of it is followed: "direct"; "bounce", which adds light that is reflected twice; or, with areas, "all"
-    samples: what eyes look along: "rays", or "areas", which cut each receptor's square into rays_per_receptor
-        rectangles and find the mean of each in closed form, behind a pupil of some around the receptors', too, and
-        below 1 of larger ones; upright worlds only; or "edges": a few rays per receptor, and rays_per_receptor where
-        these differ; models of one's own through perfect lenses only
-    tolerance: error allowed to a receptor's signal (root mean square); None where nothing was chosen. At edges, rays
-        whose signals are within it of each other do not differ
-    levels: what was chosen for each stage, and why
+    light: "direct"; "bounce", which adds light that was reflected twice; or, with areas only, "all" reflections
+    samples: "rays", "areas" or "edges". Areas divide each receptor's square into rays_per_receptor rectangles, and the
+        mean light in each is computed in closed form. Behind a pupil there are also rectangles around the receptors,
+        and receptors share larger ones if the number is below 1. Areas need an upright world. Edges are adaptive edge
+        sampling: a few rays per receptor, and rays_per_receptor where these differ. Edges need perfect lenses and
+        direct light. They serve user models and, on request, built-in worlds, for which "auto" never chooses them.
+    tolerance: error allowed to a receptor's signal (root mean square); None if nothing was chosen. In adaptive edge
+        sampling, rays whose signals agree within it count as equal.
+    levels: choice of each stage, with its reason
 
     Raises:
-        ValueError: bands, rays_per_receptor or a tolerance that are no numbers or out of range, unknown light or
-            samples, and rays that would follow all light.
+        ValueError: bands, rays_per_receptor or a tolerance that are not numbers or out of range, unknown light or
+            samples, or light = "all" without areas.
     """
 
     rays_per_receptor: float
@@ -67,25 +72,25 @@ class Fidelity:
         one_of("light", self.light, LEVELS)
         one_of("samples", self.samples, SAMPLES)
         if self.light == ALL and self.samples != AREAS:
-            raise ValueError("light = 'all': must go with samples = 'areas'; rays follow two reflections at most")
+            raise ValueError("light = 'all': must be used with samples = 'areas'; rays follow at most two reflections")
 
     @property
     def predicted_error(self) -> float | None:
-        """Of a receptor's signal, all stages together (root mean square); None where nothing was predicted."""
+        """Error of a receptor's signal by all stages together (root mean square); None if nothing was predicted."""
         known = [level.predicted_error for level in self.levels if level.predicted_error is not None]
         return math.hypot(*known) if known else None
 
     @property
     def why(self) -> str:
         """The reasons, one line per stage."""
-        return "\n".join(f"{level.stage}: {level.why}" for level in self.levels) or "as asked"
+        return "\n".join(f"{level.stage}: {level.why}" for level in self.levels) or "as requested"
 
     def __str__(self) -> str:
         levels = self.levels or (
-            Level("bands", f"{self.bands}", None, "as asked"),
-            Level("depth", f"{self.depth}", None, "as asked"),
-            Level("light", self.light, None, "as asked"),
-            Level(self.samples, f"{self.rays_per_receptor:g} per receptor", None, "as asked"),
+            Level("bands", f"{self.bands}", None, "as requested"),
+            Level("depth", f"{self.depth}", None, "as requested"),
+            Level("light", self.light, None, "as requested"),
+            Level(self.samples, f"{self.rays_per_receptor:g} per receptor", None, "as requested"),
         )
         rows = [("stage", "level", "error", "why")]
         for level in levels:
@@ -96,7 +101,7 @@ class Fidelity:
 
 
 def fidelity_asked(rays_per_receptor: float | str, eyes: Eyes) -> Fidelity | None:
-    """So many rays in direct light; None where that is left to be chosen, "auto".
+    """Return the fidelity with this number of rays in direct light, or None for "auto", which is chosen later.
 
     Raises:
         ValueError: neither a positive number nor "auto".

@@ -1,10 +1,8 @@
-"""As little work as the receptors' noise allows: how many bands, depth layers and samples a scene needs for given eyes,
-and how much of its light.
+"""Choice of the cheapest fidelity that receptor noise allows: bands, depth layers, light and samples.
 
-An error below half of the noise changes nothing that the brain can tell. Every stage has levels, cheapest first; the
-cheapest whose predicted error fits is taken, and what was chosen is on record with its reason. Which levels there are,
-and how their errors are found, differs between scenes (`world_fidelity`, `model_fidelity`); how they are chosen does
-not.
+A brain cannot distinguish an error below half of the noise. Every stage has levels, starting with the cheapest. The
+cheapest level whose predicted error is allowed is taken, and stored with the reason. The available levels and their
+errors depend on the kind of scene (`world_fidelity`, `model_fidelity`). The choice between them does not.
 """
 
 from __future__ import annotations
@@ -20,15 +18,15 @@ from sim.render.fidelity import Fidelity, Level
 
 
 class FidelityWarning(UserWarning):
-    """No level that is known keeps the error within what was allowed."""
+    """No available level keeps the error within the tolerance."""
 
 
 @dataclass(frozen=True)
 class Samples:
     """The choice of rays or areas.
 
-    kind: "rays", "areas" or "edges" · light, level: what was chosen, and why · number: for each receptor
-    enough: whether they err by no more than was allowed
+    kind: "rays", "areas" or "edges" · light, level: chosen levels of light and of samples · number: per receptor
+    enough: whether the error is at most the allowed one
     """
 
     kind: str
@@ -39,13 +37,13 @@ class Samples:
 
     @property
     def error(self) -> float:
-        """With the light that is left out."""
+        """Error by the samples and by the light that is left out."""
         return math.hypot(self.light.predicted_error or 0, self.level.predicted_error or 0)
 
 
 @dataclass(frozen=True)
 class Allowed:
-    """Error allowed to the samples (root mean square), and where no light is left out."""
+    """Allowed error of the samples (root mean square), and the same if no light is left out."""
 
     error: float
     without_light: float
@@ -53,7 +51,7 @@ class Allowed:
 
 @dataclass(frozen=True)
 class Shares:
-    """Parts of the tolerance that the stages before the samples may use up. Errors add up as squares, and samples may
+    """Shares of the tolerance that the stages before the samples may use. Errors add up as squares, and the samples may
     use the rest."""
 
     bands: float
@@ -61,7 +59,7 @@ class Shares:
     light: float
 
     def left(self, allowed: float, has_layers: bool, light: float) -> Allowed:
-        """Divide an allowed error: the rest for samples; light: error of the light that is left out."""
+        """Return the rest of an allowed error for the samples; light: error by the light that is left out."""
         spent = self.bands**2 + (self.depth**2 if has_layers else 0)
         for_light = min(light / allowed, self.light) ** 2
         return Allowed(allowed * math.sqrt(1 - (spent + for_light)), allowed * math.sqrt(1 - spent))
@@ -70,8 +68,8 @@ class Shares:
 class Stages(Protocol):
     """Levels of fidelity that a scene offers, and their errors.
 
-    eye: whose receptors' noise decides · allowed: error of a signal, all stages together (root mean square)
-    shares: of it; None: stages are judged one by one, and each may use all of it
+    eye: its receptors' noise decides · allowed: error of a signal by all stages together (root mean square)
+    shares: of the allowed error; None: each stage is judged separately and may use all of it
     """
 
     eye: optics.Eye
@@ -79,20 +77,23 @@ class Stages(Protocol):
     shares: Shares | None
 
     def bands(self) -> Level:
-        """The eye's own, and what they are worth."""
+        """Return the eye's own bands, and their error."""
 
     def depth(self, allowed: float) -> tuple[DepthLayers, Level | None]:
-        """Layers that the eye has a PSF for; no level where there is nothing to choose."""
+        """Return the layers for which the eye has a PSF, and their level, or None without a choice."""
 
     def light(self, depth: DepthLayers, allowed: float) -> Level:
-        """The light that is followed."""
+        """Return the light that is followed."""
 
     def samples(self, depth: DepthLayers, light: Level, allowed: Allowed) -> Samples:
-        """How many."""
+        """Return the number and kind of samples."""
 
 
 def cheapest(stages: Stages) -> Fidelity:
-    """The cheapest level of each stage whose predicted error is allowed; a FidelityWarning says where there is none."""
+    """Return the fidelity with the cheapest level of each stage whose predicted error is allowed.
+
+    If a stage lacks such a level, a FidelityWarning states by how much the allowed error is exceeded.
+    """
     allowed, shares = stages.allowed, stages.shares
     depth, depth_level = stages.depth(allowed * (shares.depth if shares else 1))
     light = stages.light(depth, allowed * (shares.light if shares else 1))
@@ -103,7 +104,7 @@ def cheapest(stages: Stages) -> Fidelity:
     levels = [level for level in (stages.bands(), depth_level, samples.light, samples.level) if level is not None]
     bands = stages.eye.bands
     found = Fidelity(samples.number, bands, depth, allowed, tuple(levels), samples.light.level, samples.kind)
-    # Of the bands' error only a bound is known, which may be far above it.
+    # Only a bound of the bands' error is known, which may be far above the error.
     _warn_if_worse(levels[1:], allowed, together=shares is not None)
     return found
 
@@ -114,8 +115,8 @@ def _warn_if_worse(levels: list[Level], allowed: float, together: bool) -> None:
     if worst > allowed * (1 + 1e-9):
         lead = max(levels, key=lambda level: level.predicted_error or 0)
         warnings.warn(
-            f"the best fidelity that pays errs by {worst:.1e} of a signal, {worst / allowed:.1f} times what is "
-            f"allowed, {allowed:.1e}: mostly {lead.stage}, {lead.level} ({lead.why})",
+            f"the best available fidelity has an error of {worst:.1e} of a signal, {worst / allowed:.1f} times the "
+            f"allowed {allowed:.1e}, mostly from {lead.stage}: {lead.level} ({lead.why})",
             FidelityWarning,
             stacklevel=4,
         )

@@ -1,4 +1,4 @@
-"""The stages of choosing how finely a world is rendered, each with its levels, cheapest first, and its reason."""
+"""Stages of the choice of a fidelity for a world, each with its levels, starting with the cheapest, and a reason."""
 
 from __future__ import annotations
 
@@ -16,46 +16,46 @@ from sim.scene.band_error import band_error, measured
 from sim.tracing.lighting import BOUNCE, DIRECT
 from sim.worlds.world import World
 
-# Chosen: times an error that a few random views have; what agents live through has another
-# (tests/sim/render/test_fidelity.py holds that against the noise).
+# Chosen: factor on an error in a few random views, because agents' episodes have another error
+# (tests/sim/render/test_fidelity.py compares that error with the noise).
 CAUTION = 1.2
 LAYERS = (1, 3, 5, 9)  # nodes of each are among those of the next
 NEAREST = 0.005  # chosen: quantile of the distances that counts as the nearest
 
 
 def bands(eye: optics.Eye, allowed: float) -> tuple[int, Level]:
-    """As few bands as `optics.Eye` wants for scenes of any colour."""
-    within = min(max(allowed / eye.throughput, 1e-6), 0.5)  # what an Eye takes as its tolerance
+    """Return the smallest number of bands that `optics.Eye` needs for scenes of any colour."""
+    within = min(max(allowed / eye.throughput, 1e-6), 0.5)  # the tolerances that an Eye accepts
     try:
         bands = int(replace(eye, bands="auto", tolerance=within).bands)
     except optics.AccuracyError as error:
         return eye.bands, Level("bands", f"{eye.bands}", None, f"the eyes' own: {error}")
-    return bands, Level("bands", f"{bands}", allowed, f"fewest with {allowed:.1e} for any colours up to white")
+    return bands, Level("bands", f"{bands}", allowed, f"fewest for {allowed:.1e} with any colours up to white")
 
 
 def own_bands(world: World, eye: optics.Eye) -> Level:
-    """What the eye's own bands make of the world's measured reflectances; of colours given as RGB nothing is known."""
+    """Return the eye's own bands, with their error for measured reflectances; for RGB colours the error is unknown."""
     if not (spectra := measured(world.model, world.spectra)):
         return Level("bands", f"{eye.bands}", None, "the eyes' own")
     error = float(eye.throughput) * band_error(spectra, eye.receptors, eye.bands)
-    return Level("bands", f"{eye.bands}", error, "the eyes' own; error: of measured reflectances in daylight")
+    return Level("bands", f"{eye.bands}", error, "the eyes' own; error for measured reflectances in daylight")
 
 
 def depth(trials: FidelityTrials, eye: optics.Eye, allowed: float) -> tuple[DepthLayers, Level]:
-    """One PSF for infinity where that is certainly enough, else as few layers as random views of the world want.
+    """Return one PSF for infinity if it is certainly enough, otherwise the fewest layers for random views of the world.
 
-    Light through the pupil's point p lands f p/z further off than from infinity. In the mean over a disk of radius R
-    that is |Δx| + |Δy| = 8/(3π) f R/z; a square receptor's field moves by as much of its width, and no scene up to
-    white makes more of it.
+    Light from the distance z through the pupil's point p is shifted by f p/z from light from infinity. Averaged over a
+    disk of radius R, this is |Δx| + |Δy| = 8/(3π) f R/z. A square receptor's field moves by this share of its width,
+    which bounds the error of any scene up to white.
     """
     if eye.pupil is None:
-        return ONE_PSF, Level("depth", str(ONE_PSF), 0.0, "a perfect lens blurs nothing")
+        return ONE_PSF, Level("depth", str(ONE_PSF), 0.0, "a perfect lens does not blur")
     distances = trials.distances()
     near, far = float(np.quantile(distances, NEAREST, method="higher")), float(distances[-1])
     shift = 8 / (3 * math.pi) * eye.sensor_distance * eye.pupil.radius / near / eye.receptor_pitch
     bound = eye.throughput * shift
     if bound <= allowed:
-        why = f"blur of {shift:.1e} of a receptor at {near:.2g} m, the nearest that is seen"
+        why = f"blur of {shift:.1e} of a receptor at {near:.2g} m, the nearest visible distance"
         return ONE_PSF, Level("depth", str(ONE_PSF), bound, why)
     try:
         errors = trials.errors_of_layers(DepthLayers(far, near, LAYERS[-1]), LAYERS)
@@ -68,13 +68,16 @@ def depth(trials: FidelityTrials, eye: optics.Eye, allowed: float) -> tuple[Dept
 
 
 def light(trials: FidelityTrials, sampling: EyeSampling, allowed: float) -> Level:
-    """Direct light where what is reflected twice is little; else both, and of all that is reflected more often only
-    its size is known: as small beside what is reflected twice as that is beside direct light."""
+    """Return direct light if light that is reflected twice adds little, otherwise both.
+
+    The error by light that is reflected more often is estimated: it is as small relative to the light that is reflected
+    twice as that is relative to direct light.
+    """
     try:
         twice, direct = trials.reflected_twice(sampling)
     except ValueError as error:
-        return Level("light", DIRECT, None, f"of what is reflected twice nothing is known: {error}")
+        return Level("light", DIRECT, None, f"the error by light that is reflected twice is unknown: {error}")
     if twice <= allowed:
-        return Level("light", DIRECT, twice, f"light that is reflected twice is no more than {allowed:.1e}")
+        return Level("light", DIRECT, twice, f"light that is reflected twice adds at most {allowed:.1e}")
     rest = twice**2 / max(direct - twice, twice)
-    return Level("light", BOUNCE, rest, f"light that is reflected twice is worth {twice:.1e}, more than {allowed:.1e}")
+    return Level("light", BOUNCE, rest, f"light that is reflected twice adds {twice:.1e}, more than {allowed:.1e}")

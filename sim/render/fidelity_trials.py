@@ -1,9 +1,9 @@
-"""Views of a world on which ways of sampling it are tried before any kernel is recorded.
+"""Trials of sampling methods in views of a world, before any kernel is recorded.
 
-A trial looks through some of an eye's receptors and compares what it sees with what many times as many rays see. It is
-judged where that matters: over all receptors in views of any place, and over those that see an object in views in
-which there is one near, lest what decides over an agent's life vanish among receptors that see floor and wall. All is
-drawn with fixed seeds: the same world and eyes give the same answer.
+A trial renders some of an eye's receptors and compares their signals with signals of many more rays. Errors are taken
+over two populations: all receptors in views from any place, and receptors that see an object in views with an object
+nearby. Objects decide how an episode ends, and most receptors see floor and walls, which would hide errors at objects.
+All draws have fixed seeds, so the same world and eyes give the same result.
 """
 
 from __future__ import annotations
@@ -27,37 +27,37 @@ from sim.scene.device_arrays import floats
 from sim.scene.variant import variant
 from sim.tracing import lighting
 from sim.tracing.areas.area_tracer import AreaTracer
-from sim.tracing.areas.illumination import Moment
+from sim.tracing.areas.illumination import FrameState
 from sim.tracing.areas.patch import Area
 from sim.tracing.eye_ray import EyeRay
 
-# Choices: how much a trial may cost, and how much finer than what it tries its truth is.
-RECEPTORS = 24  # looked through, at most
-RAYS = 2**19  # of one trial, at most, unless that leaves too few views
-TRUE_RAYS = 2**21  # the same of a truth for areas
-VIEWS = (12, 96)  # of one trial, at least and at most
-FINER = 8  # times as many rays, at least, for what is taken as the truth
-TRUE = 4096  # rays of it, at least, behind a pupil
-TRUE_AREA = (1024, 8192)  # rays of it for each receptor, at least and at most, where areas are tried
-WEIGHTS = 2**23  # of it, at most, unless it would not be finer
-ON_OBJECT = 0.02  # share of what a receptor sees, at least, where it sees an object
+# Chosen: the cost of a trial, and how much finer than the trial its reference ("truth") is.
+RECEPTORS = 24  # largest number of receptors
+RAYS = 2**19  # largest number of rays in one trial, unless that leaves too few views
+TRUE_RAYS = 2**21  # largest number of rays in a reference for areas
+VIEWS = (12, 96)  # smallest and largest number of views in one trial
+FINER = 8  # smallest ratio of the reference's rays to the trial's
+TRUE = 4096  # smallest number of rays of a reference behind a pupil
+TRUE_AREA = (1024, 8192)  # smallest and largest number of rays per receptor in a reference for areas
+WEIGHTS = 2**23  # largest number of weights of a reference, unless it would not be finer
+ON_OBJECT = 0.02  # smallest share of a receptor's field that an object fills if the receptor sees it
 
 
 @dataclass(frozen=True)
 class Population:
-    """Views, and which receptors of them count, (view, receptor)."""
+    """Views, and the receptors in each view that count, (view, receptor)."""
 
     views: RandomViews
     counted: np.ndarray
 
     def rms(self, error: np.ndarray) -> float:
-        """Of an error (view, channel, receptor) in the first so many views; 0 where nothing counts."""
+        """Return the root mean square of an error (view, channel, receptor) in the first views; 0 if nothing counts."""
         counted = np.broadcast_to(self.counted[: len(error), None], error.shape)
         return float(np.sqrt(np.mean(error[counted] ** 2))) if counted.any() else 0.0
 
 
 class FidelityTrials:
-    """Tries ways of sampling in one scene."""
+    """Trials of sampling methods in one scene."""
 
     def __init__(self, scene: WorldScene) -> None:
         self._scene, self._eyes, self._eye = scene, scene.eyes, scene.eye
@@ -90,10 +90,10 @@ class FidelityTrials:
         return [self._everywhere, Population(near, shares > ON_OBJECT)]
 
     def errors(self, sampling: EyeSampling, light: str = lighting.DIRECT) -> Callable[[float], float]:
-        """Root mean square error of the signals with so many rays per receptor, of the population that has more.
+        """Return a function of rays per receptor: the signals' root mean square error, the larger of both populations'.
 
         Raises:
-            NoRaysError: a receptor has none, when the function that is returned is called.
+            NoRaysError: a receptor has no rays, when the returned function is called.
         """
         truths: dict[int, list[np.ndarray]] = {}
         populations = self._populations(sampling)
@@ -103,14 +103,14 @@ class FidelityTrials:
         most = WEIGHTS / planes / (receptors if self._eye.pupil else len(self._receptors))
 
         def error(rays_per_receptor: float) -> float:
-            # In powers of 4, so that a truth serves several.
+            # A power of 4, so that one reference serves several trials.
             finer = max(2 * rays_per_receptor, min(max(FINER * rays_per_receptor, least), most))
             level = int(np.ceil(np.log(finer) / np.log(4) - 1e-9))
             if level not in truths:
                 true = sampling.trial(4.0**level, self._receptors)
                 truths[level] = [self._signals(true, sampling.depth, light, p.views) for p in populations]
             trial = sampling.trial(rays_per_receptor, self._receptors)
-            size = len(trial.directions) * len(truths[level][0])  # no views beyond the truth's
+            size = len(trial.directions) * len(truths[level][0])  # at most the reference's views
             return max(
                 population.rms(self._signals(trial, sampling.depth, light, population.views, size) - truth)
                 for population, truth in zip(populations, truths[level], strict=True)
@@ -119,7 +119,7 @@ class FidelityTrials:
         return error
 
     def have_areas(self, *lights: str) -> bool:
-        """Whether they see this world in all of these."""
+        """Return whether area sampling is possible in this world for all of these parts of the light."""
         try:
             for light in lights:
                 self._scene.areas(light)
@@ -128,7 +128,7 @@ class FidelityTrials:
         return True
 
     def area_errors(self, sampling: EyeSampling, light: str) -> Callable[[float], float]:
-        """The same with so many areas per receptor; the truth's own noise is part of it."""
+        """Return the same error as a function of areas per receptor; it includes the noise of the reference."""
         true = self._truth(sampling)
         populations = self._populations(sampling)
         truths = [self._signals(true, sampling.depth, light, p.views, TRUE_RAYS) for p in populations]
@@ -144,16 +144,16 @@ class FidelityTrials:
         return error
 
     def may_share(self, sampling: EyeSampling, per_receptor: float) -> bool:
-        """Whether receptors may share areas, so many for each: not where they would become copies of each other."""
+        """Return whether receptors may share areas, with this number per receptor, without becoming copies."""
         return self._scene.may_share(sampling, per_receptor)
 
     def areas_seen(self, sampling: EyeSampling, per_receptor: float) -> float:
-        """How many are seen per receptor where each one has so many: behind a pupil, some around."""
+        """Return the number of rendered areas per receptor; behind a pupil it includes areas around the receptors."""
         n = len(self._scene.area_trial(sampling, per_receptor, self._receptors[:1]).directions)
         return n / float(np.prod(self._eyes.resolution)) if self._eye.pupil else float(n)
 
     def _truth(self, sampling: EyeSampling) -> Trial:
-        """Rays that areas are held against; behind a pupil those that these receptors see."""
+        """Return the rays of the reference for areas; behind a pupil, rays that are drawn for these receptors."""
         of_a_view = TRUE_RAYS // (VIEWS[1] // 2)
         if isinstance(sampling, BoxSampling):
             return sampling.trial(int(np.clip(of_a_view // len(self._receptors), *TRUE_AREA)), self._receptors)
@@ -163,14 +163,14 @@ class FidelityTrials:
         return own.trial(rays / np.prod(self._eyes.resolution), self._receptors)
 
     def reflected_more_often(self, sampling: EyeSampling) -> float:
-        """Root mean square of what light that is reflected more than twice adds to the signals, as areas see it."""
+        """Return the root mean square of the signals by light that is reflected more than twice, with areas."""
         trial = self._scene.area_trial(sampling, 1, self._receptors)
         twice, all_ = (self._signals(trial, sampling.depth, light) for light in lighting.LEVELS[1:])
         return _rms(all_ - twice)
 
     def reflected_twice(self, sampling: EyeSampling) -> tuple[float, float]:
-        """Root mean square of what light that is reflected twice adds to the signals, and of direct light's signals, of
-        the population that it adds more to.
+        """Return the root mean square of the signals by light that is reflected twice, and by direct light, for the
+        population with more of the former.
 
         Raises:
             ValueError: it cannot be followed.
@@ -183,8 +183,8 @@ class FidelityTrials:
         return max(found)
 
     def errors_of_layers(self, finest: DepthLayers, counts: tuple[int, ...]) -> dict[int, float]:
-        """Root mean square difference to the signals with the finest layers, all with the same rays; the nodes of each
-        count must be among those of the finest.
+        """Return root mean square differences to the signals with the finest layers, with the same rays. The nodes of
+        each count must be among the nodes of the finest layers.
 
         Raises:
             optics.AccuracyError: see `optics.Eye.kernel`.
@@ -203,14 +203,14 @@ class FidelityTrials:
         return found
 
     def distances(self) -> np.ndarray:
-        """Of what the eyes see, along their axes [m], sorted; infinite where they see nothing."""
+        """Return the distances of hit points along the eyes' axes [m], sorted; infinite without a hit."""
         _, z = self._trace(self._views, BoxSampling(self._eye).trial(4, self._receptors), lighting.DIRECT)
         return np.sort(np.array(z))
 
     def _signals(
         self, trial: Trial, depth: DepthLayers, light: str, views: RandomViews | None = None, most: int = RAYS
     ) -> np.ndarray:
-        """(view, channel, receptor), of as many views as that many rays allow."""
+        """Return signals (view, channel, receptor) in the views that `most` rays allow."""
         rays = len(trial.directions)
         views = (views or self._views).take(int(np.clip(most // rays, *VIEWS)))
         if trial.extent:
@@ -225,13 +225,13 @@ class FidelityTrials:
         return np.einsum("clkrp,lkvp->vcr", weights, layers, optimize=True)
 
     def _factors(self, light: str, trial: Trial) -> np.ndarray:
-        """(channel, component, band): signals_c = sum_b mixing[c, b] sum_l sum_k basis[k, b] sum_p W_lb[r, p]
-        light_lk[p]."""
-        basis = (self._scene.areas if trial.extent else self._scene.tracers.of)(light).basis
+        """Return factors mixing[c, b] basis[k, b], (channel, component, band), of signals_c = sum_b mixing[c, b] sum_l
+        sum_k basis[k, b] sum_p W_lb[r, p] light_lk[p]."""
+        basis = (self._scene.areas if trial.extent else self._scene.tracers.tracer_for)(light).basis
         return self._eye.aperture_throughput * np.einsum("cb,kb->ckb", self._eye.spectral_bands.weights, basis)
 
     def _see_areas(self, views: RandomViews, trial: Trial, light: str, depth: DepthLayers) -> list[np.ndarray]:
-        """Components of the mean light in a trial's areas, for each depth layer, flat (view, area)."""
+        """Return the components of the mean light in a trial's areas, for each depth layer, flat (view, area)."""
         tracer = self._scene.areas(light)
         origins, directions = views.in_agents(self._eyes, trial.directions)
         n = len(trial.directions)
@@ -241,25 +241,25 @@ class FidelityTrials:
             width, height = (dr.opaque(mi.Float, side) for side in trial.extent)
             ray = mi.Ray3f(origin, mi.Vector3f([floats(d) for d in np.moveaxis(directions, -1, 0)]))
             axis = mi.Vector2f((origin - agent).xy) * (1 / BODY_RADIUS)
-            area = Area.of(ray, axis, (width, height))
+            area = Area.from_extent(ray, axis, (width, height))
             world, bodies = dr.arange(mi.UInt32, n * len(views)) // n, [*np.moveaxis(views.objects, 1, 0), views.agents]
-            now = Moment([_points(b, n) for b in bodies], tracer.inputs, world, self._lit(tracer, bodies))
+            now = FrameState([_points(b, n) for b in bodies], tracer.inputs, world, self._lit(tracer, bodies))
             components = tracer.radiance(area, tracer.met_by(area, tracer.inputs), now, depth)
             dr.eval(components)
             return [np.array(c) for c in components]
 
     def _lit(self, tracer: AreaTracer, bodies: list[np.ndarray]) -> list[Array]:
-        """The tracer's table of lit bodies, for their centres (view, 3)."""
+        """Return the tracer's table of illuminated bodies, for their centres (view, 3)."""
         if not tracer.places:
             return []
         place = dr.arange(mi.UInt32, tracer.places * len(bodies[0])) % tracer.places
-        return tracer.lit(place, [_points(b, tracer.places) for b in bodies], tracer.inputs)
+        return tracer.body_light(place, [_points(b, tracer.places) for b in bodies], tracer.inputs)
 
     def _trace(self, views: RandomViews, trial: Trial, light: str) -> tuple[list[Array], Array]:
-        """Components of light along a trial's rays of each view's eye, and from how far along its axis [m]: Dr.Jit,
-        flat (view, ray)."""
+        """Return the components of light along a trial's rays of each view's eye, and the distance to its source along
+        the eye's axis [m]: Dr.Jit, flat (view, ray)."""
         origins, world = views.in_agents(self._eyes, trial.directions)
-        rays, tracer = len(trial.directions), self._scene.tracers.of(light)
+        rays, tracer = len(trial.directions), self._scene.tracers.tracer_for(light)
         with variant(self._scene.variant):
             ray = mi.Ray3f(_points(origins, rays), mi.Vector3f([floats(d) for d in np.moveaxis(world, -1, 0)]))
             agent, cosine = _points(views.agents, rays), floats(np.tile(trial.directions[:, 2], len(views)))
@@ -278,13 +278,13 @@ class FidelityTrials:
 
 
 def _objects(scene: WorldScene) -> list[int]:
-    """Ids of the objects' geoms."""
+    """Return the ids of the objects' geoms."""
     bodies = [scene.model.body(name).id for name in scene.world.objects]
     return [int(np.flatnonzero(scene.model.geom_bodyid == body)[0]) for body in bodies]
 
 
 def _in_fours(trial: Trial) -> np.ndarray:
-    """Bounce samples, and as many for a second reflection."""
+    """Return bounce samples, and the same number of samples for a second reflection."""
     return np.concatenate([trial.bounce_samples, np.random.default_rng(SECOND).random(trial.bounce_samples.shape)], 1)
 
 
@@ -293,5 +293,5 @@ def _rms(values: np.ndarray) -> float:
 
 
 def _points(points: np.ndarray, rays: int) -> Array:
-    """The same for all rays of a view."""
+    """Return points that are the same for all rays of a view."""
     return mi.Point3f([floats(np.repeat(column, rays)) for column in points.T])

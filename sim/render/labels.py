@@ -1,4 +1,4 @@
-"""How far what receptors look at is, which geom it is, and how it moves on the retina: of any scene."""
+"""Labels of receptors in any scene: depth, geom id and optic flow of the points that they see."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ from sim.tracing.model_tracer import ModelTracer, Scenes
 
 
 class Labels:
-    """Of each receptor's centre, in `n_envs` worlds.
+    """Depth, geom id and optic flow of the point that each receptor's centre sees, in `n_envs` worlds.
 
-    scene: the model and its eyes; all of their rays are traced by Mitsuba
+    scene: the model and its eyes; Mitsuba traces all rays
     """
 
     def __init__(self, scene: PreparedScene, n_envs: int) -> None:
@@ -48,33 +48,37 @@ class Labels:
         self._distances, self._hits = FrozenKernel(distances), FrozenKernel(hits)
 
     def depth(self, poses: Placed) -> np.ndarray:
-        """How far what each receptor's centre looks at is, along the eye's axis [m], (env, eye, height, width) float32;
-        infinite where there is nothing."""
+        """Return the depth of each receptor centre's hit point along the eye's axis [m].
+
+        (env, eye, height, width) float32; infinite without a hit
+        """
         return self._seen(self._distances, self._scenes, poses)
 
     def ids(self, poses: Placed) -> np.ndarray:
-        """Which geom each receptor's centre looks at, (env, eye, height, width) int32; -1 where there is nothing."""
+        """Return the geom that each receptor's centre sees, (env, eye, height, width) int32; -1 without a hit."""
         scene = self.scene.scene
         apart, geoms = scene.told_apart
         found = self._seen(self._hits, Scenes(apart, self._scenes.meshes), poses).astype(int)
         return np.concatenate([scene.movers.geoms, geoms])[found].astype(np.int32)
 
     def flow(self, poses: Placed, later: Placed) -> np.ndarray:
-        """Optic flow from one moment to another: by how much what each receptor's centre looks at has moved on the
-        retina, to the right and down [receptors], (env, eye, 2, height, width) float32; NaN where there is nothing, or
-        where it is no longer before the eye."""
+        """Return the optic flow from one moment to another: the motion on the retina of the point that each receptor's
+        centre sees, to the right and down [receptors].
+
+        (env, eye, 2, height, width) float32; NaN without a hit, or if the point is then not in front of the eye
+        """
         moments = self.scene.placed(poses), self.scene.placed(later)
         self.scene.check_poses(moments[1], self.n_envs)
         frames = self.eye_frames(moments[0]), self.eye_frames(moments[1])
         return flow_between(self.eye, self.depth(moments[0]), self.ids(moments[0]), moments, frames)
 
     def eye_frames(self, poses: Placed) -> EyeFrames:
-        """Where the eyes are."""
+        """Return the eyes' frames in the world."""
         return self.scene.places.frames(self.scene.placed(poses))
 
     @property
     def recordings(self) -> int:
-        """How often the kernels were recorded."""
+        """Number of times that the kernels were recorded."""
         return self._distances.n_recordings + self._hits.n_recordings
 
     def _seen(self, kernel: Any, scenes: Scenes, poses: Placed) -> np.ndarray:
@@ -85,5 +89,5 @@ class Labels:
             self._moving.fill(placed)
             return launched(kernel, scenes, self._moving.frame, self._inputs, self.scene.variant)
 
-        found = self._slot.begin(launch).wait()
+        found = self._slot.launch(launch).wait()
         return found.reshape(self.n_envs, len(self.mounts), *self.eye.resolution)

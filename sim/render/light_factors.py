@@ -1,4 +1,4 @@
-"""What all lights of each world are multiplied by."""
+"""Factors of all lights in each world."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ import numpy as np
 
 @dataclass(frozen=True)
 class LightFactors:
-    """bands: a factor of each band in each world, (env, band) float32"""
+    """bands: a factor for each band in each world, (env, band) float32"""
 
     bands: np.ndarray
 
     @classmethod
-    def of(cls, light: np.ndarray, shape: tuple[int, int]) -> LightFactors:
-        """A copy of these.
+    def from_light(cls, light: np.ndarray, shape: tuple[int, int]) -> LightFactors:
+        """Return a copy of these factors.
 
         Raises:
             ValueError: another shape.
@@ -26,18 +26,18 @@ class LightFactors:
 
     @property
     def is_level(self) -> bool:
-        """Whether all bands of a world have the same factor: signals can be multiplied by it."""
+        """True if all bands of a world have the same factor, so that it can multiply the signals."""
         return bool((self.bands == self.bands[:, :1]).all())
 
     @property
     def level(self) -> np.ndarray:
-        """Of signals (env, eye, channel, height, width)."""
+        """Factors of signals (env, eye, channel, height, width)."""
         return self.bands[:, :1, None, None, None]
 
     def on_bands(self, layers: np.ndarray, basis: np.ndarray | None, n_eyes: int) -> np.ndarray:
-        """Light (layer, component, all rays of all views) in these factors, (layer, band, all rays of all views).
+        """Return light (layer, component, all rays of all views) times these factors, in bands instead of components.
 
-        basis: what a component is worth in each band, (component, band); None: components are bands
+        basis: contribution of a component to each band, (component, band); None: components are bands
         """
         if basis is not None:
             layers = np.einsum("lkn,kb->lbn", layers, basis.astype(np.float32))

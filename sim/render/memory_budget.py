@@ -1,5 +1,7 @@
-"""Whether what is about to be rendered has room in memory: told before it is begun, since later the process would be
-killed without a word."""
+"""A check of the memory that rendering needs, before it starts.
+
+Without this check, the system would kill the process without a message.
+"""
 
 from __future__ import annotations
 
@@ -8,11 +10,11 @@ import os
 from dataclasses import dataclass
 from pathlib import Path
 
-INDICES = 2**32  # of one Dr.Jit array
-RAY_BYTES = 64  # direction and place of a ray, and what they are made from
+INDICES = 2**32  # elements of one Dr.Jit array
+RAY_BYTES = 64  # direction and place of a ray, and the numbers from which they are computed
 GIB = 2**30
 CGROUPS = Path("/sys/fs/cgroup")
-# Of versions 2 and 1: limit, use, statistics, and there what goes before the names of files' pages.
+# Control groups of versions 2 and 1: limit, use, statistics, and in these the prefix of entries for files' pages.
 _GROUPS = (
     ("memory.max", "memory.current", "memory.stat", ""),
     ("memory/memory.limit_in_bytes", "memory/memory.usage_in_bytes", "memory/memory.stat", "total_"),
@@ -21,11 +23,11 @@ _GROUPS = (
 
 @dataclass(frozen=True)
 class Demand:
-    """What rendering takes, at the least.
+    """The least memory that rendering needs.
 
-    rays_per_receptor · worlds · eyes of one agent · resolution: receptors (height, width) of an eye
+    rays_per_receptor · worlds · eyes: of one agent · resolution: receptors (height, width) of an eye
     planes: components of light times depth layers, along every ray
-    weights: planes of weights behind a pupil (bands times depth layers); 0: none
+    weights: planes of weights behind a pupil (bands times depth layers); 0 without a pupil
     """
 
     rays_per_receptor: float
@@ -37,25 +39,25 @@ class Demand:
 
     @property
     def rays(self) -> float:
-        """Of one eye."""
+        """Number of rays of one eye."""
         return self.rays_per_receptor * math.prod(self.resolution)
 
     @property
     def elements(self) -> float:
-        """Of the array that the kernel writes."""
+        """Number of elements in the array that the kernel writes."""
         return self.rays * self.eyes * self.worlds * self.planes
 
     @property
     def bytes(self) -> float:
-        """The kernel's array, the rays, and the weights of one row of receptors, all rays to each, at double length."""
+        """Bytes of the kernel's array, of the rays, and of the weights from all rays to one row of receptors."""
         return 4 * self.elements + self.rays * (RAY_BYTES * self.eyes + 16 * self.weights * self.resolution[1])
 
 
 def check_memory(demand: Demand) -> None:
-    """Refuse what would not fit.
+    """Refuse rendering that does not fit into memory.
 
     Raises:
-        ValueError: more rays than there is room for, with how many there is room for.
+        ValueError: too many rays; the message states how many fit.
     """
     free = available()
     excess = max(demand.bytes / free, demand.elements / INDICES)
@@ -71,8 +73,8 @@ def check_memory(demand: Demand) -> None:
 
 
 def available() -> float:
-    """Bytes that can be had without swapping, by the machine and by the container that this runs in; infinite where the
-    system does not say."""
+    """Return the bytes available without swapping, in the machine and in the container that this runs in; infinite if
+    the system does not report them."""
     return min(_of_machine(), _of_container(CGROUPS))
 
 
@@ -91,7 +93,7 @@ def _of_machine() -> float:
 
 
 def _of_container(root: Path) -> float:
-    """What control groups leave of their limits; at least one byte, since a group may be above its limit."""
+    """Return the free bytes below control groups' limits; at least one, because a group may be above its limit."""
     free = math.inf
     for limit, used, statistics, prefix in _GROUPS:
         try:
@@ -103,7 +105,7 @@ def _of_container(root: Path) -> float:
 
 
 def _of_files(statistics: Path, prefix: str) -> int:
-    """Bytes of files' pages in use, which make way for whatever needs the memory."""
+    """Return the bytes of files' pages in use, which the system frees when memory is needed."""
     try:
         lines = [line.split() for line in statistics.read_text("ascii").splitlines()]
         return sum(int(size) for name, size in lines if name in (f"{prefix}active_file", f"{prefix}inactive_file"))
@@ -112,6 +114,6 @@ def _of_files(statistics: Path, prefix: str) -> int:
 
 
 def _rounded_down(value: float) -> float:
-    """To two digits."""
+    """Round down to two digits."""
     digit = 10.0 ** (math.floor(math.log10(value)) - 1)
     return math.floor(value / digit) * digit

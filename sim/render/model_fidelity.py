@@ -1,8 +1,8 @@
-"""As few rays as the receptors' noise allows, on a model of one's own: tried out, as nobody knows what there is to see.
+"""Choice of the fewest rays that receptor noise allows on a user model, from trials at given moments.
 
-The moments that are looked at are looked at with ever more rays, and with many more. Receptors whose whole field looks
-alike need one ray, however many of them there are, and would hide what the others need: the error is judged where one
-ray is not enough.
+Each moment is rendered with increasing numbers of rays, and with many rays as a reference. A receptor with a uniform
+field needs only one ray. Most receptors may have one, and they would hide the error of the others. The error is
+therefore taken over the receptors for which one ray is not enough.
 """
 
 from __future__ import annotations
@@ -32,18 +32,18 @@ from sim.scene.poses import Poses
 from sim.tracing import lighting
 from sim.tracing.model_tracer import ModelTracer
 
-# Rays per receptor that are tried, and those that they are held against: behind a pupil all receptors share all rays.
+# Rays per receptor that are tried, and those of the reference. Behind a pupil all receptors share all rays.
 PERFECT, PERFECT_TRUTH = (1, 2, 4, 8, 16, 32, 64, 128, 256), 1024
 SHARED, SHARED_TRUTH = (0.25, 0.5, 1, 2, 4, 8, 16), 64
 AUTO, FOLLOWED = "auto", (lighting.DIRECT, lighting.BOUNCE)
-SPLIT = 0.1  # of what is allowed: a receptor that errs by more with the fewest rays has something to tell apart
+SPLIT = 0.1  # share of the allowed error: a receptor with a larger error for the fewest rays has no uniform field
 
 
 @dataclass(frozen=True)
 class Trials:
-    """Errors of signals over the receptors that have something to tell apart (root mean square), by rays per receptor.
+    """Errors of signals over the receptors without a uniform field (root mean square), by rays per receptor.
 
-    share: of receptors that have
+    share: of these receptors
     """
 
     errors: Mapping[float, float]
@@ -62,24 +62,25 @@ def choose_model_fidelity(
     varied: Varied = (),
     light: str = lighting.DIRECT,
 ) -> Fidelity:
-    """The fewest rays for `ModelRenderer` whose error, tried at these poses, is within the tolerance; a FidelityWarning
-    says where there are none. Bands are the eye's own.
+    """Return the fidelity with the fewest rays for `ModelRenderer` whose error at these poses is within the tolerance.
 
-    poses: moments that stand for what will be seen
-    tolerance: of a signal (root mean square), over receptors that do not see the same in all of their field; None: half
-        of the receptors' noise, but no less than LEAST_TOLERANCE of what white is worth behind the eye's pupil
+    A FidelityWarning states by how much the tolerance is exceeded if there is none. Bands are the eye's own.
+
+    poses: moments that represent the later views
+    tolerance: of a signal (root mean square), over receptors without a uniform field; None: half of the receptors'
+        noise, but at least LEAST_TOLERANCE of the signal of white behind the eye's pupil
 
     groups, spectra, varied: see `ModelRenderer`
-    light: what of it is followed, "direct" or "bounce"; "auto": the latter where direct light alone would err by more
-        than the tolerance at these moments, over receptors to which anything bounces
+    light: the part that is followed, "direct" or "bounce"; "auto": "bounce" if the error by direct light alone exceeds
+        the tolerance at these moments, over receptors that bounced light reaches
 
     Raises:
-        ValueError: a tolerance that is not positive, other light, and what ModelRenderer raises.
+        ValueError: a tolerance that is not positive, another light, or an argument that ModelRenderer refuses.
     """
     if light not in (*FOLLOWED, AUTO):
         raise ValueError(f"light = {light!r}: must be 'direct', 'bounce' or 'auto'")
     allowed = allowed_error(eye, tolerance)
-    placed = poses if isinstance(poses, Poses) else Poses.of(poses)
+    placed = poses if isinstance(poses, Poses) else Poses.from_data(poses)
     scene = PreparedScene(
         source.load(model),
         eye,
@@ -95,7 +96,7 @@ def choose_model_fidelity(
 class ModelStages:
     """Levels that a model offers, tried at moments of its worlds; see `Stages`.
 
-    light: as `choose_model_fidelity` has it
+    light: see `choose_model_fidelity`
     """
 
     shares: Shares | None = None
@@ -106,10 +107,10 @@ class ModelStages:
         self._seen = cache(self._signals)
 
     def _signals(self, rays: float, light: str) -> np.ndarray:
-        """Signals at the moments, without noise."""
+        """Return the signals at the moments, without noise."""
         fidelity = _with(rays, self.eye, self.allowed, light)
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", MirrorWarning)  # whoever renders in earnest is told
+            warnings.simplefilter("ignore", MirrorWarning)  # the final renderer warns
             renderer = EyeRenderer(self._scene, self._moments.n, fidelity)
         return renderer.signals(self._moments)
 
@@ -132,37 +133,37 @@ class ModelStages:
         rays = next((n for n, error in trials.errors.items() if error <= most), max(trials.errors))
         enough = trials.errors[rays] <= most
         why = (
-            f"fewest with {most:.1e} where a receptor has something to tell apart "
+            f"fewest for {most:.1e} over receptors without a uniform field "
             f"({trials.share:.0%} of them, at {self._moments.n} moments)"
         )
-        why = why if enough else f"most that are tried; {most:.1e} is allowed"
+        why = why if enough else f"the largest number that is tried; {most:.1e} is allowed"
         kind = _with(rays, self.eye, self.allowed, light.level).samples
         return Samples(kind, light, rays, Level(kind, f"{rays:g} per receptor", trials.errors[rays], why), enough)
 
 
 def _light(asked: str, truth: Callable[[str], np.ndarray], allowed: float) -> Level:
-    """What of the light is followed; truth: by what is followed, what is seen with very many rays."""
+    """Return the light that is followed; truth: light -> signals with very many rays."""
     if asked != AUTO:
-        return Level("light", asked, None, "as asked")
+        return Level("light", asked, None, "as requested")
     off = np.abs(truth(lighting.BOUNCE) - truth(lighting.DIRECT)).max(axis=2)
     counts = off > SPLIT * allowed
     error = float(np.sqrt(np.square(off[counts]).mean())) if counts.any() else 0.0
-    missing = f"direct light misses {error:.1e} where anything bounces; {allowed:.1e} is allowed"
+    missing = f"direct light misses {error:.1e} over receptors that bounced light reaches; {allowed:.1e} is allowed"
     if error <= allowed:
         return Level("light", lighting.DIRECT, error, missing)
     return Level("light", lighting.BOUNCE, None, missing)
 
 
 def _with(rays: float, eye: optics.Eye, allowed: float, light: str) -> Fidelity:
-    """So many rays; in direct light through a perfect lens at edges alone, where that pays. The truth takes no short
-    cuts."""
+    """Return the fidelity with this number of rays. In direct light through a perfect lens it uses adaptive edge
+    sampling if that saves work, except for the reference."""
     at_edges = light == lighting.DIRECT and eye.pupil is None and rays < PERFECT_TRUTH
     at_edges = at_edges and edges_pay(eye.resolution, rays)
     return Fidelity(rays, eye.bands, tolerance=allowed, light=light, samples=EDGES if at_edges else RAYS)
 
 
 def tried(seen: Callable[[float], np.ndarray], ladder: Sequence[float], truth: float, allowed: float) -> Trials:
-    """What is seen with so many rays, held against what is seen with `truth`; up to the first error that is allowed.
+    """Return the errors of increasing numbers of rays, compared with `truth` rays, up to the first allowed error.
 
     seen: rays per receptor -> signals (env, eye, channel, height, width)
     """

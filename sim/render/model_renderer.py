@@ -1,4 +1,4 @@
-"""Eyes mounted on any MuJoCo model, seen through in many worlds at once."""
+"""Rendering of eyes that are mounted on any MuJoCo model, in many worlds at once."""
 
 from __future__ import annotations
 
@@ -23,29 +23,30 @@ SIXTEEN = 16  # rays per receptor
 
 
 class ModelRenderer(EyeRenderer):
-    """Sees many worlds of one model with eyes of one kind, wherever they are mounted on it.
+    """A renderer of many worlds of one model, with eyes of one kind that are mounted anywhere on it.
 
-    model: an MjModel, or what compiles to one (`sim.mirror`)
-    eye: its optics and retina; its bands are the fidelity's
-    mounts: where on the model the eyes are
+    model: an MjModel, or a source that compiles to one (`sim.mirror`)
+    eye: its optics and retina; the fidelity's bands replace its bands
+    mounts: places of the eyes on the model
     n_envs: number of worlds
     fidelity: rays per receptor and bands; None: 16 rays in the direct light of lamps and the eye's own bands, 4 by
-        default. light="bounce" adds light that is reflected twice, and what the sky and what glows send;
-        samples="edges" for that many rays only where a few of them differ, in direct light; samples="areas" without
-        rays, in closed form, where the model has one
+        default. light="bounce" adds light that is reflected twice, and the light of the sky and of glowing geoms.
+        samples="edges" traces all rays only where a few of them differ, in direct light. samples="areas" uses closed
+        forms instead of rays, if the model has them
     groups, spectra: see `sim.mirror`
-    varied: names of geoms whose size or colour may differ from world to world: as `poses` say, by the worlds' mjModels;
-        {"floor": ("sand", "grass")}: and names of the materials that one may have, in the place of other colours
-    tracer: "mitsuba" (any shapes), "closed_form" (upright walls, a floor and spheres), or "auto": the latter, where the
-        model has it. The one in use is in `.tracer.name`
-    brightest: signal of a white surface that faced all directional lights at once
+    varied: names of geoms whose size or colour may differ between worlds; `poses` contain these, from the worlds'
+        mjModels. {"floor": ("sand", "grass")} also lists materials that a geom may have, which replace other colours
+    tracer: "mitsuba" (any shapes), "closed_form" (upright walls, a floor and spheres), or "auto": the closed form if
+        the model has one. The tracer in use is in `.tracer.name`
+    brightest: signal of a white surface that faces all directional lights at once
 
-    Warns (`sim.MirrorWarning`) once of what eyes do not see of the model, and of lamps with lines in too few bands.
+    Warns (`sim.MirrorWarning`) once of features of the model that are not rendered, and of lamps with spectral lines
+    in too few bands.
 
     Raises:
-        ValueError: a bad argument, a mount on what the model does not have, an eye that looks aside of it, or is inside
-            of a sphere, a capsule, another primitive or a closed mesh in the model's reference pose, a fidelity that
-            the model cannot have, or more rays than there is memory for.
+        ValueError: a bad argument, a mount on a part that the model lacks, an eye with an eccentricity, an eye inside a
+            sphere, a capsule, another primitive or a closed mesh in the model's reference pose, a fidelity that the
+            model does not support, or more rays than fit into memory.
         optics.AccuracyError: a pupil whose light spreads too far.
     """
 

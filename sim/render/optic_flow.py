@@ -1,7 +1,7 @@
-"""Optic flow: where what eyes look at moves on their retinas, from geometry alone.
+"""Optic flow: the motion of visible points on the retina, from geometry alone.
 
-What lies on a rigid body goes with it, and the eye goes with its own (Longuet-Higgins & Prazdny 1980). Taken from one
-moment to another it is exact, whatever has happened in between.
+A point on a rigid body moves with the body, and an eye moves with its own body (Longuet-Higgins & Prazdny 1980). The
+flow from one moment to another is exact, whatever happens between them.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ Frames = tuple[np.ndarray, np.ndarray]  # pupils [m] (world, eye, 3), eyes' fram
 
 
 def receptor_centres(eye: optics.Eye) -> np.ndarray:
-    """Places of the receptors' centres on the tangent plane, x to the right and y down [receptors], (receptor, 2)."""
+    """Return the receptors' centres on the tangent plane, x to the right and y down [receptors], (receptor, 2)."""
     height, width = eye.resolution
     row, column = (index.ravel() for index in np.indices((height, width)))
     return np.stack([column + 0.5 - width / 2, row + 0.5 - height / 2], axis=-1)
@@ -25,11 +25,12 @@ def receptor_centres(eye: optics.Eye) -> np.ndarray:
 def flow_between(
     eye: optics.Eye, depth: np.ndarray, ids: np.ndarray, moments: tuple[Poses, Poses], frames: tuple[Frames, Frames]
 ) -> np.ndarray:
-    """(world, eye, 2, height, width) float32: to the right and down [receptors]; NaN where there is nothing to see, or
-    where it is beside or behind the eye by then.
+    """Return the flow to the right and down [receptors], (world, eye, 2, height, width) float32.
 
-    depth, ids: of what each receptor's centre sees at the first moment, (world, eye, height, width)
-    moments: where everything is · frames: of the eyes, at both
+    It is NaN without a hit, or if the point is not in front of the eye at the second moment.
+
+    depth, ids: of the point that each receptor's centre sees at the first moment, (world, eye, height, width)
+    moments: poses at both moments · frames: of the eyes at both moments
     """
     worlds, eyes = depth.shape[:2]
     geoms, far = ids.reshape(worlds, eyes, -1), depth.reshape(worlds, eyes, -1, 1)
@@ -48,7 +49,7 @@ def flow_between(
 
 
 def _carried(points: np.ndarray, geoms: np.ndarray, moments: tuple[Poses, Poses]) -> np.ndarray:
-    """Where points (world, eye, receptor, 3) on these geoms are later."""
+    """Return the later places of points (world, eye, receptor, 3) on these geoms."""
     world = np.arange(len(points))[:, None, None]
     (old_place, old_turn), (place, turn) = (
         (poses.geom_xpos[world, geoms], poses.geom_xmat[world, geoms]) for poses in moments

@@ -1,7 +1,8 @@
-"""Frames that are begun early and waited for late, so that other work runs beside them.
+"""Frames that are launched early and read late, so that other work runs in the meantime.
 
-A kernel reads its inputs from a buffer that the next launch overwrites. Whoever launches keeps a FrameSlot, which reads
-out the frame under way before the next one is begun: in whatever order frames are waited for, each has its own values.
+A kernel reads its inputs from a buffer that the next launch overwrites. Each launcher has a FrameSlot, which reads the
+pending frame before the next one is launched. Each frame therefore keeps its own values, in whatever order frames are
+waited for.
 """
 
 from __future__ import annotations
@@ -23,48 +24,51 @@ class PendingFrame:
         self._taken = False
 
     def settle(self) -> None:
-        """Wait until the device is done with this frame; the values are kept for `wait`."""
+        """Wait until the device has finished this frame; the values are stored for `wait`."""
         if self._read is not None:
             read, self._read = self._read, None
             self._values = read()
 
     def wait(self) -> np.ndarray:
-        """The values, handed over: from now on they are the caller's own, who may write into them.
+        """Return the values and hand them over to the caller, who may write into them.
 
         Raises:
             RuntimeError: they were handed over before.
         """
         if self._taken:
-            raise RuntimeError("this frame was waited for before, and its values may have been changed: begin another")
+            raise RuntimeError("this frame was waited for before, and its values may have been changed: launch another")
         self.settle()
         values, self._values, self._taken = self._values, None, True
         assert values is not None
         return values
 
     def then(self, what: Callable[[np.ndarray], np.ndarray]) -> PendingFrame:
-        """The frame that is made of this one's values when it is waited for."""
+        """Return a frame that is computed from this one's values when it is waited for."""
         return PendingFrame(lambda: what(self.wait()))
 
 
 def settled(values: np.ndarray) -> PendingFrame:
-    """A frame that is there already."""
+    """Return a frame whose values are available already."""
     return PendingFrame(lambda: values)
 
 
 class FrameSlot:
-    """The one frame that may be under way in a kernel's buffers."""
+    """The only frame that may be pending in a kernel's buffers."""
 
     def __init__(self) -> None:
         self._under_way: PendingFrame | None = None
 
     def clear(self) -> None:
-        """Read out the frame under way: afterwards the buffers may be written."""
+        """Read the pending frame, so that the buffers may be written."""
         if self._under_way is not None:
             self._under_way.settle()
             self._under_way = None
 
-    def begin(self, launch: Callable[[], Callable[[], np.ndarray]]) -> PendingFrame:
-        """Launch the next frame once the buffers are free; launch: starts the kernel, returns what reads its output."""
+    def launch(self, launch: Callable[[], Callable[[], np.ndarray]]) -> PendingFrame:
+        """Launch the next frame once the buffers are free.
+
+        launch: starts the kernel, and returns a function that reads its output
+        """
         self.clear()
         self._under_way = PendingFrame(launch())
         return self._under_way

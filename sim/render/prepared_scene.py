@@ -1,4 +1,4 @@
-"""A model made ready for given eyes: what choosing a fidelity and rendering both begin with, built once for both."""
+"""A model prepared for given eyes: built once, for choosing a fidelity and for rendering."""
 
 from __future__ import annotations
 
@@ -28,20 +28,20 @@ from sim.tracing.model_scene import ModelScene
 from sim.tracing.tracer import Tracer, Tracers
 from sim.tracing.upright_scene import UprightScene
 
-Placed: TypeAlias = Poses | Sequence[mujoco.MjData] | mujoco.MjData | Any  # where everything is in all worlds
+Placed: TypeAlias = Poses | Sequence[mujoco.MjData] | mujoco.MjData | Any  # poses of all worlds
 
 
 class PreparedScene:
-    """A model as the spectral bands of given eyes have it. Nothing in it depends on how finely it will be seen.
+    """A model in the spectral bands of given eyes. Nothing in it depends on the fidelity, except for the bands.
 
-    model: what there is to see · eye: its optics and retina, with its own bands · mounts: where on the model eyes are
+    model · eye: its optics and retina, with its own bands · mounts: places of the eyes on the model
     spectra, groups: see `sim.mirror` · varied: see `sim.ModelRenderer`
-    tracer: which way rays are traced, see `sim.BatchedRenderer`
-    stand: the body on which the eyes are, if they stand upright on one; None: found from the mounts
+    tracer: method of tracing rays, see `sim.BatchedRenderer`
+    stand: the body that the eyes are fixed to, if they stand upright on one; None: derived from the mounts
 
     Raises:
-        ValueError: a mount on what the model does not have, an eye that is inside of a geom in the model's reference
-            pose, and a model or a tracer that `sim.BatchedRenderer` or `sim.ModelRenderer` refuse.
+        ValueError: a mount on a part that the model lacks, an eye inside a geom in the model's reference pose, or a
+            model or tracer that `sim.BatchedRenderer` or `sim.ModelRenderer` refuses.
     """
 
     def __init__(
@@ -66,27 +66,27 @@ class PreparedScene:
 
     @property
     def mounts(self) -> tuple[Mount, ...]:
-        """Where the eyes are."""
+        """Places of the eyes on the model."""
         return self.places.mounts
 
     @property
     def bands(self) -> optics.SpectralBands:
-        """Of the eyes."""
+        """Spectral bands of the eyes."""
         return self.eye.spectral_bands
 
     @property
     def variant(self) -> str:
-        """Mitsuba's."""
+        """Mitsuba's variant."""
         return self.scene.variant
 
     def tell(self, light: str) -> None:
-        """Warn once of what is not seen, where so much of the light is followed."""
+        """Warn once of features that are not rendered if this part of the light is followed."""
         if not self._is_told:
             self._is_told = True
             self.scene.tell_what_is_missing(light)
 
     def eye_rays(self, tracer: Tracer | AreaTracer, n_envs: int) -> EyeRays:
-        """The eyes in so many worlds, as this tracer has them."""
+        """Return the eyes in `n_envs` worlds, in the form for this tracer."""
         if isinstance(tracer, ClosedForm | AreaTracer):
             return UprightEyes(self.upright.stand, n_envs)
         return FreeEyes(self.places, n_envs)
@@ -103,7 +103,7 @@ class PreparedScene:
         raise self.tracers.upright
 
     def areas(self, light: str) -> AreaTracer:
-        """What sees the world by areas.
+        """Return the tracer that uses area sampling.
 
         Raises:
             ValueError: a world that has no closed form.
@@ -111,25 +111,26 @@ class PreparedScene:
         return self.tracers.areas(light)
 
     def area_sensor(self, sampling: EyeSampling, per_receptor: float) -> Sensor:
-        """What areas are seen along: so many for each receptor."""
+        """Return the sensor with this number of areas per receptor."""
         return sampling.areas(per_receptor, in_rows=self._in_rows)
 
     def area_trial(self, sampling: EyeSampling, per_receptor: float, receptors: np.ndarray) -> Trial:
-        """What that sensor has for these receptors."""
+        """Return the part of this sensor for these receptors."""
         return sampling.area_trial(per_receptor, receptors, in_rows=self._in_rows)
 
     def may_share(self, sampling: EyeSampling, per_receptor: float) -> bool:
-        """Whether areas may be larger than receptors' squares, so many for each."""
+        """Return whether areas may be larger than receptors' squares, with this number per receptor."""
         return isinstance(sampling, FieldSampling) and sampling.may_share(per_receptor, in_rows=self._in_rows)
 
     @property
     def _in_rows(self) -> bool:
-        """What is upright has closed forms along columns of any height; spheres' outlines want rows, too."""
+        """True if areas are divided into rows, too. Walls and floor have closed forms along columns of any height, but
+        the outlines of spheres need rows."""
         upright = self.tracers.upright
         return isinstance(upright, UprightScene) and len(upright.spheres) > 0
 
     def sampling(self, depth: DepthLayers, tolerance: float | None = None) -> EyeSampling:
-        """How the eye is sampled with these depth layers; its PSFs are computed once, when first asked for.
+        """Return the sampling of the eye with these depth layers; its PSFs are computed once, on first use.
 
         tolerance: error allowed to a signal, see `sim.eyes.allowed_error`
 
@@ -142,19 +143,19 @@ class PreparedScene:
         return replace(found, tolerance=tolerance) if isinstance(found, FieldSampling) else found
 
     def placed(self, poses: Placed) -> Poses:
-        """Where everything is, as arrays."""
-        return poses if isinstance(poses, Poses) else Poses.of(poses)
+        """Return the poses as arrays."""
+        return poses if isinstance(poses, Poses) else Poses.from_data(poses)
 
     def check_poses(self, poses: Poses, n_envs: int) -> None:
-        """Refuse what cannot be rendered.
+        """Refuse poses that cannot be rendered.
 
         Raises:
-            ValueError: another number of worlds, another model's poses, poses that are not finite or not known yet, and
-                what differs from the model and is not in `varied`.
+            ValueError: another number of worlds, another model's poses, poses that are not finite or not computed yet,
+                or a difference from the model that is not in `varied`.
         """
         if poses.n != n_envs:
             raise ValueError(f"poses of {poses.n} worlds, this renderer was built for n_envs = {n_envs}")
-        if isinstance(poses, MovedBodies):  # all of the rest is as the model has it
+        if isinstance(poses, MovedBodies):  # everything else is as in the model
             self._check_finite(poses.positions)
             if poses.reference.n_bodies != self.model.nbody:
                 raise ValueError("poses of another model")
@@ -167,8 +168,8 @@ class PreparedScene:
         placed = poses.geom_xmat.any(axis=(1, 2, 3))
         if not placed.all():
             raise ValueError(
-                f"data of world {int(np.argmin(placed))} says nothing yet of where things are; call "
-                "mujoco.mj_forward(model, data) first"
+                f"data of world {int(np.argmin(placed))} contains no poses yet; call mujoco.mj_forward(model, data) "
+                "first"
             )
         self.scene.as_built.refuse_differences(poses)
 
@@ -181,7 +182,7 @@ class PreparedScene:
     def _refuse_eyes_inside(self) -> None:
         data = mujoco.MjData(self.model)
         mujoco.mj_forward(self.model, data)
-        pupils, _ = self.places.frames(Poses.of([data]))
+        pupils, _ = self.places.frames(Poses.from_data([data]))
         for mount, pupil in zip(self.mounts, pupils[0], strict=True):
             for geom in self.scene.geoms:
                 if (depth := depth_inside(self.model, data, geom, pupil)) > 0:

@@ -1,4 +1,4 @@
-"""Random views of a world, on which ways of seeing it are tried: the same ones for the same world."""
+"""Random views of a world for trials of sampling methods; the same world always has the same views."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ from sim.eyes.eyes import EYE_HEIGHT, Eyes, eye_positions, eye_rotations
 from sim.worlds.layout import CLEARANCE
 from sim.worlds.world import World
 
-# [m] from a cell's centre, along either axis: less than half a cell without the agent's body, 1 - 0.2.
+# Largest distance from a cell's centre along either axis [m]: less than half a cell minus the agent's body, 1 - 0.2.
 STRAY = 0.75
-NEAR = (0.8, 8.0)  # [m] from an object's centre: where what eyes make of it decides what agents do
+NEAR = (0.8, 8.0)  # distance from an object's centre [m] at which its appearance decides the agents' actions
 TRIES = 100
 
 
 @dataclass(frozen=True)
 class RandomViews:
-    """Views of single eyes; first axis: view.
+    """Views of single eyes; the first axis is the view.
 
-    position: of the agent [m], (n, 2) · heading [rad], (n,) · objects: centres [m], (n, k, 3) · eye: which, (n,)
+    position: of the agent [m], (n, 2) · heading [rad], (n,) · objects: centres [m], (n, k, 3) · eye: its number, (n,)
     """
 
     position: np.ndarray
@@ -30,7 +30,7 @@ class RandomViews:
     eye: np.ndarray
 
     def take(self, n: int) -> RandomViews:
-        """The first n."""
+        """Return the first n views."""
         return RandomViews(self.position[:n], self.heading[:n], self.objects[:n], self.eye[:n])
 
     def __len__(self) -> int:
@@ -42,8 +42,7 @@ class RandomViews:
         return np.column_stack([self.position, np.full(len(self), EYE_HEIGHT)])
 
     def in_agents(self, eyes: Eyes, directions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Where the eyes are (n, 3) [m], and directions (r, 3) in an eye's frame, (n, r, 3): both as the agents'
-        frames would have them if they only stood elsewhere, in the world's axes."""
+        """Return the eyes' positions [m], (n, 3), and directions (r, 3) of an eye's frame, (n, r, 3), in the world."""
         azimuths = eyes.azimuths()
         cos, sin = np.cos(self.heading), np.sin(self.heading)
         zero, one = np.zeros_like(cos), np.ones_like(cos)
@@ -54,7 +53,8 @@ class RandomViews:
 
 
 def random_views(world: World, eyes: Eyes, n: int) -> RandomViews:
-    """Agents about the cells where agents or objects may start, looking anywhere; objects on theirs."""
+    """Return views of agents near cells where agents or objects may start, in any direction; objects are on their own
+    cells."""
     rng = np.random.default_rng(0)
     cells, objects = _cells(world), _objects(world, n, rng)
     position = np.empty((n, 2))
@@ -64,7 +64,7 @@ def random_views(world: World, eyes: Eyes, n: int) -> RandomViews:
 
 
 def near_views(world: World, eyes: Eyes, n: int) -> RandomViews:
-    """Agents with an object NEAR before one of their eyes, somewhere in its field of view."""
+    """Return views of agents with an object at a distance in NEAR, within the field of view of one eye."""
     rng = np.random.default_rng(1)
     objects, cells = _objects(world, n, rng), _cells(world)
     position, heading, eye = np.empty((n, 2)), np.empty(n), rng.integers(eyes.n_eyes, size=n)
@@ -86,7 +86,7 @@ def near_views(world: World, eyes: Eyes, n: int) -> RandomViews:
 
 
 def on_objects(views: RandomViews, origins: np.ndarray, directions: np.ndarray, radii: np.ndarray) -> np.ndarray:
-    """Which of the directions (n, r, 3) meet an object's ball, (n, r)."""
+    """Return which of the directions (n, r, 3) hit an object's ball, (n, r)."""
     found = np.zeros(directions.shape[:2], bool)
     for k, radius in enumerate(radii):
         way = views.objects[:, k] - origins
@@ -100,7 +100,7 @@ def _cells(world: World) -> np.ndarray:
 
 
 def _objects(world: World, n: int, rng: np.random.Generator) -> np.ndarray:
-    """Their centres [m], (n, k, 3)."""
+    """Return the objects' centres [m], (n, k, 3)."""
     k = len(world.objects)
     heights = np.array([world.model.body(name).pos[2] for name in world.objects])
     objects = np.empty((n, k, 3))
@@ -115,7 +115,7 @@ def _stray(rng: np.random.Generator) -> np.ndarray:
 
 
 def _clear_of(objects: np.ndarray, draw: Callable[[], np.ndarray], clearance: float = CLEARANCE) -> np.ndarray:
-    """The first place drawn, of TRIES, that is clear of objects."""
+    """Return the first of at most TRIES drawn places that is clear of objects."""
     place = np.zeros(2)
     for _ in range(TRIES):
         place = draw()

@@ -1,5 +1,7 @@
-"""The kernel of `EyeRenderer`: lanes become worlds, eyes and samples, these become rays, rays become light, and light
-is shared out among depth layers and added up."""
+"""The kernel of `EyeRenderer`: from lanes to rays, from rays to light, and from light to sums per depth layer.
+
+Each lane is a sample of an eye in a world.
+"""
 
 from __future__ import annotations
 
@@ -22,16 +24,16 @@ from sim.tracing import lighting
 from sim.tracing.eye_ray import EyeRay
 from sim.tracing.tracer import Buffers, Tracer
 
-SECOND = 3  # seed: of the samples of a second reflection
+SECOND = 3  # seed of the samples for a second reflection
 
 
 @dataclass(frozen=True)
 class KernelInputs:
-    """What a kernel reads of the samples that it looks along, the same at every call.
+    """Inputs of a kernel that are the same in every call.
 
-    lanes: their numbers · sizes: samples of an eye, eyes of a world, and lanes
-    bounces: where light that bounces goes on, four numbers for each sample; None: it is not followed
-    tables: the tracer's
+    lanes: their numbers · sizes: numbers of samples of an eye, of eyes of a world, and of lanes
+    along: directions of the samples · tables: the tracer's
+    bounces: samples for the directions of bounced light, four numbers each; None: it is not followed
     """
 
     lanes: Array
@@ -43,40 +45,44 @@ class KernelInputs:
 
 @dataclass(frozen=True)
 class Frame:
-    """What a kernel reads of all worlds at one moment: their eyes, and what the tracer asks of them."""
+    """Inputs of a kernel for all worlds at one moment: their eyes, and the tracer's rows."""
 
     eyes: Array
     things: Any
 
 
 class Moving:
-    """The buffers that a kernel reads, of a number of worlds: the only inputs that change."""
+    """Buffers of all worlds that a kernel reads: the only inputs that change."""
 
     def __init__(self, eyes: EyeRays, things: Buffers) -> None:
         self._eyes, self._things = eyes, things
 
     def fill(self, poses: Poses) -> None:
-        """With these worlds'."""
+        """Write the eyes and the rows of these worlds."""
         self._eyes.fill(poses)
         self._things.fill(poses)
 
     def frame(self) -> Frame:
-        """On the device."""
+        """Return the inputs on the device."""
         return Frame(self._eyes.array(), self._things.arrays())
 
 
 class RayKernel:
-    """Follows rays. Its body is traced once; only arrays that it is handed may change.
+    """A kernel that follows rays. Its body is traced once; only arrays that are passed to it may change.
 
-    tracer, eyes: which rays, and what they meet · n_envs, n_eyes: of them · depth: layers that light is shared among
+    tracer: intersects rays · eyes: generate rays · n_envs, n_eyes: numbers of worlds and eyes
+    depth: layers among which light is divided
     """
 
     def __init__(self, tracer: Tracer, eyes: EyeRays, n_envs: int, n_eyes: int, depth: DepthLayers) -> None:
         self.tracer, self.eyes, self.n_envs, self.n_eyes, self.depth = tracer, eyes, n_envs, n_eyes, depth
 
     def inputs(self, ways: np.ndarray, bounces: np.ndarray | None = None) -> KernelInputs:
-        """Along these samples (ray, 3) of every eye. Inputs, not constants: eyes of any resolution and field of view,
-        in any number of worlds, share a kernel."""
+        """Return the inputs for these samples (ray, 3) of every eye.
+
+        They are inputs and not constants, so that eyes of any resolution and field of view, in any number of worlds,
+        share a kernel.
+        """
         lanes = self.n_envs * self.n_eyes * len(ways)
         more = None
         if bounces is not None and self.tracer.light == lighting.BOUNCE:
@@ -86,7 +92,7 @@ class RayKernel:
         return KernelInputs(counted(lanes), sizes, self.eyes.directions(ways), self.tracer.inputs, more)
 
     def sums(self, scenes: Any, frame: Frame, inputs: KernelInputs, lanes: int, reduced: int) -> Array:
-        """Sums over so many neighbours among so many lanes, flat (layer, component, world, eye, sum)."""
+        """Return sums over `reduced` neighbours among `lanes` lanes, flat (layer, component, world, eye, sum)."""
         layers = self.layers(scenes, frame, inputs)
         if len(layers) == 1:
             out = layers[0]
@@ -95,11 +101,11 @@ class RayKernel:
             each = dr.gather(mi.UInt32, inputs.sizes, 2)
             for k, value in enumerate(layers):
                 dr.scatter(out, value, inputs.lanes + k * each, mode=dr.ReduceMode.Permute)
-        # One reduction of one array: a reduction per component would trace the rays once per component.
+        # One reduction of one array, because a reduction per component would trace the rays once per component.
         return out if reduced == 1 else dr.block_reduce(dr.ReduceOp.Add, out, reduced)
 
     def layers(self, scenes: Any, frame: Frame, inputs: KernelInputs) -> list[Array]:
-        """Components of the light that comes along each lane's ray, for each depth layer."""
+        """Return the components of the light along each lane's ray, for each depth layer."""
         lane = self.lane(inputs)
         seen, there = self.seen(scenes, frame, inputs, lane)
         bounces = inputs.bounces is not None
@@ -111,14 +117,14 @@ class RayKernel:
         return [component * share for share in shares for component in components]
 
     def seen(self, scenes: Any, frame: Frame, inputs: KernelInputs, lane: Lane) -> tuple[EyeRay, Any]:
-        """A lane's ray, and what its world is."""
+        """Return a lane's ray, and its surroundings."""
         seen = self.eyes.ray(frame.eyes, inputs.along, lane, dr.gather(mi.UInt32, inputs.sizes, 0))
         return seen, self.tracer.around(scenes, frame.things, inputs.tables, lane.world)
 
     @staticmethod
     def lane(inputs: KernelInputs) -> Lane:
-        """Which sample of which eye of which world each lane is."""
-        # Lanes that only fill up a packet read 0, and to divide by that ends the process.
+        """Return the sample, eye and world of each lane."""
+        # Lanes that only fill up a packet read 0, and a division by 0 would end the process.
         samples, eyes = (dr.maximum(dr.gather(mi.UInt32, inputs.sizes, i), 1) for i in range(2))
         row = inputs.lanes // samples
         world = row // eyes
@@ -128,7 +134,7 @@ class RayKernel:
 def launched(
     frozen: Any, scenes: Any, frame: Callable[[], Frame], inputs: KernelInputs, variant_name: str
 ) -> Callable[[], np.ndarray]:
-    """A frozen kernel at work; what is returned waits for it."""
+    """Launch a frozen kernel, and return a function that waits for its output."""
     with variant(variant_name), garbage_kept():
         found = frozen(scenes, frame(), inputs)
     return lambda: _read(found)

@@ -1,10 +1,10 @@
 """Receptor noise for all worlds at once: standard normal numbers by Philox, in one frozen kernel.
 
-A counter-based generator (Salmon et al. 2011) needs no state but a key per world and the number of frames it has drawn,
-so a world's noise depends on its own seed and history alone, whatever its neighbours do.
+A counter-based generator (Salmon et al. 2011) needs only a key per world and the number of drawn frames as its state. A
+world's noise therefore depends on its own seed and history, and not on other worlds.
 
-Images of a single eye get their noise from `optics.eye.photoreceptor`, which counts photons one by one. Both have the
-same mean, variance and third moment.
+Images of a single eye get their noise from `optics.eye.photoreceptor`, which counts photons one by one. Both kinds of
+noise have the same mean, variance and third moment.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from sim.scene.frozen_kernels import garbage_kept
 from sim.scene.variant import variant
 
 PER_DRAW = 4  # normal numbers from one evaluation of Philox4x32
-FEW = 8  # worlds of the narrower kernel that serves a few of them
+FEW = 8  # worlds of the narrower kernel, which serves a few of them
 
 
 class Normals:
@@ -43,34 +43,33 @@ class Normals:
         self._kernels: dict[int, _Kernel] = {}
 
     def restart(self, keys: np.ndarray) -> None:
-        """Draw from the first frame on, under these keys (n,)."""
+        """Start again at the first frame, with these keys (n,)."""
         self._keys, self._frames = keys, np.zeros(len(keys), np.uint32)
 
     @property
     def place(self) -> np.ndarray:
-        """Keys, and frames drawn so far, (n, 2) uint64: where every world's numbers go on."""
+        """Keys and numbers of drawn frames, (n, 2) uint64: the state of every world's generator."""
         return np.stack([self._keys, self._frames.astype(np.uint64)], axis=1)
 
     def go_on_from(self, place: np.ndarray) -> None:
-        """Inverse of `place`."""
+        """Restore the state from `place`."""
         self._keys, self._frames = place[:, 0].astype(np.uint64), place[:, 1].astype(np.uint32)
 
-    def begin(self, worlds: np.ndarray) -> PendingFrame:
-        """Begin to draw the next frame of these worlds, (len(worlds), *shape) float32; it runs beside whatever comes
-        next."""
+    def launch(self, worlds: np.ndarray) -> PendingFrame:
+        """Start drawing the next frame of these worlds, (len(worlds), *shape) float32. It runs asynchronously."""
         n = len(self._keys)
         width = FEW if len(worlds) <= FEW < n else n
         if width not in self._kernels:
             self._kernels[width] = _Kernel(width, self._draws)
         padded = np.resize(worlds, width)
-        drawn = self._kernels[width].begin(
+        drawn = self._kernels[width].launch(
             self._keys[padded], self._frames[padded], lambda parts: self._frame(parts, len(worlds))
         )
         self._frames[worlds] += 1
         return drawn
 
     def _frame(self, parts: list[Array], n: int) -> np.ndarray:
-        """The first n worlds' numbers, out of the kernel's parts, each flat (world, draw)."""
+        """Return the numbers of the first n worlds from the kernel's parts, each flat (world, draw)."""
         drawn = np.empty((n, math.prod(self._shape)), np.float32)
         for k, part in enumerate(parts):
             mine = drawn[:, k * self._draws : (k + 1) * self._draws]
@@ -79,7 +78,7 @@ class Normals:
 
 
 class _Kernel:
-    """Recorded once per width; keys and frame numbers come in buffers of its own."""
+    """A kernel that is recorded once per width, with its own buffers of keys and frame numbers."""
 
     def __init__(self, worlds: int, draws: int) -> None:
         self._slot = FrameSlot()
@@ -99,10 +98,10 @@ class _Kernel:
 
         self._normals: Any = dr.freeze(normals)
 
-    def begin(
+    def launch(
         self, keys: np.ndarray, frames: np.ndarray, frame_of: Callable[[list[Array]], np.ndarray]
     ) -> PendingFrame:
-        """Draw under these keys; frame_of: makes of the device's arrays what is waited for."""
+        """Start drawing with these keys; frame_of: makes the frame's values from the device's arrays."""
 
         def launch() -> Callable[[], np.ndarray]:
             self._keys.values[:], self._frames.values[:] = keys, frames
@@ -110,23 +109,23 @@ class _Kernel:
                 parts = self._normals(self._keys.array, self._frames.array, self._lanes)
             return lambda: frame_of(parts)
 
-        return self._slot.begin(launch)
+        return self._slot.launch(launch)
 
 
 @dataclass(frozen=True)
 class NoiseModel:
-    """How noisy a signal s is: variance V = σ² + s / N, N the photons that a signal of 1 stands for.
+    """The noise of a signal s: variance V = σ² + s / N, with N the number of photons for a signal of 1.
 
     sigma: standard deviation of the Gaussian part
-    photons: N, to be broadcast against signals (..., channel, h, w); None: no shot noise
+    photons: N, broadcast against signals (..., channel, h, w); None: no shot noise
     """
 
     sigma: float
     photons: np.ndarray | None = None
 
     @classmethod
-    def of(cls, eye: optics.Eye) -> NoiseModel | None:
-        """An eye's; None without any noise."""
+    def from_eye(cls, eye: optics.Eye) -> NoiseModel | None:
+        """Return the noise of an eye; None if it has no noise."""
         photons = eye.photons
         if photons is None:
             return cls(eye.noise_sigma) if eye.noise_sigma > 0 else None
@@ -135,15 +134,15 @@ class NoiseModel:
         return cls(eye.noise_sigma, spread.astype(np.float32))
 
     def largest(self, brightest: float) -> float:
-        """Standard deviation where a signal is twice the brightest."""
+        """Return the standard deviation of a signal that is twice the brightest."""
         shot = 0.0 if self.photons is None else 2 * brightest / float(self.photons.min())
         return math.sqrt(self.sigma**2 + shot)
 
     def __call__(self, signals: np.ndarray, normals: np.ndarray) -> np.ndarray:
-        """Noisy signals (n, ...) from standard normal numbers z of the same shape, which are used up.
+        """Return noisy signals (n, ...) from standard normal numbers z of the same shape, which may be overwritten.
 
-        Shot noise is Poisson's to its third moment: s + √V z + s/N² (z² - 1) / 6V (Cornish & Fisher 1938), which
-        matters below a hundred photons.
+        Shot noise agrees with the Poisson distribution up to the third moment: s + √V z + s/N² (z² - 1) / 6V (Cornish &
+        Fisher 1938). The third moment matters below a hundred photons.
         """
         if self.photons is None:
             normals *= np.float32(self.sigma)

@@ -1,6 +1,6 @@
-"""The slow way to see, which the fast one is held against: Mitsuba's own integrators and optics' own convolution.
+"""A slow reference for the fast renderer: Mitsuba's own integrators, and the convolution of `optics`.
 
-Shares with the batched renderer the world's model and the eyes' places, and nothing of how light is found.
+It shares the world's model and the eyes' places with the batched renderer, but none of the computation of light.
 """
 
 from __future__ import annotations
@@ -24,19 +24,19 @@ from sim.worlds.world import World
 
 
 class ReferenceRenderer:
-    """Sees worlds one eye at a time: a path-traced picture of the tangent plane, then `Eye.see`.
+    """A renderer of one eye at a time: a path-traced image on the tangent plane, then `Eye.see`.
 
     world, eyes: as in `sim.BatchedRenderer`
-    integrator: of Mitsuba: "path", "direct", or its description, {"type": "path", "max_depth": 3}
-    spp: samples per cell of a picture
-    samples_per_receptor: cells along a receptor's side; None: 4 behind a pupil, more where rhabdoms are narrow, 1 for
-        the perfect lens (pixels)
+    integrator: of Mitsuba: "path", "direct", or a description, {"type": "path", "max_depth": 3}
+    spp: samples per cell of an image
+    samples_per_receptor: cells along a receptor's side; None: 4 behind a pupil, more for narrow rhabdoms, 1 for the
+        perfect lens (pixels)
     depths: nearest and farthest distance [m] between which the PSF follows the scene's depth; None: all light is
-        blurred as if from infinity
-    depth_layers: kernels between them, or "auto"
+        blurred like light from infinity
+    depth_layers: number of kernels between these distances, or "auto"
     sampler: of Mitsuba: "multijitter" for less noise
-    variant: of Mitsuba, spectral, the device's if None; scalar_spectral runs without LLVM
-    seed: of the samples; may be changed between pictures
+    variant: spectral variant of Mitsuba; None: the device's; scalar_spectral runs without LLVM
+    seed: of the samples; may be changed between images
 
     Raises:
         ValueError: a bad argument.
@@ -73,22 +73,22 @@ class ReferenceRenderer:
 
     @property
     def shape(self) -> tuple[int, int]:
-        """Cells (Y, X) of a picture: all that any receptor sees."""
+        """Cells (Y, X) of an image, which covers the fields of all receptors."""
         reach = max(kernel.shape[-1] // 2 for kernel in self.sight.kernels.values())
         height, width = (n * self.samples_per_receptor + 2 * reach for n in self.eye.resolution)
         return height, width
 
     def pictures(self, state: WorldState) -> np.ndarray:
-        """Spectral radiance on the tangent plane, (env, eye, band, Y, X)."""
+        """Return the spectral radiance on the tangent plane, (env, eye, band, Y, X)."""
         return np.array([[self._picture(view) for view in self._views(state, i)] for i in range(state.n)])
 
     def radiance(self, state: WorldState) -> np.ndarray:
-        """The same in the batched renderer's shape, (env, eye, ray, band): a picture's cells, row by row."""
+        """Return the same in the batched renderer's shape, (env, eye, ray, band): an image's cells, row by row."""
         pictures = self.pictures(state)
         return np.moveaxis(pictures.reshape(*pictures.shape[:3], -1), 2, 3)
 
     def signals(self, state: WorldState) -> np.ndarray:
-        """Noise-free photoreceptor signals, (env, eye, channel, height, width) float32."""
+        """Return noise-free photoreceptor signals, (env, eye, channel, height, width) float32."""
         return np.array([[self._signals(view) for view in self._views(state, i)] for i in range(state.n)])
 
     def _signals(self, view: Viewpoint) -> np.ndarray:
@@ -107,7 +107,7 @@ class ReferenceRenderer:
         )
 
     def _views(self, state: WorldState, index: int) -> list[Viewpoint]:
-        """Every eye's view of one world, in which everything is put where the state has it."""
+        """Return every eye's view of one world, after moving all bodies to their places in the state."""
         pose(self._data, self.world, state, index)
         self._mirror.sync(self._data)
         azimuths = self.eyes.azimuths()

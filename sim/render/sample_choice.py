@@ -1,4 +1,4 @@
-"""How many samples a receptor wants, and of which kind: rays, or areas where a world has closed forms for them."""
+"""Choice of the number and kind of samples per receptor: rays, or areas in worlds with closed forms for them."""
 
 from __future__ import annotations
 
@@ -14,23 +14,23 @@ from sim.render.fidelity_stages import CAUTION
 from sim.render.fidelity_trials import FidelityTrials
 from sim.tracing.lighting import ALL, BOUNCE
 
-# Numbers of rays that are tried: steps of about √2, so that hardly more are traced than are needed.
+# Numbers of rays that are tried, in steps of about √2, so that few more rays are traced than needed.
 PERFECT_LENS_RAYS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128, 192, 256)
 PUPIL_RAYS = (*(2.0**k * (1 + half / 2) for k in range(-4, 6) for half in (0, 1)), 64.0)
-FEW_RAYS = 1  # for each receptor, behind a pupil: where so few do, areas are not tried
+FEW_RAYS = 1  # per receptor, behind a pupil: if this number is enough, areas are not tried
 NUMBERS_OF_AREAS = (1, 2, 4, 6, 9, 12, 16, 20, 25, 30)
-SHARED_AREAS = (4 / 9, 1 / 4, 1 / 9)  # of several receptors: 1.5, two and three of them wide
-# What an area costs, in rays (docs/measurements/rendering.md); where fewer will do, they are taken. Behind a pupil its
-# light is spread by the kernel, which rays pay for, too.
+SHARED_AREAS = (4 / 9, 1 / 4, 1 / 9)  # shared by several receptors: 1.5, two and three receptors wide
+# Cost of an area in rays (docs/measurements/rendering.md). If fewer rays than this are enough, rays are taken. Behind a
+# pupil the difference is smaller, because the kernel spreads the light of either among receptors.
 PERFECT_LENS_AREA, PUPIL_AREA = 3, 1.6
-PUPIL_AREA_IN_ALL_LIGHT = 2  # in rays with a bounce
-HARDLY_MORE = 1.1  # times an error that cannot be lessened: not worth several times the samples
+PUPIL_AREA_IN_ALL_LIGHT = 2  # cost in rays with a bounce
+HARDLY_MORE = 1.1  # times the smallest error: going below this is not worth several times the samples
 
 
 def fewest_samples(trials: FidelityTrials, sampling: EyeSampling, light: Level, allowed: Allowed) -> Samples:
-    """The cheapest that err by no more than allowed; the best there are where none do.
+    """Return the cheapest samples whose error is allowed, or the most accurate samples if there are none.
 
-    light: what rays would follow of it
+    light: the light that rays would follow
     """
     errors = cache(trials.errors(sampling, light.level))
     perfect = isinstance(sampling, BoxSampling)
@@ -62,21 +62,21 @@ def _areas(
     shared: tuple[float, ...],
     allowed: Allowed,
 ) -> Samples | None:
-    """None where they cannot see the world.
+    """Return the fewest areas whose error is allowed, or None if area sampling is not possible in the world.
 
-    shared: numbers below one, falling, to be tried where one is enough
+    shared: numbers below one, in decreasing order, that are tried if one is enough
     """
     if not trials.have_areas(*((BOUNCE, ALL) if light.level == BOUNCE else (light.level,))):
         return None
     errors, most = trials.area_errors(sampling, light.level), allowed.error
     if light.level == BOUNCE:
         more, most = trials.reflected_more_often(sampling), allowed.without_light
-        light = Level("light", ALL, None, f"light that is reflected more than twice is worth {more:.1e}; in tables")
+        light = Level("light", ALL, None, f"light that is reflected more than twice adds {more:.1e}; it is in tables")
     found = _fewest(errors, NUMBERS_OF_AREAS, most, AREAS)
     for number in shared if found[2] and found[0] == 1 else ():
         if (predicted := CAUTION * errors(number)) > most:
             break
-        why = f"receptors share them: one for each is more than enough for {most:.1e}"
+        why = f"receptors share areas: one per receptor is more than enough for {most:.1e}"
         found = number, Level(AREAS, f"{number:.3g} per receptor", predicted, why), True
     return Samples(AREAS, light, *found)
 
@@ -84,9 +84,11 @@ def _areas(
 def _fewest(
     error: Callable[[float], float], numbers: tuple[float, ...], allowed: float, kind: str
 ) -> tuple[float, Level, bool]:
-    """The lowest of these numbers of samples whose error fits; where none does, the lowest that errs by hardly more
-    than any. Errors fall no faster than 1/n: numbers that could not do by that are left out. With its level, and
-    whether it is enough."""
+    """Return the lowest number of samples whose error is allowed, its level, and whether it is accurate enough.
+
+    If no error is allowed, it is the lowest number whose error is close to the smallest. Errors are assumed to fall at
+    most like 1/n, and numbers that would be too low by this rule are skipped.
+    """
     at = 0
     tried: dict[float, float] = {}
     while True:
@@ -101,6 +103,6 @@ def _fewest(
         at = next((i for i in range(at + 1, len(numbers)) if numbers[i] >= least), len(numbers) - 1)
     enough = predicted <= allowed
     number = numbers[at] if enough else next(n for n, e in tried.items() if e <= HARDLY_MORE * min(tried.values()))
-    found = "fewest of" if enough else "not enough, but hardly worse than any of"
+    found = "fewest of" if enough else "not enough, but close to the best of"
     why = f"{found} {numbers[0]:g} ... {numbers[-1]:g} for {allowed:.1e}, {len(tried)} tried"
     return number, Level(kind, f"{number:g} per receptor", tried[number], why), enough

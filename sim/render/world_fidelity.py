@@ -1,4 +1,4 @@
-"""How finely a world of rhabdom's is rendered for given eyes, tried out at random views of it."""
+"""Choice of a fidelity for a built-in world and given eyes, from trials in random views."""
 
 from __future__ import annotations
 
@@ -16,22 +16,24 @@ from sim.render.sample_choice import fewest_samples
 from sim.render.world_scene import WorldScene
 from sim.worlds.world import World
 
-SHARES = Shares(bands=0.35, depth=0.35, light=0.5)  # chosen; 0.71 of the tolerance is left to samples
+SHARES = Shares(bands=0.35, depth=0.35, light=0.5)  # chosen; 0.71 of the tolerance is left for samples
 
 
 def choose_fidelity(
     world: World, eyes: Eyes, tolerance: float | None = None, *, bands: str = "auto", tracer: str = "auto"
 ) -> Fidelity:
-    """The cheapest fidelity whose predicted error is within the tolerance; a FidelityWarning says where there is none.
+    """Return the cheapest fidelity whose predicted error is within the tolerance.
 
-    tolerance: of a receptor's signal (root mean square), over all receptors and over those that see an object near;
-        None: half of the receptors' noise, but no less than LEAST_TOLERANCE of what white is worth behind the eyes'
-        pupil.
-    bands: "auto": as few as scenes of any colours want; "own": the eyes' own, as environments have them
-    tracer: by which it is tried, see `sim.BatchedRenderer`
+    A FidelityWarning states by how much the tolerance is exceeded if there is none.
+
+    tolerance: of a receptor's signal (root mean square), over all receptors and over receptors that see a nearby
+        object; None: half of the receptors' noise, but at least LEAST_TOLERANCE of the signal of white behind the
+        eyes' pupil
+    bands: "auto": the fewest for scenes of any colours; "own": the eyes' own, as in environments
+    tracer: of the trials, see `sim.BatchedRenderer`
 
     Raises:
-        ValueError: a tolerance that is not positive, unknown bands, and what BatchedRenderer raises for such a world.
+        ValueError: a tolerance that is not positive, unknown bands, or a world that BatchedRenderer refuses.
     """
     of_kind("world", world, World, "sim.build_world('detection')")
     of_kind("eyes", eyes, Eyes, "sim.Eyes(n_eyes=2)")
@@ -46,7 +48,7 @@ def choose_fidelity(
 
 
 def chosen_fidelity(scene: WorldScene, tolerance: float | None = None) -> Fidelity:
-    """Choose as `choose_fidelity` does, for a prepared scene with its own bands."""
+    """Return the same as `choose_fidelity`, for a prepared scene with its own bands."""
     return cheapest(WorldStages(scene, tolerance))
 
 

@@ -1,4 +1,4 @@
-"""A built-in world made ready for its agents' eyes."""
+"""A built-in world, prepared for its agents' eyes."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from sim.tracing.eye_places import LevelStand
 from sim.worlds.state import WorldState
 from sim.worlds.world import World
 
-OUTSIDE = 1e-6  # of the radius: how far above the skin free eyes are, so that rounding does not put them below
+OUTSIDE = 1e-6  # height of free eyes above the skin [radii], so that rounding does not move them below it
 
 
 class WorldScene(PreparedScene):
     """A world and the eyes of every agent in it.
 
     world: geometry, materials and lights
-    eyes: of every agent; with their own bands
-    tracer: which way rays are traced, see `sim.BatchedRenderer`
+    eyes: of every agent, with their own bands
+    tracer: method of tracing rays, see `sim.BatchedRenderer`
 
     Raises:
         ValueError: a world or a tracer that `sim.BatchedRenderer` refuses.
@@ -40,16 +40,16 @@ class WorldScene(PreparedScene):
         self._turns = self._reference.poses.xmat[0, bodies]
 
     def placed(self, poses: Placed | WorldState) -> Poses:
-        """Where everything is, as arrays; of a state, too."""
+        """Return the poses as arrays; also accepts a state."""
         return self.poses(poses) if isinstance(poses, WorldState) else super().placed(poses)
 
     def poses(self, state: WorldState) -> MovedBodies:
-        """Where everything is in these worlds."""
+        """Return the poses of a state's worlds."""
         return self.poses_at(state.position, state.heading, state.objects)
 
     def poses_at(self, position: np.ndarray, heading: np.ndarray, objects: np.ndarray) -> MovedBodies:
-        """Where everything is if agents are here (world, 2) [m], look there (world,) [rad], and objects' centres are
-        here (world, object, 3) [m]."""
+        """Return the poses for agents' positions (world, 2) [m] and headings (world,) [rad], and objects' centres
+        (world, object, 3) [m]."""
         positions = np.empty((len(position), 1 + len(self.world.objects), 3))
         positions[:, 0, :2], positions[:, 0, 2], positions[:, 1:] = position, EYE_HEIGHT, objects
         rotations = np.repeat(self._turns[None].reshape(1, -1, 3, 3), len(position), axis=0)

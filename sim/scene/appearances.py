@@ -1,7 +1,8 @@
-"""How geoms may look: each in one way, or in one for each material that a world may draw for it.
+"""Appearances of geoms: one for each geom, or one for each material that a world may draw for it.
 
-Every look is built as if the model had it, texture, mapping and glow, and is a mover of its own; a world has one of a
-geom's. So worlds that draw materials are one kernel, and what has one look costs nothing for it.
+Every appearance is built as if the model had this material, including texture, mapping and glow. Each one is a separate
+mover, and a world shows one of a geom's appearances. Worlds that draw different materials therefore share one kernel,
+without extra cost for geoms with a single appearance.
 """
 
 from __future__ import annotations
@@ -16,13 +17,18 @@ from optics.numerics.arguments import did_you_mean
 from sim.scene import surfaces
 from sim.scene.spectra import Spectra, of_geom
 
-# Names of geoms that differ from world to world, and, where these are drawn, of the materials that one may have.
+# Names of geoms that differ from world to world, optionally with the names of the materials that may be drawn for them.
 Varied = Sequence[str] | Mapping[str, Sequence[str]]
 
 
 @dataclass(frozen=True, eq=False)
 class Appearance:
-    """geom: its id · model: in which it looks so · drawn: whether it is one of several materials'"""
+    """One appearance of a geom.
+
+    geom: id of the geom
+    model: a model in which the geom has this appearance
+    drawn: True if it is one of several materials' appearances
+    """
 
     geom: int
     model: mujoco.MjModel
@@ -30,19 +36,19 @@ class Appearance:
 
     @property
     def material(self) -> int:
-        """Its id; -1: none."""
+        """Id of its material; -1: none."""
         return int(self.model.geom_matid[self.geom])
 
     @property
     def alpha(self) -> float:
-        """How opaque it is."""
+        """Opacity."""
         return float(surfaces.rgba(self.model, self.geom)[3])
 
 
 def appearances_of(
     model: mujoco.MjModel, geoms: Sequence[int], materials: Mapping[int, Sequence[int]]
 ) -> list[Appearance]:
-    """All that are seen of these geoms; materials: ids of those that are drawn, by geom."""
+    """Return all visible appearances of these geoms; materials: ids of the materials that may be drawn, by geom."""
     found = []
     for geom in geoms:
         if geom in materials:
@@ -54,24 +60,24 @@ def appearances_of(
 
 
 def in_material(model: mujoco.MjModel, geom: int, material: int) -> Appearance:
-    """As a geom looks in one of the model's materials."""
+    """Return the appearance of a geom in one of the model's materials."""
     changed = copy.copy(model)
     changed.geom_matid[geom] = material
     return Appearance(geom, changed, drawn=True)
 
 
 def in_white(model: mujoco.MjModel, geom: int) -> mujoco.MjModel:
-    """The model in which a geom is white, but for its texture."""
+    """Return a model in which a geom is white, except for its texture."""
     changed = copy.copy(model)
     changed.geom_rgba[geom, :3] = 1
     return changed
 
 
 def material_of(model: mujoco.MjModel, material: str, where: str) -> int:
-    """Its id.
+    """Return the id of a material.
 
     Raises:
-        ValueError: there is none; where: who asks.
+        ValueError: the model has none of this name; the message begins with `where`.
     """
     found = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_MATERIAL, material)
     if found < 0:
@@ -84,10 +90,11 @@ def material_of(model: mujoco.MjModel, material: str, where: str) -> int:
 def varied_geoms(
     model: mujoco.MjModel, seen: Sequence[int], varied: Varied, spectra: Spectra
 ) -> dict[int, tuple[int, ...]]:
-    """Those that differ from world to world, and ids of the materials that they may have; none: size or colour differs.
+    """Return the geoms that differ from world to world, with the ids of the materials that they may have; no ids: size
+    or colour differs.
 
     Raises:
-        ValueError: there is none of that name to be seen, no such material, or a reflectance is measured.
+        ValueError: no visible geom or no material of this name, or the reflectance is measured.
     """
     known = {model.geom(g).name: g for g in seen if model.geom(g).name}
     found = {}

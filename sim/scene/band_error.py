@@ -1,4 +1,4 @@
-"""What a few bands make of measured colours and lamps."""
+"""Errors of measured colours and lamps in a few spectral bands."""
 
 from __future__ import annotations
 
@@ -15,13 +15,17 @@ from sim.scene.spectra import Spectra
 __all__ = ["band_error", "lights_in_bands", "measured"]
 
 FINE_BANDS = 64
-LEAST_MISS = 1e-3  # of white in daylight: what a type may catch too much or too little of a lamp without a word
+LEAST_MISS = 1e-3  # of white in daylight: largest error of a type's quantum catch from a lamp that causes no warning
 
 
 def lights_in_bands(model: mujoco.MjModel, spectra: Spectra, eye: Eye) -> tuple[Spectra, list[str]]:
-    """Measured spectra as this eye's bands have them: lights are, at the bands' centres, worth what each type of
-    receptor catches of them in white (`SpectralBands.of`), and not what their lines leave there by chance; materials
-    are as they were. And, in words, lights of which so few bands give a type another catch."""
+    """Return measured spectra as sampled by this eye's bands, and messages about lights with inaccurate quantum
+    catches.
+
+    The values of lights at the bands' centres are chosen such that each receptor type has the correct quantum catch
+    from white (`SpectralBands.band_values`). Sampling spectral lines at the centres would depend on chance. Spectra of
+    materials are unchanged. A message names each light for which the bands give a type another quantum catch.
+    """
     materials = {model.material(i).name for i in range(model.nmat)}
     found, off = dict(spectra), []
     for name, light in spectra.items():
@@ -33,30 +37,32 @@ def lights_in_bands(model: mujoco.MjModel, spectra: Spectra, eye: Eye) -> tuple[
 
 def _in_bands(name: str, light: Spectrum, eye: Eye) -> tuple[Spectrum, list[str]]:
     bands = eye.spectral_bands
-    found = bands.of(light, eye.receptors, nonnegative=True)
+    found = bands.band_values(light, eye.receptors, nonnegative=True)
     fine = SpectralBands.uniform(FINE_BANDS, eye.receptors)
-    caught, due = bands.weights @ found, fine.weights @ fine.of(light, eye.receptors)
+    caught, due = bands.weights @ found, fine.weights @ fine.band_values(light, eye.receptors)
     worst = int(np.argmax(np.abs(caught - due)))
     words = (
-        f"{name!r} in {len(found)} bands: receptor type {worst} catches {caught[worst]:.2g} of it, should catch "
-        f"{due[worst]:.2g} (white in daylight: 1); more bands are nearer"
+        f"{name!r} in {len(found)} bands: receptor type {worst} catches {caught[worst]:.2g} of it, but should "
+        f"catch {due[worst]:.2g} (white in daylight: 1); more bands reduce the error"
     )
     off = abs(caught[worst] - due[worst]) > LEAST_MISS
     return Spectrum(tuple(bands.wavelengths * 1e9), tuple(found)), [words] if off else []
 
 
 def measured(model: mujoco.MjModel, spectra: Spectra) -> list[Spectrum]:
-    """Reflectances of a model's materials, of those that have a spectrum instead of a colour."""
+    """Return the spectra of the model's materials that have a spectrum instead of a colour."""
     names = {model.material(i).name for i in range(model.nmat)}
     return [spectrum for name, spectrum in spectra.items() if name in names]
 
 
 def band_error(reflectances: Iterable[Spectrum], receptors: Any, bands: int) -> float:
-    """What so many bands make of these reflectances in daylight, against 64: the worst difference over reflectances
-    and types of receptor, white being 1. Blur that differs from band to band is not in it. 0 without reflectances.
+    """Return the error of these reflectances in daylight with this number of bands, compared with 64 bands.
+
+    It is the largest difference over reflectances and receptor types, relative to white; 0 without reflectances. It
+    does not include blur that differs from band to band.
 
     Raises:
-        ValueError: receptors that `optics.receptors_of` does not know, or bands out of its range.
+        ValueError: receptors that `optics.receptors_of` does not accept, or bands out of its range.
     """
     few, many = (SpectralBands.uniform(n, receptors_of(receptors)) for n in (bands, FINE_BANDS))
     return max((float(np.abs(_signals(few, one) - _signals(many, one)).max()) for one in reflectances), default=0.0)

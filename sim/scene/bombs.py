@@ -1,7 +1,7 @@
-"""Models that would fill the memory, or stand nowhere: found before they are built, and named.
+"""Checks for models that would exhaust the memory or that contain values that are not finite, before they are built.
 
-A few lines of MJCF can ask for a million copies. What the text asks for is counted before MuJoCo compiles it, what a
-compiled model holds before Mitsuba gets it. Files that a file includes are counted, too.
+A few lines of MJCF can request a million copies. The elements of the text are counted before MuJoCo compiles it, and
+the elements of a compiled model before Mitsuba receives it. Included files count, too.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ import numpy as np
 
 __all__ = ["require_finite", "require_modest", "require_modest_file"]
 
-MOST_COPIES = 20_000  # bodies, geoms and sites; the largest model that was mirrored has some hundred
-MOST_CELLS = 4096**2  # of a height field
+MOST_COPIES = 20_000  # bodies, geoms and sites; the largest model mirrored so far has a few hundred
+MOST_CELLS = 4096**2  # limit for the cells of a height field
 PLACES = (
     "geom_pos",
     "geom_quat",
@@ -28,15 +28,15 @@ PLACES = (
     "light_pos",
     "light_dir",
 )
-FOLDERS = ("assetdir", "meshdir", "texturedir")  # of a compiler element
+FOLDERS = ("assetdir", "meshdir", "texturedir")  # attributes of a compiler element
 OWNERS = {"geom": "geom", "body": "body", "mat": "material", "light": "light"}
 
 
 def require_modest(text: str, name: str) -> None:
-    """Refuse MJCF that asks for more than a machine holds; text that is no XML is MuJoCo's to refuse.
+    """Refuse MJCF that exceeds the memory of a computer. Text that is not XML is left for MuJoCo to refuse.
 
     Raises:
-        ValueError: one line that names what there is too much of.
+        ValueError: one line that names the elements that are too many.
     """
     try:
         root = ElementTree.fromstring(text)
@@ -53,11 +53,11 @@ def require_modest(text: str, name: str) -> None:
 
 
 def require_modest_file(path: Path, name: str, seen: frozenset[Path] = frozenset()) -> None:
-    """The same of a file and of all that it includes; every file that it names has to be one, where it is there at
-    all: MuJoCo would wait for a pipe for ever.
+    """Check a file, and all files that it includes, in the same way. Every file that it names must be a regular file if
+    it exists, since MuJoCo would wait for a pipe forever.
 
     Raises:
-        ValueError: one line that names what there is too much of, or what is no file.
+        ValueError: one line that names the elements that are too many, or the irregular file.
     """
     text = path.read_text(encoding="utf-8", errors="replace")
     require_modest(text, name)
@@ -77,10 +77,10 @@ def require_modest_file(path: Path, name: str, seen: frozenset[Path] = frozenset
 
 
 def require_finite(model: mujoco.MjModel, name: str) -> None:
-    """Refuse a model with a place, size or colour that is no number.
+    """Refuse a model with a position, size or colour that is not finite.
 
     Raises:
-        ValueError: one line that names the thing.
+        ValueError: one line that names the element.
     """
     for key in PLACES:
         wrong = ~np.isfinite(getattr(model, key)).all(axis=1)
@@ -94,13 +94,13 @@ def require_finite(model: mujoco.MjModel, name: str) -> None:
 
 
 def _copies(element: ElementTree.Element) -> float:
-    """Elements that there are once everything in `replicate` is copied."""
+    """Return the number of elements after all `replicate` elements are expanded."""
     inside = sum(_copies(child) for child in element)
     return (_count(element.get("count")) * inside if element.tag == "replicate" else inside) + 1
 
 
 def _count(text: str | None) -> float:
-    """A number from an attribute; what is none is MuJoCo's to refuse."""
+    """Return the number in an attribute; anything else is left for MuJoCo to refuse."""
     try:
         number = float(text or 0)
     except ValueError:

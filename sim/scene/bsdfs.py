@@ -1,10 +1,10 @@
-"""Materials as Mitsuba BSDFs. A surface is Lambertian unless its material asks for more:
+"""Materials as Mitsuba BSDFs. A surface is Lambertian unless its material has one of these properties:
 
-- specular > 0: under a rough dielectric coat, of reflectance 0.08 specular at normal incidence (0.5 is glass of index
-  1.5; Burley 2012) and of Beckmann roughness √(2 / (n + 2)) for the exponent n = 128 shininess (Walter et al. 2007).
-  specular = shininess = 0.5 is how MuJoCo's compiler says that neither was set: Lambertian.
+- specular > 0: a rough dielectric coat, with reflectance 0.08 specular at normal incidence (0.5 is glass of index 1.5;
+Burley 2012) and Beckmann roughness √(2 / (n + 2)) for the exponent n = 128 shininess (Walter et al. 2007). specular =
+shininess = 0.5 are the defaults of MuJoCo's compiler for unset values: Lambertian.
 - metallic or roughness set: Burley's principled BSDF.
-- reflectance, on planes and on top of boxes as in MuJoCo: that share of the light is reflected as by a mirror.
+- reflectance, on planes and on top of boxes as in MuJoCo: this share of the light is reflected as by a mirror.
 """
 
 from __future__ import annotations
@@ -22,18 +22,19 @@ from sim.scene.variant import Description, MitsubaObject
 
 _TYPES = mujoco.mjtGeom
 _UNSET_GLOSS = (0.5, 0.5)  # specular, shininess
-# Roughness of mirrors: an image blurred by 0.2°. Mitsuba 3.9.1 weighs a perfect mirror in a `blendbsdf` wrongly.
+# Roughness of mirrors: an image blurred by 0.2°. In a `blendbsdf`, Mitsuba 3.9.1 assigns a wrong weight to a perfect
+# mirror.
 _SILVER = 0.003
-_OPAQUE = 0.995  # MuJoCo calls what is below transparent
+_OPAQUE = 0.995  # MuJoCo treats lower alpha as transparent
 
 
 def is_open(model: mujoco.MjModel, geom: int) -> bool:
-    """Whether the inner side of a geom's surface can be seen."""
+    """Return whether the inner side of a geom's surface can be visible."""
     return surfaces.geom_type(model, geom) in (_TYPES.mjGEOM_PLANE, _TYPES.mjGEOM_MESH, _TYPES.mjGEOM_SDF)
 
 
 def mirror_share(model: mujoco.MjModel, geom: int) -> float:
-    """Share of the light that a geom's plane, or a box's top, reflects as a mirror does."""
+    """Return the share of the light that a plane or the top of a box reflects as a mirror."""
     material = model.geom_matid[geom]
     flat = surfaces.geom_type(model, geom) in (_TYPES.mjGEOM_PLANE, _TYPES.mjGEOM_BOX)
     if material < 0 or not flat or surfaces.rgba(model, geom)[3] < _OPAQUE:
@@ -48,10 +49,12 @@ def bsdf(
     measured: Spectrum | None = None,
     mirrors: bool = True,
 ) -> MitsubaObject:
-    """A geom's BSDF (a Mitsuba object of the variant in force): both sides of planes and meshes, which may be open;
-    see-through by its rgba's alpha.
+    """Return a geom's BSDF (a Mitsuba object of the variant in force).
 
-    measured: a reflectance that takes the place of its colour. mirrors: whether its mirror share counts.
+    It is two-sided for planes and meshes, which may be open, and transparent according to the alpha of the geom's rgba.
+
+    measured: a reflectance that replaces the geom's colour
+    mirrors: whether the mirror share of the material is included
     """
     if measured is None:
         description = _matter(model, geom, surfaces.reflectance_texture(model, geom, to_uv))
@@ -72,7 +75,7 @@ def bsdf(
 def matt(
     model: mujoco.MjModel, geom: int, to_uv: np.ndarray | None = None, measured: Spectrum | None = None
 ) -> MitsubaObject:
-    """The Lambertian, opaque part of it, of both sides."""
+    """Return the Lambertian, opaque part of a geom's BSDF, two-sided."""
     if measured is None:
         color = surfaces.reflectance_texture(model, geom, to_uv)
         description: Description = {"type": "diffuse", "reflectance": color}
@@ -82,7 +85,7 @@ def matt(
 
 
 def matt_white(model: mujoco.MjModel, geom: int, to_uv: np.ndarray | None = None) -> MitsubaObject:
-    """Lambertian, opaque and white on both sides, but for its texture."""
+    """Return a Lambertian, opaque, two-sided BSDF that is white except for the geom's texture."""
     texture = surfaces.texture_id(model, geom)
     color: Description = {"type": "uniform", "value": 1.0}
     if texture >= 0 and surfaces.is_mirrored(model, geom, texture):
@@ -91,7 +94,7 @@ def matt_white(model: mujoco.MjModel, geom: int, to_uv: np.ndarray | None = None
 
 
 def has_gloss(model: mujoco.MjModel, material: int) -> bool:
-    """Whether a material asks for more than a Lambertian surface."""
+    """Return whether a material is more than Lambertian."""
     if model.mat_metallic[material] >= 0 or model.mat_roughness[material] >= 0:
         return True
     specular, shininess = float(model.mat_specular[material]), float(model.mat_shininess[material])
@@ -103,7 +106,7 @@ def _diffuse(model: mujoco.MjModel, geom: int, color: Description) -> Descriptio
 
 
 def _matter(model: mujoco.MjModel, geom: int, color: Description) -> Description:
-    """Mitsuba BSDF of a geom's material in a colour (a Mitsuba texture)."""
+    """Return the Mitsuba BSDF of a geom's material with this colour (a Mitsuba texture)."""
     material = model.geom_matid[geom]
     if material < 0 or not has_gloss(model, material):
         return _diffuse(model, geom, color)
@@ -130,7 +133,7 @@ def _measured(
     spectrum: Spectrum,
     matter: Callable[[mujoco.MjModel, int, Description], Description],
 ) -> Description:
-    """Mitsuba BSDF of a measured reflectance, multiplied by the geom's texture if it has one."""
+    """Return the Mitsuba BSDF of a measured reflectance, multiplied by the geom's texture if it has one."""
     whole = matter(model, geom, spectra.described(spectrum))
     texture = surfaces.texture_id(model, geom)
     if texture < 0 or not surfaces.is_mirrored(model, geom, texture):
@@ -138,10 +141,10 @@ def _measured(
     pixels = surfaces.image(model, texture)
     if np.ptp(pixels, axis=2).max() > 0:
         name = model.material(int(model.geom_matid[geom])).name
-        raise ValueError(f"spectra: material {name!r} has a coloured texture: must be grey beside a spectrum")
+        raise ValueError(f"spectra: material {name!r} has a coloured texture: must be grey with a spectrum")
     is_linear = model.tex_colorspace[texture] == mujoco.mjtColorSpace.mjCOLORSPACE_LINEAR
     share = pixels[..., :1] if is_linear else decode_srgb(pixels[..., :1])
-    # Mitsuba multiplies no textures: black and the whole reflectance are mixed instead, pixel by pixel.
+    # Mitsuba cannot multiply textures. Instead, black and the full reflectance are blended, with the texture as weight.
     black = matter(model, geom, {"type": "uniform", "value": 0.0})
     weight = surfaces.bitmap(share, to_uv) | {"raw": True}
     return {"type": "blendbsdf", "weight": weight, "bsdf_0": black, "bsdf_1": whole}

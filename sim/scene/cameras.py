@@ -1,7 +1,7 @@
-"""MuJoCo's cameras as Mitsuba sensors, and viewpoints of one's own.
+"""MuJoCo's cameras as Mitsuba sensors, and user-defined viewpoints.
 
-A MuJoCo camera looks along its -z with x to the right; a Mitsuba sensor looks along +z with x to the left: its
-to_world is the camera's rotation times diag(-1, 1, -1).
+A MuJoCo camera looks along its -z with x to the right. A Mitsuba sensor looks along +z with x to the left. Its to_world
+is therefore the camera's rotation times diag(-1, 1, -1).
 """
 
 from __future__ import annotations
@@ -13,14 +13,18 @@ import mitsuba as mi
 import mujoco
 import numpy as np
 
+from sim.scene.pose_snapshot import PoseSnapshot
 from sim.scene.variant import MitsubaObject
-from sim.scene.whereabouts import Whereabouts
 
 
 @dataclass(frozen=True)
 class Viewpoint:
-    """A pinhole camera: position (3,) [m], rotation (3, 3) in MuJoCo's camera frame (x right, y up, looking along
-    -z), vertical field of view."""
+    """A pinhole camera.
+
+    position: (3,) [m]
+    rotation: (3, 3), in MuJoCo's camera frame (x right, y up, looking along -z)
+    fovy_deg: vertical field of view [deg]
+    """
 
     position: np.ndarray
     rotation: np.ndarray
@@ -28,7 +32,7 @@ class Viewpoint:
 
     @staticmethod
     def looking_at(origin: np.ndarray, target: np.ndarray, fovy_deg: float = 45.0) -> Viewpoint:
-        """From `origin` to `target` [m], z up (y up where one looks straight up or down)."""
+        """Return a viewpoint at `origin` that looks at `target` [m], with z up (y up if the direction is vertical)."""
         back = np.asarray(origin, float) - np.asarray(target, float)
         back /= np.linalg.norm(back)
         right = np.cross([0, 1.0, 0] if abs(back[2]) > 1 - 1e-9 else [0, 0, 1.0], back)
@@ -37,18 +41,18 @@ class Viewpoint:
         return Viewpoint(np.asarray(origin, float), rotation, fovy_deg)
 
     def rays(self, width: int, height: int) -> np.ndarray:
-        """Directions through the pixels' centres, of unit depth along the axis, (y, x, 3)."""
+        """Return directions through the centres of the pixels, of unit depth along the axis, (y, x, 3)."""
         half = np.tan(np.radians(self.fovy_deg) / 2)
         y, x = np.indices((height, width))
         across, up = (2 * (x + 0.5) - width) / height * half, (1 - 2 * (y + 0.5) / height) * half
         return np.stack([across, up, -np.ones((height, width))], axis=-1) @ self.rotation.T
 
 
-def viewpoint(model: mujoco.MjModel, data: mujoco.MjData | Whereabouts, camera: str | int | Viewpoint) -> Viewpoint:
-    """Where a camera of the model is.
+def viewpoint(model: mujoco.MjModel, data: mujoco.MjData | PoseSnapshot, camera: str | int | Viewpoint) -> Viewpoint:
+    """Return the current viewpoint of a camera of the model.
 
     Raises:
-        ValueError: an unknown one and for other than plain perspective.
+        ValueError: an unknown camera, or one without plain perspective.
     """
     if isinstance(camera, Viewpoint):
         return camera
@@ -62,7 +66,7 @@ def viewpoint(model: mujoco.MjModel, data: mujoco.MjData | Whereabouts, camera: 
 
 
 def sensor(view: Viewpoint, width: int, height: int, near: float) -> MitsubaObject:
-    """Mitsuba perspective sensor (of the variant in force) of width x height pixels."""
+    """Return a Mitsuba perspective sensor (of the variant in force) of width x height pixels."""
     matrix = np.eye(4)
     matrix[:3, :3] = view.rotation @ np.diag([-1.0, 1.0, -1.0])
     matrix[:3, 3] = view.position

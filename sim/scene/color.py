@@ -1,4 +1,4 @@
-"""Display-referred colour and linear light, as sRGB relates them (IEC 61966-2-1)."""
+"""Conversion between display-referred colour (sRGB, IEC 61966-2-1) and linear light."""
 
 from __future__ import annotations
 
@@ -9,21 +9,22 @@ _XYZ_TO_SRGB = np.array([[3.2406, -1.5372, -0.4986], [-0.9689, 1.8758, 0.0415], 
 
 
 def encode_srgb(linear: np.ndarray | float) -> np.ndarray:
-    """Linear value in [0, 1] -> sRGB display value in [0, 1]."""
+    """Convert linear values in [0, 1] to sRGB display values in [0, 1]."""
     x = np.asarray(linear, dtype=float)
     return np.where(x <= 0.0031308, 12.92 * x, 1.055 * np.maximum(x, 0.0031308) ** (1 / 2.4) - 0.055)
 
 
 def decode_srgb(display: np.ndarray | float) -> np.ndarray:
-    """sRGB display value in [0, 1] -> linear value."""
+    """Convert sRGB display values in [0, 1] to linear values."""
     x = np.asarray(display, dtype=float)
     return np.where(x <= 0.04045, x / 12.92, ((np.maximum(x, 0.04045) + 0.055) / 1.055) ** 2.4)
 
 
 def preview(radiance: np.ndarray, wavelengths_nm: np.ndarray) -> np.ndarray:
-    """Linear sRGB (y, x, 3) of spectral radiance (band, y, x): CIE 1931, scaled such that radiance D65 is white.
+    """Linear sRGB (y, x, 3) of spectral radiance (band, y, x), by CIE 1931, scaled so that radiance D65 is white.
 
-    A band counts for the wavelengths nearer to it than to the next; with few bands the colours are rough.
+    Each band represents the wavelengths that are nearer to it than to other bands. With few bands the colours are
+    rough.
     """
     from optics.spectra.bands import cie_1931, daylight
 

@@ -1,9 +1,9 @@
-"""Cube textures: six square images around a geom, laid on its triangles.
+"""Cube textures: six square images around a geom, mapped to its triangles.
 
-MuJoCo looks a cube texture up by direction: a point's coordinates in the geom's frame, divided by its half sizes
-unless the texture is uniform. Mitsuba has no such texture, so triangles are cut where two faces meet and get
-texture coordinates in one image that holds the six faces below each other, R L U D F B as MuJoCo stores them:
-R/L = +x/-x, U/D = +y/-y, F/B = +z/-z (the faces' own axes are OpenGL's, table 3.19 of its 2.1 specification).
+MuJoCo looks up a cube texture by direction: a point's coordinates in the geom's frame, divided by its half sizes unless
+the texture is uniform. Mitsuba has no such texture. Triangles are therefore cut where two faces adjoin. Their texture
+coordinates refer to one image that contains the six faces below each other, R L U D F B as MuJoCo stores them: R/L =
++x/-x, U/D = +y/-y, F/B = +z/-z (the faces' own axes are OpenGL's, table 3.19 of its 2.1 specification).
 """
 
 from __future__ import annotations
@@ -14,19 +14,20 @@ import numpy as np
 from sim.scene.tessellation import Triangles
 
 BORDER = 1  # texels around each face that repeat its edge, so that bilinear lookups do not bleed into its neighbours
-# Of each face: the axis it faces and its sign, the axes of the image's columns and rows and their signs.
+# For each face: the axis it faces and its sign, and the axes of the image's columns and rows with their signs.
 _MAJOR, _MAJOR_SIGN = np.array([0, 0, 1, 1, 2, 2]), np.array([1, -1, 1, -1, 1, -1])
 _COLUMN, _COLUMN_SIGN = np.array([2, 2, 0, 0, 0, 0]), np.array([-1, 1, 1, 1, 1, -1])
 _ROW, _ROW_SIGN = np.array([1, 1, 2, 2, 1, 1]), np.array([-1, -1, 1, -1, -1, -1])
 _SEAMS = ((0, 1, 1), (0, 1, -1), (1, 2, 1), (1, 2, -1), (0, 2, 1), (0, 2, -1))  # planes d_a = ± d_b between faces
-# Coordinates are a ratio of two that are linear on a triangle; taken as linear themselves they are wrong by about
-# an eighth of their span times the divisor's. Triangles are halved until that is below this fraction of a face.
+# Texture coordinates are a ratio of two functions that are linear on a triangle. Treating the ratio as linear causes an
+# error of about one eighth of its range times the divisor's. Triangles are halved until the error is below this
+# fraction of a face.
 TOLERANCE = 2e-3
 _HALVINGS = 12
 
 
 def padded(pixels: np.ndarray) -> np.ndarray:
-    """Faces below each other (n w, w, 3), with a border around each: (n (w + 2), w + 2, 3)."""
+    """Return faces below each other (n w, w, 3) with a border around each: (n (w + 2), w + 2, 3)."""
     width = pixels.shape[1]
     faces = pixels.reshape(-1, width, width, 3)
     margin = (BORDER, BORDER)
@@ -34,10 +35,10 @@ def padded(pixels: np.ndarray) -> np.ndarray:
 
 
 def directions(vertices: np.ndarray, kind: mujoco.mjtGeom, size: np.ndarray, uniform: bool) -> np.ndarray:
-    """Where MuJoCo looks a cube texture up, (n, 3), for points (n, 3) in a geom's frame.
+    """Return the directions of MuJoCo's cube texture lookups, (n, 3), for points (n, 3) in a geom's frame.
 
-    size: half sizes (3,) along x, y, z. A capsule's are those of its side: its caps are looked up as if the side's
-    unit cylinder went on.
+    size: half sizes (3,) along x, y, z; a capsule's describe its side, and its caps are looked up as if the
+        side's unit cylinder continued
     """
     if kind in (mujoco.mjtGeom.mjGEOM_MESH, mujoco.mjtGeom.mjGEOM_SDF, mujoco.mjtGeom.mjGEOM_HFIELD):
         found = vertices.copy()
@@ -51,15 +52,20 @@ def directions(vertices: np.ndarray, kind: mujoco.mjtGeom, size: np.ndarray, uni
 
 
 def look_up(towards: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Face (n,) of directions (n, 3), and where on it (n, 2): column and row in [0, 1], row 0 on top."""
+    """Return the faces (n,) for directions (n, 3), and positions on them (n, 2): column and row in [0, 1], row 0 at the
+    top."""
     axis = np.argmax(np.abs(towards), axis=1)
     face = 2 * axis + (np.take_along_axis(towards, axis[:, None], 1)[:, 0] < 0)
     return face, _on_face(towards, face)
 
 
 def laid(triangles: Triangles, towards: np.ndarray, width: int, n_faces: int) -> Triangles:
-    """The triangles, cut along the seams, with texture coordinates in the padded image of n_faces (6, or 1 that is
-    on all sides) of `width` texels. towards: directions of the vertices, (n, 3)."""
+    """Return the triangles, cut along the seams, with texture coordinates in the padded image.
+
+    towards: directions of the vertices, (n, 3)
+    width: texels of a face
+    n_faces: 6, or 1 if all sides share a face
+    """
     corners = np.concatenate([triangles.vertices, towards], axis=1)
     if triangles.normals is not None:
         corners = np.concatenate([corners, triangles.normals], axis=1)
@@ -92,16 +98,16 @@ def _face_of(pieces: np.ndarray) -> np.ndarray:
 
 
 def _cut(pieces: np.ndarray, side: np.ndarray) -> np.ndarray:
-    """Triangles cut in two or three where `side` (triangle, corner) changes its sign."""
+    """Return the triangles, cut into two or three if `side` (triangle, corner) changes its sign."""
     side = np.where(np.abs(side) < 1e-9 * np.abs(side).max(initial=0), 0, side)
     crossed = (side.max(axis=1) > 0) & (side.min(axis=1) < 0)
     whole, cut, side = pieces[~crossed], pieces[crossed], side[crossed]
-    # Turn each triangle so that its first corner is alone on its side (a corner on the seam counts with the others).
+    # Rotate each triangle so that its first corner is alone on its side (a corner on the seam counts with the others).
     positive = (side > 0).sum(axis=1)
     lone = np.where(positive == 1, np.argmax(side, axis=1), np.argmin(side, axis=1))
     turn = (lone[:, None] + np.arange(3)) % 3
     cut, side = np.take_along_axis(cut, turn[..., None], 1), np.take_along_axis(side, turn, 1)
-    # Where the edges to the other two corners meet the seam; a corner on it stays where it is.
+    # Intersections of the edges to the other two corners with the seam; a corner on the seam is unchanged.
     along = (side[:, :1] / (side[:, :1] - side[:, 1:]))[..., None]
     seam = cut[:, :1] + along * (cut[:, 1:] - cut[:, :1])
     tip = np.stack([cut[:, 0], seam[:, 0], seam[:, 1]], axis=1)
@@ -111,7 +117,7 @@ def _cut(pieces: np.ndarray, side: np.ndarray) -> np.ndarray:
 
 
 def _halved(pieces: np.ndarray) -> np.ndarray:
-    """Triangles halved along their longest edge until their texture coordinates are as good as linear."""
+    """Return the triangles, halved along their longest edge until their texture coordinates are nearly linear."""
     done = []
     for _ in range(_HALVINGS):
         bent = _bend(pieces) > TOLERANCE
@@ -128,7 +134,7 @@ def _halved(pieces: np.ndarray) -> np.ndarray:
 
 
 def _bend(pieces: np.ndarray) -> np.ndarray:
-    """About the error of linear texture coordinates, as a fraction of a face, per triangle."""
+    """Return the approximate error of linear texture coordinates, as a fraction of a face, per triangle."""
     face = _face_of(pieces)
     major = np.take_along_axis(pieces[..., 3:6], _MAJOR[face][:, None, None], 2)[..., 0] * _MAJOR_SIGN[face][:, None]
     at = _on_face(pieces[..., 3:6].reshape(-1, 3), np.repeat(face, 3)).reshape(-1, 3, 2)

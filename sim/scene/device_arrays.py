@@ -1,7 +1,7 @@
-"""NumPy's numbers where kernels read them, aligned.
+"""NumPy arrays in aligned memory that kernels can read.
 
-Dr.Jit compiles a kernel anew for every alignment of its inputs, and records a frozen one anew for the alignment of
-every shape that exists, in whichever scene it is.
+Dr.Jit compiles a kernel again for every alignment of its inputs. It also records a frozen kernel again for the
+alignment of every existing shape, in any scene.
 """
 
 from __future__ import annotations
@@ -15,13 +15,12 @@ import numpy as np
 from optics.numerics.autodiff import Array
 
 ALIGNMENT = 64  # [bytes]
-# [bytes] that a kernel takes at once, at most: it may read past an array's end
-# (`optics.numerics.precision.padded_for_packets`)
+# [bytes] Largest read of a kernel. It may extend past an array's end (`optics.numerics.precision.padded_for_packets`).
 PACKET = 128
 
 
 def aligned(n: int, dtype: type) -> np.ndarray:
-    """n zeros that start on 64 bytes."""
+    """Return n zeros that start at a multiple of 64 bytes."""
     size = np.dtype(dtype).itemsize
     raw = np.zeros(n * size + ALIGNMENT + PACKET, np.uint8)
     first = -raw.ctypes.data % ALIGNMENT
@@ -29,11 +28,12 @@ def aligned(n: int, dtype: type) -> np.ndarray:
 
 
 class SharedBuffer:
-    """Numbers of NumPy's that kernels read where they are. LLVM's kernels get them once: to hand them over at every
-    launch takes longer than to render a small world. A GPU has memory of its own, and gets a copy whenever it is asked
-    for.
+    """NumPy memory that kernels read directly.
 
-    values: flat; to be written only while no kernel that reads them is under way
+    LLVM's kernels receive it once, because passing it at every launch would take longer than rendering a small world. A
+    GPU has its own memory and receives a copy at every access.
+
+    values: flat; must not be written to while a kernel reads them
     """
 
     def __init__(self, n: int, kind: Any = None) -> None:
@@ -44,52 +44,56 @@ class SharedBuffer:
 
     @property
     def array(self) -> Array:
-        """The same, on the device."""
+        """The same values on the device."""
         return self._array if dr.backend_v(self._kind) == dr.JitBackend.LLVM else self._kind(self.values)
 
 
 def floats(values: np.ndarray) -> Array:
-    """A copy of them, flat, float32."""
+    """Return a flat float32 copy on the device."""
     return mi.Float(as_floats(values))
 
 
 def as_floats(values: np.ndarray) -> np.ndarray:
-    """The same, still NumPy's."""
+    """Return a flat, aligned float32 copy in NumPy."""
     found = aligned(np.size(values), np.float32)
     found[:] = np.ravel(values)
     return found
 
 
 def whole_numbers(values: Any) -> Array:
-    """The same as uint32."""
+    """Return a flat uint32 copy on the device."""
     return mi.UInt32(as_whole_numbers(values))
 
 
 def as_whole_numbers(values: Any) -> np.ndarray:
-    """The same, still NumPy's."""
+    """Return a flat, aligned uint32 copy in NumPy."""
     found = aligned(np.size(values), np.uint32)
     found[:] = np.ravel(values)
     return found
 
 
 def counted(n: int) -> Array:
-    """0 ... n - 1, in memory of its own: a frozen kernel that reads it lane by lane replays at this width. Reading
-    tables alone, Dr.Jit 1.5 took its width from one that changes with what else the process has loaded: 126 lanes
-    replayed out of 128, the last receptors silently dark (tests/test_parameters.py runs each life twice and has met
-    it)."""
+    """Return 0 ... n - 1 in separate memory, so that a frozen kernel that reads it lane by lane is replayed at this
+    width.
+
+    If a kernel reads only tables, Dr.Jit 1.5 takes its width from one of them, depending on what else the process has
+    loaded. It replayed 126 of 128 lanes in one case, and left the last receptors dark without a message
+    (tests/test_parameters.py does each training run twice and has found this error).
+    """
     found = dr.arange(mi.UInt32, n)
     dr.eval(found)
     return found
 
 
 def in_fours(vectors: np.ndarray, fourth: np.ndarray | float) -> np.ndarray:
-    """Vectors (..., 3) flat, each followed by a fourth number: four aligned floats are gathered at once."""
+    """Return vectors (..., 3) flat, each followed by a fourth number, because four aligned floats are gathered in one
+    operation."""
     rows = np.empty((*vectors.shape[:-1], 4), np.float32)
     rows[..., :3], rows[..., 3] = vectors, fourth
     return rows.ravel()
 
 
 def three(fours: Array, row: Array) -> Array:
-    """The first three of a row of four floats; aligned, they are gathered at once."""
+    """Return the first three of a row of four aligned floats, gathered in one operation."""
     x, y, z, _ = dr.gather(mi.Vector4f, fours, row)
     return mi.Vector3f(x, y, z)

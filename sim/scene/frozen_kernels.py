@@ -1,4 +1,4 @@
-"""Frozen kernels with typed inputs, and what has to hold while Dr.Jit records one or replays it."""
+"""Frozen kernels with typed inputs, and conditions while Dr.Jit records or replays them."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ from optics.numerics.autodiff import Array
 class FrozenKernel:
     """A kernel that is recorded once and replayed, whose inputs are dataclasses.
 
-    Dr.Jit is handed their arrays alone: it would look through every dataclass again at every launch.
+    Dr.Jit receives only their arrays. Otherwise it would traverse every dataclass at every launch.
 
-    body: (scenes, moving, fixed) -> arrays; scenes: Mitsuba's · moving: what changes from launch to launch
-        fixed: what hardly does
+    body: function (scenes, moving, fixed) -> arrays, with Mitsuba scenes, inputs that change at every launch, and
+        inputs that rarely change
     """
 
     def __init__(self, body: Callable[[Any, Any, Any], Any]) -> None:
@@ -35,7 +35,7 @@ class FrozenKernel:
         self._frozen: Any = dr.freeze(recorded)
 
     def __call__(self, scenes: Any, moving: Any, fixed: Any) -> Any:
-        """Launch it."""
+        """Launch the kernel."""
         if fixed is not self._fixed:
             self._fixed, self._arrays = fixed, _arrays_of(fixed)
         self._moving = moving
@@ -43,18 +43,18 @@ class FrozenKernel:
 
     @property
     def n_recordings(self) -> int:
-        """How often it was recorded."""
+        """Number of recordings of the kernel."""
         return int(self._frozen.n_recordings)
 
 
 @cache
 def _names(kind: Any) -> tuple[str, ...]:
-    """Names of a dataclass's fields; none for another type."""
+    """Return the names of a dataclass's fields; none for another type."""
     return tuple(field.name for field in fields(kind)) if is_dataclass(kind) else ()
 
 
 def _arrays_of(inputs: Any) -> list[Array]:
-    """All arrays in dataclasses and lists of them, in order."""
+    """Return all arrays in dataclasses and lists of them, in order."""
     if names := _names(inputs.__class__):
         return [array for name in names for array in _arrays_of(getattr(inputs, name))]
     if isinstance(inputs, list):
@@ -63,7 +63,7 @@ def _arrays_of(inputs: Any) -> list[Array]:
 
 
 def _with_arrays(inputs: Any, arrays: Iterator[Array]) -> Any:
-    """The same dataclasses and lists, with these arrays in them."""
+    """Return the same dataclasses and lists with these arrays in them."""
     if names := _names(inputs.__class__):
         return type(inputs)(*(_with_arrays(getattr(inputs, name), arrays) for name in names))
     if isinstance(inputs, list):
@@ -73,8 +73,8 @@ def _with_arrays(inputs: Any, arrays: Iterator[Array]) -> Any:
 
 @contextmanager
 def garbage_kept() -> Iterator[None]:
-    """Hold off Python's garbage collection: if it frees another renderer's kernels or scene while this one's kernel is
-    being recorded, Dr.Jit aborts the process."""
+    """Suspend Python's garbage collection inside the block. If it freed another renderer's kernels or scene during the
+    recording of a kernel, Dr.Jit would abort the process."""
     was_enabled = gc.isenabled()
     gc.disable()
     try:

@@ -1,4 +1,4 @@
-"""What of a model has no counterpart in its mirror, in words: nothing is left out in silence."""
+"""Descriptions of a model's features that have no counterpart in its mirror, so that every omission is reported."""
 
 from __future__ import annotations
 
@@ -19,11 +19,12 @@ _UNMIRRORED_ROLES = {
     _ROLES.mjTEXROLE_EMISSIVE: "emissive",
     _ROLES.mjTEXROLE_ORM: "occlusion, roughness and metallic",
 }
-_NAMED = 4  # things of one kind that are named; the rest are counted
+_NAMED = 4  # number of elements of one kind that are named; the rest are counted
 
 
 def left_out(model: mujoco.MjModel, geoms: Sequence[int], groups: Sequence[int]) -> list[str]:
-    """Of the visible geoms, of their materials, and of what else MuJoCo draws of these groups."""
+    """Return messages about the visible geoms, their materials, and other elements that MuJoCo draws in these
+    groups."""
     materials = sorted({int(model.geom_matid[g]) for g in geoms if model.geom_matid[g] >= 0})
     return [*_geoms(model, geoms), *_textures(model, materials), *_sky(model, geoms), *_others(model, groups)]
 
@@ -80,18 +81,18 @@ def _others(model: mujoco.MjModel, groups: Sequence[int]) -> list[str]:
 
 
 def _alpha(model: mujoco.MjModel, rgba: np.ndarray, material: np.ndarray) -> np.ndarray:
-    """Alphas by MuJoCo's rule: a thing's own colour unless that is unset, then its material's."""
+    """Return alphas by MuJoCo's rule: an element's own colour unless it is unset, otherwise that of its material."""
     unset = (rgba == np.array([0.5, 0.5, 0.5, 1.0], dtype=np.float32)).all(axis=1) & (material >= 0)
     return np.where(unset, model.mat_rgba[material, 3] if model.nmat else 1.0, rgba[:, 3])
 
 
 def listed_geoms(model: mujoco.MjModel, geoms: Iterable[int]) -> str:
-    """In words."""
+    """Return a list of geoms in words."""
     return _listed("geom", (_name(model, g) for g in geoms))
 
 
 def listed_materials(model: mujoco.MjModel, materials: Iterable[int]) -> str:
-    """In words."""
+    """Return a list of materials in words."""
     return _listed("material", (_material(model, m) for m in materials))
 
 

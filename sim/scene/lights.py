@@ -1,11 +1,12 @@
 """MuJoCo's lights as Mitsuba emitters with the spectrum of daylight.
 
-Units: a light of diffuse 1 lays the irradiance π · daylight(λ) on a surface that faces it, so that a white Lambertian
-there has radiance daylight(λ): D65, 1 at 560 nm. Mitsuba's own `d65` is scaled otherwise (1.0101 at 560 nm), and
-its `rgb` emitters inherit that; the tables here are optics' own.
+Units: a light of diffuse 1 gives the irradiance π · daylight(λ) on a surface that faces it. A white Lambertian surface
+there has radiance daylight(λ): D65, 1 at 560 nm. Mitsuba's own `d65` is scaled differently (1.0101 at 560 nm), and its
+`rgb` emitters inherit this scale. The tables here belong to optics.
 
-A light is one light: its diffuse colour also makes the highlights, whatever its specular colour. Light from a point
-falls with the square of the distance; where MuJoCo's attenuates otherwise, both agree at the model's centre.
+A light has a single colour: its diffuse colour also makes the highlights, and its specular colour is ignored. Light
+from a point decreases with the square of the distance. If MuJoCo's attenuation differs, both agree at the model's
+centre.
 """
 
 from __future__ import annotations
@@ -28,23 +29,26 @@ from sim.scene.variant import Description, MitsubaObject
 WAVELENGTHS_NM = np.arange(300.0, 781.0, 5.0)
 _TYPES = mujoco.mjtLightType
 _PROFILE = 513  # samples across a spot's cone
-_WIDEST_DEG = 88.0  # cone that an image can be projected over
-# What only MuJoCo's other renderer reads, and its value where nothing was asked for.
+_WIDEST_DEG = 88.0  # widest cone over which an image can be projected
+# Fields that only MuJoCo's other renderer reads, with the values that mean unset.
 _UNMIRRORED = {"intensity": 0.0, "bulbradius": 0.02, "range": 10.0, "softness": 0.2}
 
 
 @dataclass(frozen=True)
 class Emitter:
-    """A light as Mitsuba describes it; `position` and `direction` are where data puts it."""
+    """A light described for Mitsuba; its `position` and `direction` follow the data."""
 
     name: str
-    light: int  # id in the model; -1: none of its lights (the camera's headlight, the sky)
+    light: int  # id in the model; -1: not one of its lights (the camera's headlight, the sky)
     description: Description
 
 
 def emission(rgb: np.ndarray, scale: float, measured: Spectrum | None = None) -> Description:
-    """Spectrum scale · rgb · daylight(λ) on 300-780 nm; a grey rgb is exactly that, a coloured one goes by the
-    reflectance spectrum of its hue (Jakob and Hanika 2019). `measured` takes the place of daylight and hue."""
+    """Return the spectrum scale · rgb · daylight(λ) on 300-780 nm.
+
+    A grey rgb gives exactly this spectrum. A coloured one is multiplied by the reflectance spectrum of its hue (Jakob
+    and Hanika 2019). `measured` replaces daylight and hue.
+    """
     level = float(np.max(rgb))
     if measured is not None:
         return described(measured, scale * level)
@@ -60,7 +64,8 @@ def emission(rgb: np.ndarray, scale: float, measured: Spectrum | None = None) ->
 
 
 def glow(model: mujoco.MjModel, geom: int, to_uv: np.ndarray | None, measured: Spectrum | None) -> Description | None:
-    """Radiance of a geom whose material is emissive: that share of what it would have in full daylight."""
+    """Return the radiance of a geom with an emissive material: a share of the radiance that it would have in full
+    daylight."""
     material = model.geom_matid[geom]
     if material < 0 or model.mat_emission[material] <= 0:
         return None
@@ -74,7 +79,7 @@ def glow(model: mujoco.MjModel, geom: int, to_uv: np.ndarray | None, measured: S
 
 
 def white() -> float:
-    """Radiance of white under a light of diffuse 1 over that of Mitsuba's `d65`."""
+    """Return the radiance of white under a light of diffuse 1, relative to that of Mitsuba's `d65`."""
     return float(daylight(np.array([560e-9]))[0]) / float(_evaluate(mi.load_dict({"type": "d65"}), 560.0)[0])
 
 
@@ -92,7 +97,7 @@ def _evaluate(texture: MitsubaObject, nm: Array) -> np.ndarray:
 
 
 def emitters(model: mujoco.MjModel, data: mujoco.MjData, spectra: Spectra) -> tuple[list[Emitter], list[str]]:
-    """All active lights and the sky, and what of the lights could not be mirrored, in words."""
+    """Return all active lights and the sky, and messages about properties of lights that cannot be mirrored."""
     found, left_out = [], []
     for light in range(model.nlight):
         if not model.light_active[light]:
@@ -114,13 +119,13 @@ def emitters(model: mujoco.MjModel, data: mujoco.MjData, spectra: Spectra) -> tu
 
 
 def pose(data: mujoco.MjData, light: int) -> MitsubaObject:
-    """Mitsuba's to_world of a light: at its position, +z along its direction."""
+    """Return Mitsuba's to_world of a light: at its position, +z along its direction."""
     origin, direction = data.light_xpos[light], data.light_xdir[light]
     return aimed(origin, direction)
 
 
 def aimed(origin: np.ndarray, direction: np.ndarray) -> MitsubaObject:
-    """to_world with +z along `direction`; the turn about it does not matter to a light."""
+    """Return a to_world with +z along `direction`; the rotation about it does not matter for a light."""
     z = direction / np.linalg.norm(direction)
     x = np.cross([1.0, 0, 0] if abs(z[0]) < 0.9 else [0, 1.0, 0], z)
     x /= np.linalg.norm(x)
@@ -168,7 +173,7 @@ def _describe(model: mujoco.MjModel, data: mujoco.MjData, light: int, spectra: S
 
 
 def _profile(cutoff_deg: float, exponent: float) -> Description:
-    """cosᵉ of the angle from a spot's axis, as the image that it projects over its cone."""
+    """Return cosᵉ of the angle from a spot's axis, as the image that it projects over its cone."""
     tangent = np.tan(np.radians(cutoff_deg)) * (2 * (np.arange(_PROFILE) + 0.5) / _PROFILE - 1)
     cosine = 1 / np.sqrt(1 + tangent[:, None] ** 2 + tangent[None, :] ** 2)
     bitmap = mi.Bitmap(np.ascontiguousarray(cosine**exponent, dtype=np.float32)[..., None])

@@ -1,4 +1,5 @@
-"""Shapes that share a material as one: every shape of a Mitsuba scene costs time in every launch of a kernel."""
+"""Shapes that share a material, merged into one, because every shape of a Mitsuba scene adds time to every kernel
+launch."""
 
 from __future__ import annotations
 
@@ -16,8 +17,10 @@ PlacedPart = tuple[str, Part, np.ndarray, MitsubaObject]  # name, part, pose (4,
 
 
 def merged(parts: Iterable[PlacedPart], prefix: str) -> Description:
-    """Mitsuba shapes by name (of the variant in force): triangles of one material together, as "<prefix>_<n>"; what is
-    no mesh by itself, under its own name."""
+    """Return Mitsuba shapes by name (of the variant in force).
+
+    Triangles of one material are merged, with the name "<prefix>_<n>". Shapes that are not meshes keep their names.
+    """
     description: Description = {}
     meshes: dict[tuple[int, bool, bool], tuple[MitsubaObject, list[Triangles]]] = {}
     for name, part, pose, bsdf in parts:
@@ -34,6 +37,6 @@ def merged(parts: Iterable[PlacedPart], prefix: str) -> Description:
 
 
 def _placed(triangles: Triangles, pose: np.ndarray) -> Triangles:
-    """Triangles of a geom's frame in the world's."""
+    """Return triangles transformed from a geom's frame to the world's."""
     normals = None if triangles.normals is None else triangles.normals @ pose[:3, :3].T
     return replace(triangles, vertices=triangles.vertices @ pose[:3, :3].T + pose[:3, 3], normals=normals)

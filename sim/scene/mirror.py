@@ -1,7 +1,8 @@
 """`mirror(model)`: any MuJoCo model as a spectral Mitsuba scene that follows mjData.
 
-Mirrored: all geoms, with their materials and textures, lights, the skybox, and cameras. Faces are seen as MuJoCo draws
-them: a camera inside a body looks out of it. What cannot be mirrored is named in one MirrorWarning.
+The scene contains all geoms with their materials and textures, lights, the skybox, and cameras. Faces are visible from
+the same side as in MuJoCo: a camera inside a body looks out of it. A single MirrorWarning names everything that cannot
+be mirrored.
 """
 
 from __future__ import annotations
@@ -18,16 +19,16 @@ import numpy as np
 from optics.spectra.spectrum import Spectrum
 from sim.scene import bsdfs, cameras, inventory, lights, rays, shapes, source, surfaces
 from sim.scene.cameras import Viewpoint
+from sim.scene.pose_snapshot import PoseSnapshot
 from sim.scene.spectra import of_geom, resolve
 from sim.scene.variant import DEFAULT_VARIANT, Description, MitsubaObject, default_variant
 from sim.scene.variant import variant as in_variant
-from sim.scene.whereabouts import Whereabouts
 
-VISIBLE_GROUPS = (0, 1, 2)  # MuJoCo draws these unless told otherwise
+VISIBLE_GROUPS = (0, 1, 2)  # groups that MuJoCo draws by default
 
 
 class MirrorWarning(UserWarning):
-    """Names what of a model is missing from its mirror."""
+    """Warning that names the features of a model that its mirror lacks."""
 
 
 def mirror(
@@ -41,18 +42,19 @@ def mirror(
 ) -> Mirror:
     """Mirror a MuJoCo model.
 
-    model: an MjModel, or what compiles to one: an MjSpec, the path of an MJCF, URDF or MJB file, MJCF text
-    data: poses to start from; None: the model's reference pose
-    bodies: names of the bodies whose geoms are wanted ("world" is the static one); None: all
-    groups: geom groups that are visible; a geom of alpha 0 never is
-    variant: a spectral Mitsuba variant, the device's if None; scalar_spectral runs without LLVM, slowly
-    spectra: reflectances of materials and emission of lights, by name, in the place of their colours:
-        `optics.Spectrum`, or what `optics.reflectance` and `optics.illuminant` know by name; {"headlight": "A"} is the
-        camera's
+    model: an MjModel, or a source that compiles to one: an MjSpec, the path of an MJCF, URDF or MJB file, or MJCF text
+    data: initial poses; None: the model's reference pose
+    bodies: names of the bodies whose geoms are included ("world" is the static one); None: all
+    groups: visible geom groups; a geom with alpha 0 is never visible
+    variant: a spectral Mitsuba variant; None: that of the device. scalar_spectral runs without LLVM, but slowly.
+    spectra: reflectances of materials and emission of lights, by name, which replace their colours: `optics.Spectrum`,
+        or names accepted by `optics.reflectance` and `optics.illuminant`; {"headlight": "A"} is the camera's light
+
+    A MirrorWarning lists features that have no counterpart.
 
     Raises:
         ValueError: a model that does not compile, an unknown body, a variant without spectra, a model without visible
-            geoms, or spectra of what the model does not have; warns once, by MirrorWarning, of what has no counterpart.
+            geoms, or spectra for names that the model does not have.
     """
     return Mirror(
         source.load(model), data, bodies=bodies, groups=groups, variant=variant or default_variant(), spectra=spectra
@@ -62,10 +64,10 @@ def mirror(
 class Mirror:
     """A Mitsuba scene that mirrors a MuJoCo model.
 
-    model, variant: as given
+    model, variant: the arguments
     scene: mi.Scene; shape ids are "geom_<geom id>_<part>"
     geoms: ids of the geoms in the scene, (n,)
-    spectra: of materials and lights, by name
+    spectra: spectra of materials and lights, by name
     """
 
     def __init__(
@@ -87,7 +89,7 @@ class Mirror:
         if not len(self.geoms):
             raise ValueError("mirror: the model has no visible geom of a kind that can be mirrored")
         data = _reference_pose(model) if data is None else _checked(model, data)
-        self._places = Whereabouts.of(data)
+        self._places = PoseSnapshot.from_data(data)
         self._parts = {int(g): shapes.parts(model, g) for g in self.geoms}
         self._poses = {g: shapes.pose(data, g) for g in self._parts}
         self._bsdfs: dict[Any, MitsubaObject] = {}
@@ -102,13 +104,13 @@ class Mirror:
             warnings.warn(f"not mirrored: {'; '.join(left_out)}", MirrorWarning, stacklevel=3)
 
     def sync(self, data: mujoco.MjData) -> None:
-        """Move everything, cameras too, to where `data` has it now (after mj_forward or mj_step). Only what moved is
-        touched: a scene in which nothing moved is not rebuilt.
+        """Move everything, including cameras, to the poses in `data` (after mj_forward or mj_step). A scene in which
+        nothing moved is not rebuilt.
 
         Raises:
-            ValueError: the data of another model, and for positions that are not finite.
+            ValueError: the data of another model, or positions that are not finite.
         """
-        self._places = Whereabouts.of(_checked(self.model, data))
+        self._places = PoseSnapshot.from_data(_checked(self.model, data))
         with in_variant(self.variant):
             for geom, parts in self._parts.items():
                 pose = shapes.pose(data, geom)
@@ -121,7 +123,7 @@ class Mirror:
             self._params.update()
 
     def bsdf(self, geom: str | int) -> MitsubaObject:
-        """The BSDF of a geom, also of one that is not in the scene."""
+        """Return the BSDF of a geom, even if it is not in the scene."""
         index = self.model.geom(geom).id
         with in_variant(self.variant):
             return self._bsdf(index)
@@ -137,19 +139,20 @@ class Mirror:
         seed: int = 0,
         sampler: str = "independent",
     ) -> np.ndarray:
-        """Spectral radiance at `wavelengths` [m], (band, y, x) float32, averaged over each pixel's square.
+        """Return the spectral radiance at `wavelengths` [m], (band, y, x) float32, averaged over each pixel's square.
 
         camera: name or id of a camera of the model, or a Viewpoint
         integrator: a Mitsuba integrator: "direct", "path", ..., or its description, {"type": "path", "max_depth": 3}
         spp: samples per pixel
-        sampler: "independent", or "multijitter" for pictures: less noise
-        Units: a white Lambertian that faces a light of diffuse 1 has radiance D65(λ), 1 at 560 nm.
+        sampler: "independent", or "multijitter", which has less noise in images
 
-        Warns once, by MirrorWarning, where "direct" would look through a transparent geom.
+        Units: a white Lambertian surface that faces a light of diffuse 1 has radiance D65(λ), 1 at 560 nm.
+
+        A MirrorWarning appears once if "direct" would have to show something behind a transparent geom.
 
         Raises:
-            ValueError: an unknown camera, less than one pixel or sample, wavelengths beyond 300 to 780 nm, and what
-                Mitsuba would take wrongly.
+            ValueError: an unknown camera, less than one pixel or sample, wavelengths beyond 300 to 780 nm, or an
+                integrator or sampler that Mitsuba would apply incorrectly.
         """
         view = self.viewpoint(camera)
         rays.check_size(width, height, spp)
@@ -164,7 +167,8 @@ class Mirror:
             return taken.radiance(integrator, spp, asked, seed, sampler)
 
     def _tell_of_glass(self) -> None:
-        """Mitsuba's `direct` takes a mask's share of light for its colour, and looks through it at emitters alone."""
+        """Warn once about transparent geoms: Mitsuba's `direct` treats a mask's opacity as part of its colour, and
+        shows only emitters behind it."""
         glass = [int(g) for g in self.geoms if surfaces.rgba(self.model, int(g))[3] < 1]
         if glass and not self._told_of_glass:
             listed = inventory.listed_geoms(self.model, glass)
@@ -173,15 +177,15 @@ class Mirror:
         self._told_of_glass = True
 
     def viewpoint(self, camera: str | int | Viewpoint) -> Viewpoint:
-        """Where a camera of the model was at the last `sync`, and how it looks."""
+        """Return the viewpoint of a camera of the model at the last `sync`."""
         return cameras.viewpoint(self.model, self._places, camera)
 
     def render_ids(self, camera: str | int | Viewpoint, width: int, height: int) -> np.ndarray:
-        """Geom id seen through the centre of each pixel, (y, x) int32, -1 for none."""
+        """Return the id of the geom visible at the centre of each pixel, (y, x) int32, -1 for none."""
         return self._first_hits(camera, width, height)[0]
 
     def render_depth(self, camera: str | int | Viewpoint, width: int, height: int) -> np.ndarray:
-        """Depth along the camera's axis [m] at the centre of each pixel, (y, x) float32, inf for none."""
+        """Return the depth along the camera's axis [m] at the centre of each pixel, (y, x) float32, inf for none."""
         return self._first_hits(camera, width, height)[1]
 
     def _first_hits(self, camera: str | int | Viewpoint, width: int, height: int) -> tuple[np.ndarray, np.ndarray]:
@@ -195,7 +199,8 @@ class Mirror:
         return ids.reshape(height, width), depth.reshape(height, width)
 
     def _camera(self, view: Viewpoint, width: int, height: int) -> rays.Camera:
-        """MuJoCo draws planes from both sides, and only the outer side of everything else."""
+        """Return the camera for a view. As in MuJoCo, planes are visible from both sides, and everything else only from
+        outside."""
         planes = {g for g in self._parts if surfaces.geom_type(self.model, g) == mujoco.mjtGeom.mjGEOM_PLANE}
         closed = {f"geom_{g}_{k}" for g, parts in self._parts.items() if g not in planes for k in range(len(parts))}
         sensor = cameras.sensor(view, width, height, self._near())
@@ -216,12 +221,12 @@ class Mirror:
         return mi.load_dict(description)
 
     def _glow(self, geom: int) -> Description | None:
-        """What a geom of an emissive material sends out."""
+        """Return the emission of a geom with an emissive material."""
         to_uv = shapes.uv_transform(self.model, geom)
         return lights.glow(self.model, geom, to_uv, of_geom(self.model, geom, self.spectra))
 
     def _bsdf(self, geom: int, mirrors: bool = True) -> MitsubaObject:
-        """Geoms that look alike share one BSDF object."""
+        """Return a BSDF object, shared by all geoms of the same appearance."""
         to_uv = shapes.uv_transform(self.model, geom)
         key = (
             self.model.geom_matid[geom],
@@ -243,7 +248,7 @@ class Mirror:
 
     def _move_light(self, name: str, to_world: MitsubaObject) -> None:
         matrix = np.array(to_world.matrix)
-        if (key := f"{name}.position") in self._params:  # a light at a point, which looks the same from all sides
+        if (key := f"{name}.position") in self._params:  # a point light, which is the same from all sides
             place = matrix[:3, 3].astype(np.float32)
             if not np.array_equal(place, np.array(self._params[key]).ravel()):
                 self._params[key] = mi.Point3f(*place.tolist())
@@ -269,16 +274,16 @@ def _reference_pose(model: mujoco.MjModel) -> mujoco.MjData:
 
 
 def _checked(model: mujoco.MjModel, data: mujoco.MjData) -> mujoco.MjData:
-    """The data, if it is of this model and everything in it is somewhere."""
+    """Return the data if they belong to this model and all their poses are finite."""
     if data.geom_xpos.shape != (model.ngeom, 3) or data.xpos.shape != (model.nbody, 3):
         raise ValueError(
-            f"mirror: data of {len(data.geom_xpos)} geoms and {len(data.xpos)} bodies is not the model's, which has "
+            f"mirror: data has {len(data.geom_xpos)} geoms and {len(data.xpos)} bodies, but the model has "
             f"{model.ngeom} and {model.nbody}"
         )
     if not data.geom_xmat.any():
-        raise ValueError("mirror: data says nothing yet of where things are; call mujoco.mj_forward(model, data) first")
+        raise ValueError("mirror: data contains no poses yet; call mujoco.mj_forward(model, data) first")
     lost = ~(np.isfinite(data.geom_xpos).all(axis=1) & np.isfinite(data.geom_xmat).all(axis=1))
     if lost.any():
         name = model.geom(int(np.argmax(lost))).name or str(int(np.argmax(lost)))
-        raise ValueError(f"mirror: geom {name!r} is at no finite place; the simulation became unstable, reset its data")
+        raise ValueError(f"mirror: geom {name!r} has no finite position; the simulation is unstable, reset its data")
     return data

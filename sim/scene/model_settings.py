@@ -1,6 +1,6 @@
-"""What physics goes by of a model, as bytes: so that a change of it is noticed at every step, and can be undone.
+"""Fields of a model that physics uses, as bytes, so that changes are detected at every step and can be undone.
 
-Left out is what is large: textures, meshes and heights, of which a change stays; and names.
+Names and large fields (textures, meshes and heights) are omitted. A change of these fields is not undone.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ _STRUCTS = ("opt", "stat")
 
 
 class ModelSettings:
-    """Of one model, as it is whenever it is asked."""
+    """Current settings of one model."""
 
     def __init__(self, model: mujoco.MjModel) -> None:
         fields = [("", model), *((f"{name}.", getattr(model, name)) for name in _STRUCTS)]
@@ -27,15 +27,15 @@ class ModelSettings:
         ]
         self._arrays = {full: held for full, _, _, held in known if isinstance(held, np.ndarray) and held.size}
         self._scalars = {full: (owner, name) for full, owner, name, held in known if "." in full and _is_number(held)}
-        self._every: list[Any] = list(self._arrays.values())  # views: what they show is the model's memory
+        self._every: list[Any] = list(self._arrays.values())  # views of the model's memory
 
-    def held(self) -> bytes:
-        """Everything, in one piece; of models of one making as long as each other's."""
+    def to_bytes(self) -> bytes:
+        """Return all settings as bytes. Their length is the same for models compiled from the same source."""
         scalars: Any = np.array([getattr(owner, name) for owner, name in self._scalars.values()], float)
         return b"".join([*self._every, scalars])
 
-    def hold(self, held: bytes) -> None:
-        """Inverse of `held`: the model is as this says."""
+    def restore(self, held: bytes) -> None:
+        """Restore the settings that `to_bytes` returned."""
         start = 0
         for array in self._every:
             array[...] = np.frombuffer(held, array.dtype, array.size, start).reshape(array.shape)
@@ -45,8 +45,8 @@ class ModelSettings:
             setattr(owner, name, type(getattr(owner, name))(value))
 
     def differing(self, before: bytes) -> str:
-        """Name of the first field that is not as it was; "" if all are."""
-        start, now = 0, self.held()
+        """Return the name of the first field that has changed; "" if none has."""
+        start, now = 0, self.to_bytes()
         sizes = {name: array.nbytes for name, array in self._arrays.items()} | dict.fromkeys(self._scalars, 8)
         for name, size in sizes.items():
             if before[start : start + size] != now[start : start + size]:

@@ -1,4 +1,4 @@
-"""Poses of models in which only a few bodies move: other arrays are built only if something reads them."""
+"""Poses of models in which only a few bodies move. Other arrays are built only when they are read."""
 
 from __future__ import annotations
 
@@ -15,27 +15,28 @@ _PREFIX = {"geom": "geom_x", "site": "site_x", "camera": "cam_x"}
 class ReferencePose:
     """A model in its reference pose, from which a few bodies move.
 
-    bodies: ids of the bodies that move; they carry geoms, sites and cameras rigidly, and no other body
+    bodies: ids of the moving bodies; they carry geoms, sites and cameras rigidly, and no other body
     """
 
     def __init__(self, model: mujoco.MjModel, bodies: Sequence[int]) -> None:
         data = mujoco.MjData(model)
         mujoco.mj_forward(model, data)
-        self.poses, self.bodies, self.n_bodies = Poses.of(data), list(bodies), model.nbody
+        self.poses, self.bodies, self.n_bodies = Poses.from_data(data), list(bodies), model.nbody
         self.body_of = {"geom": model.geom_bodyid.copy(), "site": model.site_bodyid, "camera": model.cam_bodyid}
         self._local = {(kind, i): self._in_body(kind, i) for kind in _PREFIX for i in self.moved(kind)}
         self._slots: dict[tuple[int, ...], np.ndarray | None] = {}
 
     def moved(self, kind: str) -> list[int]:
-        """Ids of the things of a kind that the bodies carry."""
+        """Return the ids of the elements of a kind that the bodies carry."""
         return [int(i) for i in np.flatnonzero(np.isin(self.body_of[kind], self.bodies))]
 
     def local(self, kind: str, index: int) -> tuple[np.ndarray, np.ndarray]:
-        """Origin (3,) [m] and rotation (3, 3) of a thing in the frame of its body."""
+        """Return the origin (3,) [m] and rotation (3, 3) of an element in the frame of its body."""
         return self._local[kind, index]
 
     def slots(self, geoms: Sequence[int] | np.ndarray) -> np.ndarray | None:
-        """Places, in `bodies`, of bodies whose frames these geoms have; None if any has another. Most have."""
+        """Return the indices in `bodies` of the bodies whose frames these geoms share; None if a geom has another
+        frame. Most geoms share their body's frame."""
         key = tuple(geoms)
         if key not in self._slots:
             bodies = [int(self.body_of["geom"][geom]) for geom in key]
@@ -48,16 +49,17 @@ class ReferencePose:
         prefix = _PREFIX[kind]
         origin, turned = self.poses.frames("body", int(self.body_of[kind][index]))
         place, rotation = (getattr(self.poses, f"{prefix}{what}")[0, index] for what in ("pos", "mat"))
-        # Rounded, so that a thing that shares its body's frame gets exactly 0 and 1.
+        # Rounded, so that an element that shares its body's frame gets exactly 0 and 1.
         found = turned[0].T @ (place - origin[0]), turned[0].T @ rotation
         return np.round(found[0], 14) + 0.0, np.round(found[1], 14) + 0.0
 
 
 class MovedBodies(Poses):
-    """All bodies are in the reference pose, except the moved ones.
+    """Poses of worlds in which all bodies are in the reference pose, except the moved ones.
 
-    positions: of the moved bodies [m], (world, body, 3) · rotations: (world, body, 3, 3)
-    models: of all worlds, if their sizes, colours or materials differ; None: as the renderer's model
+    positions: positions of the moved bodies [m], (world, body, 3)
+    rotations: (world, body, 3, 3)
+    models: models of all worlds, if their sizes, colours or materials differ; None: as the renderer's model
     """
 
     reference: ReferencePose
@@ -75,7 +77,7 @@ class MovedBodies(Poses):
         vars(self).update(reference=reference, positions=positions, rotations=rotations, **own)
 
     def __getattr__(self, name: str) -> np.ndarray:
-        """Arrays of `Poses`, when they are first read."""
+        """Build an array of `Poses` when it is first read."""
         if name not in Poses.__dataclass_fields__:
             raise AttributeError(name)
         vars(self)[name] = built = self._built(name)

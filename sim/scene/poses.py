@@ -1,4 +1,4 @@
-"""Where everything in many worlds of one model is, and how large, of which colour and of which material."""
+"""Poses of everything in many worlds of one model, with sizes, colours and materials."""
 
 from __future__ import annotations
 
@@ -9,6 +9,8 @@ from zlib import crc32
 
 import mujoco
 import numpy as np
+
+from optics.numerics.renamed import renamed
 
 OF_MODELS = (
     "geom_size",
@@ -21,7 +23,7 @@ OF_MODELS = (
     "heights",
     "others",
 )
-OTHERS = (  # what else looks go by
+OTHERS = (  # other fields that appearances depend on
     "geom_group",
     "geom_type",
     "geom_dataid",
@@ -38,12 +40,16 @@ HEADLIGHT = ("active", "diffuse")
 
 @dataclass(frozen=True)
 class Poses:
-    """Positions [m] (world, thing, 3) and rotations (world, thing, 3, 3) as mjData has them after mj_forward.
+    """Positions [m] (world, thing, 3) and rotations (world, thing, 3, 3), as in mjData after mj_forward.
 
-    geom_xpos, geom_xmat, site_xpos, site_xmat, cam_xpos, cam_xmat, xpos, xmat (of bodies) · light_xpos, light_xdir
-    geom_size (world, geom, 3), geom_rgba (world, geom, 4), geom_matid (world, geom), mat_rgba, mat_emission,
-        light_diffuse, light_active: as each world's own mjModel has them; None: as the renderer's model
-    heights: a checksum of each height field's, (world, hfield), since they are many
+    geom_xpos, geom_xmat, site_xpos, site_xmat, cam_xpos, cam_xmat: of geoms, sites and cameras
+    xpos, xmat: of bodies
+    light_xpos, light_xdir: of lights
+    geom_size: (world, geom, 3), from each world's mjModel; None, here and below: as in the renderer's model
+    geom_rgba: (world, geom, 4)
+    geom_matid: (world, geom)
+    mat_rgba, mat_emission, light_diffuse, light_active: as in each world's mjModel
+    heights: a checksum of each height field, (world, hfield), since there are many heights
     others: a checksum of each of OTHERS and of HEADLIGHT, (world, field)
     """
 
@@ -67,9 +73,11 @@ class Poses:
     heights: np.ndarray | None = None
     others: np.ndarray | None = None
 
+    of = renamed("from_data")
+
     @classmethod
-    def of(cls, datas: Sequence[mujoco.MjData] | mujoco.MjData) -> Poses:
-        """Of as many worlds as there are data; one's of one."""
+    def from_data(cls, datas: Sequence[mujoco.MjData] | mujoco.MjData) -> Poses:
+        """Collect the poses of all worlds, one for each mjData; a single mjData is one world."""
         datas = [datas] if isinstance(datas, mujoco.MjData) else datas
         names = [f.name for f in fields(cls) if f.name not in OF_MODELS]
         stacked = {name: np.stack([getattr(data, name) for data in datas]) for name in names}
@@ -79,7 +87,7 @@ class Poses:
 
     @classmethod
     def joined(cls, *parts: Poses) -> Poses:
-        """The worlds of all of them, one after the other."""
+        """Concatenate the worlds of several poses."""
         found: dict[str, list[Any]] = {f.name: [getattr(part, f.name) for part in parts] for f in fields(cls)}
         joined: dict[str, Any] = {n: None if each[0] is None else np.concatenate(each) for n, each in found.items()}
         return cls(**joined)
@@ -90,35 +98,35 @@ class Poses:
         return len(self.geom_xpos)
 
     def geom_places(self, geoms: Sequence[int] | np.ndarray) -> np.ndarray:
-        """Centres of these geoms [m], (world, geom, 3)."""
+        """Return the centres of these geoms [m], (world, geom, 3)."""
         return self.geom_xpos[:, geoms]
 
     def geom_turns(self, geoms: Sequence[int] | np.ndarray) -> np.ndarray:
-        """Rotations of these geoms, (world, geom, 3, 3)."""
+        """Return the rotations of these geoms, (world, geom, 3, 3)."""
         return self.geom_xmat[:, geoms]
 
     def take(self, worlds: np.ndarray) -> Poses:
-        """These worlds alone."""
+        """Return only these worlds."""
         arrays: dict[str, Any] = {f.name: getattr(self, f.name) for f in fields(self)}
         taken: dict[str, Any] = {name: None if array is None else array[worlds] for name, array in arrays.items()}
         return Poses(**taken)
 
     def frames(self, kind: str, index: int) -> tuple[np.ndarray, np.ndarray]:
-        """Origins (world, 3) and rotations (world, 3, 3) of a site, a camera or a body."""
+        """Return the origins (world, 3) and rotations (world, 3, 3) of a site, a camera or a body."""
         name = {"site": "site_x", "camera": "cam_x", "body": "x"}[kind]
         return getattr(self, f"{name}pos")[:, index], getattr(self, f"{name}mat")[:, index]
 
 
 def of_models(models: Sequence[mujoco.MjModel], name: str) -> np.ndarray:
-    """One of OF_MODELS as these models have it now, (world, ...)."""
+    """Return one of OF_MODELS from the current state of these models, (world, ...)."""
     if all(model is models[0] for model in models):
-        field = of_model(models[0], name).copy()  # it may be written to later
+        field = of_model(models[0], name).copy()  # copied, since the model may be changed later
         return np.broadcast_to(field, (len(models), *field.shape))
     return np.stack([of_model(model, name) for model in models])
 
 
 def of_model(model: mujoco.MjModel, name: str) -> np.ndarray:
-    """One of OF_MODELS as a model has it now."""
+    """Return one of OF_MODELS from the current state of a model."""
     if name == "heights":
         return _heights(model)
     if name == "others":

@@ -1,4 +1,4 @@
-"""Geoms that are primitives: rays meet them in closed form."""
+"""Primitive geoms, which rays intersect in closed form."""
 
 from __future__ import annotations
 
@@ -17,5 +17,5 @@ KINDS = {
 
 
 def kind_of(model: mujoco.MjModel, geom: int) -> str | None:
-    """Name of the primitive that a geom is; None for meshes and for textures that need triangles."""
+    """Return the name of a geom's primitive; None for meshes and for textures that need triangles."""
     return None if shapes.is_textured(model, geom) else KINDS.get(surfaces.geom_type(model, geom))

@@ -1,7 +1,7 @@
-"""Rays of a sensor through a scene: what Mitsuba's own film does, but at given wavelengths and pixel centres, and with
-the faces that MuJoCo does not draw looked through.
+"""Rays of a sensor through a scene, as in Mitsuba's film, but at given wavelengths and pixel centres.
 
-Works on the types of the variant in force: whole wavefronts, or, in a scalar variant, one ray at a time.
+Faces that MuJoCo does not draw are skipped. The functions work on the types of the variant in force: whole wavefronts,
+or one ray at a time in a scalar variant.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ from sim.scene.variant import Description, MitsubaObject
 
 LANES = 4  # wavelengths in one mi.Spectrum
 WAVEFRONT = 1 << 21  # rays traced at once
-ROUNDING = 1e-12  # [m] of wavelengths
-NESTED = 64  # bodies in each other that a camera may be inside of
+ROUNDING = 1e-12  # [m] tolerance for wavelengths
+NESTED = 64  # limit for the number of nested bodies that contain a camera
 
 
 def check_size(width: int, height: int, spp: int) -> None:
@@ -31,10 +31,10 @@ def check_size(width: int, height: int, spp: int) -> None:
 
 
 def checked_wavelengths(wavelengths: Any) -> np.ndarray:
-    """Wavelengths [m], (band,).
+    """Return wavelengths [m], (band,).
 
     Raises:
-        ValueError: there are none, or some at which nothing shines, as those are in nanometres.
+        ValueError: none, or some outside the range of the spectra, for example because they are in nanometres.
     """
     found = np.asarray(wavelengths, float)
     low, high = (1e-9 * limit for limit in LIMITS_NM)
@@ -46,8 +46,12 @@ def checked_wavelengths(wavelengths: Any) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Camera:
-    """scene, sensor: Mitsuba's. names: of the scene's shapes, by their ids. one_sided: names of the shapes whose inner
-    side the camera looks through."""
+    """A sensor in a scene.
+
+    scene, sensor: Mitsuba's objects
+    names: names of the scene's shapes, by their ids
+    one_sided: names of the shapes whose inner side is invisible
+    """
 
     scene: MitsubaObject
     sensor: MitsubaObject
@@ -56,7 +60,7 @@ class Camera:
 
     @property
     def size(self) -> tuple[int, int]:
-        """(width, height)"""
+        """Size (width, height) in pixels."""
         width, height = (int(n) for n in self.sensor.film().size())
         return width, height
 
@@ -68,10 +72,12 @@ class Camera:
         seed: int,
         sampler: str = "independent",
     ) -> np.ndarray:
-        """Radiance (band, y, x) float32 at `wavelengths` [m]: the mean over `spp` random positions in each pixel.
+        """Return the radiance (band, y, x) float32 at `wavelengths` [m]: the mean over `spp` random positions in each
+        pixel.
 
-        sampler: of Mitsuba's: "independent", or "multijitter", whose samples of a pixel keep apart: less noise, of
-            another kind than a standard error tells; not in scalar variants, nor for spp that it would round
+        sampler: Mitsuba's "independent", or "multijitter", which stratifies the samples of a pixel. Its noise is lower,
+            and a standard error does not describe it. It is not available in scalar variants, or for spp that it would
+            round.
         """
         width, height = self.size
         method = _integrator(integrator)
@@ -83,14 +89,15 @@ class Camera:
             total = np.zeros((LANES, height * width))
             for done in range(0, spp, samples_at_once):
                 n = min(samples_at_once, spp - done)
-                # The same seed for every group of wavelengths: their rays are the same.
+                # The same seed for every group of wavelengths, so that their rays are the same.
                 sampler_seed = (seed * 0x9E3779B1 + done) & 0xFFFFFFFF
                 total += self._sum_of_samples(method, spectrum, _sampler(sampler, n), sampler_seed)
             bands.append(total[: len(nm)] / spp)
         return np.concatenate(bands).reshape(-1, height, width).astype(np.float32)
 
     def first_hits(self) -> tuple[list[str], np.ndarray]:
-        """Name of the shape seen through each pixel's centre ("" for none), row by row, and the point hit (n, 3)."""
+        """Return the name of the shape visible at each pixel's centre ("" for none), row by row, and the hit points (n,
+        3)."""
         width, height = self.size
         y, x = (a.ravel() for a in np.indices((height, width)))
         positions = np.stack([(x + 0.5) / width, (y + 0.5) / height]).astype(np.float32)
@@ -98,11 +105,11 @@ class Camera:
             hits = [self._scalar_hit(position) for position in positions.T]
             return [name for name, _ in hits], np.array([point for _, point in hits])
         ray, _ = self.sensor.sample_ray(0.0, 0.5, mi.Point2f(positions), mi.Point2f(0.5))
-        ray.maxt = dr.inf  # nothing is too far away to be seen
+        ray.maxt = dr.inf  # no far limit
         si = self._look(ray)
         shape: Array = dr.reinterpret_array(mi.UInt32, si.shape)
         found = dr.select(si.is_valid(), shape, 0).numpy()
-        # Of the hit, its distance is exact; its point suffers on shapes as large as a world.
+        # The distance of a hit is exact, but its point is inaccurate on shapes as large as a world.
         return [self.names[i] if i else "" for i in found], np.array(ray(si.t).numpy(), dtype=float).T
 
     def _scalar_hit(self, position: np.ndarray) -> tuple[str, np.ndarray]:
@@ -114,13 +121,14 @@ class Camera:
         return si.shape.id(), np.array(ray(si.t), dtype=float)
 
     def _look(self, ray: Array) -> Array:
-        """What the ray meets first; its origin is moved past the inner faces in its way."""
+        """Return the first intersection of the ray. The origin of the ray is moved past invisible inner faces."""
         si = self.scene.ray_intersect(ray)
         for _ in range(NESTED):
             inner = self._is_inner(si, ray)
             if not dr.any(inner):
                 break
-            # Along the ray alone: Mitsuba's own offset is to the side, 0.1 mm of a metre, and shows beside near things.
+            # The offset is along the ray only. Mitsuba's own offset is sideways, by 0.1 mm per metre, and visible near
+            # close objects.
             beyond = ray(si.t * (1 + 1e-5) + 4e-6 * (1 + dr.max(dr.abs(ray.o))))
             ray.o = dr.select(inner, beyond, ray.o)
             si = self.scene.ray_intersect(ray)
@@ -137,7 +145,7 @@ class Camera:
     def _sum_of_samples(
         self, method: MitsubaObject, spectrum: list[float], sampler: MitsubaObject, seed: int
     ) -> np.ndarray:
-        """Sum of the sampler's samples per pixel, (LANES, pixels)."""
+        """Return the sum of the sampler's samples per pixel, (LANES, pixels)."""
         width, height = self.size
         n = sampler.sample_count()
         if _is_scalar():
@@ -163,7 +171,7 @@ class Camera:
         position = mi.Point2f(x + jitter.x / width, y + jitter.y / height)
         ray, _ = self.sensor.sample_ray_differential(0.0, 0.5, position, mi.Point2f(0.5))
         ray.maxt = dr.inf
-        # Opaque to the compiler: other wavelengths are the same kernel.
+        # Wavelengths are opaque to the compiler, so that other wavelengths use the same kernel.
         ray.wavelengths = mi.Spectrum(*(x if _is_scalar() else dr.opaque(mi.Float, x) for x in spectrum))
         self._look(ray)
         value = method.sample(self.scene, sampler, ray)[0]
@@ -171,15 +179,15 @@ class Camera:
 
 
 def names_of(scene: MitsubaObject) -> dict[int, str]:
-    """Names of a scene's shapes by the ids that Dr.Jit gave them; none in a scalar variant, which has no ids."""
+    """Return the names of a scene's shapes by their Dr.Jit ids; empty in a scalar variant, which has no ids."""
     return {} if _is_scalar() else {_registry_id(shape): shape.id() for shape in scene.shapes()}
 
 
 def described(integrator: str | Mapping[str, Any]) -> Description:
-    """A name's description.
+    """Return the description of an integrator.
 
     Raises:
-        ValueError: it is neither.
+        ValueError: neither a name nor a description.
     """
     if not isinstance(integrator, str) and not (isinstance(integrator, Mapping) and "type" in integrator):
         raise ValueError(f"integrator = {integrator!r}: must be a name, or a description such as {{'type': 'path'}}")
@@ -189,7 +197,7 @@ def described(integrator: str | Mapping[str, Any]) -> Description:
 def _integrator(integrator: str | Mapping[str, Any]) -> MitsubaObject:
     description = described(integrator)
     if description["type"] == "direct" and {"emitter_samples", "shading_samples"} & description.keys():
-        # Mitsuba 3.9.1 adds these samples up instead of averaging them where the light is a point or a direction.
+        # For point and directional lights, Mitsuba 3.9.1 adds these samples instead of averaging them.
         raise ValueError('integrator "direct": its light samples cannot be set; take more spp')
     try:
         found = mi.load_dict(description)
@@ -197,7 +205,7 @@ def _integrator(integrator: str | Mapping[str, Any]) -> MitsubaObject:
     except RuntimeError as error:
         why = " ".join(str(error).split())
     if why:
-        raise ValueError(f"integrator = {integrator!r}: must be one of Mitsuba's, such as 'path'; it says: {why}")
+        raise ValueError(f"integrator = {integrator!r}: must be one of Mitsuba's, such as 'path'; its message: {why}")
     return found
 
 

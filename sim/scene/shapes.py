@@ -1,6 +1,9 @@
-"""Geoms as Mitsuba shapes. Planes and spheres, and capsules and cylinders without a texture, are exact (rectangle,
-sphere, cylinder, disk); everything whose texture coordinates Mitsuba would lay differently is tessellated, and so are
-ellipsoids: Mitsuba solves its own in float32, and what is small, flat or far away is hit where it is not."""
+"""Geoms as Mitsuba shapes.
+
+Planes and spheres, and capsules and cylinders without a texture, are exact (rectangle, sphere, cylinder, disk). Geoms
+for which Mitsuba's texture coordinates differ from MuJoCo's are tessellated. Ellipsoids are tessellated, too, since
+Mitsuba intersects its own ellipsoids in float32. Its hit points on small, flat or distant ones are wrong.
+"""
 
 from __future__ import annotations
 
@@ -28,17 +31,17 @@ _PRIMITIVES = (
 _ASSETS = (_TYPES.mjGEOM_MESH, _TYPES.mjGEOM_SDF, _TYPES.mjGEOM_HFIELD)
 
 
-# Half side of an infinite plane in units of the model's extent: an eye one extent above it sees its end 1e-4 rad below
-# the horizon, and float32 lays texture and shadows on it to 1e-3 of an extent. (Triangles of that size would be hit in
-# the wrong places; Mitsuba's rectangle is solved in closed form.)
+# Half side of an infinite plane in units of the model's extent. An eye one extent above the plane sees its edge 1e-4
+# rad below the horizon, and float32 is accurate to 1e-3 of an extent for texture and shadows on it. (Hits on triangles
+# of this size would be wrong; Mitsuba intersects its rectangle in closed form.)
 INFINITY = 1e4
 
 
 @dataclass(frozen=True)
 class Part:
-    """One Mitsuba shape of a geom: a plugin placed by `local` (4, 4) in the geom's frame, or triangles.
+    """One Mitsuba shape of a geom: a plugin with the pose `local` (4, 4) in the geom's frame, or triangles.
 
-    mirrors: whether the geom's mirror share is on it, if it has one
+    mirrors: whether the geom's mirror share, if it has one, applies to this part
     """
 
     plugin: str = ""
@@ -47,7 +50,7 @@ class Part:
     mirrors: bool = True
 
     def placement(self, pose: np.ndarray) -> Description:
-        """What puts the shape where a geom's pose (4, 4) says: names and values of Mitsuba's parameters."""
+        """Return names and values of the Mitsuba parameters that place the shape at a geom's pose (4, 4)."""
         if self.triangles is not None:
             placed = {"vertex_positions": self.vertices(pose)}
             return placed if self.triangles.normals is None else {**placed, "vertex_normals": self.normals(pose)}
@@ -55,7 +58,7 @@ class Part:
         return {"to_world": mi.Transform4f((pose @ self.local).tolist())}
 
     def vertices(self, pose: np.ndarray) -> np.ndarray:
-        """Vertices in the world, flat float32."""
+        """Return the vertices in the world, flat float32."""
         assert self.triangles is not None
         return as_floats(self.triangles.vertices @ pose[:3, :3].T + pose[:3, 3])
 
@@ -66,7 +69,7 @@ class Part:
 
 
 def pose(data: mujoco.MjData, geom: int) -> np.ndarray:
-    """A geom's frame in the world, (4, 4)."""
+    """Return a geom's frame in the world, (4, 4)."""
     matrix = np.eye(4)
     matrix[:3, :3] = data.geom_xmat[geom].reshape(3, 3)
     matrix[:3, 3] = data.geom_xpos[geom]
@@ -74,7 +77,7 @@ def pose(data: mujoco.MjData, geom: int) -> np.ndarray:
 
 
 def has_shape(model: mujoco.MjModel, geom: int) -> bool:
-    """Whether a geom is of a kind that is mirrored, and its asset is there (a user-defined sdf has no mesh)."""
+    """Return whether a geom's kind can be mirrored and its asset exists (a user-defined sdf has no mesh)."""
     kind = surfaces.geom_type(model, geom)
     return kind in _PRIMITIVES or (kind in _ASSETS and model.geom_dataid[geom] >= 0)
 
@@ -89,15 +92,17 @@ def _is_cubic(model: mujoco.MjModel, geom: int) -> bool:
 
 
 def uv_transform(model: mujoco.MjModel, geom: int) -> np.ndarray | None:
-    """(3, 3) from Mitsuba's own texture coordinates of a shape to MuJoCo's, repeats included; None where the
-    triangles carry MuJoCo's already, or nothing asks for them."""
+    """Return the matrix (3, 3) from a shape's Mitsuba texture coordinates to MuJoCo's, including repeats.
+
+    None if the triangles already have MuJoCo's coordinates, or if no texture needs them.
+    """
     kind, size = surfaces.geom_type(model, geom), model.geom_size[geom]
     if not is_textured(model, geom) or _is_cubic(model, geom):
         return None
     if kind not in (_TYPES.mjGEOM_SPHERE, _TYPES.mjGEOM_PLANE):
         return None
     if kind == _TYPES.mjGEOM_SPHERE:
-        # Both have u = azimuth / 2π, v = polar angle / π from +z.
+        # Both codes use u = azimuth / 2π, v = polar angle / π from +z.
         return np.diag([*surfaces.texture_repeat(model, geom, size[[0, 0]]), 1.0])
     # MuJoCo: u = (x/sx + 1)/2, v = 1 - (y/sy + 1)/2, and (x, -y) repeat/2 + 1/2 along an infinite axis; Mitsuba's v
     # points upwards.
@@ -109,13 +114,13 @@ def uv_transform(model: mujoco.MjModel, geom: int) -> np.ndarray | None:
 
 
 def _half_sides(model: mujoco.MjModel, geom: int) -> np.ndarray:
-    """Half sides of a plane [m], (2,)."""
+    """Return the half sides of a plane [m], (2,)."""
     size = model.geom_size[geom, :2]
     return np.where(size > 0, size, INFINITY * max(1.0, model.stat.extent))
 
 
 def parts(model: mujoco.MjModel, geom: int) -> list[Part]:
-    """The shapes that make up a geom."""
+    """Return the shapes that make up a geom."""
     kind, size = surfaces.geom_type(model, geom), model.geom_size[geom]
     if kind == _TYPES.mjGEOM_SPHERE and not _is_cubic(model, geom):
         return [Part("sphere", _placed(size[0], size[0], size[0]))]
@@ -150,14 +155,14 @@ def _triangles(model: mujoco.MjModel, geom: int) -> Triangles:
         return _wrapped(model, geom, triangles, size)
     repeat = surfaces.texture_repeat(model, geom, size)
     if triangles.uv is None:
-        # MuJoCo projects the image along z: (x, -y) / 2 half sizes - 1/2, the repeats before the shift.
+        # MuJoCo projects the image along z: (x, -y) / 2 half sizes - 1/2, with the repeats applied before the shift.
         uv = triangles.vertices[:, :2] / size[:2] * repeat * [0.5, -0.5] - 0.5
         return replace(triangles, uv=uv)
     return triangles.repeated(repeat)
 
 
 def _wrapped(model: mujoco.MjModel, geom: int, triangles: Triangles, size: np.ndarray) -> Triangles:
-    """Triangles under a cube texture."""
+    """Return triangles with a cube texture."""
     texture = surfaces.texture_id(model, geom)
     uniform = bool(model.mat_texuniform[model.geom_matid[geom]])
     towards = cube.directions(triangles.vertices, surfaces.geom_type(model, geom), size, uniform)
@@ -165,7 +170,7 @@ def _wrapped(model: mujoco.MjModel, geom: int, triangles: Triangles, size: np.nd
 
 
 def half_sizes(model: mujoco.MjModel, geom: int) -> np.ndarray:
-    """What MuJoCo's renderer takes for half sizes along x, y, z."""
+    """Return the half sizes along x, y, z that MuJoCo's renderer uses."""
     kind, size = surfaces.geom_type(model, geom), model.geom_size[geom]
     if kind == _TYPES.mjGEOM_SPHERE:
         return np.repeat(size[0], 3)
@@ -195,7 +200,7 @@ def _placed(sx: float, sy: float, sz: float, z: float = 0.0) -> np.ndarray:
 
 
 def build(part: Part, pose: np.ndarray, name: str, bsdf: MitsubaObject, radiance: Description | None) -> MitsubaObject:
-    """The Mitsuba shape (of the variant in force) of a part, emitting where `radiance` is given."""
+    """Return the Mitsuba shape (of the variant in force) of a part, as an emitter if `radiance` is not None."""
     if part.triangles is None:
         assert part.local is not None
         placed = mi.ScalarTransform4f((pose @ part.local).tolist())

@@ -1,8 +1,8 @@
-"""MuJoCo's skybox as the light that comes from infinity.
+"""MuJoCo's skybox as light from infinity.
 
-A skybox is drawn behind everything; here it also shines, as a sky does: white of it has the radiance of a white
-Lambertian that faces a light of diffuse 1, between 360 and 780 nm. MuJoCo looks it up by (x, z, -y): faces R/L are
-seen towards +x/-x, U/D towards +z/-z, F/B towards -y/+y.
+MuJoCo draws a skybox behind everything. Here it also illuminates the scene, as a sky does. Its white has the radiance
+of a white Lambertian surface that faces a light of diffuse 1, between 360 and 780 nm. MuJoCo looks it up by (x, z, -y):
+faces R/L are visible towards +x/-x, U/D towards +z/-z, F/B towards -y/+y.
 """
 
 from __future__ import annotations
@@ -14,19 +14,19 @@ import numpy as np
 from sim.scene import cube, surfaces
 from sim.scene.variant import Description
 
-MAX_ROWS = 1024  # of the panorama
+MAX_ROWS = 1024  # limit for the rows of the panorama
 
 
 def texture(model: mujoco.MjModel) -> int:
-    """The skybox that MuJoCo draws, the first; -1 for none."""
+    """Return the index of the skybox that MuJoCo draws, which is the first; -1 for none."""
     found = np.flatnonzero(model.tex_type == mujoco.mjtTexture.mjTEXTURE_SKYBOX)
     return int(found[0]) if len(found) else -1
 
 
 def description(model: mujoco.MjModel, white: float) -> Description | None:
-    """Mitsuba's `envmap` of the model's skybox; None where there is none, or a black one.
+    """Return Mitsuba's `envmap` of the model's skybox; None without a skybox, or with a black one.
 
-    white: radiance of white over that of Mitsuba's `d65`, which `envmap` takes for the light of a panorama.
+    white: radiance of white relative to Mitsuba's `d65`, which `envmap` uses as the light of a panorama
     """
     skybox = texture(model)
     if skybox < 0:
@@ -46,8 +46,11 @@ def description(model: mujoco.MjModel, white: float) -> Description | None:
 
 
 def _panorama(image: np.ndarray) -> np.ndarray:
-    """Latitude-longitude image (h, 2h, 3) of a padded cube image: columns from u = 0 at -z of Mitsuba's frame over
-    +x, centres at half texels; rows from +y to -y, the first and last on the poles."""
+    """Return the latitude-longitude image (h, 2h, 3) of a padded cube image.
+
+    Columns start at u = 0, at -z of Mitsuba's frame, and continue over +x, with centres at half texels. Rows run from
+    +y to -y, with the first and last row on the poles.
+    """
     pitch = image.shape[1]
     rows = min(MAX_ROWS, 2 * (pitch - 2 * cube.BORDER))
     rows = max(rows, 16)
@@ -55,7 +58,7 @@ def _panorama(image: np.ndarray) -> np.ndarray:
     azimuth = np.pi * (np.arange(2 * rows) + 0.5) / rows
     sin = np.sin(polar)[:, None]
     x, y, z = np.broadcast_arrays(sin * np.sin(azimuth), np.cos(polar)[:, None], -sin * np.cos(azimuth))
-    # Mitsuba's (x, y, z) is the world's (x, -z, y), and MuJoCo looks the world's (x, y, z) up at (x, z, -y).
+    # Mitsuba's (x, y, z) is the world's (x, -z, y). MuJoCo looks up the world's (x, y, z) at (x, z, -y).
     face, at = cube.look_up(np.stack([x, y, z], axis=-1).reshape(-1, 3))
     if len(image) == pitch:
         face = np.zeros_like(face)

@@ -1,4 +1,4 @@
-"""Geoms as plain shapes in their bodies' frames, for programs that draw a scene of their own."""
+"""Geoms as plain shapes in their bodies' frames, for programs that draw the scene themselves."""
 
 from __future__ import annotations
 
@@ -11,19 +11,21 @@ from sim.scene.mirror import VISIBLE_GROUPS
 from sim.scene.primitive_geoms import KINDS
 from sim.scene.tessellation import Triangles
 
-FAR = 3.0  # half sides of a plane without end, in units of the model's extent
+FAR = 3.0  # half sides of an infinite plane, in units of the model's extent
 
 
 @dataclass(frozen=True)
 class Solid:
-    """A geom as it was when it was asked for.
+    """A geom at the time of the call.
 
-    name: in the model, or "geom_<id>" · body: id of the one that it is on
-    kind: "ellipsoid", "capsule", "cylinder", "box" or "mesh"; a plane is a box without height
-    half_sizes: along its own axes [m]; of capsules (radius, radius, half the length between the ends' centres); of a
-        mesh 0
-    position [m], quaternion (w, x, y, z): in the body's frame · rgba: displayed colour, 0 to 1, without its texture
-    triangles: of a mesh, in its own frame
+    name: name in the model, or "geom_<id>"
+    body: id of the geom's body
+    kind: "ellipsoid", "capsule", "cylinder", "box" or "mesh"; a plane is a box of zero height
+    half_sizes: half sizes along its own axes [m]; for capsules (radius, radius, half the distance between the ends'
+        centres); 0 for a mesh
+    position, quaternion: pose in the body's frame, [m] and (w, x, y, z)
+    rgba: displayed colour, 0 to 1, without texture
+    triangles: triangles of a mesh, in its own frame
     """
 
     name: str
@@ -37,7 +39,7 @@ class Solid:
 
 
 def solids_of(model: mujoco.MjModel) -> tuple[Solid, ...]:
-    """Of all geoms that eyes see, in their order."""
+    """Return all geoms that eyes can see, in their order."""
     return tuple(_solid(model, g) for g in surfaces.visible(model, VISIBLE_GROUPS) if shapes.has_shape(model, g))
 
 

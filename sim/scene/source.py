@@ -1,4 +1,4 @@
-"""What a mirror is made of: a compiled model, or something that compiles to one."""
+"""Loading of a model from an MjModel, an MjSpec, a file, or text."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from sim.scene.bombs import require_finite, require_modest, require_modest_file
 
 
 def load(source: mujoco.MjModel | mujoco.MjSpec | str | Path) -> mujoco.MjModel:
-    """The model of an MjModel, an MjSpec, a file (MJCF, URDF, or MJB) or MJCF text (which starts with "<").
+    """Return the model of an MjModel, an MjSpec, a file (MJCF, URDF or MJB), or MJCF text (which starts with "<").
 
     Raises:
-        ValueError: one line that names the thing, for anything that does not become a model.
+        ValueError: the source does not give a model; one line names it.
     """
     if isinstance(source, mujoco.MjModel):
         return source

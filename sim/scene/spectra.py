@@ -1,8 +1,8 @@
-"""Measured spectra in the place of colours: reflectances of materials, emission of lights, by their names in the model.
+"""Measured spectra that replace colours: reflectances of materials and emission of lights, by their names in the model.
 
-A material's spectrum takes the place of its rgba; a texture, which must be grey, still multiplies it. A light's takes
-the place of daylight's and of its colour; how bright it is stays the largest of its diffuse's components. What glows,
-glows as it would look in daylight.
+A material's spectrum replaces its rgba. A texture, which must be grey, still multiplies it. A light's spectrum replaces
+daylight and the light's colour. Its level is still the largest component of its diffuse colour. The glow of an emissive
+material has the spectrum that the material reflects in daylight.
 """
 
 from __future__ import annotations
@@ -22,11 +22,12 @@ Spectra = Mapping[str, Spectrum]
 
 
 def resolve(model: mujoco.MjModel, spectra: Mapping[str, Spectrum | str] | None) -> Spectra:
-    """Spectra by name, where names of optics' own (`optics.REFLECTANCES`, `optics.ILLUMINANTS`) stand for theirs.
+    """Return spectra by name, with the names of tabulated spectra (`optics.REFLECTANCES`, `optics.ILLUMINANTS`)
+    replaced by the spectra.
 
     Raises:
-        ValueError: a name that the model has neither as a material nor as a light, or has as both; for a value that is
-            no spectrum; and for reflectances above 1.
+        ValueError: a name that is neither a material nor a light of the model, or both; a value that is not a spectrum;
+            or reflectances above 1.
     """
     materials = [model.material(i).name for i in range(model.nmat)]
     lights = [*(model.light(i).name for i in range(model.nlight)), HEADLIGHT]
@@ -50,20 +51,21 @@ def _resolved(name: str, value: Any, materials: list[str], lights: list[str]) ->
 
 
 def of_geom(model: mujoco.MjModel, geom: int, spectra: Spectra) -> Spectrum | None:
-    """The reflectance of a geom's material; None where there is only a colour."""
+    """Return the reflectance of a geom's material; None if it has only a colour."""
     material = int(model.geom_matid[geom])
     return spectra.get(model.material(material).name) if material >= 0 else None
 
 
 def in_daylight(reflectance: Spectrum) -> Spectrum:
-    """What a surface of this reflectance sends out in unit daylight, at the entries of both tables."""
+    """Return the emission of a surface with this reflectance in unit daylight, at the entries of both tables."""
     entries = {*np.arange(LIMITS_NM[0], LIMITS_NM[1] + 1, 5.0), *reflectance.wavelengths_nm}
     nm = np.array([x for x in sorted(entries) if LIMITS_NM[0] <= x <= LIMITS_NM[1]])
     return Spectrum(tuple(nm), tuple(reflectance.at(nm * 1e-9) * daylight(nm * 1e-9)))
 
 
 def described(spectrum: Spectrum, scale: float = 1.0) -> Description:
-    """Mitsuba's description of scale · spectrum on 300-780 nm: `rgb` and `d65` would be dark in the ultraviolet."""
+    """Return Mitsuba's description of scale · spectrum on 300-780 nm. Mitsuba's `rgb` and `d65` would be dark in the
+    ultraviolet."""
     inside = [nm for nm in spectrum.wavelengths_nm if LIMITS_NM[0] < nm < LIMITS_NM[1]]
     nm = np.array([LIMITS_NM[0], *inside, LIMITS_NM[1]])
     return {

@@ -1,5 +1,8 @@
-"""Colours and textures of geoms. MuJoCo's colours are display-referred; they are linearised here and get the spectrum
-that Jakob and Hanika (2019) give an RGB reflectance."""
+"""Colours and textures of geoms.
+
+MuJoCo's colours are display-referred. They are linearised here, and Jakob and Hanika's (2019) method assigns a spectrum
+to each RGB reflectance.
+"""
 
 from __future__ import annotations
 
@@ -13,26 +16,28 @@ from sim.scene import cube
 from sim.scene.color import decode_srgb
 from sim.scene.variant import Description
 
-# MuJoCo's own sign that a geom's rgba was not set, and its material's counts.
+# MuJoCo's marker for a geom whose rgba is not set, so that its material's rgba applies.
 UNSET_RGBA = np.array([0.5, 0.5, 0.5, 1.0], dtype=np.float32)
 _ROLES = mujoco.mjtTextureRole
 
 
 def geom_type(model: mujoco.MjModel, geom: int) -> mujoco.mjtGeom:
-    """A geom's kind as an enum: numpy's integers equal its members in one direction only."""
+    """Return a geom's kind as an enum, since comparisons between NumPy's integers and its members work in one direction
+    only."""
     return mujoco.mjtGeom(int(model.geom_type[geom]))
 
 
 def set_rgba(color: Sequence[float]) -> np.ndarray:
-    """The nearest colour (4,) that MuJoCo does not take for none, as it takes the grey UNSET_RGBA."""
+    """Return the nearest colour (4,) that MuJoCo does not interpret as unset, like the grey UNSET_RGBA."""
     found = np.array(color, np.float32)
     if np.array_equal(found, UNSET_RGBA):
-        found[:3] = np.nextafter(found[:3], np.float32(1))  # all three: a grey reflects all bands alike
+        found[:3] = np.nextafter(found[:3], np.float32(1))  # all three, so that a grey still reflects all bands alike
     return found
 
 
 def rgba(model: mujoco.MjModel, geom: int) -> np.ndarray:
-    """Display-referred colour (4,) of a geom, by MuJoCo's rule: its own unless unset, then its material's."""
+    """Return the display-referred colour (4,) of a geom by MuJoCo's rule: its own unless unset, otherwise that of its
+    material."""
     own = model.geom_rgba[geom]
     material = model.geom_matid[geom]
     if material >= 0 and np.array_equal(own, UNSET_RGBA):
@@ -41,12 +46,12 @@ def rgba(model: mujoco.MjModel, geom: int) -> np.ndarray:
 
 
 def visible(model: mujoco.MjModel, groups: Sequence[int]) -> list[int]:
-    """Ids of the geoms that are to be seen: those of these groups, but for what is wholly transparent."""
+    """Return the ids of the visible geoms: all geoms in these groups that are not completely transparent."""
     return [g for g in range(model.ngeom) if model.geom_group[g] in groups and rgba(model, g)[3] > 0]
 
 
 def texture_id(model: mujoco.MjModel, geom: int) -> int:
-    """Colour texture of a geom's material, -1 for none."""
+    """Return the colour texture of a geom's material, -1 for none."""
     material = model.geom_matid[geom]
     if material < 0:
         return -1
@@ -57,7 +62,8 @@ def texture_id(model: mujoco.MjModel, geom: int) -> int:
 
 
 def texture_repeat(model: mujoco.MjModel, geom: int, size: np.ndarray) -> np.ndarray:
-    """Repeats (u, v) over a geom: the material's, times the size along x and y where it is uniform."""
+    """Return the repeats (u, v) over a geom: the material's repeats, times the size along x and y if they are
+    uniform."""
     material = model.geom_matid[geom]
     repeat = model.mat_texrepeat[material].astype(float)
     if model.mat_texuniform[material]:
@@ -66,15 +72,17 @@ def texture_repeat(model: mujoco.MjModel, geom: int, size: np.ndarray) -> np.nda
 
 
 def faces_of(model: mujoco.MjModel, texture: int) -> int:
-    """Square images that a texture holds: 6, or 1 that is on all sides, of a cube; 0 for a 2-D texture."""
+    """Return the number of square images in a cube texture: 6, or 1 if all sides share it; 0 for a 2-D texture."""
     if model.tex_type[texture] == mujoco.mjtTexture.mjTEXTURE_2D:
         return 0
     return int(model.tex_height[texture] // model.tex_width[texture])
 
 
 def image(model: mujoco.MjModel, texture: int) -> np.ndarray:
-    """A texture's image (height, width, 3), as MuJoCo stores it, scaled to [0, 1], row 0 on top; of a cube, the faces
-    below each other, each with a border (`cube.padded`)."""
+    """Return a texture's image (height, width, 3), as MuJoCo stores it, scaled to [0, 1], with row 0 at the top.
+
+    For a cube texture, the faces lie below each other, each with a border (`cube.padded`).
+    """
     shape = model.tex_height[texture], model.tex_width[texture], model.tex_nchannel[texture]
     start = model.tex_adr[texture]
     pixels = model.tex_data[start : start + int(np.prod(shape))].reshape(shape).astype(np.float32) / 255
@@ -83,7 +91,7 @@ def image(model: mujoco.MjModel, texture: int) -> np.ndarray:
 
 
 def linear(model: mujoco.MjModel, texture: int, color: np.ndarray) -> np.ndarray:
-    """A texture's image times a display-referred colour (3,), linear, (height, width, 3)."""
+    """Return a texture's image times a display-referred colour (3,), in linear light, (height, width, 3)."""
     pixels = image(model, texture)
     if model.tex_colorspace[texture] == mujoco.mjtColorSpace.mjCOLORSPACE_LINEAR:
         return pixels * decode_srgb(color)
@@ -91,7 +99,8 @@ def linear(model: mujoco.MjModel, texture: int, color: np.ndarray) -> np.ndarray
 
 
 def reflectance_texture(model: mujoco.MjModel, geom: int, to_uv: np.ndarray | None = None) -> Description:
-    """Mitsuba texture of a geom's reflectance; `to_uv` (3, 3) turns the shape's texture coordinates to MuJoCo's."""
+    """Return the Mitsuba texture of a geom's reflectance; `to_uv` (3, 3) maps the shape's texture coordinates to
+    MuJoCo's."""
     color = rgba(model, geom)[:3]
     texture = texture_id(model, geom)
     if texture < 0 or not is_mirrored(model, geom, texture):
@@ -100,9 +109,9 @@ def reflectance_texture(model: mujoco.MjModel, geom: int, to_uv: np.ndarray | No
 
 
 def bitmap(values: np.ndarray, to_uv: np.ndarray | None) -> Description:
-    """Mitsuba texture of an image (height, width, 1 or 3), row 0 on top, that repeats."""
-    # Given as an object, a bitmap has its first row at v = 0, as in MuJoCo (a bitmap's `data` would be taken as
-    # coefficients of spectra, not as RGB).
+    """Return the repeating Mitsuba texture of an image (height, width, 1 or 3), row 0 at the top."""
+    # A bitmap that is passed as an object has its first row at v = 0, as in MuJoCo. (Mitsuba would interpret a bitmap's
+    # `data` as coefficients of spectra instead of RGB.)
     picture = mi.Bitmap(np.ascontiguousarray(values, dtype=np.float32))
     picture.set_srgb_gamma(False)
     transform = mi.ScalarTransform3f((np.eye(3) if to_uv is None else to_uv).tolist())
@@ -110,5 +119,6 @@ def bitmap(values: np.ndarray, to_uv: np.ndarray | None) -> Description:
 
 
 def is_mirrored(model: mujoco.MjModel, geom: int, texture: int) -> bool:
-    """Whether a texture shows on a geom: a cube's on a plane is looked up along the plane, where it has no image."""
+    """Return whether a texture is visible on a geom. A cube texture on a plane is not, since its lookup along the plane
+    has no image."""
     return not (faces_of(model, texture) and geom_type(model, geom) == mujoco.mjtGeom.mjGEOM_PLANE)

@@ -1,7 +1,7 @@
 """Geoms as triangles with MuJoCo's texture coordinates, in the geom's frame.
 
-Texture coordinates are MuJoCo's: u to the right, v downwards, (0, 0) the outer corner of the image's first texel.
-They were measured on MuJoCo 4.0.0's own renderer (tests/sim/scene/test_textures.py compares with it).
+In MuJoCo's coordinates u points to the right and v downwards, and (0, 0) is the outer corner of the image's first
+texel. They were measured with the renderer of MuJoCo 4.0.0 (tests/sim/scene/test_textures.py compares with it).
 """
 
 from __future__ import annotations
@@ -11,14 +11,20 @@ from dataclasses import dataclass, replace
 import mujoco
 import numpy as np
 
-# Chord error of a tessellated unit circle: (π/SLICES)²/2 = 3e-4 of the radius, below the 1e-3 asked of depths.
+# Chord error of a tessellated unit circle: (π/SLICES)²/2 = 3e-4 of the radius, below the required 1e-3 of depths.
 SLICES = 128
 STACKS = 64
 
 
 @dataclass(frozen=True)
 class Triangles:
-    """vertices (n, 3) [m] · normals (n, 3), unit, or None (flat) · uv (n, 2) or None · faces (m, 3), outward CCW."""
+    """Triangles of a geom.
+
+    vertices: (n, 3) [m]
+    faces: (m, 3), counter-clockwise as seen from outside
+    uv: (n, 2) or None
+    normals: (n, 3), unit vectors, or None (flat)
+    """
 
     vertices: np.ndarray
     faces: np.ndarray
@@ -26,16 +32,16 @@ class Triangles:
     normals: np.ndarray | None = None
 
     def repeated(self, repeat: np.ndarray) -> Triangles:
-        """The same, the texture repeated (u, v) times."""
+        """Return the same triangles with the texture repeated (u, v) times."""
         return self if self.uv is None else replace(self, uv=self.uv * repeat)
 
     def only(self, which: np.ndarray) -> Triangles:
-        """The same with only some of its faces, by mask (m,)."""
+        """Return the same triangles with only some of the faces, selected by a mask (m,)."""
         return replace(self, faces=self.faces[which])
 
 
 def join(parts: list[Triangles]) -> Triangles:
-    """One mesh of several; all or none have texture coordinates, and all or none normals."""
+    """Return one mesh of several. Either all or none have texture coordinates, and either all or none have normals."""
     offsets = np.cumsum([0] + [len(p.vertices) for p in parts[:-1]])
     uvs = [p.uv for p in parts if p.uv is not None]
     normals = [p.normals for p in parts if p.normals is not None]
@@ -51,8 +57,11 @@ _QUAD = np.array([[0, 1, 2], [0, 2, 3]])
 
 
 def box(half_size: np.ndarray) -> Triangles:
-    """Faces ±x carry (u, v) = (y, -z), faces ±y (x, -z), faces ±z (x, -y), each over [0, 1]: opposite faces show
-    mirror images of each other."""
+    """Return a box.
+
+    Faces ±x have (u, v) = (y, -z), faces ±y (x, -z), faces ±z (x, -y), each over [0, 1]. Opposite faces show mirror
+    images of each other.
+    """
     parts = []
     for axis, (u_axis, v_axis) in enumerate(((1, 2), (0, 2), (0, 1))):
         for sign in (1.0, -1.0):
@@ -68,12 +77,12 @@ def box(half_size: np.ndarray) -> Triangles:
 
 
 def ellipsoid(semi_axes: np.ndarray) -> Triangles:
-    """u = azimuth / 2π, v = polar angle / π from +z, both of the unit sphere that was scaled."""
+    """Return an ellipsoid: u = azimuth / 2π, v = polar angle / π from +z, both of the unit sphere before scaling."""
     return _revolved(*_arc(0, np.pi), scale=semi_axes, v=np.linspace(0, 1, STACKS + 1))
 
 
 def cylinder(radius: float, half_length: float) -> Triangles:
-    """Side: u = azimuth / 2π, v = (1 - z/h)/2. Ends: (u, v) = ((x/r + 1)/2, (y/r + 1)/2)."""
+    """Return a cylinder. Side: u = azimuth / 2π, v = (1 - z/h)/2. Ends: (u, v) = ((x/r + 1)/2, (y/r + 1)/2)."""
     side = _revolved(
         np.ones(2), np.array([1.0, -1.0]), scale=np.array([radius, radius, half_length]), v=np.array([0.0, 1.0])
     )
@@ -91,8 +100,11 @@ def cylinder(radius: float, half_length: float) -> Triangles:
 
 
 def capsule(radius: float, half_length: float) -> Triangles:
-    """Side as a cylinder's; each cap has v = 0 ... 1 of its own: from the pole to the side on top, from the side to
-    the pole below."""
+    """Return a capsule.
+
+    Its side is as in a cylinder. Each cap has its own v = 0 ... 1: from the pole to the side at the top, and from the
+    side to the pole at the bottom.
+    """
     side = _revolved(
         np.ones(2), np.array([1.0, -1.0]), scale=np.array([radius, radius, half_length]), v=np.array([0.0, 1.0])
     )
@@ -104,8 +116,11 @@ def capsule(radius: float, half_length: float) -> Triangles:
 
 
 def mesh(model: mujoco.MjModel, mesh_id: int) -> Triangles:
-    """A mesh asset, one vertex per corner of each face, since normals and texture coordinates have their own
-    indices. Like MuJoCo's renderer, an untextured corner whose normal departs from its face's is made flat."""
+    """Return a mesh asset with one vertex per corner of each face, since normals and texture coordinates have separate
+    indices.
+
+    As in MuJoCo's renderer, a corner without texture whose normal deviates from that of its face is flat.
+    """
     faces = slice(model.mesh_faceadr[mesh_id], model.mesh_faceadr[mesh_id] + model.mesh_facenum[mesh_id])
     vertices = model.mesh_vert[model.mesh_face[faces].ravel() + model.mesh_vertadr[mesh_id]].astype(float)
     normals = model.mesh_normal[model.mesh_facenormal[faces].ravel() + model.mesh_normaladr[mesh_id]].astype(float)
@@ -121,8 +136,11 @@ def mesh(model: mujoco.MjModel, mesh_id: int) -> Triangles:
 
 
 def height_field(model: mujoco.MjModel, field: int) -> Triangles:
-    """A height field asset as the closed solid that MuJoCo draws: facets whose diagonals run from the lower left to the
-    upper right corner of each cell, walls along its four sides, and a base."""
+    """Return a height field asset as the closed solid that MuJoCo draws.
+
+    The diagonals of its facets run from the lower left to the upper right corner of each cell. Walls along the four
+    sides and a base close it.
+    """
     rows, columns = int(model.hfield_nrow[field]), int(model.hfield_ncol[field])
     sx, sy, top, base = model.hfield_size[field]
     start = model.hfield_adr[field]
@@ -140,7 +158,7 @@ def height_field(model: mujoco.MjModel, field: int) -> Triangles:
 
 
 def _wall(edge: np.ndarray, base: float) -> Triangles:
-    """From an edge (n, 3) of the surface down to the base."""
+    """Return the wall from an edge (n, 3) of the surface down to the base."""
     n = len(edge)
     foot = np.column_stack([edge[:, :2], np.full(n, -base)])
     i = np.arange(n - 1)
@@ -158,8 +176,8 @@ def _arc(start: float, stop: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _revolved(radius: np.ndarray, height: np.ndarray, scale: np.ndarray, v: np.ndarray) -> Triangles:
-    """Surface of revolution of the profile (radius, height), top to bottom, then scaled; the seam's vertices are
-    doubled, since u is 0 on one side of it and 1 on the other."""
+    """Return the surface of revolution of the profile (radius, height), from top to bottom, scaled afterwards. The
+    vertices of the seam are doubled, since u is 0 on one side of it and 1 on the other."""
     azimuth = np.linspace(0, 2 * np.pi, SLICES + 1)
     circle = np.column_stack([np.cos(azimuth), np.sin(azimuth)])
     unit = np.concatenate(
@@ -169,7 +187,7 @@ def _revolved(radius: np.ndarray, height: np.ndarray, scale: np.ndarray, v: np.n
         ],
         axis=2,
     )
-    # Normal of the unit shape: that of the sphere, or of the cylinder where the radius does not change.
+    # Normals of the unit shape: those of a sphere, or of a cylinder if the radius is constant.
     normal = unit * [1, 1, 0 if np.ptp(radius) == 0 else 1] / scale
     normal /= np.linalg.norm(normal, axis=2, keepdims=True)
     uv = np.stack(np.broadcast_arrays(azimuth[None, :] / (2 * np.pi), v[:, None]), axis=2)

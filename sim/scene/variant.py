@@ -1,4 +1,4 @@
-"""Mitsuba's variant, chosen for the span of a call and given back."""
+"""Mitsuba's variant, set during a call and restored afterwards."""
 
 from __future__ import annotations
 
@@ -12,45 +12,48 @@ import mitsuba as mi
 from optics.numerics import backend
 from optics.numerics.device import device
 
-# Types of Mitsuba exist once a variant is set, so that no checker can see them: these names say what an `Any` is. What
-# Mitsuba makes of arrays (rays, points, interactions) is an `optics.numerics.autodiff.Array`.
+# Mitsuba's types exist only after a variant is set, so type checkers cannot see them. These names describe each `Any`.
+# Mitsuba's objects made of arrays (rays, points, interactions) have the type `optics.numerics.autodiff.Array`.
 MitsubaObject = Any  # a scene, shape, BSDF, sensor, sampler, integrator, texture or transform
-Description = dict[str, Any]  # of one of them, for mi.load_dict
+Description = dict[str, Any]  # description of one of them, for mi.load_dict
 
 DEFAULT_VARIANT = "llvm_ad_spectral"
 ON_GPU = "cuda_ad_spectral"
 
 
 def default_variant() -> str:
-    """Mitsuba's spectral variant for the device that is asked for.
+    """Return Mitsuba's spectral variant for the requested device.
 
     Raises:
-        optics.BackendError: there is no such device.
+        optics.BackendError: the device is not available.
     """
     return ON_GPU if device() == "cuda" else DEFAULT_VARIANT
 
 
 def on_gpu() -> bool:
-    """Whether Mitsuba's variant in force computes on a GPU."""
+    """Return whether Mitsuba's variant in force computes on a GPU."""
     return (mi.variant() or "").startswith("cuda")
 
 
 def computed(*values: Any) -> None:
-    """Have a GPU compute these now: OptiX meets one scene per kernel, and leaves others out with a line on stderr. On
-    the processor all go into one kernel."""
+    """Compute these values now if the device is a GPU.
+
+    OptiX supports one scene per kernel, and ignores others except for a line on stderr. On the CPU everything is
+    computed in one kernel.
+    """
     if on_gpu():
         dr.eval(values)
 
 
 @contextmanager
 def variant(name: str | None = None) -> Iterator[None]:
-    """Mitsuba's variant inside the block, the device's if None; afterwards the caller's own is in force again, if
-    there was one.
+    """Set Mitsuba's variant inside the block (None: that of the device), and restore the previous one afterwards, if
+    any.
 
-    (`mi.variant_context` fails where none was set before.)
+    (`mi.variant_context` fails if no variant was set before.)
 
     Raises:
-        optics.BackendError: LLVM is wanted and cannot run.
+        optics.BackendError: LLVM is requested and cannot run.
     """
     name = name or default_variant()
     before = mi.variant()

@@ -1,8 +1,8 @@
-"""What differs between the episodes of a task of one's own: light, and how large, of what and where things are.
+"""Quantities that differ between the episodes of a task: light, and sizes, colours, materials and places of objects.
 
-All of a world's lights, the sky among them, are multiplied by one spectrum, and signals with them, exactly: light adds
-up. Sizes, colours, materials and places are the worlds' own, see `sim.scene.world_models`. So all worlds are still one
-kernel.
+All lights of a world, including the sky, are multiplied by one spectrum. This multiplies the signals by exactly the
+same factor, since light is additive. Each world has its own sizes, colours, materials and places, see
+`sim.scene.world_models`. All worlds therefore still share one kernel.
 """
 
 from __future__ import annotations
@@ -19,8 +19,9 @@ from optics.spectra.spectrum import cie_1931, daylight
 
 DAYLIGHT = 6504.0  # [K] the correlated colour temperature of CIE D65
 LIGHT, TEMPERATURE = "light", "color_temperature"
-SIZE, COLOR, MATERIAL, START = OF_THINGS = ("size", "color", "material", "start")  # of what has a name: "ball.size"
-# Of their ranges: factors, kelvins, shares of red, green and blue, and lengths or angles.
+# Quantities of named objects: "ball.size".
+SIZE, COLOR, MATERIAL, START = OF_THINGS = ("size", "color", "material", "start")
+# Limits of the ranges: factors, kelvins, shares of red, green and blue, and lengths or angles.
 LIMITS = {
     LIGHT: (1e-6, 1e6),
     TEMPERATURE: (1000.0, 40_000.0),
@@ -36,12 +37,14 @@ Drawn = float | np.ndarray | str
 
 @dataclass(frozen=True)
 class Variation:
-    """ranges: (low, high) by name: "light", "color_temperature", and "NAME.size", "NAME.color" or "NAME.start" of
-        things; colours, and places in space, are three numbers each, (low, high) two opposite corners · low = high is
-        one value for all · "NAME.material": names of which one is drawn
+    """Ranges of the quantities that differ between episodes.
+
+    ranges: (low, high) by name: "light", "color_temperature", and "NAME.size", "NAME.color" or "NAME.start" of objects.
+        Colours and points in space are three numbers each, with two opposite corners as (low, high). low = high is a
+        single value for all episodes. "NAME.material": names of materials; one is drawn.
 
     Raises:
-        ValueError: another name, or no range.
+        ValueError: an unknown name, or an invalid range.
     """
 
     ranges: Mapping[str, Range]
@@ -64,8 +67,11 @@ class Variation:
                 raise ValueError(f"vary: {name} = {given!r}: must be (low, high), low first")
 
     def draw(self, random: np.random.Generator) -> dict[str, Drawn]:
-        """For one episode: factors evenly over their logarithm, temperatures over their reciprocal, in which equal
-        steps look alike (mired), colours and places evenly between their corners, materials alike."""
+        """Draw values for one episode.
+
+        Factors are uniform in their logarithm. Temperatures are uniform in their reciprocal, in which equal steps look
+        alike (mired). Colours and places are uniform between their corners. All materials have the same probability.
+        """
         found: dict[str, Drawn] = {}
         for name, given in self.ranges.items():
             what = kind_of(name)
@@ -84,29 +90,32 @@ class Variation:
         return found
 
     def blank(self, n: int) -> dict[str, np.ndarray]:
-        """Room for what is drawn, by name: (n,) or (n, 3), numbers or names."""
+        """Return arrays for drawn values, by name: (n,) or (n, 3), numbers or names."""
         return {
             name: np.array(given)[np.zeros(n, int)] if kind_of(name) == MATERIAL else np.ones((n, *np.shape(given[0])))
             for name, given in self.ranges.items()
         }
 
     def of_things(self, what: str) -> dict[str, str]:
-        """Names of ranges by the things that they are of; what: one of OF_THINGS."""
+        """Return the names of ranges by the names of their objects; what: one of OF_THINGS."""
         return {name.rpartition(".")[0]: name for name in self.ranges if kind_of(name) == what}
 
     @property
     def of_light(self) -> tuple[str, ...]:
-        """What of it is light's."""
+        """Names of the ranges that concern light."""
         return tuple(name for name in self.ranges if name in (LIGHT, TEMPERATURE))
 
     @property
-    def of_looks(self) -> bool:
-        """Whether sizes, colours or materials differ."""
+    def of_appearances(self) -> bool:
+        """True if sizes, colours or materials differ."""
         return any(kind_of(name) in (SIZE, COLOR, MATERIAL) for name in self.ranges)
 
     def light(self, values: Mapping[str, np.ndarray], wavelengths: np.ndarray) -> np.ndarray | None:
-        """What lights are multiplied by, (world, band) float32; None: nothing. values: by name, of each world ·
-        wavelengths [m]"""
+        """Return the factors of the lights, (world, band) float32; None if light does not vary.
+
+        values: values by name, for each world
+        wavelengths: [m]
+        """
         if not self.of_light:
             return None
         n = len(values[self.of_light[0]])
@@ -118,8 +127,8 @@ class Variation:
         return factors.astype(np.float32)
 
     def extremes(self, wavelengths: np.ndarray) -> np.ndarray:
-        """`light` at the ends of all its ranges, (case, band): where the brightest of all bands is. One band by itself
-        may be brighter in between, of warm and cold light by a third."""
+        """Return `light` at the ends of all its ranges, (case, band). The brightest of all bands is among them. A
+        single band may be brighter in between, with warm and cold light by a third."""
         names = self.of_light
         ends = [self.ranges[name] for name in names]
         corners = np.stack(np.meshgrid(*ends, indexing="ij"), axis=-1).reshape(-1, len(names)) if names else None
@@ -140,10 +149,10 @@ _FORM = {
 
 
 def kind_of(name: str) -> str:
-    """What a range is of: LIGHT, TEMPERATURE, or one of OF_THINGS.
+    """Return the quantity of a range: LIGHT, TEMPERATURE, or one of OF_THINGS.
 
     Raises:
-        ValueError: it is of none.
+        ValueError: an unknown quantity.
     """
     if name in (LIGHT, TEMPERATURE):
         return name
@@ -163,9 +172,12 @@ def _check_names(name: str, given: Any) -> None:
 
 
 def filter_to(kelvins: float, wavelengths: np.ndarray) -> np.ndarray:
-    """Transmission (band,) of a filter that makes of daylight what has this colour temperature and is as bright for
-    people: the ratio of black bodies of this temperature and of DAYLIGHT (Planck's law), so scaled that daylight keeps
-    its illuminance."""
+    """Return the transmission (band,) of a filter that changes daylight to light of this colour temperature and the
+    same illuminance.
+
+    It is the ratio of black bodies of this temperature and of DAYLIGHT (Planck's law), scaled to preserve the
+    illuminance.
+    """
     seen = daylight(_VISIBLE) * cie_1931(_VISIBLE)[:, 1]
     scale = seen.sum() / (seen * _ratio(kelvins, _VISIBLE)).sum()
     found: np.ndarray = scale * _ratio(kelvins, wavelengths)
@@ -173,14 +185,14 @@ def filter_to(kelvins: float, wavelengths: np.ndarray) -> np.ndarray:
 
 
 def _ratio(kelvins: float, wavelengths: np.ndarray) -> np.ndarray:
-    """Of Planck's spectra, both of which fall as λ⁻⁵."""
+    """Return the ratio of Planck's spectra, whose common factor λ⁻⁵ cancels."""
     x = h * c / (k * np.asarray(wavelengths))
     found: np.ndarray = np.expm1(x / DAYLIGHT) / np.expm1(x / kelvins)
     return found
 
 
 def _corners(given: Any) -> np.ndarray | None:
-    """(low, high) as an array (2,) or (2, 3); None: it is no such pair of finite numbers."""
+    """Return (low, high) as an array (2,) or (2, 3); None if it is not such a pair of finite numbers."""
     try:
         corners = np.asarray(given, float)
     except (TypeError, ValueError):

@@ -1,8 +1,8 @@
-"""A model for each world, where sizes, colours and materials differ or a task changes it, and where things are when an
-episode begins.
+"""A model for each world, if sizes, colours or materials differ or a task changes them, and starting places of objects.
 
-A size goes through MuJoCo's compiler, so that mass, inertia and all that follows from them are the compiler's own: what
-has a density weighs by its volume, what was given a mass keeps it. A world's model and data stay the same objects.
+MuJoCo's compiler applies sizes, so that mass, inertia and all derived quantities are its own: an object with a density
+scales its mass with its volume, and an object with a given mass keeps it. A world's model and data remain the same
+objects.
 """
 
 from __future__ import annotations
@@ -24,22 +24,23 @@ from sim.scene.primitive_geoms import kind_of as primitive_of
 from sim.scene.variation import COLOR, MATERIAL, OF_THINGS, SIZE, START, Variation
 
 Drawn = Mapping[str, of_worlds.Drawn]
-# Fields that no size changes: what is large among them would be copied for nothing.
+# Fields that do not depend on sizes; copying the large ones would be wasteful.
 _FIXED = ("tex", "mesh", "hfield", "skin", "mat_", "name", "text", "numeric", "tuple", "key", "path")
 _JOINTS = (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE)
 
 
 class WorldModels:
-    """Of `n` worlds of one model.
+    """Models of `n` worlds.
 
-    given: what the model was made of · model: what became of it; worlds have copies
-    models: of each world; one for all, unless they are `own`
-    own: whether each world has one for itself: where something of them differs or a task changes them (`separate`);
-        then each episode begins with the model as it was compiled
-    varied: names of the geoms whose size, colour or material differs, and of the materials that are drawn
+    given: source of the model
+    model: the compiled model; worlds have copies of it
+    models: models of the worlds; a single one for all, unless `own` is True
+    own: True if each world has its own model, because some quantity differs or a task changes it (`separate`). Each
+        episode then starts with the model as it was compiled.
+    varied: names of the geoms whose size, colour or material differs, with the materials that may be drawn
 
     Raises:
-        ValueError: the model has no such thing, or one that cannot differ.
+        ValueError: the model has no such object, or one that cannot vary.
     """
 
     def __init__(self, given: Any, model: mujoco.MjModel, n: int, variation: Variation | None) -> None:
@@ -54,7 +55,7 @@ class WorldModels:
             model.geom(g).name: tuple(self._materials[g][1]) if g in self._materials else ()
             for g in sorted({*self._sizes, *self._colors, *self._materials})
         }
-        self.own, self._compiled = False, ModelSettings(model).held()
+        self.own, self._compiled = False, ModelSettings(model).to_bytes()
         self.models = [copy.copy(model)] * n
         self._settings = [ModelSettings(self.models[0])] * n
         if self.varied:
@@ -63,51 +64,54 @@ class WorldModels:
             self._prepare_sizes(given)
 
     def separate(self) -> None:
-        """A model for each world from now on, as it was compiled."""
+        """Give each world its own copy of the compiled model from now on."""
         self.own, self.models = True, [copy.copy(self.model) for _ in self.models]
         self._settings = [ModelSettings(model) for model in self.models]
 
-    def held(self, world: int) -> bytes:
-        """All that physics goes by of a world's model now."""
-        return self._settings[world].held()
+    def get_state(self, world: int) -> bytes:
+        """Return the current settings of a world's model that physics uses."""
+        return self._settings[world].to_bytes()
 
-    def hold(self, world: int, held: bytes) -> None:
-        """Inverse of `held`."""
-        self._settings[world].hold(held)
+    def set_state(self, world: int, held: bytes) -> None:
+        """Restore the settings that `get_state` returned."""
+        self._settings[world].restore(held)
 
     def differs(self) -> bool:
-        """Whether the model that worlds share is no longer as it was compiled."""
-        return not self.own and self.held(0) != self._compiled
+        """Return whether the model that worlds share has changed since it was compiled."""
+        return not self.own and self.get_state(0) != self._compiled
 
     def noted(self) -> bytes:
-        """The model that several worlds share, as it is now; nothing if each has its own."""
-        return b"" if self.own else self.held(0)
+        """Return the current settings of the model that several worlds share; empty if each has its own."""
+        return b"" if self.own else self.get_state(0)
 
     def require_unchanged(self, before: bytes, whose: str) -> None:
-        """Compare with what `noted` returned; whose: what a message begins with. If there is only one world, its model
-        becomes its own as soon as a task changes it.
+        """Compare the shared model with the settings that `noted` returned.
+
+        A single world gets its own model as soon as a task changes it.
+
+        whose: beginning of the message
 
         Raises:
             RuntimeError: the model that several worlds share has changed.
         """
-        if self.own or self.held(0) == before:
+        if self.own or self.get_state(0) == before:
             return
         self.own = len(self.models) == 1
         if not self.own:
             raise RuntimeError(
-                f"{whose}: data.model has another {self._settings[0].differing(before)} now, and all worlds share it: "
-                "must be changed by the first `reset`, too; then each world has a model of its own"
+                f"{whose}: {self._settings[0].differing(before)} of data.model has changed, and all worlds share it: "
+                "must be changed by the first `reset`, too; then each world has its own model"
             )
 
-    def begin(self, world: int, drawn: Drawn) -> None:
-        """A world's sizes, colours and materials from now on; a model of its own is otherwise as it was compiled.
+    def start_episode(self, world: int, drawn: Drawn) -> None:
+        """Set a world's sizes, colours and materials. Otherwise its own model is as it was compiled.
 
         Raises:
-            ValueError: a material that is not one of its own.
+            ValueError: a material that is not one of the geom's.
         """
         mine = self.models[world]
-        if self.own and self.held(world) != self._compiled:
-            self.hold(world, self._compiled)
+        if self.own and self.get_state(world) != self._compiled:
+            self.set_state(world, self._compiled)
         if self._sizes:
             self._resize(mine, drawn)
         for geom, name in self._colors.items():
@@ -118,12 +122,12 @@ class WorldModels:
             mine.geom_matid[geom] = candidates[material]
 
     def place(self, data: mujoco.MjData, drawn: Drawn) -> None:
-        """Things are where an episode begins."""
+        """Put objects at their drawn starting places."""
         for name, (where, address) in self._starts.items():
             getattr(data, where)[address] = drawn[name]
 
     def _candidates(self, geom: int, name: str, variation: Variation | None) -> dict[str, int]:
-        """Ids of materials, by name."""
+        """Return the ids of materials, by name."""
         assert variation is not None
         if geom in self._colors:
             raise ValueError(f"vary: {name} and {self._colors[geom]}: must be one of them; materials have colours")
@@ -149,7 +153,7 @@ class WorldModels:
         for geom, mjs in self._geoms.items():
             factor, (size, ends) = float(drawn[self._sizes[geom]]), self._natural[geom]
             middle = np.tile((ends[:3] + ends[3:]) / 2, 2)
-            # A capsule that was given by its ends keeps its middle, and its half length is nobody's number.
+            # A capsule defined by its ends keeps its centre, and its half length is unused.
             mjs.size, mjs.fromto = factor * size, middle + factor * (ends - middle)
         compiled = self._spec.compile()
         for name in self._fields:
@@ -171,7 +175,7 @@ def _geom(model: mujoco.MjModel, thing: str, name: str) -> int:
 
 
 def _place(model: mujoco.MjModel, thing: str, name: str, variation: Variation | None) -> tuple[str, Any]:
-    """Which entries of which field of mjData say where a thing is."""
+    """Return the field of mjData, and the entries in it, that contain an object's place."""
     assert variation is not None
     spatial = np.ndim(variation.ranges[name][0]) == 1
     joint = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, thing)
@@ -194,16 +198,16 @@ def _place(model: mujoco.MjModel, thing: str, name: str, variation: Variation | 
 
 
 def _specification(given: Any) -> mujoco.MjSpec:
-    """What can be compiled anew."""
+    """Return a specification that can be compiled again."""
     if isinstance(given, mujoco.MjSpec):
         return given.copy()
     if isinstance(given, str) and given.lstrip().startswith("<"):
         return mujoco.MjSpec.from_string(given)
     if isinstance(given, str | Path) and Path(given).suffix != ".mjb":
-        source.load(given)  # says what is wrong, where something is
+        source.load(given)  # reports errors of the source
         return mujoco.MjSpec.from_file(str(given))
     kind = f"a {type(given).__name__}" if isinstance(given, mujoco.MjModel) else "a compiled file"
-    raise ValueError(f"vary: sizes: model is {kind}: must be MJCF or an MjSpec, which can be compiled anew")
+    raise ValueError(f"vary: sizes: model is {kind}: must be MJCF or an MjSpec, which can be compiled again")
 
 
 def _fields_of(model: mujoco.MjModel) -> list[str]:

@@ -1,4 +1,4 @@
-"""Arrays that the methods of a batch task return, checked: which method, which shape, which world."""
+"""Checks of arrays that the methods of a batch task return. Messages name the method, the shape and the world."""
 
 from __future__ import annotations
 
@@ -13,10 +13,12 @@ __all__ = ["columns", "mapping", "not_finite", "require_outcome", "rows"]
 
 
 def rows(where: str, returned: Any, n: int, kind: type) -> np.ndarray:
-    """One number for each world, (n,).
+    """Return one number for each world, (n,).
+
+    where: source of the array, for the message
 
     Raises:
-        ValueError: another shape, or no numbers; `where` they come from.
+        ValueError: another shape, or not numbers.
     """
     array = _array(where, returned, kind)
     if array.shape != (n,):
@@ -25,10 +27,10 @@ def rows(where: str, returned: Any, n: int, kind: type) -> np.ndarray:
 
 
 def columns(where: str, returned: Any, n: int) -> np.ndarray:
-    """Several numbers for each world, (n, k) float32.
+    """Return several numbers for each world, (n, k) float32.
 
     Raises:
-        ValueError: another shape, no numbers, or numbers that are not finite.
+        ValueError: another shape, not numbers, or numbers that are not finite.
     """
     array = _array(where, returned, np.float32)
     if array.ndim != 2 or len(array) != n:
@@ -40,10 +42,10 @@ def columns(where: str, returned: Any, n: int) -> np.ndarray:
 
 
 def mapping(where: str, returned: Any) -> Mapping[str, Any]:
-    """Arrays by name.
+    """Return arrays by name.
 
     Raises:
-        ValueError: something else.
+        ValueError: not a mapping.
     """
     if not isinstance(returned, Mapping):
         raise ValueError(f"{where} returned {returned!r:.80}: must be arrays by name, such as {{'progress': (n,)}}")
@@ -51,7 +53,7 @@ def mapping(where: str, returned: Any) -> Mapping[str, Any]:
 
 
 def not_finite(where: str, terms: Mapping[str, np.ndarray]) -> dict[int, str]:
-    """Worlds in which a term is not finite, with the reason."""
+    """Return the worlds in which a term is not finite, with the reason."""
     found: dict[int, str] = {}
     for name, term in terms.items():
         for world in np.flatnonzero(~np.isfinite(term)).tolist():
@@ -60,7 +62,7 @@ def not_finite(where: str, terms: Mapping[str, np.ndarray]) -> dict[int, str]:
 
 
 def require_outcome(outcome: Outcome, n: int, learners: int) -> None:
-    """Compare the arrays of an outcome with the number of worlds.
+    """Check the arrays of an outcome against the number of worlds.
 
     Raises:
         ValueError: another shape, a reward that is not finite, or worlds that do not exist.

@@ -1,4 +1,4 @@
-"""Tasks on arrays of all worlds: rules that are written once and computed for the whole batch."""
+"""Tasks on arrays of all worlds: the rules are written once and computed for the whole batch."""
 
 from __future__ import annotations
 
@@ -27,12 +27,15 @@ __all__ = ["Agent", "BatchTask"]
 
 @dataclass(frozen=True, eq=False)
 class Agent:
-    """One animal of every world, as an environment needs to know it.
+    """One animal of every world, as described to an environment.
 
-    name: what it is called among others · n_actions: numbers in an action
-    kinds: of its eyes · auxiliary: what its observation holds of each receptor beside the signal
-    first_action: what it "did last" when an episode begins
-    learns: whether its actions come from outside; otherwise from `policy`, which may be None (it does nothing)
+    name: name of the animal
+    n_actions: number of values in an action
+    kinds: kinds of its eyes
+    auxiliary: auxiliary entries of its observation, for each receptor
+    first_action: "previous action" at the beginning of an episode
+    learns: True if its actions come from outside; otherwise `policy` chooses them
+    policy: policy of an animal that does not learn; None: its actions are zeros
     """
 
     name: str
@@ -45,33 +48,36 @@ class Agent:
 
 
 class BatchTask(TaskSettings):
-    """A task whose methods get all worlds at once; only `model`, `mounts` and `rewards` have no default.
+    """A task whose methods receive all worlds at once. Only `model`, `mounts` and `rewards` have no default.
 
-    The settings are those of `sim.Task`. Arrays have one row for each world. `worlds` is what `physics` returns: here
-    `sim.ArrayWorlds`, with MuJoCo's arrays (`worlds.qpos`, `worlds.xpos` ...) stacked over worlds; the built-in tasks
-    use `sim.SlidingAgents`. `sim.check_batch_task` tests a task against this description.
+    The settings are those of `sim.Task`. Arrays have one row for each world. `worlds` is the object that `physics`
+    returns. The default is `sim.ArrayWorlds`, which stacks MuJoCo's arrays (`worlds.qpos`, `worlds.xpos` ...) over
+    worlds. The built-in tasks use `sim.SlidingAgents`. `sim.check_batch_task` tests a task against this description.
 
-    renders_early: whether rendering may begin before an action is judged, which is faster; `rewards`, `terminated`,
-        `succeeded` and `feels` must then move nothing, unless `judge` names the worlds in `Outcome.changed`
-    feel_ranges: (lowest, highest) of what `feels` returns, by name; without an entry there is no limit
-    ramped: terms of the reward that may count less while a learner begins, if `evolve` is told so
+    renders_early: if True, rendering may begin before an action is judged, which is faster. `rewards`, `terminated`,
+        `succeeded` and `proprioception` must then not move anything, unless `judge` names the worlds in
+        `Outcome.changed`.
+    proprioception_ranges: (lowest, highest) value of each entry of `proprioception`, by name; without one, no limit
+    ramped: terms of the reward that may have less weight at the beginning of training, if this is set in `evolve`
     counted: titles of rows in tables, by reward term: the number of actions in which the term is not 0
-    compared_light: light in which `evolve` compares eyes, "direct" for example; None: as `fidelity` has it
+    compared_light: light in which `evolve` compares eyes, for example "direct"; None: the light of `fidelity`
     """
 
     renders_early: bool = True
-    feel_ranges: Mapping[str, tuple[float, float]] = {}
+    proprioception_ranges: Mapping[str, tuple[float, float]] = {}
     ramped: Sequence[str] = ()
     counted: Mapping[str, str] = {}
     compared_light: str | None = None
 
     def reset(self, worlds: Any, chosen: np.ndarray, rngs: Sequence[np.random.Generator]) -> None:
-        """Start episodes in the chosen worlds, (k,) int, each with its own generator; here: as mj_resetData has it."""
+        """Start episodes in the chosen worlds, (k,) int, each with its own generator; default: the state after
+        mj_resetData."""
 
     def act(self, worlds: Any, actions: np.ndarray) -> Mapping[int, str] | None:
-        """Take actions in [-1, 1], (n, n_actions); here: each control of the actuators over the whole of its range.
+        """Take actions in [-1, 1], (n, n_actions); default: map each value to the full range of one of the actuators'
+        controls.
 
-        Returns why worlds cannot go on, by world, if there are any.
+        Returns reasons, by world, if worlds cannot continue.
         """
         mine = controls_of(worlds.model, self.actuators)
         limited = worlds.model.actuator_ctrllimited[mine].astype(bool)
@@ -80,24 +86,28 @@ class BatchTask(TaskSettings):
         return None
 
     def rewards(self, worlds: Any) -> Mapping[str, np.ndarray]:
-        """Terms of the reward of the last action, by name, (n,) each; the reward is their sum."""
+        """Return the terms of the last action's reward, by name, (n,) each; the reward is their sum."""
         raise NotImplementedError
 
     def terminated(self, worlds: Any) -> np.ndarray:
-        """Worlds whose episode ends here, (n,) bool."""
+        """Return the worlds whose episode ends here, (n,) bool."""
         return np.zeros(worlds.n, bool)
 
     def succeeded(self, worlds: Any) -> np.ndarray:
-        """Worlds in which the task is accomplished, (n,) bool: `info["is_success"]`."""
+        """Return the worlds in which the task is accomplished, (n,) bool: `info["is_success"]`."""
         return np.zeros(worlds.n, bool)
 
-    def feels(self, worlds: Any) -> np.ndarray | Mapping[str, np.ndarray]:
-        """What agents know beside what they see, (n, k), or several such arrays by name; here: nothing."""
+    def proprioception(self, worlds: Any) -> np.ndarray | Mapping[str, np.ndarray]:
+        """Return the agents' observation other than signals of eyes, (n, k), or several such arrays by name; default:
+        nothing."""
         return {}
 
     def judge(self, worlds: Any, failed: Mapping[int, str]) -> Outcome:
-        """What the last action led to; failed: why worlds could not go on, by world. Here: what the other methods say;
-        a task that computes all at once overrides this one.
+        """Return the outcome of the last action.
+
+        The default combines the other methods. A task that computes everything at once overrides this method.
+
+        failed: reasons, by world, if worlds could not continue
 
         Raises:
             ValueError: a method returned arrays of another shape.
@@ -111,7 +121,8 @@ class BatchTask(TaskSettings):
         success = rows(f"{name}: succeeded", self.succeeded(worlds), n, bool)
         failure = {**not_finite("rewards", terms), **failed}
         broken = np.array(list(failure), int)
-        terminated[broken] = True  # not truncated: nothing might have come after it that a learner could count with
+        # Terminated, not truncated: learners must not bootstrap from the state after a failure.
+        terminated[broken] = True
         for term in terms.values():
             term[broken] = 0.0
         if failure and self.failure_reward:
@@ -121,34 +132,40 @@ class BatchTask(TaskSettings):
         return Outcome(RewardTerms(list(terms), stacked), terminated, success, failure)
 
     def first_info(self, worlds: Any, chosen: np.ndarray) -> Sequence[Mapping[str, Any]] | None:
-        """More entries of `info` at the beginning of an episode, for each chosen world; None: no more."""
+        """Return additional entries of `info` at the beginning of an episode, for each chosen world; None: no
+        additions."""
         return None
 
     def commands(self) -> tuple[Command, ...]:
-        """The meaning of each number in the first agent's action; here: numbered, without units."""
+        """Return the meaning of each number in the first agent's action; default: numbered, without units."""
         return tuple(Command(str(number)) for number in range(self.agents()[0].n_actions))
 
     def solved(self, before: bool | None, info: Mapping[str, Any]) -> bool | None:
-        """Whether an episode counts as solved after one more action with this `info`; before: the same without this
-        action; None: undecided. Here: as `succeeded` says after the last action."""
+        """Return whether an episode counts as solved after one more action with this `info`; None: undecided.
+
+        The default is the result of `succeeded` after the last action.
+
+        before: the return value before this action
+        """
         return bool(info["is_success"])
 
     def azimuths(self) -> np.ndarray:
-        """Directions of the first agent's first kind of eyes [rad], (eye,), in the frame of what they are on."""
+        """Directions of the first agent's first kind of eyes [rad], (eye,), in the frame of the object that carries
+        them."""
         return np.radians([mount.azimuth_deg for mount in self.agents()[0].kinds[0].mounts])
 
     def ground_plan(self, place: np.ndarray) -> GroundPlan | None:
-        """The surroundings of this place (2,) [m] from above; None: pictures show the task instead."""
+        """Return the surroundings of this place (2,) [m] from above; None: images show the task instead."""
         return None
 
-    # What follows is needed only by tasks with a physics, agents or random streams of their own.
+    # Only tasks with their own physics, agents or random streams override the following methods.
 
     def physics(self, n: int, threads: int, variation: Variation | None) -> Physics:
-        """What moves `n` worlds."""
+        """Return the physics of `n` worlds."""
         return ArrayWorlds(self.model, self._compiled(), n, threads, self.substeps, variation)
 
     def agents(self) -> tuple[Agent, ...]:
-        """Who acts in each world; those who learn come first."""
+        """Return the agents in each world, learners first."""
         n_actions = self.n_actions(self._compiled())
         label = type(self).__name__ if self.name is None else str(self.name)
         first = np.zeros(n_actions, np.float32)
@@ -156,11 +173,11 @@ class BatchTask(TaskSettings):
         return (Agent(label, n_actions, kinds_of(self), auxiliary, first),)
 
     def streams(self, seed: Any, n: int) -> RandomStreams:
-        """Where chance comes from."""
+        """Return the random streams of the worlds."""
         return StreamsByWorld(seed, n, [len(agent.kinds) for agent in self.agents()])
 
     def in_mode(self, mode: str) -> Self:
-        """The same task in this mode."""
+        """Return the same task in this mode."""
         if self.mode == mode:
             return self
         found = copy.copy(self)
@@ -168,12 +185,13 @@ class BatchTask(TaskSettings):
         return found
 
     def take(self, worlds: Any, actions: np.ndarray, failed: Mapping[int, str]) -> Mapping[int, str]:
-        """`act`; failed: why worlds cannot go on already, by world. Returns the same of worlds that fail now."""
+        """Call `act`, and return reasons of worlds that fail now; failed: reasons of worlds that have already
+        failed."""
         return self.act(worlds, actions) or {}
 
-    def all_feel(self, worlds: Any, chosen: np.ndarray) -> list[Mapping[str, np.ndarray]]:
-        """`feels` of every agent in the chosen worlds, by name."""
-        felt, name = self.feels(worlds), f"{type(self).__name__}: feels"
+    def all_proprioception(self, worlds: Any, chosen: np.ndarray) -> list[Mapping[str, np.ndarray]]:
+        """Return `proprioception` of every agent in the chosen worlds, by name."""
+        felt, name = self.proprioception(worlds), f"{type(self).__name__}: proprioception"
         known = felt if isinstance(felt, Mapping) else {"feels": felt}
         return [{key: columns(f"{name}: {key!r}", array, worlds.n)[chosen] for key, array in known.items()}]
 

@@ -1,4 +1,5 @@
-"""What the built-in tasks share: the sliding agent, its contact sense, its weights, and a random stream per purpose."""
+"""Common parts of the built-in tasks: the sliding agent, its contact sense, its reward, and one random stream per
+purpose."""
 
 from __future__ import annotations
 
@@ -26,17 +27,19 @@ from sim.worlds.world import MAX_SPEED, World
 
 __all__ = ["STANDING", "AgentEvents", "AgentTask", "mounts_of_agent"]
 
-OUTSIDE = 1e-6  # of the radius: how far above the skin a pupil is, so that rounding does not put it below
-STANDING = (-1.0, 0.0)  # the "previous action" of an agent that has not moved yet: no speed, no turn
+OUTSIDE = 1e-6  # height of a pupil above the skin, in units of the radius, so that rounding does not put it below
+STANDING = (-1.0, 0.0)  # "previous action" of an agent that has not moved yet: no speed, no turn
 
 
 @dataclass(frozen=True)
 class AgentEvents:
-    """What happened during one action, per world.
+    """Events during one action, per world.
 
-    progress: [m], in the task's sense (n,) · goal, adversary: reached (n,) bool
-    adversary_first: an adversary was reached, and before any goal (n,) bool
-    reached: objects that were reached (n, k) bool · terminated: (n,) bool
+    progress: [m], as defined by the task, (n,)
+    goal, adversary: reached, (n,) bool
+    adversary_first: an adversary was reached before any goal, (n,) bool
+    reached: objects that were reached, (n, k) bool
+    terminated: (n,) bool
     """
 
     progress: np.ndarray
@@ -48,11 +51,11 @@ class AgentEvents:
 
     @property
     def any(self) -> np.ndarray:
-        """Something was reached, (n,) bool."""
+        """True in worlds in which an object was reached, (n,) bool."""
         return self.goal | self.adversary
 
     def within(self, worlds: np.ndarray) -> AgentEvents:
-        """The same in these worlds, (n,) bool; nothing happened in the others."""
+        """Return the same events in these worlds, (n,) bool, and none in the others."""
         return AgentEvents(
             progress=np.where(worlds, self.progress, 0.0),
             goal=self.goal & worlds,
@@ -66,12 +69,13 @@ class AgentEvents:
 class AgentTask(BatchTask):
     """A task of an agent that slides among walls, in one of the built-in worlds.
 
-    world: its layout · mode: "training" or "evaluation": the weights of the reward
-    eyes: on the agent's equator; of several kinds by name; None: nobody looks
-    fidelity: how finely they see, or "auto"
+    world: layout of the world
+    mode: "training" or "evaluation": the weights of the reward
+    eyes: eyes on the agent's equator; several kinds by name; None: no eyes
+    fidelity: fidelity of the eyes, or "auto"
     """
 
-    feel_ranges: Mapping[str, tuple[float, float]] = {"contact": (0.0, 1.0)}
+    proprioception_ranges: Mapping[str, tuple[float, float]] = {"contact": (0.0, 1.0)}
     ramped = ("contact",)
     counted: Mapping[str, str] = {
         "goal": "goals reached",
@@ -98,18 +102,18 @@ class AgentTask(BatchTask):
 
     @property
     def weights(self) -> RewardWeights:
-        """Of the reward's terms."""
+        """Weights of the reward's terms."""
         return MODES[self.mode]
 
     def n_actions(self, model: mujoco.MjModel) -> int:
-        """Forward speed, and change of heading."""
+        """Two: forward speed, and change of heading."""
         return 2
 
     def commands(self) -> tuple[Command, ...]:
         return (Command("speed", "m/s", MAX_SPEED / 2, 1.0), Command("turn", "°", np.degrees(MAX_TURN)))
 
     def solved(self, before: bool | None, info: Mapping[str, Any]) -> bool | None:
-        """Decided by what is reached first: a goal solves the task, an adversary does not."""
+        """Return the result of the first object reached: a goal solves the task, an adversary does not."""
         if before is not None:
             return before
         if info.get("adversary_first"):
@@ -120,7 +124,7 @@ class AgentTask(BatchTask):
         return self.eyes.azimuths() if isinstance(self.eyes, Eyes) else super().azimuths()
 
     def ground_plan(self, place: np.ndarray) -> GroundPlan:
-        return GroundPlan.of(self.world, place)
+        return GroundPlan.from_world(self.world, place)
 
     def physics(self, n: int, threads: int, variation: Variation | None) -> SlidingAgents:
         return SlidingAgents(self.world, n, threads, variation)
@@ -133,16 +137,16 @@ class AgentTask(BatchTask):
         return (replace(agent, first_action=np.array(STANDING, np.float32)),)
 
     def act(self, worlds: SlidingAgents, actions: np.ndarray) -> None:
-        """Forward speed and change of heading; objects move, if they do."""
+        """Set forward speed and change of heading, and the motion of the objects."""
         worlds.steer(actions)
         worlds.move_objects(*self.moved(worlds))
 
     def moved(self, worlds: SlidingAgents) -> tuple[np.ndarray, np.ndarray]:
-        """Objects (n, k, 3) [m] and their headings (n, k) [rad] after the next action; here: as they are."""
+        """Return objects (n, k, 3) [m] and their headings (n, k) [rad] after the next action; default: unchanged."""
         return worlds.state.objects, worlds.state.object_heading
 
-    def feels(self, worlds: SlidingAgents) -> Mapping[str, np.ndarray]:
-        """Whether the agent touched a wall during the last action; not at the beginning of an episode."""
+    def proprioception(self, worlds: SlidingAgents) -> Mapping[str, np.ndarray]:
+        """Return whether the agent touched a wall during the last action; 0 at the beginning of an episode."""
         touched = np.zeros(worlds.n, bool) if worlds.motion is None else worlds.motion.contact
         return {"contact": (touched & (worlds.state.steps > 0)).astype(np.float32)[:, None]}
 
@@ -152,7 +156,7 @@ class AgentTask(BatchTask):
         return [{"position": (x, y), "heading": heading} for (x, y), heading in places]
 
     def weighted(self, worlds: SlidingAgents, events: AgentEvents, failed: Mapping[int, str]) -> Outcome:
-        """The outcome of an action with these events."""
+        """Return the outcome of an action with these events."""
         if failed:
             well = np.ones(worlds.n, bool)
             well[list(failed)] = False
@@ -179,10 +183,10 @@ class AgentTask(BatchTask):
         )
 
     def put_elsewhere(self, worlds: SlidingAgents, events: AgentEvents) -> np.ndarray:
-        """Put objects that were reached elsewhere, if the episode goes on; returns the worlds that changed."""
+        """Move reached objects to new positions, if the episode goes on; return the worlds that changed."""
         return NOWHERE
 
 
 def mounts_of_agent(eyes: Eyes) -> tuple[Mount, ...]:
-    """Places of these eyes on the agent's equator."""
+    """Return the places of these eyes on the agent's equator."""
     return ring("agent", eyes.n_eyes, eyes.placement_range_deg, BODY_RADIUS * (1 + OUTSIDE))

@@ -1,4 +1,4 @@
-"""The meaning of the numbers in an action, for reports and for the first actions of a learner."""
+"""The meaning of the numbers in an action, for reports and for a learner's initial actions."""
 
 from __future__ import annotations
 
@@ -13,7 +13,8 @@ __all__ = ["Command"]
 class Command:
     """One number of an action, in [-1, 1].
 
-    name: for reports · unit: of the quantity that it commands, which is scale * (number + offset)
+    name: name in reports
+    unit: unit of the commanded quantity, which is scale * (number + offset)
     """
 
     name: str
@@ -22,5 +23,5 @@ class Command:
     offset: float = 0.0
 
     def quantity(self, numbers: np.ndarray) -> np.ndarray:
-        """The commanded quantity, in `unit`."""
+        """Return the commanded quantity, in `unit`."""
         return self.scale * (np.clip(numbers, -1, 1) + self.offset)

@@ -1,4 +1,4 @@
-"""Several animals in one world, each a task of its own: who learns, and who acts by a policy that is as it is."""
+"""Several animals in one world, each with its own task: learning animals, and animals with fixed policies."""
 
 from __future__ import annotations
 
@@ -16,23 +16,23 @@ from sim.physics.controls import actuator_names
 from sim.tasks.batch_task import BatchTask
 from sim.tasks.task import Task
 
-FRAMES_AXES = 5  # memory, eye, channel, height, width: of what eyes see in an observation, and of nothing else
-SAID_BY_ANY = ("spectra", "vary")  # what belongs to the world, too, and may be left to one animal
-SHARED = ("substeps", "episode_steps")  # what belongs to the world: every animal must say the same of it
+# Memory, eye, channel, height, width: the axes of eyes' signals, and of no other entry of an observation.
+FRAMES_AXES = 5
+SAID_BY_ANY = ("spectra", "vary")  # settings of the world that may be set in any one of the animals' tasks
+SHARED = ("substeps", "episode_steps")  # settings of the world that must be equal in all of the animals' tasks
 
 
 @dataclass(frozen=True, eq=False)
 class Frozen:
     """An animal that does not learn, in the world of one that does: one of its task's `others`.
 
-    task: what it is: its eyes, its actions and its endings; its rewards are not asked for, and others of its own are
-        left out
-    policy: what has stable-baselines3's `predict` (a learner, or what `evolve.load_policy` returns), or a function of
-        the observations of all worlds at once, as `make_vec_env` has them, that returns actions (world, number); None:
-        its actions are zeros, and nobody looks through its eyes
+    task: task that defines its eyes, actions and endings; its rewards and its own `others` are not used
+    policy: an object with stable-baselines3's `predict` (a learner, or the return value of `evolve.load_policy`), or a
+        function from the observations of all worlds, as in `make_vec_env`, to actions (world, number). None: its
+        actions are zeros, and its eyes are not rendered.
 
     Raises:
-        ValueError: these are something else.
+        ValueError: arguments of other types.
     """
 
     task: Task
@@ -46,16 +46,16 @@ class Frozen:
 
     @property
     def memory(self) -> int:
-        """Frames in the observations that its policy wants."""
+        """Number of frames in the observations that its policy expects."""
         known = getattr(getattr(self.policy, "observation_space", None), "spaces", {})
         shapes = [space.shape for space in known.values()]
         return max((shape[0] for shape in shapes if len(shape) == FRAMES_AXES), default=1)
 
     def actions(self, observation: Mapping[str, np.ndarray], shape: tuple[int, int]) -> np.ndarray:
-        """What it does in every world, of this shape (world, number).
+        """Return its actions in every world, of this shape (world, number).
 
         Raises:
-            RuntimeError: its policy fails, or returns something else.
+            RuntimeError: its policy fails, or returns another shape.
         """
         try:
             predict = getattr(self.policy, "predict", None)
@@ -72,33 +72,33 @@ class Frozen:
 
 
 class Encounter:
-    """Animals that meet in one world and see each other, such as `sim.Encounter(Prey(), Predator())`.
+    """Animals in one world that see each other, such as `sim.Encounter(Prey(), Predator())`.
 
-    animals: their tasks, all of one model, each with a body, actuators and eyes of its own; what they are called is
-        their `name`
+    animals: their tasks. All use one model, in which each animal has its own body, actuators and eyes. The `name` of a
+        task is the name of its animal.
 
     Raises:
-        ValueError: none, two of one name, or of different models.
+        ValueError: no animals, two of the same name, or different models.
     """
 
     def __init__(self, *animals: Task) -> None:
         self.animals = together(animals, "Encounter")
         for animal, name in zip(animals, self.names, strict=True):
             if animal.others:
-                raise ValueError(f"Encounter: {name} has others of its own: must be a task without any")
+                raise ValueError(f"Encounter: {name} has its own `others`: must be a task without any")
 
     @property
     def names(self) -> tuple[str, ...]:
-        """What its animals are called."""
+        """Names of the animals."""
         return tuple(map(name_of, self.animals))
 
     def alone(self, name: str, policies: Mapping[str, Any]) -> Task:
-        """The task of one animal, in which the others are frozen: for `make_vec_env` and `make_env`.
+        """Return the task of one animal, in which the others are frozen, for `make_vec_env` and `make_env`.
 
-        policies: of the others, by name, see `sim.Frozen`; others do nothing
+        policies: policies of other animals, by name, see `sim.Frozen`; animals without one do nothing
 
         Raises:
-            ValueError: there is no such animal.
+            ValueError: no animal of this name.
         """
         for asked in (name, *policies):
             if asked not in self.names:
@@ -112,22 +112,22 @@ class Encounter:
 
 
 def among(task: Task, others: Sequence[Frozen]) -> Task:
-    """The same task with these others."""
+    """Return the same task with these others."""
     learner = copy.copy(task)
     learner.others = tuple(others)
     return learner
 
 
 def name_of(task: Task) -> str:
-    """What an animal is called among others."""
+    """Return the name of an animal."""
     return type(task).__name__ if task.name is None else str(task.name)
 
 
-def cast(task: Task | Encounter) -> tuple[tuple[Task, ...], tuple[Frozen, ...]]:
-    """Those who learn, and those who do not.
+def split_agents(task: Task | Encounter) -> tuple[tuple[Task, ...], tuple[Frozen, ...]]:
+    """Return the learning animals and the frozen ones.
 
     Raises:
-        ValueError: they cannot be in one world.
+        ValueError: they cannot share a world.
     """
     if isinstance(task, Encounter):
         return task.animals, ()
@@ -139,15 +139,15 @@ def cast(task: Task | Encounter) -> tuple[tuple[Task, ...], tuple[Frozen, ...]]:
 
 
 def of_world(animals: Sequence[Task], what: str) -> Any:
-    """What belongs to the world and may be said by any animal: that of the first who says it."""
+    """Return a setting of the world from the first animal that defines it."""
     return next((said for animal in animals if (said := getattr(animal, what))), None)
 
 
 def require_own_actuators(animals: Sequence[Task], model: mujoco.MjModel) -> None:
-    """Those that act by `actuators` each have their own.
+    """Check that animals with the default `act` have separate actuators.
 
     Raises:
-        ValueError: two animals drive the same one: the last would have its way.
+        ValueError: two animals drive the same actuator, so that the last one would override the others.
     """
     owner: dict[str, str] = {}
     for animal in animals:
@@ -160,10 +160,12 @@ def require_own_actuators(animals: Sequence[Task], model: mujoco.MjModel) -> Non
 
 
 def together(animals: Sequence[Task], where: str) -> tuple[Task, ...]:
-    """Animals that can be in one world.
+    """Return the animals after checking that they can share a world.
+
+    where: beginning of the message
 
     Raises:
-        ValueError: they cannot; `where` it was asked for.
+        ValueError: they cannot share a world.
     """
     if not animals:
         raise ValueError(f"{where}: no animals: must be one sim.Task at least")
@@ -190,7 +192,7 @@ def together(animals: Sequence[Task], where: str) -> tuple[Task, ...]:
         said = [(name, value) for name, animal in zip(names, animals, strict=True) if (value := getattr(animal, what))]
         for name, value in said[1:]:
             if value != said[0][1]:
-                raise ValueError(f"{where}: {what} of {said[0][0]} and of {name} differ: must be equal, or one's alone")
+                raise ValueError(f"{where}: {what} of {said[0][0]} and of {name} differ: must be equal, or set once")
     return tuple(animals)
 
 

@@ -1,4 +1,4 @@
-"""Kinds of eyes of one animal: two that are wide and coarse, say, and one that is narrow and sharp."""
+"""Kinds of eyes of one animal, for example two wide, coarse eyes and a narrow, sharp one."""
 
 from __future__ import annotations
 
@@ -14,15 +14,20 @@ from sim.render.fidelity import Fidelity
 if TYPE_CHECKING:
     from sim.tasks.task_settings import TaskSettings
 
-EYES = "eyes"  # what an only kind is called
-AUXILIARY = ("depth", "ids", "flow")  # of each receptor, what an observation may hold, see `sim.Task`
-TAKEN = ("previous_action", "feels", *AUXILIARY)  # what else an observation holds
+EYES = "eyes"  # name of a single kind
+AUXILIARY = ("depth", "ids", "flow")  # auxiliary entries of an observation, for each receptor, see `sim.Task`
+TAKEN = ("previous_action", "feels", *AUXILIARY)  # names of other entries of an observation
 
 
 @dataclass(frozen=True)
 class EyeKind:
-    """name: of what they see in an observation · eye: optics and retina · mounts: where they are · fidelity: how finely
-    they see, or "auto" """
+    """One kind of eyes.
+
+    name: name of the eyes' signals in an observation
+    eye: optics and retina
+    mounts: places of the eyes
+    fidelity: fidelity of the eyes, or "auto"
+    """
 
     name: str
     eye: optics.Eye
@@ -31,15 +36,15 @@ class EyeKind:
 
 
 def several(task: TaskSettings) -> bool:
-    """Whether a task says eyes of more kinds than one, by name."""
+    """Return whether a task defines several kinds of eyes, by name."""
     return isinstance(task.eye, Mapping) or isinstance(task.mounts, Mapping)
 
 
 def kinds_of(task: TaskSettings) -> tuple[EyeKind, ...]:
-    """In the task's order.
+    """Return the kinds of eyes of a task, in its order.
 
     Raises:
-        ValueError: names that do not go together, or are no names.
+        ValueError: names that do not match, or are invalid.
     """
     where, eye, mounts, fidelity = type(task).__name__, task.eye, task.mounts, task.fidelity
     if not isinstance(eye, Mapping) and not isinstance(mounts, Mapping):
@@ -74,10 +79,12 @@ def kinds_of(task: TaskSettings) -> tuple[EyeKind, ...]:
 
 
 def auxiliary_of(names: Iterable[str], where: str) -> tuple[str, ...]:
-    """Names of what is wanted, in the order of AUXILIARY.
+    """Return the requested names, in the order of AUXILIARY.
+
+    where: beginning of the message
 
     Raises:
-        ValueError: one is unknown; `where` it was asked for.
+        ValueError: an unknown name.
     """
     if isinstance(names, str):
         raise ValueError(f"{where} = {names!r}: must be several names, such as ({names!r},)")
@@ -95,7 +102,7 @@ def _an_eye(where: str, said: Any) -> optics.Eye:
 
 
 def _by_name(where: str, said: Any, names: Mapping[str, Any] | Sequence[str]) -> Mapping[str, Any]:
-    """What is said of each kind; one word for all where `names` says which there are."""
+    """Return a setting for each kind of eyes; a single value applies to all `names`."""
     if isinstance(said, Mapping) and said:
         return said
     if names and not isinstance(said, Mapping):

@@ -12,26 +12,26 @@ from sim.physics.sliding_agents import SlidingAgents
 from sim.tasks.built_in import AgentEvents, AgentTask
 from sim.tasks.object_motion import wander
 from sim.tasks.outcome import NOWHERE, Outcome
-from sim.tasks.placement import Places, free_spot
+from sim.tasks.placement import SpawnPoints, free_spot
 from sim.tasks.reach import distance_to_nearest, first_reached
 
 __all__ = ["FindGoal"]
 
 
 class FindGoal(AgentTask):
-    """Progress is the decrease of the distance to the goal; an object is reached if the agent comes within REACH of its
-    centre at any substep.
+    """Reach the goal and avoid the adversaries.
 
-    An event ends the episode in training, and then only the first one counts. In evaluation the object respawns and
-    the episode goes on. In tracking the objects move.
+    Progress is the decrease of the distance to the goal. An object is reached if the agent comes within REACH of its
+    centre at any substep. In training, the first event ends the episode, and only this event counts. In evaluation, the
+    object respawns and the episode goes on. In tracking, the objects move.
     """
 
     @cached_property
     def goals(self) -> int:
-        """Number of goals: they are the first ones of the objects.
+        """Number of goals, which are the first objects.
 
         Raises:
-            ValueError: others are between them.
+            ValueError: the goals are not the first objects.
         """
         are_goals = [name.startswith("goal") for name in self.world.objects]
         if sorted(are_goals, reverse=True) != are_goals:
@@ -40,12 +40,12 @@ class FindGoal(AgentTask):
 
     @property
     def moving(self) -> bool:
-        """Whether the objects move."""
+        """True if the objects move."""
         return self.world.task == "tracking"
 
     @cached_property
-    def _places(self) -> Places:
-        return Places(self.world.agent_spawn, self.world.object_spawn)
+    def _places(self) -> SpawnPoints:
+        return SpawnPoints(self.world.agent_spawn, self.world.object_spawn)
 
     @cached_property
     def _bounds(self) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""Navigation and maze: get far from the start and into the goal region."""
+"""Navigation and maze: move away from the start and reach the goal region."""
 
 from __future__ import annotations
 
@@ -14,13 +14,12 @@ from sim.worlds.state import wrap_angle
 
 __all__ = ["HEADING_SPREAD", "FindWay"]
 
-HEADING_SPREAD = math.radians(20)  # [rad] either way, of headings along a course; chosen
+HEADING_SPREAD = math.radians(20)  # [rad] largest deviation of an initial heading from the course; chosen
 
 
 class FindWay(AgentTask):
-    """Progress is the increase of the distance from the start. Reaching the goal region ends the episode, in evaluation
-    too: there is no object that could respawn elsewhere.
-    """
+    """Progress is the increase of the distance from the start. Reaching the goal region ends the episode, also in
+    evaluation, because no object could respawn."""
 
     def reset(self, worlds: SlidingAgents, chosen: np.ndarray, rngs: Sequence[np.random.Generator]) -> None:
         n = len(chosen)

@@ -1,4 +1,5 @@
-"""How the objects of the tracking task move: privileged random policies, blind to the agent."""
+"""Motion of the objects in the tracking task: random policies that have full information about objects but none about
+the agent."""
 
 from __future__ import annotations
 
@@ -15,11 +16,11 @@ TURN = 0.4  # chosen: standard deviation of the change of heading per action [ra
 
 
 def wander(state: WorldState, chance: MotionNoise, bounds: np.ndarray, seconds: float) -> tuple[np.ndarray, np.ndarray]:
-    """Object positions (n, k, 3) and headings (n, k) one action later.
+    """Return object positions (n, k, 3) and headings (n, k) one action later.
 
-    Every object walks at SPEED with a heading that drifts at random. A step that would leave `bounds`
-    (x_min, y_min, x_max, y_max), or come within SEPARATION of where another object is or is about to step, is not
-    taken: the object turns to a random heading instead.
+    Every object walks at SPEED with a randomly drifting heading. An object does not step out of `bounds` (x_min, y_min,
+    x_max, y_max), or within SEPARATION of the present or next position of another object. It turns to a random heading
+    instead.
     """
     drift, turn = chance.next(state.objects.shape[1])
     heading = wrap_angle(state.object_heading + TURN * drift)
@@ -33,9 +34,9 @@ def wander(state: WorldState, chance: MotionNoise, bounds: np.ndarray, seconds: 
 
 
 def _nearest(to_x: np.ndarray, to_y: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Squared distance from where each object is about to step to the nearest place where another one is, or is about
-    to step [m²], (n, k)."""
-    # Worlds come last, side by side, as there are many of them: NumPy's inner loop is over that axis.
+    """Return the squared distance from each object's next position to the nearest present or next position of another
+    object [m²], (n, k)."""
+    # The worlds are the last axis, since there are many of them and NumPy's inner loop is over this axis.
     place_x, place_y = (np.ascontiguousarray(np.concatenate(at, axis=1).T) for at in ([x, to_x], [y, to_y]))
     k = x.shape[1]
     squared = (place_x[k:, None] - place_x) ** 2
@@ -47,5 +48,5 @@ def _nearest(to_x: np.ndarray, to_y: np.ndarray, x: np.ndarray, y: np.ndarray) -
 
 @cache
 def _but_itself(k: int) -> np.ndarray:
-    """Infinite for each of k objects' own two places, (k, 2k, 1)."""
+    """Return infinity for each of k objects' own two positions and 0 for the others, (k, 2k, 1)."""
     return np.tile(np.diag(np.full(k, np.inf)), 2)[..., None]

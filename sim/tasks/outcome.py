@@ -1,4 +1,4 @@
-"""What one action of all worlds was worth, and where it led."""
+"""The outcome of one action in all worlds: rewards, endings and changes."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ NOWHERE = np.empty(0, int)
 
 
 class RewardTerms:
-    """The named terms of a reward, for each row: one array for all terms, or a dictionary for each row.
+    """The named terms of a reward for each row: a single array for all terms, or a dictionary for each row.
 
-    Rows are worlds; if several agents learn, the first agent of all worlds comes first.
+    Rows are worlds. If several agents learn, the first agent of all worlds comes first.
 
     Raises:
-        ValueError: another number of terms than of names.
+        ValueError: the numbers of terms and names differ.
     """
 
     def __init__(self, names: Sequence[str], terms: np.ndarray) -> None:
@@ -31,7 +31,7 @@ class RewardTerms:
 
     @classmethod
     def of_rows(cls, rows: Sequence[Mapping[str, float]]) -> RewardTerms:
-        """Of terms that may have other names in each row."""
+        """Collect terms that may have other names in each row."""
         names = list(dict.fromkeys(name for row in rows for name in row))
         found = cls(names, np.array([[row.get(name, 0.0) for row in rows] for name in names]).reshape(-1, len(rows)))
         found._rows = [dict(row) for row in rows]
@@ -39,35 +39,36 @@ class RewardTerms:
 
     @property
     def total(self) -> np.ndarray:
-        """The reward of each row."""
+        """Reward of each row."""
         if self._rows is not None:
             return np.array([float(sum(row.values())) for row in self._rows])
         return np.asarray(self.terms.sum(axis=0))
 
     @property
     def rows(self) -> list[dict[str, float]]:
-        """Terms by name, of each row."""
+        """Terms by name, for each row."""
         if self._rows is not None:
             return self._rows
-        # Without Python's loop: this is done for every world in every step, and takes a third of the time so.
+        # Built without a Python loop, which takes a third of the time: this happens for every world in every step.
         return list(map(dict, map(zip, repeat(self.names), self.terms.T.tolist())))
 
     def __getitem__(self, name: str) -> np.ndarray:
-        """One term, (row,)."""
+        """Return one term, (row,)."""
         return np.asarray(self.terms[self.names.index(name)])
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a task makes of one action.
+    """The outcome of one action, as returned by a task.
 
-    terms: of the reward · terminated, success: (row,) bool
-    failure: why worlds could not go on, by world; their episodes end
+    terms: terms of the reward
+    terminated, success: (row,) bool
+    failure: reasons, by world, if worlds could not continue; their episodes end
     over: worlds whose episode ends although no learner's is terminated, (world,) bool; None: none
-    changed: worlds in which the task put bodies elsewhere after the action
-    info: more entries of each row's `info`; None: no more
-    feels: what agents know beside what they see, by agent and name (world, number); None: the task's `feels` says it.
-        Worlds whose numbers are NaN keep the previous ones
+    changed: worlds in which the task moved bodies after the action
+    info: additional entries of each row's `info`; None: no additions
+    proprioception: entries of the observation besides eyes, by agent and name (world, number); None: call the task's
+        method. Worlds whose numbers are NaN keep the previous ones.
     """
 
     terms: RewardTerms
@@ -77,17 +78,21 @@ class Outcome:
     over: np.ndarray | None = None
     changed: np.ndarray = field(default_factory=lambda: NOWHERE)
     info: Sequence[Mapping[str, Any]] | None = None
-    feels: Sequence[Mapping[str, np.ndarray]] | None = None
+    proprioception: Sequence[Mapping[str, np.ndarray]] | None = None
 
 
 @dataclass(frozen=True)
 class Step:
     """One action of all worlds, before any world starts a new episode.
 
-    state: of the physics after the action · terms: of the reward · reward: their sum (row,)
-    terminated, truncated, success: (row,) bool · changed: worlds that must be rendered again
-    given_up: truncated because the rewards of the episode add up to too little, (row,) bool
-    failure: why worlds could not go on, by world · info: more entries of each row's `info`, or None
+    state: state of the physics after the action
+    terms: terms of the reward
+    reward: sum of the terms (row,)
+    terminated, truncated, success: (row,) bool
+    changed: worlds that must be rendered again
+    given_up: truncated because the sum of the episode's rewards is too low, (row,) bool
+    failure: reasons, by world, if worlds could not continue
+    info: additional entries of each row's `info`, or None
     """
 
     state: Any
@@ -103,7 +108,7 @@ class Step:
 
     @property
     def reward_terms(self) -> dict[str, np.ndarray]:
-        """Each term (row,) by its name."""
+        """Terms (row,) by name."""
         return {name: self.terms[name] for name in self.terms.names}
 
     @property

@@ -1,4 +1,4 @@
-"""Tasks of one world at a time, as a batch task: plain Python methods are called world by world."""
+"""Tasks of one world at a time as a batch task, whose plain Python methods are called world by world."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from sim.scene.variation import Variation
 from sim.tasks import batch_task, simulation
 from sim.tasks import task as task_module
 from sim.tasks.batch_task import Agent, BatchTask
-from sim.tasks.encounter import Encounter, cast, name_of, of_world, require_own_actuators
+from sim.tasks.encounter import Encounter, name_of, of_world, require_own_actuators, split_agents
 from sim.tasks.eye_kinds import auxiliary_of, kinds_of
 from sim.tasks.outcome import Outcome, RewardTerms
 from sim.tasks.task import Task, named_terms
@@ -31,7 +31,7 @@ _OURS = (__file__, task_module.__file__, batch_task.__file__, simulation.__file_
 
 @dataclass
 class _OfWorld:
-    """One action in one world, for one learner."""
+    """Outcome of one action in one world, for one learner."""
 
     terms: dict[str, float] = field(default_factory=dict)
     terminated: bool = False
@@ -41,20 +41,22 @@ class _OfWorld:
 class PerWorld(BatchTask):
     """A `sim.Task` with its others, or a `sim.Encounter` whose animals all learn.
 
-    learners: tasks of those who learn · frozen: the others · animals: tasks of all, learners first
+    learners: tasks of the learning animals
+    frozen: the other animals
+    animals: tasks of all animals, learners first
 
     Raises:
-        ValueError: a setting is missing or wrong, or the animals cannot be in one world.
+        ValueError: a setting is missing or wrong, or the animals cannot share a world.
     """
 
-    renders_early = False  # methods of a user may move anything
+    renders_early = False  # a user's methods may move bodies
 
     def __init__(self, task: Task | Encounter) -> None:
         self.task = task
-        self.learners, self.frozen = cast(task)
+        self.learners, self.frozen = split_agents(task)
         self.animals = (*self.learners, *(other.task for other in self.frozen))
         self.name = " and ".join(map(name_of, self.animals))
-        self._sizes: dict[int, int] = {}  # of what each animal feels, once it is known
+        self._sizes: dict[int, int] = {}  # sizes of the animals' proprioception, once they are known
         self._whose = ["" if len(self.animals) == 1 else f"{name_of(animal)}: " for animal in self.animals]
         self.model = compiled(self.animals[0])
         for animal in self.animals[1:]:
@@ -108,7 +110,7 @@ class PerWorld(BatchTask):
         return found
 
     def judge(self, worlds: MujocoWorlds, failed: Mapping[int, str]) -> Outcome:
-        """The episode ends for all animals as soon as it ends for any of them."""
+        """Return the outcome of an action. An episode ends for all animals as soon as it ends for one of them."""
         failure, over = dict(failed), np.zeros(worlds.n, bool)
         judged: list[list[_OfWorld]] = []
         felt: list[list[np.ndarray | None]] = [[None] * worlds.n for _ in self.animals]
@@ -123,7 +125,7 @@ class PerWorld(BatchTask):
                 except Exception as error:
                     failure[world] = _told(error)
             worlds.require_places(world)
-            # Not truncated: nothing might have come after it that a learner could count with.
+            # Terminated, not truncated: learners must not bootstrap from the state after a failure.
             worth = [{"failure": animal.failure_reward} if animal.failure_reward else {} for animal in self.learners]
             judged.append([_OfWorld(terms, terminated=True) for terms in worth])
         rows = [outcome for of_learner in zip(*judged, strict=True) for outcome in of_learner]
@@ -133,10 +135,10 @@ class PerWorld(BatchTask):
             success=np.array([row.success for row in rows]),
             failure=failure,
             over=over,
-            feels=[_stacked(own) for own in felt],
+            proprioception=[_stacked(own) for own in felt],
         )
 
-    def all_feel(self, worlds: MujocoWorlds, chosen: np.ndarray) -> list[Mapping[str, np.ndarray]]:
+    def all_proprioception(self, worlds: MujocoWorlds, chosen: np.ndarray) -> list[Mapping[str, np.ndarray]]:
         try:
             of_worlds = [self._felt(worlds.datas[world]) for world in chosen]
             return [_stacked(list(own)) for own in zip(*of_worlds, strict=True)]
@@ -144,7 +146,7 @@ class PerWorld(BatchTask):
             raise RuntimeError(_told(error)) from error
 
     def _judged(self, data: mujoco.MjData) -> tuple[list[_OfWorld], bool]:
-        """Of every learner; and whether the episode ends."""
+        """Return the outcome for every learner, and whether the episode ends."""
         outcomes, over = [], False
         for animal, whose in zip(self.learners, self._whose, strict=False):
             terms = named_terms(animal, data, whose)
@@ -154,19 +156,19 @@ class PerWorld(BatchTask):
         return outcomes, over | any(other.task.terminated(data) for other in self.frozen)
 
     def _felt(self, data: mujoco.MjData) -> list[np.ndarray]:
-        """What every animal of a world feels.
+        """Return the proprioception of every animal in a world.
 
         Raises:
-            ValueError: it is no row of finite numbers, or not as many as before.
+            ValueError: not a row of finite numbers, or another number of them than before.
         """
         found = []
         for number, (animal, whose) in enumerate(zip(self.animals, self._whose, strict=True)):
-            felt = np.asarray(animal.feels(data), np.float32)
+            felt = np.asarray(animal.proprioception(data), np.float32)
             if felt.ndim != 1 or not np.isfinite(felt).all():
-                raise ValueError(f"{whose}feels returned {felt!r:.100}: must be finite numbers, (k,)")
+                raise ValueError(f"{whose}proprioception returned {felt!r:.100}: must be finite numbers, (k,)")
             size = self._sizes.get(number) or self._sizes.setdefault(number, len(felt))
             if len(felt) != (size or len(felt)):
-                raise ValueError(f"{whose}feels returned {len(felt)} numbers: must be {size}, as before")
+                raise ValueError(f"{whose}proprioception returned {len(felt)} numbers: must be {size}, as before")
             self._sizes[number] = len(felt)
             found.append(felt)
         return found
@@ -179,7 +181,7 @@ def _in_mode(task: Task, mode: str) -> Task:
 
 
 def _stacked(felt: Sequence[np.ndarray | None]) -> dict[str, np.ndarray]:
-    """One row for each world; NaN where nothing new is known."""
+    """Return one row for each world, filled with NaN for worlds without new values."""
     size = next((len(row) for row in felt if row is not None), 0)
     if not size:
         return {}
@@ -187,7 +189,7 @@ def _stacked(felt: Sequence[np.ndarray | None]) -> dict[str, np.ndarray]:
 
 
 def _told(error: Exception) -> str:
-    """Where in the user's file it happened, if it did there, and what."""
+    """Return the message of an error, with its place in the user's file if it happened there."""
     for frame in traceback.extract_tb(error.__traceback__):
         if frame.filename not in _OURS:
             place = f"{frame.name}, line {frame.lineno} of {Path(frame.filename).name}"

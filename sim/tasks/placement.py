@@ -1,4 +1,4 @@
-"""Where an episode starts: the agent and the objects drawn at random, never within reach of each other."""
+"""Random starting positions of the agent and the objects, never within reach of each other."""
 
 from __future__ import annotations
 
@@ -6,23 +6,23 @@ import numpy as np
 
 from sim.worlds.layout import CLEARANCE, SEPARATION
 
-TRIES = 100  # chosen: on detection's field none of 20 000 first tries failed
+TRIES = 100  # chosen; in the field of detection, none of 20 000 first tries failed
 
 
-class Places:
-    """Where episodes may start: cells' centres of agents (a, 2) and of objects (m, 2) [m]."""
+class SpawnPoints:
+    """Possible starting positions: centres of cells for agents (a, 2) and for objects (m, 2) [m]."""
 
     def __init__(self, agents: np.ndarray, objects: np.ndarray) -> None:
         self._agents, self._objects = agents, objects
-        # Looked up rather than worked out: some episode starts in every step of a batch.
+        # Computed in advance, since some episode starts in almost every step of a batch.
         self._clear_of_agent = np.array([_apart(objects, place, CLEARANCE) for place in agents])
         self._apart = np.array([_apart(objects, place, SEPARATION) for place in objects])
 
     def draw(self, rng: np.random.Generator, n_objects: int) -> tuple[np.ndarray, np.ndarray]:
-        """An agent's position (2,) and those of objects (k, 2).
+        """Return an agent's position (2,) and the objects' positions (k, 2).
 
         Raises:
-            ValueError: the cells cannot hold them SEPARATION and CLEARANCE apart.
+            ValueError: there are too few cells for the distances SEPARATION and CLEARANCE.
         """
         for _ in range(TRIES):
             agent, chosen = rng.integers(len(self._agents)), []
@@ -44,7 +44,7 @@ class Places:
 def free_spot(
     rng: np.random.Generator, agent: np.ndarray, others: np.ndarray, object_spawn: np.ndarray
 ) -> np.ndarray | None:
-    """A cell's centre (2,) clear of the agent and of the other objects (k, 2); None where there is none."""
+    """Return the centre (2,) of a cell clear of the agent and of the other objects (k, 2); None if there is none."""
     free = _apart(object_spawn, agent, CLEARANCE)
     for other in others:
         free &= _apart(object_spawn, other, SEPARATION)
@@ -53,7 +53,7 @@ def free_spot(
 
 
 def _apart(spots: np.ndarray, place: np.ndarray, distance: float) -> np.ndarray:
-    """Which spots (n, 2) are at least `distance` [m] from a place (2,), (n,) bool."""
+    """Return whether positions (n, 2) are at least `distance` [m] away from a place (2,), (n,) bool."""
     x, y = spots[:, 0] - place[0], spots[:, 1] - place[1]
     apart: np.ndarray = x * x + y * y >= distance**2
     return apart

@@ -1,4 +1,4 @@
-"""Random streams of worlds, by two schemes; in both a world's episodes do not depend on the number of worlds."""
+"""Random streams of worlds, by two schemes. In both, a world's episodes do not depend on the number of worlds."""
 
 from __future__ import annotations
 
@@ -11,13 +11,15 @@ import numpy as np
 
 __all__ = ["MotionNoise", "RandomStreams", "StreamsByPurpose", "StreamsByWorld"]
 
-AHEAD = 64  # actions: a call per world and action costs more than the numbers
+AHEAD = 64  # actions drawn in advance, because a call per world and action costs more than the numbers
 
 
 class RandomStreams(Protocol):
-    """entropy: what all streams are derived from; seeded with it again, every episode repeats
-    episodes, variation: generators of each world, for starts of episodes and for what varies between them
-    noise_keys: of receptor noise, by agent: (kind of eyes, world) uint64, for `sim.render.receptor_noise`
+    """Protocol of random streams.
+
+    entropy: seed of all streams; seeding with it again repeats every episode
+    episodes, variation: generators of each world, for starts of episodes and for varied quantities
+    noise_keys: keys of receptor noise, by agent: (kind of eyes, world) uint64, for `sim.render.receptor_noise`
     """
 
     entropy: Any
@@ -25,24 +27,25 @@ class RandomStreams(Protocol):
 
     @property
     def episodes(self) -> list[np.random.Generator]:
-        """For starts of episodes."""
+        """Generators for starts of episodes."""
 
     @property
     def variation(self) -> list[np.random.Generator]:
-        """For what varies between episodes."""
+        """Generators for quantities that vary between episodes."""
 
-    def held(self) -> dict[str, np.ndarray]:
-        """Where all streams stand; each array's first axis is the world."""
+    def get_state(self) -> dict[str, np.ndarray]:
+        """Return the state of all streams; each array's first axis is the world."""
 
-    def hold(self, state: Mapping[str, np.ndarray], worlds: np.ndarray) -> None:
-        """Inverse of `held`, for these worlds."""
+    def set_state(self, state: Mapping[str, np.ndarray], worlds: np.ndarray) -> None:
+        """Restore what `get_state` returned, for these worlds."""
 
 
 class StreamsByPurpose:
-    """One stream for each world and purpose: children of one seed that depend on the seed, the world's number and the
-    purpose alone. The built-in tasks use this scheme.
+    """One stream for each world and purpose, derived from the seed, the world's index and the purpose alone.
 
-    motion: of objects that move at random
+    The built-in tasks use this scheme.
+
+    motion: numbers for objects that move at random
     """
 
     def __init__(self, seed: Any, n: int, kinds: Sequence[int] = (1,)) -> None:
@@ -63,20 +66,20 @@ class StreamsByPurpose:
 
     @cached_property
     def variation(self) -> list[np.random.Generator]:
-        """For what varies between episodes, light above all."""
+        """Generators for quantities that vary between episodes, mainly light."""
         return [np.random.Generator(np.random.PCG64(child)) for child in self._of_variation]
 
-    def held(self) -> dict[str, np.ndarray]:
-        return {"chance": _states(self.episodes), "varying": _states(self.variation), **self.motion.held()}
+    def get_state(self) -> dict[str, np.ndarray]:
+        return {"chance": _states(self.episodes), "varying": _states(self.variation), **self.motion.get_state()}
 
-    def hold(self, state: Mapping[str, np.ndarray], worlds: np.ndarray) -> None:
+    def set_state(self, state: Mapping[str, np.ndarray], worlds: np.ndarray) -> None:
         _set_states(self.episodes, state["chance"], worlds)
         _set_states(self.variation, state["varying"], worlds)
-        self.motion.hold(state, worlds)
+        self.motion.set_state(state, worlds)
 
 
 class StreamsByWorld:
-    """One stream for each world, which serves all that its episodes draw. User tasks use this scheme.
+    """One stream for each world, used for all draws of its episodes. User tasks use this scheme.
 
     kinds: numbers of kinds of eyes, by agent
     """
@@ -86,28 +89,28 @@ class StreamsByWorld:
         children = [np.random.SeedSequence(self.entropy, spawn_key=(i,)) for i in range(n)]
         self.episodes = self.variation = [np.random.default_rng(child) for child in children]
         drawn = np.array([child.generate_state(sum(kinds), np.uint64) for child in children]).T
-        # The first kind of each agent has the first keys: one more kind changes no other agent's noise.
+        # The first kinds of all agents get the first keys, so that one more kind does not change another agent's noise.
         more, self.noise_keys = len(kinds), []
         for number, count in enumerate(kinds):
             self.noise_keys.append(np.concatenate([drawn[number : number + 1], drawn[more : more + count - 1]]))
             more += count - 1
 
-    def held(self) -> dict[str, np.ndarray]:
+    def get_state(self) -> dict[str, np.ndarray]:
         return {"chance": _states(self.episodes)}
 
-    def hold(self, state: Mapping[str, np.ndarray], worlds: np.ndarray) -> None:
+    def set_state(self, state: Mapping[str, np.ndarray], worlds: np.ndarray) -> None:
         _set_states(self.episodes, state["chance"], worlds)
 
 
 class MotionNoise:
-    """Random numbers for objects that move: for each action of each world, from the world's own generator."""
+    """Random numbers for moving objects: for each action of each world, from the world's own generator."""
 
     def __init__(self, generators: list[np.random.Generator]) -> None:
         self._generators = generators
         self._drawn = np.empty((0, 2, len(generators), 0))
 
     def next(self, movers: int) -> tuple[np.ndarray, np.ndarray]:
-        """Of the next action: standard normal numbers, and others uniform in [-1, 1), (n, movers) each."""
+        """Return numbers for the next action: standard normal, and uniform in [-1, 1), (n, movers) each."""
         if not len(self._drawn):
             shape = (AHEAD, movers)
             of_worlds = [(rng.standard_normal(shape), rng.uniform(-1, 1, shape)) for rng in self._generators]
@@ -115,18 +118,19 @@ class MotionNoise:
         (normal, uniform), self._drawn = self._drawn[0], self._drawn[1:]
         return normal, uniform
 
-    def held(self) -> dict[str, np.ndarray]:
-        """States of the generators, and numbers that were drawn ahead, (world, action, 2, mover), the last ones set."""
+    def get_state(self) -> dict[str, np.ndarray]:
+        """Return the states of the generators, and the numbers drawn in advance, (world, action, 2, mover), aligned to
+        the end."""
         left, _, n, movers = self._drawn.shape
         ahead = np.full((n, AHEAD, 2, movers), np.nan)
         ahead[:, AHEAD - left :] = np.transpose(self._drawn, (2, 0, 1, 3))
         return {"motion": _states(self._generators), "motion_ahead": ahead}
 
-    def hold(self, state: Mapping[str, np.ndarray], worlds: np.ndarray) -> None:
-        """Inverse of `held`.
+    def set_state(self, state: Mapping[str, np.ndarray], worlds: np.ndarray) -> None:
+        """Restore what `get_state` returned, for these worlds.
 
         Raises:
-            ValueError: only some worlds, and they are at another action than the others.
+            ValueError: the worlds are only a part of all, and are at another action than the others.
         """
         _set_states(self._generators, state["motion"], worlds)
         ahead = np.asarray(state["motion_ahead"])
@@ -135,7 +139,7 @@ class MotionNoise:
             self._drawn = np.ascontiguousarray(np.transpose(ahead[:, AHEAD - left :], (1, 2, 0, 3)))
             return
         if left != len(self._drawn):
-            raise ValueError("state: objects move in step in all worlds: must be set for all worlds at once")
+            raise ValueError("state: objects are at another action than elsewhere: must be set for all worlds at once")
         self._drawn[:, :, worlds] = np.transpose(ahead[worlds, AHEAD - left :], (1, 2, 0, 3))
 
 

@@ -1,4 +1,4 @@
-"""When an agent comes within reach of objects, and how far it is from them."""
+"""Times at which an agent comes within reach of objects, and its distance from them."""
 
 from __future__ import annotations
 
@@ -11,7 +11,8 @@ __all__ = ["distance_to_nearest", "first_reached"]
 
 
 def distance_to_nearest(state: WorldState, goals: int) -> np.ndarray:
-    """Distance on the ground from the agent's centre to the nearest goal's [m], (n,); goals are the first objects."""
+    """Return the horizontal distance from the agent's centre to the nearest goal [m], (n,); goals are the first
+    objects."""
     x = state.objects[:, :goals, 0] - state.position[:, :1]
     y = state.objects[:, :goals, 1] - state.position[:, 1:]
     nearest: np.ndarray = np.sqrt(np.minimum.reduce(x * x + y * y, axis=1))
@@ -19,12 +20,14 @@ def distance_to_nearest(state: WorldState, goals: int) -> np.ndarray:
 
 
 def first_reached(path: np.ndarray, objects_before: np.ndarray, objects_after: np.ndarray) -> np.ndarray:
-    """First substep at which the agent is within REACH of each object, (n, k); the number of substeps if never.
+    """Return the first substep at which the agent is within REACH of each object, (n, k); the number of substeps if
+    never.
 
-    path (n, substep, 2): the agent at the *end* of each substep; objects (n, k, 3) move evenly from before to after.
+    path: positions of the agent at the *end* of each substep, (n, substep, 2)
+    objects_before, objects_after: positions (n, k, 3) before and after; the motion between them is linear
     """
     substeps = path.shape[1]
-    # Worlds come last, side by side, as there are many of them: NumPy's inner loop is over that axis.
+    # The worlds are the last axis, since there are many of them and NumPy's inner loop is over this axis.
     agent = path.T.copy()[:, :, None]  # (x | y, substep, 1, n)
     place = _on_the_ground(objects_after)
     if objects_after is not objects_before:
@@ -40,5 +43,5 @@ def first_reached(path: np.ndarray, objects_before: np.ndarray, objects_after: n
 
 
 def _on_the_ground(objects: np.ndarray) -> np.ndarray:
-    """Objects (n, k, 3) as (x | y, 1, k, n)."""
+    """Return objects (n, k, 3) as (x | y, 1, k, n)."""
     return objects.T[:2].copy()[:, None]

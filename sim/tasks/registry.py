@@ -14,10 +14,10 @@ __all__ = ["task_of"]
 
 
 def task_of(world: World, mode: str = "training", **settings: Any) -> AgentTask:
-    """The task of a built-in world; settings: see `AgentTask`.
+    """Return the task of a built-in world; settings: see `AgentTask`.
 
     Raises:
-        ValueError: a world of no known task.
+        ValueError: the world belongs to no known task.
     """
     if world.task not in TASKS:
         raise ValueError(f"task = {world.task!r}: must be one of {', '.join(map(repr, TASKS))}")

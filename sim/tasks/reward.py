@@ -1,24 +1,24 @@
-"""The reward of an action: four named terms, with weights for training and others for fitness.
+"""The reward of an action: four named terms, with separate weights for training and for fitness.
 
     reward_t = λ progress_t + w_g goal_t + w_a adversary_t + w_c contact_t
 
-    progress   metres in the task's sense, x the agent's place:
-               |x_(t-1) - x_goal| - |x_t - x_goal|   detection, foraging, tracking; a goal that moves is where it
-                                                     is at that time, and of several the nearest counts
-               |x_t - x_start| - |x_(t-1) - x_start| navigation, maze; as the crow flies
+    progress   in metres, with the agent's position x:
+               |x_(t-1) - x_goal| - |x_t - x_goal|   detection, foraging, tracking; x_goal is the position of the
+                                                     nearest goal at the same time
+               |x_t - x_start| - |x_(t-1) - x_start| navigation, maze; straight-line distances
     goal       1 when the goal, or the goal region of a course or maze, is reached
     adversary  1 when an adversary is reached
     contact    1 when the agent touched a wall at any time during the action
 
                 λ      w_g    w_a    w_c
     training    0.25   1      -1     -1     an event ends the episode
-    evaluation  1.5    10     -10    -2     objects respawn and the episode goes on; only the end of the way ends it
+    evaluation  1.5    10     -10    -2     objects respawn and the episode goes on; only a goal region ends it
 
-Terms and weights are those of Tiwary, Young et al. (2025), "What if Eye...? Computationally Recreating Vision
-Evolution", as the text has them. Fitness is the mean of the evaluation episodes' sums. What differs here: the code
-published with it weighs a metre of progress in training as much as an action in contact; ours does not. Foraging is a
-task of our own, with detection's reward. A training may begin with a smaller w_c (`evolve`, `learning.contact_ramp`);
-its end and the fitness have the weights above.
+Terms and weights follow the text of Tiwary, Young et al. (2025), "What if Eye...? Computationally Recreating Vision
+Evolution". Fitness is the mean of the evaluation episodes' sums. The code published with the paper gives a metre of
+progress in training the same weight as an action in contact; rhabdom does not. Foraging is not in the paper and has
+the reward of detection. A training run may begin with a smaller w_c (`evolve`, `learning.contact_ramp`). At its end,
+and in the fitness, the weights are those above.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ TERMS = ("progress", "goal", "adversary", "contact")
 
 @dataclass(frozen=True)
 class RewardWeights:
-    """What each event is worth: progress per metre, the others per event or per action in contact."""
+    """Weights of the terms: progress per metre, the others per event or per action in contact."""
 
     progress: float
     goal: float
@@ -44,7 +44,7 @@ class RewardWeights:
 
     @cached_property
     def column(self) -> np.ndarray:
-        """The weights in the order of TERMS, (term, 1)."""
+        """Weights in the order of TERMS, (term, 1)."""
         return np.array([[getattr(self, name)] for name in TERMS])
 
 
@@ -54,7 +54,7 @@ MODES = {"training": TRAINING, "evaluation": EVALUATION}
 
 
 def check_mode(mode: str) -> None:
-    """Refuse a mode that has no weights.
+    """Refuse a mode without weights.
 
     Raises:
         ValueError: not one of MODES.
@@ -65,8 +65,7 @@ def check_mode(mode: str) -> None:
 def reward_terms(
     weights: RewardWeights, progress: np.ndarray, goal: np.ndarray, adversary: np.ndarray, contact: np.ndarray
 ) -> np.ndarray:
-    """The terms of the reward in the order of TERMS, (term, n), of progress [m] in the task's sense and of which events
-    happened."""
+    """Return the terms of the reward in the order of TERMS, (term, n), from the progress [m] and the events."""
     terms = np.array([progress, goal, adversary, contact])
     terms *= weights.column
     terms += 0.0  # never -0.0

@@ -1,4 +1,4 @@
-"""Worlds of a task in motion, unseen: actions in, rewards and endings out. Environments add the eyes."""
+"""Simulation of a task without rendering: it maps actions to rewards and endings. Environments add the eyes."""
 
 from __future__ import annotations
 
@@ -27,14 +27,18 @@ LEAST_RETURN = "least return"
 class Simulation:
     """`n` independent worlds of one task.
 
-    task: its rules · seed: of all random streams; None draws one · threads: of the physics
-    least_return: an episode whose rewards add up to no more is truncated, in training only; None: none is
-    episode_steps: actions, then an episode is truncated; None: as many as the task has
-
-    physics: what moves the worlds · agents: who acts in each world, learners first · rows: learners of all worlds
-    steps: actions taken in each world's episode (n,) · varied: how each world differs now, by name
-    taken: the last actions, within [-1, 1], and `Agent.first_action` in the place of those that were not finite
-    felt: what agents know beside what they see, by agent and name (n, k) float32
+    task: rules of the task
+    seed: seed of all random streams; None: a random seed
+    threads: threads of the physics
+    least_return: in training, an episode is truncated once its rewards sum to this value or less; None: never
+    episode_steps: number of actions after which an episode is truncated; None: the task's default
+    physics: physics of the worlds
+    agents: agents in each world, learners first
+    rows: number of learners in all worlds
+    steps: actions taken in each world's episode (n,)
+    varied: current values of the varied quantities in each world, by name
+    taken: the last actions, limited to [-1, 1], with `Agent.first_action` instead of actions that were not finite
+    felt: proprioception, by agent and name (n, k) float32
 
     Raises:
         ValueError: less than one world, or a least return that is not below 0 or not for training.
@@ -67,20 +71,20 @@ class Simulation:
         self._rehearse()
 
     def _rehearse(self) -> None:
-        """Start one episode: it shows what agents feel, and whether a task changes the model."""
+        """Start one episode to find out the agents' proprioception, and whether the task changes the model."""
         first = np.zeros(1, int)
         self._start(first)
         while self.physics.adopt_changed_model():
             self._start(first)
         self.felt = [
             {name: np.repeat(np.asarray(felt, np.float32), self.n, axis=0) for name, felt in known.items()}
-            for known in self.task.all_feel(self.physics, first)
+            for known in self.task.all_proprioception(self.physics, first)
         ]
         self.seed(self.streams.entropy)
 
     @property
     def state(self) -> Any:
-        """All worlds as they are now, in their physics' own type.
+        """Current state of all worlds, in the type of their physics.
 
         Raises:
             RuntimeError: before the first reset.
@@ -94,7 +98,7 @@ class Simulation:
         self.physics.state = state  # type: ignore[misc]
 
     def seed(self, seed: Any) -> None:
-        """Start all random streams again, from the next reset on."""
+        """Restart all random streams at the next reset."""
         self.streams = self.physics.chance = self.task.streams(seed, self.n)
         self.begun = False
 
@@ -111,21 +115,21 @@ class Simulation:
         """
         self.physics.watch()
         self._start(worlds)
-        self._feel(self.task.all_feel(self.physics, worlds), worlds)
+        self._feel(self.task.all_proprioception(self.physics, worlds), worlds)
         self.physics.check(self.task_name)
         self.begun = True
 
     @property
     def task_name(self) -> str:
-        """What messages call the task."""
+        """Name of the task in messages."""
         return " and ".join(agent.name for agent in self.agents)
 
     def step(self, actions: np.ndarray) -> Step:
-        """One action of all worlds; actions (n, numbers of all agents) in [-1, 1]."""
+        """Take one action in all worlds; actions (n, numbers of all agents) in [-1, 1]."""
         return self.judge(self.move(actions))
 
     def move(self, actions: np.ndarray) -> dict[int, str]:
-        """The first half of a step: everything moves. Returns why worlds could not go on, by world.
+        """First half of a step: move everything. Returns reasons, by world, if worlds could not continue.
 
         Raises:
             RuntimeError: before the first reset.
@@ -140,10 +144,10 @@ class Simulation:
         return {**broken, **failed}
 
     def judge(self, failed: Mapping[int, str]) -> Step:
-        """The second half: what it led to. The task may put bodies elsewhere."""
+        """Second half of a step: compute its outcome. The task may move bodies to new positions."""
         outcome = self.task.judge(self.physics, failed)
         require_outcome(outcome, self.n, self.learners)
-        self._feel(outcome.feels or self.task.all_feel(self.physics, self._everyone), slice(None))
+        self._feel(outcome.proprioception or self.task.all_proprioception(self.physics, self._everyone), slice(None))
         self.physics.check(self.task_name)
         reward = outcome.terms.total
         self._returns += reward
@@ -169,39 +173,39 @@ class Simulation:
         )
 
     def _any_learner(self, rows: np.ndarray) -> np.ndarray:
-        """Worlds in which this holds for one of the learners."""
+        """Return worlds in which the condition is true for at least one learner."""
         return rows if self.learners == 1 else np.asarray(rows.reshape(self.learners, self.n).any(axis=0))
 
     def poses(self) -> Poses:
-        """Where everything is now."""
+        """Return the current poses."""
         return self.physics.poses()
 
-    def told(self, world: int) -> dict[str, Any]:
-        """How a world differs from others, for its `info`; nothing if none differ."""
+    def variation_info(self, world: int) -> dict[str, Any]:
+        """Return the varied quantities of a world, for its `info`; empty if none vary."""
         varied = {name: _plain(values[world]) for name, values in self.varied.items()}
         return {"varied": varied} if varied else {}
 
     def light(self, wavelengths: np.ndarray) -> np.ndarray | None:
-        """Factors of the lights now, (n, band); None: none."""
+        """Return the current factors of the lights, (n, band); None: no factors."""
         return None if self.variation is None else self.variation.light(self.varied, wavelengths)
 
-    def held(self) -> dict[str, np.ndarray]:
-        """All that the future of the worlds depends on, as arrays whose first axis is the world."""
+    def get_state(self) -> dict[str, np.ndarray]:
+        """Return everything that the future of the worlds depends on, as arrays whose first axis is the world."""
         nothing = np.zeros((self.n, 0), np.float32)
         felt = {key: self.felt[k][name].copy() if name else nothing for key, k, name in self._felt_keys()}
         varied = {f"varied.{name}": array.copy() for name, array in self.varied.items()}
         returns = self._returns.reshape(self.learners, -1).T.copy()
         own = {"steps": self.steps.copy(), "returns": returns, **felt, **varied}
-        return {**self.physics.held(), **self.streams.held(), **own}
+        return {**self.physics.get_state(), **self.streams.get_state(), **own}
 
-    def hold(self, state: Mapping[str, np.ndarray], worlds: np.ndarray) -> None:
-        """Inverse of `held`, for these worlds."""
+    def set_state(self, state: Mapping[str, np.ndarray], worlds: np.ndarray) -> None:
+        """Restore what `get_state` returned, for these worlds."""
         for world in worlds:
             for name, values in self.varied.items():
                 values[world] = state[f"varied.{name}"][world]
-            self.physics.begin(world, {name: values[world] for name, values in self.varied.items()})
-        self.physics.hold(state, worlds)
-        self.streams.hold(state, worlds)
+            self.physics.start_episode(world, {name: values[world] for name, values in self.varied.items()})
+        self.physics.set_state(state, worlds)
+        self.streams.set_state(state, worlds)
         self.steps[worlds] = state["steps"][worlds]
         self._returns.reshape(self.learners, -1)[:, worlds] = state["returns"][worlds].T
         for key, k, name in self._felt_keys():
@@ -209,7 +213,7 @@ class Simulation:
                 self.felt[k][name][worlds] = state[key][worlds]
 
     def close(self) -> None:
-        """Stop threads."""
+        """Stop all threads."""
         self.physics.close()
 
     def _start(self, worlds: np.ndarray) -> None:
@@ -217,14 +221,15 @@ class Simulation:
             drawn = {} if self.variation is None else self.variation.draw(self.streams.variation[world])
             for name, value in drawn.items():
                 self.varied[name][world] = value
-            self.physics.begin(world, drawn)
+            self.physics.start_episode(world, drawn)
         self.task.reset(self.physics, worlds, [self.streams.episodes[world] for world in worlds])
         self.physics.settle(worlds)
         self.steps[worlds] = 0
         self._returns.reshape(self.learners, -1)[:, worlds] = 0.0
 
     def _finite(self, actions: np.ndarray) -> tuple[np.ndarray, dict[int, str]]:
-        """Actions within [-1, 1], and the worlds in which an agent's was not finite: it does as at first."""
+        """Return actions limited to [-1, 1], and the worlds in which an agent's action was not finite. Such an action
+        is replaced by the agent's first action."""
         failed: dict[int, str] = {}
         if not np.isfinite(actions).all():
             actions, first = actions.copy(), 0
@@ -248,7 +253,8 @@ class Simulation:
                     known[name][worlds] = array
 
     def _felt_keys(self) -> list[tuple[str, int, str]]:
-        """Name of an entry in `held`, number of the agent, and name of what it feels: none, if that is nothing."""
+        """Return the name of each entry in the stored state, the agent's index, and the entry's name in its
+        proprioception ("" if it has none)."""
         found = []
         for k, (agent, known) in enumerate(zip(self.agents, self.felt, strict=True)):
             for place, name in enumerate(known or [""]):
@@ -258,21 +264,23 @@ class Simulation:
 
 
 def check_least_return(least_return: float | None, mode: str) -> None:
-    """Refuse a least return that would end every episode at once, or episodes that fitness comes from.
+    """Refuse a least return that would end every episode at once, or one in episodes that determine the fitness.
 
     Raises:
-        ValueError: it is.
+        ValueError: the least return is not negative, or the mode is not training.
     """
     if least_return is None:
         return
     if isinstance(least_return, bool) or not isinstance(least_return, Real) or not least_return < 0:
         raise ValueError(f"least_return = {shown(least_return)}: must be below 0, or None")
     if mode != "training":
-        raise ValueError(f"least_return = {least_return!r}: must be left out in mode {mode!r}, only training ends so")
+        raise ValueError(
+            f"least_return = {least_return!r}: must be left out in mode {mode!r}, it applies to training only"
+        )
 
 
 def _plain(value: np.ndarray) -> str | float | tuple[float, ...]:
-    """A name, a number, or three."""
+    """Return a name, a number, or three numbers."""
     if value.dtype.kind == "U":
         return str(value)
     return tuple(map(float, value)) if value.ndim else float(value)

@@ -1,4 +1,4 @@
-"""A task of one's own: a robot with eyes, how an episode begins, and what a step is worth."""
+"""User tasks for one world at a time: a robot with eyes, the beginning of an episode, and the reward of a step."""
 
 from __future__ import annotations
 
@@ -16,59 +16,60 @@ if TYPE_CHECKING:
 
 
 class Task(TaskSettings):
-    """A task of one world at a time, in plain Python; only `model`, `mounts` and `rewards` have no default.
+    """A task of one world at a time, in plain Python. Only `model`, `mounts` and `rewards` have no default.
 
-    The settings are those of `TaskSettings`, and one more:
+    In addition to the settings of `TaskSettings`, there is one more:
 
-    others: animals in the same world that do not learn, see `sim.Frozen`; each has a body, actuators and eyes of its
-        own in the one model. Then an episode begins with everybody's `reset`, in turn, and ends as soon as anybody's
-        `terminated` says so: it is truncated for those whose own does not
+    others: animals in the same world that do not learn, see `sim.Frozen`. Each has its own body, actuators and eyes in
+        the same model. An episode begins with the `reset` of every animal, in turn. It ends for all as soon as one
+        animal's `terminated` is true, and is truncated for animals whose own is false.
 
-    Where the task evolves (`evolve run FILE.py:CLASS`), every animal has eyes of its own, where `place` puts them; a
-    class without arguments is needed for that.
+    If the task evolves (`evolve run FILE.py:CLASS`), every candidate has its own eyes, at the places that `place`
+    returns. The class must then have no required arguments.
 
-    What fails in a method ends its world's episode; in `reset`, and in `feels` there, it is a RuntimeError for all,
-    since a world that cannot begin has no episode.
+    A method that fails ends its world's episode. In `reset`, and in `proprioception` during a reset, a failure is a
+    RuntimeError for all worlds, since a world that cannot begin has no episode.
 
-    Methods are called for one world at a time, with its mjData after mj_forward. One task serves all worlds: what an
-    episode must remember belongs into mjData (`userdata`, say), not into the task. A `sim.BatchTask` has the same
-    methods for arrays of all worlds, which is faster.
+    Methods are called for one world at a time, with its mjData after mj_forward. One task serves all worlds, so the
+    memory of an episode must be stored in mjData (for example in `userdata`) and not in the task. A `sim.BatchTask` has
+    the same methods for arrays of all worlds, which is faster.
     """
 
     others: Sequence[Frozen] = ()
 
     def reset(self, data: mujoco.MjData, rng: np.random.Generator) -> None:
-        """Begin an episode: change what mj_resetData has left. `data.model` may be changed, too, for the episode."""
+        """Start an episode: change the state after mj_resetData. `data.model` may also be changed, for this episode."""
 
     def act(self, data: mujoco.MjData, action: np.ndarray) -> None:
-        """Take an action in [-1, 1], (n_actions,); here: each control of its actuators over the whole of its range."""
+        """Take an action in [-1, 1], (n_actions,); default: map each value to the full range of one of the actuators'
+        controls."""
         model, mine = data.model, controls_of(data.model, self.actuators)
         limited = model.actuator_ctrllimited[mine].astype(bool)
         low, high = np.where(limited[:, None], model.actuator_ctrlrange[mine], [-1.0, 1.0]).T
         data.ctrl[mine] = low + (high - low) * (action + 1) / 2
 
     def rewards(self, data: mujoco.MjData) -> Mapping[str, float]:
-        """What the step that led here is worth, by named terms; the reward is their sum."""
+        """Return the named terms of the last step's reward; the reward is their sum."""
         raise NotImplementedError
 
     def terminated(self, data: mujoco.MjData) -> bool:
-        """Whether the episode ends here."""
+        """Return whether the episode ends here."""
         return False
 
     def succeeded(self, data: mujoco.MjData) -> bool:
-        """Whether what was to be done is done: `info["is_success"]`."""
+        """Return whether the task is accomplished: `info["is_success"]`."""
         return False
 
-    def feels(self, data: mujoco.MjData) -> np.ndarray:
-        """What the animal knows beside what it sees, (k,); here: nothing."""
+    def proprioception(self, data: mujoco.MjData) -> np.ndarray:
+        """Return the animal's observation other than signals of eyes, (k,); default: nothing."""
         return np.zeros(0)
 
 
 def named_terms(task: Task, data: mujoco.MjData, whose: str = "") -> dict[str, float]:
-    """Its rewards; whose: what a message begins with.
+    """Return the named rewards of a task; whose: beginning of the message.
 
     Raises:
-        ValueError: they are no finite numbers by name.
+        ValueError: not finite numbers by name.
     """
     terms: Any = task.rewards(data)
     if not isinstance(terms, Mapping):

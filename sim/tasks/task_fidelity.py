@@ -1,4 +1,4 @@
-"""How finely eyes in a task see: as the task says, or as a few moments of its episodes require."""
+"""Fidelity of the eyes in a task: the task's own, or chosen from a few moments of its episodes."""
 
 from __future__ import annotations
 
@@ -16,22 +16,22 @@ from sim.render.model_fidelity import choose_model_fidelity
 from sim.scene.poses import Poses
 from sim.scene.variation import Variation
 from sim.tasks.batch_task import BatchTask
-from sim.tasks.encounter import Frozen, among, cast
+from sim.tasks.encounter import Frozen, among, split_agents
 from sim.tasks.eye_kinds import EYES, several
 from sim.tasks.per_world import PerWorld
 from sim.tasks.simulation import Simulation
 from sim.tasks.task import Task
 
 AUTO = "auto"
-WORLDS, LATER = 6, 12  # episodes that are looked into: at their beginnings, and so many random actions later
+WORLDS, LATER = 6, 12  # number of evaluated episodes, at their beginnings and after this number of random actions
 
 
 def fidelities_of(task: BatchTask | Task) -> dict[str, Fidelity]:
-    """Of each kind of the first agent's eyes: the task's own, or, for "auto", what `sim.choose_model_fidelity` finds.
-    The same task gets the same fidelity.
+    """Return the fidelity of each kind of the first agent's eyes: the task's own, or, for "auto", the choice of
+    `sim.choose_model_fidelity`. The result is reproducible.
 
     Raises:
-        ValueError: it is neither, and what the task's model and eyes raise.
+        ValueError: another setting, or the task's model or eyes are invalid.
     """
     batch = PerWorld(task) if isinstance(task, Task) else task
     kinds = batch.agents()[0].kinds
@@ -58,7 +58,7 @@ def fidelities_of(task: BatchTask | Task) -> dict[str, Fidelity]:
 
 
 def fidelities_among(task: BatchTask, number: int) -> dict[str, Fidelity]:
-    """Of one of the agents, by what it sees of the others.
+    """Return the fidelities of one agent's eyes, chosen for its views of the other agents.
 
     Raises:
         ValueError: see `fidelities_of`.
@@ -69,14 +69,13 @@ def fidelities_among(task: BatchTask, number: int) -> dict[str, Fidelity]:
     return fidelities_of(among(task.animals[number], others))
 
 
-def with_settled_others(task: Task) -> Task:
-    """The same task, whose others see as finely as they want to: so that it need not be found out in every environment
-    anew.
+def resolve_other_fidelities(task: Task) -> Task:
+    """Return the same task with resolved fidelities of its others, so that environments need not choose them again.
 
     Raises:
         ValueError: see `fidelities_of`.
     """
-    _, frozen = cast(task)
+    _, frozen = split_agents(task)
     batch, settled = PerWorld(task), []
     for number, other in enumerate(frozen, start=1):
         body = copy.copy(other.task)
@@ -88,7 +87,7 @@ def with_settled_others(task: Task) -> Task:
 
 
 def _in_brightest(variation: Variation, eye: optics.Eye) -> float:
-    """Error allowed to a signal, if lights are brighter in some episodes, and errors with them."""
+    """Return the error allowed to a signal if lights, and with them errors, are larger in some episodes."""
     most = variation.extremes(np.asarray(eye.spectral_bands.wavelengths)).max()
     return allowed_error(eye, None) / max(float(most), 1.0)
 

@@ -1,4 +1,4 @@
-"""What every task says about itself, whether it is written for one world at a time or for arrays of all worlds."""
+"""Settings of every task, for one world at a time or for arrays of all worlds."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import mujoco
 
 import optics
 from optics.numerics.arguments import did_you_mean, finite, whole
+from optics.numerics.renamed import warn_renamed
 from optics.spectra.spectrum import Spectrum
 from sim.eyes.mounts import Mount, fan
 from sim.physics.controls import actuator_names, controls_of
@@ -23,34 +24,38 @@ MOST_STEPS = 10**9
 
 
 class TaskSettings:
-    """What a subclass says about itself; only `model` and `mounts` have no default.
+    """Settings that a subclass defines. Only `model` and `mounts` have no default.
 
-    model: an MjModel, or what compiles to one (`sim.mirror`)
-    eye: optics and retina of every eye · mounts: where the eyes are; of several kinds of eyes both are dictionaries,
-        such as {"wide": ..., "sharp": ...}, and an observation has an array for each kind in the place of "eyes"
-    fidelity: how finely they see, see `sim.ModelRenderer`; "auto": as a few moments of its episodes want, see
-        `sim.choose_model_fidelity`; of several kinds alike, or a dictionary, too
-    substeps: of physics in one action · episode_steps: actions, then an episode is truncated
-    spectra: of materials and lights, by name, in the place of their colours
-    vary: what is drawn for each episode and world, as (low, high) by name, before `reset`:
-        "light", a factor of all lights, evenly over its logarithm
-        "color_temperature" [K] of what is white, evenly over its reciprocal
-        "GEOM.size", a factor of a geom's size, evenly over its logarithm; its mass and inertia are MuJoCo's compiler's
-        "GEOM.color", between two colours (red, green, blue), each share by itself; a texture is multiplied by it
-        "GEOM.material", of two or more of the model's, by name: its texture, colour and glow; the geom has no rgba
-        "JOINT.start", where a hinge [rad] or a slide [m] is at first; "BODY.start", between two points (x, y, z) [m],
-        of a mocap body or one with a free joint
-        All but "light" and "color_temperature" are in each world's own `data.model`, or in its data. Worlds have
-        models of their own, too, where the first `reset` changes `data.model`; otherwise they share one
-    auxiliary: of "depth", "ids" and "flow": what an observation holds of each receptor beside its signal: how far what
-        its centre looks at is, which geom, and how it has moved since the last observation; see docs/tasks.md. Eyes
-        that evolve have none
-    camera: name of the camera that pictures for people are taken with; None: one that looks at the whole model
-    actuators: names of those that an action drives; None: all
-    name: what it is called among others; None: as its class
-    failure_reward: what a step is worth that breaks its world, as the reward's term "failure". Where rewards are costs,
-        0 is more than any episode: to break the world pays, unless this is less than an episode may cost
-    mode: "training" or "evaluation", as the environment was made; methods may use it
+    model: an MjModel, or a source that compiles to one (`sim.mirror`)
+    eye: optics and retina of every eye
+    mounts: places of the eyes. For several kinds of eyes, eye and mounts are dictionaries, such as {"wide": ...,
+        "sharp": ...}. An observation then has an array for each kind instead of "eyes".
+    fidelity: fidelity of the eyes, see `sim.ModelRenderer`; "auto": chosen from a few moments of the task's episodes,
+        see `sim.choose_model_fidelity`. For several kinds of eyes: a common value, or a dictionary.
+    substeps: physics steps per action
+    episode_steps: number of actions after which an episode is truncated
+    spectra: spectra of materials and lights, by name, which replace their colours
+    vary: ranges (low, high), by name, from which values are drawn for each episode and world, before `reset`:
+        "light": a factor of all lights, uniform in its logarithm.
+        "color_temperature": colour temperature of white [K], uniform in its reciprocal.
+        "GEOM.size": a factor of a geom's size, uniform in its logarithm. MuJoCo's compiler computes mass and inertia.
+        "GEOM.color": a colour between two colours (red, green, blue), each component independently. It multiplies a
+        texture.
+        "GEOM.material": one of two or more of the model's materials, by name: its texture, colour and glow. The geom
+        must not have its own rgba.
+        "JOINT.start": initial position of a hinge [rad] or a slide [m]. "BODY.start": initial position of a mocap body,
+        or of a body with a free joint, between two points (x, y, z) [m].
+        All values except "light" and "color_temperature" are set in each world's own `data.model`, or in its data.
+        Worlds also have their own models if the first `reset` changes `data.model`. Otherwise they share one.
+    auxiliary: any of "depth", "ids" and "flow": quantities that an observation contains for each receptor in addition
+        to its signal. They are the distance of the surface at the receptor's centre, its geom, and its motion since the
+        last observation; see docs/tasks.md. Evolving eyes have none.
+    camera: name of the camera for images of the task; None: one that shows the whole model
+    actuators: names of the actuators that an action drives; None: all
+    name: name of the animal among others; None: the name of the class
+    failure_reward: reward of a step in which the world fails, as the term "failure". If rewards are costs, the default
+        of 0 is better than any normal episode, so set a value below the cost of an episode.
+    mode: "training" or "evaluation", as set when the environment was made; methods may use it
     """
 
     model: mujoco.MjModel | mujoco.MjSpec | str | Path
@@ -68,21 +73,29 @@ class TaskSettings:
     failure_reward: float = 0.0
     mode: str = "training"
 
+    def __init_subclass__(cls) -> None:
+        """Support subclasses that define `proprioception` under its old name, `feels`."""
+        super().__init_subclass__()
+        if "feels" in vars(cls) and "proprioception" not in vars(cls):
+            warn_renamed(f"{cls.__name__}.feels", "proprioception")
+            cls.proprioception = vars(cls)["feels"]  # type: ignore[attr-defined]
+
     def n_actions(self, model: mujoco.MjModel) -> int:
-        """Numbers in an action; here: as many controls as its actuators take, which is one each of most kinds."""
+        """Number of values in an action; default: the number of its actuators' controls, which is one for most
+        actuators."""
         return len(controls_of(model, self.actuators))
 
     def place(self, n_eyes: int, placement_range_deg: float, elevation_deg: float) -> Sequence[Mount]:
-        """Where an evolving animal has its eyes; here: the first of `mounts`, fanned out, see `sim.fan`."""
+        """Return the places of an evolving animal's eyes; default: the first of `mounts`, fanned out, see `sim.fan`."""
         assert not isinstance(self.mounts, Mapping)
         return fan(self.mounts[0], n_eyes, placement_range_deg, elevation_deg)
 
 
 def compiled(task: TaskSettings, model: mujoco.MjModel | None = None) -> mujoco.MjModel:
-    """The model of a task whose other settings are right; model: where it has been compiled already.
+    """Return the model of a task after checking its other settings; model: the model, if it has already been compiled.
 
     Raises:
-        ValueError: something is missing, or wrong.
+        ValueError: a setting is missing or invalid.
     """
     name = type(task).__name__
     if not hasattr(task, "model"):
@@ -103,5 +116,5 @@ def compiled(task: TaskSettings, model: mujoco.MjModel | None = None) -> mujoco.
         if not len(controls_of(model, [actuator])):
             raise ValueError(f"{name}: actuators: {actuator!r} takes no control: must be one that can be driven")
     if task.n_actions(model) < 1:
-        raise ValueError(f"{name}: its model has no actuators: n_actions and act must say what an action is")
+        raise ValueError(f"{name}: its model has no actuators: n_actions and act must define an action")
     return model

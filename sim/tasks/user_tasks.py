@@ -1,4 +1,4 @@
-"""Tasks that users write, as others handle them: whether they are paid, with eyes that evolve, for arrays of worlds."""
+"""Preparation of user tasks: as arrays of worlds, and with evolved eyes."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ UserTask = TypeVar("UserTask", bound=TaskSettings)
 
 
 def batched(task: Task | BatchTask | Encounter) -> BatchTask:
-    """A user's task for arrays of worlds.
+    """Return a user task as a task on arrays of worlds.
 
     Raises:
-        ValueError: a learner has no rewards, and what `PerWorld` raises.
+        ValueError: a learner has no rewards, or a setting is invalid, see `PerWorld`.
     """
     if isinstance(task, BatchTask):
         require_rewards(task)
@@ -35,7 +35,11 @@ def batched(task: Task | BatchTask | Encounter) -> BatchTask:
 
 
 def require_rewards(task: Task | BatchTask) -> None:
-    """ValueError unless whoever learns it is paid."""
+    """Check that a task that is learnt defines rewards.
+
+    Raises:
+        ValueError: it does not.
+    """
     judges = isinstance(task, BatchTask) and type(task).judge is not BatchTask.judge
     if getattr(task.rewards, "__func__", None) in (Task.rewards, BatchTask.rewards) and not judges:
         name = type(task).__name__
@@ -43,17 +47,17 @@ def require_rewards(task: Task | BatchTask) -> None:
 
 
 def with_evolved_eyes(task: UserTask, eyes: Eyes, elevation_deg: float = 0.0) -> UserTask:
-    """The same task for an animal with such eyes, where the task places them.
+    """Return the same task for an animal with these eyes, at the places that the task's `place` returns.
 
     Raises:
-        ValueError: the task places another number of eyes, or none, since it has no mounts, or has several kinds; its
-            `place` fails.
+        ValueError: the task returns another number of eyes, has no mounts or several kinds of eyes, or its `place`
+            fails.
     """
     name, animal = type(task).__name__, copy.copy(task)
     if several(task):
-        raise ValueError(f"{name}: eye and mounts have several kinds of eyes: must have one, where eyes evolve")
+        raise ValueError(f"{name}: eye and mounts have several kinds of eyes: must have one if eyes evolve")
     if not task.mounts and type(task).place is TaskSettings.place:
-        raise ValueError(f"{name}: mounts = {task.mounts!r}: must hold one sim.Mount at least, where the eyes are")
+        raise ValueError(f"{name}: mounts = {task.mounts!r}: must contain at least one sim.Mount, an eye's place")
     animal.eye, animal.auxiliary = eyes.eye(), ()
     try:
         animal.mounts = tuple(task.place(eyes.n_eyes, eyes.placement_range_deg, elevation_deg))

@@ -1,21 +1,21 @@
-"""Where rays end, and the light that they find there.
+"""Ray tracing: hit points of rays, and the light that comes from them.
 
-tracer               the protocol of tracers, and which of them a scene gets
-eye_places           where the eyes of a model are, and whether they stay level
+tracer               protocol of tracers, and the choice of one for a scene
+eye_places           positions of a model's eyes, and whether they stay level
 eye_ray              a ray that leaves an eye
-closed_form_tracer   ClosedForm: walls, floor and spheres in closed form
-upright_scene        a model as that, or why it is something else
-spheres              what moves there
-walls                what stands there, as upright walls
-wall_intersection    where rays meet them
-reflectance_atlas    all reflectances in one table
+closed_form_tracer   ClosedForm: rays through upright walls, a floor and spheres in closed form
+upright_scene        a model in this form, or the reason why it has another
+spheres              intersections of rays with moving spheres
+walls                upright walls and the floor of a model
+wall_intersection    intersections of rays with upright walls
+reflectance_atlas    reflectances of all materials in one table
 areas                means over rectangles of the visual field, without rays
-lighting             light that bounces
-model_tracer         ModelTracer: any shapes
-model_scene          what stands still of any model, and what moves
-model_lights         its lights
-movers               what moves, met by rays
-primitives           rays that meet primitives
+lighting             directional light, direct and reflected once more
+model_tracer         ModelTracer: rays through models with any shapes
+model_scene          static and moving geoms of any model
+model_lights         lights of any model
+movers               intersections of rays with moving geoms
+primitives           intersections of rays with MuJoCo's primitives
 paint                colours that differ between worlds
-world_rows           rows of floats that differ from world to world
+world_rows           rows of floats that differ between worlds
 """

@@ -1,10 +1,10 @@
-"""Worlds of upright walls, a floor and spheres, ray traced in closed form.
+"""A ray tracer in closed form for worlds of upright walls, a floor and spheres.
 
-A few walls are all solved; many are found by walking through a grid of cells (Amanatides and Woo 1987), which wants
-their faces to lie on one. Colours are Mitsuba's (`sim.tracing.reflectance_atlas`). Where all lights have one spectrum
-and all materials share a few, light is traced in as many components as there are independent spectra, and not once per
-band. Light that is reflected twice has products of the materials' spectra: with it, all bands are traced, unless all
-materials are grey.
+A few walls are solved one by one. Many are found by a walk through a grid of cells, on which their faces must lie
+(Amanatides and Woo 1987). Colours are Mitsuba's (`sim.tracing.reflectance_atlas`). If all lights have one spectrum and
+all materials share a few, one component is traced per independent spectrum, instead of one per band. Light that is
+reflected twice has products of the materials' spectra. If it is followed, all bands are traced, unless all materials
+are grey.
 """
 
 from __future__ import annotations
@@ -26,18 +26,19 @@ from sim.tracing.upright_scene import UprightScene
 from sim.tracing.wall_intersection import CellTables, Footprints, footprints_of
 from sim.tracing.walls import ALIGNED, NoClosedForm
 
-# Singular values below this share of the largest are rounding: eight times float32's 1.2e-7.
+# Singular values below this share of the largest are rounding errors. It is eight times float32's 1.2e-7.
 RANK_TOLERANCE = 1e-6
-# Chosen: deviation of a grey's reflectances from band to band, in Mitsuba's spectra of grey colours, that is not a hue.
+# Chosen: largest deviation of a grey's reflectances between bands, in Mitsuba's spectra of greys, that is not a hue.
 GREY = 1e-4
 Irradiance = Callable[[Array, Array], list[Array]]  # per component, at a point of a surface with this normal
-ROW = 12  # floats per face: column and row of the texel as affine functions of (x, y, z), then where the texture is
+ROW = 12  # floats per face: column and row of the texel as affine functions of (x, y, z), then the texture's place
 
 
 @dataclass(frozen=True)
 class Components:
-    """reflectance (texel, component) · levels of the lights (light, component) · basis (component, band), with
-    radiance_b = sum_k basis[k, b] reflectance_k sum_l levels[l, k] cos θ_l"""
+    """Factors of radiance_b = sum_k basis[k, b] reflectance_k sum_l levels[l, k] cos θ_l.
+
+    reflectance: (texel, component) · levels: of the lights (light, component) · basis: (component, band)"""
 
     reflectance: np.ndarray
     levels: np.ndarray
@@ -45,7 +46,7 @@ class Components:
 
 
 def components_of(texels: np.ndarray, irradiance: np.ndarray) -> Components:
-    """The fewest components that texels (texel, band) under lights (light, band) need."""
+    """Return the fewest components that texels (texel, band) under lights (light, band) need."""
     n_bands = texels.shape[1]
     brightest = irradiance[np.argmax(irradiance.sum(axis=1))]
     level = irradiance @ brightest / (brightest @ brightest)
@@ -58,7 +59,7 @@ def components_of(texels: np.ndarray, irradiance: np.ndarray) -> Components:
 
 
 def reflected_components_of(texels: np.ndarray, irradiance: np.ndarray) -> Components:
-    """Those in which what a texel sends on is a product: its reflectance times the component that arrives."""
+    """Return components in which reflected light is a product: a texel's reflectance times the arriving component."""
     grey = texels.mean(axis=1, keepdims=True)
     if np.abs(texels - grey).max() <= GREY:
         few = components_of(np.tile(grey, texels.shape[1]), irradiance)
@@ -70,19 +71,19 @@ def reflected_components_of(texels: np.ndarray, irradiance: np.ndarray) -> Compo
 
 @dataclass(frozen=True)
 class _Hit:
-    """Where rays end: lit tells whether light is seen that leaves there; reflectance: one array per component."""
+    """First hits of rays. is_lit: whether the front of a surface is hit · reflectance: one array per component."""
 
     t: Array
     point: Array
     normal: Array
-    lit: Array
+    is_lit: Array
     reflectance: list[Array]
 
 
 @dataclass(frozen=True)
 class ClosedFormTables:
-    """What kernels read of any world. texels: reflectance, an array per component · faces: see `face_rows`
-    cells: of walls that stand on a grid; None: each wall is solved
+    """Arrays that kernels read in all worlds. texels: reflectance, one array per component · faces: see `face_rows`
+    cells: grid on which the walls stand; None: each wall is solved
     """
 
     texels: list[Array]
@@ -92,29 +93,29 @@ class ClosedFormTables:
 
 @dataclass(frozen=True)
 class ClosedFormSurroundings:
-    """centres: of the spheres that are seen, in one lane's world (Point3f) · tables: what the kernel reads of any"""
+    """centres: of the visible spheres in one lane's world (Point3f) · tables: the same for all worlds"""
 
     centres: list[Array]
     tables: ClosedFormTables
 
 
 class ClosedForm:
-    """Traces rays through one world.
+    """A tracer of rays through one scene of upright walls, a floor and spheres.
 
-    name, why: of this way of tracing, for reports
-    light: what of it is followed, one of `lighting.LEVELS`
-    basis: (component, band): what each component is worth in each band
-    world, walls, footprints, lights, components: what it is made of
-    faces: textures of walls and floor, see `face_rows` · sphere_textures: the way to their texels, and where they are
+    name, why: name of the tracer, and the reason for its choice, for reports
+    light: the part of the light that is followed, one of `lighting.LEVELS`
+    basis: (component, band): contribution of each component to each band
+    world, walls, footprints, lights, components: the parts of the scene
+    faces: textures of walls and floor, see `face_rows` · sphere_textures: maps to the texels, and the texels' places
 
     Raises:
-        NoClosedForm: walls that lie on no grid, and, where light that is reflected twice is followed, walls of several
-            heights or lower than what stands between them, bodies that change their height, and a texture that would
+        NoClosedForm: walls that lie on no grid. If light that is reflected twice is followed, also walls of several
+            heights or lower than the bodies between them, bodies that change their height, and a texture that would
             turn with the eyes' body.
     """
 
     name = "closed_form"
-    scene = None  # no Mitsuba scene takes part
+    scene = None  # no Mitsuba scene is needed
 
     def __init__(self, scene: UprightScene, wavelengths: np.ndarray, light: str = lighting.DIRECT) -> None:
         self.light, self.walls, self.world = light, scene.walls, scene
@@ -143,50 +144,50 @@ class ClosedForm:
         )
 
     def buffers(self, n_envs: int) -> SphereRows:
-        """For so many worlds."""
+        """Return buffers for the rows of `n_envs` worlds."""
         return SphereRows(self.world.spheres, n_envs)
 
     def around(self, scenes: None, rows: Array, tables: ClosedFormTables, world: Array) -> ClosedFormSurroundings:
-        """What a lane in this world reads."""
+        """Return the surroundings of a lane in this world."""
         return ClosedFormSurroundings(spheres.centres_in(rows, len(self.world.spheres), world), tables)
 
     def all_bodies(self, centres: list[Array], stand: Array) -> list[Array]:
-        """Centres of the spheres that are seen, and of the eyes' own body, if that is one; stand: where it is."""
+        """Return the centres of the visible spheres and, if it is a sphere, of the eyes' own body; stand: its place."""
         if not self.world.has_own:
             return centres
         return [*centres, mi.Point3f(stand.x, stand.y, float(self.world.heights[-1]))]
 
     def radiance(self, seen: EyeRay, there: ClosedFormSurroundings, samples: Array) -> tuple[list[Array], Array]:
-        """What comes along each ray, one array per component, and from how far [m]; the first two of samples: each
-        ray's own on the unit square, wanted for light that bounces (`lighting.onwards`)."""
+        """Return the light along each ray, one array per component, and the distance to its source [m]. Light that
+        bounces uses the first two samples of each ray, on the unit square (`lighting.spawn_bounce_ray`)."""
         centres, tables = there.centres, there.tables
         bodies = self.all_bodies(centres, seen.body)
         hit = self._hit(seen.ray, centres, tables)
         light = self._irradiance(hit, bodies, tables)
         if self.light == lighting.BOUNCE:
-            onwards = lighting.onwards(hit.point, hit.normal, mi.Point2f(samples.x, samples.y))
-            second_hit = self._hit(onwards, bodies, tables)
+            bounce_ray = lighting.spawn_bounce_ray(hit.point, hit.normal, mi.Point2f(samples.x, samples.y))
+            second_hit = self._hit(bounce_ray, bodies, tables)
             second = zip(second_hit.reflectance, self._irradiance(second_hit, bodies, tables), strict=True)
-            light = [dr.select(hit.lit, dr.fma(r, e, first), 0) for first, (r, e) in zip(light, second, strict=True)]
+            light = [dr.select(hit.is_lit, dr.fma(r, e, first), 0) for first, (r, e) in zip(light, second, strict=True)]
         return [r * e for r, e in zip(hit.reflectance, light, strict=True)], hit.t
 
     def returned(self, ray: Array, shade: Array, radius: float, more: Irradiance | None = None) -> list[Array]:
-        """Light that walls and floor send back along each ray, per component: direct light in the shade of one sphere,
-        and what else arrives there, if that is known."""
+        """Return the light that walls and floor send back along each ray, per component. They receive direct light in
+        the shade of one sphere and, if given, `more` irradiance."""
         hit = self._hit(ray, [], self.inputs)
         light = self._irradiance(hit, [shade], self.inputs, [radius])
         if more:
             light = [e + other for e, other in zip(light, more(hit.point, hit.normal), strict=True)]
-        return [dr.select(hit.lit, r * e, 0) for r, e in zip(hit.reflectance, light, strict=True)]
+        return [dr.select(hit.is_lit, r * e, 0) for r, e in zip(hit.reflectance, light, strict=True)]
 
     def _hit(self, ray: Array, centres: list[Array], tables: ClosedFormTables) -> _Hit:
-        """Where rays meet walls, floor or bodies first; those without a centre are not there."""
+        """Return the first hits of rays with walls, floor or bodies; bodies without a centre are left out."""
         t, face, normal = self.footprints.hit(ray, tables.cells)
         on_floor, t_floor = self._floor_hit(ray)
         floor_first = on_floor & (t_floor < t)
         t = dr.select(floor_first, t_floor, t)
         seen = dr.isfinite(t)
-        # The floor's where nothing is met: a face that there is, in worlds without walls, too.
+        # Rays without a hit get the face of the floor, which exists in worlds without walls, too.
         face = dr.select(floor_first | ~seen, self._n_faces - 1, face)
         normal = dr.select(floor_first, mi.Normal3f(0, 0, 1), normal)
         t, which = spheres.nearest(self._bodies, centres, ray, t)
@@ -205,7 +206,7 @@ class ClosedForm:
         return _Hit(t, point, normal, lit, self._interpolate(offset, columns, rows, x, y, tables))
 
     def _floor_hit(self, ray: Array) -> tuple[Array, Array]:
-        """Whether and where a ray from above meets the floor."""
+        """Return whether a ray from above hits the floor, and the distance to the hit."""
         t = (self.walls.floor - ray.o.z) / ray.d.z
         lower, upper = self.walls.floor_lower, self.walls.floor_upper
         x, y = ray.o.x + t * ray.d.x, ray.o.y + t * ray.d.y
@@ -215,8 +216,8 @@ class ClosedForm:
     def _irradiance(
         self, hit: _Hit, bodies: list[Array], tables: ClosedFormTables, radii: list[float] | None = None
     ) -> list[Array]:
-        """Per component: sum over the lights of level · cos θ, where nothing is in the way; radii: of the bodies, None:
-        their own."""
+        """Return the irradiance per component: the sum of level · cos θ over unobstructed lights; radii: of the bodies,
+        None: their own."""
         levels = self.components.levels
         start = lighting.clear_of(hit.point, hit.normal)
         radii = list(map(float, self._bodies.radii)) if radii is None else radii
@@ -225,14 +226,14 @@ class ClosedForm:
             towards = mi.Vector3f(*map(float, light.direction))
             shadow = mi.Ray3f(start, towards)
             cosine = dr.dot(hit.normal, towards)
-            shines = hit.lit & (cosine > 0) & ~spheres.blocks(radii, bodies, shadow)
+            shines = hit.is_lit & (cosine > 0) & ~spheres.blocks(radii, bodies, shadow)
             shines &= ~self.footprints.blocks(start, light.direction, tables.cells)
             cosine = dr.select(shines, cosine, 0)
             total = [dr.fma(cosine, float(factor), sum_so_far) for factor, sum_so_far in zip(level, total, strict=True)]
         return total
 
     def _face_texel(self, face: Array, point: Array, tables: ClosedFormTables) -> tuple[Array, ...]:
-        """Texture of a face and where in it a point is: first texel, columns, rows, column and row."""
+        """Return the texture of a face and the place of a point in it: first texel, columns, rows, column and row."""
         columns = dr.gather(mi.Vector4f, tables.faces, face * 3)
         place = dr.gather(mi.Vector4f, tables.faces, face * 3 + 2)
         x = _affine(columns, point)
@@ -252,7 +253,7 @@ class ClosedForm:
     def _interpolate(
         self, offset: Array, columns: Array, rows: Array, x: Array, y: Array, tables: ClosedFormTables
     ) -> list[Array]:
-        """Reflectance per component, interpolated bilinearly in a texture that repeats."""
+        """Return the reflectance per component, interpolated bilinearly in a texture that repeats."""
         x0, x1, fx = _neighbours(x, columns)
         n = self.components.reflectance.shape[1]
         taps = [(offset, x0, 1 - fx), (offset, x1, fx)]
@@ -264,7 +265,7 @@ class ClosedForm:
 
 
 def _check_tops(scene: UprightScene) -> None:
-    """No top of a wall may be seen from where light is reflected: from any point of walls and movers."""
+    """Refuse scenes in which the top of a wall is visible from a point of a wall or mover, which may reflect light."""
     for geom, settled in zip(scene.bodies.geoms, scene.settled, strict=True):
         if not settled:
             raise NoClosedForm(f"geom {scene.model.geom(geom).name or str(geom)!r} may change its height")
@@ -275,11 +276,11 @@ def _check_tops(scene: UprightScene) -> None:
     lowest = scene.walls.top.min(initial=np.inf)
     highest = max(scene.walls.top.max(initial=-np.inf), bodies.max(initial=-np.inf))
     if highest > lowest + ALIGNED:
-        raise NoClosedForm(f"light that is reflected twice sees the top of a wall {lowest:.2g} m high")
+        raise NoClosedForm(f"light that is reflected twice would reach the top of a wall {lowest:.2g} m high")
 
 
 def face_rows(uv: np.ndarray, atlas: Atlas, place: np.ndarray) -> np.ndarray:
-    """Per face (face, ROW): column and row of the texel as affine functions of the point, place of the texture, 0."""
+    """Return rows (face, ROW): the texel's column and row as affine functions of the point, the texture's place, 0."""
     rows = np.zeros((len(uv), ROW))
     for i, (affine, texture) in enumerate(zip(uv, place, strict=True)):
         to_texel = atlas.to_texels[texture] @ np.vstack([affine, [0, 0, 0, 1]])
@@ -292,7 +293,7 @@ def _affine(row: Array, point: Array) -> Array:
 
 
 def _neighbours(x: Array, n: Array) -> tuple[Array, Array, Array]:
-    """The two whole numbers around x, modulo n, and how far x is from the first to the second."""
+    """Return the two whole numbers around x, modulo n, and the distance of x from the first."""
     whole = dr.floor(x)
     first = dr.clip(whole - n * dr.floor(whole / n), 0, n - 1)
     second = dr.select(first + 1 >= n, 0, first + 1)

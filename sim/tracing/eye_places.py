@@ -1,4 +1,4 @@
-"""Where the eyes of a model are: as frames in the world, or fixed to one body that stays level."""
+"""Positions of a model's eyes: as frames in the world, or fixed to one body that stays level."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ import numpy as np
 from sim.eyes.mounts import Mount
 from sim.scene.poses import Poses
 
-ROUNDING = 1e-9  # of rotations and of lengths [m]: what a compiled model is off by
+ROUNDING = 1e-9  # rounding error of rotations and of lengths [m] in a compiled model
 _SLIDE, _HINGE = int(mujoco.mjtJoint.mjJNT_SLIDE), int(mujoco.mjtJoint.mjJNT_HINGE)
 
 
 class NotLevelError(ValueError):
-    """Why eyes do not stand on one body that stays level, in words."""
+    """The reason why eyes are not fixed to one body that stays level."""
 
 
 class EyeFrames(NamedTuple):
@@ -32,7 +32,7 @@ class LevelStand:
     """Eyes that are fixed to one body, which only moves and turns on a level plane.
 
     body: its id · height: of its origin [m]
-    origins: pupils in its frame [m], (eye, 3) · rotations: eyes' frames in its frame, (eye, 3, 3)
+    origins: pupils in the body's frame [m], (eye, 3) · rotations: eyes' frames in the body's frame, (eye, 3, 3)
     """
 
     body: int
@@ -42,13 +42,15 @@ class LevelStand:
 
     @property
     def heights(self) -> np.ndarray:
-        """Of the pupils in the world [m], (eye,)."""
+        """Heights of the pupils in the world [m], (eye,)."""
         return self.height + self.origins[:, 2]
 
     @property
     def radius(self) -> float | None:
-        """How far all pupils are from the body's vertical axis [m], where all eyes look straight out from it along the
-        horizon, their tops up; None where they do not."""
+        """Common distance of all pupils from the body's vertical axis [m].
+
+        None if it differs between eyes, or if an eye is not upright or does not look straight out from the axis.
+        """
         level, axes = self.origins[:, :2], self.rotations[:, :, 2]
         radii = np.linalg.norm(level, axis=1)
         if not self.is_upright or radii.min() <= ROUNDING or np.ptp(radii) > ROUNDING:
@@ -58,23 +60,23 @@ class LevelStand:
 
     @property
     def is_upright(self) -> bool:
-        """Whether all eyes look along the horizon, with their tops up."""
+        """True if all eyes look along the horizon, with their tops up."""
         return bool(np.abs(self.rotations[:, :, 1] - [0, 0, 1]).max() < ROUNDING)
 
 
 class EyePlaces:
-    """Eyes that are mounted on a model.
+    """Positions of eyes that are mounted on a model.
 
-    mounts: where each is
+    mounts: one for each eye
 
     Raises:
-        ValueError: there is no mount, or one is on what the model does not have.
+        ValueError: no mount, or a mount on a part that the model lacks.
     """
 
     def __init__(self, model: mujoco.MjModel, mounts: Sequence[Mount]) -> None:
         self.mounts = tuple(mounts)
         if not self.mounts:
-            raise ValueError("mounts = []: must be one sim.Mount at least")
+            raise ValueError("mounts = []: must contain at least one sim.Mount")
         self._model, self._things = model, [mount.found_in(model) for mount in self.mounts]
         self._locals = [mount.local(kind) for mount, (kind, _) in zip(self.mounts, self._things, strict=True)]
 
@@ -82,7 +84,7 @@ class EyePlaces:
         return len(self.mounts)
 
     def frames(self, poses: Poses) -> EyeFrames:
-        """In the world."""
+        """Return the eyes' frames in the world."""
         origins, rotations = [], []
         for (kind, index), (offset, turn) in zip(self._things, self._locals, strict=True):
             origin, rotation = poses.frames(kind, index)
@@ -91,10 +93,10 @@ class EyePlaces:
         return EyeFrames(np.stack(origins, axis=1), np.stack(rotations, axis=1))
 
     def stand(self) -> LevelStand:
-        """The body that they are fixed to.
+        """Return the body that the eyes are fixed to, with their places on it.
 
         Raises:
-            NotLevelError: there are several, or it may tilt or change its height.
+            NotLevelError: several bodies, or a body that may tilt or change its height.
         """
         bodies = {self._body_of(kind, index) for kind, index in self._things}
         if len(bodies) > 1:
@@ -114,7 +116,7 @@ class EyePlaces:
         return int({"site": model.site_bodyid, "camera": model.cam_bodyid}[kind][index]) if kind != "body" else index
 
     def _in_body(self, number: int, body: int, data: mujoco.MjData) -> tuple[np.ndarray, np.ndarray]:
-        """Pupil and eye's frame in the body's frame."""
+        """Return an eye's pupil and frame in the body's frame."""
         (kind, index), (offset, turn) = self._things[number], self._locals[number]
         if kind == "body":
             return offset, turn
@@ -125,7 +127,7 @@ class EyePlaces:
         return origin + rotation @ offset, rotation @ turn
 
     def _require_level(self, body: int, data: mujoco.MjData) -> None:
-        """Joints between the world and the body may only move it on a level plane, and turn it about the vertical."""
+        """Refuse joints between world and body that do more than move it on a level plane or turn it about z."""
         model, name = self._model, self._model.body(body).name
         if abs(data.xmat[body].reshape(3, 3)[2, 2] - 1) > ROUNDING:
             raise NotLevelError(f"the eyes are on body {name!r}, which is tilted")

@@ -9,9 +9,9 @@ from optics.numerics.autodiff import Array
 
 @dataclass(frozen=True)
 class EyeRay:
-    """ray: from the pupil, into the scene (Ray3f) · axis: of the eye (Vector3f) · cosine: between the two
+    """ray: from the pupil into the scene (Ray3f) · axis: of the eye (Vector3f) · cosine: of the angle between the two
 
-    body: where the eye's body is (Point3f), of eyes that stand upright on one; else the pupil
+    body: place of the eyes' body (Point3f) if they stand upright on one; otherwise the pupil
     """
 
     ray: Array

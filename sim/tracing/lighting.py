@@ -1,9 +1,9 @@
-"""Light from the scene's directional emitters, by hand.
+"""Light from the scene's directional emitters: direct, and reflected once more.
 
-Direct light is what Mitsuba's `direct` integrator converges to, without its noise, since each emitter has exactly one
-direction. Light that was reflected once more before is found at the end of one more ray, which leaves the surface in a
-fixed direction drawn from Lambert's cosine: each camera ray has a sample of its own on the unit square for it, its
-bounce sample (`sim.eyes.sensor`), so that the rays of a receptor together see the hemisphere.
+Direct light is the limit of Mitsuba's `direct` integrator without its noise, because each emitter has exactly one
+direction. Light that was reflected once before is found by one more ray. It leaves the surface in a fixed direction
+that is drawn from Lambert's cosine. Each camera ray has its own sample on the unit square for this direction, its
+bounce sample (`sim.eyes.sensor`). The rays of a receptor together sample the hemisphere.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from optics.numerics.autodiff import Array
 from sim.scene.variant import MitsubaObject
 
 LANES = 4  # wavelengths in one mi.Spectrum
-# What of the light is followed: "bounce" adds what is reflected twice, "all" what is reflected more often.
+# Parts of the light: "bounce" adds light that is reflected twice, "all" light that is reflected more often.
 DIRECT, BOUNCE, ALL = LEVELS = ("direct", "bounce", "all")
 
 
@@ -31,18 +31,18 @@ class DirectionalLight:
 
 
 def spectra(wavelengths: np.ndarray) -> list[Array]:
-    """The bands' wavelengths [m] as Mitsuba spectra [nm], LANES at a time; the last one is filled up by repetition."""
+    """Return the bands' wavelengths [m] as Mitsuba spectra [nm] of LANES each, the last one filled up by repetition."""
     padded = np.pad(wavelengths * 1e9, (0, -len(wavelengths) % LANES), mode="edge")
     return [mi.Spectrum(*map(float, chunk)) for chunk in padded.reshape(-1, LANES)]
 
 
-def onwards(point: Array, normal: Array, bounce_sample: Array) -> Array:
-    """The ray that leaves a surface as a sample (2,) of the unit square says, on which Lambert's cosine is laid out.
+def spawn_bounce_ray(point: Array, normal: Array, bounce_sample: Array) -> Array:
+    """Return a ray that leaves a surface; a sample (2,) on the unit square is mapped to directions by Lambert's cosine.
 
-    With the radiance L that it brings, ρ L is what the surface sends on, averaged over samples."""
+    With L the radiance along this ray, the surface reflects ρ L, averaged over samples."""
     local = mi.warp.square_to_cosine_hemisphere(bounce_sample)
-    # Not mi.Frame3f(normal): on walls, whose normals are level to rounding, its axes are the rounding's.
-    # Any vector well away from the normal does; 0.9: up to 26° from upright, the other one is taken.
+    # mi.Frame3f(normal) is not used: walls' normals are level up to rounding errors, which would decide its axes.
+    # Any vector far enough from the normal serves. With 0.9, x is used for normals up to 26° from upright.
     beside = dr.select(dr.abs(normal.z) < 0.9, mi.Vector3f(0, 0, 1), mi.Vector3f(1, 0, 0))
     s = dr.normalize(dr.cross(beside, mi.Vector3f(normal)))
     direction = mi.Frame3f(s, dr.cross(mi.Vector3f(normal), s), normal).to_world(local)
@@ -50,12 +50,12 @@ def onwards(point: Array, normal: Array, bounce_sample: Array) -> Array:
 
 
 def clear_of(point: Array, normal: Array) -> Array:
-    """A point as far from the surface as Mitsuba's own shadow rays start."""
+    """Return a point off the surface, as far from it as the start of Mitsuba's own shadow rays."""
     offset = (1 + dr.max(dr.abs(point))) * mi.math.RayEpsilon
     return mi.Point3f(dr.fma(normal, offset, point))
 
 
 def diffuse_reflectance(si: Array, bsdf: MitsubaObject, wavelengths: Array) -> Array:
-    """Of a Lambertian surface."""
+    """Return the reflectance of a Lambertian surface at these wavelengths."""
     si.wavelengths = wavelengths
     return bsdf.eval_diffuse_reflectance(si, si.is_valid())

@@ -1,6 +1,6 @@
-"""Lights of any model, that may move: directional ones, points and spots, and the headlight of each eye.
+"""Lights of any model, which may move: directional lights, points, spots, and the headlight of each eye.
 
-What they send is Mitsuba's (`sim.scene.lights`), so that the renderer shows what `sim.mirror` does.
+Their emission is Mitsuba's (`sim.scene.lights`), so the renderer agrees with `sim.mirror`.
 """
 
 from __future__ import annotations
@@ -21,17 +21,17 @@ from sim.scene.variant import Description
 from sim.tracing import lighting
 from sim.tracing.world_rows import WorldRows
 
-ROWS = 2  # of four floats for each light: where it is, and where it shines
-FAR = 1e6  # [m] to what a directional light comes from
+ROWS = 2  # rows of four floats for each light: its position and its direction
+FAR = 1e6  # distance to the source of a directional light [m]
 _DIRECTIONAL, _POINT, _SPOT = "directional", "point", "spot"
 
 
 @dataclass(frozen=True)
 class ModelLight:
-    """light: id in the model; -1: the headlight of the eye that looks · kind: "directional", "point" or "spot"
-    level: irradiance on what faces it, or intensity of a point (1 m away), per band (band,)
-    cutoff, exponent: of a spot: cosine of its half angle, and how its light falls off to the side
-    direction: towards a directional light in the reference pose, as Mitsuba has it, unit (3,)
+    """light: id in the model; -1: the headlight of the observing eye · kind: "directional", "point" or "spot"
+    level: irradiance on a surface that faces the light; for points and spots, intensity (1 m away), per band (band,)
+    cutoff, exponent: of a spot: cosine of its half angle, and exponent of its falloff to the side
+    direction: towards a directional light in the reference pose, in Mitsuba's scene, unit (3,)
     """
 
     light: int
@@ -45,8 +45,8 @@ class ModelLight:
 def model_lights(
     model: mujoco.MjModel, spectra: Spectra, wavelengths: np.ndarray
 ) -> tuple[list[ModelLight], list[str]]:
-    """A model's lights at these wavelengths [m] in the variant in force, and what of them has no counterpart here; the
-    sky is none of them."""
+    """Return a model's lights without the sky at these wavelengths [m], in the current variant, and descriptions of
+    features that have no counterpart here."""
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     emitters, left_out = lights.emitters(model, data, spectra)
@@ -65,7 +65,7 @@ def model_lights(
 
 
 def _sampled(description: Description, wavelengths: np.ndarray) -> tuple[np.ndarray, np.ndarray | None]:
-    """Irradiance of a directional light, or intensity; and where a directional light is."""
+    """Return a directional light's irradiance and the direction towards it, or another light's intensity and None."""
     emitter, found = mi.load_dict(description), []
     directional, towards = description["type"] == _DIRECTIONAL, None
     for spectrum in lighting.spectra(wavelengths):
@@ -80,7 +80,7 @@ def _sampled(description: Description, wavelengths: np.ndarray) -> tuple[np.ndar
 
 
 class Lights:
-    """All of them, for the kernel. Each is asked for once per ray."""
+    """All lights of a model, for the kernel, which evaluates each of them once per ray."""
 
     def __init__(self, found: list[ModelLight]) -> None:
         self.found = found
@@ -89,7 +89,7 @@ class Lights:
         return len(self.found)
 
     def rows(self, poses: Poses) -> np.ndarray:
-        """Where they are and shine, (world, light, 4 ROWS) float32; the headlights' are not read."""
+        """Return positions and directions of lights, (world, light, 4 ROWS) float32; headlights' rows are not read."""
         rows = np.zeros((poses.n, len(self), ROWS, 4), np.float32)
         for k, light in enumerate(self.found):
             if light.light >= 0:
@@ -99,8 +99,8 @@ class Lights:
         return rows.reshape(poses.n, len(self), -1)
 
     def towards(self, k: int, point: Array, axis: Array, there: WorldRows) -> tuple[Array, Array, Array]:
-        """Unit vector from a point to a light, how far that is [m], and how much of its level arrives on what faces it;
-        axis: of the eye that looks."""
+        """Return the unit vector from a point to a light, the distance [m], and the share of the light's level that
+        arrives on a surface that faces it; axis: of the observing eye."""
         light = self.found[k]
         if light.light < 0:
             return -axis, mi.Float(FAR), mi.Float(1)

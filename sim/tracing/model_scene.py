@@ -1,6 +1,6 @@
-"""A model taken apart: what stands still becomes one Mitsuba scene, and what moves is met by itself.
+"""A model in two parts: static geoms form one Mitsuba scene, and moving geoms are intersected separately.
 
-Surfaces are matt here, and opaque: what of a material is gloss, mirror or glass is left out, and said so.
+All surfaces are matt and opaque here. Gloss, mirrors and glass are left out, and a warning lists them.
 """
 
 from __future__ import annotations
@@ -19,10 +19,10 @@ from optics import Eye
 from optics.spectra.spectrum import Spectrum
 from sim.scene import bsdfs, inventory, lights, shapes, sky, surfaces
 from sim.scene.appearances import Appearance, Varied, appearances_of, in_white, varied_geoms
-from sim.scene.as_built import AsBuilt
 from sim.scene.band_error import lights_in_bands
 from sim.scene.merged_parts import PlacedPart, merged
 from sim.scene.mirror import VISIBLE_GROUPS, MirrorWarning
+from sim.scene.model_snapshot import ModelSnapshot
 from sim.scene.primitive_geoms import kind_of
 from sim.scene.rays import names_of
 from sim.scene.spectra import of_geom, resolve
@@ -37,20 +37,20 @@ _HERE = Path(__file__).parents[1]
 
 
 class ModelScene:
-    """What tracers need of a model. Mitsuba's scenes are built when they are first needed.
+    """The parts of a model that tracers need. Mitsuba's scenes are built on first use.
 
-    model · eye: whose bands it has · variant: of Mitsuba · geoms: ids of all that are seen
-    looks: of all these geoms · moving: those that are not always where the model has them, or not always the same
-    bsdfs: of every look; kept here, since a BSDFPtr does not keep its objects alive
-    lights: all of them · spectra: measured ones of materials and lights, by name
-    has_sky: whether there is something to see at infinity
-    glows: BSDFs whose reflectance is the radiance of what glows, by look; these are met like movers
-    varied: geoms whose size or colour differs from world to world, and ids of the materials that one may have; what
-        differs is met like a mover, though it may stand still
-    as_built: what worlds are compared with
+    model · eye: determines the spectral bands · variant: of Mitsuba · geoms: ids of all visible geoms
+    looks: appearances of all these geoms · moving: appearances that may change their place, size or colour
+    bsdfs: one for every appearance; stored here, because a BSDFPtr does not keep its objects alive
+    lights: all lights · spectra: measured spectra of materials and lights, by name
+    has_sky: whether rays without a hit reach a sky
+    glows: BSDFs whose reflectance is the radiance of a glowing geom, by appearance; such geoms count as movers
+    varied: geoms whose size or colour differs between worlds, and ids of the materials that each may have; they count
+        as movers, although they may be static
+    as_built: snapshot of the model, which worlds are compared with
 
     Raises:
-        ValueError: a model without visible geoms, and spectra or variation of what it does not have.
+        ValueError: a model without visible geoms; spectra or variation of a part that the model lacks.
     """
 
     def __init__(
@@ -84,15 +84,15 @@ class ModelScene:
 
     @property
     def wavelengths(self) -> np.ndarray:
-        """Of the eye's bands [m]."""
+        """Wavelengths of the eye's bands [m]."""
         return np.asarray(self.eye.spectral_bands.wavelengths)
 
     def _may_change(self, look: Appearance) -> bool:
         return _moves(self.model, look.geom) or look.geom in self.varied or look in self.glows
 
     def tell_what_is_missing(self, light: str = DIRECT) -> None:
-        """Warn (`sim.MirrorWarning`) once of what has no counterpart where this much of the light is followed, and of
-        measured lights that the eye's bands are too few for."""
+        """Warn (`sim.MirrorWarning`) once of features that have no counterpart if this part of the light is followed,
+        and of measured lights for which the eye has too few bands."""
         model = self.model
         of_sky = ["light of the sky on surfaces"] if light == DIRECT and self.has_sky else []
         missing = [*self._unlit, *of_sky, *inventory.left_out(model, self._seen, self._groups)]
@@ -101,32 +101,32 @@ class ModelScene:
             warnings.warn(words, MirrorWarning, stacklevel=_outside())
 
     @cached_property
-    def as_built(self) -> AsBuilt:
-        """What worlds are compared with."""
+    def as_built(self) -> ModelSnapshot:
+        """Snapshot of the model, which worlds are compared with."""
         model, groups = self.model, self._groups
         reachable = [g for g in range(model.ngeom) if model.geom_group[g] in groups and shapes.has_shape(model, g)]
         hidden = [g for g in reachable if g not in self._seen]
         moving = np.array([look.geom for look in self.moving], int)
         meshes = [look.geom for look in self.moving if kind_of(look.model, look.geom) is None]
-        return AsBuilt(model, self.geoms, hidden, moving, np.setdiff1d(moving, meshes), self.varied)
+        return ModelSnapshot(model, self.geoms, hidden, moving, np.setdiff1d(moving, meshes), self.varied)
 
     @cached_property
     def movers(self) -> Movers:
-        """What moves."""
+        """The moving geoms."""
         with in_variant(self.variant):
             meshes = [look for look in self.moving if kind_of(look.model, look.geom) is None]
             return Movers(self.model, self.moving, {look: self._mesh(look, self.bsdfs[look]) for look in meshes})
 
     @cached_property
     def paint(self) -> Paint:
-        """Sizes and colours that differ from world to world."""
+        """Colours that differ between worlds."""
         glow = any(look.geom in self._painted for look in self.glows)
         with in_variant(self.variant):
             return Paint(self.model, self._painted, self.movers.geoms, self.wavelengths, glow)
 
     @cached_property
     def still(self) -> MitsubaObject:
-        """What stands still, and the sky: a Mitsuba scene."""
+        """Mitsuba scene of the static geoms and the sky."""
         with in_variant(self.variant):
             description: Description = {"type": "scene", **merged(self._still_parts(), "still")}
             if self._heaven is not None:
@@ -140,8 +140,8 @@ class ModelScene:
         return bsdfs.matt(look.model, look.geom, to_uv, of_geom(look.model, look.geom, self.spectra))
 
     def _glow(self, look: Appearance, white: bool) -> MitsubaObject | None:
-        """A BSDF whose reflectance is the radiance of what glows: the kernel asks for it as for the others, and
-        multiplies what is white by its world's colour."""
+        """Return a BSDF whose reflectance is the radiance of a glowing geom. The kernel evaluates it like other BSDFs,
+        and multiplies a white one by its world's colour."""
         to_uv, geom = shapes.uv_transform(look.model, look.geom), look.geom
         model = in_white(look.model, geom) if white else look.model
         radiance = lights.glow(model, geom, to_uv, of_geom(model, geom, self.spectra))
@@ -150,15 +150,15 @@ class ModelScene:
         return mi.load_dict({"type": "twosided", "inside": {"type": "diffuse", "reflectance": radiance}})
 
     def _mesh(self, look: Appearance, bsdf: MitsubaObject) -> MitsubaObject:
-        """A geom in its own frame."""
+        """Return the Mitsuba scene of a geom in its own frame."""
         parts = enumerate(shapes.parts(look.model, look.geom))
         built = {f"part_{k}": shapes.build(part, np.eye(4), f"part_{k}", bsdf, None) for k, part in parts}
         return mi.load_dict({"type": "scene", **built}, optimize=False)
 
     @cached_property
     def told_apart(self) -> tuple[MitsubaObject, np.ndarray]:
-        """What stands still, each geom by itself, and the geoms of its shapes by Mitsuba's ids; -1 where there is none.
-        Ids are all that rays on a GPU say of what they meet."""
+        """Mitsuba scene of the static geoms as separate shapes, and the geoms by the shapes' ids in Mitsuba, -1 for
+        unused ids. On a GPU, the id is all that a ray reports about the shape that it hits."""
         with in_variant(self.variant):
             built = {name: shapes.build(part, pose, name, bsdf, None) for name, part, pose, bsdf in self._still_parts()}
             scene = mi.load_dict({"type": "scene", **built}, optimize=False)
@@ -184,7 +184,7 @@ def _moves(model: mujoco.MjModel, geom: int) -> bool:
 
 
 def _outside() -> int:
-    """How many calls ago somebody else's code was running: that is where a warning points."""
+    """Return the stack level of the nearest caller outside `sim`, where a warning should point."""
     frame, level = sys._getframe(1), 1
     while frame.f_back is not None and Path(frame.f_code.co_filename).is_relative_to(_HERE):
         frame, level = frame.f_back, level + 1
@@ -192,7 +192,7 @@ def _outside() -> int:
 
 
 def _not_matt(model: mujoco.MjModel, looks: Sequence[Appearance], light: str) -> list[str]:
-    """What surfaces do that is left out, in words."""
+    """Return descriptions of surface properties that are left out."""
     materials = sorted({look.material for look in looks if look.material >= 0})
     glossy = [m for m in materials if bsdfs.has_gloss(model, m)]
     glowing = [m for m in materials if model.mat_emission[m] > 0 and light == DIRECT]

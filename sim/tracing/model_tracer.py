@@ -1,8 +1,8 @@
-"""Light along rays through a model: what stands still is met by Mitsuba, what moves in closed form.
+"""A tracer of rays through any model: Mitsuba intersects static geoms, `sim.tracing.movers` the moving ones.
 
-Direct light is that of lamps. Light that bounces is followed as `sim.tracing.lighting` says: a surface that is seen
-looks in one direction for what is reflected to it once more, for the sky and for what glows, and what it sees there
-looks once again for the latter two. So nothing is left out that is reflected twice at most.
+Direct light is the light of lamps. For light that bounces (`sim.tracing.lighting`), a visible surface samples one
+direction for light that is reflected once more, for the sky and for glowing geoms. The surface that is hit there
+samples one more direction for the latter two. All light that is reflected at most twice is included.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from sim.tracing.world_rows import WorldRows
 
 @dataclass(frozen=True)
 class Scenes:
-    """Mitsuba's: still: what stands still, and the sky · meshes: of what moves, each in its own frame"""
+    """Mitsuba scenes. still: static geoms and the sky · meshes: moving meshes, each in its own frame"""
 
     still: MitsubaObject
     meshes: list[MitsubaObject]
@@ -37,10 +37,10 @@ class Scenes:
 
 @dataclass(frozen=True)
 class Tables:
-    """What kernels read of any world.
+    """Arrays that kernels read in all worlds.
 
     bsdfs: of all movers · ends, painted: see `Movers` and `Paint`
-    sky: an emitter · glowing: number of each mover's glow · glows: BSDFs of these; None: there are none
+    sky: an emitter · glowing: number of each mover's glow · glows: BSDFs of these; None: no sky, no glow
     """
 
     bsdfs: Array
@@ -53,7 +53,7 @@ class Tables:
 
 @dataclass(frozen=True)
 class Rows:
-    """What kernels read of all worlds: where movers and lights are, and colours."""
+    """Arrays of all worlds that kernels read: places of movers and lights, and colours."""
 
     movers: Array
     lights: Array
@@ -62,7 +62,7 @@ class Rows:
 
 @dataclass(frozen=True)
 class Surroundings:
-    """All of that as one lane's world has it."""
+    """All of these for the world of one lane."""
 
     still: MitsubaObject
     movers: MoverRows
@@ -72,7 +72,7 @@ class Surroundings:
 
 
 class RowBuffers:
-    """Where the rows of a number of worlds are put, for kernels to read."""
+    """Buffers for the rows of `n_envs` worlds, which kernels read."""
 
     def __init__(self, scene: ModelScene, n_envs: int) -> None:
         self._scene = scene
@@ -81,7 +81,7 @@ class RowBuffers:
         self._movers, self._lights, self._paint = (shared.values.reshape(n_envs, -1) for shared in self._shared)
 
     def fill(self, poses: Poses) -> None:
-        """With these worlds'."""
+        """Write the rows of these worlds."""
         scene = self._scene
         self._movers[:] = scene.movers.rows(poses)
         if len(scene.paint):
@@ -91,17 +91,17 @@ class RowBuffers:
             self._lights[:] = scene.lights.rows(poses).reshape(poses.n, -1)
 
     def arrays(self) -> Rows:
-        """On the device."""
+        """Return the rows as arrays on the device."""
         return Rows(*(shared.array for shared in self._shared))
 
 
 @dataclass(frozen=True)
-class _Met:
-    """What rays end at.
+class _SurfaceHit:
+    """First hits of rays.
 
-    si: to ask the BSDF by · colors, glow: that multiply its reflectance and what it emits, per chunk of bands
-    which: mover, as many as there are: none · seen: whether there is anything · active: rays that there are
-    point, normal: in the world, towards where the ray comes from · t: distance [m] · direction: of the ray
+    si: interaction for the BSDF · colors, glow: factors of its reflectance and of its emission, per chunk of bands
+    which: mover, or the number of movers for none · seen: whether anything is hit · active: rays that are traced
+    point, normal: in the world, the normal towards the ray's origin · t: distance [m] · direction: of the ray
     """
 
     si: Array
@@ -118,25 +118,25 @@ class _Met:
 
 
 class ModelTracer:
-    """One component per band: surfaces are Lambertian, and each lamp is asked for once per ray and reflection.
+    """A tracer of rays through any model. Surfaces are Lambertian; lamps are sampled once per ray and reflection.
 
-    name, why: of this way of tracing, for reports
-    light: what of it is followed, "direct" or "bounce"
-    basis: (component, band): what each component is worth in each band
+    name, why: name of the tracer, and the reason for its choice, for reports
+    light: the part of the light that is followed, "direct" or "bounce"
+    basis: (component, band): contribution of each component to each band; each component is one band
     """
 
     name = "mitsuba"
 
-    def __init__(self, scene: ModelScene, light: str = lighting.DIRECT, why: str = "asked for") -> None:
+    def __init__(self, scene: ModelScene, light: str = lighting.DIRECT, why: str = "requested") -> None:
         if light == lighting.ALL:
-            raise ValueError("light = 'all': rays follow light that is reflected twice at most, see samples = 'areas'")
+            raise ValueError("light = 'all': rays follow at most two reflections, see samples = 'areas'")
         self._scene, self._bands, self.light = scene, lighting.spectra(scene.wavelengths), light
         self.why, self.basis = why, np.eye(len(scene.wavelengths))
         self._glows = len(scene.glows) > 0
         self.scene = Scenes(scene.still, scene.movers.meshes)
         shapes = scene.still.shapes()
         self._any_still = len(shapes) > 0
-        # Never empty: a BSDF among the inputs is what makes the recording collect the BSDFs' textures.
+        # Never empty: the recording collects the BSDFs' textures only if a BSDF is among the inputs.
         known = [*(scene.bsdfs[look] for look in scene.movers.looks), *(shape.bsdf() for shape in shapes[:1])]
         sky = mi.EmitterPtr([scene.still.environment()]) if scene.has_sky else None
         self.inputs = Tables(mi.BSDFPtr(known), scene.movers.ends, scene.paint.painted, sky, *self._of_glows())
@@ -150,11 +150,11 @@ class ModelTracer:
         return whole_numbers([*of_movers, len(number)]), mi.BSDFPtr(list(scene.glows.values()))
 
     def buffers(self, n_envs: int) -> RowBuffers:
-        """For so many worlds."""
+        """Return buffers for the rows of `n_envs` worlds."""
         return RowBuffers(self._scene, n_envs)
 
     def around(self, scenes: Scenes, rows: Rows, tables: Tables, world: Array) -> Surroundings:
-        """What a lane in this world reads."""
+        """Return the surroundings of a lane in this world."""
         movers, lights, paint = (
             world * n
             for n in (self._scene.movers.n_rows, max(len(self._scene.lights), 1) * LIGHT_ROWS, self._scene.paint.n_rows)
@@ -168,38 +168,38 @@ class ModelTracer:
         )
 
     def radiance(self, seen: EyeRay, there: Surroundings, samples: Array) -> tuple[list[Array], Array]:
-        """What comes along each ray, per band, and from how far [m]; samples: each ray's own, twice two numbers on the
-        unit square, wanted for light that bounces (`lighting.onwards`)."""
+        """Return the light along each ray, per band, and the distance to its source [m]. Light that bounces uses the
+        samples of each ray: two pairs of numbers on the unit square (`lighting.spawn_bounce_ray`)."""
         met = self._met(seen.ray, there)
         arrives = self._irradiance(met, seen.axis, there, shadow_of_headlight=False)
         if self.light == lighting.BOUNCE:
-            onwards = self._returned(met, seen.axis, there, samples)
-            arrives = [e + dr.pi * more for e, more in zip(arrives, onwards, strict=True)]
+            reflected = self._returned(met, seen.axis, there, samples)
+            arrives = [e + dr.pi * more for e, more in zip(arrives, reflected, strict=True)]
         spectra = self._sent(met, arrives, there)
         return [spectra[b // lighting.LANES][b % lighting.LANES] for b in range(len(self.basis))], met.t
 
-    def _returned(self, met: _Met, axis: Array, there: Surroundings, samples: Array) -> list[Array]:
-        """What comes to surfaces that are seen, from one direction each, drawn from Lambert's cosine: light that is
-        reflected there, and what glows, the sky too, be it there or reflected there."""
-        onwards = lighting.onwards(met.point, met.normal, mi.Point2f(samples.x, samples.y))
-        second = self._met(onwards, there, met.seen)
+    def _returned(self, met: _SurfaceHit, axis: Array, there: Surroundings, samples: Array) -> list[Array]:
+        """Return the light that reaches visible surfaces from one direction each, drawn from Lambert's cosine: light of
+        lamps that is reflected there, and light of the sky and of glowing geoms, emitted or reflected there."""
+        bounce_ray = lighting.spawn_bounce_ray(met.point, met.normal, mi.Point2f(samples.x, samples.y))
+        second = self._met(bounce_ray, there, met.seen)
         arrives = self._irradiance(second, axis, there, shadow_of_headlight=True)
         if self._scene.has_sky or self._glows:
-            further = lighting.onwards(second.point, second.normal, mi.Point2f(samples.z, samples.w))
+            further = lighting.spawn_bounce_ray(second.point, second.normal, mi.Point2f(samples.z, samples.w))
             last = self._met(further, there, second.seen)
             emitted = self._emitted(last, there)
             arrives = [e + dr.pi * more for e, more in zip(arrives, emitted, strict=True)]
         found = self._sent(second, arrives, there)
         return [dr.select(met.seen, spectrum, 0) for spectrum in found]
 
-    def _met(self, ray: Array, there: Surroundings, active: Array | None = None) -> _Met:
-        """What rays meet first."""
+    def _met(self, ray: Array, there: Surroundings, active: Array | None = None) -> _SurfaceHit:
+        """Return the first hits of rays."""
         movers = self._scene.movers
         active = mi.Bool(True) if active is None else active
         ray.wavelengths = self._bands[0]
         si = there.still.ray_intersect(ray, active) if self._any_still else _nothing()
         if movers.apart:
-            computed(si)  # once: every kernel that reads of it would trace it anew
+            computed(si)  # evaluated once: otherwise every kernel that reads it would trace the rays again
         far = dr.select(active, si.t, 0)
         hit = movers.nearest(ray, far, there.movers)
         on_mover = active & (hit.which < len(movers))
@@ -217,20 +217,20 @@ class ModelTracer:
         colors = glow = [mi.Spectrum(1) for _ in self._bands]
         which, paint = dr.minimum(hit.which, len(movers)), self._scene.paint
         if len(paint):
-            colors = paint.of(which, there.paint, seen)
+            colors = paint.factors(which, there.paint, seen)
         if paint.glow:
-            glow = paint.of(which, there.paint, seen, glow=True)
-        return _Met(si, bsdf, colors, glow, which, seen, active, point, normal, hit.t, ray.d)
+            glow = paint.factors(which, there.paint, seen, glow=True)
+        return _SurfaceHit(si, bsdf, colors, glow, which, seen, active, point, normal, hit.t, ray.d)
 
     def distance(self, ray: Array, there: Surroundings) -> Array:
-        """How far what each ray meets is [m]."""
+        """Return the distance to the first hit of each ray [m]."""
         si = there.still.ray_intersect_preliminary(ray) if self._any_still else _nothing()
         far = dr.select(si.is_valid(), si.t, dr.inf)
         return self._scene.movers.nearest(ray, far, there.movers).t
 
     def which(self, ray: Array, there: Surroundings) -> Array:
-        """What each ray meets: a mover by its number; what stands still by its id in Mitsuba, after all movers, and
-        nothing as the id 0. What stands still is told apart, see `ModelScene.told_apart`."""
+        """Return the first hit of each ray: a mover's number, or the number of movers plus a static shape's id in
+        Mitsuba, 0 for none. Static geoms are separate shapes, see `ModelScene.told_apart`."""
         movers, any_still = len(self._scene.movers), len(there.still.shapes()) > 0
         si = there.still.ray_intersect_preliminary(ray) if any_still else _nothing()
         far = dr.select(si.is_valid(), si.t, dr.inf)
@@ -238,15 +238,17 @@ class ModelTracer:
         shape: Array = dr.reinterpret_array(mi.UInt32, si.shape) if any_still else mi.UInt32(0)
         return dr.select(hit.which < movers, hit.which, movers + dr.select(si.is_valid(), shape, 0))
 
-    def _irradiance(self, met: _Met, axis: Array, there: Surroundings, *, shadow_of_headlight: bool) -> list[Array]:
-        """Of a surface by lamps, as spectra of so many bands each."""
+    def _irradiance(
+        self, met: _SurfaceHit, axis: Array, there: Surroundings, *, shadow_of_headlight: bool
+    ) -> list[Array]:
+        """Return the irradiance of surfaces by lamps, as spectra of LANES bands each."""
         start = lighting.clear_of(met.point, met.normal)
         total = [mi.Spectrum(0) for _ in self._bands]
         for k, light in enumerate(self._scene.lights.found):
             towards, far, share = self._scene.lights.towards(k, met.point, axis, there.lights)
             cosine = dr.dot(met.normal, towards)
             shines = met.seen & (cosine > 0) & (share > 0)
-            if light.light >= 0 or shadow_of_headlight:  # an eye's own headlight throws no shadow that it could see
+            if light.light >= 0 or shadow_of_headlight:  # an eye cannot see the shadows of its own headlight
                 shines &= ~self._shadowed(mi.Ray3f(start, towards), far, shines, there)
             arrives = dr.select(shines, cosine * share, 0)
             chunks = np.pad(light.level, (0, -len(light.level) % lighting.LANES)).reshape(-1, lighting.LANES)
@@ -258,8 +260,8 @@ class ModelTracer:
         blocked = self._scene.movers.block(ray, dr.select(active, far, 0), there.movers)
         return blocked | there.still.ray_test(ray, active & ~blocked) if self._any_still else blocked
 
-    def _sent(self, met: _Met, arrives: list[Array], there: Surroundings) -> list[Array]:
-        """Radiance: what is reflected of the light that arrives, and what is emitted."""
+    def _sent(self, met: _SurfaceHit, arrives: list[Array], there: Surroundings) -> list[Array]:
+        """Return the radiance of surfaces: reflected light, and emission."""
         emitted, found = self._emitted(met, there), []
         for band, color, e, own in zip(self._bands, met.colors, arrives, emitted, strict=True):
             met.si.wavelengths = band
@@ -267,8 +269,8 @@ class ModelTracer:
             found.append(own + dr.select(met.seen, reflected, 0))
         return found
 
-    def _emitted(self, met: _Met, there: Surroundings) -> list[Array]:
-        """Radiance of the sky where nothing is met, and of what glows."""
+    def _emitted(self, met: _SurfaceHit, there: Surroundings) -> list[Array]:
+        """Return the radiance of the sky for rays without a hit, and of glowing geoms."""
         found = [mi.Spectrum(0) for _ in self._bands]
         if self._scene.has_sky:
             nothing = met.active & ~met.seen
@@ -285,14 +287,14 @@ class ModelTracer:
 
     @staticmethod
     def _heaven(still: MitsubaObject, direction: Array, active: Array, band: Array) -> Array:
-        """Radiance of the sky."""
+        """Return the radiance of the sky."""
         si = dr.zeros(mi.SurfaceInteraction3f)
         si.wi, si.wavelengths = -direction, band
         return dr.select(active, still.environment().eval(si, active), 0)
 
 
 def _nothing() -> Array:
-    """Where a ray meets nothing."""
+    """Return the interaction of a ray that hits nothing."""
     si: Array = dr.zeros(mi.SurfaceInteraction3f)
     si.t = mi.Float(dr.inf)
     return si

@@ -1,7 +1,7 @@
-"""All that moves in a world, met by rays inside the renderer's kernel: primitives in closed form, meshes by Mitsuba.
+"""Intersections of rays with moving geoms in the renderer's kernel: primitives in closed form, meshes by Mitsuba.
 
-Each mesh is a scene of its own, in the geom's frame, and rays are taken there: nothing is rebuilt when it moves. On a
-GPU each has a kernel of its own.
+Each mesh has its own scene in the geom's frame, and rays are transformed to this frame. Nothing is rebuilt when it
+moves. On a GPU each mesh has its own kernel.
 """
 
 from __future__ import annotations
@@ -25,11 +25,11 @@ from sim.tracing.primitives import PRIMITIVES, Primitive
 from sim.tracing.world_rows import WorldRows
 
 _TYPES = mujoco.mjtGeom
-# Of four floats for each mover: a sphere around its origin; then an axis of its frame in the world and one of its
-# sizes, three times.
+# Rows of four floats for each mover: a sphere around its origin; then, three times, an axis of its frame in the world
+# and one of its sizes.
 ROWS = 4
-MESHES = 32  # at most; on the processor all are scenes in one kernel
-# How far each kind reaches from its origin [m], by half sizes (..., 3).
+MESHES = 32  # largest number of meshes; on a CPU all of them are scenes in one kernel
+# Distance that each kind reaches from its origin [m], from its half sizes (..., 3).
 _REACH: dict[mujoco.mjtGeom, Callable[[np.ndarray], np.ndarray]] = {
     _TYPES.mjGEOM_SPHERE: lambda size: size[..., 0],
     _TYPES.mjGEOM_ELLIPSOID: lambda size: size.max(axis=-1),
@@ -41,7 +41,7 @@ _REACH: dict[mujoco.mjtGeom, Callable[[np.ndarray], np.ndarray]] = {
 
 @dataclass(frozen=True)
 class Hit:
-    """t: distance [m], infinite where nothing is met · which: mover · normal: unit, in the world · uv: of meshes"""
+    """t: distance [m], infinite without a hit · which: mover · normal: unit, in the world · uv: of meshes"""
 
     t: Array
     which: Array
@@ -57,27 +57,27 @@ class _Frame:
     origin: Array
 
     def taken(self, v: Array) -> Array:
-        """A direction in the mover's frame."""
+        """Return a direction of the world in the mover's frame."""
         return mi.Vector3f(*(dr.dot(axis, v) for axis in self.axes))
 
     def given(self, v: Array) -> Array:
-        """The mover's direction in the world."""
+        """Return a direction of the mover's frame in the world."""
         return self.axes[0] * v.x + self.axes[1] * v.y + self.axes[2] * v.z
 
 
 @dataclass(frozen=True)
 class MoverRows(WorldRows):
-    """Of one world: a sphere around all movers, then ROWS for each. ends: see `Movers`"""
+    """Rows of one world: a sphere around all movers, then ROWS for each. ends: see `Movers`"""
 
     ends: Array
 
 
 class Movers:
-    """The geoms of a model that move, primitives first, by kind; where materials are drawn, each of a geom's looks.
+    """The moving geoms of a model, primitives first, by kind. A geom with drawn materials has a mover per appearance.
 
-    looks: of each · geoms: their ids, (mover,) · n_primitives: of them
-    resizable: ids of geoms whose sizes may differ between worlds: those that are primitives only
-    meshes: Mitsuba scenes of the others
+    looks: appearance of each mover · geoms: their ids, (mover,) · n_primitives: number of primitives
+    resizable: ids of geoms whose sizes may differ between worlds: geoms that are always primitives
+    meshes: Mitsuba scenes of the other movers
     ends: number of the first mover of each kind, for the kernel
 
     Raises:
@@ -88,7 +88,7 @@ class Movers:
         self, model: mujoco.MjModel, looks: Sequence[Appearance], meshes: dict[Appearance, MitsubaObject]
     ) -> None:
         if len(meshes) > MESHES:
-            raise ValueError(f"the model has {len(meshes)} moving meshes: must be {MESHES} at most; hide some by group")
+            raise ValueError(f"the model has {len(meshes)} moving meshes: must be at most {MESHES}; hide some by group")
         closed = [look for look in looks if look not in meshes]
         by_kind = {name: [each for each in closed if kind_of(each.model, each.geom) == name] for name in PRIMITIVES}
         primitives = [look for group in by_kind.values() for look in group]
@@ -100,7 +100,7 @@ class Movers:
         self.meshes = list(meshes.values())
         self._sizes = model.geom_size[self.geoms].copy()
         self._types = model.geom_type[self.geoms]
-        # Of meshes from their origins [m]; a plane that is seen by itself has no end.
+        # Reach of meshes from their origins [m]; a plane is infinite.
         self._mesh_reach = np.where(self._types == _TYPES.mjGEOM_PLANE, np.inf, model.geom_rbound[self.geoms])
         self._known: tuple[bytes, np.ndarray, np.ndarray] | None = None  # extents of the last poses
         self._ends = np.cumsum([0, *(len(group) for group in by_kind.values())])
@@ -111,16 +111,16 @@ class Movers:
 
     @property
     def apart(self) -> bool:
-        """Whether each mesh is met in a kernel by itself, which no branch can hold: see `computed`."""
+        """True if each mesh is intersected in its own kernel, which no branch can contain: see `computed`."""
         return bool(self.meshes) and on_gpu()
 
     @property
     def n_rows(self) -> int:
-        """Of four floats each, in one world."""
+        """Number of rows of four floats in one world."""
         return 1 + ROWS * len(self)
 
     def rows(self, poses: Poses) -> np.ndarray:
-        """What the kernel reads of a world: a sphere around all movers, then each, (world, 4 n_rows) float32."""
+        """Return the rows of the kernel: a sphere around all movers, then each mover, (world, 4 n_rows) float32."""
         rows = np.zeros((poses.n, self.n_rows, 4), np.float32)
         if len(self):
             places, (sizes, reach) = poses.geom_places(self.geoms), self._extents(poses)
@@ -134,11 +134,11 @@ class Movers:
             each[:, :, 1:, :3] = np.swapaxes(poses.geom_turns(self.geoms), -1, -2)
             each[:, :, 1:, 3] = sizes
             if absent is not None:
-                each[:, :, 0, :3] += np.where(absent, np.nan, 0)[..., None]  # nowhere: no comparison holds
+                each[:, :, 0, :3] += np.where(absent, np.nan, 0)[..., None]  # NaN: rays miss it
         return rows.reshape(poses.n, -1)
 
     def _absent(self, poses: Poses) -> np.ndarray | None:
-        """Which looks a world has not, (world or 1, mover); None: it has all."""
+        """Return which appearances a world lacks, (world or 1, mover); None if it has all."""
         if not self._drawn.any():
             return None
         here = self._as_built if poses.geom_matid is None else poses.geom_matid
@@ -146,8 +146,8 @@ class Movers:
         return absent
 
     def _extents(self, poses: Poses) -> tuple[np.ndarray, np.ndarray]:
-        """Half sizes (world or 1, mover, 3), of spheres three times the radius, and how far each reaches from its
-        origin, (world or 1, mover) [m]."""
+        """Return half sizes (world or 1, mover, 3), for spheres three times the radius, and how far each mover reaches
+        from its origin, (world or 1, mover) [m]."""
         if poses.geom_size is None:
             sizes = self._sizes[None].copy()
         else:
@@ -168,7 +168,7 @@ class Movers:
         return sizes, reach
 
     def nearest(self, ray: Array, farthest: Array, there: MoverRows) -> Hit:
-        """The one that a ray meets first, nearer than `farthest`."""
+        """Return the first hit of a ray that is nearer than `farthest`."""
         none = farthest, mi.UInt32(len(self)), mi.Vector3f(0, 0, 1), mi.Point2f(0)
         if not len(self):
             return Hit(*none)
@@ -180,7 +180,7 @@ class Movers:
         return Hit(*found)
 
     def block(self, ray: Array, farthest: Array, there: MoverRows) -> Array:
-        """Whether any lies on a ray, nearer than `farthest`."""
+        """Return whether any mover lies on a ray, nearer than `farthest`."""
         if self.apart:
             computed(ray, farthest, there.fours, there.first)
             return self._block(ray, farthest, there)
@@ -232,15 +232,15 @@ class Movers:
         return blocked
 
     def _is_there(self, k: int, frame: _Frame) -> Array | bool:
-        """Whether a world has mover k: what Embree and OptiX make of rays from nowhere is not defined."""
+        """Return whether a world has mover k. Embree's and OptiX's results for rays with NaN origins are undefined."""
         return ~dr.isnan(frame.origin.x) if self._drawn[k] else True
 
     def _kinds(self) -> list[tuple[int, Primitive]]:
-        """Those that there are, by number."""
+        """Return the kinds of primitives that occur, with their numbers."""
         return [(i, p) for i, p in enumerate(PRIMITIVES.values()) if self._ends[i] < self._ends[i + 1]]
 
     def _normals(self, point: Array, which: Array, there: MoverRows) -> Array:
-        """Of primitives, at points on them."""
+        """Return the normals of primitives at points on them."""
         k = dr.minimum(which, max(self.n_primitives - 1, 0))
         frame, size = _frame(there, k)
         local = frame.taken(point - frame.origin)
@@ -252,7 +252,7 @@ class Movers:
 
 
 def _met(hit: Callable[..., Array], ray: Array, there: MoverRows, k: Array) -> Array:
-    """Where a ray meets mover k [m]. Most rays miss the sphere around it, and their neighbours do, too."""
+    """Return the distance to mover k along a ray [m]. Most rays and their neighbours miss the sphere around it."""
 
     def within() -> Array:
         frame, size = _frame(there, k)
@@ -263,23 +263,23 @@ def _met(hit: Callable[..., Array], ray: Array, there: MoverRows, k: Array) -> A
 
 
 def _frame(there: MoverRows, k: Array) -> tuple[_Frame, Array]:
-    """Of a mover, and its half sizes."""
+    """Return the frame of a mover, and its half sizes."""
     fours = [list(there.four(1 + k * ROWS + i)) for i in range(1, ROWS)]
     a, b, c = (mi.Vector3f(*four[:3]) for four in fours)
     return _Frame((a, b, c), there.point(1 + k * ROWS)), mi.Vector3f(*(four[3] for four in fours))
 
 
 def _may_meet(ray: Array, there: MoverRows, row: Array | int) -> Array:
-    """Whether a ray meets the sphere of this row."""
+    """Return whether a ray hits the sphere of this row."""
     x, y, z, radius = there.four(row)
     way, square = mi.Vector3f(x, y, z) - ray.o, radius * radius
     along = dr.dot(way, ray.d)
-    aside = way - along * ray.d  # a difference of squares would lose what is small and far away
+    aside = way - along * ray.d  # a difference of squares would lose small, distant spheres
     return (dr.squared_norm(way) < square) | ((along > 0) & (dr.squared_norm(aside) < square))
 
 
 def _loop(kind: int, there: MoverRows, step: Callable[..., Any], *state: Array) -> tuple[Array, ...]:
-    """A step for each mover of a kind."""
+    """Run a step for each mover of a kind."""
     end = dr.gather(mi.UInt32, there.ends, kind + 1)
     start = dr.gather(mi.UInt32, there.ends, kind)
     found: tuple[Array, ...] = dr.while_loop((start, *state), lambda k, *_: k < end, step, label="movers")

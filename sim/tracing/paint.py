@@ -1,8 +1,8 @@
-"""Colours that differ from world to world, as reflectances in the eye's bands, for the kernel.
+"""Colours that differ between worlds, as reflectances in the eye's bands, for the kernel.
 
-What is painted is built white, texture and all, and the kernel multiplies it by its world's colour: MuJoCo, too, has a
-colour multiply a texture. Spectra of colours are Mitsuba's (Jakob and Hanika 2019), as everywhere. What glows, glows in
-its world's colour, too, by the spectrum that `sim.scene.lights.emission` has for it.
+Painted geoms are built white, including their textures, and the kernel multiplies them by their world's colour. In
+MuJoCo, a colour multiplies a texture, too. Spectra of colours are Mitsuba's (Jakob and Hanika 2019), as in all scenes.
+Glowing geoms glow in their world's colour, with the spectrum of `sim.scene.lights.emission`.
 """
 
 from __future__ import annotations
@@ -25,16 +25,16 @@ from sim.tracing.world_rows import WorldRows
 
 @dataclass(frozen=True)
 class PaintRows(WorldRows):
-    """Of one world. painted: see `Paint`"""
+    """Rows of one world. painted: see `Paint`"""
 
     painted: Array
 
 
 class Paint:
-    """Of some geoms, in the order of `geoms`; needs the variant in force.
+    """Colours of some geoms, in the order of `geoms`; needs the scene's Mitsuba variant to be set.
 
     movers: ids of all movers · glow: whether any of the geoms glows
-    painted: number of each mover among them, for the kernel
+    painted: number of each mover among the geoms, for the kernel
     """
 
     def __init__(
@@ -54,11 +54,11 @@ class Paint:
 
     @property
     def n_rows(self) -> int:
-        """Of four floats each, in one world; never none."""
+        """Number of rows of four floats in one world, at least 1."""
         return max(len(self) * len(self._spectra) * (1 + self.glow), 1)
 
     def rows(self, poses: Poses) -> np.ndarray:
-        """Reflectances, (world, 4 n_rows) float32; then, if any glow, what their glow is multiplied by."""
+        """Return reflectances, (world, 4 n_rows) float32, followed by the factors of the glow if any geom glows."""
         rows = np.zeros((poses.n, self.n_rows * lighting.LANES), np.float32)
         if not len(self):
             return rows
@@ -70,15 +70,15 @@ class Paint:
         return rows
 
     def _colors(self, poses: Poses) -> np.ndarray:
-        """(world or 1, geom, 3) sRGB: a world's own or, where it has none, the material's, as MuJoCo has it."""
+        """Return sRGB colours, (world or 1, geom, 3): a world's own or, by default, the material's, as in MuJoCo."""
         if poses.geom_rgba is None:
             return self._own[None]
         here = poses.geom_rgba[:, self.geoms]
         unset = (here == surfaces.UNSET_RGBA).all(axis=-1, keepdims=True) & self._of_material
         return np.where(unset, self._own, here[..., :3])
 
-    def of(self, which: Array, there: PaintRows, seen: Array, *, glow: bool = False) -> list[Array]:
-        """What a mover's reflectances are multiplied by, or its glow, as spectra."""
+    def factors(self, which: Array, there: PaintRows, seen: Array, *, glow: bool = False) -> list[Array]:
+        """Return the factors of a mover's reflectances, or of its glow, as spectra."""
         k = dr.gather(mi.UInt32, there.painted, which, seen)
         painted = seen & (k < len(self))
         start = len(self) * len(self._spectra) if glow else 0
@@ -89,7 +89,7 @@ class Paint:
         return found
 
     def _spectrum(self, rgb: tuple[float, ...], emitted: bool) -> np.ndarray:
-        """Of a display-referred colour, (band,): a reflectance, or, as emitters have it, its hue's times its level."""
+        """Return the reflectance (band,) of a display-referred colour or, as in emitters, its hue's times its level."""
         if (rgb, emitted) not in self._known:
             if len(self._known) > 10_000:
                 self._known.clear()

@@ -1,8 +1,8 @@
-"""Rays that meet MuJoCo's primitives, in the geom's own frame, from outside.
+"""Intersections of rays with MuJoCo's primitives, in the geom's own frame, from outside.
 
-Faces are seen from outside alone: as MuJoCo draws a body, an eye within it looks out. Distances count in lengths of the
-ray's direction; infinite where it misses. In float32, roots are found around the point where the ray passes nearest, so
-that what is small or far away is met where it is.
+Only the outer sides of faces are visible. As in MuJoCo's rendering, an eye inside a body looks out of it. Distances are
+multiples of the direction's length, and infinite for a miss. Roots are computed relative to the point where the ray
+passes nearest, so that hits of small or distant geoms are accurate in float32.
 """
 
 from __future__ import annotations
@@ -16,19 +16,19 @@ import mitsuba as mi
 from optics.numerics.autodiff import Array
 
 TINY = 1e-20
-PARALLEL = 1e-9  # of a unit direction's parts: rays this level meet no end of what is upright
+PARALLEL = 1e-9  # component of a unit direction across a surface below which a ray is parallel to it and misses it
 
 
 @dataclass(frozen=True)
 class Primitive:
-    """hit(origin, direction, size): distance · normal(point, size): outwards, as long as it comes; size: MuJoCo's"""
+    """hit(origin, direction, size): distance · normal(point, size): outwards, not normalised; size: MuJoCo's"""
 
     hit: Callable[[Array, Array, Array], Array]
     normal: Callable[[Array, Array], Array]
 
 
 def _into_ball(o: Array, d: Array) -> Array:
-    """Where a ray enters the unit ball."""
+    """Return the distance at which a ray enters the unit ball."""
     square = dr.squared_norm(d)
     nearest = -dr.dot(o, d) / square
     p = dr.fma(d, nearest, o)
@@ -46,7 +46,7 @@ def _ellipsoid_normal(p: Array, size: Array) -> Array:
 
 
 def _into_side(o: Array, d: Array, radius: Array) -> Array:
-    """Where a ray enters the endless cylinder around z; infinite where it runs along it."""
+    """Return the distance at which a ray enters the infinite cylinder around z; infinite for a ray along z."""
     square = dr.maximum(d.x * d.x + d.y * d.y, TINY)
     nearest = -(o.x * d.x + o.y * d.y) / square
     x, y = dr.fma(d.x, nearest, o.x), dr.fma(d.y, nearest, o.y)
@@ -106,7 +106,7 @@ def _box_normal(p: Array, size: Array) -> Array:
     return mi.Vector3f(dr.select(x, q.x, 0), dr.select(y, q.y, 0), dr.select(x | y, 0, q.z))
 
 
-# By name, in the order in which movers of these kinds stand; spheres are ellipsoids.
+# Primitives by name, in the order of movers of these kinds; spheres are ellipsoids.
 PRIMITIVES = {
     "ellipsoid": Primitive(_ellipsoid_hit, _ellipsoid_normal),
     "capsule": Primitive(_capsule_hit, _capsule_normal),

@@ -1,7 +1,7 @@
 """Reflectances of all materials in one table, baked from Mitsuba's own BSDFs.
 
-Every texel is evaluated by Mitsuba at the bands' wavelengths; between texels the table is interpolated bilinearly and
-repeated, as Mitsuba's `bitmap` does it. A texture that does not change along an axis is one texel wide there.
+Mitsuba evaluates every texel at the bands' wavelengths. Between texels the table is interpolated bilinearly and
+repeated, like Mitsuba's `bitmap`. A texture that is constant along an axis has a single texel along it.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from sim.tracing import lighting
 
 @dataclass(frozen=True)
 class Atlas:
-    """texels: reflectance, (texel, band), all textures one after the other, row by row
+    """texels: reflectance, (texel, band), of all textures in sequence, row by row
     places: per texture: first texel, columns, rows, (texture, 3)
     to_texels: per texture: (column, row) = to_texels @ (u, v, 1), (texture, 2, 3); texel centres at whole numbers
     """
@@ -32,12 +32,12 @@ class Atlas:
 
     @property
     def one_dimensional(self) -> bool:
-        """Whether no texture has more than one row."""
+        """True if no texture has more than one row."""
         return bool((self.places[:, 2] == 1).all())
 
 
 def bake(model: mujoco.MjModel, geoms: Sequence[int], bsdfs: Sequence[MitsubaObject], wavelengths: np.ndarray) -> Atlas:
-    """The atlas of these geoms' BSDFs at wavelengths [m]: one texture per geom; geoms of one BSDF share its texels."""
+    """Return the atlas of these geoms' BSDFs at wavelengths [m]: a texture per geom; geoms of one BSDF share texels."""
     texels: list[np.ndarray] = []
     places: dict[int, tuple[tuple[int, int, int], np.ndarray]] = {}
     for geom, bsdf in zip(geoms, bsdfs, strict=True):
@@ -54,7 +54,7 @@ def bake(model: mujoco.MjModel, geoms: Sequence[int], bsdfs: Sequence[MitsubaObj
 def _bake_one(
     model: mujoco.MjModel, geom: int, bsdf: MitsubaObject, wavelengths: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Reflectance (row, column, band), and the way there from Mitsuba's (u, v) of the geom, (2, 3)."""
+    """Return the reflectance (row, column, band), and the map from Mitsuba's (u, v) of the geom to texels, (2, 3)."""
     width, height = 1, 1
     if shapes.is_textured(model, geom):
         height, width = surfaces.image(model, surfaces.texture_id(model, geom)).shape[:2]
@@ -76,7 +76,7 @@ def _constant(table: np.ndarray, axis: int) -> bool:
 
 
 def _reflectance(bsdf: MitsubaObject, uv: np.ndarray, wavelengths: np.ndarray) -> np.ndarray:
-    """What Mitsuba says, (point, band)."""
+    """Return Mitsuba's reflectance at texture coordinates (2, point), (point, band)."""
     si = dr.zeros(mi.SurfaceInteraction3f, uv.shape[1])
     si.uv = mi.Point2f(*(mi.Float(np.ascontiguousarray(c, np.float32)) for c in uv))
     si.wi = mi.Vector3f(0, 0, 1)

@@ -1,9 +1,9 @@
-"""Spheres that move, intersected in closed form inside the renderer's kernel.
+"""Intersections of rays with moving spheres, in closed form inside the renderer's kernel.
 
-Moving a shape of a Mitsuba scene rebuilds its acceleration structure; a few spheres per world are cheaper solved
-by hand. Their texture coordinates are Mitsuba's and MuJoCo's for a sphere: u = azimuth / 2π, v = polar angle / π
-from +z, both in the sphere's own frame. These serve scenes in closed form, and an eye may be inside one;
-`primitives` has the shapes of all other models, which are met from outside alone.
+Moving a shape of a Mitsuba scene rebuilds its acceleration structure. For a few spheres per world, closed forms are
+cheaper. Texture coordinates are Mitsuba's and MuJoCo's for a sphere: u = azimuth / 2π, v = polar angle / π from +z,
+both in the sphere's own frame. This module serves scenes in closed form, and an eye may be inside a sphere. The module
+`primitives` has the shapes of all other models, which are hit only from outside.
 """
 
 from __future__ import annotations
@@ -19,18 +19,18 @@ from sim.scene.device_arrays import SharedBuffer, three
 from sim.scene.poses import Poses
 from sim.scene.variant import MitsubaObject
 
-TURNED = 1e-6  # of rotations: what is no rounding
+TURNED = 1e-6  # smallest change of a rotation that is not a rounding error
 
 
 @dataclass(frozen=True)
 class Spheres:
-    """The movers of one world, alike in all worlds but for their positions.
+    """The moving spheres of a scene; only their positions differ between worlds.
 
     radii: [m], (k,)
     frames: rotation from the sphere's frame to the world's, (k, 3, 3)
     textured: which have a texture, (k,)
     names: of the geoms
-    bsdfs: one Mitsuba BSDF each; kept here, since a BSDFPtr does not keep its objects alive
+    bsdfs: one Mitsuba BSDF each; stored here, because a BSDFPtr does not keep its objects alive
     geoms: ids of the geoms, (k,)
     """
 
@@ -46,7 +46,7 @@ class Spheres:
 
 
 class SphereRows:
-    """Where the centres of spheres in a number of worlds are put, in fours, for kernels to read."""
+    """Buffer for the centres of spheres in `n_envs` worlds, in rows of four floats, which kernels read."""
 
     def __init__(self, spheres: Spheres, n_envs: int) -> None:
         self._spheres = spheres
@@ -57,7 +57,7 @@ class SphereRows:
         self._frames, self._names = spheres.frames[textured], [spheres.names[k] for k in textured]
 
     def fill(self, poses: Poses) -> None:
-        """With these worlds'.
+        """Write the centres of these worlds.
 
         Raises:
             ValueError: a sphere with a texture has turned.
@@ -67,30 +67,30 @@ class SphereRows:
         if self._textured and (off := np.abs(poses.geom_turns(self._textured) - self._frames)).max() > TURNED:
             name = self._names[int(off.max(axis=(0, 2, 3)).argmax())]
             raise ValueError(
-                f"geom {name!r} has a texture and has turned: closed forms keep it as the model has it: must be seen "
-                "with tracer = 'mitsuba'"
+                f"geom {name!r} has a texture and has turned; closed forms do not turn textures: must be rendered with "
+                "tracer = 'mitsuba'"
             )
 
     def arrays(self) -> Array:
-        """On the device."""
+        """Return the centres as an array on the device."""
         return self._shared.array
 
 
 def centres_in(rows: Array, n: int, world: Array) -> list[Array]:
-    """Centres of n spheres in a lane's world."""
+    """Return the centres of n spheres in a lane's world."""
     first = world * n
     return [mi.Point3f(three(rows, first + k)) for k in range(n)]
 
 
 def nearest(spheres: Spheres, centres: list[Array], ray: Array, t: Array) -> tuple[Array, Array]:
-    """Distance [m] to the nearest of `t` and the spheres along the ray, and which sphere that is; none: len(spheres).
-    With fewer centres than spheres, the last ones are not there."""
+    """Return the distance [m] to the nearest of `t` and the spheres along the ray, and the number of that sphere,
+    len(spheres) for none. With fewer centres than spheres, the last spheres are left out."""
     which = mi.UInt32(len(spheres))
     for k, centre in enumerate(centres):
         b, c = _quadratic(ray, centre, float(spheres.radii[k]))
         discriminant = b * b - c
         root = dr.sqrt(dr.maximum(discriminant, 0))
-        # From inside (c < 0) the far side is what one sees.
+        # From inside (c < 0) the far side is visible.
         t_k = dr.select(c < 0, root - b, -b - root)
         hit = (discriminant > 0) & (t_k > 0) & (t_k < t)
         t = dr.select(hit, t_k, t)
@@ -99,7 +99,7 @@ def nearest(spheres: Spheres, centres: list[Array], ray: Array, t: Array) -> tup
 
 
 def blocks(radii: list[float], centres: list[Array], ray: Array) -> Array:
-    """Whether any sphere lies on the ray ahead of its origin."""
+    """Return whether any sphere lies on the ray ahead of its origin."""
     blocked = mi.Bool(False)
     for radius, centre in zip(radii, centres, strict=True):
         b, c = _quadratic(ray, centre, radius)
@@ -108,7 +108,7 @@ def blocks(radii: list[float], centres: list[Array], ray: Array) -> Array:
 
 
 def normal_and_uv(spheres: Spheres, centres: list[Array], which: Array, point: Array) -> tuple[Array, Array]:
-    """Outward normal in the world's frame and texture coordinates at a point on sphere `which`."""
+    """Return the outward normal in the world's frame and the texture coordinates at a point on sphere `which`."""
     centre, local = mi.Point3f(0), mi.Vector3f(0)
     for k, other in enumerate(centres):
         centre = dr.select(which == k, other, centre)
@@ -122,6 +122,6 @@ def normal_and_uv(spheres: Spheres, centres: list[Array], which: Array, point: A
 
 
 def _quadratic(ray: Array, centre: Array, radius: float) -> tuple[Array, Array]:
-    """Half the linear and the constant coefficient of |o + t d - centre|² = radius² (the ray's d is a unit vector)."""
+    """Return half the linear and the constant coefficient of |o + t d - centre|² = radius² (|d| = 1)."""
     from_centre = ray.o - centre
     return dr.dot(from_centre, ray.d), dr.squared_norm(from_centre) - radius * radius

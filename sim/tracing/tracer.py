@@ -1,4 +1,4 @@
-"""What a kernel asks of a way of tracing rays, and which of them a scene gets."""
+"""The protocol of tracers that kernels use, and the choice of one for a scene."""
 
 from __future__ import annotations
 
@@ -24,18 +24,20 @@ TRACERS = ("auto", ClosedForm.name, ModelTracer.name)
 
 
 class Buffers(Protocol):
-    """Where kernels read what differs between worlds."""
+    """Buffers of everything that differs between worlds, which kernels read."""
 
     def fill(self, poses: Poses) -> None:
-        """With these worlds'."""
+        """Write the rows of these worlds."""
 
     def arrays(self) -> Any:
-        """On the device."""
+        """Return the rows as arrays on the device."""
 
 
 class Tracer(Protocol):
-    """name: of the way of tracing, one of TRACERS · why it was taken
-    light: what of it is followed, one of `lighting.LEVELS`
+    """A method of tracing rays.
+
+    name: one of TRACERS · why: reason for its choice
+    light: the part of the light that is followed, one of `lighting.LEVELS`
     basis: (component, band): radiance_b = sum_k basis[k, b] component_k
     """
 
@@ -46,31 +48,33 @@ class Tracer(Protocol):
 
     @property
     def scene(self) -> Any:
-        """Mitsuba's scenes, which the kernel wants as an argument of its own; None: there are none."""
+        """Mitsuba's scenes, which are a separate argument of the kernel; None if there are none."""
 
     @property
     def inputs(self) -> Any:
         """Arrays that the kernel reads."""
 
     def buffers(self, n_envs: int) -> Buffers:
-        """For so many worlds."""
+        """Return buffers for the rows of `n_envs` worlds."""
 
     def around(self, scenes: Any, rows: Any, inputs: Any, world: Array) -> Any:
-        """What a lane in this world reads of the three."""
+        """Return the surroundings of a lane in this world, taken from the three."""
 
     def radiance(self, seen: EyeRay, there: Any, samples: Array) -> tuple[list[Array], Array]:
-        """What comes along each ray, one array per component, and from how far [m]; samples: each ray's own, four on
-        the unit interval, wanted for light that bounces (`lighting.onwards`)."""
+        """Return the light along each ray, one array per component, and the distance to its source [m].
+
+        samples: four numbers on the unit interval for each ray, for light that bounces (`lighting.spawn_bounce_ray`)
+        """
 
 
 class Tracers:
-    """The tracers of a scene, one for every level of light.
+    """The tracers of a scene, one for each part of the light.
 
-    name: one of TRACERS; "auto": in closed form, where there is one
-    stand: the body on which the eyes are; None: whichever that is
+    name: one of TRACERS; "auto": the closed form if the scene has one, otherwise Mitsuba
+    stand: the body that the eyes are fixed to; None: derived from their mounts
 
     Raises:
-        ValueError: an unknown name, and "closed_form" where the scene has none.
+        ValueError: an unknown name, or "closed_form" for a scene without a closed form.
     """
 
     def __init__(
@@ -81,11 +85,11 @@ class Tracers:
         self._scene, self._name, self._places, self._stand = scene, name, places, stand
         self._known: dict[str, Tracer] = {}
         self._areas: dict[str, AreaTracer] = {}
-        self.of(lighting.DIRECT)
+        self.tracer_for(lighting.DIRECT)
 
     @cached_property
     def upright(self) -> UprightScene | NoClosedForm:
-        """The closed form of the scene, or why there is none."""
+        """The closed form of the scene, or the reason why there is none."""
         try:
             return upright_scene(self._scene, self._places.stand() if self._stand is None else self._stand)
         except NoClosedForm as reason:
@@ -95,11 +99,11 @@ class Tracers:
 
     @property
     def is_upright(self) -> bool:
-        """Whether rays are traced in closed form."""
-        return self.of(lighting.DIRECT).name == ClosedForm.name
+        """True if rays are traced in closed form."""
+        return self.tracer_for(lighting.DIRECT).name == ClosedForm.name
 
-    def of(self, light: str) -> Tracer:
-        """The one that follows this much of the light.
+    def tracer_for(self, light: str) -> Tracer:
+        """Return the tracer that follows this part of the light.
 
         Raises:
             ValueError: there is none.
@@ -111,7 +115,7 @@ class Tracers:
 
     def _made(self, light: str) -> Tracer:
         if light == lighting.ALL:
-            raise ValueError("light = 'all': rays follow light that is reflected twice at most, see samples = 'areas'")
+            raise ValueError("light = 'all': rays follow at most two reflections, see samples = 'areas'")
         if self._name == ModelTracer.name:
             return ModelTracer(self._scene, light)
         try:
@@ -127,10 +131,10 @@ class Tracers:
         return ClosedForm(self.upright, self._scene.wavelengths, light)
 
     def areas(self, light: str) -> AreaTracer:
-        """The one that sees by areas.
+        """Return the tracer that uses area sampling.
 
         Raises:
-            ValueError: a world that cannot be seen so, and a tracer that was asked for and has no areas.
+            ValueError: a world without closed forms for areas, or a tracer that was requested and has no areas.
         """
         if self._name == ModelTracer.name:
             raise ValueError(f"samples = 'areas': tracer = {self._name!r} traces rays only")

@@ -1,6 +1,6 @@
-"""A model as upright walls, a floor and spheres that move, seen by eyes that stay level: if that is what it is.
+"""A model as upright walls, a floor and moving spheres, seen by eyes that stay level, if it has this form.
 
-Reasons why a model is something else are one line each, and name the thing.
+If a model has another form, the reason is one line that names the geom, light or body.
 """
 
 from __future__ import annotations
@@ -22,17 +22,20 @@ from sim.tracing.spheres import Spheres
 from sim.tracing.walls import ALIGNED, NoClosedForm, Walls, walls_of
 
 _SPHERE = mujoco.mjtGeom.mjGEOM_SPHERE
-_KEEP_THEIR_WAY = (int(mujoco.mjtCamLight.mjCAMLIGHT_FIXED), int(mujoco.mjtCamLight.mjCAMLIGHT_TRACK))  # of lights
+# Modes of lights that do not change their direction.
+_KEEP_THEIR_WAY = (int(mujoco.mjtCamLight.mjCAMLIGHT_FIXED), int(mujoco.mjtCamLight.mjCAMLIGHT_TRACK))
 
 
 @dataclass(frozen=True)
 class UprightScene:
-    """stand: of the eyes · walls: and the floor · lights: all of them
-    spheres: that eyes see · bodies: the same, and last, where there is one, the sphere of the eyes' own body, which
-        they do not see
-    heights: of all bodies' centres [m], (body,); they are those of the reference pose · settled: which of them keep
-        theirs, (body,)
-    model · variant: of Mitsuba · bsdfs: of each geom, by id; those of geoms that look alike are one object
+    """A model in closed form.
+
+    stand: the body that the eyes are fixed to · walls: with the floor · lights: all lights
+    spheres: all visible spheres · bodies: the same, followed by the eyes' own body, which they do not see, if it is a
+        sphere
+    heights: of all bodies' centres in the reference pose [m], (body,)
+    settled: whether each body keeps this height, (body,)
+    model · variant: of Mitsuba · bsdfs: of each geom, by id; geoms that look alike share one object
     """
 
     model: mujoco.MjModel
@@ -48,15 +51,15 @@ class UprightScene:
 
     @property
     def has_own(self) -> bool:
-        """Whether the eyes' body is a sphere."""
+        """True if the eyes' body is a sphere."""
         return len(self.bodies) > len(self.spheres)
 
 
 def upright_scene(scene: ModelScene, stand: LevelStand) -> UprightScene:
-    """A model's.
+    """Return the closed form of a model.
 
     Raises:
-        NoClosedForm: it is none.
+        NoClosedForm: it has none.
     """
     _refuse_what_shines(scene)
     model = scene.model
@@ -105,7 +108,7 @@ def _refuse_what_shines(scene: ModelScene) -> None:
 
 
 def _checked(model: mujoco.MjModel, light: ModelLight) -> DirectionalLight:
-    """A light that is directional, stays where it is and shines from above."""
+    """Return a light that is directional, fixed, and shines from above; refuse all others."""
     if light.light < 0:
         raise NoClosedForm("the headlight moves with each eye")
     name = repr(model.light(light.light).name or str(light.light))
@@ -123,7 +126,7 @@ def _checked(model: mujoco.MjModel, light: ModelLight) -> DirectionalLight:
 def _refuse_what_eyes_would_see(
     model: mujoco.MjModel, data: mujoco.MjData, stand: LevelStand, own: Sequence[int]
 ) -> None:
-    """Of their own body, which has to be one sphere, with eyes on its skin that look straight out."""
+    """Refuse eyes that would see their own body. It must be a sphere, with eyes on its skin that look straight out."""
     if not own:
         return
     name = model.body(stand.body).name
@@ -141,7 +144,7 @@ def _refuse_what_eyes_would_see(
 
 
 def _alike(scene: ModelScene) -> dict[int, MitsubaObject]:
-    """BSDFs by geom; one object for geoms that look alike."""
+    """Return BSDFs by geom; geoms that look alike share one object."""
     first: dict[tuple[object, ...], Appearance] = {}
     found = {}
     for look in scene.looks:
@@ -174,7 +177,7 @@ def _spheres(data: mujoco.MjData, geoms: Sequence[int], bsdfs_of: dict[int, Mits
 
 
 def _keeps_height(model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> bool:
-    """Whether no joint changes the height of a sphere. Mocap bodies are taken to keep theirs."""
+    """Return whether no joint changes the height of a sphere. Mocap bodies are assumed to keep their height."""
     body = int(model.geom_bodyid[geom])
     while body > 0:
         first = model.body_jntadr[body]

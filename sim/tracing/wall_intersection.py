@@ -1,4 +1,4 @@
-"""Where rays meet upright walls: each wall solved (few of them), or the cells that they fill walked through (many)."""
+"""Intersections of rays with upright walls: a few are solved one by one, many are found by a walk through a grid."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from optics.numerics.autodiff import Array
 from sim.scene.device_arrays import floats
 from sim.tracing.walls import ALIGNED, SIDES, NoClosedForm, Walls
 
-FEW = 8  # walls that are solved one by one; a walk through a grid costs about as much
-CELLS = 1_000_000  # of a grid, at most
-NEVER_ZERO = 1e-9  # components of directions below this are this: no wall is hit beside its end by that
+FEW = 8  # largest number of walls that are solved one by one; a walk through a grid costs about the same
+CELLS = 1_000_000  # largest number of cells in a grid
+NEVER_ZERO = 1e-9  # smallest component of a direction; smaller ones are replaced, which shifts no hit off a wall's end
 
 
 @dataclass(frozen=True)
 class CellTables:
-    """Of a grid's cells, row by row. wall: which one fills it · top: of that wall [m] · stop: height below which a ray
-    ends there [m]"""
+    """The cells of a grid, row by row. wall: number of the wall that fills it · top: of that wall [m] · stop: height
+    below which a ray ends there [m]"""
 
     wall: Array
     top: Array
@@ -30,20 +30,20 @@ class CellTables:
 
 
 class Footprints(Protocol):
-    """how: in words · tables: what the kernel reads; None: nothing."""
+    """A method of intersecting rays with walls. how: description · tables: arrays that the kernel reads, if any."""
 
     how: str
     tables: CellTables | None
 
     def hit(self, ray: Array, cells: CellTables | None) -> tuple[Array, Array, Array]:
-        """Distance [m] to the nearest wall (inf: none; 0: inside one), its face, and the face's normal."""
+        """Return the distance [m] to the nearest wall (inf: none; 0: inside one), its face, and the face's normal."""
 
     def blocks(self, start: Array, direction: np.ndarray, cells: CellTables | None) -> Array:
-        """Whether a wall stands between a point outside all walls and a light in this direction, upwards."""
+        """Return whether a wall stands between a point outside all walls and a light in this upward direction."""
 
 
 def footprints_of(walls: Walls) -> Footprints:
-    """The cheaper way for these walls.
+    """Return the cheaper method for these walls.
 
     Raises:
         NoClosedForm: many walls that do not fit a grid.
@@ -52,7 +52,7 @@ def footprints_of(walls: Walls) -> Footprints:
 
 
 class EachWall:
-    """Every wall's slab test, unrolled."""
+    """A slab test of every wall, unrolled."""
 
     def __init__(self, walls: Walls) -> None:
         self._walls = walls
@@ -94,7 +94,7 @@ class EachWall:
 
 
 class Cells:
-    """A grid whose cells are filled by one wall each, or empty. Around it lie cells in which rays end."""
+    """A walk through a grid of cells that are empty or filled by one wall. Rays end in a ring of cells around it."""
 
     def __init__(self, walls: Walls) -> None:
         self._side, origin, cells = cells_of(walls)
@@ -108,7 +108,7 @@ class Cells:
         tops = np.where(filled, walls.top[np.maximum(padded, 0)], -np.inf)
         edge = np.ones_like(filled)
         edge[1:-1, 1:-1] = False
-        # A ray stops where it leaves the grid, without having hit.
+        # A ray that leaves the grid stops without a hit.
         tables = np.maximum(padded, 0), tops, np.where(edge, np.inf, tops)
         self.tables: CellTables | None = CellTables(*(floats(table) for table in tables))
 
@@ -145,7 +145,7 @@ class Cells:
         return _finished(dr.select(hit, t, math.inf), face, through_x, dx, dy)
 
     def blocks(self, start: Array, direction: np.ndarray, cells: CellTables | None) -> Array:
-        """See Footprints. A shadow ray has left the walls behind after so few cells that the walk is unrolled."""
+        """See Footprints. A shadow ray rises above all walls after a few cells, so the walk is unrolled."""
         assert cells is not None
         dx, dy, dz = map(float, direction)
         x, y = self._place(start)
@@ -167,7 +167,7 @@ class Cells:
         return blocked
 
     def _crossings(self, direction: np.ndarray) -> int:
-        """Cell borders that a ray from the floor crosses, at most, until it is above all walls."""
+        """Return the largest number of cell borders that a ray from the floor crosses until it is above all walls."""
         reach = self._climb * np.abs(direction[:2]) / direction[2] / self._side
         return int(np.ceil(reach).sum())
 
@@ -175,13 +175,13 @@ class Cells:
         return (column >= 0) & (column < self._columns) & (row >= 0) & (row < self._rows)
 
     def _place(self, point: Array) -> tuple[Array, Array]:
-        """Coordinates in cells."""
+        """Return the coordinates of a point in cells."""
         return tuple((point[i] - float(self._corner[i])) * (1 / self._side) for i in range(2))
 
 
 def cells_of(walls: Walls) -> tuple[float, np.ndarray, np.ndarray]:
-    """The walls on the coarsest grid: side of its cells [m], its lower corner (2,), and which wall fills each cell
-    (row, column), -1 for none.
+    """Return the coarsest grid on which the walls lie: side of its cells [m], its lower corner (2,), and the number of
+    the wall that fills each cell (row, column), -1 for none.
 
     Raises:
         NoClosedForm: walls that lie on no grid, or overlap.
@@ -197,7 +197,7 @@ def cells_of(walls: Walls) -> tuple[float, np.ndarray, np.ndarray]:
 
 
 def _finished(t: Array, face: Array, through_x: Array, dx: Array, dy: Array) -> tuple[Array, Array, Array]:
-    """A wall's first face is turned into the one that was met: those that face -x, +x, -y, +y."""
+    """Return distance, hit face and its normal; face: the first of a wall, whose faces are ordered -x, +x, -y, +y."""
     x, y = dr.select(dx > 0, -1.0, 1.0), dr.select(dy > 0, -1.0, 1.0)
     side = dr.select(
         through_x, dr.select(dx > 0, mi.UInt32(0), mi.UInt32(1)), dr.select(dy > 0, mi.UInt32(2), mi.UInt32(3))
@@ -211,7 +211,7 @@ def _never_zero(d: Array) -> Array:
 
 
 def _grid(walls: Walls) -> tuple[float, np.ndarray, tuple[int, int]]:
-    """Side of the cells [m], lower corner (2,), rows and columns of the coarsest square grid on which all faces lie."""
+    """Return cell side [m], lower corner (2,), and rows and columns of the coarsest square grid that fits all faces."""
     faces = [np.unique(np.round(np.concatenate([walls.lower[:, a], walls.upper[:, a]]), 6)) for a in range(2)]
     origin = np.array([f[0] for f in faces])
     side = 0.0
@@ -225,7 +225,7 @@ def _grid(walls: Walls) -> tuple[float, np.ndarray, tuple[int, int]]:
 
 
 def _common(a: float, b: float) -> float:
-    """Greatest common divisor of lengths, to ALIGNED."""
+    """Return the greatest common divisor of two lengths, with tolerance ALIGNED."""
     while b > ALIGNED:
         a, b = b, a % b
         if a - b < ALIGNED:

@@ -1,8 +1,8 @@
-"""A static world in closed form: upright walls on a floor, if that is what the model is made of.
+"""A static world in closed form: upright walls on a floor, if the model consists of these.
 
-Walls are axis-aligned boxes that reach down to the floor and up beyond the eyes: from where eyes are, no top or bottom
-of a wall is ever seen, so a ray meets a wall where it enters the wall's footprint, if it is low enough there.
-Texture coordinates are affine on every face; they are taken from the mirror's own triangles.
+Walls are axis-aligned boxes that reach from the floor to above the eyes. Their tops and bottoms are not visible from
+the eyes. A ray therefore hits a wall at its entry into the wall's footprint, if it is low enough there. Texture
+coordinates are affine on every face; they are taken from the mirror's own triangles.
 """
 
 from __future__ import annotations
@@ -15,15 +15,15 @@ import numpy as np
 
 from sim.scene import shapes, surfaces
 
-SIDES = 4  # of a wall: those that face -x, +x, -y, +y
-FACES = 6  # of a box, of four corners each
+SIDES = 4  # sides of a wall, which face -x, +x, -y, +y
+FACES = 6  # faces of a box, with four corners each
 ALIGNED = (
     1e-6  # largest deviation of a wall's rotation from quarter turns, and of faces from a common height or grid [m]
 )
 
 
 class NoClosedForm(ValueError):
-    """Why a world has no closed form, in words."""
+    """The reason why a world has no closed form."""
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,7 @@ class Walls:
     """Walls and floor of a world.
 
     lower, upper: corners of the walls' footprints [m], (n, 2) · top of each [m], (n,)
-    floor: height of the floor [m] · floor_lower, floor_upper  its corners (2,)
+    floor: height of the floor [m] · floor_lower, floor_upper: its corners (2,)
     uv: texture coordinates of faces, (SIDES n + 1, 2, 4): (u, v) = uv @ (x, y, z, 1); the floor comes last
     geoms: the geom of each face, (SIDES n + 1,)
     """
@@ -50,7 +50,7 @@ class Walls:
 
 
 def walls_of(model: mujoco.MjModel, geoms: Sequence[int], eyes: np.ndarray) -> Walls:
-    """The walls and the floor that these geoms are; eyes: heights of the pupils [m].
+    """Return the walls and the floor that these geoms form; eyes: heights of the pupils [m].
 
     Raises:
         NoClosedForm: any other geom or placement.
@@ -74,7 +74,7 @@ def walls_of(model: mujoco.MjModel, geoms: Sequence[int], eyes: np.ndarray) -> W
         raise NoClosedForm("the eyes are not above the floor")
     floor_lower, floor_upper = floor[:, :2].min(axis=0), floor[:, :2].max(axis=0)
     if (corners[..., :2] < floor_lower - ALIGNED).any() or (corners[..., :2] > floor_upper + ALIGNED).any():
-        raise NoClosedForm("a wall stands beside the floor")
+        raise NoClosedForm("a wall extends beyond the floor")
     return Walls(
         lower=corners[:, 0, :2],
         upper=corners[:, 1, :2],
@@ -88,7 +88,7 @@ def walls_of(model: mujoco.MjModel, geoms: Sequence[int], eyes: np.ndarray) -> W
 
 
 def _rectangle(model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> np.ndarray:
-    """Mitsuba's rectangle of a plane: the points (u, v) = (0, 0), (1, 0), (0, 1) in the world, (3, 3)."""
+    """Return Mitsuba's rectangle of a plane: the points (u, v) = (0, 0), (1, 0), (0, 1) in the world, (3, 3)."""
     (part,) = shapes.parts(model, geom)
     assert part.local is not None
     corners = np.array([[-1, -1, 0, 1], [1, -1, 0, 1], [-1, 1, 0, 1]], float)
@@ -104,7 +104,7 @@ def _floor_uv(corners: np.ndarray) -> np.ndarray:
 
 
 def _box(model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> tuple[np.ndarray, np.ndarray, list[np.ndarray]]:
-    """Lower and upper corner of a box, and the texture coordinates of its sides."""
+    """Return the lower and upper corner of a box, and the texture coordinates of its sides."""
     pose = shapes.pose(data, geom)
     if np.abs(np.abs(pose[:3, :3]).max(axis=0) - 1).max() > ALIGNED:
         raise NoClosedForm(f"box {model.geom(geom).name!r} is not aligned with the axes")
@@ -119,7 +119,7 @@ def _box(model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> tuple[np.ndar
     faces = [(low, 0), (high, 0), (low, 1), (high, 1)]
     found = []
     for bound, axis in faces:
-        # The box's corners come face by face, four each.
+        # The corners of a box are listed face by face, four each.
         quads = vertices.reshape(-1, 4, 3)
         face = int(np.argmin(np.abs(quads[:, :, axis] - bound[axis]).max(axis=1)))
         found.append(_affine(quads[face], uv.reshape(-1, 4, 2)[face]))
@@ -127,7 +127,7 @@ def _box(model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> tuple[np.ndar
 
 
 def _affine(points: np.ndarray, uv: np.ndarray) -> np.ndarray:
-    """(2, 4) with uv = affine @ (x, y, z, 1) on the plane of the points (n, 3); it does not change across it."""
+    """Return the map (2, 4) with uv = map @ (x, y, z, 1) on the plane of points (n, 3), constant along its normal."""
     along = points[1:] - points[0]
     linear = np.linalg.lstsq(along, uv[1:] - uv[0], rcond=None)[0].T
     return np.column_stack([linear, uv[0] - linear @ points[0]])

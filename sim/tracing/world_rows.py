@@ -1,4 +1,4 @@
-"""Rows of four floats in which a kernel finds what differs from world to world."""
+"""Rows of four floats for everything that differs between worlds, which kernels read."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ from sim.scene.device_arrays import three
 
 @dataclass(frozen=True)
 class WorldRows:
-    """fours: of all worlds, flat · first: the first row of a lane's world"""
+    """fours: rows of all worlds, flat · first: number of the first row of a lane's world"""
 
     fours: Array
     first: Array
 
     def point(self, row: Array | int) -> Array:
-        """The first three floats of one of the world's rows."""
+        """Return the first three floats of one of the world's rows."""
         return three(self.fours, self.first + row)
 
     def four(self, row: Array | int) -> Array:
-        """All four (Vector4f)."""
+        """Return all four floats of a row (Vector4f)."""
         return dr.gather(mi.Vector4f, self.fours, self.first + row)

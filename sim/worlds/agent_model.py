@@ -1,4 +1,4 @@
-"""A world's agent by itself, for physics of the few things that are near it (`sim.physics.local_contacts`)."""
+"""A world's agent without its world, for physics of the few objects near it (`sim.physics.local_contacts`)."""
 
 from __future__ import annotations
 
@@ -8,27 +8,28 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-ROOM = 4  # geoms about an agent: the corner of two walls, and one or two more in reach
+ROOM = 4  # number of geoms around an agent: the corner of two walls, and one or two more in reach
 
 
 @dataclass(frozen=True)
 class AgentModel:
     """An agent without its world.
 
-    model: it, among ROOM boxes that touch nothing: no objects, walls, lights, cameras or textures
-    whole: fingerprint of the world's model that it is the agent of
+    model: the agent among ROOM boxes that touch nothing, without objects, walls, lights, cameras or textures
+    whole: fingerprint of the world's model that contains this agent
     """
 
     model: mujoco.MjModel
     whole: bytes
 
     @classmethod
-    def of(cls, spec: mujoco.MjSpec, whole: mujoco.MjModel) -> AgentModel:
-        """The body "agent" of a spec that has been compiled into `whole`."""
+    def from_spec(cls, spec: mujoco.MjSpec, whole: mujoco.MjModel) -> AgentModel:
+        """Extract the body "agent" of a spec that has been compiled into `whole`."""
         return cls(_alone(spec.copy()), _fingerprint(whole))
 
     def stands_for(self, model: mujoco.MjModel) -> bool:
-        """Whether this is that model's agent: not where any number of it was altered after it had been compiled."""
+        """Return whether this is the agent of that model. It is not if any number of the model has changed since it was
+        compiled."""
         return self.whole == _fingerprint(model)
 
 

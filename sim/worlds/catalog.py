@@ -1,6 +1,6 @@
-"""The tasks by name. Whoever lists them (environments, Gymnasium's ids, configurations, reports) reads them here.
+"""The built-in tasks by name. Environments, Gymnasium's ids, configurations and reports use this table.
 
-No MuJoCo here: command lines and `import gymnasium` list tasks without loading it.
+This module does not import MuJoCo, so that command lines and `import gymnasium` can list tasks without loading it.
 """
 
 from __future__ import annotations
@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from types import MappingProxyType
 
-# Name -> what is asked of the agent: "evolve to ...".
+# Name -> goal of the agent: "evolve to ...".
 TASKS: Mapping[str, str] = MappingProxyType(
     {
         "navigation": "follow a course between striped walls to its end",
@@ -19,5 +19,5 @@ TASKS: Mapping[str, str] = MappingProxyType(
     }
 )
 
-EPISODE_STEPS = 256  # actions, then the episode is truncated; as published
-COURSES = ("short", "long")  # of navigation: names of the drawings in `sim.worlds.navigation`
+EPISODE_STEPS = 256  # number of actions after which an episode is truncated; as published
+COURSES = ("short", "long")  # names of navigation's drawings in `sim.worlds.navigation`

@@ -1,7 +1,8 @@
-"""A course: a way through a grid of cells on which an agent that keeps getting farther from its start arrives.
+"""A course: a path through a grid of cells that an agent can follow by always increasing its distance from the start.
 
-Navigation rewards distance from the start. Where the way falls back towards the start, that reward has a local optimum,
-and nobody ever leaves it (docs/concepts/physics.md). On a course it nowhere falls back by more than MOST_FALL.
+Navigation rewards distance from the start. If the path leads back towards the start, this reward has a local optimum
+that no agent ever leaves (docs/concepts/physics.md). On a course the distance never has to decrease by more than
+MOST_FALL.
 """
 
 from __future__ import annotations
@@ -18,23 +19,24 @@ from sim.worlds.layout import CELL, cell_centers
 
 Cell = tuple[int, int]  # row, column
 
-MOST_FALL = 1.5  # [m] by which the distance from the start may have to fall on the way on, wherever an agent has got to
-GOAL_COLUMNS = 3  # the free cells of the last columns but the outer wall are the goal
-LOOK_AHEAD = 3  # cells on the shortest way: where they lead is the way's direction
-MOST_STEPS = 10**9  # of an episode
+# [m] largest necessary decrease of the distance from the start, from any position that an agent has reached.
+MOST_FALL = 1.5
+GOAL_COLUMNS = 3  # the goal consists of the free cells in the last columns before the outer wall
+LOOK_AHEAD = 3  # number of cells along the shortest path that define its direction
+MOST_STEPS = 10**9  # limit for the actions of an episode
 _WALL, _FREE, _START, _TRAINING_START = "#.Ss"
 
 
 @dataclass(frozen=True)
 class Course:
-    """Walls, and where to start from, as a drawing: a line per row of cells, north on top.
+    """Walls and starting positions as a drawing, with a line per row of cells, north at the top.
 
-    drawing: "#" a wall, "." free, "S" free and a start, "s" a start in training only
-    episode_steps: actions, then an episode is truncated; None: as many as everywhere
+    drawing: "#": a wall; ".": free; "S": free, and a start; "s": free, and a start in training only
+    episode_steps: number of actions after which an episode is truncated; None: the task's default
 
     Raises:
-        ValueError: lines of different lengths, another sign, an open border, no start, a start in the goal or from
-            which there is no way to it, one on whose way the distance from it falls by more than MOST_FALL, or
+        ValueError: lines of different lengths, another character, an open border, no start, a start in the goal, a
+            start without a path to the goal, a start from which the distance has to decrease by more than MOST_FALL, or
             episode_steps that are not a whole number above 0.
     """
 
@@ -45,7 +47,7 @@ class Course:
         of_kind("course: drawing", self.drawing, str, "'######\\n#S...#\\n######'")
         lines = self.drawing.split()
         if len({len(line) for line in lines}) != 1 or (signs := set(self.drawing) - set("#.Ss \n")):
-            what = "all lines must be as long" if len({len(line) for line in lines}) != 1 else f"signs {sorted(signs)}"
+            what = "lines differ in length" if len({len(line) for line in lines}) != 1 else f"signs {sorted(signs)}"
             raise ValueError(f"course: {what}; must be lines of '#', '.', 'S' and 's'")
         border = np.ones(self.walls.shape, bool)
         border[1:-1, 1:-1] = False
@@ -63,37 +65,37 @@ class Course:
     def _check(self, start: Cell) -> None:
         if self.goal[start]:
             raise ValueError(
-                f"course: start in cell {start} is in the goal, the free cells of the last {GOAL_COLUMNS} columns but "
-                "the outer wall: must be west of it"
+                f"course: start in cell {start} is in the goal, the free cells of the last {GOAL_COLUMNS} columns "
+                "before the outer wall: must be west of it"
             )
         if not np.isfinite(self.way[start]):
-            raise ValueError(f"course: start in cell {start} has no way to the goal")
+            raise ValueError(f"course: start in cell {start} has no path to the goal")
         fall, at = self.fall(start)
         if fall > MOST_FALL:
             raise ValueError(
-                f"course: from cell {at} on, the distance from the start in cell {start} has to fall by {fall:.2g} m: "
+                f"course: after cell {at}, the distance from the start in cell {start} has to fall by {fall:.2g} m: "
                 f"must be at most {MOST_FALL:g} m"
             )
 
     @cached_property
     def signs(self) -> np.ndarray:
-        """The drawing's, (row, column), row 0 in the south."""
+        """Characters of the drawing, (row, column), row 0 in the south."""
         return np.array([list(line) for line in reversed(self.drawing.split())])
 
     @cached_property
     def walls(self) -> np.ndarray:
-        """Boolean (row, column)."""
+        """Cells that are walls, boolean (row, column)."""
         walls: np.ndarray = self.signs == _WALL
         return walls
 
     @property
     def starts(self) -> list[Cell]:
-        """Where episodes begin in evaluation."""
+        """Starting cells in evaluation."""
         return _cells(self.signs == _START)
 
     @property
     def training_starts(self) -> list[Cell]:
-        """Where episodes begin in training."""
+        """Starting cells in training."""
         return _cells(np.isin(self.signs, (_START, _TRAINING_START)))
 
     @cached_property
@@ -105,7 +107,7 @@ class Course:
 
     @cached_property
     def way(self) -> np.ndarray:
-        """Length of the shortest way to the goal from every cell [m], (row, column); infinite where there is none."""
+        """Length of the shortest path to the goal from every cell [m], (row, column); infinite without a path."""
         way = np.where(self.goal, 0.0, np.inf)
         queue = [(0.0, cell) for cell in _cells(self.goal)]
         while queue:
@@ -118,21 +120,21 @@ class Course:
         return way
 
     def heading(self, cell: Cell) -> float:
-        """Direction of the shortest way from a cell [rad]."""
+        """Return the direction of the shortest path from a cell [rad]."""
         ahead = cell
         for _ in range(LOOK_AHEAD):
             ahead = min([ahead, *self._next_to(ahead)], key=lambda other: float(self.way[other]))
         return float(np.arctan2(ahead[0] - cell[0], ahead[1] - cell[1]))
 
     def fall(self, start: Cell) -> tuple[float, Cell]:
-        """The most by which the distance from a start has to fall between some cell ahead of it and the goal [m], on
-        the easiest way there; and that cell."""
+        """Return the largest decrease of the distance from a start that is necessary on the way from some cell ahead of
+        it to the goal [m], on the easiest path, and that cell."""
         ease = self._ease(start)
         return max((_apart(start, cell) - float(ease[cell]), cell) for cell in self._ahead(start))
 
     def _ease(self, start: Cell) -> np.ndarray:
-        """Of the ways from a cell to the goal, the one whose least distance from the start is largest: that distance
-        [m], (row, column)."""
+        """Return, for each cell, the least distance from the start along the path to the goal that maximises it [m],
+        (row, column)."""
         ease = np.full(self.walls.shape, -1.0)
         queue = [(-_apart(start, cell), cell) for cell in _cells(self.goal)]
         for negative, cell in queue:
@@ -148,7 +150,7 @@ class Course:
         return ease
 
     def _ahead(self, start: Cell) -> set[Cell]:
-        """Cells to which ways lead from the start that come nearer to the goal with every cell."""
+        """Return the cells on paths from the start that approach the goal with every cell."""
         seen, waiting = {start}, [start]
         while waiting:
             cell = waiting.pop()
@@ -159,7 +161,7 @@ class Course:
         return seen
 
     def _next_to(self, cell: Cell) -> Iterator[Cell]:
-        """Free cells that an agent can enter next, also diagonally, but not past a wall's corner."""
+        """Yield the free cells that an agent can enter next, also diagonally, but not around a wall's corner."""
         row, column = cell
         for r in (row - 1, row, row + 1):
             for c in (column - 1, column, column + 1):
@@ -167,7 +169,7 @@ class Course:
                     yield r, c
 
     def places(self, cells: list[Cell]) -> np.ndarray:
-        """Centres of cells [m], (n, 2)."""
+        """Return the centres of cells [m], (n, 2)."""
         rows, columns = np.array(cells).T
         return cell_centers(columns, rows, (self.walls.shape[0], self.walls.shape[1]))
 

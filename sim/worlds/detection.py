@@ -12,8 +12,8 @@ FIELD = (9, 11)  # free cells (rows, columns), as published
 OBJECT_RADIUS = 0.5  # [m], as published
 OBJECTS = ("goal", "adversary_0", "adversary_1")
 STRIPES = 6  # across the visible side of an object
-# Edges between an adversary's bands [deg from the top]: about as far apart as a goal's where eyes see them, and such
-# that light from above brightens either kind as much (validation/E1_balance.py finds them).
+# Edges between an adversary's bands [deg from the top]. To the eyes, they are about as far apart as a goal's edges, and
+# light from above gives both kinds of objects the same brightness (computed by validation/sim/equal_brightness.py).
 BAND_EDGES_DEG = (23.2, 47.8, 77.1, 107.0, 138.0, 170.0)
 OBJECT_MARGIN = 2  # cells between the wall and the nearest place of an object
 
@@ -21,10 +21,12 @@ OBJECT_MARGIN = 2  # cells between the wall and the nearest place of an object
 def add_layout(spec: mujoco.MjSpec, rng: np.random.Generator) -> Layout:
     """Add field and objects.
 
-    Goal: stripes along meridians (upright); adversary: along parallels (level), about as wide, turned by 90°.
+    A goal has stripes along meridians (vertical). An adversary has stripes of about the same width along parallels
+    (horizontal), that is, turned by 90°.
 
-    12 sectors of 30° around the vertical axis, of which a viewer sees 6, against bands of latitude whose edges make
-    up for the light from above: no single receptor that sees all of an object tells by brightness what it is.
+    A goal has 12 sectors of 30° around the vertical axis; a viewer sees 6 of them. The edges of an adversary's bands
+    of latitude compensate for the light from above. A single receptor that sees the whole object therefore cannot
+    distinguish them by brightness.
     """
     materials.add_texture(spec, "upright_stripes", materials.stripes((8, 1536), 2 * STRIPES, axis=1))
     materials.add_texture(
@@ -37,7 +39,7 @@ def add_layout(spec: mujoco.MjSpec, rng: np.random.Generator) -> Layout:
 
 def furnished_field(spec: mujoco.MjSpec) -> Layout:
     """Add the field, and the objects in the materials "goal" and "adversary". The agent starts in the outermost ring of
-    cells, objects in the field's middle."""
+    cells, the objects in the middle of the field."""
     _add_field(spec)
     _add_objects(spec)
     rows, columns = (a.ravel() for a in np.indices(FIELD))

@@ -1,8 +1,9 @@
-"""Foraging: the field of detection, with objects of one pattern that differ only in what they reflect below 400 nm.
+"""Foraging: the field of detection, with objects of the same pattern that differ only in reflectance below 400 nm.
 
-All are yellow, as many flowers are; the goal reflects ultraviolet too, as those that bees visit often do. The default
-RGB-like receptors take no light below 400 nm: to them, both are the same under any light and by any number of bands.
-(Spectra that differed in the visible, too, could be metamers for one light and one number of bands at a time only.)
+All objects are yellow, like many flowers. The goal also reflects ultraviolet, like many flowers that bees visit. The
+default RGB-like receptors absorb no light below 400 nm. To them, both kinds are identical under any light and for any
+number of bands. (If the spectra differed in the visible, too, they could only be metamers for one light and one number
+of bands.)
 """
 
 from __future__ import annotations
@@ -18,14 +19,15 @@ from sim.worlds.detection import STRIPES, furnished_field
 from sim.worlds.layout import Layout
 
 DARK, BRIGHT = 0.05, 0.8  # reflectance of yellow at either end of the visible range
-EDGE_NM, WIDTH_NM = 510.0, 15.0  # where and how fast it rises
+EDGE_NM, WIDTH_NM = 510.0, 15.0  # position and width of the rise
 ULTRAVIOLET = {"goal": 0.6, "adversary": DARK}  # reflectance in the ultraviolet
-FULL_NM, NONE_NM = 350.0, 400.0  # below, it reflects as much as that; above, it is yellow alone
+FULL_NM, NONE_NM = 350.0, 400.0  # below the first, ultraviolet reflectance; above the second, the yellow alone
 STEP_NM = 5.0
 
 
 def petal(ultraviolet: float) -> Spectrum:
-    """Yellow that reflects this share of the ultraviolet: smooth, and the same for all shares from 400 nm on."""
+    """Return a yellow spectrum with this reflectance in the ultraviolet. It is smooth, and identical for all values
+    from 400 nm on."""
     nm = np.arange(LIMITS_NM[0], LIMITS_NM[1] + STEP_NM / 2, STEP_NM)
     yellow = DARK + (BRIGHT - DARK) / (1 + np.exp((EDGE_NM - nm) / WIDTH_NM))
     way = np.clip((nm - FULL_NM) / (NONE_NM - FULL_NM), 0, 1)

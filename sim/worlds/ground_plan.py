@@ -15,13 +15,14 @@ __all__ = ["GroundPlan"]
 
 @dataclass(frozen=True)
 class GroundPlan:
-    """Lengths [m].
+    """Ground plan of a world. Lengths are in [m].
 
     walls: (n, 4): centre x, y and half sides along x, y
     bounds: x_min, y_min, x_max, y_max of all walls
-    goal_region: the same of the goal of navigation or maze, or None
-    object_names, object_radius: (object,) · object_bodies: their ids in the model
-    body_radius: of the agent
+    goal_region: x_min, y_min, x_max, y_max of the goal in navigation or a maze, or None
+    object_names, object_radius: (object,)
+    object_bodies: ids of the objects' bodies in the model
+    body_radius: radius of the agent
     """
 
     walls: np.ndarray
@@ -33,8 +34,8 @@ class GroundPlan:
     body_radius: float
 
     @classmethod
-    def of(cls, world: World, place: np.ndarray) -> GroundPlan:
-        """The plan of a world; of several mazes only the one around this place (2,) [m]."""
+    def from_world(cls, world: World, place: np.ndarray) -> GroundPlan:
+        """Return the plan of a world; with several mazes, only the one around this place (2,) [m]."""
         model = world.model
         walls = np.array([_footprint(model, i) for i in range(model.ngeom) if model.geom(i).name.startswith("wall")])
         region = world.goal_region
@@ -55,7 +56,8 @@ class GroundPlan:
 def _maze_around(
     walls: np.ndarray, region: np.ndarray | None, mazes: int, y: float
 ) -> tuple[np.ndarray, np.ndarray | None]:
-    """Walls and goal of the maze around y [m]; mazes lie north of each other, all of the same height."""
+    """Return the walls and goal of the maze around y [m]. The mazes lie north of each other and have the same
+    height."""
     south, north = (walls[:, 1] - walls[:, 3]).min(), (walls[:, 1] + walls[:, 3]).max()
     height = (north - south) / mazes
     low = south + height * int(np.clip((y - south) // height, 0, mazes - 1))
@@ -67,7 +69,8 @@ def _maze_around(
 
 
 def _footprint(model: mujoco.MjModel, geom: int) -> tuple[float, float, float, float]:
-    """Ground plan of a box that is turned by a multiple of 90°: half sides are |R| times the box's own."""
+    """Return the ground plan of a box that is turned by a multiple of 90°; its half sides are |R| times the
+    box's own."""
     rotation = np.empty(9)
     mujoco.mju_quat2Mat(rotation, model.geom_quat[geom])
     half = np.abs(rotation.reshape(3, 3)) @ model.geom_size[geom]

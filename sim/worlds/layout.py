@@ -1,4 +1,4 @@
-"""What task worlds are laid out from: a grid of cells, walls, a floor."""
+"""Elements of task worlds: a grid of cells, walls, a floor."""
 
 from __future__ import annotations
 
@@ -11,23 +11,23 @@ import numpy as np
 from optics.spectra.spectrum import Spectrum
 
 CELL = 2.0  # [m] side of a grid cell
-WALL_HEIGHT = 1.0  # [m]: as high as the objects; a receptor row of 11° sees nothing but wall up to 8 m away
+WALL_HEIGHT = 1.0  # [m], the height of the objects; a receptor row of 11° sees only wall up to 8 m away
 
-REACH = 1.0  # [m] from the agent's centre to an object's: closer counts as reached, as published
-SEPARATION = 2 * REACH  # [m] between objects: no place is within reach of two
-CLEARANCE = REACH + 0.5  # [m] between the agent's start and an object; the first action from rest takes it 0.44 m
+REACH = 1.0  # [m] from the agent's centre to an object's: an object that is closer is reached, as published
+SEPARATION = 2 * REACH  # [m] between objects: no position is within reach of two
+CLEARANCE = REACH + 0.5  # [m] between the agent's start and an object; the first action from rest covers 0.44 m
 
-# Collision filter: the agent's contype meets the walls' conaffinity, and nothing else meets anything, so that only
-# pairs of the agent and a wall are ever tested.
+# Collision filter: the agent's contype matches the walls' conaffinity, and there are no other matches. MuJoCo therefore
+# tests only pairs of the agent and a wall.
 WALL_CONAFFINITY = 1
 
 
 @dataclass(frozen=True)
 class Starts:
-    """Where agents begin.
+    """Starting positions of agents.
 
     position: (n, 2) [m]
-    heading: which way they look there [rad], (n,); None: any way
+    heading: initial heading [rad], (n,); None: random
     """
 
     position: np.ndarray
@@ -36,14 +36,15 @@ class Starts:
 
 @dataclass(frozen=True)
 class Layout:
-    """What a task adds to a world: its mocap sphere bodies and the places to start from.
+    """Additions of a task to a world: mocap sphere bodies and starting positions.
 
     objects: names of mocap sphere bodies
-    starts: of the agent;  object_spawn: (m, 2) [m]
+    starts: starting positions of the agent
+    object_spawn: possible positions of objects, (m, 2) [m]
     goal_region: (x_min, y_min, x_max, y_max) [m] or None
-    spectra: reflectances of materials, by name, where a colour would not do
-    training_starts: of the agent in training, if not the same
-    episode_steps: actions, then an episode is truncated; None: as many as everywhere
+    spectra: reflectances of materials, by name, for materials that need more than a colour
+    training_starts: starting positions of the agent in training, if they differ
+    episode_steps: number of actions after which an episode is truncated; None: the default
     """
 
     objects: tuple[str, ...]
@@ -56,8 +57,8 @@ class Layout:
 
 
 def cell_centers(columns: np.ndarray, rows: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
-    """Centres (n, 2) [m] of grid cells; the grid of `shape` (rows, columns) is centred on the origin, row 0 at the
-    smallest y."""
+    """Return the centres (n, 2) [m] of grid cells. The grid of `shape` (rows, columns) is centred on the origin, with
+    row 0 at the smallest y."""
     x = (np.asarray(columns) - (shape[1] - 1) / 2) * CELL
     y = (np.asarray(rows) - (shape[0] - 1) / 2) * CELL
     return np.stack([x, y], axis=-1).astype(float)
@@ -66,7 +67,7 @@ def cell_centers(columns: np.ndarray, rows: np.ndarray, shape: tuple[int, int]) 
 def add_wall(spec: mujoco.MjSpec, name: str, center: np.ndarray, size: tuple[float, float], material: str) -> None:
     """Add a wall: a box of `size` (length along x, along y) [m] that stands on the floor.
 
-    The geom's own x axis runs along the wall, because MuJoCo counts a uniform texture's repeats along it.
+    The geom's own x axis runs along the wall, because MuJoCo counts a uniform texture's repeats along this axis.
     """
     along_y = size[1] > size[0]
     length, width = (size[1], size[0]) if along_y else size
@@ -84,7 +85,7 @@ def add_wall(spec: mujoco.MjSpec, name: str, center: np.ndarray, size: tuple[flo
 
 
 def add_floor(spec: mujoco.MjSpec, size: tuple[float, float]) -> None:
-    """Add the floor, `size` [m] along x and y. Nothing falls: it is only seen."""
+    """Add the floor, `size` [m] along x and y. It is only visible: nothing falls."""
     spec.worldbody.add_geom(
         name="floor",
         type=mujoco.mjtGeom.mjGEOM_PLANE,

@@ -1,7 +1,7 @@
-"""What worlds are made of: reflectances, striped textures and daylight, put into an MjSpec.
+"""Materials of worlds: reflectances, striped textures and daylight, added to an MjSpec.
 
-MuJoCo's colours are display-referred (sRGB), so reflectances are encoded here and decoded by the mirror
-(`sim.scene.color`). The MjModel is the one source of truth: the textures live in it.
+MuJoCo's colours are display-referred (sRGB). Reflectances are therefore encoded here and decoded by the mirror
+(`sim.scene.color`). The MjModel contains the textures and is the only source of these data.
 """
 
 from __future__ import annotations
@@ -18,22 +18,22 @@ from sim.scene.color import encode_srgb, preview
 # Chosen.
 WHITE = 0.9  # reflectance of a light stripe
 BLACK = 0.05  # reflectance of a dark stripe
-GREY = 0.5  # reflectance of a plain wall: stripes are as far below as above it
+GREY = 0.5  # reflectance of a plain wall, about midway between the stripes
 FLOOR = 0.04  # reflectance of the floor
 BODY = 0.3  # reflectance of the agent's body
 
-# Directional lights from three sides: every wall gets light, no two walls the same, so that a wall's brightness
-# tells its direction; (azimuth [deg] and elevation [deg] of where the light comes from, level). There is no sky:
-# a constant environment would be the main source of noise in a render.
+# Directional lights from three sides: every wall is lit, and no two walls equally, so that a wall's brightness
+# indicates its direction; (azimuth [deg] and elevation [deg] of the source, level). There is no sky, since a constant
+# environment would be the main source of noise in a render.
 LIGHTS = ((20.0, 40.0, 0.9), (140.0, 40.0, 0.6), (260.0, 40.0, 0.45))
 
 
 def stripes(shape: tuple[int, int], edges: int | Sequence[float], axis: int) -> np.ndarray:
-    """Image of stripes, alternately light and dark along `axis` (0: rows, 1: columns), (height, width, 3) uint8,
-    display-referred; the first stripe is light.
+    """Return an image of stripes, alternately light and dark along `axis` (0: rows, 1: columns), (height, width, 3)
+    uint8, display-referred. The first stripe is light.
 
-    edges: between stripes, as parts of the axis in (0, 1); or how many stripes there are, all equally wide. A texel
-        that an edge crosses has the mean reflectance of what it covers.
+    edges: edges between stripes, as fractions of the axis in (0, 1); or the number of stripes of equal width. A texel
+        crossed by an edge has the mean reflectance of its area.
     """
     n = shape[axis]
     inner = np.arange(1, edges) / edges if isinstance(edges, int) else np.asarray(edges, float)
@@ -68,8 +68,8 @@ def add_textured(
     uniform: bool = False,
     color: Sequence[float] = (1.0, 1.0, 1.0),
 ) -> None:
-    """Add a matte material with a 2-D texture, repeated over the geom (or, `uniform`, per 2 m of it) and multiplied by
-    a display-referred colour."""
+    """Add a matte material with a 2-D texture, repeated over the geom (or, if `uniform`, per 2 m of it) and multiplied
+    by a display-referred colour."""
     material = spec.add_material(
         name=name, texrepeat=list(repeat), texuniform=uniform, specular=0, shininess=0, rgba=[*color, 1.0]
     )
@@ -77,7 +77,7 @@ def add_textured(
 
 
 def display_color(reflectance: Spectrum) -> tuple[float, float, float]:
-    """Display-referred colour (sRGB) of a reflectance in daylight, for renderers that know no spectra."""
+    """Return the display-referred colour (sRGB) of a reflectance in daylight, for renderers without spectra."""
     nm = np.arange(380.0, 781.0, 5.0)
     radiance = reflectance.at(nm * 1e-9) * daylight(nm * 1e-9)
     r, g, b = encode_srgb(np.clip(preview(radiance[:, None, None], nm)[0, 0], 0, 1)).tolist()

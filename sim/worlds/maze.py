@@ -1,4 +1,4 @@
-"""The maze: corridors between striped walls, drawn at random; the way leads from its west end to its east end."""
+"""The maze: random corridors between striped walls, from a start in the west to a goal in the east."""
 
 from __future__ import annotations
 
@@ -8,16 +8,16 @@ import numpy as np
 from sim.worlds.layout import CELL, Layout, Starts, add_floor, cell_centers
 from sim.worlds.striped_walls import add_striped_walls
 
-MAZE = (13, 39)  # cells (rows, columns), odd: rooms at odd coordinates, walls or doors between them
+MAZE = (13, 39)  # cells (rows, columns), odd: rooms at odd coordinates, with walls or openings between them
 START_COLUMNS = 4  # the agent starts in the free cells west of this column
-GOAL_COLUMNS = 3  # the free cells of the last columns but the outer wall are the goal
+GOAL_COLUMNS = 3  # the goal consists of the free cells in the last columns before the outer wall
 
 _NEIGHBORS = ((0, 2), (0, -2), (2, 0), (-2, 0))
 
 
 def add_layout(spec: mujoco.MjSpec, rng: np.random.Generator, mazes: int = 1) -> Layout:
-    """Add mazes drawn by `rng`, side by side (north of each other) and without a way from one to the next: an agent
-    starts in any of them, and what it learns is good for all."""
+    """Add mazes drawn by `rng`, next to each other from south to north and not connected. An agent starts in any of
+    them, so that what it learns applies to all."""
     walls = np.concatenate([draw_maze(MAZE, rng) for _ in range(mazes)])
     shape = walls.shape
     add_floor(spec, (shape[1] * CELL, shape[0] * CELL))
@@ -36,10 +36,10 @@ def add_layout(spec: mujoco.MjSpec, rng: np.random.Generator, mazes: int = 1) ->
 
 
 def draw_maze(shape: tuple[int, int], rng: np.random.Generator) -> np.ndarray:
-    """Walls of a maze without dead ends, boolean (row, column).
+    """Return the walls of a maze without dead ends, boolean (row, column).
 
-    A depth-first walk joins all rooms into a tree; then every dead end gets a second door, so that an agent that
-    follows a corridor always gets somewhere.
+    A depth-first walk connects all rooms into a tree. Every dead end then gets a second opening, so that an agent that
+    follows a corridor never has to turn back.
     """
     walls = np.ones(shape, dtype=bool)
     walls[1, 1] = False

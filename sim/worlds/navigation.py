@@ -1,4 +1,4 @@
-"""Navigation: a course between striped walls, from its west end to its east end, with islands to pass by."""
+"""Navigation: a course between striped walls, from its west end to its east end, with islands in between."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from sim.worlds.course import GOAL_COLUMNS, Course
 from sim.worlds.layout import CELL, Layout, Starts, add_floor
 from sim.worlds.striped_walls import add_striped_walls
 
-# Diagonals are so wide that an agent has 2 m of free play between the corners of their walls, and ways part and join
-# again. The shortest way is 90 m.
+# Diagonal paths are wide enough that an agent has 2 m of free play between the corners of their walls. Paths split and
+# join again. The shortest path is 90 m.
 SHORT = Course(
     """
     ###########################################
@@ -34,7 +34,7 @@ SHORT = Course(
     ###########################################
     """
 )
-# Twice as long, to be run in half as many actions: only who is fast gets far.
+# Twice as long, for half the number of actions: only a fast agent gets far.
 LONG = Course(
     """
     ##################################################################################
@@ -57,10 +57,10 @@ DRAWN: Mapping[str, Course] = MappingProxyType(dict(zip(COURSES, (SHORT, LONG), 
 
 
 def course_named(course: str | Course) -> Course:
-    """A course, or the drawn one with that name.
+    """Return a course, or the built-in course of this name.
 
     Raises:
-        ValueError: there is none.
+        ValueError: no such course.
     """
     if isinstance(course, Course):
         return course
@@ -76,7 +76,7 @@ def add_layout(spec: mujoco.MjSpec, rng: np.random.Generator, course: Course) ->
     """Add the walls of a course, with stripes drawn by `rng`."""
     rows, columns = course.walls.shape
     add_floor(spec, (columns * CELL, rows * CELL))
-    # Nobody sees a wall that has no free cell next to it.
+    # A wall without an adjacent free cell is never visible.
     near = scipy.ndimage.binary_dilation(~course.walls, np.ones((3, 3)))
     add_striped_walls(spec, course.walls & near, rng)
     right, top = columns * CELL / 2 - CELL, rows * CELL / 2 - CELL
@@ -91,6 +91,6 @@ def add_layout(spec: mujoco.MjSpec, rng: np.random.Generator, course: Course) ->
 
 
 def _starts(course: Course, training: bool) -> Starts:
-    """Along the way everywhere."""
+    """Return starting positions with headings along the course."""
     cells = course.training_starts if training else course.starts
     return Starts(course.places(cells), np.array([course.heading(cell) for cell in cells]))

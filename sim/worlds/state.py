@@ -1,4 +1,5 @@
-"""What a batch of worlds is, as plain arrays: the value that physics advances, eyes look at and recorders keep."""
+"""State of a batch of worlds as plain arrays. Physics advances it, eyes are rendered from it, and recorders
+store it."""
 
 from __future__ import annotations
 
@@ -13,14 +14,14 @@ from sim.worlds.world import World
 
 @dataclass(frozen=True)
 class WorldState:
-    """All worlds of a batch at one instant; first axis: world.
+    """All worlds of a batch at one instant; the first axis is the world.
 
     position: agent [m], (n, 2)
     heading: agent [rad], in [-π, π), (n,)
     velocity: agent [m/s], (n, 2)
     objects: centres of the objects, in the order of World.objects [m], (n, k, 3)
     object_heading: direction in which each object moves [rad], (n, k)
-    start: where the agent started its episode [m], (n, 2)
+    start: the agent's starting position in this episode [m], (n, 2)
     steps: actions taken in this episode, (n,) int
     goals_reached: in this episode, (n,) int
     adversaries_reached: in this episode, (n,) int
@@ -43,48 +44,49 @@ class WorldState:
 
     @property
     def all_finite(self) -> bool:
-        """Whether every number in every world surely is one: False, too, where their squares add up to infinity."""
-        # NaN and infinity survive any sum, and one test of a sum costs less than one of every term.
+        """True if every number in every world is certainly finite; also False if the sum of their squares overflows."""
+        # NaN and infinity propagate through sums, and testing one sum is cheaper than testing every term.
         numbers = (self.heading, self.position, self.velocity, self.objects, self.object_heading)
         return math.isfinite(sum(np.vdot(array, array) for array in numbers))
 
     @property
     def finite(self) -> np.ndarray:
-        """Worlds in which every number is one, (n,) bool."""
+        """Worlds in which every number is finite, (n,) bool."""
         total = self.heading + self.position.sum(axis=1) + self.velocity.sum(axis=1)
         total += self.objects.sum(axis=(1, 2)) + self.object_heading.sum(axis=1)
         finite: np.ndarray = np.isfinite(total)
         return finite
 
     def repaired(self) -> WorldState:
-        """The same worlds with 0 for whatever is not finite."""
+        """Return the same worlds with 0 instead of numbers that are not finite."""
         return WorldState(**{name: np.nan_to_num(array, posinf=0.0, neginf=0.0) for name, array in vars(self).items()})
 
     def take(self, worlds: np.ndarray) -> WorldState:
-        """These worlds alone (copies)."""
+        """Return copies of only these worlds."""
         return WorldState(**{name: array[worlds] for name, array in vars(self).items()})
 
     def put(self, worlds: np.ndarray, other: WorldState) -> WorldState:
-        """A new batch, with `other`'s worlds at these places."""
+        """Return a new batch in which `other`'s worlds replace these worlds."""
         arrays = {name: array.copy() for name, array in vars(self).items()}
-        places = slice(worlds[0], worlds[0] + 1) if len(worlds) == 1 else worlds  # most often one: quicker so
+        # Usually there is one, and a slice is faster.
+        places = slice(worlds[0], worlds[0] + 1) if len(worlds) == 1 else worlds
         for name, array in arrays.items():
             array[places] = getattr(other, name)
         return WorldState(**arrays)
 
 
 def concatenate(states: list[WorldState]) -> WorldState:
-    """One batch of several."""
+    """Return one batch of several."""
     return WorldState(**{name: np.concatenate([getattr(s, name) for s in states]) for name in vars(states[0])})
 
 
 def wrap_angle(angle: np.ndarray) -> np.ndarray:
-    """The same angle in [-π, π)."""
+    """Return the same angle in [-π, π)."""
     return (angle + np.pi) % (2 * np.pi) - np.pi
 
 
 def pose(data: mujoco.MjData, world: World, state: WorldState, index: int = 0) -> None:
-    """Put MuJoCo's data where one world of a state is."""
+    """Set MuJoCo's data to one world of a state."""
     data.joint("agent_x").qpos[0], data.joint("agent_y").qpos[0] = state.position[index]
     data.joint("agent_heading").qpos[0] = state.heading[index]
     for name, centre in zip(world.objects, state.objects[index], strict=True):

@@ -10,8 +10,8 @@ from sim.worlds.layout import CELL, add_wall, cell_centers
 
 LONGEST_WALL = 4  # cells in one box: a new stripe frequency at least every 8 m
 
-# Stripe periods along a wall [m]; a box's end faces, as long as one cell, carry as many stripes as its sides
-# per cell times its length, which is how MuJoCo repeats a texture.
+# Stripe periods along a wall [m]. A box's end faces, which are one cell long, have as many stripes as its whole sides,
+# since MuJoCo repeats a texture equally often on all faces.
 STRIPE_PERIODS = (4.0, 2.0, 1.0, 2 / 3)
 
 
@@ -29,7 +29,7 @@ def add_striped_walls(spec: mujoco.MjSpec, walls: np.ndarray, rng: np.random.Gen
 def merge_walls(walls: np.ndarray, longest: int) -> list[tuple[int, int, int, int]]:
     """Cover wall cells by disjoint straight runs of at most `longest` cells: (row, column, rows, columns) each.
 
-    Greedy: of the two runs that start in the first uncovered cell, the longer one.
+    The algorithm is greedy: of the two runs that start in the first uncovered cell, it uses the longer one.
     """
     left = walls.copy()
     runs = []

@@ -1,7 +1,7 @@
-"""A task's world: what stands where, as a MuJoCo model, and where agent and objects may start.
+"""A task's world as a MuJoCo model, with the starting positions of agent and objects.
 
-`build_world` compiles one. What all worlds have in common is added here; what is special about one is in
-`sim.worlds.detection`, `.foraging`, `.maze` and `.navigation`.
+`build_world` compiles a world. Parts that all worlds share are added here; the others are in `sim.worlds.detection`,
+`.foraging`, `.maze` and `.navigation`.
 """
 
 from __future__ import annotations
@@ -22,17 +22,17 @@ from sim.worlds.catalog import TASKS
 from sim.worlds.course import Course
 from sim.worlds.layout import WALL_CONAFFINITY, Layout, Starts
 
-MOST_SEED = 2**128  # choice: what NumPy draws for a seed
-MOST_MAZES = 100_000  # choice: more than memory holds
+MOST_SEED = 2**128  # chosen limit: the size of NumPy's own random seeds
+MOST_MAZES = 100_000  # chosen limit, beyond what memory can hold
 _FIELDS = {"detection": detection.add_layout, "foraging": foraging.add_layout, "tracking": detection.add_layout}
 
 TIMESTEP = 0.02  # [s], as published
-# Lag [s] of the agent's speed behind the commanded one, and speed reached per speed commanded: with them an agent goes
-# as far per action as in the published environment (tests/sim/worlds/test_world.py).
+# Time constant [s] of the agent's speed, and speed reached per commanded speed. With these values the distance per
+# action is that of the published environment (tests/sim/worlds/test_world.py).
 TIME_CONSTANT, SPEED_GAIN = 0.35, 0.99
 MAX_SPEED = 10.0  # [m/s] commanded, as published
 
-# The agent can move MAX_SPEED * TIMESTEP = 0.2 m in one substep. Its whiskers feel a wall that near, so that the
+# The agent can move MAX_SPEED * TIMESTEP = 0.2 m in one substep. Its whiskers feel a wall at this distance, so that the
 # skin, and the eyes in it, never pass through a wall. See `_add_agent` for the contact's stiffness.
 WHISKER_LENGTH = MAX_SPEED * TIMESTEP  # [m]
 
@@ -44,14 +44,15 @@ class World:
     model: static geoms; body "agent" with slide joints agent_x, agent_y and hinge agent_heading, actuators agent_x,
         agent_y (commanded velocity [m/s], world axes), sensor agent_touch (> 0: wall contact); mocap bodies for the
         objects; cameras eye_0 ... on the agent if it was built with eyes
-    objects: mocap sphere bodies: ("goal", "adversary_0", "adversary_1"), or () for navigation and maze
-    starts: of the agent, in cells' centres;  object_spawn: cells' centres (m, 2) [m]
-    goal_region: navigation and maze: (x_min, y_min, x_max, y_max) [m]
-    spectra: measured spectra of materials and lights, by name: what the renderers use instead of their colours
-    alone: the model's agent by itself; without, agents that may touch something are stepped in the whole model
-    training_starts: of the agent in training; None: the same
-    episode_steps: actions, then an episode is truncated; None: as many as everywhere
-    mazes: that lie north of each other; 1 in tasks without mazes
+    objects: mocap sphere bodies: ("goal", "adversary_0", "adversary_1"), or () in navigation and mazes
+    starts: starting positions of the agent, in centres of cells
+    object_spawn: possible positions of objects, in centres of cells, (m, 2) [m]
+    goal_region: in navigation and mazes: (x_min, y_min, x_max, y_max) [m]
+    spectra: measured spectra of materials and lights, by name, which the renderers use instead of their colours
+    alone: the model's agent without its world; None: agents near obstacles are simulated in the whole model
+    training_starts: starting positions of the agent in training; None: the same
+    episode_steps: number of actions after which an episode is truncated; None: the default
+    mazes: number of mazes, which lie north of each other; 1 in other tasks
     """
 
     task: str
@@ -68,7 +69,7 @@ class World:
 
     @property
     def agent_spawn(self) -> np.ndarray:
-        """All places in which an agent may start, (n, 2) [m]."""
+        """All possible starting positions of an agent, (n, 2) [m]."""
         if self.training_starts is None:
             return self.starts.position
         return np.unique(np.concatenate([self.starts.position, self.training_starts.position]), axis=0)
@@ -86,16 +87,16 @@ def build_world(
     """Build the world of a task.
 
     task: one of `sim.TASKS`
-    seed: draws mazes, and the stripes of walls; the field of the other tasks is always the same
-    mazes: of the task "maze": so many different ones, and an episode begins in any of them
-    course: of navigation: "short", "long" (twice as long, in half as many actions) or a `sim.Course`
-    eyes: if given, the agent carries cameras eye_0 ..., left to right
-    spectra: of materials and lights, by name ("wall", "floor", "light_0" ...), in addition to or instead of the task's
-        own: `optics.Spectrum`, or names out of `optics.reflectance` and `optics.illuminant`
+    seed: seed of mazes, and of the stripes of walls; the field of the other tasks is always the same
+    mazes: number of different mazes in the task "maze"; an episode starts in any of them
+    course: course of navigation: "short", "long" (twice as long, for half the actions) or a `sim.Course`
+    eyes: if not None, the agent has cameras eye_0 ..., left to right
+    spectra: spectra of materials and lights, by name ("wall", "floor", "light_0" ...), which add to the task's own or
+        replace them: `optics.Spectrum`, or names accepted by `optics.reflectance` and `optics.illuminant`
 
     Raises:
-        ValueError: an unknown task or course, a negative seed, mazes or a course for another task, or spectra of what
-            is not there.
+        ValueError: an unknown task or course, a negative seed, mazes or a course for another task, or spectra for names
+            that do not exist.
     """
     if not isinstance(task, str) or task not in TASKS:
         raise ValueError(f"unknown task {shown(task)}: must be one of {', '.join(TASKS)}{did_you_mean(task, TASKS)}")
@@ -121,7 +122,7 @@ def build_world(
         object_spawn=layout.object_spawn,
         goal_region=layout.goal_region,
         spectra=resolve(model, {**layout.spectra, **(spectra or {})}),
-        alone=AgentModel.of(spec, model),
+        alone=AgentModel.from_spec(spec, model),
         training_starts=layout.training_starts,
         episode_steps=layout.episode_steps,
         mazes=mazes,
@@ -139,7 +140,7 @@ def _empty_world() -> mujoco.MjSpec:
     spec.modelname = "rhabdom"
     spec.option.timestep = TIMESTEP
     spec.option.gravity = [0, 0, 0]  # the agent moves in a plane
-    # MuJoCo 4.0.0's sparse Newton Hessian is wrong (mended in 4.0.1).
+    # MuJoCo 4.0.0's sparse Newton Hessian is wrong (fixed in 4.0.1).
     spec.option.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
     spec.visual.map.znear = 1e-4
     materials.add_daylight(spec)
@@ -150,10 +151,10 @@ def _empty_world() -> mujoco.MjSpec:
 
 
 def _add_agent(spec: mujoco.MjSpec, start: np.ndarray, eyes: Eyes | None) -> None:
-    """Add the agent: slide joints in world axes, then the heading (set by the simulation, no actuator turns it).
+    """Add the agent: slide joints in world axes, then the heading (set by the simulation, without an actuator).
 
-    The contact is frictionless, and stiff in a discrete sense: damping 1/dt stops the approach within the substep
-    in which the wall is felt, stiffness 0.2/dt² pushes back a fifth of the depth per substep, without a bounce.
+    The contact is frictionless, and stiff for discrete steps. Damping 1/dt stops the approach within the substep in
+    which the wall is felt. Stiffness 0.2/dt² pushes back one fifth of the depth per substep, without a bounce.
     """
     body = spec.worldbody.add_body(name="agent", pos=[float(start[0]), float(start[1]), EYE_HEIGHT])
     slide, hinge = mujoco.mjtJoint.mjJNT_SLIDE, mujoco.mjtJoint.mjJNT_HINGE
@@ -191,7 +192,7 @@ def _add_agent(spec: mujoco.MjSpec, start: np.ndarray, eyes: Eyes | None) -> Non
 
 
 def _add_velocity_servo(spec: mujoco.MjSpec, joint: str) -> None:
-    """First-order lag, dv/dt = (SPEED_GAIN ctrl - v) / TIME_CONSTANT, for a body of 1 kg."""
+    """Add a servo with first-order lag, dv/dt = (SPEED_GAIN ctrl - v) / TIME_CONSTANT, for a body of 1 kg."""
     spec.add_actuator(
         name=joint,
         target=joint,

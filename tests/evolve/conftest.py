@@ -13,29 +13,29 @@ from tests.evolve.small_run import small_run
 
 @pytest.fixture(scope="session")
 def run(tmp_path_factory):
-    """One candidate, hardly trained, with everything real."""
+    """Return a run of one candidate with minimal real training."""
     return small_run(tmp_path_factory.mktemp("played") / "run")
 
 
 @pytest.fixture(scope="session")
 def episode(run):
-    """An episode with seed 3."""
+    """Return an episode with seed 3."""
     return record(run, seed=3, radiance_every=64)
 
 
 class Silent:
-    """Watches and says nothing."""
+    """A watcher that prints nothing."""
 
     def training(self, candidate_id, steps, planned):
-        """Nothing."""
+        """Do nothing."""
 
     def evaluated(self, candidate):
-        """Nothing."""
+        """Do nothing."""
 
 
 @pytest.fixture(scope="session")
 def finished(tmp_path_factory):
-    """A finished run of closed-form fitness."""
+    """Return a finished run with a fitness in closed form."""
     run = Run.create(tmp_path_factory.mktemp("finished") / "run", tiny())
     with LocalExecutor(bowl, 1) as executor:
         carry_on(run, executor, Silent())
@@ -44,7 +44,7 @@ def finished(tmp_path_factory):
 
 @pytest.fixture
 def call(capsys):
-    """Runs a command; returns exit code, what it printed, and its complaint."""
+    """Return a function that runs a command and returns its exit code, stdout and stderr."""
 
     def command(*arguments):
         try:

@@ -1,4 +1,4 @@
-"""Episodes as files held them at first: of built-in tasks alone, without poses."""
+"""Episodes in the first file format: built-in tasks only, without poses."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ COLUMNS = (
 
 
 def of_first_form(episode: Episode, adversary_first: list[bool] | None = None) -> tuple[dict, dict]:
-    """Arrays of a file, and what it holds as JSON.
+    """Return the arrays of a file, and its JSON content.
 
-    adversary_first: whether an action reached an adversary before any goal; None: the file says nothing of it
+    adversary_first: whether an action reached an adversary before any goal; None: the entry is missing from the file
     """
     arrays = {name: getattr(episode, name) for name in COLUMNS} | {"contact": episode.beside["contact"][:, 0] > 0}
     arrays |= {f"term_{name}": term for name, term in episode.reward_terms.items()}

@@ -1,4 +1,4 @@
-"""Lines of a record as a stranger could send them: valid JSON or nearly, and never what was meant."""
+"""Manipulated lines of a record: valid JSON or nearly, but with invalid content."""
 
 import json
 
@@ -6,7 +6,7 @@ from tests.evolve.store.records import candidate
 
 HUGE = "9" * 400
 
-# What is put into a good line: field (dotted) -> its JSON text
+# Replacements for values of a valid line: field (dotted) -> its JSON text
 VALUES = {
     "Infinity as an id": ("id", "Infinity"),
     "10**400 as an id": ("id", HUGE),
@@ -61,7 +61,7 @@ VALUES = {
 
 
 def line(field, value, identity=0):
-    """A good line with one value exchanged."""
+    """Return a valid line with one value replaced."""
     record = json.loads(candidate(identity).to_line())
     place, _, trait = field.partition(".")
     if trait:

@@ -1,4 +1,4 @@
-"""A run small enough for a test: one candidate, hardly trained, with everything real."""
+"""A run that is small enough for a test: one candidate with minimal real training."""
 
 from __future__ import annotations
 
@@ -36,9 +36,9 @@ def small_config(task="detection", learning=LEARNING, **eye):
 
 
 def small_run(path, seed=5):
-    """A run directory with one evaluated candidate, and that candidate's evaluation."""
+    """Create a run directory with one evaluated candidate, and return it with that candidate's evaluation."""
     run = Run.create(path, small_config())
     outcome = evaluate(PHENOTYPE, run.config, seed, run.policy_path(0))
     genome = (0.5,) * Genotype(run.config.genome).dimension
-    run.append(Candidate.of(Place(0, 0, 0), genome, PHENOTYPE, seed, outcome))
+    run.append(Candidate.from_evaluation(Place(0, 0, 0), genome, PHENOTYPE, seed, outcome))
     return run

@@ -1,6 +1,7 @@
-"""Whatever is asked of `evolve`'s public functions: an animal that can be built, or one line. Nothing else.
+"""Public functions of `evolve` return an animal that can be built for any input, or raise a one-line error.
 
-EVOLVE_EXAMPLES=20 python -m pytest --all tests/evolve/test_any_input.py     tries twenty times as many inputs
+EVOLVE_EXAMPLES=20 python -m pytest --all tests/evolve/test_any_input.py     tries twenty times the default number of
+inputs
 """
 
 import json
@@ -45,7 +46,7 @@ def one_line(error):
 
 
 def sound(phenotype, config):
-    """Its eyes can be built, and its record reads back as itself."""
+    """Assert that the animal's eyes can be built, and that its record is read back unchanged."""
     eyes = phenotype.eyes(config.eye)
     assert np.isfinite(eyes.azimuths()).all()
     assert Phenotype.from_json(json.loads(json.dumps(phenotype.to_json()))) == phenotype
@@ -54,7 +55,7 @@ def sound(phenotype, config):
 @examples(60)
 @given(st.lists(st.tuples(st.sampled_from(KEYS), st.sampled_from(VALUES)), max_size=4), st.integers(0, 2**32))
 def test_settings_are_refused_in_a_line_or_have_animals(settings_, seed):
-    """Every genome of a config that is accepted has an animal, and the config is read as it was written."""
+    """Every genome of an accepted config has an animal, and the config is read back unchanged."""
     try:
         config = assemble("detection", "quick", assignments=[f"{key}={value}" for key, value in settings_])
     except ConfigError as error:

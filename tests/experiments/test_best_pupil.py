@@ -1,4 +1,5 @@
-"""The best pupil: measures against closed forms, the sharpest pinhole against Rayleigh's, the page against it."""
+"""The best pupil: measures against closed forms, the sharpest pinhole against Rayleigh's, and the page against its
+store."""
 
 from pathlib import Path
 
@@ -16,7 +17,8 @@ def test_measures_of_a_perfect_image_are_closed_forms():
     quality, contrast, bits = measures(np.ones(257), 0.25, 0.01)
     assert contrast == pytest.approx(1 - 0.01 / 0.25)
     assert quality == pytest.approx(0.25 * contrast)
-    # π/4 of the receptors' square of frequencies lies within Nyquist's circle; half a log per receptor.
+    # A fraction π/4 of the receptors' square of frequencies lies within Nyquist's circle; half a logarithm per
+    # receptor.
     assert bits == pytest.approx(np.pi / 4 * 0.5 * np.log2(1 + (SCENE * 0.25 / 0.01) ** 2), rel=1e-4)
 
 
@@ -30,25 +32,25 @@ def test_optimum_is_that_of_the_parabola():
     apertures = np.geomspace(0.05, 0.5, 8)
     rows = [Row("hole", a, 0.01, 0.0, 1 - np.log(a / 0.21) ** 2, a, 0.0, 0.0, 0.0) for a in apertures]
     assert best(rows, "hole", 0.01, "contrast") == pytest.approx(0.21)
-    assert best(rows, "hole", 0.01, "bits") == 0.5, "at the end of what was tried"
+    assert best(rows, "hole", 0.01, "bits") == 0.5, "the best value is the last one tried"
 
 
 @pytest.mark.slow
 def test_with_little_noise_the_best_hole_is_rayleighs_pinhole():
-    """The criterion differs from his (he judged by eye, at one wavelength), hence 15 %; geometry alone would close the
-    pupil, diffraction alone open it."""
+    """Rayleigh judged sharpness by eye at one wavelength, so the criterion differs by up to 15 %. Geometry alone would
+    close the pupil, and diffraction alone would open it."""
     backend.require()
     rows = computed(tuple(np.geomspace(0.07, 0.2, 6)), (0.001,))
     assert best(rows, "hole", 0.001, "contrast") == pytest.approx(rayleigh(), rel=0.15)
-    assert best(rows, "lens", 0.001, "contrast") == pytest.approx(0.2), "a lens gains by every opening"
+    assert best(rows, "lens", 0.001, "contrast") == pytest.approx(0.2), "a lens gains from every increase in aperture"
 
 
 @pytest.mark.slow
 def test_stripes_are_seen_best_where_a_disk_of_blur_takes_least():
-    """Behind a hole light falls on a disk as wide as the hole: T MTF = a² 2 J1(x) / x with x = π a L f is greatest at
-    J0's first zero. Of a hole of three Fresnel zones the disk is brighter in its middle, hence 8 %; one of less than
-    one is as wide as diffraction makes it, hence 25 % for the narrowest stripes. Any other of these widths has its
-    optimum at half or twice as much."""
+    """Behind a pinhole, light falls on a disk as wide as the pinhole: T MTF = a² 2 J1(x) / x with x = π a L f is
+    greatest at J0's first zero. For a pinhole of three Fresnel zones the disk is brighter in its middle, hence 8 %. For
+    less than one zone, diffraction sets the width of the disk, hence 25 % for the narrowest stripes. Stripes of another
+    of these widths have their optimum at half or twice the aperture."""
     backend.require()
     rows = computed(tuple(np.geomspace(0.06, 0.9, 25)), (0.01,))
     for width, tolerance in ((1, 0.25), (2, 0.08), (4, 0.08)):
@@ -58,7 +60,7 @@ def test_stripes_are_seen_best_where_a_disk_of_blur_takes_least():
         assert best(rows, "lens", 0.01, f"stripes_{width}") == pytest.approx(0.9)
     beyond = [row for row in rows if row.pupil == "hole" and row.relative_aperture > 4.2 / (np.pi * RESOLUTION / 4)]
     assert beyond
-    assert max(row.stripes_2 for row in beyond) == 0.0, "reversed"
+    assert max(row.stripes_2 for row in beyond) == 0.0, "contrast is reversed"
 
 
 def test_page_is_what_its_store_says():

@@ -1,4 +1,5 @@
-"""Every width with every brain: errors are what they say, ceilings and exponents those of made-up laws."""
+"""Every eye width with every brain: error measures follow their definitions, and fits recover the ceilings and
+exponents of synthetic laws."""
 
 import math
 
@@ -35,7 +36,7 @@ def lived(design, success_rate, fitness=0.0, episodes=10**6):
 
 
 def of_law(law):
-    """Lives in detection whose share of missed episodes is law(acuity, units)."""
+    """Training runs in detection whose fraction of missed episodes is law(acuity, units)."""
     mine = [design for design in designs() if design.task == "detection"]
     return [lived(design, 1 - law(design.width / 90, design.neurons)) for design in mine]
 
@@ -47,7 +48,9 @@ def test_every_brain_has_every_eye_in_every_task():
     assert len(asked) == len(set(asked)) == len(EYES) * len(WIDTHS) * len(BRAINS) * len(SEEDS)
     assert {design.height for design in asked if design.task == "navigation"} == {1}
     assert all(design.height == design.width for design in asked if design.task != "navigation")
-    assert {design.seed for design in every[: len(asked) // len(SEEDS)]} == {SEEDS[0]}, "one life of each first"
+    assert {design.seed for design in every[: len(asked) // len(SEEDS)]} == {SEEDS[0]}, (
+        "the first seed of every design comes first"
+    )
     assert all(design.height == design.width for design in control_of(every))
     assert asked[0].animal.encoder == math.ceil(asked[0].neurons / 4)
 
@@ -67,13 +70,14 @@ def test_a_shortfall_is_between_the_worst_and_the_best_life():
 
 @pytest.mark.parametrize(("least", "found"), [(1, 1), (16, 16), (1000, None)])
 def test_the_brain_that_fine_eyes_need(least, found):
-    """Error falls with acuity for those that are large enough; one of 4 units by less than half."""
+    """Error falls with acuity for brains that are large enough; with 4 units it falls by less than half."""
     lives = of_law(lambda acuity, units: 0.01 / acuity if units >= least else 0.9 - 0.3 * acuity * (units == 4))
     assert needed(lives) == found
 
 
 def test_a_brain_whose_coarsest_eyes_fail_by_themselves_gains_nothing():
-    """Of 4 units from .99 to .48, where other brains miss .7 with the coarsest: not half of that."""
+    """The error falls from 0.99 to 0.48 with 4 units, but other brains miss 0.7 with the coarsest eyes, and 0.48 is
+    more than half of that."""
     lives = of_law(lambda acuity, units: (0.99 - 0.51 * (acuity > 0.2)) if units == 4 else 0.7 - 0.6 * (acuity > 0.2))
     assert needed(lives) == 16
 
@@ -81,14 +85,14 @@ def test_a_brain_whose_coarsest_eyes_fail_by_themselves_gains_nothing():
 @pytest.mark.parametrize(
     ("least", "navigates", "message"),
     [
-        (16, 16, "Fine eyes pay only for brains that are large enough"),
+        (16, 16, "Finer eyes are better only with a sufficiently large brain"),
         (
             16,
             1000,
-            "Fine eyes pay only for brains that are large enough; not in navigation, where finer eyes are lower",
+            "Finer eyes are better only with a sufficiently large brain; not in navigation, where finer eyes are lower",
         ),
-        (1, 1000, "What acuity is worth to brains of each size"),
-        (1000, 1000, "What acuity is worth to brains of each size"),
+        (1, 1000, "Error over acuity for brains of each size"),
+        (1000, 1000, "Error over acuity for brains of each size"),
     ],
 )
 def test_the_figure_says_what_the_lives_do(least, navigates, message):
@@ -135,7 +139,8 @@ def test_the_best_brain_of_each_eye_is_found():
 
 
 def test_exponents_of_a_law_are_found():
-    """Error falls with acuity, and with a brain up to 16 units: the best brains show the exponent of acuity alone."""
+    """Error falls with acuity, and with brain size up to 16 units: the best brains show the exponent of acuity
+    alone."""
     rows = of_law(lambda acuity, units: 0.02 * acuity**-0.4 * min(units, 16) ** -0.1)
     law = frontier(rows, missed)
     assert law.exponents[0].mean == pytest.approx(0.4, abs=1e-4)

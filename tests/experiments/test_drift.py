@@ -1,4 +1,4 @@
-"""The null model of a search, and the p of runs under it."""
+"""The null model of a search, and p values of runs under it."""
 
 from dataclasses import replace
 
@@ -11,7 +11,7 @@ from evolve.search.null_model import FIRST_SEED
 from evolve.search.search import Search
 from experiments.candidates import Row
 from experiments.drift import Drift, _row, drifted, of_the_end
-from experiments.evolved import Conduct, Store, null_table
+from experiments.evolved import RunMetadata, Store, null_table
 from experiments.store import Origin
 
 SEARCHES = 60
@@ -32,22 +32,22 @@ def test_random_fitness_moves_genes_that_are_open_and_no_others():
     )
     quantities = {"fov": lambda row: row.fov_deg, "up": lambda row: row.height, "fitness": lambda row: row.fitness}
     drift = drifted(config, "navigation", quantities, 4)
-    assert {one.quantity for one in drift} == {"fov", "up"}, "nobody lived"
+    assert {one.quantity for one in drift} == {"fov", "up"}, "the null model has no fitness"
     *fov, end = (one for one in drift if one.quantity == "fov")
     assert [one.generation for one in fov] == [0, 1, 2, 3]
     assert all(one.low < one.median < one.high for one in fov)
-    assert fov[0].high - fov[0].low < fov[3].high - fov[3].low, "searches part"
-    assert fov[0].low < 45 < fov[0].high, "from the same start"
+    assert fov[0].high - fov[0].low < fov[3].high - fov[3].low, "searches diverge"
+    assert fov[0].low < 45 < fov[0].high, "all searches start at the same value"
     assert fov[1].low < end.median < fov[3].high
     assert len(end.ends.split()) == SEARCHES
     held = [one for one in drift if one.quantity == "up"]
     assert all(one.held for one in held)
-    assert str(held[-1]) == "held at 1"
+    assert str(held[-1]) == "fixed at 1"
 
 
 @pytest.mark.slow
 def test_every_phase_has_an_end():
-    """Of its own generations alone: three of one, though there are only two before the second begins."""
+    """Each end covers only the generations of its phase: the last three, though the first phase has only two."""
     config = assemble(preset="lens", assignments=("genome.doe.opens_at=2", "genome.refractive_index.opens_at=2"))
     drift = drifted(config, "lens", {"a": lambda row: row.relative_aperture, "n": lambda row: row.refractive_index}, 6)
     ends = {(one.quantity, one.generation): one for one in drift if one.ends}
@@ -65,20 +65,21 @@ def test_p_counts_searches_that_came_as_far_on_either_side():
 
 
 def test_runs_that_agree_have_a_smaller_p_than_one():
-    """A null model uniform in [0, 1]: the mean of two draws is triangular, and a mean m has p = 2 x 2 m²."""
+    """For a null model uniform in [0, 1], the mean of two draws is triangular, and a mean m has p = 2 x 2 m²."""
     end = Drift("a", "x", 5, 0.0, 0.5, 1.0, " ".join(f"{(i + 0.5) / 1000:.4f}" for i in range(1000)))
-    assert end.p(0.1, 0.1) == pytest.approx(4 * 0.1**2, rel=0.15), "three standard errors of so many draws"
+    assert end.p(0.1, 0.1) == pytest.approx(4 * 0.1**2, rel=0.15), "three standard errors of this number of draws"
     assert end.p(0.1) == pytest.approx(2 * 0.1, rel=0.02)
-    assert end.p(0.05, 0.95) == pytest.approx(1.0, abs=0.03), "runs that part cancel each other"
-    assert end.p(-1.0, -1.0) == pytest.approx(2 / 1001), "no smaller than so many searches allow"
+    assert end.p(0.05, 0.95) == pytest.approx(1.0, abs=0.03), "runs in opposite directions cancel"
+    assert end.p(-1.0, -1.0) == pytest.approx(2 / 1001), "p is at least 2 / (number of searches + 1)"
 
 
 def test_runs_are_compared_where_the_null_model_was_computed():
-    """The run that went further has its p; one that stopped earlier would be compared with more drift than it had."""
+    """The longer run has its p value. The run that stopped earlier has none, because the null model has drifted for
+    longer."""
     rows = [
         replace(ROW, seed=seed, generation=g, fov_deg=10.0) for seed, last in ((0, 5), (1, 3)) for g in range(last + 1)
     ]
-    conduct = [Conduct("a", seed, 6, n, 6, 1.0, "", 0.01, 1e-4) for seed, n in ((0, 6), (1, 4))]
+    conduct = [RunMetadata("a", seed, 6, n, 6, 1.0, "", 0.01, 1e-4) for seed, n in ((0, 6), (1, 4))]
     drift = [Drift("a", "fov", 5, 20.0, 45.0, 80.0, "20 45 80"), Drift("a", "fov", 5, 20.0, 45.0, 80.0)]
     store = Store(rows, conduct, drift, Origin.here(1.0), "")
     table = null_table(store, {"fov": lambda row: row.fov_deg}).splitlines()
@@ -95,7 +96,8 @@ def test_ties_are_ties_although_ends_have_six_digits():
 
 
 def test_ends_are_means_over_candidates_as_those_of_runs_are(monkeypatch):
-    """A quantity that few candidates have: generations count by how many have it, as in `last_values`."""
+    """For a quantity that few candidates have, generations are weighted by their number of such candidates, as in
+    `last_values`."""
     monkeypatch.setattr("experiments.drift.SEEDS", 3)
     config = assemble("detection", "bifurcation-detection", assignments=("search.generations=3",))
     some = {"several": lambda row: row.placement_range_deg if row.n_eyes > 1 else float("nan")}

@@ -1,4 +1,4 @@
-"""Runs become rows, rows means with intervals, power laws and pages."""
+"""Runs become rows; rows become means with intervals, power laws and pages."""
 
 import math
 from dataclasses import replace
@@ -18,7 +18,7 @@ from evolve.store.directory import Run
 from evolve.store.evaluation import Evaluation
 from experiments import bending_light, brains_and_acuity, goals_shape_eyes, learning_through_holes
 from experiments.candidates import Row, full_return, parameters, rows_of
-from experiments.evolved import Conduct, Store, main
+from experiments.evolved import RunMetadata, Store, main
 from experiments.glass import relief_of
 from experiments.means import last_mean
 from experiments.store import Origin, write_rows
@@ -36,14 +36,18 @@ PHASES = (*SMALL, "genome.doe.opens_at=1", "genome.refractive_index.opens_at=1")
 
 
 def run_of(path, preset, settings, fitness):
-    """A run whose candidates were never trained; fitness None: that one failed."""
+    """A run whose candidates were never trained; fitness None marks a failed candidate."""
     config = assemble(preset=preset, assignments=settings)
     run = Run.create(path, config)
     start = Genotype(config.genome).start
     for identity, value in enumerate(fitness):
         outcome = Evaluation.failed("too weak") if value is None else Evaluation(value, (value,) * 4, 0.25, 10, 1.0)
         genome = np.clip(start + 0.01 * identity, 0, 1)
-        run.append(Candidate.of(Place.of(identity, 2), tuple(genome), develop(genome, config), identity, outcome))
+        run.append(
+            Candidate.from_evaluation(
+                Place.from_id(identity, 2), tuple(genome), develop(genome, config), identity, outcome
+            )
+        )
     return run
 
 
@@ -86,7 +90,7 @@ def test_the_best_of_each_generation_is_looked_through(tmp_path):
     assert [row.phase for row in rows] == [0, 0, 1, 1]
     best = rows[1]
     assert 0 < best.image_quality < best.above_noise < 1
-    assert best.above_noise == pytest.approx(best.above_noise_of_hole, rel=0.05), "a relief that is nearly flat"
+    assert best.above_noise == pytest.approx(best.above_noise_of_hole, rel=0.05), "the relief is nearly flat"
     assert len(best.relief.split()) == 16
 
 
@@ -97,8 +101,8 @@ def test_mean_is_over_the_last_generations_that_succeeded():
 
 
 def test_seeds_that_differ_make_the_interval_wide():
-    """Two seeds, far apart and each of one mind: Student's factor for one degree of freedom is 12.7, and candidates do
-    not count as independent."""
+    """Two seeds with different means and no spread within each: Student's factor for one degree of freedom is 12.7, and
+    candidates are not counted as independent."""
     rows = [replace(ROW, seed=seed, index=i, fitness=1.0 + 2 * seed) for seed in (0, 1) for i in range(50)]
     found = last_mean(rows, lambda row: row.fitness)
     assert found.mean == 2.0
@@ -108,7 +112,7 @@ def test_seeds_that_differ_make_the_interval_wide():
 
 
 def with_error(wanted, size):
-    """A row of this error and size."""
+    """A row with this error and size."""
     episodes = 10_000
     failures = wanted * (episodes + 1) - 0.5
     changes = {"episodes": episodes, "success_rate": 1 - failures / episodes, "memory_frames": 1, "cpd": 1.0}
@@ -122,7 +126,7 @@ def test_exponents_are_of_errors():
         rows = [with_error(*pair) for pair in zip(wanted, sizes, strict=True)]
         store = Store(rows, [], [], Origin.here(1.0), "")
         assert f"| navigation | 4 | {shown} |" in brains_and_acuity.exponents(store)
-        assert "| navigation | - | - | - | - |" in brains_and_acuity.factors(store), "memory and acuity are the same"
+        assert "| navigation | - | - | - | - |" in brains_and_acuity.factors(store), "memory and acuity do not vary"
 
 
 def test_each_factor_has_its_exponent():
@@ -133,11 +137,11 @@ def test_each_factor_has_its_exponent():
         rows.append(replace(with_error(wanted, count), cpd=cpd, memory_frames=frames))
     line = brains_and_acuity.factors(Store(rows, [], [], Origin.here(1.0), "")).splitlines()[-1].split("|")
     found = [float(cell.split()[0]) for cell in line[2:5]]
-    assert found == pytest.approx([0.5, 0.1, 0.0], abs=1e-3), "acuity, parameters, memory"
+    assert found == pytest.approx([0.5, 0.1, 0.0], abs=1e-3), "exponents of acuity, parameters and memory"
 
 
 def test_in_a_maze_what_is_missing_of_a_full_return_is_the_error():
-    """Straight ways of 63 to 67 m at 1.5 per metre, and 10 for the goal."""
+    """Straight paths of 63 to 67 m at 1.5 per metre, plus 10 for the goal."""
     full = full_return("maze")
     assert 1.5 * 63 + 10 < full < 1.5 * 67 + 10
     assert math.isnan(full_return("detection"))
@@ -150,10 +154,10 @@ def test_unfinished_generations_do_not_count(tmp_path):
     assert [row.generation for row in rows] == [0, 0]
     stages = (*SMALL, "search.rungs=2")
     rows = rows_of(run_of(tmp_path / "stages", "bifurcation-detection", stages, (1.0, 2.0)), "detection")
-    assert not rows, "half of the training is not all of it"
+    assert not rows, "candidates trained for half the steps do not count"
     steady = (*SMALL, "search.steady_state=true")
     rows = rows_of(run_of(tmp_path / "steady", "bifurcation-detection", steady, (1.0, 2.0, 30.0)), "detection")
-    assert len(rows) == 3, "one by one, candidates are of no generation"
+    assert len(rows) == 3, "a steady-state search has no generations"
 
 
 def test_runs_of_one_group_differ_in_their_seeds_alone(tmp_path, capsys):
@@ -180,7 +184,7 @@ def test_an_answer_does_not_outlive_its_numbers(tmp_path):
 
 
 def test_variants_are_compared_at_the_same_generations(tmp_path):
-    """A control without a second phase has no first one that lasts as long as both."""
+    """A control without a second phase is compared over both phases of the other group."""
     rows = [
         replace(ROW, group=group, generation=g, phase=int(group == "lens" and g >= 4), relative_aperture=1 - 0.1 * g)
         for group in ("lens", "index1") for g in range(8)
@@ -210,10 +214,10 @@ def test_messages_of_figures_count_pupils_and_lenses():
     ]
     store = Store(rows, [], [], Origin.here(1.0), "")
     assert bending_light.message(store) == (
-        "Alone, 3 of 4 pupils close; where glass may become a lens 1 of 3 open again, where it may not 0 of 1"
+        "In phase I, 3 of 4 pupils close; in phase II, 1 of 3 reopen if a lens is possible, and 0 of 1 if not"
     )
     assert bending_light.message_of_reliefs(store) == (
-        "Where glass may become a lens, it gathers light in 6 of the last 9 animals"
+        "If a lens is possible, glass converges light in 6 of the last 9 animals"
     )
 
 
@@ -230,13 +234,13 @@ def test_fittest_and_least_fit_are_of_the_last_phase():
 
 @pytest.mark.parametrize("side", [4, 7])
 def test_reliefs_of_any_number_of_genes_are_drawn(tmp_path, side):
-    """Heights that rise like the row number rise everywhere and are symmetric, whichever surface joins them."""
+    """Heights that rise with the row number rise everywhere and are symmetric, for either kind of interpolation."""
     rows = np.repeat(np.arange(side) / (side - 1), side)
     heights, _ = relief_heights(Pupil(1.0, relief_of(rows)))
     assert (np.diff(heights, axis=0) > 0).all()
     assert heights.mean() == pytest.approx(0.5)
     failed = [replace(ROW, failed=1, relief="0.5 " * 16, seed=1)]
-    conduct = [Conduct("a", 0, 1, 1, 1, 1.0, "", 0.01, 1e-4)]
+    conduct = [RunMetadata("a", 0, 1, 1, 1, 1.0, "", 0.01, 1e-4)]
     store = Store(
         [replace(ROW, relief=" ".join(map(str, rows)), refractive_index=1.5), *failed],
         conduct,
@@ -262,11 +266,11 @@ def test_pages_come_from_their_stores(experiment, tmp_path, capsys):
     stem = tmp_path / "data" / experiment.NAME
     write_rows(rows, stem.with_suffix(".csv"))
     groups = [(group, seed) for group in ("navigation", "detection") for seed in (3, 4)]
-    runs = [Conduct(*run, 12, 4, 4, 1.0, "abc", 0.01, 1e-4) for run in groups]
+    runs = [RunMetadata(*run, 12, 4, 4, 1.0, "abc", 0.01, 1e-4) for run in groups]
     write_rows(runs, stem.with_name(f"{stem.name}_runs.csv"))
     Origin.here(1.0).write(stem.with_suffix(".json"))
     assert experiment.main(["--docs", str(tmp_path), "--answer", "Partly, because nobody learnt."]) == 0
-    assert experiment.main(["--docs", str(tmp_path)]) == 0, "the answer is kept"
+    assert experiment.main(["--docs", str(tmp_path)]) == 0, "the stored answer is reused"
     text = (tmp_path / f"{experiment.NAME}.md").read_text()
     assert "**Answer.** Partly, because nobody learnt." in text
     for line in text.splitlines():
@@ -286,4 +290,4 @@ def test_what_cannot_be_collected_gets_one_line(tmp_path, capsys):
     assert main("x", "X", page, ["--docs", str(tmp_path), "--runs", "lens"]) == 2
     assert "--runs: must be GROUP=DIR" in capsys.readouterr().err
     assert main("x", "X", page, ["--docs", str(tmp_path), "--runs", "lens=/absent"]) == 2
-    assert "/absent is no run" in capsys.readouterr().err
+    assert "/absent is not a run" in capsys.readouterr().err

@@ -1,4 +1,4 @@
-"""The store of experiments: what is written reads back, and says with what it was made."""
+"""The store of experiments: written rows read back, together with their origin."""
 
 from dataclasses import dataclass
 
@@ -23,7 +23,7 @@ def test_rows_read_back(tmp_path):
 
 def test_no_rows_are_refused_and_what_was_there_stays(tmp_path):
     write_rows([Row("a", 1, 2.0)], tmp_path / "rows.csv")
-    with pytest.raises(ValueError, match="no rows to write"):
+    with pytest.raises(ValueError, match="cannot write an empty table"):
         write_rows([], tmp_path / "rows.csv")
     assert len(read_rows(Row, tmp_path / "rows.csv")) == 1
 

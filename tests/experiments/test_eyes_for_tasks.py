@@ -1,4 +1,4 @@
-"""The same animals in both tasks: what is trained is kept, and the interaction is that of closed forms."""
+"""The same animals in both tasks: finished training runs are stored, and the interaction agrees with closed forms."""
 
 from dataclasses import replace
 
@@ -25,7 +25,7 @@ def lived(design, fitness):
 
 
 def rows(effect, spread=1.0, noises=(BRIGHT,), seed=0):
-    """Lives whose fitness in detection is `effect` higher for cameras, and in navigation as much lower."""
+    """Training runs in which cameras have `effect` more fitness in detection, and `effect` less in navigation."""
     chance, found = np.random.default_rng(seed), []
     for design in with_rows(designs()):
         if design.noise_sigma in noises:
@@ -45,23 +45,24 @@ def test_every_animal_lives_in_both_tasks_and_in_every_light():
 
 
 def test_controls_hold_the_height_and_are_not_mixed_with_rows():
-    """Square eyes of every shape in both tasks, as often in each; a row of the same width is no control."""
+    """The controls are square eyes of every shape, equally often in both tasks; a row of the same width is not a
+    control."""
     square = with_squares(designs())
     counts = [[sum(d.task == t and (d.n_eyes, d.width) == s[:2] for d in square) for s in SHAPES] for t in TASKS]
-    assert counts[0] == counts[1], "navigation and detection"
+    assert counts[0] == counts[1], "navigation and detection have the same controls"
     assert len(designs()) == len(with_rows(designs())) + len(CONTROLS) * len(SEEDS)
 
 
 def test_a_difference_of_rows_alone_is_not_one_of_squares():
-    """Navigators whose rows fail and whose square eyes do not: the confounded crossing finds a difference, the primary
-    one does not."""
+    """Eyes with a single row of receptors fail in navigation and square eyes succeed: the confounded comparison finds
+    a difference, and the primary one does not."""
     chance = np.random.default_rng(0)
     every = [lived(d, (20 if d.height == 1 and d.width == 15 else 120) + chance.normal()) for d in designs()]
     confounded = crossing([row for row in with_rows(every) if row.noise_sigma == BRIGHT], np.random.default_rng(0))
     primary = crossing(with_squares(every), np.random.default_rng(0))
     assert confounded.differences["navigation"].high < -90
     assert abs(primary.differences["navigation"].mean) < 2
-    assert "low, and not" in height_message(every)
+    assert "low, but not" in height_message(every)
     worse = [replace(row, fitness=row.fitness - 100 * (row.height == row.width == 15)) for row in every]
     assert "at any height" in height_message(worse)
     lines = {line.split(" | ")[0]: line.split(" | ")[1:] for line in controls_table(every).splitlines()}
@@ -79,20 +80,20 @@ def test_an_animal_is_what_its_design_says():
 
 
 def test_an_interaction_is_found_and_measured():
-    """Differences of 2 and -2 among lives that differ by 0.3: an interaction of 13 of these, within what 16 degrees of
-    freedom leave of a standard deviation."""
+    """Differences of 2 and -2 among training runs with a standard deviation of 0.3 give an interaction of 13 standard
+    deviations, within the accuracy that 16 degrees of freedom allow for a standard deviation."""
     found = crossing(rows(2.0, spread=0.3), np.random.default_rng(0))
     assert found.differences["detection"].low < 2 < found.differences["detection"].high
     assert found.differences["navigation"].low < -2 < found.differences["navigation"].high
     assert found.interaction.low < 4 / 0.3 < found.interaction.high
-    assert found.interaction.low > 2 * 2.06, "more than a unit that holds the difference itself lets come out"
+    assert found.interaction.low > 2 * 2.06, "larger than a unit that contains the difference itself would allow"
     assert found.p < 1e-3
 
 
 @pytest.mark.parametrize(("lives", "held"), [(6, 0.93), (3, 0.88)])
 def test_intervals_of_the_interaction_hold_it_as_often_as_the_page_says(lives, held):
-    """Of 2000 imitated experiments, to what the page rounds and three standard errors of a binomial; twice as many
-    lives with cameras."""
+    """The coverage in 2000 simulated experiments agrees with the page, up to rounding and three standard errors of a
+    binomial. Cameras have twice the number of training runs."""
     chance, found = np.random.default_rng(0), []
     for _ in range(2000):
         fitness = {
@@ -105,7 +106,7 @@ def test_intervals_of_the_interaction_hold_it_as_often_as_the_page_says(lives, h
 
 
 def test_no_interaction_where_eyes_matter_alike():
-    """One kind of eye is better in both tasks: a main effect is no interaction."""
+    """One kind of eye is better in both tasks: a main effect is not an interaction."""
     alike = [
         replace(row, fitness=row.fitness + 4 * (row.width == 15) * (row.task == "navigation")) for row in rows(2.0)
     ]
@@ -116,7 +117,7 @@ def test_no_interaction_where_eyes_matter_alike():
 
 
 def test_p_is_uniform_where_nothing_matters():
-    """Of 200 experiments without any effect as many have p < 0.1 as should (three standard errors of a binomial)."""
+    """A tenth of 200 experiments without any effect have p < 0.1 (within three standard errors of a binomial)."""
     from unittest import mock
 
     with mock.patch.object(crossing_module, "RESAMPLES", 200):
@@ -136,7 +137,7 @@ def test_what_has_been_trained_is_not_trained_again(tmp_path, capsys):
     capsys.readouterr()
     both = train_all(asked, TINY, path, workers=1)
     assert both[0] == first[0]
-    assert capsys.readouterr().out.count("of 2") == 1, "only the second was trained"
+    assert capsys.readouterr().out.count("of 2") == 1, "only the second design is trained"
     assert Origin.read(path.with_suffix(".json")).whose == "worker"
 
 
@@ -175,7 +176,7 @@ def test_rows_survive_the_file(tmp_path):
 
 
 def test_lives_that_failed_count_for_nothing():
-    """A training that diverged has no fitness: p is that of the others."""
+    """A training run that diverged has no fitness: p is computed from the others."""
     found = rows(0.0, spread=1.0)
     one = next(i for i, row in enumerate(found) if (row.task, row.n_eyes, row.width) == ("detection", 2, 15))
     without = crossing([*found[:one], *found[one + 1 :]], np.random.default_rng(0))
@@ -187,12 +188,12 @@ def test_lives_that_failed_count_for_nothing():
 def test_without_two_lives_of_each_there_is_no_crossing():
     few = [row for row in rows(2.0, spread=0.3) if row.seed == 0 or row.width != 15]
     few = [row for row in few if not (row.width == 15 and row.task == "detection")]
-    with pytest.raises(ValueError, match="a crossing takes 2 lives of each kind of eyes in each task"):
+    with pytest.raises(ValueError, match="needs at least 2 training runs of each kind of eyes in each task"):
         crossing(few, np.random.default_rng(0))
     assert "| σ = 0.01, navigators with rows | - | - | - | - |" in crossings_table(few)
 
 
-@pytest.mark.parametrize(("effect", "message"), [(1.5, "does not turn the order"), (-1.5, "light turns the order")])
+@pytest.mark.parametrize(("effect", "message"), [(1.5, "does not reverse"), (-1.5, "light reverses the order")])
 def test_the_figure_says_whether_less_light_turns_the_answer(effect, message):
     found = rows(2.0, spread=0.3) + rows(effect, spread=0.3, noises=(0.05,), seed=1)
     lights = {

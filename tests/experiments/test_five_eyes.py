@@ -1,4 +1,4 @@
-"""Five stages of an eye: sharper in the order in which they should be, at a tenth of the page's size."""
+"""Five stages of an eye: sharpness increases in the expected order, at a tenth of the page's size."""
 
 import numpy as np
 import pytest
@@ -11,7 +11,7 @@ pytestmark = pytest.mark.slow
 
 @pytest.fixture(scope="module")
 def seen():
-    """Stages' views of black and white stripes, three to a retina."""
+    """Views of black and white stripes through each stage, three stripes to a retina."""
     backend.require()
     with pytest.MonkeyPatch.context() as patch:
         for name, value in {"FINE": 30, "COARSE": 15, "CELLS": 30}.items():

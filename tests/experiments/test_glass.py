@@ -1,4 +1,4 @@
-"""The power of an eye's glass, of that which brings far objects to focus."""
+"""The power of an eye's glass, relative to the power that focuses far objects."""
 
 import math
 from dataclasses import replace
@@ -24,7 +24,7 @@ ANIMAL = Phenotype(
 
 
 def paraboloid(strength, radius, index=1.6):
-    """Genes of the paraxial lens (exactly a patch) of so many times the power that focuses far objects."""
+    """Genes of the paraxial lens (exactly a patch) with `strength` times the power that focuses far objects."""
     distance = EYE.sensor_width / (2 * math.tan(math.radians(FOV) / 2))
     relief = BSplineRelief.paraboloid(0.5, strength / ((index - 1) * distance * EYE.relief_height), radius)
     return tuple(relief.control_points.ravel())
@@ -52,11 +52,11 @@ def test_what_is_no_bowl_has_no_power():
     for relief in (tilt, saddle):
         assert power(replace(ANIMAL, relief=tuple(relief.ravel())), EYE) == pytest.approx(0.0, abs=1e-9)
     for height in (0.0, 0.5, 0.7):
-        assert power(replace(ANIMAL, relief=(height,) * 16, relative_aperture=0.05), EYE) == 0.0, "to the last bit"
+        assert power(replace(ANIMAL, relief=(height,) * 16, relative_aperture=0.05), EYE) == 0.0, "exactly zero"
 
 
 def test_finer_reliefs_and_no_glass():
-    """A paraboloid's heights at the cells' centres make the same lens, but for the spline that goes through them."""
+    """A paraboloid's heights at the cells' centres make the same lens, up to the error of the spline through them."""
     side, radius = 12, 0.5 * 0.4 * EYE.sensor_width
     at = ((np.arange(side) + 0.5) / side * 2 - 1) * radius
     distance = EYE.sensor_width / (2 * math.tan(math.radians(FOV) / 2))
@@ -66,7 +66,7 @@ def test_finer_reliefs_and_no_glass():
 
 
 def test_retinas_as_wide_as_their_receptors_have_the_same_power():
-    """15 receptors of 4 µm are 60 µm of retina, however that was said."""
+    """15 receptors of 4 µm make 60 µm of retina, whichever of the two settings is given."""
     lens = replace(ANIMAL, relief=paraboloid(1.0, 0.5 * 0.4 * EYE.sensor_width))
     pitched, wide = replace(EYE, receptor_pitch=4e-6), replace(EYE, sensor_width=60e-6)
     assert power(lens, pitched) == pytest.approx(power(lens, wide)) != pytest.approx(power(lens, EYE))
@@ -74,7 +74,7 @@ def test_retinas_as_wide_as_their_receptors_have_the_same_power():
 
 @pytest.mark.parametrize("strength", [-0.5, 0.0, 0.8, 1.0])
 def test_paraxial_lens_blurs_by_what_it_falls_short_of_its_power(strength):
-    """Rays through a disk of radius R land on one of radius |1 - P| R, whose root mean square is R / sqrt(2)."""
+    """Rays through a disk of radius R land on a disk of radius |1 - P| R, whose root mean square is R / sqrt(2)."""
     radius = 0.4 * 15 / 2  # in receptors
     lens = replace(ANIMAL, relief=paraboloid(strength, 0.5 * 0.4 * EYE.sensor_width))
     expected = abs(1 - strength) * radius / math.sqrt(2)
@@ -88,5 +88,7 @@ def test_a_prism_moves_a_point_and_does_not_blur_it_more():
     cylinder = (
         np.array(paraboloid(1.0, 0.5 * 0.4 * EYE.sensor_width)).reshape(4, 4).mean(axis=0)[None].repeat(4, axis=0)
     )
-    assert 0.6 < blur(replace(ANIMAL, relief=tuple(cylinder.ravel())), EYE) / blur(flat, EYE) < 0.8, "sqrt(1/2)"
+    assert 0.6 < blur(replace(ANIMAL, relief=tuple(cylinder.ravel())), EYE) / blur(flat, EYE) < 0.8, (
+        "a cylinder leaves sqrt(1/2) of the blur"
+    )
     assert math.isnan(blur(replace(ANIMAL, relief=None, relative_aperture=None, refractive_index=None), EYE))

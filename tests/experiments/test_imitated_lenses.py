@@ -1,4 +1,4 @@
-"""Imitated searches: a landscape through made-up lives is found again, and searches climb it."""
+"""Simulated searches: the fit recovers a fitness landscape from synthetic training runs, and searches climb it."""
 
 import math
 from dataclasses import replace
@@ -20,7 +20,7 @@ RECORD = RECORDS / imitated_lenses.RECORD
 
 @pytest.fixture
 def lives():
-    """Three of each of many eyes, with chance."""
+    """Three noisy training runs for each of many eyes."""
     random = np.random.default_rng(0)
     eyes = [(a, b) for a in np.linspace(0.1, 0.7, 13) for b in np.linspace(0, 3, 11) for _ in range(3)]
     fitness = [float(TRUE.fitness(a, b)) for a, b in eyes]
@@ -31,13 +31,15 @@ def lives():
 
 def test_a_landscape_is_found_again(lives):
     found = fitted(lives)
-    assert found.misfit == pytest.approx(1, abs=0.1), "of 429 lives, the standard deviation is good to 3 %"
+    assert found.misfit == pytest.approx(1, abs=0.1), (
+        "with 429 training runs, the standard deviation is accurate to 3 %"
+    )
     for aperture, blur in ((0.2, 0.0), (0.45, 0.0), (0.45, 1.0), (0.6, 2.5)):
         expected = TRUE.fitness(aperture, blur)
         assert abs(found.fitness(aperture, blur) - expected) < SPREAD[0] + 0.05 * expected
-    assert Check.of(lives, found).correlation > 0.9
+    assert Check.from_runs(lives, found).correlation > 0.9
     shuffled = [replace(life, fitness=other.fitness) for life, other in zip(lives, lives[::-1], strict=True)]
-    assert Check.of(shuffled, found).correlation < 0.3
+    assert Check.from_runs(shuffled, found).correlation < 0.3
 
 
 @pytest.mark.slow
@@ -46,7 +48,7 @@ def test_lives_differ_by_chance_alone():
     drawn = TRUE.lived(animals, EyeConfig(), np.random.default_rng(0))
     expected = float(TRUE.fitness(0.45, 0.0))
     deviation = SPREAD[0] + SPREAD[1] * expected
-    assert drawn.mean() == pytest.approx(expected, abs=0.01 * expected)  # blur is 0 to the pixels' width
+    assert drawn.mean() == pytest.approx(expected, abs=0.01 * expected)  # blur is 0 up to the pixels' width
     assert drawn.std() == pytest.approx(deviation, rel=0.05)
 
 
@@ -56,19 +58,20 @@ def test_lives_of_a_record_are_those_of_its_phases():
     assert len(before) == opening(run.config) * run.config.search.population
     assert len(before) + len(after) == len(run.candidates)
     for life in before:
-        assert life.blur == pytest.approx(life.aperture * 15 / math.sqrt(8), rel=0.01), "of a hole"
+        assert life.blur == pytest.approx(life.aperture * 15 / math.sqrt(8), rel=0.01), "blur of a pinhole"
     assert any(abs(life.blur / (life.aperture * 15 / math.sqrt(8)) - 1) > 0.3 for life in after)
 
 
 @pytest.mark.slow
 def test_searches_climb_what_there_is_to_climb(monkeypatch):
-    """Where nobody differs, nothing is found; where light and sharpness pay, wider pupils with glass near focus."""
+    """The search finds nothing on a flat landscape. If light and sharpness increase fitness, it finds wider pupils with
+    glass near focus."""
     monkeypatch.setitem(imitated_lenses.CASES, "short", ("search.generations=24",))
     ended = [searched("short", 0, land) for land in (TRUE, replace(TRUE, high=0.0))]
     assert ended == [searched("short", 0, land) for land in (TRUE, replace(TRUE, high=0.0))]
     found, lost = ended
     assert 0.7 < found.power < 1.3
-    assert found.blur < 1 < lost.blur  # .2 to .5, and 1.7 to 5, in six searches
+    assert found.blur < 1 < lost.blur  # 0.2 to 0.5, and 1.7 to 5, in six searches
     assert found.fitness > 100
     assert found.strehl > lost.strehl or math.isnan(lost.strehl)
 
@@ -78,9 +81,9 @@ def test_page(tmp_path, lives):
     rows = [searched("3 genes, 18 generations", seed, TRUE) for seed in (0, 1)]
     land = fitted(lives)
     lived = [*lives, Life(0.3, 0.5, 50.0)]
-    told = Told(rows, lived, land, Check.of(lives, land), Origin.here(1.0), "Yes.")
+    told = Told(rows, lived, land, Check.from_runs(lives, land), Origin.here(1.0), "Yes.")
     page(told).publish(tmp_path)
     text = (tmp_path / "imitated_lenses.md").read_text()
     assert "| 3 genes, 18 generations |" in text
-    assert "correlate by" in text
+    assert "r = " in text
     assert (tmp_path / "figures" / "imitated_lenses.png").stat().st_size > 10_000

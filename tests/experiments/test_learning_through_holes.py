@@ -1,4 +1,4 @@
-"""The hole that animals learn best behind: found where it is, and not where there is none."""
+"""The pinhole that gives the best learning: found if there is one, and not found otherwise."""
 
 from dataclasses import replace
 
@@ -7,14 +7,14 @@ import pytest
 
 from experiments import learning_through_holes
 from experiments.candidates import Row
-from experiments.evolved import Conduct, Store
+from experiments.evolved import RunMetadata, Store
 from experiments.store import Origin
 
 ROW = Row(*("a", 0, 0, 0, 0, 0, 1.0, 0.5, 4, 2, 60.0, 45.0, 8, 8, 0.1, 5, 64, 1000))
 
 
 def through_holes(peak, noise, group="0.001"):
-    """Animals whose success falls off on both sides of a width, but for luck."""
+    """Animals whose success falls on both sides of one pupil width, with random noise."""
     chance = np.random.default_rng(1)
     widths = np.linspace(0.05, 0.65, 40)
     success = 0.3 + 0.5 * np.exp(-0.5 * (np.log(widths / peak) / 0.4) ** 2) + noise * chance.normal(size=40)
@@ -25,7 +25,7 @@ def through_holes(peak, noise, group="0.001"):
 @pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("peak", [0.15, 0.25])
 def test_the_best_width_is_found_with_an_interval_that_holds_it(peak):
-    """Animals are spread evenly over a, not over log a, which would move a kernel's mean to the wider side."""
+    """Animals are spread evenly over a, not over log a, which would shift a kernel's mean to the wider side."""
     found, p = learning_through_holes.best_width(through_holes(peak, 0.1))
     assert found.low <= peak <= found.high
     assert found.mean == pytest.approx(peak, rel=0.25)
@@ -36,7 +36,8 @@ def test_the_best_width_is_found_with_an_interval_that_holds_it(peak):
 
 
 def test_curves_do_not_run_away_where_there_are_no_animals():
-    """Of four animals behind narrow holes a resample may hold two, whose line rises without end."""
+    """A resample may hold two of the four animals behind narrow pinholes, and a line through two points can rise
+    without bound."""
     widths = [0.059, 0.069, 0.087, 0.097, *np.linspace(0.25, 0.64, 26)]
     success = [0.17, 0.16, 0.22, 0.09, *(0.5 - 3 * (np.linspace(0.25, 0.64, 26) - 0.34) ** 2)]
     rows = [
@@ -50,15 +51,15 @@ def test_curves_do_not_run_away_where_there_are_no_animals():
 def test_no_width_is_best_where_nothing_is_learnt():
     flat = [replace(row, success_rate=0.33 + 0.1 * np.sin(37.0 * i)) for i, row in enumerate(through_holes(0.2, 0.0))]
     assert learning_through_holes.best_width(flat)[1] > 0.05
-    conduct = [Conduct("0.001", 0, 40, 5, 5, 1.0, "", 0.001, 1e-4)]
-    assert "| nowhere better |" in learning_through_holes.table(Store(flat, conduct, [], Origin.here(1.0), ""))
+    conduct = [RunMetadata("0.001", 0, 40, 5, 5, 1.0, "", 0.001, 1e-4)]
+    assert "| no best width |" in learning_through_holes.table(Store(flat, conduct, [], Origin.here(1.0), ""))
     with pytest.raises(ValueError, match="three animals"):
         learning_through_holes.best_width([replace(row, failed=1) for row in flat])
 
 
 def test_widths_are_held_against_what_is_predicted_for_their_noise():
     rows = [*through_holes(0.2, 0.0), *through_holes(0.2, 0.0, "0.01")]
-    conduct = [Conduct(group, 0, 40, 5, 5, 1.0, "", float(group), 1e-4) for group in ("0.001", "0.01")]
+    conduct = [RunMetadata(group, 0, 40, 5, 5, 1.0, "", float(group), 1e-4) for group in ("0.001", "0.01")]
     bright, dark = learning_through_holes.table(Store(rows, conduct, [], Origin.here(1.0), "")).splitlines()[2:]
     assert [cell.strip() for cell in bright.split("|")[5:9]] == ["0.11", "0.12", "0.21", "0.41"]
     assert [cell.strip() for cell in dark.split("|")[5:9]] == ["0.21", "0.12", "0.21", "0.41"]

@@ -1,4 +1,4 @@
-"""The search for a lens: gradients against differences, searches that get somewhere, and their page."""
+"""The search for a lens: gradients against finite differences, searches that improve, and their page."""
 
 from pathlib import Path
 
@@ -21,14 +21,15 @@ def dr_jit():
 
 
 def blurred():
-    """Genes of a lens of 0.8 times the power it should have."""
+    """Genes of a lens with 0.8 times the power needed for focus."""
     points = BSplineRelief.paraboloid(0.0, 0.8 / (0.5 * lens_optimizers.RETINA), lens_optimizers.RADIUS).control_points
     return np.append(points.ravel() / RELIEF_HEIGHT + 0.8, 0.5)
 
 
 @pytest.mark.parametrize("spot", [None, 6e-6])
 def test_gradient_is_that_of_the_loss(spot):
-    """Central differences over 1e-4 of the genes' range, some relief and index; exact to what the search's PSFs are."""
+    """The reference is a central difference over 1e-4 of the genes' range, for some relief genes and the index; the
+    accuracy is that of the search's PSFs."""
     genome = np.clip(blurred() + 0.005 * np.random.default_rng(0).standard_normal(17), 0, 1)
     _, slope = gradient(genome, spot)
     for place in (5, 10, 16):

@@ -1,4 +1,4 @@
-"""Intervals of means and differences hold the truth as often as they say, also with few seeds."""
+"""Confidence intervals of means and differences have their nominal coverage, also with few seeds."""
 
 import numpy as np
 import pytest
@@ -6,7 +6,7 @@ import pytest
 from experiments.means import difference, mean_of
 
 EXPERIMENTS = 4000
-BINOMIAL = 3 * np.sqrt(0.95 * 0.05 / EXPERIMENTS)  # three standard errors of a share of 0.95
+BINOMIAL = 3 * np.sqrt(0.95 * 0.05 / EXPERIMENTS)  # three standard errors of a fraction of 0.95
 
 
 @pytest.mark.fast_cases(1)
@@ -19,7 +19,8 @@ def test_intervals_over_seeds_hold_the_mean_in_95_of_100(seeds):
 
 @pytest.mark.parametrize("seeds", [2, 3, 6])
 def test_a_bootstrap_over_as_few_seeds_would_be_too_narrow(seeds):
-    """The wrong method, which the test above rejects: with two and three seeds it spans no more than their range."""
+    """The test above rejects this wrong method: with two and three seeds the bootstrap interval spans at most their
+    range."""
     chance = np.random.default_rng(seeds)
     held = []
     for sample in chance.normal(size=(1000, seeds)):
@@ -30,7 +31,8 @@ def test_a_bootstrap_over_as_few_seeds_would_be_too_narrow(seeds):
 
 
 def test_intervals_of_differences_hold_them_where_spreads_differ():
-    """Welch's degrees of freedom are an approximation: half a percent is left to it beside the binomial error."""
+    """Welch's degrees of freedom are an approximation, so half a percent is allowed in addition to the binomial
+    error."""
     chance = np.random.default_rng(0)
     drawn = [(3 * chance.normal(size=6), chance.normal(size=12)) for _ in range(EXPERIMENTS)]
     held = [one.low < 0 < one.high for one in (difference(*both) for both in drawn)]
@@ -44,5 +46,5 @@ def test_a_difference_has_the_sign_of_the_first_sample():
 
 def test_one_value_has_no_interval():
     assert str(mean_of(np.array([3.0]))) == "3"
-    with pytest.raises(ValueError, match="two values or more"):
+    with pytest.raises(ValueError, match="at least two values"):
         difference(np.ones(1), np.ones(3))

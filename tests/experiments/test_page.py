@@ -1,4 +1,4 @@
-"""Pages of results: templates that are filled in, with a place for everything and nothing left open."""
+"""Pages of results: templates are filled in completely, and every value has a place."""
 
 import re
 from pathlib import Path
@@ -48,7 +48,8 @@ def test_published_page_stands_beside_its_figures(tmp_path):
 
 
 def test_five_eyes_says_what_its_template_says(monkeypatch):
-    """Its numbers come from pictures, which are not stored: all but the numbers and their origin."""
+    """The page's numbers come from renderings that are not stored, so the comparison leaves out the numbers and their
+    origin."""
     monkeypatch.undo()
     view = five_eyes.View(None, None, 1.0, 1.0, 1.0, 1.0)
     made = five_eyes.page([view] * len(five_eyes.STAGES), view, Origin.here(1.0)).markdown

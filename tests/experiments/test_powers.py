@@ -1,4 +1,4 @@
-"""Power laws: exact ones are found, and intervals hold the truth as often as they say."""
+"""Power laws: exact laws are recovered, and intervals have their nominal coverage."""
 
 import numpy as np
 import pytest
@@ -19,8 +19,8 @@ def test_exact_powers_are_found():
 
 @pytest.mark.slow
 def test_intervals_hold_the_truth_as_often_as_they_say():
-    """Of 100 laws of 40 candidates, 95 in theory; a bootstrap of pairs is a little too narrow. 3.3 standard deviations
-    of a count below 93."""
+    """Theory gives 95 of 100 laws of 40 candidates; a bootstrap of pairs is slightly too narrow. The limit is 3.3
+    standard deviations of a count below 93."""
     chance = np.random.default_rng(1)
     held = 0
     for seed in range(100):
@@ -32,7 +32,7 @@ def test_intervals_hold_the_truth_as_often_as_they_say():
 
 @pytest.mark.slow
 def test_spread_is_what_is_not_explained():
-    """Half of the variance is the size's, half is not."""
+    """The size explains half of the variance."""
     chance = np.random.default_rng(2)
     x, noise = chance.standard_normal((2, 20_000))
     assert power_law(np.exp(-x + noise), np.exp(x)).explained == pytest.approx(0.5, abs=0.02)
@@ -43,8 +43,8 @@ def test_spread_is_what_is_not_explained():
     [
         ([0.5, 0.4, 0.3], [[1, 1, 1]], "at least 3"),
         ([0.5, 0.4, 0.3, 0.2], [[1, 2, 3, 4], [2, 4, 6, 8]], "following"),
-        ([0.5, 0.5, 0.5, 0.5], [[1, 2, 3, 4]], "all the same"),
-        ([0.5, 0.0, 0.3, 0.4], [[1, 2, 3, 4]], "above 0"),
+        ([0.5, 0.5, 0.5, 0.5], [[1, 2, 3, 4]], "all equal"),
+        ([0.5, 0.0, 0.3, 0.4], [[1, 2, 3, 4]], "must be positive"),
     ],
 )
 def test_what_has_no_power_law_is_refused(errors, sizes, message):

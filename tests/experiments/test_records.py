@@ -1,4 +1,4 @@
-"""Records of runs that are kept in the repository: what pages say can be made from them again, and they can go on."""
+"""Records of runs stored in the repository: they reproduce the statements of the pages, and the runs can be resumed."""
 
 import csv
 import importlib
@@ -55,7 +55,7 @@ class NobodyThere(Exception):
 
 
 class Nobody:
-    """An executor that has nobody to evaluate anything, watched by nobody."""
+    """An executor that evaluates nothing, and a progress display that shows nothing."""
 
     training = evaluated = None
 
@@ -68,7 +68,7 @@ class Nobody:
 @pytest.mark.fast_cases(3)
 @pytest.mark.parametrize("record", RUNS, ids=lambda path: path.name)
 def test_search_still_proposes_what_is_on_record(record, tmp_path):
-    """So that a record goes on where it ends: the loop asks for the first animal that is missing, and for no other."""
+    """A recorded run can be resumed: the loop requests exactly the first missing animal."""
     run = Run.open(shutil.copytree(record, tmp_path / "run"))
     if finished(run):
         evolve(run, Nobody(), Nobody())
@@ -76,7 +76,7 @@ def test_search_still_proposes_what_is_on_record(record, tmp_path):
         with pytest.raises(NobodyThere):
             evolve(run, Nobody(), Nobody())
     search = run.config.search
-    cma = search.optimizer == "CMA"  # a quasi-random search has no step, and in one dimension no chance
+    cma = search.optimizer == "CMA"  # a quasi-random search has no step size and, in one dimension, no randomness
     other = replace(search, sigma=0.9 * search.sigma) if cma else replace(search, optimizer="CMA")
     (run.path / "config.toml").write_text(to_toml(replace(run.config, search=other)))
     with pytest.raises(RunError):
@@ -86,7 +86,7 @@ def test_search_still_proposes_what_is_on_record(record, tmp_path):
 @pytest.mark.slow
 @pytest.mark.parametrize("page", PAGES)
 def test_pages_hold_what_is_on_record(page, tmp_path, monkeypatch):
-    """Optical measures of each run's last generation alone: one eye takes seconds."""
+    """Optical measures are checked for each run's last generation only, because one eye takes seconds."""
     runs = [(group, Run.open(RECORDS / name)) for group, names in PAGES[page].items() for name in names]
     late = {id(c.phenotype) for _, run in runs for c in run.generation(complete(run)[-1])}
     seen = candidates._seen
@@ -98,8 +98,8 @@ def test_pages_hold_what_is_on_record(page, tmp_path, monkeypatch):
         left_out = OPTICAL if one["strehl"] == "nan" else ()
         exact, measured = (set(one) - set(OPTICAL), set(OPTICAL) - set(left_out))
         assert {name: one[name] for name in exact} == {name: other[name] for name in exact}
-        # What optics finds of an eye may move within what the eye promises of its kernel, 1e-2, when a cheaper way is
-        # found; a fifth of that tells neighbours in a generation apart.
+        # Optical measures of an eye may change within the tolerance of its kernel, 1e-2, if a cheaper method is found.
+        # A fifth of that distinguishes neighbours in a generation.
         found_of, stored_of = ({name: float(row[name]) for name in measured & row.keys()} for row in (one, other))
         assert found_of == pytest.approx(stored_of, rel=2e-3, nan_ok=True)
     looked_at = sum(row["strehl"] != "nan" for row in found)

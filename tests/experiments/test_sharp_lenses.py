@@ -1,4 +1,5 @@
-"""Lenses of every power: glass is what its design says, and what sharpness is worth is that of made-up lives."""
+"""Lenses of every power: the glass follows its design, and the measured benefit of sharpness is that of the synthetic
+training runs."""
 
 import math
 
@@ -17,7 +18,7 @@ def lived(design, fitness):
 
 
 def lives(fitness_of):
-    """fitness_of: a lens's Strehl ratio and power -> fitness, with a little chance."""
+    """Synthetic training runs with a little noise; fitness_of: a lens's Strehl ratio and power -> fitness."""
     random = np.random.default_rng(0)
     return [
         lived(d, fitness_of(lens_of(d.relative_aperture, d.glass_power).strehl, d.glass_power) + random.normal())
@@ -51,15 +52,15 @@ def test_lenses_are_sharpest_in_focus():
 
 
 def test_what_sharpness_is_worth():
-    """Twenty for who is sharp, of a fitness that is otherwise that of contrast alone, or nothing."""
+    """Sharp lenses have 20 more fitness in one case and none in the other; the rest of the fitness is constant."""
     paid, unpaid = lives(lambda strehl, _: 100 + 20 * (strehl > SHARP)), lives(lambda *_: 100)
     for aperture in APERTURES:
         found, nothing = worth(paid, aperture), worth(unpaid, aperture)
         assert found.low < 20 < found.high
         assert found.low > 18
         assert nothing.low < 0 < nothing.high
-    assert "worth more" in _message(paid)
-    assert "what sharpness adds is lost" in _message(unpaid)
+    assert "higher fitness" in _message(paid)
+    assert "no significant effect" in _message(unpaid)
 
 
 @pytest.mark.slow
@@ -74,5 +75,5 @@ def test_page(tmp_path):
     page(rows, Origin.here(1.0, "worker"), "Yes.").publish(tmp_path)
     text = (tmp_path / "sharp_lenses.md").read_text()
     assert "| 0.45 | 1 | 0.982 | 0.95 |" in text
-    assert "live 4 lives" in text
+    assert "4 independent training runs" in text
     assert (tmp_path / "figures" / "sharp_lenses.png").stat().st_size > 10_000

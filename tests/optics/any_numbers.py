@@ -1,4 +1,4 @@
-"""What tests draw inputs from, odd ones among them, and what a refusal is."""
+"""Strategies from which tests draw inputs, odd ones included, and a check of refusals."""
 
 import math
 import os
@@ -19,7 +19,7 @@ def logarithmic(low, high):
 
 
 def or_odd(usual):
-    """Mostly the usual, now and then what nobody should ask for."""
+    """Mostly usual values, sometimes values that no user should pass."""
     odd = st.sampled_from([0.0, -1e-6, math.nan, math.inf, -math.inf, 1e-300, 1e-16, 1e16, 1e300])
     return st.one_of(*[usual] * 8, odd)
 

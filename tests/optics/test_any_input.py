@@ -1,6 +1,6 @@
-"""Whatever is asked of `psf`: a finite answer within its predicted error, or one line. Nothing else.
+"""A call of `psf` with arbitrary arguments gives a finite answer within its predicted error, or a one-line error.
 
-OPTICS_EXAMPLES=20 python -m pytest --all tests/optics/test_any_input.py     tries twenty times as many inputs
+OPTICS_EXAMPLES=20 python -m pytest --all tests/optics/test_any_input.py     tries 20 times the inputs
 """
 
 import math
@@ -82,7 +82,7 @@ def reliefs(draw):
 
 @st.composite
 def requests(draw, radius=(3e-7, 5e-5)):
-    """pupil and arguments of `psf`, all sensible each by itself."""
+    """The pupil and arguments of `psf`, each sensible on its own."""
     pupil = {
         "aperture_radius": draw(logarithmic(*radius)),
         "height": draw(reliefs()),
@@ -109,10 +109,10 @@ def requests(draw, radius=(3e-7, 5e-5)):
 
 
 def answer(pupil, asked):
-    """The result, or None where the request is refused in one line."""
+    """The result, or None if the request is refused in one line."""
     try:
         return optics.psf(Pupil(**pupil), **asked)
-    except ValueError as error:  # AccuracyError is one
+    except ValueError as error:  # AccuracyError is a subclass
         only_one_line(error)
         return None
 
@@ -127,7 +127,7 @@ def sane(result, asked):
 
 
 def too_dear(pupil, asked, most=0.1):
-    """Whether it would take long; a refusal is not dear."""
+    """Return whether the request would take long; a refusal counts as fast."""
     try:
         made = Pupil(**pupil)
         arguments = {name: value for name, value in asked.items() if name != "wavelengths"}
@@ -155,8 +155,8 @@ def test_any_psf_is_within_its_predicted_error(request_):
         for got, true, plan in zip(result.psf, reference.psf, result.plans, strict=True):
             error = relative_l2(got, true)
             assert error <= asked["tolerance"] + exact["tolerance"]
-            # An error may be three times what was predicted from 40 points (psf_error_prediction). Far below the
-            # tolerance the ratio may be larger, because only chance decides how much is left.
+            # An error may be three times the prediction from 40 points (psf_error_prediction). Far below the tolerance
+            # the ratio may be larger, because only chance decides the size of the error.
             assert error <= max(3 * plan.predicted_error, 0.01 * asked["tolerance"]) + exact["tolerance"]
 
 
@@ -182,7 +182,7 @@ LENGTHS = ("sensor_distance", "source_distance", "dx", "tolerance")
 @examples(100)
 @given(requests(radius=(3e-7, 1e-5)), st.data())
 def test_odd_arguments_end_in_one_line_or_in_a_sane_answer(request_, data):
-    """One argument at a time is what nobody should ask for."""
+    """Only one argument at a time has an odd value."""
     pupil, asked = request_
     name = data.draw(st.sampled_from([*NAMES, *LENGTHS, "wavelengths", "source_angle", "height", "shape", "centre"]))
     odd = data.draw(or_odd(st.floats(1e-9, 10)))

@@ -1,6 +1,6 @@
-"""Whatever is asked of `propagate`: a finite answer within its predicted error, or one line. Nothing else.
+"""A call of `propagate` with arbitrary arguments gives a finite answer within its predicted error, or a one-line error.
 
-OPTICS_EXAMPLES=20 python -m pytest --all tests/optics/test_any_propagation.py     tries twenty times as many inputs
+OPTICS_EXAMPLES=20 python -m pytest --all tests/optics/test_any_propagation.py     tries 20 times the inputs
 """
 
 import math
@@ -38,7 +38,7 @@ def fields(draw):
 
 @st.composite
 def smooth_fields(draw):
-    """Tilted spots that fit their samples, in space and in frequency, so that u's own sampling is no error."""
+    """Tilted spots that fit their samples, in space and in frequency, so that u's own sampling adds no error."""
     height, width = draw(st.integers(28, 36)), draw(st.integers(28, 36))
     y, x = np.arange(height) - height // 2, np.arange(width) - width // 2
     waist = draw(st.floats(2.8, 3.0))
@@ -49,7 +49,7 @@ def smooth_fields(draw):
 
 def brute_force(u, dx, wavelength, distance, out_dx, out_shape):
     """The samples' sinc interpolant by its own definition: ∫ Û(f) H(f) e^{2πi f·x} df over the samples' band by
-    Gauss-Legendre, evanescent part decaying. Written out, so that nothing repeats and nothing wraps around."""
+    Gauss-Legendre, with a decaying evanescent part. It is written out, so that nothing repeats or wraps around."""
     band = 0.5 / dx
     reach = abs(distance) / wavelength + (max(u.shape) * dx + max(out_shape) * out_dx) / wavelength
     count = int(60 + 8 * reach * min(1, band * wavelength))
@@ -66,7 +66,7 @@ def brute_force(u, dx, wavelength, distance, out_dx, out_shape):
 @examples(60)
 @given(smooth_fields(), st.floats(0.01, 40), logarithmic(1e-4, 0.3), st.sampled_from(["float32", "float64"]), st.data())
 def test_any_field_propagates_within_its_predicted_error(field, waves, tolerance, dtype, data):
-    u, pitch = field  # at least 0.75 λ: then no frequency is beyond 1/λ, where the integrand has a branch point
+    u, pitch = field  # at least 0.75 λ, so that no frequency exceeds 1/λ, where the integrand has a branch point
     wavelength = data.draw(st.floats(*WAVELENGTHS))
     dx, distance = pitch * wavelength, waves * wavelength
     asked = {"wavelength": wavelength, "dx": dx, "distance": distance, "tolerance": tolerance, "dtype": dtype}

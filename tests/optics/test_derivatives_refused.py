@@ -1,4 +1,4 @@
-"""What carries no derivative says so: none is dropped in silence."""
+"""Functions without derivatives report this: none is dropped without an error."""
 
 import drjit as dr
 import numpy as np
@@ -117,14 +117,14 @@ DROPPED = {
 
 @pytest.mark.parametrize("name", DROPPED)
 def test_it_is_refused(name):
-    with pytest.raises(ValueError, match=r"asks for a derivative, which it does not carry") as error:
+    with pytest.raises(ValueError, match=r"requires a derivative, but none is propagated") as error:
         DROPPED[name]()
     assert str(error.value).startswith(name.split(" of ")[0].removesuffix("s"))
 
 
 def test_torch_asks_too():
     torch = pytest.importorskip("torch")
-    with pytest.raises(ValueError, match="inner asks for a derivative"):
+    with pytest.raises(ValueError, match="inner requires a derivative"):
         optics.Annulus(torch.tensor(0.5, requires_grad=True))
 
 
@@ -143,7 +143,7 @@ def test_plain_arrays_of_drjit_are_numbers():
     ids=["radius", "focal length", "coefficient", "waist"],
 )
 def test_torch_asks_in_vain_where_drjit_is_carried(make):
-    """PyTorch's derivatives would be dropped: `optics.torch` takes what it carries."""
+    """PyTorch's derivatives would be dropped; `optics.torch` accepts its tensors."""
     torch = pytest.importorskip("torch")
-    with pytest.raises(ValueError, match="asks for a derivative, which it does not carry"):
+    with pytest.raises(ValueError, match="requires a derivative, but none is propagated"):
         make(torch.tensor(1e-5, dtype=torch.float64, requires_grad=True))

@@ -1,4 +1,5 @@
-"""Every argument of the public face, given what it is not: an answer, or one line of our own. Nothing else."""
+"""Every argument of the public interface, with values of the wrong kind: an answer, or a one-line error of this
+project."""
 
 import math
 
@@ -21,7 +22,7 @@ PICTURE = {
 }
 SOURCE = {"source_distance": math.inf, "source_angle": (0.0, 0.0), "centre": (0.0, 0.0)}
 
-# Valid calls. They are so small that hundreds of variants take seconds.
+# Valid calls, small enough that hundreds of variants take seconds.
 SHAPES = {
     "Annulus": {"inner": 0.3},
     "Disk": {"radius": 0.3, "centre": (0.0, 0.1)},
@@ -160,7 +161,7 @@ def test_any_argument(name):
 
 
 def test_nothing_of_the_face_is_forgotten():
-    """What is left out is made by optics itself, or takes what is tried here."""
+    """Omitted names are results of optics itself, or take the same arguments as names that are tested here."""
     made = {"AccuracyError", "BackendError", "MTF", "Mode", "PSFBatch", "PSFResult", "Plan", "PropagationResult"}
     made |= {"ExitPupil", "SpectralBands", "StackResult", "VectorFocus", "WhitePSF", "Relief", "Circle", "Combined"}
     like_others = {

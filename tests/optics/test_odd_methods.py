@@ -1,4 +1,5 @@
-"""Arguments of methods, given what they are not: an answer, or one line of our own. See `test_odd_arguments`."""
+"""Arguments of methods, with values of the wrong kind: an answer, or a one-line error of this project. See
+`test_odd_arguments`."""
 
 from functools import cache
 
@@ -48,7 +49,7 @@ def noise():
     return np.random.default_rng(0)
 
 
-# A method, bound, and a valid call of it; made when it is its turn.
+# A bound method and a valid call of it, created when the test runs.
 CALLS = {
     "AppositionEye.contrast": lambda: (facets().contrast, {"cycles_per_degree": 0.1, "azimuth_deg": 0.0} | GREEN),
     "AppositionEye.field": lambda: (facets().field, GREEN),
@@ -119,7 +120,7 @@ def test_any_argument(name):
 
 @pytest.mark.parametrize("odd", [None, "many", 0, 1.5, np.zeros((2, 2))])
 def test_zones_of_the_field(odd):
-    """Apart from the others: "auto" and two zones take seconds."""
+    """This is a separate test, because "auto" and two zones take seconds."""
     with pytest.raises(ValueError, match=r"field_zones = .*: must be"):
         eye().sight(2, field_zones=odd)
 

@@ -24,8 +24,8 @@ def test_values_are_those_of_psf():
 @pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("shape", [(4, 4), (7, 7)])
 def test_gradients_equal_central_differences(shape):
-    """float64: differences of h = 1e-10 m carry 1e-9/1e-4 of rounding, hence 1e-4 of the largest gradient. What the
-    method errs by, both sides err by: the tolerance need not be as small."""
+    """float64: differences of h = 1e-10 m have 1e-9/1e-4 of rounding, hence 1e-4 of the largest gradient. The method's
+    own error is the same on both sides, so the tolerance need not be that small."""
     rng = np.random.default_rng(1)
     points, weight = rng.random(shape) * 1e-6, torch.tensor(rng.random((1, 21, 17)))
 
@@ -51,7 +51,7 @@ def test_gradients_equal_central_differences(shape):
 
 @pytest.mark.slow
 def test_a_lens_is_learnt_by_adam():
-    """From a weak lens to the focus: an image loss in torch, the optics in Dr.Jit."""
+    """The lens improves from a weak lens to the focus: an image loss in torch, the optics in Dr.Jit."""
     weak = 0.5 * BSplineRelief.paraboloid(0.0, 1 / (0.5 * 150e-6), 12e-6).control_points
     lens = optics.torch.PointSpread(12e-6, heights=torch.tensor(weak), unit=0.1e-6, **VIEW)
     x, y = (torch.arange(n) - n // 2 for n in (17, 21))
@@ -77,9 +77,9 @@ def test_errors_pass_through():
         optics.torch.psf(np.zeros((4, 4)), radius=1e-5, **VIEW)
     with pytest.raises(ValueError, match=r"heights = .*must be a kind of Tensor"):
         optics.torch.PointSpread(1e-5, heights=np.zeros((4, 4)), **VIEW)
-    with pytest.raises(ValueError, match=r"field: is `optics.psf`'s alone"):
+    with pytest.raises(ValueError, match=r"field: only `optics.psf` returns it"):
         optics.torch.psf(torch.zeros(4, 4), radius=1e-5, field=True, **VIEW)
-    with pytest.raises(AccuracyError, match="float32 carries"):
+    with pytest.raises(AccuracyError, match="float32 allows"):
         optics.torch.psf(torch.zeros(4, 4), radius=1e-5, tolerance=1e-8, **VIEW)
 
 
@@ -87,7 +87,7 @@ def test_a_gpu_that_torch_cannot_use_is_refused(monkeypatch):
     monkeypatch.setenv(device.VARIABLE, "cuda")
     monkeypatch.setattr(device, "has_gpu", lambda: True)
     monkeypatch.setattr(torch.cuda, "is_available", lambda: False)
-    with pytest.raises(optics.BackendError, match="RHABDOM_DEVICE asks for a GPU, and this torch has none"):
+    with pytest.raises(optics.BackendError, match="RHABDOM_DEVICE requires a GPU, but this torch has none"):
         optics.torch.psf(torch.zeros(4, 4), radius=30e-6, sensor_distance=240e-6)
 
 

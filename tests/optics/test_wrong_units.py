@@ -1,4 +1,4 @@
-"""Wrong units and refusals: the reason that is true, in one line, at once."""
+"""Wrong units and refusals: the true reason, in one line, at once."""
 
 import numpy as np
 import pytest
@@ -11,7 +11,7 @@ PHASE = np.random.default_rng(0).random((32, 32)) * 6.28
 @pytest.mark.parametrize("radius", [25e-6, 1e-3])
 @pytest.mark.parametrize("relief", [optics.HeightMap, optics.PixelRelief, lambda h: optics.BSplineRelief(h[:4, :4])])
 def test_heights_in_radians_are_no_lengths(radius, relief):
-    """They once asked for 290 GiB."""
+    """Heights in radians would otherwise need 290 GiB."""
     with pytest.raises(
         ValueError, match=r"height spans \d.* must be in metres, at most 100 radii or 0.001 m \(a phase φ \[rad\]"
     ):
@@ -25,7 +25,8 @@ def test_steep_heights_need_no_memory_to_be_refused():
 
 
 def test_a_refusal_names_what_there_is():
-    """A hole 25 m wide has no relief to flatten: its radius is told. A relief of millimetres is named."""
+    """An aperture 25 m wide has no relief to flatten, so the message names its radius. A relief of millimetres is
+    named."""
     with pytest.raises(optics.AccuracyError, match=r"the pupil \(radius 25 m, Fresnel number [\d.e+]+\)$"):
         optics.psf(optics.Pupil(25))
     with pytest.raises(optics.AccuracyError, match=r"Fresnel number [\d.]+\); a flatter height needs less$"):
@@ -34,7 +35,7 @@ def test_a_refusal_names_what_there_is():
 
 def test_a_wrapped_height_map_points_at_pixels():
     x = (np.arange(128) + 0.5) / 64 - 1
-    for radius in (60e-6, 200e-6):  # too slow, and refused anyhow
+    for radius in (60e-6, 200e-6):  # too slow, and refused in any case
         wrapped = (-(radius**2) * (x**2 + x[:, None] ** 2) / (8 * radius)) % 1.1e-6
         with pytest.raises(optics.AccuracyError, match=r"height jumps by .* optics\.PixelRelief\(height\)"):
             optics.psf(optics.Pupil(radius, height=wrapped), sensor_distance=8 * radius)
@@ -52,7 +53,7 @@ def test_a_wrapped_height_map_points_at_pixels():
     ],
 )
 def test_hankel_is_refused_for_want_of_symmetry(pupil, options):
-    with pytest.raises(optics.AccuracyError, match="the same all around") as error:
+    with pytest.raises(optics.AccuracyError, match="rotationally symmetric relief") as error:
         optics.psf(pupil, method="hankel", **options)
     assert "grazing" not in str(error.value)
 

@@ -1,4 +1,4 @@
-"""Which test covers which module of rhabdom.
+"""Tests that fail when a module of rhabdom is broken.
 
 importing: test_importing.py, test_wheel.py
 command: test_wheel.py

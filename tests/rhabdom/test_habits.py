@@ -1,4 +1,4 @@
-"""Files that a project's hosts and tools read are in their forms, and say what is true."""
+"""Configuration files of the project's hosting service and tools are well formed and correct."""
 
 import json
 import re

@@ -1,4 +1,4 @@
-"""`import rhabdom` gives the three packages, under either name, whoever else bears these names."""
+"""`import rhabdom` gives the three packages, under either name, even if other projects use these names."""
 
 import os
 import subprocess
@@ -11,7 +11,7 @@ ROOT = Path(__file__).resolve().parents[2]
 
 
 def python(code: str, *first: Path) -> subprocess.CompletedProcess[str]:
-    """A new interpreter, in which `first` stand before rhabdom on the path."""
+    """Result of running code in a new interpreter, with `first` before rhabdom on the path."""
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(map(str, (*first, ROOT)))}
     command = [sys.executable, "-P", "-c", code]
     return subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
@@ -57,7 +57,9 @@ def test_another_projects_package_is_named_and_does_not_stand_in_the_way(foreign
     assert child.stdout == "optics.elements.pupil\n", child.stderr
     assert "the project glass 9 holds a package optics too: pip uninstall glass" in child.stderr
     assert child.stderr.count("RuntimeWarning") == 1
-    assert "theirs" in python("import optics; print(optics.lens)", foreign).stdout, "it would have been found"
+    assert "theirs" in python("import optics; print(optics.lens)", foreign).stdout, (
+        "without rhabdom the other package is imported"
+    )
 
 
 def test_a_file_of_ones_own_is_named(tmp_path):
@@ -70,4 +72,4 @@ def test_a_file_of_ones_own_is_named(tmp_path):
 def test_what_has_been_imported_already_cannot_be_helped(foreign):
     child = python("import optics, rhabdom", foreign)
     last = child.stderr.strip().splitlines()[-1]
-    assert last.startswith(f"ImportError: {foreign / 'optics'}: is imported as optics")
+    assert last.startswith(f"ImportError: {foreign / 'optics'}: is already imported as optics")

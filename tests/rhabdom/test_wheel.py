@@ -1,6 +1,7 @@
-"""A wheel, built from the sdist and installed in a bare environment outside the repository, does what the README says.
+"""A wheel, built from the sdist and installed in an empty environment outside the repository, works as the README
+describes.
 
-What rhabdom needs is borrowed from this environment, which makes the test quick; CI installs it all from the index.
+rhabdom's dependencies are borrowed from this environment to make the test quick; CI installs them all from the index.
 """
 
 import os
@@ -22,7 +23,7 @@ PYTHON = f"python{sys.version_info.major}.{sys.version_info.minor}"
 
 @pytest.fixture(scope="module")
 def built(tmp_path_factory):
-    """sdist and wheel; the wheel is made of what the sdist holds."""
+    """sdist and wheel; the wheel is built from the sdist."""
     out = tmp_path_factory.mktemp("dist")
     command = [sys.executable, "-m", "build", "--no-isolation", "--outdir", out, ROOT]
     child = subprocess.run(command, capture_output=True, text=True, check=False)
@@ -32,13 +33,13 @@ def built(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def bare(built, tmp_path_factory):
-    """A new environment with the wheel; returns its folder."""
+    """Folder of a new environment with the wheel installed."""
     folder = tmp_path_factory.mktemp("elsewhere") / "env"
     subprocess.run([sys.executable, "-m", "venv", "--without-pip", folder], check=True)
     packages = folder / "lib" / PYTHON / "site-packages"
     [wheel] = built.glob("*.whl")
     pip = [sys.executable, "-m", "pip", "--python", folder / "bin" / "python", "install", "--quiet"]
-    # Not with PYTHONPATH: a checkout there that is installed for editing would pass for the wheel.
+    # PYTHONPATH is removed, because an editable checkout on it would be taken for the wheel.
     subprocess.run([*pip, "--no-deps", "--no-index", wheel], check=True, env=ELSEWHERE)
     (packages / "zz_borrowed.pth").write_text("\n".join(site.getsitepackages()))
     return folder
@@ -63,17 +64,19 @@ def test_the_sdist_holds_what_the_repository_holds(built):
 
 
 def test_the_wheel_touches_no_folder_that_others_may_have(built):
-    """Another project's `optics` would overwrite files in a folder of that name."""
+    """Another project's `optics` would overwrite files in a folder with that name."""
     [wheel] = built.glob("*.whl")
     with zipfile.ZipFile(wheel) as archive:
         names = archive.namelist()
         about = archive.read(next(name for name in names if name.endswith("METADATA"))).decode()
     assert {name.split("/")[0].partition("-")[0] for name in names} == {"rhabdom", "rhabdom.pth"}
     assert sum(name.endswith((".toml", ".js", ".css", ".csv")) for name in names) > 15
-    assert any(name.endswith("evolve/demo/candidates.jsonl") for name in names), "the run that evolve demo shows"
+    assert any(name.endswith("evolve/demo/candidates.jsonl") for name in names), (
+        "the run that evolve demo shows is missing"
+    )
     text = about.partition("\n\n")[2]
     relative = [line for line in text.splitlines() if "](docs/" in line or "](CHANGELOG" in line]
-    assert relative == [], "relative links lead nowhere on the package index"
+    assert relative == [], "relative links do not work on the package index"
     for line in ("Author: rhabdom developers", "License-Expression: BSD-3-Clause", "Keywords: ", "Classifier: "):
         assert f"\n{line}" in about
 
@@ -110,7 +113,7 @@ def test_missing_llvm_is_one_line(bare, tmp_path):
 
 
 def test_another_optics_is_named_and_does_no_harm(bare):
-    """Installed over ours, it would have overwritten it."""
+    """Another `optics` in the same folder would overwrite ours."""
     packages = bare / "lib" / PYTHON / "site-packages"
     files = {
         packages / "optics" / "__init__.py": "lens = 'theirs'\n",

@@ -1,4 +1,4 @@
-"""What tests hold of sim: a folder for each of its folders, which says which test covers which module.
+"""Tests of sim: each folder covers the folder of the same name and lists which test covers which module.
 
 exr: test_exr.py, test_exr_previews.py
 """

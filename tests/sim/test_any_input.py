@@ -1,6 +1,6 @@
-"""Whatever is asked of `sim`'s public functions: finite answers of the right shape, or one line. Nothing else.
+"""Public functions of `sim` return finite results of the right shape for any input, or raise a one-line error.
 
-SIM_EXAMPLES=20 python -m pytest tests/sim/test_any_input.py     tries twenty times as many inputs
+SIM_EXAMPLES=20 python -m pytest tests/sim/test_any_input.py     tries twenty times the default number of inputs
 """
 
 import math
@@ -25,12 +25,12 @@ def examples(count):
 
 
 def or_odd(usual):
-    """Mostly the usual, now and then what nobody should ask for."""
+    """Return a strategy that usually draws valid values, and sometimes invalid ones."""
     return st.one_of(*[usual] * 9, st.sampled_from(ODD))
 
 
 def made(function, *args, **kwargs):
-    """The result, or None where the request is refused in one line."""
+    """Return the result, or None if the request is refused in one line."""
     try:
         return function(*args, **kwargs)
     except ValueError as error:
@@ -74,7 +74,7 @@ def test_eyes_are_as_asked_or_refused(asked):
     assert azimuths.shape == (eyes.n_eyes,)
     assert np.isfinite(azimuths).all()
     assert np.abs(azimuths).max() <= math.radians(eyes.placement_range_deg) / 2 + 1e-12
-    assert (np.diff(azimuths) <= 0).all(), "from left to right"
+    assert (np.diff(azimuths) <= 0).all(), "not in order from left to right"
     assert len(set(eyes.names())) == eyes.n_eyes
 
 
@@ -84,20 +84,20 @@ def field():
 
 
 def anywhere(world, n, seed):
-    """Agents and objects at random, in walls, in each other and far outside, too."""
+    """Return random positions of agents and objects, including positions in walls, in each other and far outside."""
     rng, k = np.random.default_rng(seed), len(world.objects)
     position, heading, none = rng.uniform(-15, 15, (n, 2)), rng.uniform(-np.pi, np.pi, n), np.zeros(n, int)
     objects = np.concatenate([rng.uniform(-12, 12, (n, k, 2)), np.full((n, k, 1), 0.5)], axis=2)
     return WorldState(position, heading, np.zeros((n, 2)), objects, np.zeros((n, k)), position, none, none, none)
 
 
-seen = []  # how many worlds were looked at
+seen = []  # number of worlds of each rendered example
 
 
 @examples(6)
 @given(sound_eyes, st.integers(1, 3), st.integers(1, 6), st.integers(0, 2**31))
 def test_signals_are_finite_wherever_agents_stand(field, asked, n, rays, seed):
-    """Light is not negative, and in this field nothing is brighter than white in its sun."""
+    """Signals are not negative, and in this world no surface is brighter than white in direct sunlight."""
     eyes = sim.Eyes(**asked)
     renderer = made(sim.BatchedRenderer, field, eyes, n, sim.Fidelity(rays, eyes.bands))
     if renderer is None:
@@ -117,7 +117,7 @@ def test_enough_was_looked_at():
 
 @pytest.mark.parametrize("odd", ODD, ids=lambda odd: f"{odd!s:.8}")
 def test_odd_counts_are_refused_or_taken(field, odd):
-    """A huge whole number, say: its arithmetic would overflow somewhere below."""
+    """For example, a huge integer would overflow in later arithmetic."""
     eyes = sim.Eyes(resolution=(1, 2))
     made(sim.Fidelity, odd, 4)
     made(sim.Fidelity, 4, odd)
@@ -127,7 +127,7 @@ def test_odd_counts_are_refused_or_taken(field, odd):
 @examples(8)
 @given(st.sampled_from(sim.TASKS), or_odd(st.integers(1, 3)), st.integers(1, 3), st.integers(0, 2**32))
 def test_environments_go_on_whatever_is_done_in_them(task, n_envs, memory, seed):
-    """Also where actions are no numbers: that world's episode ends with a reason, and the others go on."""
+    """An action of NaN ends that world's episode with a reason, and the other worlds continue."""
     eyes = sim.Eyes(n_eyes=1, resolution=(1, 2), fov_deg=40)
     envs = made(sim.make_vec_env, task, eyes, n_envs, seed, memory=memory, rays_per_receptor=1)
     if envs is None:

@@ -1,4 +1,4 @@
-"""EXR files: what goes in comes out, others can read it, and damage never passes for data."""
+"""EXR files: values survive writing and reading, other programs can read the files, and damage is always reported."""
 
 import json
 import os
@@ -50,7 +50,7 @@ def test_round_trip_is_bit_exact(tmp_path):
 
 @pytest.mark.parametrize("turn", [lambda a: np.asfortranarray(a), lambda a: a[:, ::-1, ::2]])
 def test_non_contiguous_arrays_are_written_right(tmp_path, turn):
-    """OpenEXR itself writes these wrong in silence."""
+    """OpenEXR itself writes such arrays incorrectly without an error."""
     image = turn(np.random.default_rng(1).random((4, 8, 6), dtype=np.float32))
     assert not image[0].flags.c_contiguous
     write_exr(tmp_path / "a.exr", [View("left", NM, image, image)])
@@ -124,7 +124,7 @@ def test_a_truncated_file_raises_one_clear_error(tmp_path):
 
 
 def test_flipped_bits_never_pass_for_data(tmp_path):
-    """Each flip is either reported or harmless (in a byte that holds nothing of ours): never other data."""
+    """Each flip is either reported or harmless (in a byte without data of ours)."""
     write_exr(tmp_path / "a.exr", views())
     whole = (tmp_path / "a.exr").read_bytes()
     rng, flipped, reported = np.random.default_rng(2), tmp_path / "flipped.exr", 0
@@ -141,7 +141,7 @@ def test_flipped_bits_never_pass_for_data(tmp_path):
             assert same_bits(view.radiance, got[view.name].radiance)
             assert same_bits(view.receptors, got[view.name].receptors)
             assert view.attributes == got[view.name].attributes
-    assert reported > 100  # nearly all of the file is data that counts
+    assert reported > 100  # nearly all bytes of the file are protected data
 
 
 def test_foreign_and_missing_files(tmp_path):
@@ -249,7 +249,7 @@ def test_a_name_twice_is_refused(tmp_path):
 
 
 def test_a_file_whose_last_parts_were_taken_away_is_not_whole(tmp_path):
-    """Each part that is left is as it was written; only their number says that there were more."""
+    """The remaining parts are intact; only their number shows that parts are missing."""
     import OpenEXR
 
     write_exr(tmp_path / "a.exr", views())
@@ -264,7 +264,7 @@ def test_a_file_whose_last_parts_were_taken_away_is_not_whole(tmp_path):
 
 
 def test_a_picture_is_on_the_disk_before_it_has_its_name(tmp_path, monkeypatch):
-    """Else a machine that dies leaves a name with half a picture, or none, behind it."""
+    """Otherwise a crash of the machine could leave a name with an incomplete image."""
     steps, sync, replace = [], os.fsync, os.replace
     monkeypatch.setattr(os, "fsync", lambda file: (steps.append(("sync", os.fstat(file).st_size)), sync(file)))
     monkeypatch.setattr(
@@ -290,7 +290,7 @@ def test_a_disk_that_is_full_leaves_the_old_picture_and_nothing_else(tmp_path, m
 
 
 def test_names_need_not_be_text(tmp_path):
-    """On Linux a file's name is bytes, and OpenEXR takes UTF-8 alone."""
+    """A file's name consists of bytes on Linux, and OpenEXR accepts only UTF-8."""
     path = tmp_path / os.fsdecode(b"bad\xffname.exr")
     write_exr(path, views())
     assert [view.name for view in read_exr(path)] == ["left", "right", "signals"]

@@ -1,4 +1,4 @@
-"""What plain viewers show of EXR files: daylight is white, and long waves are red."""
+"""Previews of EXR files in plain viewers: daylight is white, and long wavelengths are red."""
 
 import numpy as np
 import pytest
@@ -15,12 +15,12 @@ def test_preview_of_daylight_is_white():
     red = np.where(nm > 600, 1.0, 0.0)[:, None, None] * np.ones((8, 1, 1))
     r, g, b = preview(red, nm)[0, 0]
     assert r > 5 * max(g, b)
-    # Bands in any order mean the same.
+    # The order of bands does not matter.
     np.testing.assert_allclose(preview(red[::-1], nm[::-1]), preview(red, nm))
 
 
 def written_preview(path, view):
-    """R, G and B of what the receptors of the one view say, as a viewer reads them."""
+    """Return R, G and B of a file with one view of receptors' signals, as a viewer reads them."""
     import OpenEXR
 
     write_exr(path, [view])

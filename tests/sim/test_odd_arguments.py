@@ -1,4 +1,6 @@
-"""Arguments of `sim` given what they are not: an answer, or one line of our own. See the optics' test."""
+"""Arguments of the wrong type or value in `sim`: a result, or a one-line error of our own. See the test of the same
+name in optics.
+"""
 
 import numpy as np
 import pytest
@@ -49,7 +51,7 @@ def test_views_to_write(tmp_path):
 
 
 def test_environments():
-    """What is refused before anything is built."""
+    """These arguments are refused before any environment is built."""
     valid = {"mode": "training", "least_return": -50.0, "auxiliary": (), "spectra": None, "mazes": 1, "n_envs": 1}
     fixed = {"task": "detection", "eyes": sim.Eyes(1, (1, 1)), "rays_per_receptor": 1.0}
     assert complaints(lambda **asked: sim.make_vec_env(**fixed, **asked).close(), valid) == {}

@@ -1,4 +1,4 @@
-"""Proofs are listed where readers look for them: proofs.toml, tables of contents, and the index of their pages."""
+"""Proofs are listed in proofs.toml, in tables of contents, and in the index of their pages."""
 
 import ast
 import re

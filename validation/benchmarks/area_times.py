@@ -1,9 +1,9 @@
-"""Eyes behind holes and lenses by rays and by areas, in one process: `python -m validation.benchmarks.area_times`.
+"""Ray sampling and area sampling of eyes behind pinholes and lenses: `python -m validation.benchmarks.area_times`.
 
-Prints errors in units of the receptors' noise, against many rays with a bounce, over all receptors and over those that
-see an object, and medians of CPU time of one thread for a look of 64 worlds: of the rays that are chosen where there is
-nothing else, of one area per receptor, and of what is chosen. Agents have an object before them, as those that have
-learnt their task do.
+All are measured in one process. The table shows errors in units of the receptors' noise, relative to many rays with a
+bounce, over all receptors and over the receptors that see an object. It also shows medians of CPU time of one thread
+for the signals of 64 worlds: for the rays that are chosen if only rays are available, for one area per receptor, and
+for the automatic choice. Agents have an object in front of them, as after training.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ from sim.tasks.simulation import Simulation
 from sim.worlds.state import WorldState
 
 WORLDS, STEPS, LOOKS, WARM_UP = 64, 40, 9, 2
-TRUE, SIGMA = 256, 0.003  # rays per receptor; of white
-SEEN = 0.01  # of white behind the pupil: what an object changes where it is seen
+TRUE, SIGMA = 256, 0.003  # rays per receptor; noise, relative to white
+SEEN = 0.01  # relative to white behind the pupil: change of a signal that counts as seeing an object
 EYES = sim.Eyes(n_eyes=2, resolution=(15, 15), placement_range_deg=45.0, noise_sigma=SIGMA)
 
 
 def behind(a: float, focus: float | None = None) -> sim.Eyes:
-    """A hole of relative aperture a, or a lens in it, with such a share of the focal length that is right."""
+    """Eyes with a pinhole of relative aperture a, or a lens in it with `focus` times the correct focal length."""
     focal_length = None if focus is None else focus * EYES.eye().sensor_distance
     return replace(EYES, optics=optics.Pupil(a * EYES.sensor_width / 2, thin_lens_focal_length=focal_length))
 
@@ -37,14 +37,14 @@ CASES = {
     "hole, a = .9": behind(0.9),
     "hole, a = .55": behind(0.55),
     "hole, a = .3": behind(0.3),
-    "lens out of focus, a = .55": behind(0.55, 1.5),
-    "lens nearly in focus, a = .55": behind(0.55, 1.1),
-    "lens in focus, a = .55": behind(0.55, 1.0),
+    "lens out of focus, a = 0.55": behind(0.55, 1.5),
+    "lens nearly in focus, a = 0.55": behind(0.55, 1.1),
+    "lens in focus, a = 0.55": behind(0.55, 1.0),
 }
 
 
 def moments(world: sim.World) -> WorldState:
-    """Worlds in which everybody looks at an object, .6 to 4 m ahead."""
+    """Worlds in which all agents face an object 0.6 to 4 m ahead."""
     simulation, random = Simulation(task_of(world), WORLDS, 0), np.random.default_rng(0)
     simulation.reset()
     for _ in range(STEPS):
@@ -57,14 +57,14 @@ def moments(world: sim.World) -> WorldState:
 
 
 def seen_in(renderer: sim.BatchedRenderer, state: WorldState, truth: np.ndarray) -> np.ndarray:
-    """Which signals an object is in: those that differ where all are out of the room."""
+    """Mask of the signals that contain an object, which change if all objects are moved away."""
     away = replace(state, objects=state.objects + np.array([100.0, 0.0, 0.0]))
     found: np.ndarray = np.abs(renderer.signals(away) - truth) > SEEN * renderer.eye.throughput
     return found
 
 
 def rows(world: sim.World, name: str, eyes: sim.Eyes, state: WorldState) -> list[str]:
-    """A table's rows of one eye."""
+    """Table rows for one eye."""
     bounced = sim.Fidelity(TRUE, eyes.bands, light="bounce")
     tracer = sim.BatchedRenderer(world, eyes, WORLDS, bounced)
     truth = tracer.signals(state)
@@ -96,7 +96,7 @@ def main() -> None:
     dr.set_thread_count(1)
     world = sim.build_world("detection")
     state = moments(world)
-    print("| eye | samples | error [σ] | where an object is seen [σ] | CPU [ms] |\n|---|---|---|---|---|")
+    print("| eye | samples | error [σ] | on objects [σ] | CPU [ms] |\n|---|---|---|---|---|")
     for name, eyes in CASES.items():
         print("\n".join(rows(world, name, eyes, state)), flush=True)
 

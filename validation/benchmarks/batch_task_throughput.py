@@ -1,8 +1,7 @@
-"""The same task for one world at a time and on arrays of all worlds: steps per second of `examples/find_ball.py` and
-`examples/find_balls.py`.
+"""Steps per second of a task on single worlds and on arrays of worlds (`examples/find_ball.py` and `find_balls.py`).
 
-Actions are random, and episodes begin anew as they end. Both take turns in one process; rates are medians of the
-rounds, and the ratio is the median of the rounds' ratios, with the least and the largest in brackets.
+Actions are random, and episodes restart when they end. Both forms take turns in one process. Rates are medians of the
+rounds. The ratio is the median of the rounds' ratios, with the smallest and the largest in brackets.
 
     python -m validation.benchmarks.batch_task_throughput [--rounds 7] [--seconds 1]
 """
@@ -27,7 +26,7 @@ TASKS = {"find_ball": "FindBall", "find_balls": "FindBalls"}
 
 
 def task(module: str) -> Any:
-    """An example's task."""
+    """Return the task of an example."""
     spec = importlib.util.spec_from_file_location(module, EXAMPLES / f"{module}.py")
     assert spec is not None
     assert spec.loader is not None
@@ -64,8 +63,8 @@ def rates(worlds: int, rounds: int, seconds: float) -> dict[str, list[float]]:
 def main() -> None:
     assert __doc__
     options = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    options.add_argument("--rounds", type=int, default=7, help="of each measurement")
-    options.add_argument("--seconds", type=float, default=1.0, help="of each round")
+    options.add_argument("--rounds", type=int, default=7, help="rounds of each measurement")
+    options.add_argument("--seconds", type=float, default=1.0, help="seconds of each round")
     asked = options.parse_args()
     print("| worlds | sim.Task, steps/s | sim.BatchTask, steps/s | ratio |\n|---|---|---|---|")
     for worlds in WORLDS:

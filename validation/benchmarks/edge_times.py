@@ -1,8 +1,8 @@
-"""Rays at edges alone beside as many everywhere, in one process: `python -m validation.benchmarks.edge_times`.
+"""Adaptive edge sampling compared with uniform sampling, in one process: `python -m validation.benchmarks.edge_times`.
 
-Prints errors in units of the receptors' noise over those that have something to tell apart (one ray is not enough), and
-medians of CPU time of one thread for a look of 32 worlds. The worlds are a ball in the dark, of which few receptors see
-a rim, and textured things, which leave few receptors without an edge.
+The table shows errors in units of the receptors' noise over those receptors for which one ray is not enough, and
+medians of CPU time of one thread for the signals of 32 worlds. In the first world, a ball in the dark, few receptors
+see a rim. In the second, with textured objects, few receptors see no edge.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ import optics
 import sim
 
 WORLDS, LOOKS, WARM_UP = 32, 7, 2
-TRUE, SIGMA, APART = 2048, 0.01, 0.05  # rays per receptor; of white; of σ
+TRUE, SIGMA, APART = 2048, 0.01, 0.05  # rays per receptor; noise, relative to white; threshold in σ
 EYE = optics.Eye(resolution=(15, 15), fov_deg=50, bands=4, noise_sigma=SIGMA)
 FIDELITIES = [sim.Fidelity(n, EYE.bands, samples=how) for how in ("rays", "edges") for n in (16, 64, 128)]
 BALL = """
@@ -46,7 +46,7 @@ THINGS = """
 
 
 def moments(model: mujoco.MjModel) -> list[mujoco.MjData]:
-    """Of joints somewhere."""
+    """States with random joint positions."""
     random, found = np.random.default_rng(0), []
     for _ in range(WORLDS):
         data = mujoco.MjData(model)
@@ -57,7 +57,7 @@ def moments(model: mujoco.MjModel) -> list[mujoco.MjData]:
 
 
 def rows(name: str, text: str) -> list[str]:
-    """A table's rows of one world."""
+    """Table rows for one world."""
     model = mujoco.MjModel.from_xml_string(text)
     datas, mount = moments(model), sim.Mount("head", offset=(0.2, 0, 0))
 
@@ -81,11 +81,11 @@ def rows(name: str, text: str) -> list[str]:
 
 
 def main() -> None:
-    """Prints a row for each world and fidelity."""
+    """Print a row for each world and fidelity."""
     dr.set_thread_count(1)
-    print("| world (receptors with something to tell apart) | rays | error [σ] | worst [σ] | CPU [ms] |")
+    print("| world (receptors that see an edge) | rays | error [σ] | worst [σ] | CPU [ms] |")
     print("|---|---|---|---|---|")
-    print("\n".join([*rows("a ball in the dark", BALL), *rows("textured things", THINGS)]))
+    print("\n".join([*rows("a ball in the dark", BALL), *rows("textured objects", THINGS)]))
 
 
 if __name__ == "__main__":

@@ -1,9 +1,9 @@
-"""What the first PSF of a process takes, beside `import numpy, scipy`.
+"""CPU time of the first PSF of a process, compared with `import numpy, scipy`.
 
     python -m validation.benchmarks.first_psf [rounds]
 
-Prints medians of CPU time of processes of their own, one after the other in turns. Python's byte code and Dr.Jit's
-kernels are kept from earlier processes, as they are for a user.
+Prints medians of CPU time of separate processes that take turns. Python's byte code and Dr.Jit's kernels are cached
+from earlier processes, as they are for a user.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ PROGRAMS = {
 
 
 def milliseconds(program: str) -> float:
-    """CPU time of a process."""
+    """CPU time [ms] of a process."""
     environment = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     subprocess.run([sys.executable, "-c", program], env=environment, check=True)
@@ -37,12 +37,12 @@ def milliseconds(program: str) -> float:
 
 
 def main(arguments: list[str]) -> None:
-    """Prints a row for each program."""
+    """Print a row for each program."""
     milliseconds(PICTURE)
     rounds = int(arguments[0]) if arguments else ROUNDS
     spent = [[milliseconds(program) for program in PROGRAMS.values()] for _ in range(rounds)]
     medians = np.median(spent, axis=0)
-    print("| | CPU time [ms] | of the first |\n|---|---|---|")
+    print("| | CPU time [ms] | relative to the first |\n|---|---|---|")
     for name, median in zip(PROGRAMS, medians, strict=True):
         print(f"| {name} | {median:.0f} | {median / medians[0]:.2f} |")
 

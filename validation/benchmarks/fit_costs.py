@@ -1,7 +1,7 @@
-"""What operations cost here, beside the numbers by which methods predict their time (optics/numerics/cost.py)
+"""Cost of operations on this machine, compared with the constants of the cost model (optics/numerics/cost.py)
 
-Each operation is timed at several sizes, warm, and a line is fitted through the medians: seconds of a call, and of each
-sample, entry or pair. Then every method is timed as a whole against what its plan says.
+Each operation is timed at several sizes, warm, and a line is fitted through the medians: seconds per call, and per
+sample, entry or pair. Then every method is timed as a whole and compared with the prediction of its plan.
 
     python -m validation.benchmarks.fit_costs [--repeats N]
 """
@@ -48,7 +48,7 @@ METHODS = (
 
 @dataclass(frozen=True)
 class Operation:
-    """What is timed: `run(size)` does `count(size)` units, of which each is predicted to take `seconds`."""
+    """An operation to time: `run(size)` processes `count(size)` units with a predicted time of `seconds` each."""
 
     name: str
     seconds: float
@@ -58,7 +58,7 @@ class Operation:
 
 
 def operations(types: Precision) -> Iterator[Operation]:
-    """Those that decide: each constant of the cost model that can be told from the others."""
+    """Operations for the constants of the cost model that can be measured separately."""
     flop = 1 / cost.MATMUL_FLOPS[types.dtype]
     yield Operation(
         f"flop of a matrix product, {types.dtype}",
@@ -106,7 +106,7 @@ def _fourier(n: int, types: Precision) -> None:
 
 
 def _fft_sample(n: int) -> float:
-    """As `fourier.predicted_seconds` has it, per sample of n x n."""
+    """Predicted seconds per sample of n x n, as in `fourier.predicted_seconds`."""
     return 2 * (5 * np.log2(n + 1) / cost.FFT_FLOPS + cost.FFT_LINE_SAMPLE) + 2 * cost.FFT_COPY
 
 
@@ -139,7 +139,7 @@ def _profile(n: int, types: Precision) -> None:
 
 
 def seconds(run: Callable[[], object], repeats: int) -> float:
-    """Median of warm calls."""
+    """Median duration [s] of warm calls."""
     found = []
     for _ in range(repeats + 2):
         start = time.perf_counter()
@@ -150,7 +150,7 @@ def seconds(run: Callable[[], object], repeats: int) -> float:
 
 
 def fitted(operation: Operation, repeats: int) -> tuple[float, float]:
-    """Seconds of a call and of each unit: the line through the times, each weighed by its size."""
+    """Seconds per call and per unit: the line through the times, each weighted by its size."""
     times = np.array([seconds(lambda n=n: operation.run(n), repeats) for n in operation.sizes])
     counts = np.array([operation.count(n) for n in operation.sizes], dtype=np.float64)
     terms = np.column_stack([np.ones_like(counts), counts]) / times[:, None]
@@ -161,7 +161,7 @@ def fitted(operation: Operation, repeats: int) -> tuple[float, float]:
 def main() -> None:
     assert __doc__
     options = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    options.add_argument("--repeats", type=int, default=9, help="timings of which the median counts")
+    options.add_argument("--repeats", type=int, default=9, help="number of timings for each median")
     repeats = options.parse_args().repeats
     print(f"{'operation':<38}{'predicted':>12}{'found':>12}{'a call':>12}")
     for dtype in ("float32", "float64"):

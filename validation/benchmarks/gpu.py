@@ -1,9 +1,9 @@
-"""The processor and a GPU: the same pictures, gradients, looks and steps on both, and what they take.
+"""Processor and GPU: times of the same PSFs, gradients, renderings and steps on both.
 
     python -m validation.benchmarks.gpu [--only NAME ...]
 
-Each device computes in a process of its own. Prints wall time per call, medians after calls that compile and warm up,
-and the largest difference between both devices' numbers, as a share of the largest number.
+Each device computes in a separate process. Prints wall time per call, as medians after calls that compile and warm up,
+and the largest difference between the results of both devices, as a share of the largest number.
 """
 
 from __future__ import annotations
@@ -33,7 +33,10 @@ PLACES = ("cpu", "cuda")
 
 @dataclass(frozen=True)
 class Case:
-    """make: prepares a call, whose numbers both devices shall agree in."""
+    """A case to measure.
+
+    make: prepares a call. Both devices must agree on its result.
+    """
 
     name: str
     make: Callable[[], Callable[[], Any]]
@@ -48,7 +51,7 @@ def relief(radius: float) -> Any:
 
 
 def one_picture(side: int, radius: float, dtype: str) -> Callable[[], Callable[[], Any]]:
-    """A PSF of a pupil with glass near a lens."""
+    """PSF of a pupil with glass that approximates a lens."""
 
     def make() -> Callable[[], Any]:
         import optics
@@ -74,7 +77,7 @@ def many_pictures(count: int) -> Callable[[], Callable[[], Any]]:
 
 
 def gradient() -> Callable[[], Any]:
-    """Of the light on the axis, over sixteen heights of a relief."""
+    """Gradient of the light on the axis over the sixteen heights of a relief."""
     import drjit as dr
 
     import optics
@@ -95,7 +98,7 @@ def gradient() -> Callable[[], Any]:
 
 
 def whole_plane(side: int) -> Callable[[], Callable[[], Any]]:
-    """A field carried from plane to plane by the angular spectrum."""
+    """A field propagated from plane to plane by the angular spectrum."""
 
     def make() -> Callable[[], Any]:
         import optics
@@ -109,7 +112,7 @@ def whole_plane(side: int) -> Callable[[], Callable[[], Any]]:
 
 
 def kernel() -> Callable[[], Any]:
-    """What a receptor sees, four bands."""
+    """Receptive kernel, four bands."""
     from sim import Eyes
     from sim.eyes.receptive_fields import cells_for
     from validation.benchmarks.sim_throughput import with_pupil
@@ -140,7 +143,7 @@ def looks(worlds: int, lens: bool, samples: str) -> Callable[[], Callable[[], An
 
 
 def steps(worlds: int) -> Callable[[], Callable[[], Any]]:
-    """A step of all worlds: physics on the processor, looks on the device, noise."""
+    """A step of all worlds: physics on the processor, rendering and noise on the device."""
 
     def make() -> Callable[[], Any]:
         import sim
@@ -162,15 +165,15 @@ CASES = (
     Case("gradient of a PSF, 16 heights", gradient),
     *(Case(f"plane to plane, {n} x {n}", whole_plane(n)) for n in (512, 2048)),
     Case("kernel of a receptor", kernel),
-    *(Case(f"looks, perfect lens, areas, {n} worlds", looks(n, False, "areas")) for n in WORLDS),
-    *(Case(f"looks, behind a lens, areas, {n} worlds", looks(n, True, "areas")) for n in WORLDS),
-    *(Case(f"looks, perfect lens, rays, {n} worlds", looks(n, False, "rays")) for n in WORLDS),
+    *(Case(f"signals, perfect lens, areas, {n} worlds", looks(n, False, "areas")) for n in WORLDS),
+    *(Case(f"signals, behind a lens, areas, {n} worlds", looks(n, True, "areas")) for n in WORLDS),
+    *(Case(f"signals, perfect lens, rays, {n} worlds", looks(n, False, "rays")) for n in WORLDS),
     *(Case(f"steps, {n} worlds", steps(n)) for n in WORLDS),
 )
 
 
 def measured(case: Case) -> dict[str, Any]:
-    """Seconds of the first call and of later ones, and what the first found."""
+    """Seconds of the first call and of later ones, and the result of the first."""
     call = case.make()
     begun = time.perf_counter()
     values = np.asarray(call())
@@ -186,12 +189,12 @@ def measured(case: Case) -> dict[str, Any]:
 
 
 def child(place: str, names: list[str], out: Path) -> None:
-    """Measures on this process's device; a case that fails is told in one line."""
+    """Measure on this process's device; a case that fails is reported in one line."""
     numbers, arrays = {}, {}
     for case in chosen(names):
         try:
             found = measured(case)
-        except Exception as error:  # whatever a device cannot do is a result, too
+        except Exception as error:  # failures on a device are results, too
             numbers[case.name] = {"failed": f"{type(error).__name__}: {(str(error).splitlines() or [''])[0][:300]}"}
             continue
         arrays[case.name] = found.pop("values")
@@ -202,12 +205,12 @@ def child(place: str, names: list[str], out: Path) -> None:
 
 
 def chosen(names: list[str]) -> list[Case]:
-    """Cases that have one of these in their names; all without any."""
+    """Cases whose names contain one of these words; all cases for an empty list."""
     return [case for case in CASES if not names or any(name in case.name for name in names)]
 
 
 def row(name: str, found: dict[str, dict[str, Any]], arrays: dict[str, Any]) -> str:
-    """Of a table; what a device cannot do stands in the place of its time."""
+    """Table row; the reason for a failure replaces the time."""
     cpu, gpu = (found[place][name] for place in PLACES)
     if "failed" in gpu or "failed" in cpu:
         return f"| {name} | {cpu.get('failed', 'works')} | {gpu.get('failed', 'works')} | | |"
@@ -221,7 +224,7 @@ def row(name: str, found: dict[str, dict[str, Any]], arrays: dict[str, Any]) -> 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--only", nargs="*", default=[], metavar="TEXT", help="cases with one of these in their names")
+    parser.add_argument("--only", nargs="*", default=[], metavar="TEXT", help="cases whose names contain one of these")
     parser.add_argument("--child", help=argparse.SUPPRESS)
     parser.add_argument("--out", type=Path, help=argparse.SUPPRESS)
     asked = parser.parse_args()
@@ -229,7 +232,7 @@ def main() -> None:
         child(asked.child, asked.only, asked.out)
         return
     if not chosen(asked.only):
-        sys.exit(f"no case has {' or '.join(asked.only)} in its name: {', '.join(case.name for case in CASES)}")
+        sys.exit(f"no case name contains {' or '.join(asked.only)}: {', '.join(case.name for case in CASES)}")
     if not has_gpu():
         sys.exit("Dr.Jit finds no NVIDIA GPU here")
     with tempfile.TemporaryDirectory() as folder:

@@ -1,10 +1,11 @@
-"""What the kernels of evolving eyes take.
+"""CPU time of the kernels of evolving eyes.
 
     OPENBLAS_NUM_THREADS=1 python -m validation.benchmarks.kernel_times [genotypes]
 
-Random genotypes of the preset `lens`, on the cells that receptive fields are tabulated on, in its own view and in
-narrower ones; with three genes of a relief (laptop) and with sixteen (paper). Prints CPU seconds of one thread for
-`Eye.kernel` of eyes never seen before, once a round of others has compiled its kernels; and how many are refused.
+Random genotypes of the preset `lens` are used, with the cells on which receptive fields are tabulated, in the preset's
+field of view and in narrower ones, with three genes of a relief (laptop) and with sixteen (paper). Prints CPU seconds
+of one thread for `Eye.kernel` of new eyes, after a round with other eyes has compiled its kernels, and the number of
+refused eyes.
 """
 
 from __future__ import annotations
@@ -26,14 +27,14 @@ VIEWS_DEG = (45.0, 20.0, 10.0)
 
 
 def eyes(count: int, fov_deg: float, scale: str, seed: int) -> list[optics.Eye]:
-    """Of random genotypes."""
+    """Eyes of random genotypes."""
     config = assemble(preset="lens", scale=scale, assignments=[f"genome.fov_deg.start={fov_deg}"])
     rng, dimension = np.random.default_rng(seed), Genotype(config.genome).dimension
     return [develop(rng.random(dimension), config).eyes(config.eye).eye() for _ in range(count)]
 
 
 def seconds(eye: optics.Eye) -> float | None:
-    """CPU time; None: refused."""
+    """CPU time; None if refused."""
     start = time.process_time()
     try:
         eye.kernel(cells_for(eye))
@@ -43,7 +44,7 @@ def seconds(eye: optics.Eye) -> float | None:
 
 
 def main(arguments: list[str]) -> None:
-    """Prints a row for each population."""
+    """Print a row for each population."""
     dr.set_thread_count(1)
     count = int(arguments[0]) if arguments else GENOTYPES
     print("| genes | view [deg] | median [s] | 90 % [s] | worst [s] | refused |\n|---|---|---|---|---|---|")

@@ -1,11 +1,11 @@
-"""How fast agents learn: PPO training with environment and optimiser, against MuJoCo's renderer that only draws.
+"""Training speed: PPO with environment and optimiser, compared with MuJoCo's renderer alone.
 
     python -m validation.benchmarks.learning_throughput [--steps 24576] [--json]
 
-Agent-steps per second of the whole machine: as in an evolution, as many trainings run in parallel as there are cores,
-each in a process with one thread (after a training to warm up; rollouts and updates, without evaluations). In the same
-run `mujoco.Renderer` draws the same eyes of one world without shadows. Settings of learning are the defaults of the
-task. The bound on training holds for one remembered frame and a perfect lens.
+Rates are agent-steps per second of the whole machine. As in an evolutionary run, one training per core runs in
+parallel, each in a process with one thread (after a warm-up training; rollouts and updates, without evaluations). In
+the same run `mujoco.Renderer` renders the same eyes of one world without shadows. Settings of learning are the defaults
+of the task. The bound on training applies to one frame of memory and a perfect lens.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from typing import Any
 
 from evolve.config.assemble import assemble
 from evolve.search.worker import prepare_device
-from validation.benchmarks.sim_throughput import (  # chooses OpenGL before MuJoCo is imported
+from validation.benchmarks.sim_throughput import (  # sets OpenGL before MuJoCo is imported
     CASES,
     Case,
     measure,
@@ -35,7 +35,7 @@ BARS = {"detection": 12.0, "maze": 50.0}  # ratios to mujoco.Renderer
 
 @dataclass(frozen=True)
 class Learner:
-    """Who learns: a case's eyes, behind a lens or perfect, and how many frames are remembered."""
+    """A learner: the eyes of a case, with a lens or perfect optics, and the number of frames in memory."""
 
     case: Case
     lens: bool
@@ -63,7 +63,7 @@ def training_rate(learner: Learner, steps: int, seed: int) -> float:
     worlds = sim.make_vec_env(case.task, eyes, config.n_envs, seed, mode="training", **common)
     evaluation_worlds = sim.make_vec_env(case.task, eyes, 2, seed, mode="evaluation", **common)
     marks: list[float] = []
-    for attempt in (0, 1):  # the first one compiles kernels and imports what torch imports on first use
+    for attempt in (0, 1):  # the first one compiles kernels and loads torch's lazy modules
         marks.clear()
         train(
             Worlds(worlds, evaluation_worlds),
@@ -72,12 +72,12 @@ def training_rate(learner: Learner, steps: int, seed: int) -> float:
             attempt,
             lambda done, planned: marks.append(time.perf_counter()),
         )
-    # From the first rollout's end to the last one's: whole updates and rollouts, no evaluation.
+    # Between the ends of the first and the last rollout there are only whole updates and rollouts.
     return (len(marks) - 1) * config.n_envs * config.n_steps / (marks[-1] - marks[0])
 
 
 def machine_rate(learner: Learner, steps: int) -> float:
-    """Of as many such trainings side by side as there are cores."""
+    """Agent-steps per second of one such training per core, side by side."""
     cores = os.cpu_count() or 1
     context = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(cores, mp_context=context, initializer=prepare_device) as pool:
@@ -95,7 +95,7 @@ def results(case: Case, steps: int) -> dict[str, float]:
 
 
 def missed(task: str, rates: dict[str, float]) -> list[str]:
-    """The bar, in words, if it is missed."""
+    """Description of the bound if it is missed."""
     ratio = rates["training, perfect lens, memory 1"] / rates["mujoco"]
     return [f"{task}: {ratio:.3g}x mujoco.Renderer, must be {BARS[task]:g}x"] if ratio < BARS[task] else []
 
@@ -103,7 +103,7 @@ def missed(task: str, rates: dict[str, float]) -> list[str]:
 def main() -> int:
     """Measure detection and the maze; print a table, or JSON."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--steps", type=int, default=24_576, help="of each training (default 24576)")
+    parser.add_argument("--steps", type=int, default=24_576, help="steps of each training (default 24576)")
     parser.add_argument("--json", action="store_true", help="print JSON")
     options = parser.parse_args()
     rollout = max(assemble(task).learning.n_envs * assemble(task).learning.n_steps for task in BARS)
@@ -118,7 +118,7 @@ def main() -> int:
         print(f"{task}, agent-steps/s of {os.cpu_count()} cores (ratio to mujoco.Renderer):")
         for name, rate in rates.items():
             print(f"  {name:35}{rate:8.0f}{rate / rates['mujoco']:8.1f}x")
-    print("\n".join(broken or ["all bars are met"]))
+    print("\n".join(broken or ["all bounds hold"]))
     return int(bool(broken))
 
 

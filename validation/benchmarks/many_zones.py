@@ -1,7 +1,7 @@
-"""Focuses of many Fresnel zones with Zernike's modes up to order six: `python -m validation.benchmarks.many_zones`.
+"""Foci of many Fresnel zones with Zernike modes up to order six: `python -m validation.benchmarks.many_zones`.
 
-Prints CPU seconds of one thread for 513 x 513 samples about the focus, once kernels are compiled, and how far the
-picture is from the direct sum at 16 points about its middle, relative to the root mean square there.
+Prints CPU seconds of one thread for 513 x 513 samples about the focus with compiled kernels, and the difference between
+the PSF and the direct sum at 16 points about its middle, relative to the root mean square there.
 """
 
 from __future__ import annotations
@@ -16,11 +16,11 @@ from optics.point_spread.planner import choose
 
 WAVELENGTH, SIDE, ORDER = 550e-9, 513, 6
 FRESNEL_NUMBERS, APERTURES, TOLERANCES = (1_000, 10_000), (0.1, 0.3), (1e-2, 1e-3)
-WAVES = 0.08  # [µm] of a mode of second order; higher ones have less
+WAVES = 0.08  # [µm] of a mode of second order; higher ones have smaller coefficients
 
 
 def lens(fresnel_number: float, aperture: float, rng: np.random.Generator) -> optics.Pupil:
-    """With a random wavefront."""
+    """A lens with a random wavefront."""
     tangent = aperture / np.sqrt(1 - aperture**2)
     radius = fresnel_number * WAVELENGTH / tangent
     modes = {(n, m): WAVES * rng.normal() / (n - 1) for n in range(2, ORDER + 1) for m in range(-n, n + 1, 2)}
@@ -28,7 +28,7 @@ def lens(fresnel_number: float, aperture: float, rng: np.random.Generator) -> op
 
 
 def seconds(pupil: optics.Pupil, dx: float, tolerance: float) -> tuple[optics.PSFResult, float]:
-    """The picture, planned anew, and its CPU time."""
+    """The PSF, including planning, and its CPU time."""
     for _ in range(2):
         choose.cache_clear()
         start = time.process_time()
@@ -38,7 +38,7 @@ def seconds(pupil: optics.Pupil, dx: float, tolerance: float) -> tuple[optics.PS
 
 
 def off(result: optics.PSFResult, rng: np.random.Generator) -> float:
-    """Relative distance from the direct sum."""
+    """Relative difference from the direct sum."""
     places = SIDE // 2 + np.round(rng.normal(size=(16, 2)) * 8).astype(int)
     ask = {"shape": (1, 1), "method": "rayleigh_sommerfeld", "tolerance": 1e-6, "dtype": "float64"}
     exact = [
@@ -50,7 +50,7 @@ def off(result: optics.PSFResult, rng: np.random.Generator) -> float:
 
 
 def main() -> None:
-    """Prints a row for each lens and tolerance."""
+    """Print a row for each lens and tolerance."""
     dr.set_thread_count(1)
     rng = np.random.default_rng(3)
     print("| Fresnel number | NA | tolerance | seconds | error |\n|---|---|---|---|---|")

@@ -1,9 +1,9 @@
-"""Time of a quick picture of the agent beside a slow one, in one process.
+"""Times of fast and slow renderings of an agent, in one process.
 
     python -m validation.benchmarks.picture_times
 
-Prints medians of CPU time of one thread, with and without eyes in the picture. The first two pictures of each kind, in
-which kernels are compiled, do not count. The agent walks from picture to picture.
+Prints medians of CPU time of one thread, with and without the eyes' signals in the image. The first two images of each
+kind compile kernels and do not count. The agent moves between images.
 """
 
 from __future__ import annotations
@@ -17,13 +17,13 @@ import sim
 from sim.envs.follow_camera import FollowCamera
 from sim.worlds.state import WorldState
 
-QUICK, SLOW, WARM_UP = 15, 3, 2  # pictures
-SAMPLES = 12  # of slow pictures
+QUICK, SLOW, WARM_UP = 15, 3, 2  # images
+SAMPLES = 12  # of slow renderings
 EYES = {"maze": sim.Eyes(n_eyes=10, resolution=(1, 4), fov_deg=30, placement_range_deg=300)}
 
 
 def walk(task: str, eyes: sim.Eyes) -> tuple[sim.World, list[WorldState]]:
-    """States of an agent that turns slowly as it goes."""
+    """States of an agent that turns slowly as it moves."""
     env = sim.make_env(task, eyes, rays_per_receptor=1)
     env.reset(seed=1)
     states = []
@@ -34,7 +34,7 @@ def walk(task: str, eyes: sim.Eyes) -> tuple[sim.World, list[WorldState]]:
 
 
 def milliseconds(camera: FollowCamera, states: list[WorldState]) -> float:
-    """Median CPU time of a picture."""
+    """Median CPU time [ms] of a rendering."""
     spent = []
     for state in states:
         start = time.process_time()
@@ -44,9 +44,9 @@ def milliseconds(camera: FollowCamera, states: list[WorldState]) -> float:
 
 
 def main() -> None:
-    """Prints a row for each task."""
+    """Print a row for each task."""
     dr.set_thread_count(1)
-    print("| task | quick [ms] | without eyes [ms] | slow [ms] | slow / quick |")
+    print("| task | fast [ms] | without eyes [ms] | slow [ms] | slow / fast |")
     print("|---|---|---|---|---|")
     for task in sim.TASKS:
         eyes = EYES.get(task, sim.Eyes())

@@ -1,19 +1,19 @@
-"""How fast agents see: the batched renderer and environment against MuJoCo's own renderer, in one process.
+"""Rendering speed: the batched renderer and environment compared with MuJoCo's renderer, in one process.
 
     python -m validation.benchmarks.sim_throughput --json
 
 Medians over repeated calls after warm-up, in agent-steps per second (one step of one agent: all its eyes once):
     render         every eye of every world, perfect lens
-    render_mitsuba the same where Mitsuba traces the rays, and not the closed form that a world of walls has
+    render_mitsuba the same with Mitsuba's ray tracing instead of the closed form for worlds of walls
     render_optics  the same behind a pupil: receptive fields, weights, bands
     step           the whole VecEnv step behind that pupil: physics, rewards, rendering, optics, noise, infos
-    overhead       how much longer steps take than their physics (of agents, and of objects that move) and their
-                   rendering, optics and noise by themselves, done again from the same states right after them,
-                   BLOCK steps at a time: at most OVERHEAD
-    mujoco         mujoco.Renderer drawing the same eyes of one world, one after the other (RGB, no optics, no shadows)
-    mujoco_shadows the same with shadows, which the batched renderer has; in software they are what it mostly does
-    mi_render      the mirror's Mitsuba scene of one world, posed and rendered eye by eye with as many samples
-Ratios are to `mujoco`, the faster one. Absolute numbers say as much about the machine as about the code.
+    overhead       extra time of steps relative to their parts: physics (of agents and of moving objects) and rendering
+                   with optics and noise. The parts are repeated from the same states right after the steps, BLOCK
+                   steps at a time. The bound is OVERHEAD.
+    mujoco         mujoco.Renderer with the same eyes of one world, one after the other (RGB, no optics, no shadows)
+    mujoco_shadows the same with shadows, as in the batched renderer; software rendering spends most time on them
+    mi_render      the mirror's Mitsuba scene of one world, posed and rendered eye by eye (same number of samples)
+Ratios are to `mujoco`, the faster one. Absolute numbers depend on the machine and on the code.
 """
 
 from __future__ import annotations
@@ -58,29 +58,29 @@ CASES = (
     Case("tracking", sim.Eyes(n_eyes=2, resolution=(15, 15), fov_deg=45, placement_range_deg=60)),
     Case("maze", sim.Eyes(n_eyes=10, resolution=(1, 4), fov_deg=30, placement_range_deg=150)),
 )
-SAMPLES = 4  # per receptor, of a perfect lens; behind the pupil as few rays as the receptors' noise allows
-# Bars with 64 worlds: ratios to `mujoco`, and the step's overhead.
+SAMPLES = 4  # per receptor, with a perfect lens; behind the pupil the automatic choice by the receptors' noise
+# Bounds with 64 worlds: ratios to `mujoco`, and the step's overhead.
 BARS = {
     "maze": {"render_optics": 400.0, "step": 150.0},
     "detection": {"render_optics": 18.0, "step": 14.0},
 }
 OVERHEAD = 0.15
-# Steps of a loop of steps, and of a loop of their parts right after it: each with caches warmed by its own previous
-# pass, and so short that the machine is in the same state for both.
+# Length of a loop of steps, and of the loop of their parts right after it. Each loop has caches warmed by its own
+# previous pass, and both are short # enough for the machine to be in the same state.
 BLOCK = 8
 WARM_UP = 3  # calls
-SETTLED = 256  # steps: an episode. Before, physics meets walls for the first time, and makes models of them
+SETTLED = 256  # steps: an episode. Before, physics touches new walls and builds models of them
 
 
 def with_pupil(eyes: sim.Eyes) -> sim.Eyes:
-    """The same eyes behind an open pupil a quarter as wide as the retina, with a lens in focus."""
+    """The same eyes behind an open pupil one quarter as wide as the retina, with a lens in focus."""
     focal_length = eyes.eye().sensor_distance
     pupil = optics.Pupil(aperture_radius=eyes.sensor_width / 8, thin_lens_focal_length=focal_length)
     return replace(eyes, optics=pupil)
 
 
 def seconds(call: Callable[[], Any], budget: float) -> float:
-    """Median duration of a call: some to warm up, then for `budget` seconds, five at least."""
+    """Median duration of a call: a few calls to warm up, then calls for `budget` seconds, at least five."""
     for _ in range(WARM_UP):
         call()
     times: list[float] = []
@@ -110,7 +110,7 @@ def measure(case: Case, n_envs: int, budget: float) -> dict[str, Any]:
         chosen[name] = f"{renderer.tracer.name}, {renderer.fidelity.rays_per_receptor:g} rays per receptor"
         rates[name] = n_envs / seconds(lambda renderer=renderer: renderer.signals(moved()), budget)  # type: ignore[misc]
     step = _Step(case, n_envs)
-    for _ in range(SETTLED + BLOCK):  # a block to count, however little time there is
+    for _ in range(SETTLED + BLOCK):  # at least one block counts
         step()
     seconds(step, 2 * budget)
     rates["step"] = n_envs / statistics.median(step.wholes[SETTLED:])
@@ -130,10 +130,13 @@ def measure(case: Case, n_envs: int, budget: float) -> dict[str, Any]:
 
 
 class _Step:
-    """One step of all worlds, behind the pupil, with random actions; and by themselves, after every BLOCK steps and
-    from the same states, their parts: physics of agents and of objects, and looks (rendering, optics and noise).
+    """One step of all worlds behind the pupil with random actions, and separate measurements of its parts.
 
-    wholes  durations of the steps [s] · shares: of every block, what the steps took beyond their parts
+    After every BLOCK steps the parts are repeated from the same states: physics of agents and of objects, and rendering
+    with optics and noise.
+
+    wholes: durations of the steps [s].
+    shares: excess of the steps' time over their parts, for every block.
     """
 
     def __init__(self, case: Case, n_envs: int) -> None:
@@ -156,10 +159,10 @@ class _Step:
 
         simulation.task.moved = moved  # type: ignore[method-assign]
         self._note(physics.agents, "step", physics.agents.step)
-        self._note(sight, "begin", lambda *asked: alone.begin(*asked).wait())
+        self._note(sight, "launch", lambda *asked: alone.launch(*asked).wait())
 
     def _note(self, owner: Any, name: str, alone: Callable[..., Any]) -> None:
-        """Remember what the step asks of this method, for doing it again `alone`."""
+        """Record the step's call of this method, to repeat it separately."""
         method = getattr(owner, name)
 
         def noted(*asked: Any) -> Any:
@@ -184,7 +187,7 @@ def _duration(call: Callable[[], Any]) -> float:
 
 
 def _mitsuba_rate(world: sim.World, eyes: sim.Eyes, state: Any, budget: float) -> float:
-    """Agent-steps/s of Mitsuba as a script would use it: scene edited and rendered for every eye of one world."""
+    """Agent-steps/s of Mitsuba in a plain script: the scene is edited and rendered for every eye of one world."""
     height, width = eyes.resolution
     mirror = sim.mirror(world.model)
     data = mujoco.MjData(world.model)
@@ -200,11 +203,11 @@ def _mitsuba_rate(world: sim.World, eyes: sim.Eyes, state: Any, budget: float) -
 
 
 def _mujoco_rate(world: sim.World, eyes: sim.Eyes, state: Any, budget: float, shadows: bool) -> float | None:
-    """Agent-steps/s of mujoco.Renderer with the eyes' resolution; None where there is no OpenGL."""
+    """Agent-steps/s of mujoco.Renderer with the eyes' resolution; None without OpenGL."""
     height, width = eyes.resolution
     try:
         renderer = mujoco.Renderer(world.model, height, width)
-    except Exception as error:  # whatever the OpenGL platform throws
+    except Exception as error:  # OpenGL platforms raise various errors
         print(f"no mujoco.Renderer here: {error}")
         return None
     data = mujoco.MjData(world.model)
@@ -228,8 +231,8 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--json", action="store_true", help="print JSON")
     parser.add_argument("--n-envs", type=int, nargs="+", default=[64], help="numbers of worlds (default 64)")
-    parser.add_argument("--task", choices=[case.task for case in CASES], nargs="+", help="default: all")
-    parser.add_argument("--seconds", type=float, default=2.0, help="spent on each number (default 2)")
+    parser.add_argument("--task", choices=[case.task for case in CASES], nargs="+", help="default: all tasks")
+    parser.add_argument("--seconds", type=float, default=2.0, help="seconds for each number (default 2)")
     options = parser.parse_args()
     cases = [case for case in CASES if options.task is None or case.task in options.task]
     results = [measure(case, n, options.seconds) for case in cases for n in options.n_envs]
@@ -241,7 +244,7 @@ def main() -> int:
     for result in results:
         print(_table(result))
     missed = [line for result in results for line in _missed(result)]
-    print("\n".join(missed or ["all bars are met"]))
+    print("\n".join(missed or ["all bounds hold"]))
     return int(bool(missed))
 
 
@@ -257,7 +260,7 @@ def _table(result: dict[str, Any]) -> str:
 
 
 def _missed(result: dict[str, Any]) -> list[str]:
-    """Bars that this result misses; they are set for 64 worlds."""
+    """Bounds that this result misses; they are set for 64 worlds."""
     ratios = result["ratio_to_mujoco"]
     if result["n_envs"] != 64 or not ratios:
         return []

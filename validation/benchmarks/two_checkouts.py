@@ -1,8 +1,8 @@
 """Whole steps of environments in this checkout and in another one, such as the commit before a change.
 
-Each checkout steps the same tasks with the same actions in a process of its own. The two take turns of a third of a
-second, so that a machine whose speed varies slows down both. The ratio is this checkout's steps per second over the
-other's: the median over the turns, with the quartiles in brackets. Both checkouts need the names of tasks and the
+Each checkout steps the same tasks with the same actions in a separate process. The two take turns of a third of a
+second, so variations of the machine's speed affect both. The ratio is this checkout's steps per second over the
+other's: the median over the turns, with the quartiles in brackets. Both checkouts must have the task names and the
 arguments of `sim.make_vec_env` that are used here.
 
     python -m validation.benchmarks.two_checkouts OTHER [--turns 21] [--only detection]
@@ -24,7 +24,7 @@ from typing import Any
 
 CHECKOUT = Path(__file__).resolve().parents[2]
 LINE = "steps per second: "
-SECONDS, WARM_UP = 0.33, 1.5  # of each turn, and before the first one
+SECONDS, WARM_UP = 0.33, 1.5  # seconds of each turn, and before the first one
 
 
 def _example(name: str, task: str) -> Any:
@@ -37,7 +37,7 @@ def _example(name: str, task: str) -> Any:
 
 
 def _humanoid() -> Any:
-    """Gymnasium's humanoid (MIT) with two eyes, whose reward does not matter here."""
+    """Gymnasium's humanoid (MIT) with two eyes; its reward is irrelevant here."""
     import optics
     import sim
 
@@ -77,8 +77,8 @@ def cases() -> dict[str, Callable[[], Any]]:
 
     found = {f"detection, {n} world(s)": built_in("detection", few, n) for n in (1, 64, 256)}
     found |= {f"navigation, {n} world(s)": built_in("navigation", many, n) for n in (1, 64, 256)}
-    found["detection behind a hole, 64 worlds"] = built_in("detection", behind_a_hole(few), 64)
-    found["navigation behind a hole, 64 worlds"] = built_in("navigation", behind_a_hole(many), 64)
+    found["detection behind a pinhole, 64 worlds"] = built_in("detection", behind_a_hole(few), 64)
+    found["navigation behind a pinhole, 64 worlds"] = built_in("navigation", behind_a_hole(many), 64)
     found |= {f"find_ball, {n} world(s)": own(lambda: _example("find_ball", "FindBall"), n) for n in (1, 64)}
     found["ant, 64 worlds"] = own(lambda: _example("ant_seeks", "AntSeeks"), 64)
     found["humanoid, 64 worlds"] = own(_humanoid, 64)
@@ -86,7 +86,7 @@ def cases() -> dict[str, Callable[[], Any]]:
 
 
 def serve() -> None:
-    """Measure what the parent process asks for: a line with the name of a case opens it, an empty line is a turn."""
+    """Measure on requests of the parent process: a line with the name of a case opens it, an empty line is a turn."""
     import numpy as np
 
     import sim

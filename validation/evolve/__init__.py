@@ -1,14 +1,14 @@
-"""Proofs of learning, search and run directories, and what they need.
+"""Proofs of learning, search and run directories, and their helpers.
 
-learning_curves       what is learnt, how soon, and with which settings
-early_ranking         ranks after little training against final ranks
-fewer_epochs          fewer passes late in a training
-run_directory_safety  prepared, spoilt and killed runs
-worker_endurance      a worker after many candidates
+learning_curves       learning curves of the tasks with several settings
+early_ranking         ranks after little training compared with final ranks
+fewer_epochs          fewer epochs late in a training run
+run_directory_safety  manipulated, damaged and killed runs
+worker_endurance      memory of a worker over many candidates
 
-watched_trainings     trainings and how often they reach the goal
-hostile               trials of prepared runs, and their promises
-hostile_runs          trials: a run directory given to a command
-hostile_files         trials: pages, policies, pictures and models
-hostile_unfinished    trials: readers that leave, directories that are deleted
+watched_trainings     training runs with regular evaluations
+hostile               trials of untrusted runs, with the guarantees that they test
+hostile_runs          trials: damaged run directories
+hostile_files         trials: pages, policies, images and models
+hostile_unfinished    trials: closed pipes and deleted directories
 """

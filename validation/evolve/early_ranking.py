@@ -1,27 +1,34 @@
-"""Does little training tell who will be good? (E2)
+"""Early ranking: does fitness after little training predict final fitness?
 
-Budget ladders (`search.rungs`, `evolve.search.successive_halving`) train the whole generation a little and only the
-better part on. That saves time only if the order after little training is the order after all of it. Here animals are
-drawn from the genome, with one to four eyes of 1 x 1 to 15 x 15 receptors behind a perfect lens. They learn detection
-up a ladder of four rungs as a run would train them, except that none is held back. The table compares their order on
-each rung with that on the last (Spearman's rank correlation, and its 90 % confidence interval from a bootstrap over
-animals).
+Does the order of animals after part of a training run predict their order after all of it? Half of the training
+predicts the final order with a rank correlation of 0.86. Less training predicts little: 0.64 after an eighth and -0.33
+after a quarter.
 
-"32 episodes" is what a run sees: the fitness on each rung, from its own evaluation episodes. "128 episodes" measures
-the policy of each rung longer, in other worlds; the last line compares the two measurements on the last rung.
+**Method.** Successive halving (`search.rungs`, `evolve.search.successive_halving`) trains the whole generation a little
+and continues only with the better part. This saves time only if the early order equals the final order. Here animals
+are drawn from the genome, with one to four eyes of 1 x 1 to 15 x 15 receptors behind a perfect lens. They learn
+detection over four rungs, as in an evolutionary run, but no animal is stopped at a rung.
 
-The second table gives what halving (or quartering) these animals as one generation would have cost in CPU seconds,
-relative to training all of them to the end. It also gives the place, in the order of the last rung by 128 episodes,
-of the animal that the ladder declares the best.
+**First table.** It compares the order on each rung with that on the last: Spearman's rank correlation, and its 90 %
+confidence interval from a bootstrap over animals. "32 episodes" is the fitness that a run uses, from the evaluation
+episodes of each rung. "128 episodes" evaluates the policy of each rung for longer, in other worlds. The last line
+compares the two measurements on the last rung.
 
-Result: half of the training predicted the result of the whole (0.86). Less training predicted little; 16 animals are
-too few to say more: an eighth did better (0.64) than a quarter (-0.33), and neither interval is narrow. A ladder of
-two rungs saves a fifth of the time; lower rungs save more and may lose the best. Ladders are off by default.
-Thirty-two episodes measure fitness well enough (0.99 with the result of 128). Fitness from six episodes, of an
-earlier learner that had not learnt the task by the end, predicted nothing about the result of 48 episodes (0.02).
+**Second table.** It states the CPU seconds that halving (or quartering) these animals as one generation would have
+cost, relative to training all of them to the end. It also states the rank of the animal that successive halving selects
+as the best, in the order of the last rung by 128 episodes. Its two columns differ in the measurement that decides which
+animals continue.
 
-Trainings are stored (`docs/validation/data/early_ranking.csv`), because they take minutes each; the page comes from the
-store.
+**Result.** Two rungs with half of the animals on the second save a fifth of the time. Lower rungs save more and may
+lose the best animal. Successive halving is off by default. Thirty-two episodes measure fitness well enough: their
+correlation with 128 episodes is 0.99. Fitness from six episodes, with an earlier learner that had not learnt the task
+by the end, did not predict the result of 48 episodes (0.02).
+
+**Limits.** 16 animals are too few for further conclusions. An eighth of the training did better (0.64) than a quarter
+(-0.33), and neither interval is narrow.
+
+Training runs take minutes each, so their results are stored (`docs/validation/data/early_ranking.csv`). The page is
+written from the stored results.
 
     python -m validation.evolve.early_ranking [--train N] [--out DIR] [--docs DIR]
 """
@@ -48,7 +55,7 @@ from evolve.genome.phenotype import Phenotype
 from evolve.learning.fitness import evaluate
 from evolve.learning.policy import load_policy
 from evolve.learning.ppo import play
-from evolve.learning.training_stage import TrainingStage
+from evolve.learning.training_rung import TrainingRung
 from evolve.search.successive_halving import budgets, promoted
 from evolve.search.worker import prepare_device
 from evolve.store.atomic_files import write_whole
@@ -56,20 +63,19 @@ from validation.pages.page import Page, parser
 from validation.pages.work_precision_chart import MUTED, OURS, OURS_TOO
 
 STORED = Path("docs/validation/data/early_ranking.csv")
-TOTAL = 163_840  # steps of a whole training: 40 rollouts
+TOTAL = 163_840  # steps of a full training run: 40 rollouts
 RUNGS = 4
 FEW = 32  # episodes of each rung's own evaluation, a run's default
-MANY = 128  # episodes of the longer look
+MANY = 128  # episodes of the longer evaluation
 HOLDS = 0.8  # rank correlation at which a rung can be trusted
-LADDERS = ((2, 0.5), (2, 0.25), (3, 0.5), (4, 0.5))  # (rungs, part that goes on)
-UNSEEN = 10_000  # added to an animal's number: the longer look is into worlds it never saw
-RAYS = 96  # of an eye, and at least one per receptor
+LADDERS = ((2, 0.5), (2, 0.25), (3, 0.5), (4, 0.5))  # (rungs, promoted share)
+UNSEEN = 10_000  # added to an animal's number: the longer evaluation uses unseen worlds
+RAYS = 96  # rays of an eye, and at least one per receptor
 
 
 @dataclass(frozen=True)
 class Row:
-    """One animal on one rung. steps: trained, fewer than the budget where it stopped early; fitness: of FEW
-    episodes; fitness_many: of MANY; cpu_seconds: of this rung."""
+    """One animal on one rung: fitness from FEW and MANY episodes; steps, below the budget after early stopping."""
 
     animal: int
     eyes: int
@@ -104,7 +110,7 @@ def animals(count: int) -> list[Phenotype]:
 
 
 def config(animal: Phenotype) -> RunConfig:
-    """A run of detection whose ladder has RUNGS rungs; rays enough for this animal's eyes."""
+    """Configuration of a run of detection with RUNGS rungs and enough rays for this animal's eyes."""
     rays = max(1, RAYS // (animal.resolution[0] * animal.resolution[1]))
     settings = (f"learning.total_steps={TOTAL}", f"learning.eval_interval={TOTAL // 2 ** (RUNGS - 1)}")
     optics = ("eye.optics=false", f"eye.rays_per_receptor={rays}")
@@ -114,7 +120,7 @@ def config(animal: Phenotype) -> RunConfig:
 
 
 def climbed(number: int, animal: Phenotype) -> list[Row]:
-    """An animal's rows, from the first rung to the last."""
+    """Rows of an animal on all rungs, from the first to the last."""
     run, rows = config(animal), []
     worlds = sim.make_vec_env(
         run.task,
@@ -131,7 +137,7 @@ def climbed(number: int, animal: Phenotype) -> list[Row]:
         ends = budgets(run.search, run.learning)
         for rung in range(RUNGS):
             began = time.process_time()
-            outcome = evaluate(animal, run, number, policy, stretch=TrainingStage(ends[: rung + 1], kept[: rung + 1]))
+            outcome = evaluate(animal, run, number, policy, stretch=TrainingRung(ends[: rung + 1], kept[: rung + 1]))
             spent = time.process_time() - began
             if outcome.failure is not None:
                 raise RuntimeError(f"animal {number}: {outcome.failure}")
@@ -142,7 +148,7 @@ def climbed(number: int, animal: Phenotype) -> list[Row]:
 
 
 def read_rows(path: Path) -> list[Row]:
-    """What is stored; [] without a file."""
+    """Return the stored rows; [] without a file."""
     if not path.exists():
         return []
     kinds = {f.name: {"int": int, "float": float}[str(f.type)] for f in fields(Row)}
@@ -151,7 +157,7 @@ def read_rows(path: Path) -> list[Row]:
 
 
 def write_rows(rows: Sequence[Row], path: Path) -> None:
-    """All rows, whole or not at all."""
+    """Write all rows atomically."""
     text = io.StringIO()
     writer = csv.DictWriter(text, [f.name for f in fields(Row)], lineterminator="\n")
     writer.writeheader()
@@ -161,7 +167,7 @@ def write_rows(rows: Sequence[Row], path: Path) -> None:
 
 
 def store(count: int, path: Path) -> None:
-    """Train the animals that the file does not have yet."""
+    """Train the animals that are missing in the file."""
     rows = read_rows(path)
     for number, animal in enumerate(animals(count)):
         if any(row.animal == number for row in rows):
@@ -179,7 +185,7 @@ def columns(rows: Sequence[Row], name: str) -> np.ndarray:
 
 
 def correlation(a: np.ndarray, b: np.ndarray) -> tuple[float, float, float]:
-    """Spearman's rank correlation, and the ends of its 90 % interval."""
+    """Spearman's rank correlation, and the ends of its 90 % confidence interval."""
     draws = np.random.default_rng(0).integers(len(a), size=(2000, len(a)))
     (whole,), drawn = _of_ranks(a[None], b[None]), _of_ranks(a[draws], b[draws])
     low, high = np.quantile(drawn[np.isfinite(drawn)], [0.05, 0.95])
@@ -187,7 +193,7 @@ def correlation(a: np.ndarray, b: np.ndarray) -> tuple[float, float, float]:
 
 
 def _of_ranks(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Pearson's correlation of the ranks of each row; NaN where a row is all the same."""
+    """Pearson's correlation of the ranks of each row; NaN for constant rows."""
     x, y = (rankdata(values, axis=1) - (values.shape[1] + 1) / 2 for values in (a, b))
     with np.errstate(invalid="ignore"):
         return (x * y).sum(axis=1) / np.sqrt((x**2).sum(axis=1) * (y**2).sum(axis=1))
@@ -195,8 +201,11 @@ def _of_ranks(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Halving:
-    """A ladder, climbed by the stored animals as one generation. cost: CPU seconds, in parts of all whole trainings.
-    place: of the animal that it declares the best in the order of whole trainings by MANY episodes, 1 the best."""
+    """Successive halving of the stored animals as one generation.
+
+    cost: CPU seconds relative to all full training runs.
+    place: rank of the animal that it selects, in the order after full training by MANY episodes; 1 is the best.
+    """
 
     rungs: int
     promoted: float
@@ -205,8 +214,10 @@ class Halving:
 
 
 def halving(rows: Sequence[Row], rungs: int, share: float, by: str = "fitness") -> Halving:
-    """A ladder whose budgets are stored ones: the share that goes on is 1/2, or 1/4 with every other rung. `by` decides
-    who goes on: "fitness" or "fitness_many"."""
+    """Apply successive halving with stored budgets; `by`: "fitness" or "fitness_many" decides on promotion.
+
+    share: promoted share, 1/2, or 1/4 with every other rung.
+    """
     fitness, many, spent = (columns(rows, name) for name in (by, "fitness_many", "cpu_seconds"))
     search = replace(SearchConfig(), population=len(fitness), rungs=rungs, promoted=share)
     stride = round(-np.log2(share))
@@ -223,7 +234,7 @@ def halving(rows: Sequence[Row], rungs: int, share: float, by: str = "fitness") 
 
 
 def table(rows: Sequence[Row]) -> str:
-    """A line per rung, then a line per ladder."""
+    """A line per rung, then a line per variant of successive halving."""
     fitness, many, spent = (columns(rows, name) for name in ("fitness", "fitness_many", "cpu_seconds"))
     lines = [f"{len(fitness)} animals", f"{'steps':>9}{'CPU time':>10}{f'{FEW} episodes':>26}{f'{MANY} episodes':>26}"]
     share = spent.cumsum(axis=1).sum(axis=0) / spent.sum()
@@ -231,16 +242,16 @@ def table(rows: Sequence[Row]) -> str:
         cells = "".join(_shown(correlation(measured[:, rung], measured[:, -1])) for measured in (fitness, many))
         last = _shown(correlation(fitness[:, -1], many[:, -1])) + f"  ({FEW} against {MANY} episodes)"
         lines.append(f"{budget:9,}{share[rung]:10.0%}" + (cells if rung < RUNGS - 1 else last))
-    lines += ["", f"{'ladder':26}{'CPU time':>10}{f'place of its best, by {FEW} episodes':>36}{f'by {MANY}':>8}"]
+    lines += ["", f"{'rungs':26}{'CPU time':>10}{f'rank of selected, by {FEW} episodes':>36}{f'by {MANY}':>8}"]
     for rungs, share in LADDERS:
         by_few, by_many = (halving(rows, rungs, share, by) for by in ("fitness", "fitness_many"))
-        name = f"{rungs} rungs, {share:g} goes on"
+        name = f"{rungs} rungs, {share:g} promoted"
         lines.append(f"{name:26}{by_few.cost:10.0%}{by_few.place:36}{by_many.place:8}")
     return "\n".join(lines)
 
 
 def verdicts(rows: Sequence[Row]) -> list[str]:
-    """Every bound that the stored trainings break, in words."""
+    """Descriptions of the bounds that the stored training runs violate."""
     many = columns(rows, "fitness_many")
     return [] if len(many) >= 16 else [f"{len(many)} animals are too few"]
 
@@ -270,10 +281,10 @@ def draw(rows: Sequence[Row], path: Path) -> None:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Train what is asked for, then make the page of all that is stored."""
+    """Run the requested training, then write the page of all stored results."""
     options_parser = parser(__doc__ or "")
-    options_parser.add_argument("--train", type=int, default=0, metavar="N", help="animals that must be stored")
-    options_parser.add_argument("--stored", type=Path, default=STORED, help="file of the stored trainings")
+    options_parser.add_argument("--train", type=int, default=0, metavar="N", help="number of animals to be stored")
+    options_parser.add_argument("--stored", type=Path, default=STORED, help="file of the stored training runs")
     options = options_parser.parse_args(arguments)
     if options.train:
         prepare_device()

@@ -1,11 +1,12 @@
-"""Can a run directory be mailed? Strangers' runs, files and readers, against what is promised about them.
+"""Trials of untrusted runs, files and readers: do they satisfy the guarantees of run directories?
 
     python -m validation.evolve.hostile [--trials N] [--seed S]
 
-Each trial spoils a fresh copy of a small run (or a policy, a picture, a model, a page) at random and gives it to a
-command. A trial fails if the command prints a traceback, more than one line or what steers a terminal, if it ends with
-another exit code than promised, takes more than a second where sizes are checked, or touches a file outside the run.
-The table counts promises, trials and failures; one failure is an exit code of 1. The seed makes it repeatable.
+Each trial randomly damages a fresh copy of a small run (or a policy, an image, a model, a page) and passes it to a
+command. A trial fails if the command prints a traceback, more than one line or terminal control sequences, or ends with
+another exit code than promised. It also fails if the command takes more than a second where sizes are checked, or
+touches a file outside the run. The table counts trials and failures of each promise. Any failure gives exit code 1. The
+seed makes the trials repeatable.
 """
 
 from __future__ import annotations
@@ -29,12 +30,16 @@ from validation.evolve.hostile_runs import (
 )
 from validation.evolve.hostile_unfinished import reader_leaves, run_is_deleted
 
-SHOWN = 3  # failures of a promise that are told
+SHOWN = 3  # printed failures per promise
 
 
 @dataclass(frozen=True)
 class Promise:
-    """trial: what is wrong after one trial, None if nothing is; share: of all trials."""
+    """A guarantee with its trial.
+
+    trial: returns the failure of one trial, or None.
+    share: share of all trials.
+    """
 
     text: str
     trial: Callable[[random.Random, Stage], str | None]
@@ -42,22 +47,22 @@ class Promise:
 
 
 PROMISES = (
-    Promise("links, FIFOs, sockets and folders under a file's name lead nowhere", strange_file, 0.2),
-    Promise("impossible values in a record: one line, code 2", impossible_value, 0.25),
-    Promise("broken bytes: read as they are, or one line, code 2", broken_bytes, 0.15),
+    Promise("links, FIFOs, sockets and folders in place of files are refused", strange_file, 0.2),
+    Promise("invalid values in a record: one-line error, exit code 2", impossible_value, 0.25),
+    Promise("damaged bytes: read unchanged, or one-line error, exit code 2", broken_bytes, 0.15),
     Promise("animals too large to build are refused within a second", shape_bomb, 0.05),
-    Promise("nothing printed steers the terminal", steering_text, 0.08),
-    Promise("text stays text on a page", text_on_a_page, 0.08),
-    Promise("forged and broken policies are refused within a second", forged_policy, 0.08),
-    Promise("broken EXR files: the same views, or an error", broken_picture, 0.05),
+    Promise("printed text contains no terminal control sequences", steering_text, 0.08),
+    Promise("text is escaped on pages", text_on_a_page, 0.08),
+    Promise("forged and damaged policies are refused within a second", forged_policy, 0.08),
+    Promise("damaged EXR files: the same images, or an error", broken_picture, 0.05),
     Promise("models too large to build are refused within a second", bomb_of_a_model, 0.05),
-    Promise("a run goes on when its reader leaves", reader_leaves, 0.005),
-    Promise("a run that is deleted stays so and says so", run_is_deleted, 0.005),
+    Promise("a run continues after its output pipe is closed", reader_leaves, 0.005),
+    Promise("a deleted run stays deleted and ends with a message", run_is_deleted, 0.005),
 )
 
 
 def failures(promise: Promise, trials: int, seed: int, stage: Stage) -> list[str]:
-    """What went wrong, in how many trials it did."""
+    """Descriptions of the failed trials."""
     chances = (random.Random(f"{promise.trial.__name__} {seed} {number}") for number in range(trials))
     return [wrong for chance in chances if (wrong := promise.trial(chance, stage)) is not None]
 

@@ -1,4 +1,4 @@
-"""Trials of validation/evolve/hostile.py: pages, policies, pictures and models that a stranger has prepared."""
+"""Trials of validation/evolve/hostile.py: untrusted pages, policies, images and models."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ MARKUP = "<>\"'&/= \x00\x1b{}$-;"
 
 
 class _Tags(HTMLParser):
-    """Elements and attributes that a browser would find in a page."""
+    """Parser for the elements and attributes that a browser would find in a page."""
 
     def __init__(self, content: str) -> None:
         super().__init__()
@@ -45,7 +45,7 @@ class _Tags(HTMLParser):
 
 
 def text_on_a_page(chance: random.Random, stage: Stage) -> str | None:
-    """Markup as a failure's text, among the versions, and as the run's name."""
+    """Put markup into a failure's text, the versions, and the run's name."""
     hostile = "".join(chance.choice((*TEXTS, *MARKUP)) for _ in range(6))
     run = Run.open(stage.copy("run" + hostile.replace("/", "-").replace("\x00", "")[:60]))
     failed = replace(run.candidates[-1], id=6, generation=1, index=2, failure=hostile)
@@ -72,11 +72,11 @@ def _in_time(read: Callable[[], object], refusals: tuple[type[Exception], ...], 
 
 
 def forged_policy(chance: random.Random, stage: Stage) -> str | None:
-    """A shape that its tensors do not have, or bytes that are broken."""
+    """Give a policy a shape that differs from its tensors, or damaged bytes."""
     path = stage.folder / "policy.safetensors"
     policy = build_policy(PolicyConfig((2, 2, 3, 2, 2), 8))
     save_policy(policy, path)
-    load_policy(path)  # PyTorch loads a second's worth of itself with the first
+    load_policy(path)  # loads PyTorch's lazy modules, which takes a second
     forged = chance.random() < 0.5
     if forged:
         shape = {"eyes": [2, 2, 3, 2, 2], "neurons": 8, "layers": 2}
@@ -90,13 +90,13 @@ def forged_policy(chance: random.Random, stage: Stage) -> str | None:
         for _ in range(chance.randint(1, 4)):
             content[chance.randrange(min(2000, len(content)))] = chance.randrange(256)
         path.write_bytes(content[: chance.choice((len(content), chance.randrange(len(content))))])
-    meant = forged and wrong == "8" and key != "eyes"  # text that is a number after all
+    meant = forged and wrong == "8" and key != "eyes"  # text that is a valid number
     with torch.random.fork_rng():
         return _in_time(lambda: load_policy(path), (ValueError,), must=forged and not meant)
 
 
 def broken_picture(chance: random.Random, stage: Stage) -> str | None:
-    """An EXR file with bytes flipped, or cut short: the same views, or ExrError."""
+    """Flip bytes of an EXR file, or truncate it: the images must be unchanged, or ExrError raised."""
     path = stage.folder / "views.exr"
     if not path.exists():
         noise = np.random.default_rng(0)
@@ -112,13 +112,13 @@ def broken_picture(chance: random.Random, stage: Stage) -> str | None:
     def read() -> None:
         views = sim.read_exr(spoilt)
         if any(not np.array_equal(a.radiance, b.radiance) for a, b in zip(views, whole, strict=True)):
-            raise AssertionError("other views than were written")
+            raise AssertionError("other images than were written")
 
     return _in_time(read, (ExrError,), must=False)
 
 
 def bomb_of_a_model(chance: random.Random, stage: Stage) -> str | None:
-    """Copies, cells and places beyond all bounds in MJCF."""
+    """Put excessive copies, cells and positions into an MJCF model."""
     many = chance.choice((10**5, 10**6, 10**9, "1" + "0" * 400))
     geom = "<geom name='ball' size='1'/>"
     inside, asset = chance.choice(

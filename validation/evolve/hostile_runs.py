@@ -1,4 +1,4 @@
-"""Trials of validation/evolve/hostile.py: a run directory that a stranger has prepared, given to a command."""
+"""Trials of validation/evolve/hostile.py: commands on damaged run directories."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ BOMBS = {
 
 @dataclass(frozen=True)
 class Stage:
-    """A finished little run, copies of which are spoilt, beside a file that is none of the run's business."""
+    """A small finished run, which is copied and damaged, and a file outside the run."""
 
     folder: Path
 
@@ -80,13 +80,15 @@ class Stage:
             genome = np.random.default_rng(number).random(dimension)
             outcome = Evaluation(float(number), (number - 0.5, number + 0.5), 0.5, 4096, 0.1, ((4096, 1.0),))
             animal = develop(genome, run.config)
-            run.append(Candidate.of(Place.of(number, 4), tuple(genome.tolist()), animal, number, outcome))
+            run.append(
+                Candidate.from_evaluation(Place.from_id(number, 4), tuple(genome.tolist()), animal, number, outcome)
+            )
         (folder / "thesis.tex").write_text(SECRET)
         return cls(folder)
 
     @property
     def lines(self) -> list[str]:
-        """Of the run's record."""
+        """Lines of the run's record."""
         return (self.folder / "whole" / "candidates.jsonl").read_text().splitlines(keepends=True)
 
     @property
@@ -94,14 +96,14 @@ class Stage:
         return self.folder / "thesis.tex"
 
     def copy(self, name: str = "run") -> Path:
-        """A fresh run to spoil."""
+        """Return a fresh copy of the run."""
         shutil.rmtree(self.folder / "trial", ignore_errors=True)
         (self.folder / "trial").mkdir()
         return Path(shutil.copytree(self.folder / "whole", self.folder / "trial" / name))
 
 
 def call(*arguments: Any) -> tuple[int, str, str]:
-    """A command's exit code, and what it printed."""
+    """Run a command and return its exit code and output."""
     out, err = io.StringIO(), io.StringIO()
     with redirect_stdout(out), redirect_stderr(err):
         try:
@@ -114,7 +116,7 @@ def call(*arguments: Any) -> tuple[int, str, str]:
 
 
 def refusal(stage: Stage, *arguments: Any) -> str | None:
-    """What is wrong with how a command refuses; None where it does so in one line and touches nothing."""
+    """Check that a command refuses in one line and touches no other file; return the failure, or None."""
     code, out, err = call(*arguments)
     if code != 2 or out or err.count("\n") != 1 or not err.startswith("evolve: error: "):
         return f"code {code}, said {err[-200:]!r}"
@@ -124,7 +126,7 @@ def refusal(stage: Stage, *arguments: Any) -> str | None:
 
 
 def strange_file(chance: random.Random, stage: Stage) -> str | None:
-    """Something else under the name of a file or a folder, for any command, `run --out` among them."""
+    """Replace a file or folder by something else, for any command, including `run --out`."""
     run, name = stage.copy(), chance.choice(FILES + FOLDERS)
     kind = chance.choice([kind for kind in KINDS if kind != ("directory" if name in FOLDERS else "file")])
     place = run / name
@@ -155,7 +157,7 @@ def _put(kind: str, place: Path, victim: Path) -> None:
 
 
 def impossible_value(chance: random.Random, stage: Stage) -> str | None:
-    """A value that no field may have, anywhere in a line of the record."""
+    """Put an invalid value anywhere in a line of the record."""
     run, record = stage.copy(), json.loads(stage.lines[-1])
     table = record["phenotype"] if chance.random() < 0.5 else record
     table[chance.choice([name for name in table if name != "failure"])] = "@"
@@ -165,7 +167,7 @@ def impossible_value(chance: random.Random, stage: Stage) -> str | None:
 
 
 def shape_bomb(chance: random.Random, stage: Stage) -> str | None:
-    """An animal that would fill the memory; whoever builds it is too late."""
+    """Record an animal that would exceed the memory if it were built."""
     run, record = stage.copy(), json.loads(stage.lines[-1])
     trait = chance.choice(list(BOMBS))
     record["phenotype"][trait] = "@"
@@ -177,7 +179,7 @@ def shape_bomb(chance: random.Random, stage: Stage) -> str | None:
 
 
 def broken_bytes(chance: random.Random, stage: Stage) -> str | None:
-    """Bytes flipped, cut out or put in: read as they are where that still makes sense, or refused in one line."""
+    """Flip, remove or insert bytes: the record must be read if it is still valid, or refused in one line."""
     run = stage.copy()
     path = run / chance.choice(("config.toml", "candidates.jsonl", "versions.json"))
     content = bytearray(path.read_bytes())
@@ -193,12 +195,12 @@ def broken_bytes(chance: random.Random, stage: Stage) -> str | None:
 
 
 def steering_text(chance: random.Random, stage: Stage) -> str | None:
-    """Escape sequences as a failure's text and a directory's name, shown by `status` and `compare`."""
+    """Put escape sequences into a failure's text and a directory's name, shown by `status` and `compare`."""
     letters = [chr(chance.choice((27, 7, 8, 13, 0x9B, 0x202E, 0xDCE9, chance.randrange(1, 0x500)))) for _ in range(12)]
     name = "".join(letters).replace("/", "-").encode(errors="surrogateescape").decode(errors="surrogateescape")
     run, record = stage.copy(f"run{name}"), json.loads(stage.lines[-1])
     record |= {"failure": f"ValueError: {name}", "fitness": None}
     (run / "candidates.jsonl").write_text("".join(stage.lines[:-1]) + json.dumps(record) + "\n")
     code, out, err = call(chance.choice(("status", "compare")), run)
-    plain = (out + err).translate(dict.fromkeys(map(ord, "\n\t"))).isprintable()  # layout steers nothing
+    plain = (out + err).translate(dict.fromkeys(map(ord, "\n\t"))).isprintable()  # newlines and tabs are harmless
     return None if code == 0 and plain else f"code {code}, said {out + err!r}"

@@ -1,4 +1,4 @@
-"""Trials of validation/evolve/hostile.py: runs whose reader leaves or whose directory is deleted, in processes."""
+"""Trials of validation/evolve/hostile.py: processes whose output pipe is closed or whose directory is deleted."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ CHECKOUT = Path(__file__).resolve().parents[2]
 
 
 def quickly(phenotype: Any, config: Any, seed: int, policy: Path, progress: Any) -> Evaluation:
-    """An evaluation that takes no time."""
+    """Evaluation that takes no time."""
     write_whole(policy, b"policy")
     return Evaluation(phenotype.fov_deg, (phenotype.fov_deg,), 0.5, 4096, 0.01)
 
 
 def while_it_is_deleted(phenotype: Any, config: Any, seed: int, policy: Path, progress: Any) -> Evaluation:
-    """The same, before or after which somebody deletes the run."""
+    """Evaluation that takes no time and deletes the run before or after it."""
     if seed % 2:
         shutil.rmtree(policy.parents[2])
     outcome = quickly(phenotype, config, seed, policy, progress)
@@ -54,7 +54,7 @@ def _begin(stage: Stage, evaluate: str, seed: int, *options: str, **streams: Any
 
 
 def reader_leaves(chance: random.Random, stage: Stage) -> str | None:
-    """`evolve run | head -1`, with and without `--json` and `2>&1`: the run goes on to its end."""
+    """`evolve run | head -1`, with and without `--json` and `2>&1`: the run must continue to its end."""
     reader, writer = os.pipe()
     err = chance.choice((writer, subprocess.DEVNULL))
     child = _begin(
@@ -69,13 +69,13 @@ def reader_leaves(chance: random.Random, stage: Stage) -> str | None:
 
 
 def run_is_deleted(chance: random.Random, stage: Stage) -> str | None:
-    """While its first candidate trains: it stays deleted, and the process says so with code 2."""
+    """Delete a run while its first candidate trains: it must stay deleted, with a message and exit code 2."""
     child = _begin(stage, "while_it_is_deleted", chance.randrange(100), stdout=subprocess.PIPE, stderr=subprocess.PIPE)
     _, err = child.communicate()
     said = err.decode().splitlines()[-1:]
     if child.returncode != 2 or b"Traceback" in err or not said or "evolve: error: " not in said[0]:
         return f"code {child.returncode}, said {err[-200:]!r}"
-    return "is there again" if (stage.folder / "trial" / "run").exists() else None
+    return "the directory exists again" if (stage.folder / "trial" / "run").exists() else None
 
 
 def _main() -> int:

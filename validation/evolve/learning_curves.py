@@ -1,33 +1,46 @@
-"""What is learnt, how soon, and with which settings (E0)
+"""Learning curves: what is learnt, how fast, and with which settings
 
-Detection is solved if the goal comes first in 80 % of the episodes. An agent that reaches objects without telling
-them apart finds it first in a third. Every row is a training with `evolve.learning.ppo` in sim's worlds. Every 50,000
-steps 100 episodes test the policy as it is, without exploration, in worlds that it never saw. CPU seconds are those
-of one thread for rollouts and updates, without these tests; "update" is the share of the updates. In brackets: the 95
-% confidence interval of the last test (Wilson). Returns are undiscounted training returns per episode.
+How many steps does it take to learn the tasks? Two eyes of 15 x 15 receptors solve detection after 86,016 and 143,360
+steps (23 and 40 CPU seconds, two seeds) and tracking after 159,744. A single receptor stays at chance. In the maze the
+goal is not reached within these budgets.
 
-One receptor stays at chance: where it reaches an object at all, that is the goal in one of three cases. Eyes of many
+**Method.** Each row is a training run with `evolve.learning.ppo` in sim's worlds. Every 50,000 steps, 100 episodes
+evaluate the policy without exploration, in worlds that it never saw. Detection is solved if the goal comes first in
+80 % of the episodes. An agent that reaches objects without distinguishing them finds it first in a third. Eyes of many
 receptors are sampled with one ray per receptor (in mazes 4), the single receptor with 96.
 
-In the maze the goal is not reached within such budgets. There the table gives how far an episode ends from its
-start, and what it earned: 0.25 per metre, minus 1 for every action in contact with a wall; as fitness, 1.5 and 2.
-Standing still earns 0, and an animal with one eye learns little more than that. Animals with ten eyes travel. They
-get farther than a hand-written controller that knows the true distances of the walls in eleven directions and steers
-to where it is widest (21.8 m at 1.5 m/s with 2.6 actions in contact, a return of 2.8 ± 0.9; 25.6 m and -14 at 5 m/s).
-Their return is about 0, because every action in contact costs as much as four metres earn. Their fitness, by which
-they are selected, is above 0. Means have 95 % confidence intervals; that of the fitness is an upper bound.
+**First table.** CPU seconds are of one thread, for rollouts and updates without these evaluations. "update" is the
+share of the updates. The brackets hold the 95 % confidence interval of the last evaluation (Wilson). Returns are
+undiscounted training returns per episode. The single receptor stays at chance: if it reaches an object at all, that is
+the goal in one of three cases.
 
-Settings are the defaults of the task except for those named. "With tanh" are trainings with the earlier defaults: 64
-worlds x 64 steps, 4 epochs, a constant learning rate of 1e-3, tanh, mini-batches of stretches of 32 steps (the one of
-detection is from the last commit with them). Now it is 128 x 32, 10 epochs, 3e-3 falling as one over the steps after
-75,000 (in mazes 200,000), leaky rectifiers, stretches of 8. Since these trainings passes fall before the rate does
-(`fewer_epochs`). `docs/measurements/learning.md` lists what else was tried.
-A row of few steps is a training that was stopped there, not one that learnt so fast. All trainings "with tanh" except
-detection are older than the bounds on means of actions; in the maze contact then had its full price after 500,000
-steps.
+**Second table.** In the maze, the table states how far from its start an episode ends, and what it earned. The return
+is 0.25 per metre, minus 1 for every action in contact with a wall. The fitness is 1.5 per metre, minus 2 for every such
+action. Means have 95 % confidence intervals. That of the fitness is an upper bound.
 
-Trainings are stored (`docs/validation/data/learning_curves.csv`), because they take minutes each; the page comes from
-the store.
+Standing still earns 0, and an animal with one eye learns little more than that. Animals with ten eyes travel. They get
+farther than a hand-written controller that receives the true distances of the walls in eleven directions and steers in
+the direction of most space. That controller reaches 21.8 m at 1.5 m/s with 2.6 actions in contact and a return of 2.8 ±
+0.9, or 25.6 m and -14 at 5 m/s. The return of the animals with ten eyes is about 0, because every action in contact
+costs as much as four metres earn. Their fitness, by which they are selected, is above 0.
+
+**Settings.** They are the defaults of the task except for those named.
+
+- "With tanh" rows use earlier defaults: 64 worlds x 64 steps, 4 epochs, a constant learning rate of 1e-3, tanh, and
+  mini-batches of stretches of 32 steps. The detection runs are from the last commit with these defaults.
+- The other rows use 128 x 32, 10 epochs, a learning rate of 3e-3 that falls as one over the steps after 75,000 (in
+  mazes 200,000), leaky rectifiers and stretches of 8. In these runs the number of epochs is constant. The present
+  learner reduces it before the learning rate (`fewer_epochs`).
+
+**Bounds.** Two eyes of 15 x 15 receptors solve detection and tracking. A single receptor is not better than chance. In
+the maze, ten eyes beat one in fitness and in distance.
+
+**Limits.** A row of few steps is a training run that was stopped there, not one that learnt so fast. Except in
+detection, the learner of the "with tanh" rows had no bounds on the means of actions. In its maze, contact had its full
+price after 500,000 steps. `docs/measurements/learning.md` lists other settings that were tried.
+
+Training runs take minutes each, so their results are stored (`docs/validation/data/learning_curves.csv`). The page is
+written from the stored results.
 
     python -m validation.evolve.learning_curves [--train CASE ...] [--seeds N ...] [--out DIR] [--docs DIR]
 """
@@ -49,7 +62,7 @@ from validation.pages.page import Page, parser
 from validation.pages.work_precision_chart import MUTED, OURS, OURS_TOO
 
 STORED = Path("docs/validation/data/learning_curves.csv")
-SOLVED = 0.8  # of the episodes
+SOLVED = 0.8  # share of the episodes
 CHANCE = 1 / 3
 PAIR = sim.Eyes(n_eyes=2, resolution=(15, 15), fov_deg=45, placement_range_deg=60)
 ONE_RECEPTOR = sim.Eyes(n_eyes=1, resolution=(1, 1), fov_deg=45)
@@ -76,7 +89,7 @@ CHANGES: tuple[dict[str, Any], ...] = (
 
 
 def _settings(changes: dict[str, Any]) -> Case:
-    """Detection with two eyes and the default settings but for these."""
+    """Detection with two eyes and the default settings except for these changes."""
     name = ", ".join(f"{key} {value:g}" for key, value in changes.items()) or "detection, 2 x (15 x 15)"
     return Case(name, PAIR, learning=replace(LearningConfig(), **changes))
 
@@ -90,12 +103,12 @@ CONTROLS = (
     Case("maze, 1 x (1 x 4)", ONE_EYE, "maze", assemble("maze").learning, rays_per_receptor=4),
 )
 CASES = {case.name: case for case in (*SETTINGS, *CONTROLS)}
-# Stored, and trained no more: today's learner has no such units.
+# Stored results of earlier learners, which cannot be repeated: the present learner has no such units.
 FORMER = tuple(f"{task}, with tanh" for task in ("detection", "tracking", "maze"))
 
 
 def store(case: Case, seed: int, path: Path) -> None:
-    """Train, and put the rows in the place of those that the file has of this case and seed, as they come."""
+    """Train, and replace the rows of this case and seed in the file after every evaluation."""
     others = [row for row in read_rows(path) if (row.case, row.seed) != (case.name, seed)]
     rows = []
     for row in watched(case, seed):
@@ -120,12 +133,12 @@ def trainings(rows: Sequence[Row]) -> dict[str, list[list[Row]]]:
 
 
 def table(rows: Sequence[Row]) -> str:
-    """Trainings that seek a goal, then those that travel."""
+    """Training runs in tasks with a goal, then those in the maze."""
     return "\n".join(seeking(rows)) + "\n\n" + "\n".join(travelling(rows))
 
 
 def travelling(rows: Sequence[Row]) -> list[str]:
-    """A line per training in the maze: what was reached in the end, with 95 % intervals of the means."""
+    """A line per training run in the maze: final results, with 95 % confidence intervals of the means."""
     head = f"{'case':32}{'seed':>5}{'steps':>12}{'CPU s':>7}{'return':>16}{'fitness':>14}{'distance [m]':>14}"
     lines = [head + f"{'contacts':>10}{'goal':>7}{'update':>8}"]
     for name, runs in trainings(rows).items():
@@ -141,7 +154,7 @@ def travelling(rows: Sequence[Row]) -> list[str]:
 
 
 def seeking(rows: Sequence[Row]) -> list[str]:
-    """A line per training with a goal: steps and CPU seconds to the threshold, and what was reached in the end."""
+    """A line per training run with a goal: steps and CPU seconds to the threshold, and final results."""
     found = {name: runs for name, runs in trainings(rows).items() if not name.startswith("maze")}
     width = max(map(len, ("case", *found))) + 1
     head = f"{'case':{width}}{'seed':>5}{'80 % after':>12}{'CPU s':>7}{'steps':>9}{'goal first':>20}"
@@ -161,7 +174,7 @@ def seeking(rows: Sequence[Row]) -> list[str]:
 
 
 def verdicts(rows: Sequence[Row]) -> list[str]:
-    """Every bound that the stored trainings break, in words."""
+    """Descriptions of the bounds that the stored training runs violate."""
     runs = trainings(rows)
     broken = []
     for task in ("detection", "tracking"):
@@ -184,7 +197,7 @@ def verdicts(rows: Sequence[Row]) -> list[str]:
 
 
 def draw(rows: Sequence[Row], path: Path) -> None:
-    """How often the goal came first, over steps."""
+    """Share of episodes with the goal first, over steps."""
     import matplotlib
 
     matplotlib.use("agg")
@@ -210,13 +223,13 @@ def draw(rows: Sequence[Row], path: Path) -> None:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Train what is asked for, then make the page of all that is stored."""
+    """Run the requested training, then write the page of all stored results."""
     options_parser = parser(__doc__ or "")
     options_parser.add_argument("--train", nargs="+", default=[], choices=CASES, metavar="CASE", help=" | ".join(CASES))
     options_parser.add_argument("--seeds", nargs="+", type=int, default=[0], help="of the trainings")
     options_parser.add_argument("--steps", type=int, default=600_000, help="of each training")
     options_parser.add_argument("--interval", type=int, default=50_000, help="steps between evaluations")
-    options_parser.add_argument("--stored", type=Path, default=STORED, help="file of the stored trainings")
+    options_parser.add_argument("--stored", type=Path, default=STORED, help="file of the stored training runs")
     options = options_parser.parse_args(arguments)
     for name in options.train:
         learning = replace(CASES[name].learning, total_steps=options.steps, eval_interval=options.interval)

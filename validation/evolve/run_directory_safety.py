@@ -1,15 +1,26 @@
-"""A run directory can be mailed, and killed (F0)
+"""Safety of run directories: runs from strangers and killed runs
 
-What is promised about strangers' runs and unfinished runs, held against random trials. A trial spoils a fresh copy of a
-small run (or a policy, a picture, a model, a page) and gives it to a command; it fails if there is a traceback, more
-than one line, another exit code than promised, a second's work where sizes are checked, or a file touched outside the
-run (`validation/evolve/hostile.py`). Or it kills a run with SIGKILL at a random moment and continues it: it fails if
-the record, or a policy, differs by a bit from that of the same run which nobody has killed
-(`tests/evolve/search/kills.py`, candidates in closed form; `tests/evolve/search/training_kills.py`, real trainings).
+Are a stranger's run and a killed run safe to open? Yes: 2,605 random trials of 13 promises had 0 failures.
 
-Trials are stored (`docs/validation/data/run_directory_safety.csv`), because they take half an hour; the page comes from
-the store. Short versions are tests. `tests/validation/evolve/test_hostile.py` also breaks each promise on purpose, and
-must notice.
+**Method.** Most trials damage a fresh copy of a small run (or a policy, an image, a model, a page) and pass it to a
+command (`validation/evolve/hostile.py`). Such a trial fails if one of these happens:
+
+- the command prints a traceback or more than one line;
+- it ends with another exit code than promised;
+- it takes more than a second where sizes are checked;
+- it touches a file outside the run.
+
+The other trials kill a run with SIGKILL at a random moment and continue it. They fail if the record or a policy differs
+by a bit from that of the same run without kills. `tests/evolve/search/kills.py` uses candidates in closed form, and
+`tests/evolve/search/training_kills.py` real training runs.
+
+**Table.** It counts trials and failures of each promise.
+
+**Limits.** The trials cover the listed promises only. Short versions run as tests.
+`tests/validation/evolve/test_hostile.py` also breaks each promise on purpose, and checks that the trial notices.
+
+Trials take half an hour, so their results are stored (`docs/validation/data/run_directory_safety.csv`). The page is
+written from the stored results.
 
     python -m validation.evolve.run_directory_safety [--trials N [--only WORDS]] [--kills N] [--seed S] [--out DIR]
         [--docs DIR]
@@ -37,14 +48,14 @@ ROOT = Path(__file__).resolve().parents[2]
 STORED = Path("docs/validation/data/run_directory_safety.csv")
 LEAST_TRIALS = 2000
 KILLS = {
-    "killed while it searches: the same record, bit for bit": "kills.py",
-    "killed while animals learn: the same record and policies, bit for bit": "training_kills.py",
+    "killed during the search: the same record, bit for bit": "kills.py",
+    "killed during training: the same record and policies, bit for bit": "training_kills.py",
 }
 
 
 @dataclass(frozen=True)
 class Row:
-    """A promise, how often it was tried, and how often it was broken."""
+    """A promise, with the number of its trials and failures."""
 
     promise: str
     trials: int
@@ -52,7 +63,7 @@ class Row:
 
 
 def of_strangers(trials: int, seed: int, only: str = "") -> list[Row]:
-    """Of `validation.evolve.hostile`: of all promises, or of those whose text has `only` in it."""
+    """Run the trials of `validation.evolve.hostile`, for all promises or those whose text contains `only`."""
     rows = []
     with tempfile.TemporaryDirectory() as folder:
         stage = Stage.build(Path(folder))
@@ -67,7 +78,7 @@ def of_strangers(trials: int, seed: int, only: str = "") -> list[Row]:
 
 
 def of_kills(kills: int, seed: int) -> list[Row]:
-    """Of the scripts that kill runs; the first difference ends a script, and is one failure."""
+    """Run the scripts that kill runs; a script ends at the first difference, which is one failure."""
     rows = []
     for promise, script in KILLS.items():
         command = [sys.executable, ROOT / "tests" / "evolve" / "search" / script, str(kills), str(seed)]
@@ -80,7 +91,7 @@ def of_kills(kills: int, seed: int) -> list[Row]:
 
 
 def stored() -> list[Row]:
-    """What was tried last."""
+    """Return the latest stored results."""
     if not STORED.is_file():
         return []
     with STORED.open(encoding="utf-8", newline="") as file:
@@ -95,7 +106,7 @@ def table(rows: Sequence[Row]) -> str:
 
 
 def broken(rows: Sequence[Row]) -> list[str]:
-    """Bounds that do not hold."""
+    """Descriptions of the bounds that do not hold."""
     found = [f"{row.promise}: {row.failures} of {row.trials} trials failed" for row in rows if row.failures]
     if (trials := sum(row.trials for row in rows)) < LEAST_TRIALS:
         found.append(f"{trials} trials: must be at least {LEAST_TRIALS}")
@@ -103,7 +114,7 @@ def broken(rows: Sequence[Row]) -> list[str]:
 
 
 def draw(rows: Sequence[Row], path: Path) -> None:
-    """Bars of trials; what failed in another colour."""
+    """Bars of trials, with failures in another colour."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(9, 4), layout="constrained")
@@ -117,9 +128,9 @@ def draw(rows: Sequence[Row], path: Path) -> None:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     options_of = parser(__doc__ or "")
-    options_of.add_argument("--trials", type=int, default=0, help="try strangers' runs anew, so often")
-    options_of.add_argument("--kills", type=int, default=0, help="kill anew, so often each")
-    options_of.add_argument("--only", default="", help="words of the promises that are tried anew")
+    options_of.add_argument("--trials", type=int, default=0, help="number of new trials of untrusted runs")
+    options_of.add_argument("--kills", type=int, default=0, help="number of new kills for each script")
+    options_of.add_argument("--only", default="", help="words of the promises to try again")
     options_of.add_argument("--seed", type=int, default=0)
     options = options_of.parse_args(arguments)
     before = {row.promise: row for row in stored()}

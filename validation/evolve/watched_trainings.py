@@ -1,4 +1,4 @@
-"""Watched trainings: how often the goal is reached, after how many steps and CPU seconds."""
+"""Training runs with regular evaluations: goals reached over steps and CPU seconds."""
 
 from __future__ import annotations
 
@@ -22,13 +22,15 @@ from sim.tasks.reward import EVALUATION, TRAINING
 
 __all__ = ["Case", "Row", "read_rows", "steps_to", "watched", "wilson", "write_rows"]
 
-UNSEEN = 10_000  # added to a training's seed: evaluation worlds start where no training world did
+UNSEEN = 10_000  # added to the seed of a training run: evaluation worlds have unseen starts
 
 
 @dataclass(frozen=True)
 class Case:
-    """A training: who learns what, and how. episodes: played at every evaluation, in worlds that end at the first
-    object touched."""
+    """A training run: eyes, task and settings.
+
+    episodes: number of episodes in every evaluation, in worlds where an episode ends at the first object touched.
+    """
 
     name: str
     eyes: sim.Eyes
@@ -42,9 +44,13 @@ class Case:
 
 @dataclass(frozen=True)
 class Row:
-    """One evaluation. cpu_seconds: of rollouts and updates so far, one thread; update_seconds: of updates alone;
-    contacts: actions in contact per episode; distance: of an episode's end from its start [m]; errors are standard
-    errors of means. Not a number: not measured."""
+    """One evaluation. Errors are standard errors of means, and NaN means not measured.
+
+    cpu_seconds: CPU time of rollouts and updates so far, one thread.
+    update_seconds: CPU time of updates.
+    contacts: actions in contact per episode.
+    distance: distance [m] of an episode's end from its start.
+    """
 
     case: str
     seed: int
@@ -62,7 +68,7 @@ class Row:
 
     @property
     def fitness(self) -> float:
-        """Of an episode in the maze, where progress adds up to the distance from the start."""
+        """Fitness of an episode in the maze, where progress adds up to the distance from the start."""
         weights = EVALUATION
         return (
             weights.progress * self.distance
@@ -72,14 +78,16 @@ class Row:
 
     @property
     def fitness_error(self) -> float:
-        """No less than its standard error: contact is what the return lacks of the price of the distance, and errors
-        that go together add up at worst. Without goals."""
+        """Upper bound on the standard error of the fitness, without goals.
+
+        The contacts follow from the difference between return and distance, and errors are added as in the worst case.
+        """
         contacts_error = TRAINING.progress * self.distance_error + self.return_error
         return EVALUATION.progress * self.distance_error - EVALUATION.contact * contacts_error
 
 
 class Journey(VecEnvWrapper):
-    """Worlds that note how their first episodes since a reset went: contacts (n,), distance from the start [m] (n,)."""
+    """Worlds that record contacts (n,) and distance from the start [m] (n,) of their first episodes since a reset."""
 
     def reset(self) -> Any:
         observation = self.venv.reset()
@@ -99,7 +107,7 @@ class Journey(VecEnvWrapper):
 
 
 def watched(case: Case, seed: int) -> Iterable[Row]:
-    """Train once; a row after every `eval_interval` steps, and no early end."""
+    """Train once; yield a row after every `eval_interval` steps, without early stopping."""
     dr.set_thread_count(1)
     common: dict[str, Any] = {"memory": case.memory, "rays_per_receptor": case.rays_per_receptor}
     worlds = sim.make_vec_env(case.task, case.eyes, case.learning.n_envs, seed, **common)
@@ -151,12 +159,12 @@ def wilson(successes: int, trials: int, z: float = 1.96) -> tuple[float, float]:
 
 
 def steps_to(rows: Iterable[Row], threshold: float) -> Row | None:
-    """The first evaluation of one training at which the goal came first in this share of the episodes."""
+    """The first evaluation of a training run with the goal first in this share of the episodes."""
     return next((row for row in rows if row.goals >= threshold * row.episodes), None)
 
 
 def read_rows(path: Path) -> list[Row]:
-    """Rows of a CSV file; none if there is no file."""
+    """Rows of a CSV file; an empty list without a file."""
     if not path.exists():
         return []
     kinds = {"str": str, "int": int, "float": float}
@@ -165,7 +173,7 @@ def read_rows(path: Path) -> list[Row]:
 
 
 def write_rows(rows: Iterable[Row], path: Path) -> None:
-    """The file anew, whole or not at all."""
+    """Write the file atomically."""
     path.parent.mkdir(parents=True, exist_ok=True)
     unfinished = path.with_suffix(".tmp")
     with unfinished.open("w", encoding="utf-8", newline="") as file:

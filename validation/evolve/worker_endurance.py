@@ -1,13 +1,21 @@
-"""Does a long run stay as it began? (F2)
+"""Worker endurance: memory and open files over many candidates
 
-One worker evaluates many real candidates, one after another, as a run of a week would have it do: drawn from the whole
-genome, each with other eyes, kernels and brain, each trained a little and measured. After each the worker's resident
-memory and its open files are read from the system. Candidates differ in size, so what counts is the trend: the median
-of the last quarter over that of the second (the first still loads libraries and compiles kernels).
+Does a worker stay the same after many candidates? Yes: over 300 candidates, the ratio of the last quarter to the second
+is 1.00 for memory and 1.00 for open files.
 
-What grows, grows with the kernels that Dr.Jit keeps: one for each shape of eye that has not been there before.
+**Method.** One worker evaluates many real candidates one after another, as in a run of a week. The candidates are drawn
+from the whole genome, each with other eyes, kernels and brain. Each is trained a little and evaluated. After each
+candidate, the worker's resident memory and its open files are read from the system.
 
-Measurements are stored (`docs/validation/data/worker_endurance.csv`); the page comes from the store.
+**Table.** Candidates differ in size, so the trend counts: the median of the last quarter over that of the second. (The
+first quarter still loads libraries and compiles kernels.)
+
+**Bounds.** Memory grows at most 1.25 times from the second quarter to the last, and the number of open files does not
+grow.
+
+**Limits.** Any growth comes from the kernels that Dr.Jit keeps: one for each shape of eye that has not occurred before.
+
+Measurements are stored (`docs/validation/data/worker_endurance.csv`). The page is written from the stored measurements.
 
     python -m validation.evolve.worker_endurance [--candidates N] [--out DIR] [--docs DIR]
 """
@@ -45,7 +53,7 @@ SETTINGS = (
     "learning.eval_interval=128",
     "evaluation.episodes=2",
     "eye.rays_per_receptor=1",
-    # Animals of all kinds: the preset's own genome is narrower.
+    # Covers all kinds of animals: the preset's own genome is narrower.
     *("genome.placement_range_deg.low=0", "genome.placement_range_deg.high=180"),
     *("genome.fov_deg.low=1", "genome.fov_deg.high=100"),
     *("genome.resolution.low=1", "genome.resolution.high=16"),
@@ -54,13 +62,18 @@ SETTINGS = (
     *("genome.doe.open=true", "genome.memory_frames.open=true", "genome.memory_frames.high=5"),
     *("genome.neurons.open=true", "genome.neurons.low=16", "genome.neurons.high=128"),
 )
-MOST_GROWTH = 1.25  # of memory, from the second quarter to the last
+MOST_GROWTH = 1.25  # ratio of memory between the last quarter and the second
 MB = 1e6
 
 
 @dataclass(frozen=True)
 class Row:
-    """The worker after a candidate. memory: resident [bytes]; files: open; failure: of the candidate, or empty."""
+    """The worker after a candidate.
+
+    memory: resident memory [bytes].
+    files: number of open files.
+    failure: failure of the candidate, or empty.
+    """
 
     candidate: int
     memory: int
@@ -69,7 +82,7 @@ class Row:
 
 
 def jobs(config: RunConfig, count: int, folder: Path) -> Iterator[Job]:
-    """Animals from all over the genome."""
+    """Jobs with animals drawn from the whole genome."""
     genotype, rng = Genotype(config.genome), np.random.default_rng(0)
     for identity in range(count):
         animal = develop(rng.random(genotype.dimension), config)
@@ -77,7 +90,7 @@ def jobs(config: RunConfig, count: int, folder: Path) -> Iterator[Job]:
 
 
 def measured(count: int) -> list[Row]:
-    """A worker's memory and open files after each of so many candidates."""
+    """A worker's memory and open files after each candidate."""
     config, rows = assemble("detection", "quick", assignments=SETTINGS), []
     with tempfile.TemporaryDirectory() as folder, LocalExecutor(evaluate_candidate, 1, prepare_device) as executor:
         for job, outcome in executor.run(list(jobs(config, count, Path(folder)))):
@@ -89,13 +102,13 @@ def measured(count: int) -> list[Row]:
 
 
 def usage(pid: int) -> tuple[int, int]:
-    """Resident memory [bytes] and open files of a process, as Linux tells them."""
+    """Resident memory [bytes] and number of open files of a process, from Linux's /proc."""
     status = Path(f"/proc/{pid}/statm").read_text().split()
     return int(status[1]) * os.sysconf("SC_PAGE_SIZE"), len(os.listdir(f"/proc/{pid}/fd"))
 
 
 def stored() -> list[Row]:
-    """What was measured last."""
+    """Return the latest stored measurements."""
     with STORED.open(encoding="utf-8", newline="") as file:
         return [
             Row(int(row["candidate"]), int(row["memory"]), int(row["files"]), row["failure"])
@@ -119,7 +132,7 @@ def table(rows: Sequence[Row]) -> str:
 
 
 def broken(rows: Sequence[Row]) -> list[str]:
-    """Bounds that do not hold."""
+    """Descriptions of the bounds that do not hold."""
     memory, files = (quarters([getattr(row, name) for row in rows]) for name in ("memory", "files"))
     found = []
     if memory[3] > MOST_GROWTH * memory[1]:
@@ -144,7 +157,7 @@ def draw(rows: Sequence[Row], path: Path) -> None:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     options_of = parser(__doc__ or "")
-    options_of.add_argument("--candidates", type=int, default=0, help="measure anew, so many")
+    options_of.add_argument("--candidates", type=int, default=0, help="number of candidates for a new measurement")
     options = options_of.parse_args(arguments)
     if options.candidates:
         write_table(STORED, [asdict(row) for row in measured(options.candidates)])

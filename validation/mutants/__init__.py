@@ -1,8 +1,8 @@
-"""Mistakes made on purpose in a copy of the tree, and the tests that notice them.
+"""Mutation testing: deliberate mistakes in a copy of the tree, and the tests that detect them.
 
-mutation_testing  the proof: the share of mutants that the nearest tests kill
+mutation_testing  proof: share of mutants that the nearest tests kill
 named_mutants     mutants that are always tried
-mutant_sites      places where a module can be made wrong
-mutant_trials     one mutant after another, and what tests make of it
-mutant_plugin     a plugin of pytest: quick tests first, within a budget
+mutant_sites      possible mutations of a module
+mutant_trials     runs of the nearest tests on each mutant
+mutant_plugin     pytest plugin: fast tests first, within a time budget
 """

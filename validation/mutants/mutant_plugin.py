@@ -1,9 +1,9 @@
-"""A plugin of pytest for `validation.mutants`: quick tests come first, dear ones are left out, what fails is noted.
+"""Pytest plugin for `validation.mutants`: fast tests run first, slow ones are omitted, and failures are recorded.
 
 MUTANTS names a file of JSON: {"times": {test: seconds} or null, "measured": [tests], "seconds": budget, "report":
 file}.
-Without times all tests run but those measured already, until the budget is spent. The report holds what each test took
-and which failed.
+Without times, all tests run that have not been measured yet, until the budget is spent. The report contains the
+duration of each test and the failed tests.
 """
 
 from __future__ import annotations
@@ -17,11 +17,11 @@ from typing import Any
 
 import pytest
 
-FEWEST = 2  # tests of a file that run however dear they are
+FEWEST = 2  # tests of a file that always run, even if slow
 
 
 class Nearest:
-    """What one run of pytest is asked for, and what came of it."""
+    """Instructions for one run of pytest, and its results."""
 
     def __init__(self, asked: dict[str, Any]) -> None:
         self.known: dict[str, float] | None = asked["times"]
@@ -49,7 +49,7 @@ class Nearest:
         return sum(self.known[item.nodeid] for item in items)
 
     def _quick(self, items: list[pytest.Item]) -> list[pytest.Item]:
-        """The quickest of a file, as many as the budget allows."""
+        """The fastest tests of a file that fit into the budget."""
         kept: list[pytest.Item] = []
         spent = 0.0
         for item in sorted(items, key=lambda item: self.known[item.nodeid]):
@@ -60,7 +60,7 @@ class Nearest:
 
     def pytest_runtest_logfinish(self) -> None:
         if self.known is None and time.monotonic() - self.began > self.budget:
-            self.session.shouldstop = "the tests of this file are dear"
+            self.session.shouldstop = "the tests of this file are slow"
 
     def pytest_sessionstart(self, session: pytest.Session) -> None:
         self.session = session

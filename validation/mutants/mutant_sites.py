@@ -1,7 +1,7 @@
-"""Where a module of the three packages can be made wrong on purpose, and how: one place, one small change each.
+"""Possible mutations of the modules of the three packages: one small change at one place each.
 
-Changes are of the kinds that people make by mistake: a sign, a comparison, a bound off by one, a check or a call left
-out, axes or arguments swapped, an extreme taken for the other. Messages, annotations and docstrings stay as they are.
+Mutations are typical human mistakes: a sign, a comparison, a bound off by one, an omitted check or call, swapped axes
+or arguments, a maximum instead of a minimum. Messages, annotations and docstrings are never changed.
 """
 
 from __future__ import annotations
@@ -50,14 +50,14 @@ NAMES = {
     "argmin": "argmax",
     "argmax": "argmin",
 }
-ORDERED = ("arctan2", "atan2", "cross", "divmod", "meshgrid", "where", "searchsorted")  # their arguments have an order
+ORDERED = ("arctan2", "atan2", "cross", "divmod", "meshgrid", "where", "searchsorted")  # by order of arguments
 
 
 @dataclass(frozen=True)
 class Site:
     """A change to one place of a file: bytes from `start` to `end`, which read `before`, become `after`.
 
-    line: counted from 1; kind: of mistake; same: how many equal changes of an equal line come before this one
+    line: counted from 1; kind: kind of mistake; same: number of earlier sites with an equal change of an equal line
     """
 
     path: str
@@ -72,26 +72,26 @@ class Site:
 
     @property
     def change(self) -> str:
-        """What the line becomes, or loses, in words that stay the same where lines above it change."""
+        """Description of the change, which does not depend on changes of other lines."""
         return " ".join(f"{self.before} -> {self.after}  |  {self.text}".split()) + f" #{self.same}" * (self.same > 0)
 
     def applied(self, source: bytes) -> bytes:
-        """The file with the mistake in it.
+        """Return the file with the mistake in it.
 
         Raises:
-            ValueError: the file is another one by now.
+            ValueError: the file has changed in the meantime.
         """
         if source[self.start : self.end] != self.before.encode():
             raise ValueError(f"{self.path}: has changed at line {self.line}")
         return source[: self.start] + self.after.encode() + source[self.end :]
 
     def chance(self, seed: int) -> str:
-        """Its place in a random order which other files and other lines have no part in."""
+        """Hash that defines the place in a random order, independent of other files and lines."""
         return hashlib.sha256(f"{seed} {self.path} {self.kind} {self.change}".encode()).hexdigest()
 
 
 def sites(path: str, source: bytes) -> list[Site]:
-    """All changes of one file, in its order."""
+    """Return all mutations of one file, in its order."""
     found = sorted(_Finder(path, source).all(), key=lambda site: (site.start, site.end))
     seen: Counter[tuple[str, str, str]] = Counter()
     numbered = []
@@ -103,14 +103,14 @@ def sites(path: str, source: bytes) -> list[Site]:
 
 
 def drawn(root: Path, package: str, count: int, seed: int) -> list[Site]:
-    """Changes of a package's modules, evenly drawn from all there are."""
+    """Return a random sample of the mutations of a package's modules, evenly drawn."""
     modules = sorted(path for path in (root / package).rglob("*.py") if path.name != "__init__.py")
     everything = [site for path in modules for site in sites(str(path.relative_to(root)), path.read_bytes())]
     return sorted(everything, key=lambda site: site.chance(seed))[:count]
 
 
 class _Finder:
-    """Looks at one file's syntax; positions are in bytes."""
+    """Visitor of one file's syntax tree; positions are in bytes."""
 
     def __init__(self, path: str, source: bytes) -> None:
         self.path, self.source = path, source
@@ -132,7 +132,7 @@ class _Finder:
                     yield from self._below(child)
 
     def _left_alone(self, node: ast.AST) -> bool:
-        """Text, types, and what runs in no program of a user's."""
+        """Return whether a node is text, a type, or code that no user's program runs."""
         if isinstance(node, ast.Assign):
             names = [target.id for target in node.targets if isinstance(target, ast.Name)]
             return "__all__" in names
@@ -236,7 +236,7 @@ class _Finder:
         return self._site("axes", start, end, swapped)
 
     def _between(self, kind: str, left: ast.AST, right: ast.AST, before: str, after: str) -> Iterator[Site]:
-        """The operator that stands between two operands."""
+        """The operator between two operands."""
         low, high = self._end(left), self._start(right)
         pattern = r"\b" + before.replace(" ", r"\s+") + r"\b" if before[0].isalpha() else re.escape(before)
         match = re.search(pattern, self.source[low:high].decode())
@@ -259,7 +259,7 @@ class _Finder:
 
 
 def _is_type(node: ast.AST) -> bool:
-    """`int | None`, `Sequence[int]`: names of types, joined."""
+    """Return whether a node is a union or subscript of type names, such as `int | None` or `Sequence[int]`."""
     if isinstance(node, ast.BinOp):
         return isinstance(node.op, ast.BitOr) and (_is_type(node.left) or _is_type(node.right))
     if isinstance(node, ast.Subscript):

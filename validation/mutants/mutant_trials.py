@@ -1,4 +1,4 @@
-"""What the nearest tests make of a mutant: a copy of the tree is spoilt, and mended again after the tests."""
+"""Trials of mutants with the nearest tests, in a copy of the tree that is restored after each trial."""
 
 from __future__ import annotations
 
@@ -20,17 +20,17 @@ from validation.mutants.mutant_sites import Site
 
 __all__ = ["Copy", "Trial", "nearest_tests"]
 
-PATIENCE = 4.0  # times what its tests take unspoilt, until a mutant counts as hanging
-GRACE_S = 60.0  # and this, as starts and compilations take longer on a busy machine
-BUDGET_S = 20.0  # of tests of each file; the quickest come first
-MEASURED_S = 60.0  # after which no further test of a file is tried unspoilt, and none that was not is asked later
+PATIENCE = 4.0  # multiple of the duration without mutation after which a mutant counts as hanging
+GRACE_S = 60.0  # added to it, because starts and compilations take longer on a busy machine
+BUDGET_S = 20.0  # for the tests of each file; the fastest come first
+MEASURED_S = 60.0  # limit on measuring the tests of a file; tests not measured by then are never used
 NO_TEST = 5  # pytest's exit code
-DATA_BYTES = 6 * 2**30  # that a mutant may take
+DATA_BYTES = 6 * 2**30  # memory limit of a mutant
 
 
 @dataclass(frozen=True)
 class Trial:
-    """verdict: "killed" or "survived"; by: the test that failed, "time limit" or "crash"."""
+    """Outcome of a mutant: verdict, "killed" or "survived"; by, the test that failed, "time limit" or "crash"."""
 
     verdict: str
     by: str
@@ -38,7 +38,7 @@ class Trial:
 
 
 def nearest_tests(root: Path, path: str) -> list[str]:
-    """Test files that the folder of tests names for a module, relative to the tree."""
+    """Test files that the folder of tests lists for a module, relative to the tree."""
     package, *folders, name = Path(path).with_suffix("").parts
     if not folders:
         own = f"tests/{package}/test_{name}.py"
@@ -56,7 +56,8 @@ def nearest_tests(root: Path, path: str) -> list[str]:
 class Copy:
     """A copy of a tree in `folder`, in which mutants are tried one after another.
 
-    times: seconds of each test that passes unspoilt, {test file: {test: seconds}}; versions: of those files, by hash
+    times: seconds of each test that passes without mutation, {test file: {test: seconds}}.
+    versions: hashes of those files.
     """
 
     folder: Path
@@ -65,8 +66,8 @@ class Copy:
     _stamps: int = 0
 
     @classmethod
-    def of(cls, root: Path, folder: Path) -> Copy:
-        """Of what git tracks, and what is new."""
+    def from_root(cls, root: Path, folder: Path) -> Copy:
+        """Copy the files that git tracks, and new ones."""
         listed = ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"]
         names = subprocess.run(listed, cwd=root, capture_output=True, check=True).stdout.decode().split("\0")
         for name in filter(None, names):
@@ -84,7 +85,7 @@ class Copy:
         return self.folder / "tree"
 
     def measure(self, files: list[str]) -> None:
-        """What tests take, unspoilt, of files that are new or have changed; those that fail even so are left out."""
+        """Measure the tests of files that are new or have changed, without mutation; failing tests are omitted."""
         for file in files:
             version = hashlib.sha256((self.tree / file).read_bytes()).hexdigest()
             if self.versions.get(file) != version:
@@ -95,7 +96,7 @@ class Copy:
                 (self.folder / "known.json").write_text(json.dumps({"times": self.times, "versions": self.versions}))
 
     def tried(self, site: Site, files: list[str]) -> Trial:
-        """The nearest tests, with the mistake in place."""
+        """Run the nearest tests with the mistake in place."""
         self.measure(files)
         target = self.tree / site.path
         source, began = target.read_bytes(), time.perf_counter()
@@ -115,7 +116,7 @@ class Copy:
         return Trial(verdict, by, time.perf_counter() - began)
 
     def _write(self, target: Path, content: bytes) -> None:
-        """With a time of its own: Python takes a compiled file for the source's by time and size."""
+        """Write a file with a unique time, because Python recognises compiled files by time and size of the source."""
         self._stamps += 1
         target.write_bytes(content)
         stamp = int(time.time()) - 1_000_000 + self._stamps
@@ -124,15 +125,17 @@ class Copy:
     def _pytest(
         self, files: list[str], times: dict[str, float] | None, limit: float
     ) -> tuple[dict[str, Any], int | None]:
-        """Report and exit code of a run of the tests in `times`, up to the first failure; None: of all, to measure
-        them. The code is None if the run was ended at its limit."""
+        """Report and exit code of a run of the tests in `times`, up to the first failure.
+
+        With times=None all tests run and are measured. The code is None if the run was ended at its limit.
+        """
         asked, report = self.folder / "asked.json", self.folder / "report.json"
         report.unlink(missing_ok=True)
         seconds = MEASURED_S if times is None else BUDGET_S
         measured = list(self.times.get(files[0], {})) if times is None else []
         content = {"times": times, "measured": measured, "seconds": seconds, "report": str(report)}
         asked.write_text(json.dumps(content))
-        shutil.rmtree(self.folder / "cache", ignore_errors=True)  # a mutant's tables and verdicts are its own
+        shutil.rmtree(self.folder / "cache", ignore_errors=True)  # caches of one mutant must not affect the next
         command = [
             sys.executable,
             "-m",
@@ -169,14 +172,14 @@ class Copy:
 
 
 def _limit_memory() -> None:
-    """Of a child: a mutant that asks for all there is must not take it from others."""
+    """Limit the memory of a child process, because a mutant may request all of it."""
     import resource
 
     resource.setrlimit(resource.RLIMIT_DATA, (DATA_BYTES, DATA_BYTES))
 
 
 def _end(child: subprocess.Popen[bytes]) -> None:
-    """And whomever it has started."""
+    """Kill a child and the processes that it started."""
     with contextlib.suppress(ProcessLookupError):
         os.killpg(child.pid, signal.SIGKILL)
     child.wait()

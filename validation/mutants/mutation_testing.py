@@ -1,21 +1,27 @@
-"""Do the tests notice? (F1)
+"""Mutation testing: do the tests notice deliberate mistakes?
 
-Mistakes are made on purpose, one at a time, in a copy of the tree: a sign, a comparison, a bound off by one, a check or
-a call left out, axes or arguments swapped, an extreme taken for the other. Then the nearest tests run: those that the
-folder of tests names for the module (`tests/optics/methods/__init__.py`, say), the quickest first, some twenty seconds
-of each file. A mutant is killed if one of them fails, hangs or crashes.
+Which share of deliberate mistakes do the tests notice? They kill 185 of 193 mutants, which is 96 %. Six further mutants
+change nothing that a user could see and do not count.
 
-The first mutants are named in `validation/mutants/named_mutants.py`: mistakes that nothing had noticed. The others are
-drawn evenly from all places of the three packages where such a mistake can be made. A mutant that changes nothing which
-a user could see (the same results, a little sooner or later) is no mistake: it is listed as alike, with the reason, and
-does not count.
+**Method.** A mutant is one deliberate mistake in a copy of the tree: a sign, a comparison, a bound off by one, an
+omitted check or call, swapped axes or arguments, or a maximum instead of a minimum. Then the nearest tests run. The
+folder of tests names them for each module (for example in `tests/optics/methods/__init__.py`). The quickest run first,
+for about twenty seconds of each file. A mutant is killed if one of these tests fails, hangs or crashes.
 
-Eight mutants were tried by hand, with tests that this leaves out or that were written for them, and are stored with the
-rest. The reasons of those that are alike or survived come from reading the code.
+The first mutants are named in `validation/mutants/named_mutants.py`: mistakes that no test had noticed. The others are
+drawn evenly from all places in the three packages where such a mistake can be made. A mutant that changes nothing which
+a user could see (the same results, slightly sooner or later) is not a mistake. It is listed as alike, with the reason,
+and does not count.
 
-Trials are stored (`docs/validation/data/mutation_testing.csv`), because they take a minute each; the page comes from
-the store, and `--trials` goes on where the store ends. `--again` tries once more what has survived, after a test was
-written, say.
+**Bounds.** At least 90 % of the mutants that are mistakes are killed. Every mutant that is alike or survived has a
+reason.
+
+**Limits.** Eight mutants were tried by hand, with tests that this procedure omits or that were written for them. They
+are stored with the rest. The reasons for mutants that are alike or survived come from reading the code.
+
+A trial takes a minute, so results are stored (`docs/validation/data/mutation_testing.csv`). The page is written from
+the stored results. `--trials` continues after the last stored mutant. `--again` tries the survivors once more, for
+example after a test was written.
 
     python -m validation.mutants.mutation_testing [--trials N] [--seed S] [--again] [--out DIR] [--docs DIR]
 """
@@ -41,13 +47,17 @@ from validation.pages.work_precision_chart import MUTED, OURS, OURS_TOO
 ROOT = Path(__file__).resolve().parents[2]
 STORED = Path("docs/validation/data/mutation_testing.csv")
 PACKAGES = ("optics", "sim", "evolve")
-WANTED = 0.9  # of the mutants that are mistakes, killed
+WANTED = 0.9  # share of the mutants that are mistakes to be killed
 
 
 @dataclass(frozen=True)
 class Row:
-    """A trial as it is stored. verdict: "killed", "survived", or "alike" where the mutant is no mistake; by: the test
-    that failed; reason: why one that was not killed is alike, or is left."""
+    """A stored trial.
+
+    verdict: "killed", "survived", or "alike" if the mutant is not a mistake.
+    by: the test that failed.
+    reason: explanation for a mutant that was not killed.
+    """
 
     path: str
     line: int
@@ -67,7 +77,7 @@ class Row:
 
 
 def stored(path: Path) -> list[Row]:
-    """Trials so far."""
+    """Return the trials so far."""
     if not path.is_file():
         return []
     with path.open(encoding="utf-8", newline="") as file:
@@ -75,7 +85,7 @@ def stored(path: Path) -> list[Row]:
 
 
 def chosen(root: Path, count: int, seed: int) -> list[Site]:
-    """Named mutants first, then of the packages in turn, those of each evenly drawn."""
+    """Named mutants first, then mutants of each package in turn, evenly drawn."""
     named = [mutant.site(root) for mutant in NAMED]
     share = [drawn(root, package, count, seed) for package in PACKAGES]
     in_turn = [site for site in chain.from_iterable(zip_longest(*share)) if site is not None]
@@ -83,8 +93,8 @@ def chosen(root: Path, count: int, seed: int) -> list[Site]:
 
 
 def trials(root: Path, sites: Sequence[Site], folder: Path) -> Iterator[Row]:
-    """What becomes of each mutant, one after another."""
-    copy = Copy.of(root, folder)
+    """Yield the outcome of each mutant."""
+    copy = Copy.from_root(root, folder)
     for site in sites:
         trial = copy.tried(site, nearest_tests(root, site.path))
         print(
@@ -94,7 +104,7 @@ def trials(root: Path, sites: Sequence[Site], folder: Path) -> Iterator[Row]:
 
 
 def go_on(root: Path, store: Path, options: argparse.Namespace) -> None:
-    """Try the mutants that are asked for and not in the store yet; the store is written after each."""
+    """Try the requested mutants that are not stored yet; the store is written after each."""
     before = {row.key: row for row in stored(store)}
     again = {key for key, row in before.items() if options.again and row.verdict != "killed"}
     wanted = chosen(root, options.trials, options.seed)
@@ -112,13 +122,13 @@ def go_on(root: Path, store: Path, options: argparse.Namespace) -> None:
 
 
 def table(rows: Sequence[Row]) -> str:
-    """Counts by package, and what was not killed."""
+    """Counts by package, and the mutants that were not killed."""
     lines = [f"{'':<10}{'mutants':>9}{'alike':>9}{'killed':>9}{'survived':>10}{'killed of mistakes':>20}"]
     for name in (*PACKAGES, "all"):
         of = [row for row in rows if name in (row.package, "all")]
         alike, killed, left = (sum(row.verdict == verdict for row in of) for verdict in ("alike", "killed", "survived"))
         lines.append(f"{name:<10}{len(of):>9}{alike:>9}{killed:>9}{left:>10}{killed / max(killed + left, 1):>19.0%}")
-    for verdict, title in (("survived", "survived"), ("alike", "alike: no mistakes")):
+    for verdict, title in (("survived", "survived"), ("alike", "alike: not mistakes")):
         of = [row for row in rows if row.verdict == verdict]
         lines += ["", title] if of else []
         for row in sorted(of, key=lambda row: (row.path, row.line)):
@@ -127,7 +137,7 @@ def table(rows: Sequence[Row]) -> str:
 
 
 def share(rows: Sequence[Row]) -> float:
-    """Of the mutants that are mistakes, those killed."""
+    """Share of killed mutants among the mistakes."""
     mistakes = [row for row in rows if row.verdict != "alike"]
     return sum(row.verdict == "killed" for row in mistakes) / max(len(mistakes), 1)
 
@@ -135,7 +145,7 @@ def share(rows: Sequence[Row]) -> float:
 def broken(rows: Sequence[Row]) -> list[str]:
     """Bounds that do not hold."""
     found = [
-        f"{row.path}: {row.change}: lives without a reason"
+        f"{row.path}: {row.change}: not killed, without a reason"
         for row in rows
         if row.verdict != "killed" and not row.reason
     ]
@@ -166,7 +176,7 @@ def draw(rows: Sequence[Row], path: Path) -> None:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     options_of = parser(__doc__ or "")
-    options_of.add_argument("--trials", type=int, default=0, help="mutants that the store shall hold; it is filled up")
+    options_of.add_argument("--trials", type=int, default=0, help="mutants in the store; missing ones are tried")
     options_of.add_argument("--seed", type=int, default=0)
     options_of.add_argument("--again", action="store_true", help="try survivors once more")
     options_of.add_argument("--store", type=Path, default=STORED)

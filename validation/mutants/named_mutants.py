@@ -1,4 +1,4 @@
-"""Mutants that are always tried: mistakes that nothing noticed when they were made on purpose for the first time."""
+"""Mutants that are always tried: deliberate mistakes that no test detected at first."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ __all__ = ["NAMED", "Named"]
 
 @dataclass(frozen=True)
 class Named:
-    """In the file, `before`, which is there once, becomes `after`."""
+    """A mutant in a file: `before`, which occurs once, becomes `after`."""
 
     path: str
     what: str
@@ -20,14 +20,14 @@ class Named:
     after: str
 
     def site(self, root: Path) -> Site:
-        """Where it is.
+        """Site of the mutant in its file.
 
         Raises:
-            ValueError: `before` is not there, or more than once.
+            ValueError: `before` does not occur exactly once.
         """
         source = (root / self.path).read_bytes()
         if source.count(self.before.encode()) != 1:
-            raise ValueError(f"{self.path}: {self.before!r} must be there once")
+            raise ValueError(f"{self.path}: {self.before!r} must occur once")
         start = source.index(self.before.encode())
         line = source.count(b"\n", 0, start) + 1
         return Site(
@@ -43,25 +43,25 @@ NAMED = (
     *_mutants(
         "optics/point_spread/spot_check.py",
         (
-            "darkness costs the check digits",
+            "darkness reduces the digits of the check",
             "2 * 10.0 ** (darkness - reference.digits)",
             "2 * 10.0 ** (-reference.digits)",
         ),
-        ("the direct sum's own error is told", " + 2 * 10.0 ** (darkness - reference.digits)", ""),
+        ("the direct sum's own error is included", " + 2 * 10.0 ** (darkness - reference.digits)", ""),
     ),
-    *_mutants("optics/eye/kernel_interpolation.py", ("too dark counts as too bright", "in (1, -1)))", "in (1, 1)))")),
+    *_mutants("optics/eye/kernel_interpolation.py", ("negative differences count", "in (1, -1)))", "in (1, 1)))")),
     *_mutants(
         "optics/point_spread/psf_result.py",
-        ("the cutoff knows the medium", "* index / self.wavelengths\n", "/ self.wavelengths\n"),
+        ("the cutoff depends on the medium", "* index / self.wavelengths\n", "/ self.wavelengths\n"),
     ),
     *_mutants(
         "optics/numerics/backend.py",
-        ("what may be mended is proved again", 'if result.verdict in ("good", "aborts"):', "if True:"),
+        ("libraries that may be repaired are tested again", 'if result.verdict in ("good", "aborts"):', "if True:"),
     ),
     *_mutants(
         "sim/physics/agent_motion.py",
-        ("a broken simulation touches nothing", "contact = contact & ~unstable", "pass"),
-        ("speeds that no actuator can bring", "UNSTABLE_SPEED = 10 * MAX_SPEED", "UNSTABLE_SPEED = 1000 * MAX_SPEED"),
+        ("an unstable simulation has no contacts", "contact = contact & ~unstable", "pass"),
+        ("speeds beyond all actuators", "UNSTABLE_SPEED = 10 * MAX_SPEED", "UNSTABLE_SPEED = 1000 * MAX_SPEED"),
     ),
     *_mutants(
         "sim/render/receptor_noise.py",
@@ -70,37 +70,37 @@ NAMED = (
     ),
     *_mutants(
         "sim/exr.py",
-        ("parts that are missing", 'if attributes.get("parts") != str(expected):', "if False:"),
+        ("missing parts", 'if attributes.get("parts") != str(expected):', "if False:"),
         (
-            "a picture is on the disk before it has its name",
+            "an image is synced before it is renamed",
             "            os.fsync(file.fileno())\n",
             "            pass\n",
         ),
         (
-            "half a picture is removed",
+            "an incomplete image is removed",
             "        Path(temporary).unlink(missing_ok=True)\n        raise",
             "        raise",
         ),
     ),
     *_mutants(
         "evolve/store/record.py",
-        ("a line is on the disk", "                file.flush()\n                os.fsync(file.fileno())\n", ""),
+        ("a line is synced", "                file.flush()\n                os.fsync(file.fileno())\n", ""),
         (
-            "what is cut off is gone from the disk",
+            "a truncation is synced",
             "(self._whole_bytes)\n                os.fsync(file.fileno())",
             "(self._whole_bytes)",
         ),
     ),
     *_mutants(
         "evolve/store/atomic_files.py",
-        ("a file is on the disk before it has its name", "            os.fsync(file.fileno())", "            pass"),
-        ("its name is on the disk", "        sync_folder(path.parent)", "        pass"),
-        ("half a file is removed", "            neighbour.unlink(missing_ok=True)", "            pass"),
+        ("a file is synced before it is renamed", "            os.fsync(file.fileno())", "            pass"),
+        ("its name is synced", "        sync_folder(path.parent)", "        pass"),
+        ("an incomplete file is removed", "            neighbour.unlink(missing_ok=True)", "            pass"),
     ),
     *_mutants(
         "evolve/store/directory.py",
         (
-            "the first of the best is the best",
+            "ties go to the first candidate",
             "(candidate.fitness, -candidate.id)",
             "(candidate.fitness, candidate.id)",
         ),
@@ -108,7 +108,7 @@ NAMED = (
     *_mutants("evolve/search/search.py", ("a failure counts as the worst so far", "LOWEST = -1e9", "LOWEST = 0.0")),
     *_mutants(
         "evolve/learning/fitness.py",
-        ("every stage has chance of its own", "[seed, number] if number else seed", "seed"),
+        ("every rung has its own seed", "[seed, number] if number else seed", "seed"),
     ),
-    *_mutants("evolve/report/markup.py", ("data end no script", '.replace("<", "\\\\u003c")', "")),
+    *_mutants("evolve/report/markup.py", ("data cannot end a script element", '.replace("<", "\\\\u003c")', "")),
 )

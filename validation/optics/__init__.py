@@ -1,18 +1,18 @@
-"""Proofs of the optics, and what they need.
+"""Proofs of the optics, and their helpers.
 
-ideal_lens_psf        the PSF of an ideal lens against the exact integral and Airy's pattern
-departure_from_airy   how far the exact PSF departs from Airy's pattern
-psf_error_prediction  predicted errors of random PSFs against actual ones
+ideal_lens_psf        PSF of an ideal lens compared with the exact integral and the Airy pattern
+departure_from_airy   difference between the exact PSF and the Airy pattern
+psf_error_prediction  predicted and actual errors of random PSFs
 aliasing              aliasing beyond the critical distance, and wrap-around
-undersampled_lens     a lens on too few samples
-float32_precision     phases that lose their digits in float32
-backward_propagation  propagation backwards against the decay of evanescent waves
-thin_element          a relief as a phase mask against refraction
-limiting_cases        the edges of the domain: a closed form, or an error of one line
-cell_samples          how many samples integrals over cells need
-freeze_spectra        the stored spectra against colour-science
+undersampled_lens     lens on too few samples
+float32_precision     loss of digits of phases in float32
+backward_propagation  backward propagation and evanescent waves
+thin_element          phase mask compared with refraction at a relief
+limiting_cases        edges of the domain: a known value, or a one-line error
+cell_samples          number of samples for integrals over cells
+freeze_spectra        stored spectra compared with colour-science
 
 random_cases          random pupils, distances, windows and tolerances
 refraction            rays through a real surface
-textbook_propagation  the angular spectrum of textbooks, in NumPy
+textbook_propagation  textbook angular spectrum in NumPy
 """

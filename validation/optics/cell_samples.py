@@ -1,8 +1,8 @@
-"""How many samples integrals over cells need: `python -m validation.optics.cell_samples [genotypes]`.
+"""Number of samples for integrals over cells: `python -m validation.optics.cell_samples [genotypes]`.
 
-Behind random genotypes of the preset `lens` each wavelength's PSF is computed at twice so many samples per cycle of its
-highest frequency, and its integrals over the eye's cells from every second sample are held against those from all.
-Prints the relative error by the cycles that a cell holds: the median, nine in ten, and the worst of all pictures.
+For random genotypes of the preset `lens`, each wavelength's PSF is computed with twice the stated samples per cycle of
+its highest frequency. Integrals over the eye's cells from every second sample are compared with those from all samples.
+Prints the relative error by the number of cycles per cell: the median, the 90 % quantile, and the largest of all PSFs.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ from validation.benchmarks.kernel_times import VIEWS_DEG, eyes
 
 GENOTYPES = 20
 SAMPLES = (1.75, 2.0, 2.125, 2.25, 2.375, 2.625)  # per cycle
-CYCLES = (0.0, 0.5, 1.0, 2.0, 9.0)  # of cells, from one of these to the next
+CYCLES = (0.0, 0.5, 1.0, 2.0, 9.0)  # per cell: limits of classes
 
 
 def errors(eye: optics.Eye, samples: float) -> list[tuple[float, float]]:
-    """Cycles of a cell and relative error of the integrals, of each of the eye's wavelengths."""
+    """Cycles per cell and relative error of the integrals, for each of the eye's wavelengths."""
     assert eye.pupil is not None
     retina = eye._retina(cells_for(eye))
     beams = beams_to(eye.pupil, retina, np.inf, (0.0, 0.0))
@@ -41,7 +41,7 @@ def errors(eye: optics.Eye, samples: float) -> list[tuple[float, float]]:
     for request, picture in zip(requests, pictures(requests), strict=True):
         window = request.problem.window
         image = picture.image.numpy().reshape(window.shape).astype(float)
-        if window.shape[0] // 2 % 2:  # both must end where every second sample does, the middle among them
+        if window.shape[0] // 2 % 2:  # both sets must end at the same sample and contain the middle
             image = image[1:-1, 1:-1]
         few = _integrals(image[::2, ::2], 2 * window.dx, tiles)
         many = _integrals(image, window.dx, tiles)
@@ -57,17 +57,17 @@ def _integrals(image: np.ndarray, pitch: float, tiles: Tiles) -> np.ndarray:
 
 
 def main(arguments: list[str]) -> None:
-    """Prints a row for each number of samples and size of cell."""
+    """Print a row for each number of samples and size of cell."""
     count = int(arguments[0]) if arguments else GENOTYPES
     everyone = [eye for scale in ("laptop", "paper") for view in VIEWS_DEG for eye in eyes(count, view, scale, seed=3)]
-    print("| samples per cycle | cycles of a cell | pictures | median | 90 % | worst |\n|---|---|---|---|---|---|")
+    print("| samples per cycle | cycles per cell | PSFs | median | 90 % | worst |\n|---|---|---|---|---|---|")
     for samples in SAMPLES:
         rows = []
         for eye in everyone:
             try:
                 rows += errors(eye, samples)
             except optics.AccuracyError:
-                continue  # its light spreads too far for twice the samples
+                continue  # its light is too extended for twice the samples
         for least, most in pairwise(CYCLES):
             some = [error for cycles, error in rows if least <= cycles < most]
             if some:

@@ -1,13 +1,13 @@
-"""How far the exact PSF of an ideal lens departs from Airy's pattern, over the numerical aperture (A1).
+"""Difference between the exact PSF of an ideal lens and the Airy pattern, over the numerical aperture
 
-The table shows the exact first Rayleigh-Sommerfeld integral, by quadrature, minus the Airy pattern. The Fresnel
-number is 100 throughout, so only the angle changes. The departure must be O(NA²) = O((R/f)²), for both ways to read
-Airy at an angle (tan: v = kRr/f; sin: v = kr NA). `optics.psf` is measured with the same lenses and must agree with
-the exact one.
+The table shows the exact first Rayleigh-Sommerfeld integral, by quadrature, minus the Airy pattern. The Fresnel number
+is 100 throughout, so only the angle changes. The difference must be O(NA²) = O((R/f)²), for both definitions of Airy's
+variable at large angles (tan: v = kRr/f; sin: v = kr NA). `optics.psf` uses the same lenses and must agree with the
+exact integral.
 
     python -m validation.optics.departure_from_airy [--out DIR]
 
-Prints the table, draws the figure, and exits with 1 if a bound is broken.
+Prints the table, draws the figure, and exits with 1 if a bound does not hold.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ import optics
 from validation import reference
 
 WAVELENGTH = 550e-9
-FRESNEL_NUMBER = 100.0  # so large that its own departure, below 1 / N², does not show
+FRESNEL_NUMBER = 100.0  # large enough to make its own contribution, below 1 / N², negligible
 APERTURES = (0.01, 0.02, 0.04, 0.08, 0.12, 0.17, 0.24, 0.35, 0.5, 0.6, 0.7)
 RINGS = 5
 TOLERANCE = 1e-5
-# Up to here (f/2.1) the leading order is meant to rule; beyond, the next one may show.
+# Up to here (f/2.1) the leading order should dominate; beyond, the next one may contribute.
 LEADING_ORDER = 0.24
 
 
@@ -41,12 +41,12 @@ class Row:
     tangent_misfit: float  # Airy with v = kRr/f
     sine_misfit: float  # Airy with v = kr NA, same power
     peak_ratio: float  # exact peak over Airy's
-    error: float  # of optics.psf
+    error: float  # error of optics.psf
     method: str
 
 
 def measure(aperture: float) -> Row:
-    """The ideal lens of this NA: R/f = tan θ and R²/(λf) fix both lengths."""
+    """Results for the ideal lens of this NA: R/f = tan θ and R²/(λf) determine both lengths."""
     tangent = aperture / np.sqrt(1 - aperture**2)
     focal_length = FRESNEL_NUMBER * WAVELENGTH / tangent**2
     radius = tangent * focal_length
@@ -84,9 +84,9 @@ def orders(rows: list[Row]) -> tuple[float, float, float]:
 
 
 def broken_bounds(rows: list[Row]) -> list[str]:
-    """Every bound that does not hold, in words."""
+    """Descriptions of the bounds that do not hold."""
     found = [
-        f"NA {row.aperture:g}: optics.psf off by {row.error:.1g}, asked {TOLERANCE:g}"
+        f"NA {row.aperture:g}: optics.psf has an error of {row.error:.1g}, tolerance {TOLERANCE:g}"
         for row in rows
         if not row.error <= TOLERANCE
     ]
@@ -128,9 +128,9 @@ def draw(rows: list[Row], path: Path) -> None:
     chart.loglog(aperture, [1 - row.peak_ratio for row in rows], "^-", color="#999999", label="Airy's peak")
     chart.loglog(aperture, factor * aperture**2, ":", color="black", lw=1, label=f"{factor:.2f} NA²")
     chart.loglog(aperture, [row.error for row in rows], "o-", color="#0072B2", label="optics.psf")
-    chart.axhline(TOLERANCE, color="#009E73", lw=1, ls="--", label="tolerance asked")
+    chart.axhline(TOLERANCE, color="#009E73", lw=1, ls="--", label="tolerance")
     chart.set(xlabel="numerical aperture", ylabel="relative L2 to the exact integral, five rings")
-    chart.set(title="Airy departs like NA², optics.psf does not")
+    chart.set(title="The Airy pattern's error grows like NA²")
     chart.minorticks_off()
     ticks = aperture[[0, 1, 2, 3, 5, 7, 10]]
     chart.set_xticks(ticks, [f"{na:g}" for na in ticks])
@@ -141,7 +141,7 @@ def draw(rows: list[Row], path: Path) -> None:
         scale = 2 * np.pi / WAVELENGTH * row.radius / row.focal_length
         exact = np.abs(reference.ideal_lens_field(v / scale, WAVELENGTH, row.radius, row.focal_length)) ** 2
         cuts.semilogy(v, exact / (scale * row.radius / 2) ** 2, color=color, label=f"NA {row.aperture:g}")
-    cuts.set(xlabel="v = kRr/f", ylabel="intensity over Airy's peak", ylim=(1e-5, 1.5), title="Lower and wider")
+    cuts.set(xlabel="v = kRr/f", ylabel="intensity over Airy's peak", ylim=(1e-5, 1.5), title="Exact: lower and wider")
     cuts.legend(frameon=False, fontsize=8)
     figure.suptitle(f"Exact PSF of an ideal lens and Airy's pattern, Fresnel number {FRESNEL_NUMBER:g}, 550 nm")
     path.parent.mkdir(parents=True, exist_ok=True)

@@ -1,18 +1,21 @@
-"""Float32: phases that lose their digits, and dark windows (B3)
+"""Float32 precision: rounded phases and dark windows
 
-A phase kz is rounded to float32 within kz 2^-24: at 550 nm that is 7e-4 rad at 1 mm and 0.7 rad at 1 m. Lenses of
-Fresnel number 20 focus at 0.1 mm to 10 m. The textbook's angular spectrum in float32 throughout (phases too) is
-compared with the same in float64, so they differ only by rounding. Its error passes 1e-5 near 2 mm, 1e-3 near 0.1 m
-and 1 near 3 m.
+At which distance do float32 phases lose their digits, and when does `optics.psf` need float64? The error of the
+textbook's method in float32 passes 1e-5 near 2 mm, 1e-3 near 0.1 m and 1 near 3 m. `optics.psf` in float32 stays below
+1e-5 at every distance. It needs float64 only for dark windows far from the focus.
 
-Phases in rhabdom are optical paths in float64. They lose their whole waves there, and only the rest, below one wave,
-becomes float32. So `optics.psf` in float32 stays below 1e-5 at every distance, and no phase kz forces it to float64.
+**First table.** A phase kz is rounded to float32 within kz 2^-24: at 550 nm that is 7e-4 rad at 1 mm and 0.7 rad at
+1 m. Lenses of Fresnel number 20 focus at 0.1 mm to 10 m. The textbook's angular spectrum in float32 throughout (phases
+too) is compared with the same method in float64, so they differ only by rounding.
 
-The limit of float32 is darkness. Rounding is a fixed share of the pupil's light, and a window far off the focus holds
-little of that light. Here the source of an ideal lens (R = 50 µm, f = 0.5 mm) moves off the axis while the window
-stays on it. Every PSF is compared with the direct sum at a few of its points. Where it misses the tolerance, it is
-computed again with more digits. Where that does not help, it is refused with an `AccuracyError` that names the dtype.
-float64 still works there.
+In rhabdom, phases are optical paths in float64. Whole waves are removed in float64, and only the remainder, below one
+wave, becomes float32. Therefore no phase kz requires float64.
+
+**Second table.** Darkness is the limit of float32. Rounding is a fixed share of the pupil's light, and a window far
+from the focus receives little of that light. Here the source of an ideal lens (R = 50 µm, f = 0.5 mm) moves off the
+axis while the window stays on it. Every PSF is compared with the direct sum at a few of its points. If it misses the
+tolerance there, it is computed again with more digits. If that does not help, it is refused with an `AccuracyError`
+that names the dtype. float64 still works in these windows.
 
     python -m validation.optics.float32_precision [--out DIR] [--docs DIR]
 """
@@ -34,8 +37,8 @@ from validation.reference import AIRY_ZEROS, relative_l2
 WAVELENGTH = 550e-9
 FRESNEL_NUMBER = 20.0
 DISTANCES = tuple(float(z) for z in np.geomspace(1e-4, 10, 11))
-SAMPLES = 256  # over 4R: the pitch is 0.6 of what the lens needs
-TOLERANCE = 1.1e-5  # just above what float32 is accepted for
+SAMPLES = 256  # over 4R: the pitch is 0.6 times the largest that resolves the lens
+TOLERANCE = 1.1e-5  # just above the smallest that float32 accepts
 BREAKS = (1e-5, 1e-4, 1e-3, 1e-2, 1e-1)
 RADIUS, FOCAL_LENGTH = 50e-6, 500e-6
 ANGLES = (0.0, 0.03, 0.1, 0.2, 0.3, 0.6, 0.9, 1.2)  # [rad]
@@ -45,7 +48,11 @@ REFERENCE = {"tolerance": 1e-9, "method": "rayleigh_sommerfeld", "dtype": "float
 
 @dataclass(frozen=True)
 class Distant:
-    """naive: error of float32 phases. ours, plan: of optics.psf in float32."""
+    """Results at one distance.
+
+    naive: error of float32 phases.
+    ours, plan: error and plan of optics.psf in float32.
+    """
 
     distance: float
     naive: float
@@ -54,14 +61,17 @@ class Distant:
 
     @property
     def rounding(self) -> float:
-        """kz 2^-24 [rad]"""
+        """Rounding error of the phase, kz 2^-24 [rad]."""
         return 2 * np.pi / WAVELENGTH * self.distance * 2.0**-24
 
 
 @dataclass(frozen=True)
 class Dark:
-    """brightness: root mean square of the window over the focus. errors, predicted: NaN where refused; per
-    DARK_TOLERANCES in float32, last in float64."""
+    """Results for one window.
+
+    brightness: root mean square of the window over that of the focus.
+    errors, predicted: NaN if refused; per DARK_TOLERANCES in float32, last in float64.
+    """
 
     angle: float
     brightness: float
@@ -105,21 +115,21 @@ def dark(angle: float) -> Dark:
 
 
 def breaking_distances(rows: list[Distant]) -> list[float]:
-    """Where naive phases pass each of BREAKS, between the measured distances by power laws."""
+    """Distances at which naive phases exceed each of BREAKS, interpolated by power laws."""
     errors = np.maximum.accumulate([row.naive for row in rows])
     return [float(np.exp(np.interp(np.log(b), np.log(errors), np.log(DISTANCES)))) for b in BREAKS]
 
 
 def broken_bounds(rows: list[Distant], windows: list[Dark]) -> list[str]:
-    """Every bound that does not hold, in words."""
+    """Descriptions of the bounds that do not hold."""
     broken = []
     for row in rows:
         if not row.naive <= max(row.rounding, 1e-6):
-            broken.append(f"{row.distance:.1e} m: float32 phases err by {row.naive:.1g}, above kz 2^-24")
+            broken.append(f"{row.distance:.1e} m: float32 phases have an error of {row.naive:.1g}, above kz 2^-24")
         if row.distance >= 0.3 and not row.naive > 1e-3:
-            broken.append(f"{row.distance:.1e} m: float32 phases err by {row.naive:.1g}, too good to be true")
+            broken.append(f"{row.distance:.1e} m: float32 phases have the error {row.naive:.1g}, too small to be true")
         if not (row.ours <= TOLERANCE and row.ours <= 3 * row.plan.predicted_error):
-            broken.append(f"{row.distance:.1e} m: optics.psf errs by {row.ours:.1g}")
+            broken.append(f"{row.distance:.1e} m: optics.psf has an error of {row.ours:.1g}")
     for window in windows:
         name = f"window at brightness {window.brightness:.1g}"
         for error, predicted, tolerance in zip(
@@ -162,13 +172,13 @@ def draw(rows: list[Distant], windows: list[Dark], path: Path) -> None:
     left.loglog(z, [row.naive for row in rows], "o-", color="#999999", label="textbook, phases in float32")
     left.loglog(z, [row.rounding for row in rows], ":", color="black", lw=1, label="kz 2⁻²⁴, the rounding of the phase")
     left.loglog(z, [row.ours for row in rows], "o-", color="#D55E00", label="optics.psf in float32")
-    left.axhline(TOLERANCE, color="#009E73", ls="--", lw=1, label="tolerance asked of it")
+    left.axhline(TOLERANCE, color="#009E73", ls="--", lw=1, label="its requested tolerance")
     left.set(xlabel="distance = focal length [m], Fresnel number 20", ylabel="relative L2 error of intensity")
-    left.set(title="Whole waves have to go before float32 comes", ylim=(1e-8, 20))
+    left.set(title="float32 phases lose their digits", ylim=(1e-8, 20))
     left.legend(frameon=False, fontsize=8.5, loc="upper left")
     darkness = [window.brightness for window in windows]
     colors = "#56B4E9", "#0072B2", "#D55E00", "#009E73"
-    names = [f"float32, asked {t:g}" for t in DARK_TOLERANCES] + [f"float64, asked {TOLERANCE:g}"]
+    names = [f"float32, tolerance {t:g}" for t in DARK_TOLERANCES] + [f"float64, tolerance {TOLERANCE:g}"]
     for i, (color, name) in enumerate(zip(colors, names, strict=True)):
         errors = np.array([window.errors[i] for window in windows])
         right.loglog(darkness, errors, "o-", color=color, label=name)

@@ -1,9 +1,9 @@
-"""The four tables of optics/spectra/data, taken from colour-science and written as they are stored
+"""The four tables of optics/spectra/data, exported from colour-science
 
     python -m validation.optics.freeze_spectra [--write]
 
-Without --write it compares what colour-science holds with what is stored, byte for byte, names files that differ, and
-exits with 1 if any does. Sources and licence: optics/spectra/data/README.md.
+Without --write it compares the data of colour-science with the stored files byte for byte, lists files that differ, and
+exits with 1 if there are any. Sources and licence: optics/spectra/data/README.md.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ PATCHES = {"white 9.5 (.05 D)": "white", "black 2 (1.5 D)": "black"}
 
 
 def colour_tables() -> dict[str, np.ndarray]:
-    """CIE D65, and the colour matching functions of 1931 (0 where they are not tabulated, below 360 nm)."""
+    """CIE D65, and the colour matching functions of 1931 (0 below 360 nm, outside their table)."""
     import colour
 
     matching = colour.MSDS_CMFS["CIE 1931 2 Degree Standard Observer"]
@@ -35,7 +35,7 @@ def colour_tables() -> dict[str, np.ndarray]:
 
 
 def illuminants() -> dict[str, np.ndarray]:
-    """Illuminants but D65 and E, dark where they are not tabulated."""
+    """Illuminants except D65 and E, 0 at wavelengths without an entry."""
     return {"wavelength_nm": FROM_300, **{name: _power(name) for name in ILLUMINANTS}}
 
 
@@ -70,7 +70,7 @@ def _power(illuminant: str) -> np.ndarray:
 
 
 def _at(spectrum: Any, wavelengths: np.ndarray) -> np.ndarray:
-    """The table's own entries, 0 where there are none; indexed, colour-science would interpolate, and round."""
+    """Entries of the table itself, 0 where missing; indexing in colour-science would interpolate and round."""
     known = dict(zip(spectrum.wavelengths, spectrum.values, strict=True))
     return np.array([known.get(float(nm), 0 * spectrum.values[0]) for nm in wavelengths])
 
@@ -80,7 +80,7 @@ def _patch(name: str) -> str:
 
 
 def text(columns: dict[str, np.ndarray]) -> str:
-    """As CSV: numbers in the fewest digits that tell them from all others."""
+    """CSV text: numbers with the fewest digits that identify them."""
     rows = zip(*columns.values(), strict=True)
     lines = [",".join(columns), *(",".join(repr(float(value)).removesuffix(".0") for value in row) for row in rows)]
     return "\n".join(lines) + "\n"
@@ -92,14 +92,14 @@ def main() -> int:
     options.add_argument("--write", action="store_true", help="write the files instead of comparing them")
     asked = options.parse_args()
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # colour-science tells of optional packages that it does not need here
+        warnings.simplefilter("ignore")  # colour-science warns about optional packages that are irrelevant here
         found = {name: text(table()) for name, table in TABLES.items()}
     if asked.write:
         for name, table in found.items():
             (DATA / name).write_text(table)
         return 0
     differing = [name for name, table in found.items() if (DATA / name).read_text() != table]
-    print("\n".join(f"differs: {name}" for name in differing) or f"all {len(found)} tables are as stored")
+    print("\n".join(f"differs: {name}" for name in differing) or f"all {len(found)} tables equal the stored ones")
     return 1 if differing else 0
 
 

@@ -1,13 +1,13 @@
-"""The PSF of an ideal lens, from f/2 to f/16 at the scale of a small eye, against two oracles (A0).
+"""PSF of an ideal lens, from f/2 to f/16 at the scale of a small eye, compared with two references
 
-1. The exact first Rayleigh-Sommerfeld integral, by quadrature in float64. The angular spectrum must agree with it.
-2. The Airy pattern, the limit of that integral for small apertures far away. The exact PSF departs from it by O(NA²),
-   and by O(1/Fresnel number²) where the lens is small. So Airy must *not* fit at f/2, its misfit must fall like NA²,
-   and a slow lens of large Fresnel number must show Airy itself.
+1. The exact first Rayleigh-Sommerfeld integral, by quadrature in float64. `optics.psf` must agree with it.
+2. The Airy pattern, the limit of that integral for small apertures and large distances. The exact PSF differs from it
+by O(NA²), and by O(1/Fresnel    number²) for small lenses. At f/2 the Airy pattern must therefore *not* agree. The
+difference must fall like NA², and a slow lens of large Fresnel    number must agree with the Airy pattern.
 
     python -m validation.optics.ideal_lens_psf [--out DIR]
 
-Prints the table, draws the figure, and exits with 1 if a bound is broken.
+Prints the table, draws the figure, and exits with 1 if a bound does not hold.
 """
 
 from __future__ import annotations
@@ -27,12 +27,12 @@ from validation import reference
 WAVELENGTH = 550e-9
 FOCAL_LENGTH = 240e-6
 F_NUMBERS = (2, 4, 8, 16)
-# f = 50 mm at f/50: NA = 0.01 and Fresnel number 9, so that both departures from Airy are below 1e-3.
+# f = 50 mm at f/50: NA = 0.01 and Fresnel number 9 make both differences from the Airy pattern less than 1e-3.
 SLOW_LENS = (50e-3, 50)
 RINGS = 5
-SAMPLES = 131  # two more than the fifth dark ring needs on either side of 129
+SAMPLES = 131  # 129 samples reach the fifth dark ring; one more on either side
 
-# Issue bound for float32. What is reached is far below; the request (tolerance) is what the bound belongs to.
+# Bound for float32 at the requested tolerance. Actual errors are much smaller.
 MOST_ERROR = 1e-3
 # Exact minus Airy over Airy, area-weighted relative L2 over five rings, from the quadrature alone (within 5 %).
 DEPARTURE = {2: 4.52e-2, 4: 1.17e-2, 8: 3.06e-3}
@@ -40,14 +40,14 @@ DEPARTURE = {2: 4.52e-2, 4: 1.17e-2, 8: 3.06e-3}
 
 @dataclass(frozen=True)
 class Row:
-    """One lens: errors are relative L2 of intensity over the first five rings."""
+    """Results for one lens: errors are relative L2 of intensity over the first five rings."""
 
     f_number: float
     focal_length: float
     plan: optics.Plan
-    error: float  # against the exact integral
-    airy_misfit: float  # of the computed PSF against Airy
-    departure: float  # of the exact integral from Airy
+    error: float  # relative to the exact integral
+    airy_misfit: float  # computed PSF compared with the Airy pattern
+    departure: float  # exact integral compared with the Airy pattern
     first_zero: float  # [m], of the computed PSF
     airy_first_zero: float
     encircled_energy: float  # of the computed PSF within Airy's first zero
@@ -59,7 +59,7 @@ class Row:
 
 
 def measure(f_number: float, focal_length: float = FOCAL_LENGTH, dtype: str = "float32") -> Row:
-    """PSF of the ideal lens by `optics.psf` beside both oracles."""
+    """Compare the PSF of the ideal lens by `optics.psf` with both references."""
     radius = focal_length / (2 * f_number)
     zeros = reference.AIRY_ZEROS * WAVELENGTH * focal_length / (2 * np.pi * radius)
     edge = zeros[RINGS - 1]
@@ -97,7 +97,7 @@ def measure(f_number: float, focal_length: float = FOCAL_LENGTH, dtype: str = "f
 
 
 def _first_minimum(x: np.ndarray, cut: np.ndarray) -> float:
-    """Where the cut first turns upwards, on the spline through it."""
+    """Position of the first minimum of the cut, on the spline through it."""
     slope = CubicSpline(x, cut).derivative()
     roots = [root for root in slope.roots(extrapolate=False) if root > x[2] and slope(root, 1) > 0]
     return float(roots[0])
@@ -110,7 +110,7 @@ def _disk_integral(profile: CubicSpline, radius: float) -> float:
 
 
 def broken_bounds(rows: list[Row], slow: Row) -> list[str]:
-    """Every bound that does not hold, in words."""
+    """Descriptions of the bounds that do not hold."""
     found = [
         f"f/{row.f_number:g}: error {row.error:.2g} against the exact integral, bound {MOST_ERROR:g}"
         for row in [*rows, slow]
@@ -123,7 +123,7 @@ def broken_bounds(rows: list[Row], slow: Row) -> list[str]:
     if not slow.airy_misfit <= 1e-3:
         found.append(f"f/{slow.f_number:g}, f = {slow.focal_length:g} m: misfit to Airy {slow.airy_misfit:.2g} > 1e-3")
     for row in [*rows, slow]:
-        # The sum over samples is good to (dx / ring width)², 1e-3 here.
+        # The error of the sum over samples is (dx / ring width)², 1e-3 here.
         if not abs(row.encircled_energy - row.exact_encircled_energy) < 1e-3:
             found.append(f"f/{row.f_number:g}: encircled energy {row.encircled_energy:.5f}")
     order = airy_order(rows)
@@ -133,7 +133,7 @@ def broken_bounds(rows: list[Row], slow: Row) -> list[str]:
 
 
 def airy_order(rows: list[Row]) -> float:
-    """Exponent of NA in the misfit to Airy from f/2 to f/8, where the Fresnel number still is large."""
+    """Exponent of NA in the difference from the Airy pattern from f/2 to f/8, at large Fresnel numbers."""
     fast, slow = (next(row for row in rows if row.f_number == n) for n in (2, 8))
     return float(np.log(fast.airy_misfit / slow.airy_misfit) / np.log(slow.f_number / fast.f_number))
 
@@ -153,7 +153,7 @@ def table(rows: list[Row]) -> str:
 
 
 def draw(rows: list[Row], path: Path) -> None:
-    """Cuts through the PSFs beside both oracles, and the misfits over NA."""
+    """Cuts through the PSFs with both references, and the differences over NA."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(11, 6.2), layout="constrained")
@@ -174,11 +174,11 @@ def draw(rows: list[Row], path: Path) -> None:
     misfit.loglog(aperture, [row.airy_misfit for row in rows], "o-", color="#999999", label="computed vs Airy")
     misfit.loglog(aperture, [row.error for row in rows], "o-", color="#D55E00", label="computed vs exact")
     misfit.loglog(aperture, 0.047 * (aperture / aperture[0]) ** 2, ":", color="black", lw=1, label="NA²")
-    misfit.axhline(MOST_ERROR, color="#009E73", lw=1, ls="--", label="tolerance asked")
+    misfit.axhline(MOST_ERROR, color="#009E73", lw=1, ls="--", label="tolerance")
     misfit.minorticks_off()
     misfit.set_xticks(aperture, [f"{na:.3f}\nf/{row.f_number:g}" for na, row in zip(aperture, rows, strict=True)])
     misfit.set(xlabel="numerical aperture", ylabel="relative L2 of intensity over five rings", ylim=(1e-7, 1e-1))
-    misfit.set(title="Exact is not Airy")
+    misfit.set(title="The exact PSF differs from Airy's")
     misfit.legend(frameon=False, fontsize=8, loc="lower right")
     figure.suptitle("PSF of an ideal lens, f = 240 µm, 550 nm")
     path.parent.mkdir(parents=True, exist_ok=True)

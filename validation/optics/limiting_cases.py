@@ -1,16 +1,21 @@
-"""Limiting cases: a closed form, or one line that says what is wrong (B6)
+"""Limiting cases: a known value or an error of one line
 
-Every row asks for something at the edge of what makes sense, and states what must come. Either a value known in
-closed form is met to the tolerance given, or an error names the argument, its value and the valid range. Nothing else
-may happen: no NaN, no warning that scrolls by, no picture of noise.
+Does every input at the edge of the domain give the right value or a clear error? Yes: all 12 inputs with a known value
+reach it within their tolerance, and all 26 invalid inputs are refused in one line.
 
-These work: pupils far below the wavelength (Rayleigh-Sommerfeld's cos²θ lobe), a relief of the medium's index, a DOE
-of one pixel (a plate: no change), a source in the focal plane (collimated: the bare aperture's shadow), a window of
-one sample, windows far off the axis, sources at grazing incidence, a plane at distance 0 in `optics.propagate`.
+**Method.** Each row of the table requests something at the edge of the domain, and has an expected outcome. Either the
+result agrees with a value known in closed form to the stated tolerance, or an error names the argument, its value and
+the valid range. Nothing else may happen: no NaN, no mere warning, no image of noise.
 
-These are refused: lengths of 0, NaN or beyond 1e±15 m, wavelengths outside the colour tables (360 to 780 nm) or where
-a dispersion curve falls below 1, more digits than the dtype has, windows so close that light reaches them at grazing
-angles only, more samples than 4096 across. The last three raise an `AccuracyError`, which is a `ValueError`.
+**Accepted inputs.** These inputs have a known value: pupils far below the wavelength (Rayleigh-Sommerfeld's cos²θ
+lobe), a relief of the medium's index, a DOE of one pixel (a plate: no change), a source in the focal plane (collimated:
+the bare aperture's shadow), a window of one sample, windows far off the axis, sources at grazing incidence, and a plane
+at distance 0 in `optics.propagate`.
+
+**Refused inputs.** These inputs raise an error: lengths of 0, NaN or beyond 1e±15 m, wavelengths outside the colour
+tables (300 to 780 nm) or at which a dispersion curve falls below 1, more digits than the dtype has, windows so close
+that light reaches them only at grazing angles, and more samples than 4096 across. The last three raise an
+`AccuracyError`, which is a `ValueError`.
 
     python -m validation.optics.limiting_cases [--out DIR] [--docs DIR]
 """
@@ -39,7 +44,12 @@ WINDOW: dict[str, Any] = {"dx": 2e-6, "shape": (17, 17), "tolerance": 1e-3}
 
 @dataclass(frozen=True)
 class Edge:
-    """happened: what came; expected: what must; holds: whether it is that."""
+    """A case at the edge of the domain.
+
+    happened: actual outcome.
+    expected: expected outcome.
+    holds: True if they agree.
+    """
 
     name: str
     happened: str
@@ -56,7 +66,7 @@ def propagated(u: Any, **more: Any) -> optics.PropagationResult:
 
 
 def lobe(radius: float) -> float:
-    """Error against a pinhole's PSF = πa² z² / (λρ²)², ka << 1: the field of the kernel ik z / (2πρ²) e^{ikρ}."""
+    """Error relative to a pinhole's PSF = πa² z² / (λρ²)², ka << 1, from the kernel ik z / (2πρ²) e^{ikρ}."""
     distance, side = 1e-3, 17
     got = psf(Pupil(radius), distance, dx=2e-4, shape=(side, side))
     x = (np.arange(side) - side // 2) * 2e-4
@@ -69,27 +79,27 @@ def same(pupil: Pupil, other: Pupil, **more: Any) -> float:
 
 
 def on_axis() -> float:
-    """One sample on the axis against |1 - (z/L) e^{ik(L - z)}|², the bare aperture's closed form."""
+    """Error of one sample on the axis relative to |1 - (z/L) e^{ik(L - z)}|², the closed form of the bare aperture."""
     exact = circular_aperture_on_axis(RADIUS, DISTANCE, LAMBDA) / (math.pi * RADIUS**2)
     return abs(float(psf(Pupil(RADIUS), shape=(1, 1))[0, 0]) / exact - 1)
 
 
 def far_window() -> float:
-    """5 mm beside a pupil at 0.2 mm, in darkness of 1e-9: against a quadrature in float64."""
+    """Error in a window 5 mm off the axis at 0.2 mm, at a brightness of 1e-9, relative to quadrature in float64."""
     result = optics.psf(BARE, [LAMBDA], DISTANCE, centre=(5e-3, 0.0), dx=2e-6, shape=(5, 5), tolerance=1e-2)
     r = np.hypot(result.x[None, :], result.y[:, None])
     return relative_l2(result.psf[0], np.abs(ideal_lens_field(r, LAMBDA, RADIUS, distance=DISTANCE)) ** 2 / BARE.area)
 
 
 def slanted() -> float:
-    """86° of incidence: the lens' axis is dark, but right."""
+    """Error at 86° of incidence, where the lens' axis is dark, relative to float64."""
     pupil, asked = Pupil(RADIUS, thin_lens_focal_length=FOCUS), {"source_angle": (1.5, 0.0)}
     exact = psf(pupil, **asked, tolerance=1e-6, method="rayleigh_sommerfeld", dtype="float64")
     return relative_l2(psf(pupil, **asked), exact)
 
 
 def evanescent_wave() -> float:
-    """exp(2πifx) of f = 1.25/λ under a wide Gaussian: decays to e^{-2πz√(f² - 1/λ²)}, in the middle of the Gaussian."""
+    """Error of the decay e^{-2πz√(f² - 1/λ²)} of exp(2πifx) with f = 1.25/λ, in the middle of a wide Gaussian."""
     f, z, dx = 1.25 / LAMBDA, 0.1 * LAMBDA, LAMBDA / 20
     x = (np.arange(641) - 320) * dx
     u = np.tile(np.exp(-((x / (100 * dx)) ** 2)) * np.exp(2j * np.pi * f * x), (641, 1))
@@ -107,13 +117,13 @@ def identity() -> float:
 BARE, PLATE = Pupil(RADIUS), Pupil(RADIUS, np.array([[7e-6]]))
 LENS = Pupil(RADIUS, thin_lens_focal_length=FOCUS)
 ROUGH = np.random.default_rng(0).random((8, 8)) * 10e-6
-# What must be small, and how small.
+# Errors that must be small, with their bounds.
 VALUES: tuple[tuple[str, Callable[[], float], float], ...] = (
     ("pupil of 1 pm: against the cos²θ lobe", lambda: lobe(1e-12), 1e-3),
     ("pupil of 1 nm: against the cos²θ lobe", lambda: lobe(1e-9), 1e-3),
     ("pupil of λ/50: against the cos²θ lobe", lambda: lobe(LAMBDA / 50), 2e-2),
-    ("index = medium's, rough relief: against none", lambda: same(Pupil(RADIUS, ROUGH, n=1.0), BARE), 1e-9),
-    ("DOE of one pixel: against none", lambda: same(PLATE, BARE), 1e-3),
+    ("relief at medium's index: against bare pupil", lambda: same(Pupil(RADIUS, ROUGH, n=1.0), BARE), 1e-9),
+    ("DOE of one pixel: against bare pupil", lambda: same(PLATE, BARE), 1e-3),
     ("source in the focal plane: against no lens", lambda: same(LENS, BARE, source_distance=FOCUS), 1e-6),
     ("window of one sample: against the closed form", on_axis, 1e-3),
     ("window 88° off the axis: against quadrature", far_window, 1e-2),
@@ -122,7 +132,7 @@ VALUES: tuple[tuple[str, Callable[[], float], float], ...] = (
     ("propagate an evanescent wave: its decay", evanescent_wave, 2e-2),
     ("propagate darkness: brightest sample", lambda: float(np.abs(propagated(np.zeros((5, 5))).u).max()), 0.0),
 )
-# What must be refused, and the line that says why.
+# Requests that must be refused, with the error message.
 REFUSALS: tuple[tuple[str, Callable[[], Any], str], ...] = (
     ("pupil of 0 m", lambda: Pupil(0.0), r"aperture_radius = 0\.0: must be greater than 0"),
     ("pupil of NaN", lambda: Pupil(math.nan), r"aperture_radius = nan: must be greater than 0"),
@@ -146,7 +156,11 @@ REFUSALS: tuple[tuple[str, Callable[[], Any], str], ...] = (
     ("daylight at 290 nm", lambda: daylight(np.array([290e-9])), r"wavelengths hold 2\.9e-07 m: must lie in \[300e-9"),
     ("pigment of 800 nm", lambda: pigment_absorptance(np.array([5e-7]), 8e-7), "lambda_max = 8e-07: must lie in"),
     ("dispersion below 1", lambda: RefractiveIndex(1.5, -1e-13).at(3e-7), "n = 0.388889 at wavelength 3e-07 m"),
-    ("float32 asked for 1e-6", lambda: psf(BARE, tolerance=1e-6), "float32 carries 1e-05; dtype='float64' carries"),
+    (
+        "tolerance of 1e-6 in float32",
+        lambda: psf(BARE, tolerance=1e-6),
+        "float32 allows at least 1e-05; dtype='float64' allows",
+    ),
     ("relief of 1 m", lambda: Pupil(RADIUS, ROUGH * 1e5), "height spans .* must be in metres, at most 100 radii"),
     ("relief of 0.9 mm", lambda: psf(Pupil(RADIUS, ROUGH * 90)), "needs .* samples across .*the limits are 4096"),
     ("X-rays (1 pm)", lambda: psf(BARE, wavelength=1e-12), "needs .* samples across .*the limits are 4096"),
@@ -164,9 +178,9 @@ def measure() -> list[Edge]:
 def _value(name: str, call: Callable[[], float], most: float) -> Edge:
     try:
         error = call()
-    except Exception as failure:  # whatever comes is the finding
+    except Exception as failure:  # any other error is the outcome
         return Edge(name, f"{type(failure).__name__}: {failure}", f"at most {most:g}", False)
-    return Edge(name, f"off by {error:.1e}", f"at most {most:g}", bool(error <= most))
+    return Edge(name, f"error {error:.1e}", f"at most {most:g}", bool(error <= most))
 
 
 def _refusal(name: str, call: Callable[[], Any], line: str) -> Edge:
@@ -176,13 +190,13 @@ def _refusal(name: str, call: Callable[[], Any], line: str) -> Edge:
         words = str(error)
         known = re.search(line, words) is not None and "\n" not in words
         return Edge(name, f"{type(error).__name__}: {words}", f"a line like {line}", known)
-    except Exception as failure:  # whatever else comes is the finding
+    except Exception as failure:  # any other error is the outcome
         return Edge(name, f"{type(failure).__name__}: {failure}", f"a line like {line}", False)
-    return Edge(name, "an answer", f"a line like {line}", False)
+    return Edge(name, "a result", f"a line like {line}", False)
 
 
 def broken_bounds(edges: list[Edge]) -> list[str]:
-    """Every bound that does not hold, in words."""
+    """Descriptions of the bounds that do not hold."""
     return [f"{edge.name}: {edge.happened}; expected {edge.expected}" for edge in edges if not edge.holds]
 
 
@@ -191,7 +205,7 @@ def table(edges: list[Edge]) -> str:
 
 
 def draw(path: Path) -> None:
-    """Four pictures at the edge: from a hole of 1 nm to a window far off."""
+    """Four PSFs at the edge of the domain, from a pinhole of 1 nm to a window far off the axis."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(13, 3.6), layout="constrained")
@@ -201,7 +215,7 @@ def draw(path: Path) -> None:
     cut = [psf(Pupil(1e-9), 1e-3, shape=(1, 1), centre=(float(at), 0.0))[0, 0] * (1 + (at / 1e-3) ** 2) for at in x]
     hole.plot(theta, np.cos(np.deg2rad(theta)) ** 2, color="black", lw=1, label="cos²θ")
     hole.plot(theta, np.array(cut) / max(cut), ".", color="#D55E00", label="optics.psf")
-    hole.set(xlabel="θ [deg]", ylabel="intensity at equal distance", title="A hole of 1 nm")
+    hole.set(xlabel="θ [deg]", ylabel="intensity at equal distance", title="A pinhole of 1 nm")
     hole.legend(frameon=False, fontsize=8.5)
     fine: dict[str, Any] = {"dx": 0.5e-6, "shape": (1, 161)}
     at = (np.arange(161) - 80) * 0.5
@@ -214,7 +228,7 @@ def draw(path: Path) -> None:
     difference = [relative_l2(psf(Pupil(RADIUS, ROUGH * 0.01, n=n, medium_n=1.33)), _wet()) for n in indices]
     slope.plot(indices, difference, "o-", color="#D55E00")
     slope.set(
-        xlabel="index of a rough relief (100 nm) in water", ylabel="change of the PSF", title="n = medium: nothing"
+        xlabel="index of a rough relief (100 nm) in water", ylabel="change of the PSF", title="n = medium: no effect"
     )
     places = np.geomspace(50e-6, 5e-3, 30)
     dark = [psf(BARE, shape=(1, 15), centre=(float(p), 0.0), tolerance=1e-2).mean() for p in places]

@@ -1,4 +1,4 @@
-"""Random pupils, apertures, distances, windows and tolerances over the whole domain that the planner is made for."""
+"""Random pupils, apertures, distances, windows and tolerances over the whole domain of the planner."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ FRESNEL_NUMBERS = (1e-2, 1e3)
 APERTURES = (1e-2, 0.7)
 TALLEST_RELIEF = 40e-6
 SIDES = (17, 257)
-COARSE, COARSEST = 0.25, 4.0  # share of the windows that have a pitch of 0.3 to so many times λz/2R
+COARSE, COARSEST = 0.25, 4.0  # share of windows with a pitch of 0.3 to COARSEST times λz/2R
 LOOSEST = 3e-2
 TIGHTEST = {"float32": 1e-5, "float64": 1e-8}
 KINDS = {"flat": 0.1, "lens": 0.15, "B-spline": 0.35, "lens + B-spline": 0.3, "height map": 0.1}
@@ -27,7 +27,12 @@ OPENINGS = {"circle": 0.4, "annulus": 0.15, "slit": 0.2, "regular polygon": 0.1,
 
 @dataclass(frozen=True)
 class Case:
-    """aperture: NA = R/√(R² + z²). relief: peak height of a relief [m], 0 without. window: dx and shape."""
+    """A random case.
+
+    aperture: NA = R/√(R² + z²).
+    relief: peak height of a relief [m], 0 without.
+    window: dx and shape.
+    """
 
     kind: str
     opening: str
@@ -54,7 +59,10 @@ class Case:
 
 
 def draw_case(rng: np.random.Generator) -> Case:
-    """Fresnel number, NA, relief height and tolerance log-uniform; windows from a part of the light to all of it."""
+    """Draw Fresnel number, NA, relief height and tolerance log-uniformly.
+
+    Windows cover a part of the light or all of it.
+    """
     fresnel_number, aperture = (_log_uniform(rng, *ends) for ends in (FRESNEL_NUMBERS, APERTURES))
     tangent = aperture / math.sqrt(1 - aperture**2)
     radius = fresnel_number * WAVELENGTH / tangent
@@ -81,7 +89,7 @@ def _log_uniform(rng: np.random.Generator, low: float, high: float) -> float:
 
 
 def _aperture(rng: np.random.Generator, opening: str) -> Aperture:
-    """Slits down to a twentieth of the radius, stars with 3 to 9 points."""
+    """Slits with a width down to a twentieth of the radius, stars with 3 to 9 points."""
     if opening == "annulus":
         return optics.Annulus(rng.uniform(0.05, 0.95))
     if opening == "slit":
@@ -97,7 +105,7 @@ def _aperture(rng: np.random.Generator, opening: str) -> Aperture:
 
 
 def _hills(rng: np.random.Generator) -> np.ndarray:
-    """A tilted, wavy surface of peak height 1, 12 x 12 samples."""
+    """Tilted, wavy surface of peak height 1, 12 x 12 samples."""
     y, x = np.mgrid[-1:1:12j, -1:1:12j]
     c = rng.normal(size=6)
     surface = c[0] * x + c[1] * y + c[2] * x * y + c[3] * np.sin(3 * x + c[4]) * np.cos(2 * y + c[5])
@@ -105,8 +113,11 @@ def _hills(rng: np.random.Generator) -> np.ndarray:
 
 
 def _window(rng: np.random.Generator, radius: float, distance: float, focused: bool) -> dict[str, Any]:
-    """Half its width: part of the pupil's shadow or some Airy radii, whichever is wider, or else what so many samples
-    of a coarse pitch take; at most 50° off the axis."""
+    """Window of random width, at most 50° off the axis.
+
+    Half its width is a part of the pupil's shadow or a few Airy radii, whichever is larger, or follows from a number of
+    samples with a coarse pitch.
+    """
     shadow = radius * rng.uniform(0.3, 1.5) * (0.1 if focused else 1.0)
     rings = rng.uniform(3, 12) * WAVELENGTH * distance / (2 * radius)
     shape = tuple(int(n) for n in rng.integers(SIDES[0], SIDES[1] + 1, 2))

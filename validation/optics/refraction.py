@@ -1,4 +1,4 @@
-"""Rays through a real surface z = h(x), glass below, vacuum above, light along +z: what a thin element cannot know."""
+"""Rays through a real surface z = h(x), glass below, vacuum above, light along +z: effects beyond a thin element."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ __all__ = [
 
 @dataclass(frozen=True)
 class RealLens:
-    """strehl: of the real surface at its best focus; spread: paraxial less marginal focus over λ/NA²."""
+    """strehl: Strehl ratio of the real surface at its best focus; spread: (paraxial minus marginal focus) / (λ/NA²)."""
 
     aperture: float
     height: float
@@ -33,7 +33,7 @@ class RealLens:
 
 @dataclass(frozen=True)
 class Corrugation:
-    """Shares of the light; the mask lets everything through once."""
+    """Shares of the light; the mask transmits all of it once."""
 
     depth: float
     reflected: float
@@ -41,10 +41,10 @@ class Corrugation:
 
 
 def refract(slope: np.ndarray, n: float) -> tuple[np.ndarray, np.ndarray]:
-    """Direction (x, z) of a ray that leaves glass of index n where h has this slope; NaN where it is totally reflected.
+    """Direction (x, z) of a ray that leaves glass of index n at a slope of h; NaN for total reflection.
 
-    Snell's law as a vector: t = n d + (√(1 - n²(1 - c²)) - n c) N, c = d·N, N = (-h', 1)/√(1 + h'²)
-    (Born & Wolf, Principles of Optics, §3.2.2).
+    Snell's law as a vector: t = n d + (√(1 - n²(1 - c²)) - n c) N, c = d·N, N = (-h', 1)/√(1 + h'²) (Born & Wolf,
+    Principles of Optics, §3.2.2).
     """
     slope = np.asarray(slope, dtype=np.float64)
     c = 1 / np.sqrt(1 + slope**2)
@@ -54,18 +54,18 @@ def refract(slope: np.ndarray, n: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 def deviation_glass_first(angle: float, n: float) -> float:
-    """[rad] of a ray that leaves through a surface tilted by α: arcsin(n sin α) - α; NaN where totally reflected."""
+    """Deviation [rad] of a ray that leaves through a surface tilted by α: arcsin(n sin α) - α; NaN if reflected."""
     sine = n * np.sin(angle)
     return float(np.arcsin(sine) - angle) if sine < 1 else float("nan")
 
 
 def deviation_relief_first(angle: float, n: float) -> float:
-    """[rad] of a ray that enters through a surface tilted by `angle` and leaves through a flat one."""
+    """Deviation [rad] of a ray that enters through a surface tilted by `angle` and leaves through a flat one."""
     return float(np.arcsin(n * np.sin(angle - np.arcsin(np.sin(angle) / n))))
 
 
 def thin_deviation(angle: float, n: float) -> float:
-    """[rad] by the thin element exp(ik(n - 1)h): sin θ = (n - 1) tan α; NaN where evanescent."""
+    """Deviation [rad] by the thin element exp(ik(n - 1)h): sin θ = (n - 1) tan α; NaN for evanescent waves."""
     sine = (n - 1) * np.tan(angle)
     return float(np.arcsin(sine)) if sine < 1 else float("nan")
 
@@ -82,23 +82,23 @@ def transmission(angle: float, n: float) -> float:
 
 
 def caught_again(height: Callable[[np.ndarray], np.ndarray], slope: np.ndarray, x: np.ndarray, n: float) -> np.ndarray:
-    """Which rays, leaving z = height(x) at these places of these slopes, meet the surface a second time.
+    """Mask of the rays from z = height(x) at these places with these slopes that hit the surface a second time.
 
-    The surface must stay below its highest sampled place: beyond it a ray is free.
+    The surface must stay below its highest sampled point, above which a ray is free.
     """
     tx, tz = refract(slope, n)
     start = height(x)
     climb = start.max() - start
     caught = np.zeros(x.shape, dtype=bool)
     with np.errstate(invalid="ignore", divide="ignore"):
-        reach = np.where(tz > 0, climb / tz, 0)  # a ray is followed until it has risen above everything
+        reach = np.where(tz > 0, climb / tz, 0)  # a ray is traced until it is above the whole surface
         for share in np.linspace(0.002, 1, 500):
             caught |= start + share * reach * tz < height(x + share * reach * tx) - 1e-12 * np.ptp(start)
     return caught
 
 
 def real_lens(aperture: float, focal_length: float, n: float, wavelength: float) -> RealLens:
-    """The relief whose mask is an ideal lens, flat side to the light, rim in the plane z = 0."""
+    """The relief whose mask is an ideal lens, flat side towards the light, rim in the plane z = 0."""
     radius = focal_length * aperture / np.sqrt(1 - aperture**2)
     height = (np.hypot(radius, focal_length) - focal_length) / (n - 1)
     nodes, weights = np.polynomial.legendre.leggauss(300)

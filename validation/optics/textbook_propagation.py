@@ -1,4 +1,4 @@
-"""The angular spectrum as textbooks have it, in NumPy: what these pages show to fail. Time factor exp(-iωt)."""
+"""Textbook angular spectrum in NumPy, whose failures these pages show. Time factor exp(-iωt)."""
 
 from __future__ import annotations
 
@@ -12,14 +12,15 @@ def angular_spectrum(
 ) -> np.ndarray:
     """F⁻¹{F{u} H}, H = exp(2πi z √(1/λ² - fx² - fy²)), over the samples' own period (Goodman §3.10.2).
 
-    Backwards (z < 0) evanescent waves grow as they decayed forwards. dtype: of every number on the way, kz included.
+    Backwards (z < 0), evanescent waves grow as they decay forwards. dtype: type of every intermediate number, including
+    kz.
     """
     real = np.zeros(0, dtype).real.dtype.type
     fx, fy = (np.fft.fftfreq(n, dx).astype(real) for n in u.shape[::-1])
     axial = np.sqrt((real(1 / wavelength**2) - fx[None, :] ** 2 - fy[:, None] ** 2).astype(dtype))
     with np.errstate(over="ignore", invalid="ignore"):
         transfer = np.exp(dtype(2j * np.pi * distance) * axial)
-        # NumPy transforms in float64; rounding to dtype before and after is what is left of it.
+        # NumPy transforms in float64, so the result is rounded to dtype before and after.
         spectrum = (np.fft.fft2(np.fft.ifftshift(u)).astype(dtype) * transfer).astype(dtype)
         return np.fft.fftshift(np.fft.ifft2(spectrum)).astype(dtype)
 

@@ -1,22 +1,25 @@
-"""The thin element: what a relief as a phase mask cannot know (B5)
+"""Thin element: effects that a phase mask omits from a real relief
 
-A relief of height h is modelled as the phase k(n - 1)h in one plane. The model is chosen before any propagation
-starts, and no predicted error covers it: `predicted_error` is that of propagating the mask. Rays through the real
-surface show what the mask leaves out (Snell's law, light from inside the glass of n = 1.5,
+What does a phase mask miss of a real relief, and when does that matter? rhabdom uses the mask throughout. Slopes below
+10° and lenses below NA = 1.16 (λ/f)^¼ are safe. That NA is 0.25 for f = 240 µm.
+
+**Method.** A relief of height h is modelled as the phase k(n - 1)h in one plane. The model is chosen before any
+propagation starts, and no predicted error covers it: `predicted_error` is that of propagating the mask. Rays through
+the real surface show the effects that the mask omits (Snell's law, light from inside the glass of n = 1.5,
 `validation/optics/refraction.py`):
 
-- refraction at a slope: a prism of angle α deviates by arcsin(n sin α) - α, the mask by arcsin((n - 1) tan α), which
-  is the same whichever side the light comes from. The mask is 1 % off at α = 11° and 10 % at 30°;
-- total reflection: beyond 41.8° no light leaves, while the mask goes on to 63°. A lens made of one relief ends there,
-  at NA = 0.45; the mask has no such limit;
-- Fresnel reflection: 4 % at normal incidence, 10 % at 36°, 25 % at 40°. No PSF here includes it;
-- thickness: rays bend at the surface, not in the plane. A relief whose mask is an ideal lens is not an ideal lens
-  itself. Its Strehl ratio falls below 0.8 at NA = 1.16 (λ/f)^¼, 0.25 for f = 240 µm; and the focus spreads along the
-  axis by many depths of field;
-- neighbours: a sinusoidal corrugation starts to reflect totally where its depth is 0.28 of its period. From 0.30 on,
-  some rays that have left meet the next ridge.
+- **Refraction at a slope.** A prism of angle α deviates by arcsin(n sin α) - α, the mask by arcsin((n - 1) tan α). The
+  mask's deviation is the same for light from either side. The mask is 1 % off at α = 11° and 10 % at 30°.
+- **Total reflection.** Beyond 41.8° no light leaves, while the mask transmits up to 63°. A lens made of one relief ends
+  there, at NA = 0.45. The mask has no such limit.
+- **Fresnel reflection.** It is 4 % at normal incidence, 10 % at 36° and 25 % at 40°. No PSF here includes it.
+- **Thickness.** Rays bend at the surface, not in the plane. A relief whose mask is an ideal lens is not an ideal lens
+  itself. Its Strehl ratio falls below 0.8 at NA = 1.16 (λ/f)^¼, and the focus spreads along the axis by many depths of
+  field.
+- **Neighbouring ridges.** A sinusoidal corrugation starts to reflect totally if its depth is 0.28 of its period. From
+  0.30 on, some rays that have left the surface hit the next ridge.
 
-rhabdom uses the mask throughout. Slopes below 10° and lenses below NA = 1.16 (λ/f)^¼ are safe.
+The command computes the table:
 
     python -m validation.optics.thin_element [--out DIR] [--docs DIR]
 """
@@ -50,13 +53,13 @@ N, WAVELENGTH, FOCAL_LENGTH = 1.5, 550e-9, 240e-6
 ANGLES_DEG = (1.0, 2.0, 5.0, 10.0, 15.0, 20.0, 25.0, 30.0, 35.0, 40.0, 45.0, 55.0)
 APERTURES = (0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4, 0.44)
 FOCAL_LENGTHS = (60e-6, 240e-6, 960e-6)
-DEPTHS = (0.05, 0.1, 0.2, 0.25, 0.3, 0.4, 0.6, 1.0)  # of a corrugation / its period
+DEPTHS = (0.05, 0.1, 0.2, 0.25, 0.3, 0.4, 0.6, 1.0)  # depth of a corrugation over its period
 PRISM_RADIUS, PRISM_DISTANCE = 20e-6, 1e-3
 
 
 @dataclass(frozen=True)
 class Prism:
-    """Deviations [rad] at one angle; psf: from where optics.psf has its peak (NaN: not asked)."""
+    """Deviations [rad] at one angle; psf: from the peak of optics.psf (NaN: not computed)."""
 
     angle_deg: float
     real: float
@@ -75,7 +78,7 @@ def prism(angle_deg: float, with_psf: bool = True) -> Prism:
 
 
 def psf_deviation(angle: float) -> float:
-    """Direction of the brightest point behind a prism, by optics.psf: a parabola through the top of a cut."""
+    """Direction of the brightest point behind a prism by optics.psf, from a parabola through the top of a cut."""
     heights = np.tan(angle) * PRISM_RADIUS * (2 * np.arange(4) - 3)
     pupil = optics.Pupil(PRISM_RADIUS, optics.BSplineRelief(np.tile(heights, (4, 1))), n=N)
     place = PRISM_DISTANCE * float(np.tan(thin_deviation(angle, N)))
@@ -92,7 +95,7 @@ def _lens(aperture: float, focal_length: float = FOCAL_LENGTH) -> RealLens:
 
 
 def limits() -> dict[str, float]:
-    """Where the mask is off by so much, and where light takes ways that it does not know."""
+    """Limits of the mask: given errors of its deviation, and effects that it omits."""
 
     def off(angle: float, by: float) -> float:
         return 1 - thin_deviation(angle, N) / deviation_glass_first(angle, N) - by
@@ -105,7 +108,7 @@ def limits() -> dict[str, float]:
         "NA of total reflection": (N - 1) * float(np.tan(np.arcsin(1 / N))),
         **{f"NA of Strehl 0.8, f = {f * 1e6:g} µm": _aperture_of_strehl(f) for f in FOCAL_LENGTHS},
         "corrugation reflects, depth / period": float(np.tan(np.arcsin(1 / N)) / np.pi),
-        "corrugation catches, depth / period": _depth_that_catches(),
+        "ray hits the next ridge, depth / period": _depth_that_catches(),
     }
 
 
@@ -121,7 +124,7 @@ def _depth_that_catches() -> float:
     return high
 
 
-# What the page says in words, and how well it must be met.
+# Numbers in the page's text, with tolerances.
 SAID = {
     "angle off by 1 % [deg]": (11.0, 0.5),
     "angle off by 10 % [deg]": (30.0, 0.5),
@@ -132,19 +135,19 @@ SAID = {
     "NA of Strehl 0.8, f = 240 µm": (0.25, 0.005),
     "NA of Strehl 0.8, f = 960 µm": (1.16 * (WAVELENGTH / 960e-6) ** 0.25, 0.02),
     "corrugation reflects, depth / period": (0.28, 0.006),
-    "corrugation catches, depth / period": (0.30, 0.006),
+    "ray hits the next ridge, depth / period": (0.30, 0.006),
 }
 
 
 def broken_bounds(prisms: list[Prism], lenses: list[RealLens], found: dict[str, float]) -> list[str]:
-    """Every bound that does not hold, in words."""
+    """Descriptions of the bounds that do not hold."""
     broken = [
         f"{name}: {found[name]:.4g}, the page says {said:.4g}"
         for name, (said, within) in SAID.items()
         if not abs(found[name] - said) <= within
     ]
     for row in prisms:
-        # Half a step of a cut 1 µm wide at 1 mm; the peak's own obliquity is of that size too.
+        # Half a step of a cut 1 µm wide at 1 mm; the obliquity of the peak has the same size.
         if not np.isnan(row.psf) and not abs(row.psf - row.thin) < 5e-4:
             broken.append(
                 f"{row.angle_deg:g} deg: optics.psf deviates by {row.psf:.5f} rad, its model by {row.thin:.5f}"
@@ -152,7 +155,7 @@ def broken_bounds(prisms: list[Prism], lenses: list[RealLens], found: dict[str, 
     gentle = [row for row in prisms if row.angle_deg <= 10]
     order = order_of_convergence([row.angle_deg for row in gentle], [row.real - row.thin for row in gentle])
     if not abs(order - 3) < 0.1:
-        broken.append(f"the mask's deviation is off like angle^{order:.2f}, must be 3: it is right to first order")
+        broken.append(f"the mask's deviation has errors like angle^{order:.2f}, must be 3: it is right to first order")
     slow = [row for row in lenses if row.aperture <= 0.2]
     order = order_of_convergence([row.aperture for row in slow], [row.spread for row in slow])
     if not abs(order - 4) < 0.1:
@@ -172,7 +175,7 @@ def table(prisms: list[Prism], lenses: list[RealLens], ridges: list[Corrugation]
     lines.append("NA      height [µm]   Strehl of the real surface   spread of its focus / depth of field")
     for lens in lenses:
         lines.append(f"{lens.aperture:<8g}{lens.height * 1e6:<14.3g}{lens.strehl:<29.3f}{lens.spread:.3g}")
-    lines.append("\ncorrugation, depth / period   totally reflected   caught by the next ridge")
+    lines.append("\ncorrugation, depth / period   totally reflected   hits the next ridge")
     lines += [f"{row.depth:<30g}{row.reflected:<20.1%}{row.caught:.1%}" for row in ridges]
     lines.append("\nlimits")
     lines += [f"{name:<40}{value:.3g}" for name, value in found.items()]
@@ -211,7 +214,7 @@ def draw(lenses: list[RealLens], path: Path) -> None:
 
 
 def _rays(axes: Any) -> None:
-    """Through the relief whose mask is an ideal lens of NA 0.4."""
+    """Rays through the relief whose mask is an ideal lens of NA 0.4."""
     f, aperture = FOCAL_LENGTH * 1e6, 0.4
     radius = f * aperture / np.sqrt(1 - aperture**2)
     x = np.linspace(-radius, radius, 201)

@@ -1,18 +1,21 @@
-"""An undersampled lens: noise that looks like a PSF (B2)
+"""Undersampled lens: a speckle pattern that resembles a PSF
 
-The published setting is a pupil of a few mm on 51 or 101 samples; here f = 4 mm and 550 nm, on a grid of 2 mm, with
-lenses of f/2, f/8 and f/13.5. The phase of a lens turns by half a wave from sample to sample at its rim if the pitch
-is λ / (2 NA). On 51 samples the pitch is 35, 9 and 5 times that. The samples then do not describe a lens but a
-pattern of many false ones. Most light goes elsewhere, and the picture is a regular speckle with a bright middle.
-Nothing in it shows the mistake: it is finite and positive, and it keeps the power.
+What does a lens on too few samples look like? It gives a regular speckle pattern with a bright centre. For f/2 on 51
+samples, Airy's first dark ring contains 6.2e-06 of the light instead of 0.8278. The share is right once the pitch falls
+below λ / (2 NA), and not before.
 
-The table shows the energy inside Airy's first dark ring, as a share of the light through the pupil. It compares the
-textbook's angular spectrum on the samples' own grid (with band-limited interpolation between its points) with the
-exact Rayleigh-Sommerfeld integral. The energy jumps to the right value once the pitch falls below λ / (2 NA), and not
-before.
+**Method.** The published setting is a pupil of a few mm on 51 or 101 samples. Here f = 4 mm and 550 nm, on a grid of
+2 mm, with lenses of f/2, f/8 and f/13.5. At a pitch of λ / (2 NA), the phase of a lens turns by half a wave from sample
+to sample at its rim. On 51 samples the pitch is 35, 9 and 5 times that. The samples then describe a pattern of many
+false lenses instead of one lens, and most light goes elsewhere. Nothing in the image shows the mistake: it is finite
+and positive, and its power is conserved.
 
 `optics.psf` takes no samples of the pupil. It chooses them from the slope of the phase, or uses a method that needs
-none. The same pupils come out right to the tolerance asked for.
+none. PSFs of the same pupils are right to the requested tolerance.
+
+**Table.** It shows the energy inside Airy's first dark ring, as a share of the light through the pupil. The textbook's
+angular spectrum on the samples' own grid (with band-limited interpolation between its points) is compared with the
+exact Rayleigh-Sommerfeld integral.
 
     python -m validation.optics.undersampled_lens [--out DIR] [--docs DIR]
 """
@@ -35,11 +38,11 @@ WAVELENGTH = 550e-9
 GRID, FOCAL_LENGTH = 2e-3, 4e-3
 F_NUMBERS = (2.0, 8.0, 13.5)
 PUBLISHED = (51, 101)
-# The same f/2 ten times smaller, where enough samples fit into memory.
+# The same f/2 ten times smaller, so that enough samples fit into memory.
 SMALL = 0.1
 SWEEP = (16, 24, 32, 48, 64, 90, 110, 128, 150, 176, 200, 256, 352, 512)
 TOLERANCE = 1e-4
-RINGS_SHOWN = 5.0  # [µm] half the width of the picture of the true PSF
+RINGS_SHOWN = 5.0  # [µm] half the width of the image of the true PSF
 
 
 @dataclass(frozen=True)
@@ -54,7 +57,7 @@ class Lens:
 
     @property
     def needed_pitch(self) -> float:
-        """λ / (2 NA)"""
+        """Largest pitch that resolves the lens, λ / (2 NA)."""
         return WAVELENGTH * np.hypot(self.radius, self.focal_length) / (2 * self.radius)
 
     @property
@@ -67,7 +70,7 @@ class Lens:
 
 @dataclass(frozen=True)
 class Row:
-    """Energy inside Airy's dark ring: exact, by optics.psf, and by the textbook on `samples`."""
+    """Energy inside Airy's first dark ring: exact, by optics.psf, and by the textbook on `samples`."""
 
     lens: Lens
     exact: float
@@ -78,7 +81,7 @@ class Row:
 
 
 def focus(lens: Lens, n: int) -> tuple[np.ndarray, np.ndarray]:
-    """Fields in the pupil and in the focal plane, textbook."""
+    """Fields in the pupil and in the focal plane by the textbook's method."""
     u = sampled_lens(n, lens.grid / n, WAVELENGTH, lens.radius, lens.focal_length)
     return u, angular_spectrum(u, lens.grid / n, WAVELENGTH, lens.focal_length)
 
@@ -102,7 +105,8 @@ def true_psf(lens: Lens, dx: float, side: int = 65) -> optics.PSFResult:
 def energy_inside(u: np.ndarray, dx: float, radius: float) -> float:
     """∫ |u|² over a disk about the centre, of the band-limited function through the samples.
 
-    Gauss-Legendre in radius, trapezoid in angle; the points lie between the samples, so the Fourier sum is written out.
+    Gauss-Legendre in radius, trapezoidal rule in angle. The points lie between the samples, so the Fourier sum is
+    evaluated directly.
     """
     n = len(u)
     frequency = np.fft.fftshift(np.fft.fftfreq(n, dx))
@@ -124,18 +128,18 @@ def _exact(lens: Lens) -> float:
 
 
 def broken_bounds(published: list[Row], sweep: Row) -> list[str]:
-    """Every bound that does not hold, in words."""
+    """Descriptions of the bounds that do not hold."""
     broken = []
     for row in [*published, sweep]:
         name = f"f/{row.lens.f_number:g}, f = {row.lens.focal_length:g} m"
-        # The sum over the window's samples is good to (dx / ring width)², 2e-4 here.
+        # The error of the sum over the window's samples is (dx / ring width)², 2e-4 here.
         if not abs(row.ours - row.exact) < 2e-4:
             broken.append(f"{name}: optics.psf has {row.ours:.5f} inside, exact is {row.exact:.5f}")
         for n, share in zip(row.samples, row.textbook, strict=True):
             under = row.lens.undersampling(n)
             if under > 2.5 and not share < 0.15 * row.exact:
                 broken.append(f"{name}: on {n} samples, {under:.1f} times too coarse, the textbook has {share:.3f}")
-            # A hard edge on a Cartesian grid is good to half a percent of the energy.
+            # The error of a hard edge on a Cartesian grid is half a percent of the energy.
             if under <= 1 and not abs(share - row.exact) < 5e-3:
                 broken.append(f"{name}: on {n} samples, fine enough, the textbook has {share:.3f}")
     return broken
@@ -154,7 +158,7 @@ def table(published: list[Row], sweep: Row) -> str:
 
 
 def draw(published: list[Row], sweep: Row, path: Path) -> None:
-    """What the undersampled lens looks like, what the PSF is, and where the textbook becomes right."""
+    """Undersampled image, true PSF, and energy over the pitch."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(13.5, 3.6), layout="constrained")
@@ -191,7 +195,7 @@ def _shares(axes: Any, published: list[Row], sweep: Row) -> None:
     axes.axvline(1, color="#009E73", lw=1)
     axes.text(0.93, 2e-5, "pitch λ / (2 NA)", rotation=90, ha="right", color="#009E73", fontsize=8.5)
     axes.set(
-        xlabel="pitch / (λ / 2 NA)", ylabel="energy inside Airy's first dark ring", title="Right below 1, wrong above"
+        xlabel="pitch / (λ / 2 NA)", ylabel="energy inside Airy's first dark ring", title="Correct below 1, wrong above"
     )
     axes.legend(frameon=False, fontsize=7, loc="lower left", bbox_to_anchor=(0.24, -0.02))
 

@@ -1,6 +1,6 @@
-"""What proofs share: their pages, stored tables and charts.
+"""Shared code of proofs: pages, stored tables and charts.
 
-page                  Page: a script's docstring and table, printed, drawn and written into docs/validation
+page                  Page: a script's docstring and table as a page in docs/validation
 tables                CSV files of measurements
-work_precision_chart  error against time, and the colours of all charts
+work_precision_chart  chart of error against time, and the colours of all charts
 """

@@ -1,6 +1,6 @@
-"""One page per limit: a script's own docstring and table, printed, drawn and, if asked, written into the docs.
+"""Pages of proofs: a script's docstring and table, printed, drawn and optionally written to the docs.
 
-The docstring is the page's text: its first line the title, an indented line the command.
+The docstring is the page's text: its first line is the title, and an indented line is the command.
 """
 
 from __future__ import annotations
@@ -18,7 +18,11 @@ __all__ = ["Page", "blanked", "parser"]
 
 @dataclass(frozen=True)
 class Page:
-    """name: of script, figure and page. broken: every bound that does not hold, in words."""
+    """A proof's page.
+
+    name: name of script, figure and page.
+    broken: descriptions of the bounds that do not hold.
+    """
 
     name: str
     text: str
@@ -28,7 +32,7 @@ class Page:
     @property
     def markdown(self) -> str:
         title, _, prose = cleandoc(self.text).partition("\n")
-        figure = f"It draws `validation/figures/{self.name}.png`."
+        figure = f"The command draws `validation/figures/{self.name}.png`."
         return f"# {title}\n\n{prose.strip()}\n\n{figure}\n\n```\n{self.table}\n```\n"
 
     @property
@@ -36,7 +40,7 @@ class Page:
         return f"{self.name}.md"
 
     def publish(self, options: argparse.Namespace, draw: Callable[[Path], None]) -> int:
-        """Prints table and verdict, draws the figure into --out, writes the page into --docs; the exit code."""
+        """Print table and verdict, draw the figure into --out, write the page into --docs; return the exit code."""
         print(self.table)
         options.out.mkdir(parents=True, exist_ok=True)
         figure = options.out / f"{self.name}.png"
@@ -54,14 +58,14 @@ class Page:
 
 
 def parser(text: str) -> argparse.ArgumentParser:
-    """The options that every page has."""
+    """Argument parser with the options of all pages."""
     found = argparse.ArgumentParser(description=text.split("\n")[0])
     found.add_argument("--out", type=Path, default=Path("validation/figures"), help="directory for the figure")
-    found.add_argument("--docs", type=Path, help="directory to write the page into, docs/validation for the stored one")
+    found.add_argument("--docs", type=Path, help="directory for the page, docs/validation for the stored one")
     return found
 
 
 def blanked(markdown: str) -> str:
-    """The page without its numbers, which differ in their last digits from machine to machine."""
+    """Replace the numbers of a page, since their last digits differ between machines."""
     without = re.sub(r"[-+]?(\d[\d.]*(e[-+]?\d+)?|\binf\b|\bnan\b)", "#", markdown)
     return re.sub(r"[ -]+", " ", without)

@@ -1,4 +1,4 @@
-"""Tables of measurements beside the pages that show them."""
+"""Tables of measurements, stored next to the pages that show them."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ __all__ = ["write_table"]
 
 
 def write_table(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
-    """A CSV file of rows with the same keys, whole or not at all."""
+    """Write a CSV file of rows with the same keys atomically."""
     path.parent.mkdir(parents=True, exist_ok=True)
     unfinished = path.with_suffix(".tmp")
     with unfinished.open("w", encoding="utf-8", newline="") as file:

@@ -1,7 +1,7 @@
 """The work-precision chart: error against time, both logarithmic. Better is lower and further left.
 
-What the chart is about is drawn in colour, what it is compared with in grey; every curve bears its name, so that no
-legend has to be read. Names stand beside the axes, apart from one another, with a thin line to their curve's end.
+Our curves are in colour, curves of other codes in grey. Every curve is labelled directly instead of in a legend. Labels
+stand to the right of the axes without overlaps, with a thin line to their curve's end.
 """
 
 from __future__ import annotations
@@ -21,7 +21,11 @@ NAME_HEIGHT = 0.052  # of the axes, per line of text
 
 @dataclass(frozen=True)
 class Curve:
-    """errors over seconds, in any order. joined: a line through them, else dots alone; label "": not named."""
+    """A curve of errors over seconds, in any order.
+
+    joined: True for a line through the points, False for dots.
+    label: name; "" for none.
+    """
 
     label: str
     seconds: Sequence[float]
@@ -36,7 +40,7 @@ class Curve:
 
 @dataclass(frozen=True)
 class Region:
-    """Where a goal holds: at most these seconds, at most this error."""
+    """Region of a goal: at most these seconds and at most this error."""
 
     label: str
     seconds: float
@@ -44,7 +48,7 @@ class Region:
 
 
 def front(points: Iterable[tuple[float, float]]) -> list[tuple[float, float]]:
-    """Of (seconds, error) pairs those that no other beats in both, fastest first."""
+    """Pareto front of (seconds, error) pairs, fastest first."""
     kept: list[tuple[float, float]] = []
     for seconds, error in sorted(points):
         if math.isfinite(error) and (not kept or error < kept[-1][1]):
@@ -53,10 +57,10 @@ def front(points: Iterable[tuple[float, float]]) -> list[tuple[float, float]]:
 
 
 def draw_work_precision(axes: Any, curves: Sequence[Curve], regions: Sequence[Region] = (), title: str = "") -> None:
-    """All curves and goals into one pair of matplotlib axes.
+    """Draw all curves and goals into one pair of matplotlib axes.
 
     Raises:
-        ValueError: a curve is empty, or holds seconds or errors that no logarithm takes.
+        ValueError: a curve is empty, or has values without a logarithm.
     """
     for curve in curves:
         _check(curve)
@@ -75,7 +79,7 @@ def draw_work_precision(axes: Any, curves: Sequence[Curve], regions: Sequence[Re
 
 def _check(curve: Curve) -> None:
     if len(curve.seconds) != len(curve.errors) or not len(curve.errors):
-        raise ValueError(f"{curve.label}: {len(curve.seconds)} seconds, {len(curve.errors)} errors; must be as many")
+        raise ValueError(f"{curve.label}: {len(curve.seconds)} seconds, {len(curve.errors)} errors; must be equal")
     for name, values in (("seconds", curve.seconds), ("errors", curve.errors)):
         if not all(math.isfinite(value) and value > 0 for value in values):
             raise ValueError(f"{curve.label}: {name} = {list(values)}: must be finite and above 0")
@@ -108,7 +112,7 @@ def _line(axes: Any, curve: Curve) -> None:
 
 
 def _names(axes: Any, curves: Sequence[Curve]) -> None:
-    """Beside the axes, in the order of the curves' last points, no two closer than a line of text."""
+    """Place labels next to the axes, in the order of the curves' last points, at least a line of text apart."""
     ends = [min(zip(curve.errors, curve.seconds, strict=True)) for curve in curves]
     heights = [axes.transAxes.inverted().transform(axes.transData.transform((s, e)))[1] for e, s in ends]
     for index, height in zip(np.argsort(heights), _apart(sorted(heights)), strict=True):
@@ -128,7 +132,7 @@ def _names(axes: Any, curves: Sequence[Curve]) -> None:
 
 
 def _apart(heights: Sequence[float]) -> list[float]:
-    """Heights, ascending, moved up just enough, then all down into the axes."""
+    """Move ascending heights up just enough to separate them, then all down into the axes."""
     placed: list[float] = []
     for height in heights:
         placed.append(max(height, placed[-1] + NAME_HEIGHT) if placed else max(height, 0.02))

@@ -1,16 +1,16 @@
-"""Other codes for scalar diffraction, each behind one small adapter with a name of its own: `PEER` in each module.
+"""Adapters to other codes for scalar diffraction: `PEER` in one module per code.
 
-Adapters set a code up the way its documents say, in its own units and conventions. Whatever a code can prepare once
-(sampled fields, transfer functions, propagators) is prepared before the clock starts.
+Adapters use a code as its documentation recommends, in its own units and conventions. Sampled fields, transfer
+functions and propagators that a code can prepare once are prepared before timing starts.
 
-work_precision    the proof: error against time of these codes and ours
-population_speed  the proof: PSFs per CPU second of whole populations
-peer_claims       the proof: what the tests of other codes and textbooks assert
+work_precision    proof: error against time of these codes and ours
+population_speed  proof: PSFs per CPU second of whole populations
+peer_claims       proof: claims of other codes' tests and of textbooks
 claims            those claims
-problem           the cases that every code is given
-measure, points   measured points, and the file that keeps those of the peers
-goals             what is asked of `optics` beside its peers
-rhabdom           ours, on the same cases
+problem           cases for all codes
+measure, points   measured points, and the file of the peers' points
+goals             goals of `optics` relative to its peers
+rhabdom           this package on the same cases
 
 Adapters: deeplens, diffractio, diffractsim, hcipy, lightpipes, poppy, prysm, svetlanna, torchoptics, waveprop.
 """
@@ -44,7 +44,7 @@ MODULES = (
 
 @cache
 def installed() -> Mapping[Peer, str]:
-    """Those that can be run here, with their versions. One that is there but cannot be imported is named."""
+    """Peers that can run here, with their versions. Installed peers that cannot be imported are reported."""
     found = {}
     for module in MODULES:
         peer = import_module(f"validation.peers.{module}").PEER

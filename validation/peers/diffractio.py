@@ -24,7 +24,7 @@ def runs(case: Case, grid: SampleGrid, dtype: str) -> Iterator[Run]:
     )
     tight = case.around_pupil(grid.n).odd
     narrow = _field(case, tight)
-    # It takes the ends for edges of cells, and its first output is the second cell.
+    # It treats the ends as edges of cells, and its first output is the second cell.
     edge = case.half_window + case.window.dx / 2
     window = (np.linspace(-edge, edge, case.window.n) - case.window.dx) * MICRONS
     yield Run(

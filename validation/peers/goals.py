@@ -1,4 +1,4 @@
-"""What is asked of `optics` beside its peers, decided from measured points."""
+"""Goals of `optics` relative to its peers, evaluated from measured points."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from validation.peers.points import Point
 __all__ = ["ACCURATE", "CONVERGED_PEER", "FASTER", "SINGLE", "Verdict", "own_best", "verdicts"]
 
 ACCURATE, FASTER = 2e-7, 10.0  # goal 1: this error, this many times faster than a peer reaches its own best
-SINGLE, CONVERGED_PEER = 1e-5, 1e-3  # goal 2: this error in float32, before any peer has that one
-COMPARABLE = 2.0  # goal 3: plain angular spectra differ by no more than this
+SINGLE, CONVERGED_PEER = 1e-5, 1e-3  # goal 2: this error in float32, sooner than any peer reaches the other
+COMPARABLE = 2.0  # goal 3: largest ratio between errors of plain angular spectra
 NO_SLOWER = 1.0
 
 
@@ -27,7 +27,7 @@ class Verdict:
 
 
 def verdicts(ours: Sequence[Point], peers: Sequence[Point]) -> list[Verdict]:
-    """Every goal on every case of ours."""
+    """Evaluate every goal on every case of ours."""
     found = []
     for case in dict.fromkeys(point.case for point in ours):
         mine, others = ([point for point in points if point.case == case] for points in (ours, peers))
@@ -67,7 +67,10 @@ def _single_precision(case: str, ours: Sequence[Point], peers: Sequence[Point]) 
 
 
 def _angular_spectra(case: str, ours: Sequence[Point], peers: Sequence[Point]) -> list[Verdict]:
-    """At equal samples: errors against the least of the peers', times against the quickest of those as near to it."""
+    """Compare angular spectra with equal samples.
+
+    Errors are relative to the smallest of the peers', times to the fastest peer with a comparable error.
+    """
     found = []
     spectra = [[point for point in points if point.kind == "angular spectrum"] for points in (ours, peers)]
     for samples in sorted({point.samples for point in spectra[0]} & {point.samples for point in spectra[1]}):
@@ -85,8 +88,10 @@ def _angular_spectra(case: str, ours: Sequence[Point], peers: Sequence[Point]) -
 
 
 def own_best(peers: Iterable[Point]) -> list[Point]:
-    """Each peer's point of least error, among those that solve the same problem: a paraxial method is at its best with
-    a handful of samples, and wrong."""
+    """Point of the smallest error of each peer, among methods that solve the same problem.
+
+    Paraxial methods are excluded, because they are most accurate with a handful of samples by chance.
+    """
     found: dict[str, Point] = {}
     for point in peers:
         if point.kind != "paraxial" and (point.peer not in found or point.error < found[point.peer].error):

@@ -1,4 +1,4 @@
-"""hcipy: its propagators, built beforehand; apertures hard, or supersampled as its own examples do."""
+"""hcipy: its propagators, built before timing; apertures with hard edges, or supersampled as in its examples."""
 
 from __future__ import annotations
 

@@ -25,7 +25,7 @@ def runs(case: Case, grid: SampleGrid, dtype: str) -> Iterator[Run]:
         lambda data: case.resampled(data, padded),
         "padded to twice the grid",
     )
-    # Its convolution takes the pitch to be size / (n - 1).
+    # Its convolution defines the pitch as size / (n - 1).
     convolved = LightPipes.Begin(grid.dx * (grid.n - 1), WAVELENGTH, grid.n, dtype=kind)
     convolved.field = case.pupil(grid, paraxial=True).astype(dtype)
     yield Run(

@@ -1,4 +1,4 @@
-"""Runs turned into points, all on one thread of one process."""
+"""Measurement of runs as points, all on one thread of one process."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ __all__ = ["OURS", "median_seconds", "one_thread", "our_points", "peer_points", 
 
 OURS = "rhabdom"
 REPEATS = 5
-UNHURRIED = 1.0  # seconds
-LARGEST_PARAXIAL = 600  # samples: their error is the model's long before, so more of them only take longer
+UNHURRIED = 1.0  # seconds, above which three calls are enough
+LARGEST_PARAXIAL = 600  # samples: the error of their model dominates, so more samples only take longer
 
 
 @contextmanager
 def one_thread() -> Iterator[None]:
-    """Dr.Jit, torch, BLAS, OpenMP and numexpr on one thread each, and as they were before afterwards."""
+    """Limit Dr.Jit, torch, BLAS, OpenMP and numexpr to one thread each, and restore their settings afterwards."""
     import drjit as dr
     import torch
     from threadpoolctl import threadpool_limits
 
-    numexpr = sys.modules.get("numexpr")  # comes with some peers
+    numexpr = sys.modules.get("numexpr")  # a dependency of some peers
     before = dr.thread_count(), torch.get_num_threads(), numexpr.set_num_threads(1) if numexpr else 1
     dr.set_thread_count(1)
     torch.set_num_threads(1)
@@ -45,9 +45,9 @@ def one_thread() -> Iterator[None]:
 
 
 def median_seconds(compute: Callable[[], Any], repeats: int = REPEATS, least: float = 0.05) -> float:
-    """Median of at least `repeats` calls (three where one takes a second) and `least` seconds.
+    """Median of at least `repeats` calls (three if one takes a second) and `least` seconds.
 
-    It must have been called once before: a second call, where short, is often still new to it and not counted.
+    It must have been called once before. A short second call often still includes warm-up and is not counted.
     """
     times = [_seconds(compute)]
     if times[0] < UNHURRIED:
@@ -75,7 +75,7 @@ def our_points(case: Case, machine: str) -> Iterator[Point]:
 def peer_points(case: Case, machine: str, peers: Mapping[Peer, str]) -> Iterator[Point]:
     """Every method of these peers (with their versions), on every grid, in every precision."""
     for peer, version in peers.items():
-        done = set()  # methods that choose their own pitch see some grids as the same
+        done = set()  # some grids are equal for methods that choose their own pitch
         for grid in grids(case):
             for dtype in peer.dtypes:
                 for run in peer.runs(case, grid, dtype):
@@ -86,7 +86,7 @@ def peer_points(case: Case, machine: str, peers: Mapping[Peer, str]) -> Iterator
 
 
 def quickest(rounds: Sequence[Sequence[Point]]) -> list[Point]:
-    """One point of each method and setting: the least of its medians. Others' load only ever adds time."""
+    """One point of each method and setting: the smallest of its medians, since other load only adds time."""
     best: dict[tuple[object, ...], Point] = {}
     for point in (point for points in rounds for point in points):
         key = (*point.series, point.samples, point.pitch)

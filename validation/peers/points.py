@@ -1,4 +1,4 @@
-"""Measured points: how wrong, how fast, and the file that keeps those of the peers."""
+"""Measured points of error and time, and the file of the peers' points."""
 
 from __future__ import annotations
 
@@ -15,9 +15,12 @@ STORED = Path(__file__).with_name("measured.csv")
 
 @dataclass(frozen=True)
 class Point:
-    """samples across and pitch [m]: of the pupil as sampled. error: relative L2 of intensity over the window.
+    """A measured point.
 
-    seconds: median, one thread. kind: see `problem.Run`.
+    samples, dx: samples across the pupil and their pitch [m].
+    error: relative L2 error of intensity over the window.
+    seconds: median on one thread.
+    kind: see `problem.Run`.
     """
 
     case: str
@@ -36,15 +39,15 @@ class Point:
 
     @property
     def series(self) -> tuple[str, str, str, str, str]:
-        """What it shares with the points of the same method at other samples."""
+        """Key that points of the same method with other samples share."""
         return self.case, self.peer, self.method, self.dtype, self.detail
 
 
 def read_points(path: Path = STORED) -> list[Point]:
-    """Every row of the file.
+    """Return every row of the file.
 
     Raises:
-        ValueError: the file is not such a table, or a number in it is none.
+        ValueError: the file is not such a table, or contains an invalid number.
     """
     with path.open(newline="", encoding="utf-8") as file:
         rows = list(csv.reader(file))
@@ -55,7 +58,7 @@ def read_points(path: Path = STORED) -> list[Point]:
 
 
 def write_points(points: Iterable[Point], path: Path = STORED) -> None:
-    """Whole or not at all."""
+    """Write the file atomically."""
     temporary = path.with_suffix(".tmp")
     with temporary.open("w", newline="", encoding="utf-8") as file:
         table = csv.writer(file, lineterminator="\n")

@@ -1,7 +1,7 @@
-"""The cases that every code is given, what it may start from, and what it is compared with.
+"""Cases for all codes, with their input and the exact result.
 
-A code gets the field in the pupil, sampled on a square grid of its own choice, and answers with the intensity on
-129 x 129 points. Exact is the first Rayleigh-Sommerfeld integral in float64 (`validation.reference`).
+A code receives the field in the pupil, sampled on a square grid of its choice, and returns the intensity on 129 x 129
+points. The exact result is the first Rayleigh-Sommerfeld integral in float64 (`validation.reference`).
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ __all__ = ["CASES", "WAVELENGTH", "Case", "Peer", "Run", "SampleGrid", "error", 
 WAVELENGTH = 550e-9
 POINTS = 129  # across the window
 FOCAL_LENGTH = 300e-6
-FEWEST, MOST = 128, 1080  # samples across a grid; 1080 is the first fast length that puts 8 samples between outputs
-MOST_WIDE = 640  # of the wider grids; only codes without a band limit gain (near field: 7e-3, not 1.3e-2, at 1080)
+FEWEST, MOST = 128, 1080  # samples across a grid; 1080 is the first fast length with 8 samples per output
+MOST_WIDE = 640  # for wider grids; only codes without a band limit gain (near field: 7e-3, not 1.3e-2, at 1080)
 PER_OUTPUT = (1 / 6, 1 / 4, 1 / 3, 1 / 2, 1, 2, 4, 8)  # samples per output pitch
 CONVERGED = 1e-10
 
@@ -49,7 +49,7 @@ class SampleGrid:
 
     @property
     def padded(self) -> SampleGrid:
-        """Twice as wide, for codes whose transforms wrap around."""
+        """Grid of twice the width, for codes whose transforms wrap around."""
         return SampleGrid(2 * self.n, self.dx)
 
     @property
@@ -77,7 +77,7 @@ class Case:
         return math.isfinite(self.focal_length)
 
     def around_pupil(self, n: int) -> SampleGrid:
-        """n x n samples no wider than the pupil needs, for codes that transform onto another pitch."""
+        """n x n samples on a grid just wider than the pupil, for codes that transform onto another pitch."""
         return SampleGrid(n, 2.04 * self.radius / n)
 
     def exact(self) -> np.ndarray:
@@ -116,10 +116,10 @@ CASES = (
 
 @dataclass(frozen=True)
 class Run:
-    """One way to compute a case. `compute` is what is timed; `intensity` turns its result into the window, untimed.
+    """A way to compute a case. `compute` is timed; `intensity` converts its result to the window, untimed.
 
     kind: "angular spectrum" (exact, from hard-edged samples), "exact" (any other) or "paraxial".
-    grid: what it samples the pupil on, before it pads.
+    grid: sampling of the pupil before padding.
     """
 
     method: str
@@ -133,7 +133,7 @@ class Run:
 
 @dataclass(frozen=True)
 class Peer:
-    """A library on PyPI and how to make it compute a case from n x n samples in one of its precisions."""
+    """A library on PyPI with a function that computes a case from n x n samples in one of its precisions."""
 
     distribution: str
     package: str
@@ -142,9 +142,10 @@ class Peer:
 
 
 def grids(case: Case) -> list[SampleGrid]:
-    """Square grids, even and fast to transform, that hold pupil and window once, and twice over where that is coarse.
+    """Square grids with even, fast lengths that contain pupil and window once, and coarse ones of twice that width.
 
-    Outputs fall on samples where those are fine enough. The wider grids are for codes whose error is wrapped light.
+    Outputs coincide with samples if the samples are fine enough. The wider grids are for codes whose error is wrapped
+    light.
     """
     least = max(2.04 * case.radius, 2 * case.half_window)
     found = []
@@ -157,7 +158,7 @@ def grids(case: Case) -> list[SampleGrid]:
 
 
 def error(case: Case, intensity: np.ndarray, fitted: bool) -> float:
-    """Relative L2 of intensity over the window; fitted: after the overall scale that makes it least."""
+    """Relative L2 error of intensity over the window; fitted: after the overall scale that minimises it."""
     exact = case.exact()
     image = np.asarray(intensity, np.float64)
     if image.shape != exact.shape or not np.isfinite(image).all():
@@ -168,7 +169,7 @@ def error(case: Case, intensity: np.ndarray, fitted: bool) -> float:
 
 @cache
 def _exact(case: Case) -> np.ndarray:
-    """By the reference's own node counts, checked at some radii against many more."""
+    """Exact result with the reference's own node counts, checked at some radii with many more."""
     r = np.hypot(case.window.x[None, :], case.window.x[:, None])
     profile = ideal_lens_profile(float(r.max()), WAVELENGTH, case.radius, case.focal_length, case.distance)
     some = np.linspace(0, float(r.max()), 23)

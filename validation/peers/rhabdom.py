@@ -1,4 +1,4 @@
-"""Ours, on the same cases: `optics.psf` from 1e-2 to 1e-9, and `optics.propagate` on a hard-edged sampled pupil."""
+"""This package on the same cases: `optics.psf` from 1e-2 to 1e-9, and `optics.propagate` on a hard-edged pupil."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ __all__ = ["TOLERANCES", "plain_angular_spectrum", "psf_runs"]
 
 TOLERANCES = tuple(10.0**-n for n in range(2, 10))
 DTYPES = ("float32", "float64")
-LONGEST = 0.2  # predicted seconds beyond which a method asked for by name is not worth a point
+LONGEST = 0.2  # predicted seconds above which a method selected by name is omitted
 
 
 def psf_runs(case: Case) -> Iterator[Run]:
-    """Every tolerance that can be had, by the planner's choice and by each method that can be that exact."""
+    """Every possible tolerance, with the planner's choice and with each method of that accuracy."""
     focal_length = case.focal_length if case.has_lens else None
     pupil = optics.Pupil(aperture_radius=case.radius, thin_lens_focal_length=focal_length)
     for method in ("auto", *EXACT):
@@ -44,7 +44,7 @@ def _calls(pupil: optics.Pupil, request: dict[str, Any]) -> Iterator[Run]:
             return
         optics.psf(pupil, [WAVELENGTH], **request)
     except optics.AccuracyError:
-        return  # it says so instead of returning a wrong picture: no point to draw
+        return  # it raises an error instead of returning a wrong PSF: no point to draw
     calls = {method: lambda: optics.psf(pupil, [WAVELENGTH], **request).psf}
     for name, compute in calls.items():
         detail = f"tolerance {request['tolerance']:.0e}" + (f", {plan.method}" if method == "auto" else "")
@@ -53,7 +53,7 @@ def _calls(pupil: optics.Pupil, request: dict[str, Any]) -> Iterator[Run]:
 
 
 def plain_angular_spectrum(case: Case, grid: SampleGrid) -> Iterator[Run]:
-    """The angular spectrum of the same hard-edged samples that the peers get."""
+    """The angular spectrum of the same hard-edged samples that the peers receive."""
     window = case.window
     pupil = case.pupil(grid)
     for dtype, complex_dtype in zip(DTYPES, (np.complex64, np.complex128), strict=True):

@@ -1,4 +1,4 @@
-"""svetlanna: free space built beforehand, by zero-padded angular spectrum or by Rayleigh-Sommerfeld convolution."""
+"""svetlanna: free space built before timing, by zero-padded angular spectrum or Rayleigh-Sommerfeld convolution."""
 
 from __future__ import annotations
 

@@ -15,12 +15,12 @@ def runs(case: Case, grid: SampleGrid, dtype: str) -> Iterator[Run]:
     import torchoptics
 
     torchoptics.set_default_dtype(torch.float64 if dtype == "complex128" else torch.float32)
-    # Its default pads by 2 n on every side; n/2 is what the others pad, at a sixth of the time.
+    # Its default pads by 2 n on every side; n/2 is the padding of the others, at a sixth of the time.
     for pad in (grid.n // 2, 2 * grid.n) if grid.n <= 300 else (grid.n // 2,):
         field = torchoptics.Field(torch.from_numpy(case.pupil(grid)), WAVELENGTH, 0, grid.dx)
 
         def spectrum(field: torchoptics.Field = field, pad: int = pad) -> torch.Tensor:
-            # asm_pad leaves the padding in; only the middle is wanted.
+            # asm_pad returns the padding, too; only the middle is used.
             method = {"propagation_method": "ASM", "asm_pad": (pad, pad)}
             return field.propagate_to_z(case.distance, **method).data
 
@@ -38,7 +38,7 @@ def runs(case: Case, grid: SampleGrid, dtype: str) -> Iterator[Run]:
 
 
 def _target(case: Case, grid: SampleGrid) -> SampleGrid:
-    """Odd number of samples that holds the window with room to interpolate, and makes the transform a fast length."""
+    """Odd number of samples that covers the window with a margin for interpolation, and has a fast transform."""
     least = 2 * math.ceil(case.half_window / grid.dx) + 1
     if grid.dx > case.window.dx:
         least = grid.odd.n

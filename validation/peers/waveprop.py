@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 from validation.peers.problem import WAVELENGTH, Case, Peer, Run, SampleGrid
 
-# The scaled transform convolves 4 n x 4 n: beyond this it takes seconds and gains nothing over the plain one.
+# The scaled transform convolves 4 n x 4 n: beyond this it takes seconds without an advantage over the plain one.
 LARGEST_SCALED = 640
 
 
@@ -32,7 +32,7 @@ def runs(case: Case, grid: SampleGrid, dtype: str) -> Iterator[Run]:
         )
     if grid.n <= LARGEST_SCALED:
         transfer = angular_spectrum(**start, bandlimit=True, return_H=True)
-        # Of an even number of points m its centre is m/2 + 1; what lies before the window is left out.
+        # For an even number m of points its centre is m/2 + 1; the points before the window are omitted.
         points = case.window.n + 3
         yield Run(
             "scaled angular spectrum",
@@ -43,8 +43,8 @@ def runs(case: Case, grid: SampleGrid, dtype: str) -> Iterator[Run]:
             lambda data: (data.abs().double() ** 2).numpy()[3:, 3:],
             "transfer function computed beforehand",
         )
-    if not case.has_lens and dtype == "complex128":  # it drops the imaginary part of its input
-        odd = grid.odd  # as its Simpson's rule asks
+    if not case.has_lens and dtype == "complex128":  # it ignores the imaginary part of its input
+        odd = grid.odd  # required by its Simpson's rule
         aperture = case.aperture(odd)
         for simpson in (False, True):
             yield Run(

@@ -1,13 +1,13 @@
-"""Error against time of `optics.psf` and other diffraction codes, on ideal lenses and a near-field aperture (D0).
+"""Error against time of `optics.psf` and other diffraction codes, on ideal lenses and a near-field aperture
 
-The reference is the first Rayleigh-Sommerfeld integral. A peer starts from a sampled field, prepares what it can before
-the clock starts, and its overall scale is fitted. Ours starts from radius and focal length, and is not fitted. Without
---peers the peers' points are the stored ones, with their date and machine. The goals are ratios of times, so they are
-then only indicative.
+The reference is the first Rayleigh-Sommerfeld integral. A peer starts from a sampled field, its preparations are not
+timed, and its overall scale is fitted. `optics.psf` starts from radius and focal length, and is not fitted. Without
+--peers, the peers' points are the stored ones, with their date and machine. The goals are ratios of times, so they are
+only indicative in that case.
 
     python -m validation.peers.work_precision [--peers [PEER ...] [--write]] [--rounds N] [--cases f/2 ...]
 
-prints tables and goals, draws the figure, exits 1 if a goal is missed. Peers: `pip install .[peers]`.
+Prints tables and goals, draws the figure, and exits with 1 if a goal is missed. Peers: `pip install .[peers]`.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ COLORS = {"float32": OURS, "float64": OURS_TOO}
 def measure(
     cases: Sequence[Case], machine: str, rounds: int, rivals: Mapping[Peer, str]
 ) -> tuple[list[Point], list[Point]]:
-    """Ours and the peers', interleaved; the least of each point's medians over the rounds."""
+    """Points of this package and of the peers, measured in turns; the smallest of the medians over the rounds."""
     ours, peers = [], []
     if rivals:
         print(f"peers: {', '.join(f'{peer.distribution} {at}' for peer, at in rivals.items())}", file=sys.stderr)
@@ -47,7 +47,7 @@ def measure(
 
 
 def table(points: Sequence[Point]) -> str:
-    """Best error of every method of every code, and the time of that."""
+    """Best error of every method of every code, with its time."""
     series: dict[tuple[str, ...], list[Point]] = defaultdict(list)
     for point in points:
         series[point.case, point.peer, point.method, point.dtype].append(point)
@@ -62,7 +62,7 @@ def table(points: Sequence[Point]) -> str:
 
 
 def curves(ours: Sequence[Point], peers: Sequence[Point]) -> list[Curve]:
-    """Of each code what it does best at each time; ours by precision, all our methods as dots."""
+    """Pareto front of each code; for this package one per dtype, with all methods as dots."""
     found = []
     for peer in sorted({point.peer for point in peers}):
         kept = front((point.seconds, point.error) for point in peers if point.peer == peer)
@@ -80,7 +80,7 @@ def curves(ours: Sequence[Point], peers: Sequence[Point]) -> list[Curve]:
 
 
 def regions(peers: Sequence[Point]) -> list[Region]:
-    """Where ours has to be, given the peers' points of a case."""
+    """Regions of the goals for this package, given the peers' points of a case."""
     found = []
     converged = [point.seconds for point in peers if point.error <= CONVERGED_PEER]
     if converged:
@@ -117,7 +117,7 @@ def draw(ours: Sequence[Point], peers: Sequence[Point], path: Path, caption: str
 
 
 LEGEND = (
-    "thick lines: the method that the planner chooses; dots: each exact method asked for by name; "
+    "thick lines: the method that the planner chooses; dots: each exact method selected by name; "
     "grey: the best of each peer's methods\n"
     f"goal 1: {_power(ACCURATE)} at least {FASTER:g}x faster than the first peer to reach its own best; "
     f"goal 2: {_power(SINGLE)} in float32 before any peer has {_power(CONVERGED_PEER)}"
@@ -166,12 +166,12 @@ def _rivals(names: list[str] | None) -> Mapping[Peer, str]:
 def _options(arguments: list[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     names = [case.name for case in CASES]
-    parser.add_argument("--peers", nargs="*", metavar="PEER", help="run the peers that are installed, or only these")
+    parser.add_argument("--peers", nargs="*", metavar="PEER", help="run all installed peers, or only these")
     parser.add_argument("--write", action="store_true", help="store the peers' points (with --peers)")
     parser.add_argument("--stored", type=Path, default=STORED, help="file of the stored points")
-    parser.add_argument("--rounds", type=int, default=1, help="measure everything so many times, keep the quickest")
+    parser.add_argument("--rounds", type=int, default=1, help="number of measurements; the fastest counts")
     parser.add_argument("--cases", nargs="+", default=names, choices=names, metavar="CASE", help=", ".join(names))
-    parser.add_argument("--machine", default=f"{os.cpu_count()} cores {platform.machine()}", help="its class, in words")
+    parser.add_argument("--machine", default=f"{os.cpu_count()} cores {platform.machine()}", help="name of the machine")
     parser.add_argument("--out", type=Path, default=Path("validation/figures"), help="directory for the figure")
     options = parser.parse_args(arguments)
     unknown = set(options.peers or ()) - {peer.distribution for peer in installed()}

@@ -1,10 +1,10 @@
-"""Closed forms and converged quadratures in float64: what the package is measured against.
+"""Closed forms and converged quadratures in float64, with which the packages are compared.
 
-Nothing here imports the package. Each function names its formula and source. Time factor exp(-iωt); fields leave the
-carrier exp(ikz) out, so that their phase stays small; lengths in m, aberrations in waves.
+These modules do not import the packages. Each function states its formula and source. The time factor is exp(-iωt).
+Fields omit the carrier exp(ikz), so their phase stays small. Lengths are in m, aberrations in waves.
 
 waves                plane waves, Gaussian beams, edges
-circular             circular apertures: Airy's pattern, and the axis
+circular             circular apertures: Airy pattern and field on the axis
 rayleigh_sommerfeld  the exact integral of a circular pupil with an ideal lens
 richards_wolf        the vector focus
 defocus              light near a focus: Lommel's functions
@@ -12,7 +12,7 @@ aberrations          Zernike's polynomials and Strehl ratios
 apertures            Fourier transforms of openings
 gratings             orders, efficiencies, self-images
 lenses               focal lengths of lenses, zone plates and pinholes
-measures             the distance of two results, and orders of convergence
+measures             differences between results, and orders of convergence
 """
 
 from validation.reference.aberrations import (

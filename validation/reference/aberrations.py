@@ -1,4 +1,4 @@
-"""Aberrations of a circular pupil: Zernike's polynomials, and the Strehl ratio each costs.
+"""Aberrations of a circular pupil: Zernike polynomials, and Strehl ratios.
 
 Coefficients in waves of the peak terms W020 ρ², W040 ρ⁴, W131 ρ³ cos θ, W222 ρ² cos² θ. The Strehl ratio is
 |<e^{2πiW}>|² over the unit disk, paraxial: the intensity on the axis of the reference sphere, not the highest one.
@@ -24,7 +24,7 @@ __all__ = [
     "zernike",
 ]
 
-# σ/W of each aberration alone, and balanced by the lower one that makes σ least (Born & Wolf §9.2; Mahajan 1983).
+# σ/W of each aberration alone, and balanced by the lower one that minimises σ (Born & Wolf §9.2; Mahajan 1983).
 RMS_PER_WAVE = {
     "defocus": 1 / (2 * math.sqrt(3)),
     "spherical": 2 / (3 * math.sqrt(5)),
@@ -37,7 +37,7 @@ RMS_PER_WAVE = {
 
 
 def marechal_strehl(sigma: float) -> float:
-    """exp(-(2πσ)²), σ the RMS of the wavefront in waves, good below a tenth (Mahajan 1983, JOSA 73:860)."""
+    """exp(-(2πσ)²), σ the RMS of the wavefront in waves, accurate below a tenth (Mahajan 1983, JOSA 73:860)."""
     return math.exp(-((2 * math.pi * sigma) ** 2))
 
 

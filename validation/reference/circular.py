@@ -1,4 +1,4 @@
-"""Circular apertures: Airy's paraxial far field, and what the exact integral says on the axis."""
+"""Circular apertures: Airy's paraxial far field, and the exact integral on the axis."""
 
 from __future__ import annotations
 

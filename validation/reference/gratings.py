@@ -1,4 +1,4 @@
-"""Gratings: where their orders go, how much light each gets, where they image themselves."""
+"""Gratings: fields and efficiencies of their orders, and Talbot distances."""
 
 from __future__ import annotations
 
@@ -62,8 +62,10 @@ def grating_field(
 
 
 def talbot_distance(period: float, wavelength: float) -> float:
-    """Where orders -1, 0 and 1 are in phase again: z = λ / (1 - √(1 - λ²/d²)), exactly (from
-    k z (1 - cos θ) = 2π, sin θ = λ/d; Rayleigh 1881, Phil. Mag. 11:196)."""
+    """Distance at which orders -1, 0 and 1 are in phase again: z = λ / (1 - √(1 - λ²/d²)), exactly.
+
+    It follows from k z (1 - cos θ) = 2π, sin θ = λ/d (Rayleigh 1881, Phil. Mag. 11:196).
+    """
     sine2 = (wavelength / period) ** 2
     return wavelength * (1 + np.sqrt(1 - sine2)) / sine2
 

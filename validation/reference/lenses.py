@@ -1,4 +1,4 @@
-"""Where lenses, zone plates and pinholes focus, over distance and wavelength."""
+"""Focal lengths of lenses, zone plates and pinholes, over distance and wavelength."""
 
 from __future__ import annotations
 
@@ -38,9 +38,9 @@ def kinoform_on_axis(
 ) -> tuple[float, float]:
     """Focus [m] of an order, and the PSF [1/m²] there, of a wrapped paraboloid with depth λ0 and f0 at λ0:
 
-    f = f0 λ0/(mλ), sinc²(λ0/λ - m) πR²/(λf)². Paraxial, and exact then where the pupil holds whole zones,
-    R² = 2 M λ0 f0: over ρ² the pupil is a blazed grating and the axis sees one Fourier coefficient (Buralli, Morris &
-    Rogers 1989, Appl. Opt. 28:976).
+    f = f0 λ0/(mλ), sinc²(λ0/λ - m) πR²/(λf)². This is the paraxial limit, in which it is exact if the pupil contains
+    whole zones, R² = 2 M λ0 f0: over ρ² the pupil is a blazed grating, and the field on the axis is one Fourier
+    coefficient (Buralli, Morris & Rogers 1989, Appl. Opt. 28:976).
     """
     focus = diffractive_focal_length(focal_length, design_wavelength, wavelength, order)
     off = math.pi * (design_wavelength / wavelength - order)
@@ -52,7 +52,7 @@ def pinhole_radius(wavelength: float, distance: float) -> float:
     """Sharpest pinhole: R = √(0.742 λz) has the highest peak per unit of light.
 
     Fresnel's axial intensity is 4 sin²(πN/2), N = R²/(λz), so the PSF's peak is 4 sin²(πN/2) / (πλzN), highest at
-    tan(πN/2) = πN. Between the balance of Airy's radius with the hole's, √(0.61 λz), and the brightest axis, √(λz)
-    (Rayleigh 1891, Phil. Mag. 31:87; Young 1971, Appl. Opt. 10:2763).
+    tan(πN/2) = πN. It lies between the radius that equals its Airy radius, √(0.61 λz), and the radius with the
+    brightest axis, √(λz) (Rayleigh 1891, Phil. Mag. 31:87; Young 1971, Appl. Opt. 10:2763).
     """
     return math.sqrt(PINHOLE_FRESNEL_NUMBER * wavelength * distance)

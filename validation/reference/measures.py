@@ -1,4 +1,4 @@
-"""How far apart two results are, and how fast that falls."""
+"""Differences between results, and their orders of convergence."""
 
 from __future__ import annotations
 

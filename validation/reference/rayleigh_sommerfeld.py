@@ -11,7 +11,7 @@ from numpy.polynomial import chebyshev
 
 __all__ = ["ideal_lens_field", "ideal_lens_profile"]
 
-# Nodes beyond the phase's own band: float64's 37 nepers, and the same again for amplitude and round numbers.
+# Nodes beyond the phase's own band: 37 nepers of float64, and as a margin the same again for the amplitude.
 DIGITS = 37.0
 
 
@@ -28,16 +28,16 @@ def ideal_lens_field(
     """Field of an ideal lens exp(-ik(√(ρ² + f²) - f)) in a unit wave at radii r of the plane z = distance.
 
     The wave is plane, or exp(ik(√(ρ² + s²) - s)) of a point source at s = source_distance. An infinite focal length is
-    the bare aperture. First Rayleigh-Sommerfeld integral (Goodman §3.5), D the distance from the aperture's point:
+    the bare aperture. First Rayleigh-Sommerfeld integral (Goodman §3.5), with D the distance from the aperture's point:
 
         U = ∫∫ P z/(2πD²) (1/D - ik) e^{ik(D - z)} ρ dρ dφ
 
     Gauss-Legendre in ρ, trapezoid in φ (half the circle by symmetry). nodes: (radial, angular); by default enough for
-    float64, from the gradient of the whole phase: what lens and path together still turn.
+    float64, from the gradient of the total phase of lens and path.
     """
     z = focal_length if distance is None else distance
     if not math.isfinite(z):
-        raise ValueError(f"distance = {z}: must be finite where there is no lens")
+        raise ValueError(f"distance = {z}: must be finite without a lens")
     k = 2 * np.pi / wavelength
     r = np.asarray(r, dtype=np.float64)
     field = np.empty(r.shape, dtype=np.complex128)
@@ -56,10 +56,10 @@ def ideal_lens_field(
 def ideal_lens_profile(
     r_max: float, wavelength: float, radius: float, focal_length: float = math.inf, distance: float | None = None
 ) -> Callable[[np.ndarray], np.ndarray]:
-    """`ideal_lens_field` as a function of r in [0, r_max]: its Chebyshev interpolant in r², good to 1e-11 of the peak.
+    """`ideal_lens_field` as a function of r in [0, r_max]: its Chebyshev interpolant in r², error 1e-11 of the peak.
 
     The field is even and analytic in r, and band-limited by the steepest ray (Trefethen, Approximation Theory and
-    Approximation Practice, ch. 8). For windows: pays off beyond some hundred radii.
+    Approximation Practice, ch. 8). It saves time for windows with more than a few hundred radii.
     """
     z = focal_length if distance is None else distance
     steepest = (radius + r_max) / math.hypot(radius + r_max, z)

@@ -1,14 +1,15 @@
 """The vector focus of symmetric light: Richards and Wolf's three integrals.
 
-B. Richards and E. Wolf, Proc. R. Soc. A 253, 358 (1959), eqs. 2.30 to 2.32. Each direction θ brings a plane wave, whose
-field is turned with the ray. With an amplitude a(θ) on the sphere about the focus, light polarised along x has there
+B. Richards and E. Wolf, Proc. R. Soc. A 253, 358 (1959), eqs. 2.30 to 2.32. Each direction θ contributes a plane wave,
+whose field is rotated with the ray. With an amplitude a(θ) on the sphere about the focus, light polarised along x has
+there
 
     E = (I₀ + I₂ cos 2φ, I₂ sin 2φ, -2i I₁ cos φ),   Iₘ = kz/2 ∫ a cₘ sin θ Jₘ(kρ sin θ) e^{ikW} dθ,
 
     c₀ = 1 + cos θ,  c₁ = sin θ,  c₂ = 1 - cos θ.
 
-A flat pupil of even light (r = z tan θ) has a = 1/cos θ: with c₀ = 2 and the others 0 this is Rayleigh-Sommerfeld's
-integral for k z large. An aplanatic lens (r = z sin θ) has a = √cos θ.
+An evenly illuminated flat pupil (r = z tan θ) has a = 1/cos θ: with c₀ = 2 and the others 0 this is the
+Rayleigh-Sommerfeld integral for large kz. An aplanatic lens (r = z sin θ) has a = √cos θ.
 """
 
 from __future__ import annotations
@@ -21,12 +22,16 @@ import numpy as np
 
 __all__ = ["Light", "focal_integrals"]
 
-SPARE = 60  # choice: nodes beyond π a cycle, from which on Gauss and Legendre's rule converges
+SPARE = 60  # choice: nodes beyond π per cycle, above which Gauss-Legendre quadrature converges
 
 
 @dataclass(frozen=True)
 class Light:
-    """at: θ to a(θ) e^{ikW(θ)}. cycles: that W turns through between the rims, at most."""
+    """Light on the pupil.
+
+    at: θ to a(θ) e^{ikW(θ)}.
+    cycles: upper bound on the cycles of W between the rims.
+    """
 
     at: Callable[[np.ndarray], np.ndarray]
     cycles: float = 0.0
@@ -37,8 +42,8 @@ def focal_integrals(
 ) -> np.ndarray:
     """I₀, I₁ and I₂ at the radii `rho` [m], and scalar theory's, (4, radius), complex.
 
-    wavenumber: k [1/m] in the medium. distance: z [m]. ends: θ of the pupil's inner and outer rim.
-    light: what arrives from each direction.
+    wavenumber: k [1/m] in the medium. distance: z [m]. ends: θ of the pupil's inner and outer rim. light: amplitude
+    from each direction.
     """
     from scipy.special import jv, roots_legendre
 

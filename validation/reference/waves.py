@@ -1,4 +1,4 @@
-"""Waves whose propagation is known: plane waves, beams, edges."""
+"""Waves with known propagation: plane waves, beams, edges."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ __all__ = [
 
 def plane_wave(x: np.ndarray, z: float, wavelength: float, fx: float) -> np.ndarray:
     """exp(2πi(fx x + z(√(1/λ² - fx²) - 1/λ))): beyond fx = 1/λ it decays like exp(-2πz √(fx² - 1/λ²))
-    (Goodman §3.10.2). For evanescent waves, too, the carrier is left out."""
+    (Goodman §3.10.2). The carrier is omitted for evanescent waves, too."""
     axial = np.sqrt(complex(1 / wavelength**2 - fx**2))
     difference = -(fx**2) / (axial + 1 / wavelength)
     return np.exp(2j * np.pi * (fx * np.asarray(x) + z * difference))
@@ -35,7 +35,7 @@ def gaussian_beam(r: np.ndarray, wavelength: float, waist: float, z: float) -> n
 
 
 def gaussian_field(r: np.ndarray, wavelength: float, waist: float, z: float, *, nodes: int = 0) -> np.ndarray:
-    """What exp(-r²/w0²) becomes at distance z >= 0, exactly: its angular spectrum summed,
+    """Exact field of exp(-r²/w0²) at distance z >= 0, summed from its angular spectrum.
 
     ∫ πw0² e^{-π²w0²f²} H(f) J0(2πfr) 2πf df, H as in `plane_wave` (Goodman §3.10; the Hankel transform §2.1.5).
     Propagating part with f = sin θ / λ, evanescent part with f = cosh t / λ: both integrands are smooth.
@@ -70,7 +70,7 @@ def knife_edge_field(x: np.ndarray, wavelength: float, z: float) -> np.ndarray:
 def slit_field(x: np.ndarray, half_width: float, wavelength: float, z: float) -> np.ndarray:
     """Fresnel's field behind a slit |x| < a in a unit plane wave, the difference of two edges (Goodman §4.5.1).
 
-    The product of two is a rectangle's.
+    The product of two such fields is that of a rectangle.
     """
     scale = np.sqrt(2 / (wavelength * z))
     x = np.asarray(x)

@@ -1,10 +1,10 @@
-"""Does the environment's memory stay flat, and is each kernel recorded once, over a hundred thousand steps?
+"""Memory and kernel recordings of an environment over a hundred thousand steps
 
     python -m validation.sim.environment_endurance [--steps N] [--task TASK]
 
-Steps a small VecEnv behind a pupil with random actions, episodes ending and beginning all the while, and reads the
-process's resident memory every tenth of the way. Bounds: after the first tenth it grows by less than 2 MB (allocators
-round), and no frozen function is recorded a second time.
+Steps a small VecEnv behind a pupil with random actions over many episodes, and reads the process's resident memory
+after every tenth of the steps. Bounds: after the first tenth the memory grows by less than 2 MB (allocators round), and
+no frozen function is recorded a second time.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ import numpy as np
 import sim
 from validation.benchmarks.sim_throughput import CASES, with_pupil
 
-GROWTH = 2.0  # [MB]
+GROWTH = 2.0  # largest growth [MB]
 WORLDS = 4
 
 
 def resident() -> float:
-    """Memory of this process that is in RAM [MB] (Linux)."""
+    """Resident memory of this process [MB] (Linux)."""
     with open("/proc/self/status", encoding="ascii") as status:
         line = next(line for line in status if line.startswith("VmRSS:"))
     return int(line.split()[1]) / 1024

@@ -1,19 +1,25 @@
-"""Goal and adversary are equally bright to one receptor (E1)
+"""Equal brightness of goal and adversary to a single receptor
 
-The kinds of objects in detection and tracking differ only in the direction of their stripes. Light comes from above,
-so level bands of equal width would make adversaries brighter or darker than goals, and one photoreceptor could tell
-them apart. The edges of the bands are therefore fitted by least squares to remove that difference, over all
-directions and distances from which an eye of 45° sees (nearly) all of an object. The bands stay near 30°, as wide as
-a goal's sectors. The two lowest edges can hardly be seen and are not fitted.
+Can a single photoreceptor distinguish goal from adversary by brightness? Not from 2 m on: averaged over directions, the
+difference is at most 0.04 of the receptor noise.
 
-The table gives adversary minus goal, in units of the receptors' noise (a standard deviation of 0.01), as seen by one
-receptor that looks straight ahead; mean and root mean square over 24 directions. Rays are cast here at one lit
-sphere, without the renderer; `tests/sim/worlds/test_balance.py` compares the renderer with the same.
+**Method.** The kinds of objects in detection and tracking differ only in the direction of their stripes. Light comes
+from above. Level bands of equal width would therefore make adversaries brighter or darker than goals, and one
+photoreceptor could distinguish them. The edges of the bands are fitted by least squares to remove that difference. The
+fit covers all directions and distances from which an eye of 45° sees (nearly) all of an object. The bands stay near
+30°, as wide as a goal's sectors. The two lowest edges can hardly be seen and are not fitted.
 
-Bounds, from 2 m on: the mean difference is below a fifth of the noise, and at most a tenth of the noise worse than
-with the fitted edges. (All edges may shift by some degrees together; the shipped ones were rounded from such a fit.)
-Nearer than 2 m an eye misses the top of an object, and the difference grows to several times the noise. But so does
-the difference between the lit side and the other side of either kind.
+Rays are traced to one illuminated sphere, without the renderer. `tests/sim/worlds/test_balance.py` compares the
+renderer with the same calculation.
+
+**Table.** It shows adversary minus goal, in units of the receptor noise (a standard deviation of 0.01), for one
+receptor that looks straight ahead. Each cell is a mean or root mean square over 24 directions.
+
+**Bounds.** From 2 m on, the mean difference is below a fifth of the noise, and at most a tenth of the noise worse than
+with the fitted edges. (All edges may shift together by some degrees. The shipped ones were rounded from such a fit.)
+
+**Limits.** Nearer than 2 m, an eye misses the top of an object, and the difference grows to several times the noise.
+The difference between the illuminated side and the other side of either kind grows there as well.
 
     python -m validation.sim.equal_brightness [--out DIR] [--docs DIR]
 """
@@ -34,19 +40,19 @@ from sim.worlds.detection import BAND_EDGES_DEG, OBJECT_RADIUS, STRIPES
 from validation.pages.page import Page, parser
 from validation.pages.work_precision_chart import MUTED, OURS, OURS_TOO
 
-FITTED = 4  # edges from the top
-DISTANCES = (2.0, 2.4, 3.2, 5.2)  # [m] from the agent's centre, that the fit looks at
+FITTED = 4  # number of fitted edges, from the top
+DISTANCES = (2.0, 2.4, 3.2, 5.2)  # [m] from the agent's centre, used in the fit
 NEAR = (1.1, 1.3, 1.5, 1.7)
-BEARINGS_DEG = (0.0, 10.0)  # of the object, from straight ahead
+BEARINGS_DEG = (0.0, 10.0)  # of the object, relative to straight ahead
 DIRECTIONS = np.arange(24) * 2 * np.pi / 24
-BINS, RAYS = 720, 240  # of latitude and longitude; rays along either side of the receptor's field
-EVEN = tuple(20.0 + 30.0 * i for i in range(FITTED))  # [deg] where the fit starts
-STIFFNESS = 1.0  # a band 30° too wide counts as much as a difference of this share of the noise
+BINS, RAYS = 720, 240  # bins of latitude and longitude; rays along either side of the receptor's field
+EVEN = tuple(20.0 + 30.0 * i for i in range(FITTED))  # [deg] initial edges
+STIFFNESS = 1.0  # a band 30° too wide has the weight of a difference of this share of the noise
 
 
 @cache
 def light_seen(distance: float, bearing_deg: float) -> tuple[np.ndarray, np.ndarray]:
-    """What one receptor sees of a white object, by the latitude (direction, BINS) and by the longitude it comes from.
+    """Light of a white object in one receptor, by latitude (direction, BINS) and by longitude of its origin.
 
     Lambert's law under the world's directional lights; uniform over the receptor's square field.
     """
@@ -85,7 +91,7 @@ def _lights() -> list[tuple[np.ndarray, float]]:
 
 
 def contrast(light: np.ndarray, edges: Sequence[float]) -> np.ndarray:
-    """Light of alternate stripes less what it would be if all were of the mean reflectance; edges in parts of 1."""
+    """Light of alternate stripes minus that of the mean reflectance; edges as fractions of the whole."""
     bounds = np.concatenate([[0], np.sort(edges), [1]])
     collected = np.array([np.interp(bounds * BINS, np.arange(BINS + 1), np.r_[0, np.cumsum(row)]) for row in light])
     sign = np.where(np.arange(len(bounds) - 1) % 2 == 0, 1, -1)
@@ -93,7 +99,7 @@ def contrast(light: np.ndarray, edges: Sequence[float]) -> np.ndarray:
 
 
 def difference(edges_deg: Sequence[float], distance: float, bearing_deg: float = 0.0) -> np.ndarray:
-    """Signal of an adversary with these edges less that of a goal, in units of the noise, (direction,)."""
+    """Signal of an adversary with these edges minus that of a goal, in units of the noise, (direction,)."""
     by_latitude, by_longitude = light_seen(distance, bearing_deg)
     sectors = np.arange(1, 2 * STRIPES) / (2 * STRIPES)
     bands = np.asarray(edges_deg) / 180
@@ -101,7 +107,7 @@ def difference(edges_deg: Sequence[float], distance: float, bearing_deg: float =
 
 
 def fitted() -> np.ndarray:
-    """Edges [deg] that make adversaries as bright as grey, seen from anywhere in the plane of the eyes."""
+    """Edges [deg] that make adversaries as bright as grey, seen from any direction in the plane of the eyes."""
     rest = BAND_EDGES_DEG[FITTED:]
 
     def residuals(edges: np.ndarray) -> np.ndarray:
@@ -113,7 +119,7 @@ def fitted() -> np.ndarray:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Fit, compare with what is shipped, and make the page."""
+    """Fit, compare with the shipped edges, and write the page."""
     options = parser(__doc__ or "").parse_args(arguments)
     fit, even = fitted(), np.arange(1, STRIPES) * 180 / STRIPES
     lines = [
@@ -134,7 +140,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _draw(path: Path) -> None:
-    """The mean difference over distance, for fitted and for even bands."""
+    """Mean difference over distance, for fitted and for even bands."""
     import matplotlib
 
     matplotlib.use("agg")
@@ -150,7 +156,7 @@ def _draw(path: Path) -> None:
         axes.plot(distances, mean, color=color)
         axes.annotate(label, (distances[0], mean[0]), fontsize=8, xytext=(4, 0), textcoords="offset points")
     axes.axhline(0, color=MUTED, lw=0.6)
-    axes.set(xlabel="distance [m]", ylabel="adversary less goal [noise]")
+    axes.set(xlabel="distance [m]", ylabel="adversary minus goal [noise]")
     axes.spines[["top", "right"]].set_visible(False)
     figure.savefig(path, dpi=150)
     pyplot.close(figure)

@@ -1,7 +1,7 @@
-"""What MuJoCo's own renderer draws: geom ids and depth of a model in several poses.
+"""Images by MuJoCo's own renderer: geom ids and depth of a model in several poses.
 
-It runs in a child process: a machine's OpenGL may bring an LLVM of its own, which does not always live in peace with
-the one that Dr.Jit loads. As a program: mujoco_pictures.py IN.npz MODEL.mjb OUT.npz
+It runs in a child process, because the system's OpenGL may load its own LLVM, which can conflict with that of Dr.Jit.
+Command line: mujoco_pictures.py IN.npz MODEL.mjb OUT.npz
 """
 
 from __future__ import annotations
@@ -16,15 +16,19 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
-# Round things are polygons for MuJoCo's renderer; at this many slices their outlines are off by 5e-4 of the radius.
+# MuJoCo's renderer draws round shapes as polygons; with this number of slices the error of outlines is 5e-4 of the
+# radius.
 SLICES = 96
-FAR = 2e4  # of the model's extent: infinite planes reach to the horizon
+FAR = 2e4  # relative to the model's extent: infinite planes reach the horizon
 
 
 @dataclass(frozen=True)
 class Shot:
-    """A pose (qpos, mocap_pos, mocap_quat) and where it is seen from: a camera's id, or, if that is -1, lookat (3,),
-    distance, azimuth and elevation [deg] of a free camera."""
+    """A pose (qpos, mocap_pos, mocap_quat) and its viewpoint.
+
+    The viewpoint is a camera's id, or, if that is -1, lookat (3,), distance, azimuth and elevation [deg] of a free
+    camera.
+    """
 
     qpos: np.ndarray
     mocap_pos: np.ndarray
@@ -37,7 +41,7 @@ class Shot:
         data.mocap_pos[:], data.mocap_quat[:] = self.mocap_pos, self.mocap_quat
 
     def origin_and_target(self) -> tuple[np.ndarray, np.ndarray]:
-        """Of the free camera."""
+        """Origin and target of the free camera."""
         azimuth, elevation = np.radians(self.free[4:6])
         cos = np.cos(elevation)
         forward = np.array([cos * np.cos(azimuth), cos * np.sin(azimuth), np.sin(elevation)])
@@ -45,14 +49,14 @@ class Shot:
 
 
 def draw(model: mujoco.MjModel, shots: list[Shot], width: int, height: int) -> tuple[np.ndarray, np.ndarray] | None:
-    """Geom ids (shot, y, x), -1 for none, and depths [m]; None where there is no OpenGL."""
+    """Geom ids (shot, y, x), -1 for none, and depths [m]; None without OpenGL."""
     with tempfile.TemporaryDirectory() as folder:
         asked, model_path, drawn = (str(Path(folder) / name) for name in ("in.npz", "model.mjb", "out.npz"))
         mujoco.mj_saveModel(model, model_path)
         fields = {name: np.array([getattr(s, name) for s in shots]) for name in Shot.__dataclass_fields__}
         np.savez(asked, size=[width, height], **fields)
         command = [sys.executable, __file__, asked, model_path, drawn]
-        # EGL needs no display; where someone has set another way, that one is taken.
+        # EGL needs no display; an existing setting takes precedence.
         child = subprocess.run(command, env={"MUJOCO_GL": "egl", **os.environ}, capture_output=True, check=False)
         if child.returncode:
             return None
@@ -61,7 +65,7 @@ def draw(model: mujoco.MjModel, shots: list[Shot], width: int, height: int) -> t
 
 
 def only_geoms() -> mujoco.MjvOption:
-    """MuJoCo's default view without what is no geom."""
+    """MuJoCo's default view without objects other than geoms."""
     option = mujoco.MjvOption()
     for groups in (option.sitegroup, option.tendongroup, option.skingroup, option.flexgroup):
         groups[:] = 0

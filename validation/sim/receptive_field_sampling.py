@@ -1,18 +1,24 @@
-"""Receptive fields sampled by rays, against the padded-image convolution (C1)
+"""Receptive fields sampled by rays, compared with convolution of a padded image
 
-Behind a pupil, all receptors of an eye share one set of rays, drawn from the mixture of their receptive fields, and
-the signal of a receptor is a weighted sum. The reference is the published way: a picture of the tangent plane, wider
-than the retina by the reach of the kernel, convolved with the PSF (`Eye.see`). Its cells are another grid than the
-one on which the fields of the rays are tabulated, and each has many rays of its own, or, where all light is followed,
-many areas. The light is the same, so only the sampling differs.
+Do rays sample receptive fields without bias? With the number n of rays per receptor, errors fall at least like n^-0.51
+wherever a slope can be fitted. The automatic choice has an error of at most 0.165 of the receptor noise σ.
 
-Errors are root mean squares over receptors, channels and states of an agent that acts at random in the detection
-world. They are in units of the receptors' noise, σ = 0.01 of the signal of white behind a wide-open pupil. The pupils
-are: none (the perfect lens), a pinhole (a = 0.04 of the retina's width), open without a lens, a relief drawn at
-random, and a lens in focus (a = 0.25). The last column is what `rays_per_receptor = "auto"` takes, rays or areas, and
-how far it is off; the bound is half of the noise. The perfect lens needs 24 states to show that, because its errors
-differ much between views; pupils need 4. Errors must fall at least like n^-0.5, as with independent rays, down to the
-0.01 σ by which two tables of one PSF may differ. No slope is given where fewer than three errors are above that.
+**Method.** Behind a pupil, all receptors of an eye share one set of rays, drawn from the mixture of their receptive
+fields. The signal of a receptor is a weighted sum over these rays. The reference is the published method: an image of
+the tangent plane, wider than the retina by the reach of the kernel, is convolved with the PSF (`Eye.see`). Its cells
+form a different grid from the one on which the rays' receptive fields are tabulated. Each cell has many rays of its
+own, or many areas if all light is followed. The light is the same, so only the sampling differs.
+
+Errors are root mean squares over receptors, channels and states of an agent that acts at random in the detection world.
+They are in units of the receptor noise, σ = 0.01 of the signal of white behind a wide-open pupil. The pupils are: none
+(the perfect lens), a pinhole (a = 0.04 of the retina's width), open without a lens, a relief drawn at random, and a
+lens in focus (a = 0.25). The perfect lens uses 24 states, because its errors differ much between views. Pupils use 4.
+
+**Table.** The last column shows the choice of `rays_per_receptor = "auto"`, rays or areas, and its error. No slope is
+given if fewer than three errors are above 0.01 σ.
+
+**Bounds.** The error of the automatic choice is at most half of the noise. Errors fall at least like n^-0.5, as with
+independent rays, down to 0.01 σ. Two tables of one PSF may differ by that much.
 
     python -m validation.sim.receptive_field_sampling [--out DIR] [--docs DIR]
 """
@@ -38,21 +44,21 @@ from validation.sim.scenes import SIGMA, lived_through, rms
 PUPILS = ("perfect", "pinhole", "open", "random relief", "lens")
 RETINAS = {(1, 4): 30.0, (15, 15): 45.0, (31, 31): 45.0}  # resolution and field of view [deg]
 RAYS = (0.25, 1.0, 4.0, 16.0, 64.0)
-MOST = 16_000  # rays of one eye
+MOST = 16_000  # largest number of rays of one eye
 STATES, PERFECT_STATES = 4, 24
-APERTURE, PINHOLE = 0.25, 0.04  # radius of pupil beside half of the retina's width
+APERTURE, PINHOLE = 0.25, 0.04  # radius of the pupil relative to half of the retina's width
 RELIEF_HEIGHT = 20e-6  # [m]
-CELLS = 3  # of the reference's pictures along a receptor's side; the rays' fields have 2 or 4 and more
+CELLS = 3  # cells of the reference's images along a receptor's side; the rays' fields have 2, or 4 and more
 CELL_RAYS, PERFECT_RAYS = 48, 1024
 CELL_AREAS, PERFECT_AREAS = 4, 64
-HALF = 0.5  # of the noise
+HALF = 0.5  # bound, relative to the noise
 SLOPE = -0.5
-TABULATION = 0.01  # [σ] below which errors are not the rays': PSFs to 1 % on two grids, and signals of about 1 σ
+TABULATION = 0.01  # [σ] below which errors come from PSFs, not from rays (1 % on two grids, with signals of about 1 σ)
 
 
 @dataclass(frozen=True)
 class Series:
-    """Errors [σ] of one pupil and retina by rays per receptor, and of what "auto" takes, in its light."""
+    """Errors [σ] of one pupil and retina by rays per receptor, and of the choice of "auto", in its light."""
 
     pupil: str
     retina: str
@@ -65,7 +71,7 @@ class Series:
 
     @property
     def slope(self) -> float:
-        """Of errors over rays, both logarithmic, above TABULATION; -inf where too few are."""
+        """Slope of errors above TABULATION over rays, both logarithmic; -inf for too few errors."""
         kept = [(r, e) for r, e in zip(self.rays, self.errors, strict=True) if e > TABULATION]
         if len(kept) < 3:
             return -math.inf
@@ -87,7 +93,7 @@ def eyes_behind(pupil: str, resolution: tuple[int, int]) -> sim.Eyes:
 
 
 def convolved(world: sim.World, eyes: sim.Eyes, state: WorldState, light: str) -> np.ndarray:
-    """What the eyes see by the reference, (state, channel, h, w)."""
+    """Signals of the eyes by the reference, (state, channel, h, w)."""
     eye = eyes.eye()
     cells = 1 if eye.pupil is None else CELLS
     reach = eye.kernel(cells).shape[-1] // 2
@@ -107,7 +113,7 @@ def convolved(world: sim.World, eyes: sim.Eyes, state: WorldState, light: str) -
 
 
 def reference_fidelity(eyes: sim.Eyes, light: str) -> sim.Fidelity:
-    """Of the picture's cells, which through a perfect lens are whole receptors."""
+    """Fidelity of the cells of the reference's image, which are whole receptors with a perfect lens."""
     perfect = eyes.optics is None
     if light == "all":
         return sim.Fidelity(PERFECT_AREAS if perfect else CELL_AREAS, eyes.bands, light=light, samples="areas")
@@ -115,7 +121,7 @@ def reference_fidelity(eyes: sim.Eyes, light: str) -> sim.Fidelity:
 
 
 def sampled(world: sim.World, eyes: sim.Eyes, state: WorldState, fidelity: sim.Fidelity) -> tuple[np.ndarray, float]:
-    """The same by rays or areas, and how many there were per receptor."""
+    """Signals of the eyes by rays or areas, and their number per receptor."""
     renderer = sim.BatchedRenderer(world, eyes, 1, fidelity)
     rays = len(renderer.sensor.directions) / math.prod(eyes.resolution)
     return np.concatenate([renderer.signals(state.take(np.array([i]))) for i in range(state.n)])[:, 0], rays
@@ -141,11 +147,11 @@ def measure(pupil: str, resolution: tuple[int, int], world: sim.World, state: Wo
 
 
 def broken_bounds(series: Sequence[Series]) -> list[str]:
-    """Every bound that does not hold, in words."""
+    """Descriptions of the bounds that do not hold."""
     broken = []
     for s in series:
         if s.auto_error > HALF:
-            broken.append(f"{s.pupil}, {s.retina}: auto errs by {s.auto_error:.2f} σ")
+            broken.append(f"{s.pupil}, {s.retina}: auto has an error of {s.auto_error:.2f} σ")
         if s.slope > SLOPE:
             broken.append(f"{s.pupil}, {s.retina}: errors fall like n^{s.slope:.2f}")
     return broken
@@ -165,7 +171,7 @@ COLORS = dict(zip(PUPILS, ("#000000", "#999999", "#0072B2", "#E69F00", "#009E73"
 
 
 def draw(series: Sequence[Series], path: Path) -> None:
-    """One panel per retina: errors over rays, what auto took as a star."""
+    """One panel per retina: errors over rays, with the choice of auto as a star."""
     from matplotlib.figure import Figure
 
     retinas = list(dict.fromkeys(s.retina for s in series))
@@ -179,7 +185,7 @@ def draw(series: Sequence[Series], path: Path) -> None:
     figure.axes[0].set_ylabel("error [σ of the receptors' noise]")
     handles, labels = figure.axes[-1].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside right", title="star: auto\ndotted: σ/2", frameon=False)
-    figure.suptitle("What is chosen by itself errs by less than half of the noise, behind every pupil")
+    figure.suptitle("The error of the automatic choice is below half of the noise, behind every pupil")
     figure.savefig(path, dpi=110)
 
 

@@ -1,17 +1,24 @@
-"""The mirror against MuJoCo's own renderer, on models that others made (C0)
+"""Mirrored scenes of third-party models, compared with MuJoCo's own renderer
 
-Every model is put into five random poses. Each pose is seen twice: from a random direction, and by one of the model's
-own cameras, if it has one (fixed or tracking). In each picture, the geom seen through the centre of every pixel is
-compared with MuJoCo's segmentation renderer. Where they agree, depth is compared with MuJoCo's ray caster. (The
-renderer draws round things as polygons, here of 96 slices; the ray caster knows their exact shapes.)
+Do mirrored models agree with MuJoCo's own renderer? In each of 59 third-party models, at least 99.796 % of the pixels
+show the same geom. Of those, at least 99.900 % have the same depth to 1e-3.
 
-Bounds: at least 99.5 % of the pixels of every model show the same geom, and of those at least 99.9 % have the same
-depth to 1e-3. The rest are pixels at the limb of what the mirror tessellates. The mirror names what a model has that
-it lacks, and the last column counts these in words.
+**Method.** Every model is put into five random poses. Each pose is rendered from a random direction, and by one of the
+model's own cameras, if it has one (fixed or tracking). In each image, the geom seen through the centre of every pixel
+is compared with MuJoCo's segmentation renderer. Where they agree, depth is compared with MuJoCo's ray caster. (The
+renderer draws round shapes as polygons, here of 96 slices. The ray caster uses their exact shapes.)
 
-The models are those in dm_control (suite, locomotion, third-party robots), gymnasium-robotics and gymnasium that
-compile by themselves. They are not part of rhabdom: `pip install 'rhabdom[validation]'`, or, where pins conflict,
-`pip install --no-deps --target DIR dm_control gymnasium-robotics` and DIR in PYTHONPATH.
+**Table.** The columns state the number of geoms, the share of pixels that show the same geom, this share in the worst
+image, and the share of the same depth. The last column lists the features of the model that the mirror lacks, as
+reported by the mirror.
+
+**Bounds.** At least 99.5 % of the pixels of every model show the same geom, and of those at least 99.9 % have the same
+depth to 1e-3.
+
+**Limits.** The remaining pixels are at the limb of surfaces that the mirror tessellates. The models are those in
+dm_control (suite, locomotion, third-party robots), gymnasium-robotics and gymnasium that compile on their own. They are
+not part of rhabdom. Install them with `pip install 'rhabdom[validation]'`. If pins conflict, use
+`pip install --no-deps --target DIR dm_control gymnasium-robotics` and add DIR to PYTHONPATH.
 
     python -m validation.sim.scene_against_mujoco [--only WORD] [--out DIR] [--docs DIR]
 """
@@ -37,7 +44,7 @@ from validation.sim.mujoco_pictures import Shot, draw
 
 POSES, WIDTH, HEIGHT = 5, 240, 180
 SAME_GEOM, SAME_DEPTH, DEPTH_TOLERANCE = 0.995, 0.999, 1e-3
-# Package, where in it, and which of its files are whole models.
+# Package, folder, and pattern of the files that are whole models.
 COLLECTIONS = (
     ("dm_control", "suite", "*.xml"),
     ("dm_control", "locomotion", "walkers/assets/**/*.xml"),
@@ -50,7 +57,7 @@ COLLECTIONS = (
 
 @dataclass(frozen=True)
 class Row:
-    """One model: shares of pixels (all, and the worst picture), and what the mirror said that it lacks."""
+    """One model: shares of pixels (all, and the worst image), and the features that the mirror reports as missing."""
 
     name: str
     geoms: int
@@ -61,19 +68,21 @@ class Row:
 
 
 def model_files() -> Iterator[tuple[str, Path]]:
-    """(name, path) of every file that may be a model."""
+    """Yield (name, path) of every file that may be a model."""
     for package, folder, pattern in COLLECTIONS:
         found = importlib.util.find_spec(package)
         for root in (found.submodule_search_locations or []) if found else []:
             for path in sorted((Path(root) / folder).glob(pattern)):
                 if "touch_sensors" in path.name:
-                    continue  # the same hands with more sites
+                    continue  # the same hands with additional sites
                 yield f"{package}/{path.relative_to(root)}".removesuffix(".xml"), path
 
 
 def poses(model: mujoco.MjModel, rng: np.random.Generator) -> Iterator[Shot]:
-    """Every joint anywhere in its range, mocap bodies moved and turned; seen from anywhere above the horizon, and by
-    the model's cameras one after the other."""
+    """Random poses with moved and rotated mocap bodies.
+
+    Each is seen from a random direction above the horizon, and by the model's cameras in turn.
+    """
     data = mujoco.MjData(model)
     for i in range(POSES):
         mujoco.mj_resetData(model, data)
@@ -98,7 +107,7 @@ def _quat(rng: np.random.Generator) -> np.ndarray:
 
 
 def move(model: mujoco.MjModel, qpos: np.ndarray, joint: int, rng: np.random.Generator) -> None:
-    """A joint to anywhere in its range."""
+    """Move a joint to a random position within its range."""
     kind, at = mujoco.mjtJoint(int(model.jnt_type[joint])), model.jnt_qposadr[joint]
     if kind == mujoco.mjtJoint.mjJNT_FREE:
         qpos[at : at + 3] += rng.uniform(-0.1, 0.1, 3) * model.stat.extent
@@ -112,7 +121,11 @@ def move(model: mujoco.MjModel, qpos: np.ndarray, joint: int, rng: np.random.Gen
 
 
 def compare(name: str, model: mujoco.MjModel) -> Row:
-    """Raises RuntimeError where MuJoCo cannot draw."""
+    """Compare one model.
+
+    Raises:
+        RuntimeError: MuJoCo cannot render.
+    """
     shots = list(poses(model, np.random.default_rng(0)))
     pictures = draw(model, shots, WIDTH, HEIGHT)
     if pictures is None:
@@ -136,8 +149,7 @@ def compare(name: str, model: mujoco.MjModel) -> Row:
 
 
 def _agreement(mirror: Mirror, data: mujoco.MjData, shot: Shot, drawn: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Whether each pixel shows the same geom, and whether those that do, and that the ray caster sees too, are at the
-    same depth."""
+    """Masks of pixels that show the same geom, and of those with the same depth, if the ray caster hits the geom."""
     view = _viewpoint(mirror, shot)
     seen, depth = mirror.render_ids(view, WIDTH, HEIGHT), mirror.render_depth(view, WIDTH, HEIGHT)
     cast, distance = _cast(mirror, data, view)
@@ -165,7 +177,7 @@ def _cast(mirror: Mirror, data: mujoco.MjData, view: Viewpoint) -> tuple[np.ndar
 
 
 def measure(only: str = "") -> tuple[list[Row], list[str]]:
-    """Rows of the models with `only` in their names, and the files that are no models by themselves."""
+    """Rows of the models with `only` in their names, and the files that are only parts of models."""
     rows, fragments = [], []
     for name, path in model_files():
         if only not in name:
@@ -184,7 +196,7 @@ def measure(only: str = "") -> tuple[list[Row], list[str]]:
 
 
 def broken_bounds(rows: list[Row]) -> list[str]:
-    """Every bound that does not hold, in words."""
+    """Descriptions of the bounds that do not hold."""
     words = [f"{r.name}: {r.same_geom:.3%} of pixels show the same geom" for r in rows if r.same_geom < SAME_GEOM]
     return words + [f"{r.name}: {r.same_depth:.3%} have the same depth" for r in rows if r.same_depth < SAME_DEPTH]
 
@@ -198,31 +210,31 @@ def table(rows: list[Row], fragments: list[str]) -> str:
     head = f"{'model':<66} {'geoms':>5} {'same id':>9} {'worst':>9} {'depth':>9}  not mirrored"
     worst = f"{'the worst':<66} {'':5} {min(r.same_geom for r in rows):9.3%} {min(r.worst_picture for r in rows):9.3%} "
     worst += f"{min(r.same_depth for r in rows):9.3%}"
-    count = f"{len(rows)} models; {len(fragments)} more files are parts of models"
+    count = f"{len(rows)} models; {len(fragments)} further files are parts of models"
     return "\n".join([head, *map(_line, rows), worst, count])
 
 
 def draw_figure(rows: list[Row], path: Path) -> None:
-    """What is missing to full agreement, per model."""
+    """Deviations from full agreement, per model."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(9, 0.16 * len(rows) + 1.5), layout="constrained")
     axes, y = figure.subplots(), np.arange(len(rows))
     for values, bar, color, label in (
-        ([r.same_geom for r in rows], SAME_GEOM, "#0072B2", "another geom than MuJoCo's renderer"),
-        ([r.same_depth for r in rows], SAME_DEPTH, "#D55E00", "of these, another depth than its ray caster"),
+        ([r.same_geom for r in rows], SAME_GEOM, "#0072B2", "geom differs from MuJoCo's renderer"),
+        ([r.same_depth for r in rows], SAME_DEPTH, "#D55E00", "same geom, but depth differs from the ray caster"),
     ):
         axes.plot(np.maximum(1 - np.array(values), 1e-6), y, "o", ms=3, color=color, label=label)
         axes.axvline(1 - bar, color=color, lw=1, ls=":")
     axes.set_yticks(y, [r.name for r in rows], fontsize=5)
-    axes.set(xscale="log", xlabel="share of pixels (dotted: the bars)", ylim=(len(rows), -1))
+    axes.set(xscale="log", xlabel="share of pixels (dotted: bounds)", ylim=(len(rows), -1))
     axes.legend(frameon=False, fontsize=8)
     figure.savefig(path, dpi=110)
 
 
 def main(arguments: list[str] | None = None) -> int:
     asked = parser(__doc__)
-    asked.add_argument("--only", default="", help="models with this in their names")
+    asked.add_argument("--only", default="", help="only models whose names contain this")
     options: argparse.Namespace = asked.parse_args(arguments)
     rows, fragments = measure(options.only)
     if not rows:

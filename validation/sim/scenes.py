@@ -1,4 +1,4 @@
-"""What agents see on their way: worlds, perfect and real lenses, and states that agents got into."""
+"""Worlds, eyes with perfect and real lenses, and states of agents for the proofs of rendering."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ from sim.worlds.state import WorldState
 __all__ = ["SCENES", "SIGMA", "Scene", "facing_objects", "lived_through", "rms", "sees_object"]
 
 SIGMA = 0.01
-NEAR = (0.8, 4.0)  # [m] from an object's centre
-STRAY = 0.75  # [m] from a cell's centre, along either axis
-TURN = 0.6  # [rad] from the object's direction: within an eye's field of view, or in the gap between two
-WITHIN = 16  # rays through a receptor's square, of which one must meet an object for it to see that
+NEAR = (0.8, 4.0)  # [m] distance from an object's centre
+STRAY = 0.75  # [m] distance from a cell's centre, along either axis
+TURN = 0.6  # [rad] largest angle to the object: within an eye's field of view, or in the gap between two
+WITHIN = 16  # rays through a receptor's square; a receptor sees an object if one of them hits it
 
 
 @dataclass(frozen=True)
 class Scene:
-    """A task's world, its eyes, and how wide their pupil is beside the retina; None: a perfect lens."""
+    """A task's world, its eyes, and the width of their pupil relative to the retina; None for a perfect lens."""
 
     task: str
     seed: int
@@ -43,7 +43,7 @@ class Scene:
         return "perfect lens" if self.aperture is None else "lens"
 
     def eyes_with(self, bands: int) -> sim.Eyes:
-        """With the scene's lens, in focus at infinity, and so many bands."""
+        """The eyes with the scene's lens, in focus at infinity, and this number of bands."""
         pupil = None
         if self.aperture is not None:
             pupil = optics.Pupil(
@@ -65,7 +65,7 @@ SCENES = (
 
 
 def lived_through(world: sim.World, n: int, steps: int = 20) -> WorldState:
-    """States that agents get into who act at random."""
+    """States that agents reach with random actions."""
     simulation = Simulation(task_of(world), n, 3)
     simulation.reset()
     rng = np.random.default_rng(5)
@@ -94,7 +94,7 @@ def facing_objects(world: sim.World, state: WorldState) -> WorldState:
 
 
 def sees_object(world: sim.World, eyes: sim.Eyes, state: WorldState) -> np.ndarray:
-    """Which receptors have a part of an object in the square that they look at, (env, eye, height, width) bool."""
+    """Mask (env, eye, height, width) of the receptors with a part of an object in their square field."""
     sharp = replace(eyes, optics=None)
     directions = BoxSampling(sharp.eye()).sensor(WITHIN).directions
     position, heading, objects = (

@@ -1,4 +1,4 @@
-"""The figure of speed against accuracy: a row for each eye and population of receptors, a column for each world."""
+"""Figure of speed against accuracy: a row for each eye and population of receptors, a column for each world."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ COLORS = {"closed_form": "#0072B2", "areas": "#CC79A7", "mitsuba": "#E69F00", "r
 NAMES = {
     "closed_form": "rays, closed form",
     "areas": "areas",
-    "mitsuba": "rays, Mitsuba's tracing",
-    "reference": "Mitsuba's pictures",
+    "mitsuba": "rays, Mitsuba's ray tracing",
+    "reference": "Mitsuba's renderings",
 }
 STAR = "#D55E00"
 STYLES = {"direct": ":", "bounce": "--", "all": "-"}
@@ -31,16 +31,16 @@ def on_objects(errors: Errors) -> float | None:
     return errors.on_objects
 
 
-POPULATIONS = (("all receptors", everywhere), ("those that see an object", on_objects))
+POPULATIONS = (("all receptors", everywhere), ("receptors that see an object", on_objects))
 
 
 def message(charts: Sequence[Chart]) -> str:
-    """What the figure shows, in words."""
+    """Title of the figure."""
     worst = max(chart.auto.error.worst for chart in charts)
     if not any(chart.missed for chart in charts):
-        return f'"auto" keeps its promise of σ/2, also on objects: its worst error is {worst:.2f} σ'
+        return f'The error of "auto" is below σ/2, also on objects: at most {worst:.2f} σ'
     missed = sum(bool(chart.missed) for chart in charts)
-    return f'"auto" misses its promise of σ/2 in {missed} of {len(charts)} charts: its worst error is {worst:.3f} σ'
+    return f'The error of "auto" exceeds σ/2 in {missed} of {len(charts)} charts: up to {worst:.3f} σ'
 
 
 def draw(charts: Sequence[Chart], path: Path) -> None:
@@ -110,15 +110,15 @@ def _legend(figure: Any, columns: int) -> None:
         return Line2D([], [], ls="", marker=marker, label=label, **style)
 
     entries = [
-        mark('what "auto" picks', "*", color=STAR, ms=12),
+        mark('choice of "auto"', "*", color=STAR, ms=12),
         Line2D([], [], color="black", lw=0.9, label="Pareto front"),
-        Patch(color="#009E73", alpha=0.15, label="promised: below σ/2"),
+        Patch(color="#009E73", alpha=0.15, label="bound of auto: σ/2"),
         *(
             mark(f"{name} (number: per receptor)" if k < 2 else name, "o", color=color)
             for k, (name, color) in enumerate(zip(NAMES.values(), COLORS.values(), strict=True))
         ),
         mark("direct light", MARKS["direct"], color="black", mfc="white"),
-        mark("light reflected twice, too", MARKS["bounce"], color="black"),
+        mark("with one bounce", MARKS["bounce"], color="black"),
         mark("all light", MARKS["all"], color="black"),
     ]
     figure.legend(handles=entries, loc="outside lower center", ncols=columns, frameon=False, fontsize=8.5)

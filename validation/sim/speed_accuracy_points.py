@@ -1,4 +1,4 @@
-"""The chart of speed against accuracy: its points, its front and its table."""
+"""Data of the chart of speed against accuracy: points, front and table."""
 
 from __future__ import annotations
 
@@ -14,15 +14,17 @@ from validation.sim.scenes import SIGMA, rms
 
 __all__ = ["EVERYWHERE", "ON_OBJECTS", "PROMISED", "Chart", "Errors", "Point", "Setting", "rows_of", "table"]
 
-PROMISED = 0.5  # [σ]
-EVERYWHERE, ON_OBJECTS = "over all receptors", "over those that see an object"
-FLOOR = 0.03  # [σ], below which errors beside the same light are those of what is taken for its end
+PROMISED = 0.5  # [σ] error bound of auto
+EVERYWHERE, ON_OBJECTS = "over all receptors", "over receptors that see an object"
+FLOOR = 0.03  # [σ], below which errors relative to the same light come from its reference
 
 
 @dataclass(frozen=True)
 class Setting:
-    """One way to render. samples: rays or areas per receptor, or samples per cell of the reference renderer; None: as
-    many as auto picks."""
+    """A way to render.
+
+    samples: rays or areas per receptor, or samples per cell of the reference renderer; None for the choice of auto.
+    """
 
     back_end: str
     samples: float | None
@@ -36,19 +38,19 @@ class Setting:
 
 @dataclass(frozen=True)
 class Errors:
-    """Root mean squares in σ, over all receptors, and over those that see an object, None where there are none."""
+    """Root mean squares in σ, over all receptors, and over receptors that see an object; None without objects."""
 
     everywhere: float
     on_objects: float | None = None
 
     @classmethod
-    def of(cls, found: Sequence[np.ndarray], true: Sequence[np.ndarray], unit: float) -> Errors:
-        """Of signals beside true ones, one array for each population."""
+    def between(cls, found: Sequence[np.ndarray], true: Sequence[np.ndarray], unit: float) -> Errors:
+        """Differences between signals and true ones, one array for each population."""
         return cls(*(rms(a - b) / unit for a, b in zip(found, true, strict=True)))
 
     @property
     def worst(self) -> float:
-        """What "auto" promises something about."""
+        """Larger of both errors, on which "auto" has a bound."""
         return max(self.everywhere, self.on_objects or 0)
 
     def __str__(self) -> str:
@@ -57,9 +59,14 @@ class Errors:
 
 @dataclass(frozen=True)
 class Point:
-    """What a setting is worth. error: to the path-traced reference; sampling: over all receptors, to the same light to
-    the end, in σ. speed: agent-steps per CPU second; fidelity: what was rendered with, None for the reference renderer;
-    warning: that came with auto's choice."""
+    """A measured setting.
+
+    error: error relative to path-traced light, in σ.
+    sampling: error over all receptors relative to the same light with very many samples, in σ.
+    speed: agent-steps per CPU second.
+    fidelity: fidelity of the renderer, None for the reference renderer.
+    warning: warning of auto's choice.
+    """
 
     setting: Setting
     error: Errors
@@ -74,7 +81,7 @@ class Point:
 
     @property
     def kind(self) -> str:
-        """Auto's by what it picked."""
+        """Method; for auto the method that it chose."""
         f = self.fidelity
         return (
             self.setting.back_end
@@ -83,7 +90,7 @@ class Point:
         )
 
     def __str__(self) -> str:
-        """As the setting, with what auto picked in its place."""
+        """The setting, with auto's choice filled in."""
         f = self.fidelity
         if f is None or self.setting.samples is not None:
             return str(self.setting)
@@ -92,7 +99,11 @@ class Point:
 
 @dataclass(frozen=True)
 class Chart:
-    """All points of a scene; of the reference, its own standard error; how far each light's end is from it. In σ."""
+    """All points of a scene, in σ.
+
+    reference_error: standard error of the reference.
+    left: difference between converged light of each kind and the reference.
+    """
 
     scene: str
     points: tuple[Point, ...]
@@ -104,7 +115,7 @@ class Chart:
         return self.auto.error.on_objects is not None
 
     def front_of(self, error: Callable[[Errors], float | None]) -> tuple[Point, ...]:
-        """Points that no other beats in both speed and this error, fastest first."""
+        """Pareto front of speed and this error, fastest first."""
         ranked = sorted(self.points, key=lambda p: (-p.speed, error(p.error)))
         least, found = np.inf, []
         for point in ranked:
@@ -116,7 +127,7 @@ class Chart:
 
     @property
     def front(self) -> tuple[Point, ...]:
-        """Of the greater of both populations' errors."""
+        """Pareto front for the larger of both populations' errors."""
         return self.front_of(lambda errors: errors.worst)
 
     @property
@@ -125,19 +136,19 @@ class Chart:
 
     @property
     def rival(self) -> Point:
-        """The fastest point that is at least as exact as auto's."""
+        """The fastest point at least as accurate as auto."""
         return max((p for p in self.points if p.error.worst <= self.auto.error.worst), key=lambda p: p.speed)
 
     @property
     def missed(self) -> list[tuple[str, float]]:
-        """Where auto errs by more than it promised and the reference's own noise explains, and by how much."""
+        """Populations in which auto's error exceeds its bound plus the reference's noise, with the error."""
         found, own = self.auto.error, self.reference_error
         pairs = (EVERYWHERE, found.everywhere, own.everywhere), (ON_OBJECTS, found.on_objects or 0, own.on_objects or 0)
         return [(where, error) for where, error, noise in pairs if error > np.hypot(PROMISED, noise)]
 
     @property
     def not_falling(self) -> list[str]:
-        """Samples and light whose errors do not come nearer to the same light's end with their number."""
+        """Samples and kinds of light whose errors do not decrease with the number of samples."""
         plain = [p for p in self.points if p.setting.samples and p.setting.back_end in ("closed_form", "areas")]
         plain = [p for p in plain if p.setting.bands == 4 and p.setting.layers == 1]
         series: dict[str, list[Point]] = {}
@@ -151,21 +162,22 @@ class Chart:
 
 
 def table(charts: Sequence[Chart]) -> str:
-    lines = ["in brackets: over the receptors that see an object"]
+    lines = ["in brackets: over receptors that see an object"]
     for chart in charts:
         front, auto, rival = chart.front, chart.auto, chart.rival
         ends = ", ".join(f"{light} light {error} σ" for light, error in chart.left.items())
-        lines += ["", f"{chart.scene}; reference good to {chart.reference_error} σ; to the end, {ends} from it"]
+        lines += ["", f"{chart.scene}; standard error of the reference {chart.reference_error} σ"]
+        lines.append(f"converged light differs from the reference: {ends}")
         if auto.fidelity and auto.fidelity.predicted_error:
             predicted = auto.fidelity.predicted_error / SIGMA
-            lines.append(f"auto predicted {predicted:.2f} σ; {auto.speed / rival.speed:.2f} of the front's speed")
+            lines.append(f"auto predicts {predicted:.2f} σ; {auto.speed / rival.speed:.2f} of the front's speed")
         verdict = ", ".join(f"{error:.3f} σ {where}" for where, error in chart.missed)
-        lines.append(f"auto promised {PROMISED} σ: {'it errs by ' + verdict if verdict else 'kept'}")
+        lines.append(f"auto: bound {PROMISED} σ {'exceeded: ' + verdict if verdict else 'satisfied'}")
         if auto.warning:
-            lines.append(f"auto warned: {auto.warning}")
+            lines.append(f"auto: warning: {auto.warning}")
         if not chart.has_objects:
-            lines.append("no objects: there are no receptors that see one")
-        lines.append("how          samples  bands  light   layers   steps/s   error [σ]  on objects  beside its light")
+            lines.append("no objects in this world")
+        lines.append("how          samples  bands  light   layers   steps/s   error [σ]  on objects  vs same light")
         for p in sorted(chart.points, key=lambda p: -p.speed):
             speed = f"{p.speed:.3g}" if p.speed < 100 else f"{p.speed:.0f}"
             on_objects = "" if p.error.on_objects is None else f"{p.error.on_objects:.3f}"

@@ -1,3 +1,3 @@
-"""What the commands of `evolve` do; one module per kind, loaded by `evolve.cli.main` on use."""
+"""Implementations of the commands of `evolve`; `evolve.cli.main` imports their modules on use."""
 
-INTERRUPTED = 130  # exit code after Ctrl-C, as shells count it
+INTERRUPTED = 130  # exit code after Ctrl-C, by the convention of shells

@@ -1,4 +1,4 @@
-"""`evolve completion`: what a shell needs to complete this command."""
+"""`evolve completion`: completion scripts for shells."""
 
 from __future__ import annotations
 

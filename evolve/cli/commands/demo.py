@@ -1,4 +1,4 @@
-"""`evolve demo`: a finished run to look at, before one of one's own."""
+"""`evolve demo`: a finished run that ships with rhabdom."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ __all__ = ["demo"]
 
 
 def demo(arguments: Namespace) -> int:
-    """Put the shipped run into a directory and make of it what a run of one's own ends with."""
+    """Copy the shipped run into a directory, and write the report, replay and EXR files of its best animal."""
     device.make_ready()
     run = copy_shipped_run(arguments.out)
     shown = not (arguments.json or arguments.quiet)

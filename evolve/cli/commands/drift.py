@@ -1,4 +1,4 @@
-"""`evolve drift`: runs beside the null model of their search."""
+"""`evolve drift`: comparison of runs with the null model of their search."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ __all__ = ["drift"]
 
 
 def drift(arguments: Namespace) -> int:
-    """Print which genes moved further than chance moves them."""
+    """Print which genes moved further than chance explains."""
     runs = [Run.open(directory) for directory in arguments.directories]
     said = "searches with random fitness"
     with Waiting(1).of_one_step(said) as wait:

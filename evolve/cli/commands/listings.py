@@ -1,4 +1,4 @@
-"""`evolve tasks` and `evolve genes`: what there is."""
+"""`evolve tasks`, `evolve presets` and `evolve genes`: lists of tasks, presets and genes."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def tasks(arguments: Namespace) -> int:
 
 
 def presets(arguments: Namespace) -> int:
-    """Print the presets: their task, if they bring one, their scales, and what they are for."""
+    """Print the presets with their task, if they set one, their scales and their purpose."""
     found = [preset_about(name) for name in preset_names()]
     if arguments.json:
         print(json.dumps(found, indent=1))
@@ -35,7 +35,7 @@ def presets(arguments: Namespace) -> int:
 
 
 def genes(arguments: Namespace) -> int:
-    """Print the genes: range, how far evolution searches and from where unless told otherwise, and what each does."""
+    """Print the genes with their range, their default search interval and start value, and their effect."""
     ordered = [gene for cluster in CLUSTERS for gene in GENES.values() if gene.cluster == cluster]
     if arguments.json:
         print(json.dumps([_record(gene) for gene in ordered], indent=1))
@@ -47,12 +47,12 @@ def genes(arguments: Namespace) -> int:
     for row in rows:
         print("  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip())
     print(
-        f"\n{len(GENES)} genes. Open or freeze one, or a cluster: --set genome.NAME.open=true or false\n"
-        "From generation N on: --set genome.NAME.opens_at=N. A relief of N x N genes: --set eye.relief_points=N,\n"
-        "of an eighth of them, that looks the same mirrored and turned: --set eye.relief_symmetric=true\n"
-        "Square eyes have one gene, resolution, for height and width: --set eye.square=true\n"
-        "Spectral genes count where --set eye.receptors=genes; else all eyes of a run have the receptors named there.\n"
-        "Mutations are those of search.optimizer=mutation; CMA begins with Gaussian steps of the same size."
+        f"\n{len(GENES)} genes. Open or freeze a gene or a cluster: --set genome.NAME.open=true or false\n"
+        "Open a gene from generation N: --set genome.NAME.opens_at=N\n"
+        "Use a relief of N x N genes: --set eye.relief_points=N. Mirror and rotate an eighth of them: --set\n"
+        "eye.relief_symmetric=true. Use one gene, resolution, for height and width: --set eye.square=true\n"
+        "Spectral genes need --set eye.receptors=genes; otherwise all eyes of a run have the receptors named there.\n"
+        "Mutations apply to search.optimizer=mutation; CMA starts with Gaussian steps of the same size."
     )
     return 0
 

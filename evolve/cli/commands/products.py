@@ -1,4 +1,4 @@
-"""`evolve replay`, `report` and `export`: what can be made from a run; and all of it at once."""
+"""`evolve replay`, `report` and `export`: files that are written from a run, one by one or all at once."""
 
 from __future__ import annotations
 
@@ -19,20 +19,20 @@ __all__ = ["REPORT", "Products", "export", "finished_products", "open_page", "re
 
 @dataclass(frozen=True)
 class Products:
-    """What has been made of a finished run; a replay where one was asked for."""
+    """Files written from a finished run; `replay` is None unless a replay was requested."""
 
     report: Path
     frames: list[Path]
     replay: Path | None = None
 
     def record(self, run: Run) -> dict[str, Any]:
-        """As plain values."""
+        """Return the files as JSON values."""
         replay = {} if self.replay is None else {"replay": str(self.replay)}
         exr = [str(frame) for frame in self.frames]
         return {"directory": str(run.path), "report": str(self.report), **replay, "exr": exr}
 
     def lines(self, run: Run) -> list[str]:
-        """For people."""
+        """Return the files as lines of text."""
         return [
             f"run directory: {run.path}",
             f"report: {self.report}",
@@ -42,8 +42,12 @@ class Products:
 
 
 def finished_products(run: Run, shown: bool, replay: bool = False) -> Products:
-    """The best animal's episode as EXR files and report, and, if asked for, as a page that plays it; a bar meanwhile,
-    if `shown`. The report comes last: where it is, all is there."""
+    """Write EXR files and report of the best animal's episode and, with `replay`, a page that plays the episode.
+
+    The report is written last, so its existence shows that all files are complete.
+
+    shown: whether to show a progress bar
+    """
     with Waiting(3 + replay, shown) as wait:
         wait.step("the best agent plays an episode")
         from evolve.analysis import recorder
@@ -52,7 +56,7 @@ def finished_products(run: Run, shown: bool, replay: bool = False) -> Products:
         from evolve.report.write import write
 
         best, played = recorder.record(run), None
-        (run.path / REPORT).unlink(missing_ok=True)  # the former one, which is kept where no episode can be played
+        (run.path / REPORT).unlink(missing_ok=True)  # a former report is kept if no episode can be played
         if replay:
             wait.step("writing the replay")
             played = write_page(run, best)
@@ -63,7 +67,7 @@ def finished_products(run: Run, shown: bool, replay: bool = False) -> Products:
 
 
 def replay(arguments: Namespace) -> int:
-    """Let an agent play one episode again: a table here, and a page that plays it."""
+    """Let an agent play one episode again; print a table, and write a page that plays the episode."""
     run = _open(arguments)
     with _waiting(arguments, "an episode is played and written"):
         from evolve.report.replay import BESIDE, episode_facts, episode_table, write_replay
@@ -92,7 +96,7 @@ def report(arguments: Namespace) -> int:
 
 
 def export(arguments: Namespace) -> int:
-    """Write what an agent saw, one EXR file per frame."""
+    """Write the radiance in front of an agent's eyes, one EXR file per frame."""
     run = _open(arguments)
     with _waiting(arguments, "EXR files are written") as wait:
         from evolve.report.exr_export import export_run
@@ -106,19 +110,19 @@ def export(arguments: Namespace) -> int:
 
 
 def open_page(page: Path, arguments: Namespace) -> None:
-    """In a browser, if that is asked for."""
+    """Open a page in a browser if `--open` was given."""
     if arguments.open:
         webbrowser.open(page.resolve().as_uri())
 
 
 def _waiting(arguments: Namespace, text: str) -> Waiting:
-    """A wait of one step, which takes half a minute at most."""
+    """Return a wait of one step, which takes at most half a minute."""
     wait = Waiting(1, shown=not (arguments.json or arguments.quiet))
     return wait.of_one_step(text)
 
 
 def _open(arguments: Namespace) -> Run:
-    """The run, on a machine that can see."""
+    """Open the run, and check that this machine can compute eyes."""
     run = Run.open(arguments.directory, arguments.task)
     device.make_ready()
     return run

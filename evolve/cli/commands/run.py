@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from typing import Any
 
-from evolve.analysis.mishaps import mishaps_of, mishaps_told
+from evolve.analysis.episode_failures import episode_failure_lines, episode_failures_of
 from evolve.cli.commands import INTERRUPTED
 from evolve.cli.commands.products import REPORT, Products, finished_products, open_page
 from evolve.cli.run_plan import RunPlan, steps_each
@@ -30,17 +30,17 @@ __all__ = ["resume", "start"]
 
 
 def start(arguments: Namespace) -> int:
-    """Begin a run and carry it to its end."""
+    """Start a run and carry it to its end."""
     scheduler = _scheduler(arguments)
     if arguments.tensorboard:
         require_tensorboard()
     prepared = prepare_run(_request(arguments))
     if arguments.dry_run:
-        return _show(RunPlan.of(prepared.config, prepared.directory(arguments.out)), arguments.json)
+        return _show(RunPlan.from_config(prepared.config, prepared.directory(arguments.out)), arguments.json)
     notes = (
         [] if arguments.json or arguments.quiet else lint(prepared.config)
-    )  # looks at the world, which takes its time: nothing is begun yet
-    with prepared.begin(Run, arguments.out) as run:
+    )  # builds the world, which takes time; the run directory does not exist yet
+    with prepared.create(Run, arguments.out) as run:
         if not arguments.json:
             for note in notes:
                 _note(note)
@@ -63,7 +63,7 @@ def resume(arguments: Namespace) -> int:
 
 
 def _request(arguments: Namespace) -> RunRequest:
-    """The settings that the command line names."""
+    """Return the settings from the command line."""
     flags = [f"{name}={value}" for name in ("seed", "workers") if (value := getattr(arguments, name)) is not None]
     return RunRequest(
         arguments.task,
@@ -80,11 +80,11 @@ def _note(text: str) -> None:
 
 
 def _silence(text: str) -> None:
-    """The note is not shown."""
+    """Ignore a note."""
 
 
 def _show(plan: RunPlan, as_json: bool) -> int:
-    """The plan, with what this machine makes of it; nothing is begun."""
+    """Print the plan with the measured pace of this machine; start nothing."""
     if not as_json:
         print("measuring this machine's pace ...", file=sys.stderr, flush=True)
     plan = plan.measured()
@@ -93,7 +93,7 @@ def _show(plan: RunPlan, as_json: bool) -> int:
 
 
 class _Shown:
-    """The command's watchers: progress as its options choose it, and TensorBoard's files if requested."""
+    """Watchers of the command: progress in the selected form, and TensorBoard's files if requested."""
 
     def __init__(self, arguments: Namespace) -> None:
         self._arguments = arguments
@@ -110,7 +110,7 @@ class _Shown:
 
 
 def _carry_on(run: Run, arguments: Namespace, scheduler: Scheduler | None) -> int:
-    """Carry a run whose lock is held to its end; on Ctrl-C say how to go on. Nothing needs saving: it is on record."""
+    """Carry a locked run to its end; after Ctrl-C, print how to continue. The record is already complete on disk."""
     shown = _Shown(arguments)
     try:
         carry_on(run, shown.watched, _workers(scheduler))
@@ -128,7 +128,7 @@ def _carry_on(run: Run, arguments: Namespace, scheduler: Scheduler | None) -> in
 
 
 def _already_finished(run: Run, arguments: Namespace) -> int:
-    """What a run that was killed at its very end still lacks; nothing where all is there."""
+    """Write the missing files of a run that was killed after its last evaluation; do nothing if they are complete."""
     page, frames = run.path / REPORT, sorted((run.path / "exr").glob("*.exr"))
     if not page.is_file() or not frames:
         return _finish(run, arguments)
@@ -147,12 +147,12 @@ def _watcher(run: Run, workers: int, arguments: Namespace) -> Bar | Events | Lin
 
 
 def _workers(scheduler: Scheduler | None) -> Callable[[RunConfig], AbstractContextManager[Workers]]:
-    """Dask's if it has a scheduler, else this machine's processes."""
+    """Return Dask's workers if there is a scheduler, else processes of this machine."""
     return local_workers if scheduler is None else lambda config: DaskExecutor(scheduler)
 
 
 def _scheduler(arguments: Namespace) -> Scheduler | None:
-    """Only Dask has one, and needs one: it must be there before anything is begun."""
+    """Return the scheduler of Dask after a check that it is reachable; None for local processes."""
     files = arguments.tls_ca_file, arguments.tls_cert, arguments.tls_key
     wanted = arguments.scheduler is not None
     if (arguments.executor == "dask") != wanted or (any(files) and not wanted):
@@ -160,7 +160,7 @@ def _scheduler(arguments: Namespace) -> Scheduler | None:
     if not wanted:
         return None
     if getattr(arguments, "workers", None) is not None:
-        raise ConfigError("--workers: is for this machine's processes; of Dask's workers all take part that are there")
+        raise ConfigError("--workers: is for this machine's processes; with Dask, all available workers take part")
     scheduler = Scheduler(arguments.scheduler, *files)
     if not getattr(arguments, "dry_run", False):
         scheduler.require_answer()
@@ -168,7 +168,7 @@ def _scheduler(arguments: Namespace) -> Scheduler | None:
 
 
 def _finish(run: Run, arguments: Namespace) -> int:
-    """Write report and EXR files, and name them; 1 if no candidate could be evaluated."""
+    """Write report and EXR files and print their paths; return 1 if no candidate could be evaluated."""
     failures = [candidate for candidate in run.candidates if candidate.failure]
     if run.best is None:
         print(f"evolve: every candidate failed; the last one: {failures[-1].failure}", file=sys.stderr)
@@ -187,14 +187,13 @@ def _finished_event(run: Run, best: Candidate, made: Products) -> dict[str, Any]
 
 
 def _outcome(run: Run, best: Candidate, failures: list[Candidate]) -> list[str]:
-    """The best candidate, how many failed, what failed in episodes, and how many genomes did not fit together as they
-    were."""
+    """Return lines with the best candidate and with the numbers of failed candidates, episodes and repaired genomes."""
     lines = [f"best: candidate {best.id}, fitness {best.fitness:.4g}, success rate {best.success_rate:.0%}"]
     if failures:
         lines.append(
             f"failed: {len(failures)} of {len(run.candidates)} candidates; the last one: {failures[-1].failure}"
         )
-    lines += mishaps_told(mishaps_of(run.candidates))
+    lines += episode_failure_lines(episode_failures_of(run.candidates))
     changed = [names for candidate in run.candidates if (names := repaired(candidate.vector, run.config))]
     if changed:
         genes = ", ".join(sorted({name for names in changed for name in names}))
@@ -209,6 +208,6 @@ def _plan(config: RunConfig) -> str:
     genes = sum(use.open for use in config.genome.values())
     return (
         f"{config.task}, {search.generations} generations x {search.population} candidates x {steps_each(config)} steps"
-        f"{f' in up to {search.rungs} budget stages' if search.rungs > 1 else ''}, "
+        f"{f' in up to {search.rungs} rungs' if search.rungs > 1 else ''}, "
         f"{genes} genes open"
     )

@@ -1,4 +1,4 @@
-"""`evolve config`: all settings of a run that is not begun, and what each may be."""
+"""`evolve config`: all settings of a run that has not started, and the range of each."""
 
 from __future__ import annotations
 
@@ -31,8 +31,10 @@ def config(arguments: Namespace) -> int:
 
 
 def schema() -> dict[str, Any]:
-    """JSON schema (draft 2020-12) of a run's config.toml and of files for `--config`; what one setting means for
-    another it cannot say, `evolve config show` does."""
+    """Return the JSON schema (draft 2020-12) of a run's config.toml and of files for `--config`.
+
+    It describes single settings; `evolve config show` also checks dependencies between settings.
+    """
     top = {f.name: _setting(f) for f in fields(RunConfig) if f.name in ("seed", "workers", "task_sha256")}
     task = {"anyOf": [{"enum": list(TASKS)}, {"type": "string", "pattern": f"^{LABEL.pattern}$"}]}
     sections = {name: _object({f.name: _setting(f) for f in fields(cls)}) for name, cls in SECTIONS.items()}
@@ -46,7 +48,7 @@ def _object(properties: dict[str, Any], closed: bool = True) -> dict[str, Any]:
 
 
 def _setting(definition: Field[Any]) -> dict[str, Any]:
-    """One setting: kind, range, default, meaning."""
+    """Return the schema of one setting: type, range, default and meaning."""
     kind = str(definition.type)
     found: dict[str, Any] = {"description": definition.metadata["meaning"], "default": definition.default}
     valid = definition.metadata["valid"]
@@ -57,13 +59,13 @@ def _setting(definition: Field[Any]) -> dict[str, Any]:
 
 
 def _limits(valid: Interval) -> dict[str, float]:
-    """A range as JSON schema has it; what has no end has no maximum."""
+    """Return a range in the form of JSON schema; an unbounded range has no maximum."""
     least = {"exclusiveMinimum" if valid.open_low else "minimum": valid.low}
     return least | ({"maximum": valid.high} if math.isfinite(valid.high) else {})
 
 
 def _gene(gene: Gene) -> dict[str, Any]:
-    """What a run may say of a gene."""
+    """Return the schema of a gene's settings."""
     kind = "integer" if gene.kind == "integer" else "number"
     value = {"type": kind, **_limits(gene.range)}
     default = GENES[gene.name].default if gene.name in GENES else gene.default

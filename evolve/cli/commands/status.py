@@ -1,4 +1,4 @@
-"""`evolve status` and `evolve list`: how runs stand, read from their records alone, once or again and again."""
+"""`evolve status` and `evolve list`: states of runs, read only from their records, once or repeatedly."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from evolve.analysis.mishaps import mishaps_of, mishaps_told
+from evolve.analysis.episode_failures import episode_failure_lines, episode_failures_of
 from evolve.runs.output import as_it_is
 from evolve.search.successive_halving import finished
 from evolve.store.candidate import Candidate
@@ -21,12 +21,12 @@ from evolve.store.lock import holder
 
 __all__ = ["listing", "standing", "standing_lines", "status"]
 
-WATCH_S = 2.0  # between two looks
-SHOWN = 12  # generations, the latest
+WATCH_S = 2.0  # interval between two readings
+SHOWN = 12  # number of latest generations
 
 
 def status(arguments: Namespace) -> int:
-    """Print how a run stands; with --watch again whenever that has changed, until nobody works on it any more."""
+    """Print the state of a run; with --watch, print it after each change until no process works on the run."""
     now = standing(Run.open(arguments.directory))
     if not arguments.watch:
         _show(arguments, now)
@@ -43,8 +43,8 @@ def status(arguments: Namespace) -> int:
 
 
 def listing(arguments: Namespace) -> int:
-    """Print the runs in a directory, one line each, the latest last; what cannot be read says why."""
-    # Of a folder that cannot be read pathlib raises; it holds no run of ours.
+    """Print the runs in a directory, one line each, the latest last; for an unreadable run, print the reason."""
+    # Unlike os.path.exists, pathlib raises for an unreadable folder, which cannot be a run of this user.
     folders = [path for path in arguments.directory.iterdir() if os.path.exists(path / "config.toml")]
     found = [_standing_or_reason(path) for path in sorted(folders, key=lambda path: path.stat().st_mtime)]
     if arguments.json:
@@ -74,7 +74,7 @@ def _in_one_line(one: dict[str, Any]) -> str:
 
 
 def _show(arguments: Namespace, now: dict[str, Any]) -> None:
-    """As text; as JSON indented, or one line each where it is repeated. A terminal is cleared before each look."""
+    """Print a state as text or indented JSON; with --watch, JSON takes one line and a terminal is cleared first."""
     if arguments.json:
         print(json.dumps(now, indent=None if arguments.watch else 2, allow_nan=False, default=vars), flush=True)
         return
@@ -86,7 +86,7 @@ def _show(arguments: Namespace, now: dict[str, Any]) -> None:
 
 
 def standing(run: Run) -> dict[str, Any]:
-    """How a run stands, as plain values."""
+    """Return the state of a run as JSON values."""
     worker = holder(run.path)
     state = "running" if worker else "finished" if finished(run) else "interrupted"
     best = run.best
@@ -102,7 +102,7 @@ def standing(run: Run) -> dict[str, Any]:
             "planned": run.config.candidates,
         },
         "last_failure": next((c.failure for c in reversed(run.in_order_of_finish) if c.failure), None),
-        "mishaps": mishaps_of(run.candidates),
+        "mishaps": episode_failures_of(run.candidates),
         "steps": sum(candidate.steps for candidate in run.candidates),
         "best": None
         if best is None
@@ -128,7 +128,7 @@ def _generation(members: Sequence[Candidate]) -> dict[str, Any]:
 
 
 def standing_lines(now: dict[str, Any]) -> list[str]:
-    """What `standing` has found, for people."""
+    """Return the result of `standing` as lines of text."""
     count, best = now["candidates"], now["best"]
     by = f" by process {now['process']}" if now["process"] else ""
     failed = f", {count['failed']} failed" if count["failed"] else ""
@@ -138,7 +138,7 @@ def standing_lines(now: dict[str, Any]) -> list[str]:
     ]
     if now["last_failure"]:
         lines.append(f"last failure: {now['last_failure']}")
-    lines += mishaps_told(now["mishaps"])
+    lines += episode_failure_lines(now["mishaps"])
     if best is not None:
         lines.append(f"best: candidate {best['id']}, fitness {best['fitness']:.4g}")
     told = [(number, g) for number, g in enumerate(now["generations"]) if g["best"] is not None]

@@ -1,4 +1,4 @@
-"""`evolve validate` and `evolve doctor`: does it work here?"""
+"""`evolve validate` and `evolve doctor`: checks of results and of the installation."""
 
 from __future__ import annotations
 
@@ -21,7 +21,10 @@ CHECKOUT = Path(__file__).resolve().parents[3]
 
 @dataclass(frozen=True)
 class _Proof:
-    """module: that runs it; old: the module's name when proofs had codes, such as "B0_planner", or ""."""
+    """A validation script.
+
+    module: module that runs it · old: its former name with a code, such as "B0_planner", or ""
+    """
 
     module: str
     old: str
@@ -32,7 +35,7 @@ class _Proof:
 
     @property
     def question(self) -> str:
-        """The first line of its docstring."""
+        """First line of the script's docstring."""
         source = (CHECKOUT / self.module.replace(".", "/")).with_suffix(".py").read_text(encoding="utf-8")
         return (ast.get_docstring(ast.parse(source)) or "").split("\n")[0]
 
@@ -45,10 +48,10 @@ def doctor(arguments: Namespace) -> int:
 
 
 def validate(arguments: Namespace) -> int:
-    """Run the proofs of `validation`, all or those named; each asserts and draws. 1 if any fails."""
+    """Run all or the named scripts of `validation`, which assert and draw; return 1 if any fails."""
     listed = CHECKOUT / "validation" / "proofs.toml"
     if not listed.is_file():
-        print("evolve: error: validate needs a checkout of rhabdom: its proofs are not installed", file=sys.stderr)
+        print("evolve: error: validate needs a checkout of rhabdom: its scripts are not installed", file=sys.stderr)
         return 2
     paths = tomllib.loads(listed.read_text(encoding="utf-8"))["proofs"]
     known = [_Proof(f"validation.{path.replace('/', '.')}", old) for path, old in paths.items()]
@@ -61,10 +64,10 @@ def validate(arguments: Namespace) -> int:
 
 
 def _found(name: str, proofs: Mapping[str, _Proof]) -> _Proof:
-    """The proof of that name, or of that code, which is then told its name.
+    """Return the script of a name or of a former code; for a code, print the current name.
 
     Raises:
-        ConfigError: there is none.
+        ConfigError: the name is unknown.
     """
     if name in proofs:
         return proofs[name]
@@ -76,16 +79,16 @@ def _found(name: str, proofs: Mapping[str, _Proof]) -> _Proof:
     from optics.numerics.arguments import did_you_mean
 
     raise ConfigError(
-        f"validate {name}: there is no such proof{did_you_mean(name, proofs)} (see evolve validate --list)"
+        f"validate {name}: there is no such script{did_you_mean(name, proofs)} (see evolve validate --list)"
     )
 
 
 def _run(proofs: list[_Proof]) -> int:
-    """Run one after another; 1 if any fails."""
+    """Run scripts one after another; return 1 if any fails."""
     from evolve.runs.progress import clock
 
     if len(proofs) > 1:
-        print(f"{len(proofs)} proofs, most of which take seconds and some minutes", flush=True)
+        print(f"{len(proofs)} scripts; most take seconds, some take minutes", flush=True)
     failed, began = [], time.monotonic()
     for number, proof in enumerate(proofs, start=1):
         print(f"{number}/{len(proofs)} {proof.name}, after {clock(time.monotonic() - began)}", flush=True)

@@ -1,20 +1,20 @@
-"""Light by areas: means over rectangles of the visual field in closed form, where rays would have to be many.
+"""Area sampling: means over rectangles of the visual field in closed form, which would otherwise need many rays.
 
-area_tracer    AreaTracer: what an area sees
-branches       what is left out where no area needs it
-illumination   the light that falls on a patch
-patch          Area, and the Patch of a surface that is seen in it
-lit_bodies     and on bodies that move
-body_light     what of it arrives where they are seen
-half_planes    shares that straight lines cut off
-borders        between columns of areas
-columns        walls, floor and sky behind an area
-sphere_areas   spheres in front of them
-light_table    light that walls and floor send on to each other
-light_nodes    where that is known, and between
-light_baking   how that is found
-light_store    and kept on disk
-cell_grid      the cells that it is kept for
-stripes        textures, averaged
-shadows        shares of a patch that a light reaches
+area_tracer         AreaTracer: the light in an area
+branches            branches of the kernel for work that few areas need
+illumination        light that falls on a patch
+patch               Area, and the Patch of a surface that is visible in it
+illuminated_bodies  table of the light on moving bodies
+body_light          light on the visible part of a body
+half_planes         shares that straight lines cut off
+borders             borders between columns of areas
+columns             walls, floor and sky behind an area
+sphere_areas        spheres in an area
+light_table         tables of the light that walls and floor send to each other
+light_nodes         nodes of these tables, and interpolation between them
+light_baking        computation of these tables
+light_store         cache of light tables on disk
+cell_grid           grid of the free cells of a world
+stripes             averages of textures
+shadows             share of a patch that each light reaches
 """

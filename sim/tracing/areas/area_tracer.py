@@ -1,7 +1,7 @@
-"""Worlds of upright walls, a floor and spheres, seen by whole areas instead of rays: in closed form, no noise.
+"""A renderer by area sampling for worlds of upright walls, a floor and spheres: in closed form, without noise.
 
-What an area sees is shared out among floor, walls, sky and spheres; each surface's texture is averaged over its patch,
-and each light is shut off by the shares that lie in shadow. Colours and components are those of
+Each area is divided among floor, walls, sky and spheres. Each surface's texture is averaged over its patch, and each
+light is reduced by the share of the patch that lies in its shadow. Colours and components are the same as in
 `sim.tracing.closed_form_tracer`, which follows rays through the same worlds.
 """
 
@@ -22,7 +22,7 @@ from sim.tracing.areas import sphere_areas
 from sim.tracing.areas.body_light import BodyLight
 from sim.tracing.areas.branches import only_where
 from sim.tracing.areas.columns import RIM, Columns, Piece
-from sim.tracing.areas.illumination import AreaTables, Illumination, Moment
+from sim.tracing.areas.illumination import AreaTables, FrameState, Illumination
 from sim.tracing.areas.light_table import LightTable
 from sim.tracing.areas.patch import Area, Patch
 from sim.tracing.areas.sphere_areas import Slice, SphereTexture, SphereView, Strip
@@ -31,30 +31,30 @@ from sim.tracing.closed_form_tracer import ClosedForm
 from sim.tracing.spheres import SphereRows, centres_in
 from sim.tracing.walls import ALIGNED, NoClosedForm
 
-LEAST_DIP = 1e-4  # of directions that meet the floor
-BANDS = 2
-STRETCHES = 2  # of a wall's texture, each averaged by itself: what is near fills more of an area than what is far
+LEAST_DIP = 1e-4  # smallest downward slope of directions that hit the floor
+BANDS = 2  # parts of the floor in an area
+STRETCHES = 2  # parts of a wall's texture, averaged separately: near parts fill more of an area than distant ones
 
 
 @dataclass(frozen=True)
 class _LitSphere:
-    """A sphere as an area sees it. number: of the body · light: on it · depth: layers that its light is shared among"""
+    """A sphere in an area. number: of the body · light: on it · depth: layers among which its light is divided"""
 
     number: int
     view: SphereView
     light: BodyLight
-    now: Moment
+    now: FrameState
     depth: DepthLayers
 
 
 class AreaTracer:
-    """Sees by areas.
+    """A tracer that uses area sampling.
 
-    rays: the tracer of rays through the same world, for the same light
+    rays: tracer of rays through the same world, for the same light
 
-    name, why: of this way of tracing, for reports
-    light: what of it is followed
-    basis: (component, band): what each component is worth in each band
+    name, why: name of the tracer, and the reason for its choice, for reports
+    light: the part of the light that is followed
+    basis: (component, band): contribution of each component to each band
 
     Raises:
         NoClosedForm: walls of several heights or on no grid, and textures along two axes.
@@ -102,57 +102,59 @@ class AreaTracer:
         self,
         area: Area,
         met: tuple[Array, Array],
-        now: Moment,
+        now: FrameState,
         depth: DepthLayers = ONE_PSF,
     ) -> list[Array]:
-        """Mean of what comes out of each area, one array per component, for each depth layer.
+        """Return the mean radiance in each area, one array per component, for each depth layer.
 
-        met: faces at the area's left and right border, see `met` and `met_by`
+        met: faces at the area's left and right border, see `first_faces` and `met_by`
         """
         nothing = [0.0] * (depth.count * len(self.basis))
         pieces = self._columns.pieces(area, met, now.inputs.face_ends)
-        seen = [only_where(piece.beside > 0, partial(self._wall, area, piece, now, depth), nothing) for piece in pieces]
+        seen = [
+            only_where(piece.wall_share > 0, partial(self._wall, area, piece, now, depth), nothing) for piece in pieces
+        ]
         floor = partial(self._floor, area, pieces, now, depth)
-        seen.append(only_where(pieces[0].below + pieces[1].below > 0, floor, nothing))
+        seen.append(only_where(pieces[0].floor_share + pieces[1].floor_share > 0, floor, nothing))
         spheres = []
         for k, centre in enumerate(self._seen_bodies(now)):
             in_view = sphere_areas.may_see(area, centre, self._radii[k])
             sphere = partial(self._sphere, area, k, pieces, now, depth)
             spheres.append(only_where(in_view, sphere, [0.0] * 3 + nothing))
-        parts = pieces[0].beside, pieces[1].beside, pieces[0].below + pieces[1].below
+        parts = pieces[0].wall_share, pieces[1].wall_share, pieces[0].floor_share + pieces[1].floor_share
         total = [mi.Float(0) for _ in nothing]
         for part, light, *hidden in zip(parts, seen, *(sphere[:3] for sphere in spheres), strict=True):
             left = dr.clip(1 - sum(hidden, mi.Float(0)) / dr.maximum(part, LEAST_DIP), 0, 1)
             total = [dr.fma(left, own, sum_) for own, sum_ in zip(light, total, strict=True)]
         return [sum(own, rest) for rest, *own in zip(total, *(sphere[3:] for sphere in spheres), strict=True)]
 
-    def met(self, origin: Array, level: Array, inputs: AreaTables) -> Array:
-        """Number of the wall's face that is met in a level direction (Vector2f)."""
-        return self._columns.met(origin, level, inputs.cells)
+    def first_faces(self, origin: Array, level: Array, inputs: AreaTables) -> Array:
+        """Return the number of the wall's face that is hit in a level direction (Vector2f)."""
+        return self._columns.first_faces(origin, level, inputs.cells)
 
     def met_by(self, area: Area, inputs: AreaTables) -> tuple[Array, Array]:
-        """Of the faces at an area's left and right border."""
-        left, right = (self.met(area.origin, area.level(mi.Float(a)), inputs) for a in (-0.5, 0.5))
+        """Return the numbers of the faces at an area's left and right border."""
+        left, right = (self.first_faces(area.origin, area.level(mi.Float(a)), inputs) for a in (-0.5, 0.5))
         return left, right
 
     def buffers(self, n_envs: int) -> SphereRows:
-        """For so many worlds."""
+        """Return buffers for the rows of `n_envs` worlds."""
         return self.rays.buffers(n_envs)
 
     def bodies(self, rows: Array, world: Array, stand: Array) -> list[Array]:
-        """Centres of the bodies in a lane's world; stand: where the eyes' own is."""
+        """Return the centres of the bodies in a lane's world; stand: place of the eyes' own body."""
         return self.rays.all_bodies(centres_in(rows, len(self.rays.world.spheres), world), stand)
 
     @property
     def places(self) -> int:
-        """Rows of a world's table of lit bodies; none where light that they reflect is not followed."""
-        return self._illumination.bodies.places if self._reflected else 0
+        """Number of rows of a world's table of illuminated bodies; 0 if the light that they reflect is not followed."""
+        return self._illumination.bodies.nodes_per_body_set if self._reflected else 0
 
-    def lit(self, place: Array, bodies: list[Array], inputs: AreaTables) -> list[Array]:
-        """Rows of that table, at places of the worlds in which the bodies stand."""
+    def body_light(self, place: Array, bodies: list[Array], inputs: AreaTables) -> list[Array]:
+        """Return rows of this table, at places in worlds with these bodies."""
         return self._illumination.bodies.table(place, bodies, inputs.around)
 
-    def _wall(self, area: Area, piece: Piece, now: Moment, depth: DepthLayers) -> list[Array]:
+    def _wall(self, area: Area, piece: Piece, now: FrameState, depth: DepthLayers) -> list[Array]:
         patch = piece.patch(area, self._walls.floor, self._columns.top)
         row = dr.gather(mi.Vector4f, now.inputs.faces, 2 * piece.face.index)
         place = dr.gather(mi.Vector2f, now.inputs.faces, 4 * piece.face.index + 2)
@@ -167,13 +169,13 @@ class AreaTracer:
         if self._reflected and now.inputs.reflected:
             arriving = self._reflected.on_wall(patch, now.inputs.reflected)
             light = _sum(light, self._illumination.past_bodies(patch, arriving, now))
-        sent_on = [piece.beside * r * e for r, e in zip(reflectance, light, strict=True)]
-        return _in_layers(depth, piece.nearness_at(piece.middle), sent_on)
+        sent_on = [piece.wall_share * r * e for r, e in zip(reflectance, light, strict=True)]
+        return _in_layers(depth, piece.inverse_distance_at(piece.middle), sent_on)
 
-    def _floor(self, area: Area, pieces: tuple[Piece, Piece], now: Moment, depth: DepthLayers) -> list[Array]:
-        """In bands of the same height, which lie the further apart the nearer they are to the horizon."""
-        share = pieces[0].below + pieces[1].below
-        a = sum(piece.middle * piece.below for piece in pieces) / dr.maximum(share, LEAST_DIP)
+    def _floor(self, area: Area, pieces: tuple[Piece, Piece], now: FrameState, depth: DepthLayers) -> list[Array]:
+        """Return the floor's light, from bands of equal height in the area; bands near the horizon are longer."""
+        share = pieces[0].floor_share + pieces[1].floor_share
+        a = sum(piece.middle * piece.floor_share for piece in pieces) / dr.maximum(share, LEAST_DIP)
 
         def add(index: Array, total: list[Array]) -> tuple[Array, list[Array]]:
             below = area.height * (0.5 - share * ((mi.Float(index) + 0.5) / BANDS))
@@ -193,30 +195,32 @@ class AreaTracer:
         return [sum_ * share / BANDS for sum_ in total]
 
     def _floor_patch(self, area: Area, a: Array, dip: Array, height: Array) -> Patch:
-        """The floor in a band of the visual field of this height, its middle at column a and so far down."""
+        """Return the floor's patch in a band of the visual field, from the band's height and middle (column a, dip)."""
         t = (area.origin.z - self._walls.floor) / dip
         level, across = area.level(a), area.level(a) * (t / dip * height)
         point = area.origin + mi.Vector3f(level.x, level.y, -dip) * t
         along = mi.Vector3f(area.right.x, area.right.y, 0) * t
         return Patch(point, mi.Normal3f(0, 0, 1), along, mi.Vector3f(across.x, across.y, 0))
 
-    def _floor_reflectance(self, patch: Patch, now: Moment) -> list[Array]:
+    def _floor_reflectance(self, patch: Patch, now: FrameState) -> list[Array]:
         per_x, per_y, _, at = self._floor_column
         column = per_x * patch.point.x + per_y * patch.point.y + at
         along, across = (per_x * side.x + per_y * side.y for side in (patch.along, patch.across))
         return self._stripes.mean_over(self._floor_texture, column, (along, across), now.inputs.stripes)
 
-    def _sphere(self, area: Area, k: int, pieces: tuple[Piece, Piece], now: Moment, depth: DepthLayers) -> list[Array]:
-        """Shares of the area in which it hides either wall and the floor, and light that comes from it, per component,
-        times its share; without what is hidden by nearer spheres."""
+    def _sphere(
+        self, area: Area, k: int, pieces: tuple[Piece, Piece], now: FrameState, depth: DepthLayers
+    ) -> list[Array]:
+        """Return the shares of the area in which a sphere hides either wall and the floor, and its light times its
+        share, per component. Parts that nearer spheres hide are left out."""
         view = SphereView(area, now.bodies[k], self._radii[k])
-        light = BodyLight.of(self._illumination, self._reflected, k, view.whole().patch, now)
+        light = BodyLight.on_patch(self._illumination, self._reflected, k, view.whole().patch, now)
         sphere = _LitSphere(k, view, light, now, depth)
 
         def add(number: Array, hidden: list[Array], total: list[Array]) -> tuple[Array, ...]:
             strip = view.strip(number)
             behind = [self._columns.behind(area, piece, strip.part) for piece in pieces]
-            found = behind[0].beside, behind[1].beside, behind[0].below + behind[1].below
+            found = behind[0].wall_share, behind[1].wall_share, behind[0].floor_share + behind[1].floor_share
             bare, *sent_on = self._strip(area, sphere, strip)
             hidden = [dr.fma(own, bare, sum_) for own, sum_ in zip(found, hidden, strict=True)]
             return number + 1, hidden, _sum(sent_on, total)
@@ -226,8 +230,8 @@ class AreaTracer:
         return [*hidden, *total]
 
     def _strip(self, area: Area, sphere: _LitSphere, strip: Strip) -> list[Array]:
-        """Share of a strip of a sphere before which no other stands, and light that comes from it, per component, times
-        its share of the area."""
+        """Return the share of a strip that no other sphere hides, and its light, per component, times its share of the
+        area."""
         k, view, now, depth = sphere.number, sphere.view, sphere.now, sphere.depth
         texture = self._sphere_textures[k]
 
@@ -236,7 +240,7 @@ class AreaTracer:
             bare = self._not_hidden(area, k, slice_, now)
             column, sides = sphere_areas.columns_of(texture, slice_.patch, self._radii[k])
             reflectance = self._stripes.mean_over(texture.texture, column, sides, now.inputs.stripes)
-            layers = _in_layers(depth, slice_.vergence(area), sphere.light.on(slice_.patch.normal))
+            layers = _in_layers(depth, slice_.inverse_distance(area), sphere.light.on(slice_.patch.normal))
             sent_on = [bare / mi.Float(view.sides)]
             sent_on += [slice_.share * bare * r * e for r, e in zip(reflectance * depth.count, layers, strict=True)]
             return number + 1, _sum(sent_on, total)
@@ -245,8 +249,8 @@ class AreaTracer:
         _, total = dr.while_loop(start, lambda number, _: number < view.sides, add, label="slices")
         return total
 
-    def _not_hidden(self, area: Area, k: int, slice_: Slice, now: Moment) -> Array:
-        """Share of a slice before which no other sphere stands; as if others hid it at random, where several do."""
+    def _not_hidden(self, area: Area, k: int, slice_: Slice, now: FrameState) -> Array:
+        """Return the share of a slice that no other sphere hides. Several spheres are assumed to hide it at random."""
         way = now.bodies[k] - area.origin
         bare = mi.Float(1)
         for j, other in enumerate(self._seen_bodies(now)):
@@ -256,20 +260,20 @@ class AreaTracer:
                 bare *= 1 - dr.select(nearer, sphere_areas.hidden_by(towards, self._radii[j], slice_), 0)
         return bare
 
-    def _seen_bodies(self, now: Moment) -> list[Array]:
+    def _seen_bodies(self, now: FrameState) -> list[Array]:
         return now.bodies[: len(self._sphere_textures)]
 
 
 def _in_layers(depth: DepthLayers, vergence: Array, light: list[Array]) -> list[Array]:
-    """Light from the distance 1 / vergence along the eye's axis, shared out among depth layers."""
+    """Divide light from the distance 1 / vergence along the eye's axis among depth layers."""
     if depth.count == 1:
         return light
     return [share * component for share in depth.shares(vergence) for component in light]
 
 
 def _in_eights(rows: np.ndarray) -> np.ndarray:
-    """Per face, in eights: column of the texel as an affine function of (x, y, z), first texel and columns of the
-    texture; the floor's rim has any texture, since none of it is seen."""
+    """Return rows of eight per face: column of the texel as an affine function of (x, y, z), first texel and columns of
+    the texture. The floor's rim has an arbitrary texture, because it is invisible."""
     found = np.zeros((len(rows) + RIM, 8))
     found[: len(rows), :6] = rows
     found[len(rows) :, 5] = 1

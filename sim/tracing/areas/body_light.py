@@ -1,34 +1,36 @@
-"""Light on what an area sees of a body: shadows, and what other bodies change, are found once for all of it; the rest
-depends on how it slopes."""
+"""Light on the visible part of a body.
+
+Shadows and the effect of other bodies are computed once for the whole part. The rest depends on the surface's normal.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 from optics.numerics.autodiff import Array
-from sim.tracing.areas.illumination import Illumination, Moment
+from sim.tracing.areas.illumination import FrameState, Illumination
 from sim.tracing.areas.light_table import LightTable, sum_of
 from sim.tracing.areas.patch import Patch
 
 
 @dataclass(frozen=True)
 class BodyLight:
-    """illumination: straight from the lights · lit: share of each that reaches what is seen
-    around: reflected light, harmonics in fours per component; none where it is not followed
-    change: of it, per component, by other bodies
+    """illumination: direct light · visibility: share of each light that reaches the visible part
+    around: reflected light, harmonics in fours per component; empty if it is not followed
+    change: change of reflected light by other bodies, per component
     """
 
     illumination: Illumination
-    lit: list[Array]
+    visibility: list[Array]
     around: list[list[Array]]
     change: list[Array]
 
     @classmethod
-    def of(
-        cls, illumination: Illumination, reflected: LightTable | None, body: int, patch: Patch, now: Moment
+    def on_patch(
+        cls, illumination: Illumination, reflected: LightTable | None, body: int, patch: Patch, now: FrameState
     ) -> BodyLight:
-        """Light on a patch that stands for what is seen of a body; body: its number."""
-        lit = illumination.lit(patch, now, body)
+        """Return the light on a patch that stands for the visible part of a body; body: its number."""
+        lit = illumination.visibility(patch, now, body)
         if reflected is None or now.inputs.reflected is None:
             return cls(illumination, lit, [], [])
         around = reflected.on_body(body, now.bodies[body], now.inputs.reflected)
@@ -37,8 +39,8 @@ class BodyLight:
         return cls(illumination, lit, around, [a - b for a, b in zip(left, free, strict=True)])
 
     def on(self, normal: Array) -> list[Array]:
-        """Per component, where the body slopes like this."""
-        light = self.illumination.arriving(normal, self.lit)
+        """Return the light per component on a surface with this normal."""
+        light = self.illumination.arriving(normal, self.visibility)
         if not self.around:
             return light
         parts = zip(light, self.around, self.change, strict=True)

@@ -1,4 +1,4 @@
-"""Work that few areas ask for, left out where none of its neighbours in the wavefront does."""
+"""Branches for work that few areas need, skipped by packets of the wavefront in which no area needs it."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from optics.numerics.autodiff import Array
 
 
 def only_where(needed: Array, values: Callable[[], list[Array]], otherwise: list[float]) -> list[Array]:
-    """The values where they are needed, and elsewhere the others. A branch of the kernel: packets of lanes of which
-    none needs the values pass it by."""
+    """Return the values where they are needed, and the alternatives otherwise. This is a branch of the kernel: packets
+    of lanes skip it if none of their lanes needs the values."""
     found: list[Array] = dr.if_stmt((), needed, values, lambda: [mi.Float(value) for value in otherwise])
     return found

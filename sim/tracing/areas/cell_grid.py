@@ -1,4 +1,4 @@
-"""The free cells of a world of walls: where patches are, and where in their cell."""
+"""The grid of free cells in a world of walls, and the places of points in it."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ from sim.tracing.walls import Walls
 
 @dataclass(frozen=True)
 class CellGrid:
-    """side: of a cell [m] · corner: the grid's lower one [m], (2,) · free: which cells hold no wall, (row, column)
+    """side: of a cell [m] · corner: lower corner of the grid [m], (2,) · free: cells without a wall, (row, column)
 
-    Two rings of cells without a wall lie around those with one; the outermost are never free."""
+    The grid ends at the outermost faces of the walls."""
 
     side: float
     corner: np.ndarray
     free: np.ndarray
 
     @classmethod
-    def of(cls, walls: Walls) -> CellGrid:
-        """The coarsest on which the walls lie.
+    def from_walls(cls, walls: Walls) -> CellGrid:
+        """Return the coarsest grid on which the walls lie.
 
         Raises:
             NoClosedForm: there is none.
@@ -35,7 +35,7 @@ class CellGrid:
 
     @property
     def numbers(self) -> np.ndarray:
-        """Of the free cells, row by row; 0 where there is a wall."""
+        """Numbers of the free cells, row by row; 0 for cells with a wall."""
         return np.where(self.free, np.cumsum(self.free).reshape(self.free.shape) - 1, 0)
 
     @property
@@ -46,8 +46,8 @@ class CellGrid:
         return found
 
     def locate(self, point: Array, table: Array) -> tuple[Array, Array, Array]:
-        """What a table of all cells, row by row, has for the cell of a point, and where in it the point is, in [0, 1].
-        Points beyond the grid are at its border."""
+        """Return the entry for the cell of a point in a table of all cells, row by row, and the place of the point in
+        this cell, x and y in [0, 1]. Points outside the grid are moved to its border."""
         rows, columns = self.free.shape
         x, y = ((point[i] - float(self.corner[i])) * (1 / self.side) for i in range(2))
         column, row = dr.clip(dr.floor(x), 0, columns - 1), dr.clip(dr.floor(y), 0, rows - 1)

@@ -1,8 +1,8 @@
-"""The upright world behind an area: which walls stand at its left and right ends, and where one gives way to the other.
+"""The walls behind an area: the faces at its left and right borders, and the edge between them.
 
-Seen from a level eye, a wall that is met at the distance t (in lengths of the level direction) ends below at
--z/t and on top at (top - z)/t: 1/t, its nearness, runs evenly along a, so the shares of floor, wall and sky have closed
-forms. Where the ends of the area see two walls, a corner or an edge lies between, found from the walls' ends.
+For a level eye, a wall that is hit at the distance t (in lengths of the level direction) ends below at -z/t and on top
+at (top - z)/t. The inverse distance 1/t is linear in a, so the shares of floor, wall and sky have closed forms. If two
+walls are hit at the borders of the area, there is a corner or an edge between them, found from the walls' ends.
 """
 
 from __future__ import annotations
@@ -20,14 +20,14 @@ from sim.tracing.areas.patch import Area, Patch, Rectangle
 from sim.tracing.wall_intersection import CellTables, Footprints
 from sim.tracing.walls import SIDES, Walls
 
-LEAST_NEARNESS = 1e-6  # [1/m] of what is seen in a stretch of no width
-NOTHING = 1e-12  # height of parts that are empty
-RIM = 4  # sides of the floor, at which worlds without a wall end
+LEAST_NEARNESS = 1e-6  # smallest inverse distance [1/m], for stretches of no width
+NOTHING = 1e-12  # height of empty parts
+RIM = 4  # sides of the floor's rim, at which worlds without a wall end
 
 
 @dataclass(frozen=True)
 class Face:
-    """index: which · left, right: its ends, as seen from in front (Point2f)."""
+    """A face of a wall. index: its number · left, right: its ends, seen from the front (Point2f)."""
 
     index: Array
     left: Array
@@ -38,34 +38,34 @@ class Face:
 class Piece:
     """A wall's face in columns start <= a <= end of an area.
 
-    nearness: at a = 0, and its slope along a [1/m]
-    below, beside, above: shares of the area in which floor, wall and sky are seen in these columns
+    inverse_distance: at a = 0, and its slope along a [1/m]
+    floor_share, wall_share, sky_share: shares of the area that floor, wall and sky fill in these columns
     """
 
     face: Face
     start: Array
     end: Array
-    nearness: tuple[Array, Array]
-    below: Array
-    beside: Array
-    above: Array
+    inverse_distance: tuple[Array, Array]
+    floor_share: Array
+    wall_share: Array
+    sky_share: Array
 
     @property
     def middle(self) -> Array:
-        """Of its columns."""
+        """Middle of the columns."""
         return (self.start + self.end) / 2
 
-    def nearness_at(self, a: Array) -> Array:
-        """1/t at a [1/m]."""
-        return dr.maximum(dr.fma(self.nearness[1], a, self.nearness[0]), LEAST_NEARNESS)
+    def inverse_distance_at(self, a: Array) -> Array:
+        """Return 1/t at a [1/m]."""
+        return dr.maximum(dr.fma(self.inverse_distance[1], a, self.inverse_distance[0]), LEAST_NEARNESS)
 
     def place(self, area: Area, a: Array) -> Array:
-        """Where the wall is met at a (Point2f)."""
-        return area.origin.xy + area.level(a) / self.nearness_at(a)
+        """Return the point at which the wall is hit at a (Point2f)."""
+        return area.origin.xy + area.level(a) / self.inverse_distance_at(a)
 
     def patch(self, area: Area, floor: float, top: float) -> Patch:
-        """What is seen of the wall."""
-        near = self.nearness_at(self.middle)
+        """Return the visible patch of the wall."""
+        near = self.inverse_distance_at(self.middle)
         bottom, ceiling = (area.up + sign * area.height / 2 for sign in (-1, 1))
         low = dr.maximum((floor - area.origin.z) * near, bottom)
         high = dr.maximum(dr.minimum((top - area.origin.z) * near, ceiling), low)
@@ -84,9 +84,9 @@ class Piece:
 
 
 class Columns:
-    """Finds the pieces of a world of walls, all of one height.
+    """Pieces of walls behind areas, in a world of walls of one height.
 
-    top: height of the walls' tops [m] · face_ends: of all faces, for the kernel
+    top: height of the walls' tops [m] · face_ends: ends of all faces, for the kernel
     """
 
     def __init__(self, walls: Walls, footprints: Footprints) -> None:
@@ -97,17 +97,17 @@ class Columns:
         self.face_ends = floats(_face_ends(walls))
 
     def pieces(self, area: Area, met: tuple[Array, Array], face_ends: Array) -> tuple[Piece, Piece]:
-        """The left and the right one; where one wall fills all columns, the right one has none.
+        """Return the left and the right piece; if one wall fills all columns, the right piece is empty.
 
-        met: faces at the area's left and right border, see `met`
+        met: faces at the area's left and right border, see `first_faces`
         """
         half = mi.Float(0.5)
         left, right = (self._face(index, face_ends) for index in met)
         edge = dr.select(left.index == right.index, half, self._edge(area, left, right))
         return self._piece(area, left, -half, edge), self._piece(area, right, edge, half)
 
-    def met(self, origin: Array, level: Array, cells: CellTables | None) -> Array:
-        """Number of the face that is met in a level direction (Vector2f)."""
+    def first_faces(self, origin: Array, level: Array, cells: CellTables | None) -> Array:
+        """Return the number of the face that is hit in a level direction (Vector2f)."""
         ray = mi.Ray3f(origin, mi.Vector3f(level.x, level.y, 0))
         t, face, _ = self._footprints.hit(ray, cells)
         return dr.select(dr.isfinite(t), face, self._rim + self._side_of_floor(ray))
@@ -118,7 +118,7 @@ class Columns:
         return Face(face, mi.Point2f(ends.x, ends.y), mi.Point2f(ends.z, ends.w))
 
     def _side_of_floor(self, ray: Array) -> Array:
-        """Through which of the floor's sides a ray leaves it: -x, +x, -y, +y."""
+        """Return the number of the side through which a ray leaves the floor: -x, +x, -y, +y."""
         t = [
             (dr.select(d > 0, upper, lower) - o) / dr.select(dr.abs(d) < LEAST_NEARNESS, LEAST_NEARNESS, d)
             for o, d, lower, upper in zip(ray.o, ray.d, self._lower, self._upper, strict=False)
@@ -127,11 +127,11 @@ class Columns:
         return dr.select(t[0] < t[1], x, y + 2)
 
     def _edge(self, area: Area, left: Face, right: Face) -> Array:
-        """Where the left wall gives way to the right one: at an end of the nearer one, or where they meet in a corner.
-        What is seen between two walls that both end is not known: half of it goes to either."""
+        """Return the column of the edge between two walls: an end of the nearer wall, or their common corner. If both
+        walls end, the surface between them is unknown, and each wall gets half of the columns."""
         ends = dr.minimum(_column_of(area, left.right, 1.0), 0.5)
         begins = dr.maximum(_column_of(area, right.left, -1.0), -0.5)
-        (l0, l1), (r0, r1) = _nearness(area, left), _nearness(area, right)
+        (l0, l1), (r0, r1) = _inverse_distance(area, left), _inverse_distance(area, right)
         middle = (ends + begins) / 2
         slope = l1 - r1
         corner = (r0 - l0) / dr.select(dr.abs(slope) < LEAST_NEARNESS, LEAST_NEARNESS, slope)
@@ -142,31 +142,31 @@ class Columns:
 
     def _piece(self, area: Area, face: Face, start: Array, end: Array) -> Piece:
         none = mi.Float(0)
-        piece = Piece(face, start, end, _nearness(area, face), none, none, none)
+        piece = Piece(face, start, end, _inverse_distance(area, face), none, none, none)
         return self.behind(area, piece, Rectangle(mi.Float(0), mi.Float(0), mi.Float(1), mi.Float(1)))
 
     def behind(self, area: Area, piece: Piece, part: Rectangle) -> Piece:
-        """What a part of the area sees of a piece."""
+        """Return the piece as it is visible in a part of the area."""
         start, end = (dr.clip(part.a + sign * part.width / 2, piece.start, piece.end) for sign in (-1, 1))
-        near = [piece.nearness_at(a) for a in (start, end)]
+        near = [piece.inverse_distance_at(a) for a in (start, end)]
         bottom, ceiling = (area.up + (part.b + sign * part.height / 2) * area.height for sign in (-1, 1))
         depth, climb = self._floor - area.origin.z, self.top - area.origin.z
         share, per = (end - start) * part.height, dr.rcp(dr.maximum(area.height * part.height, NOTHING))
         below = share * mean_clamped(*((depth * n - bottom) * per for n in near))
         above = share * mean_clamped(*((ceiling - climb * n) * per for n in near))
         beside = dr.select(piece.face.index < self._rim, dr.maximum(share - below - above, 0), 0)
-        return replace(piece, start=start, end=end, below=below, beside=beside, above=above)
+        return replace(piece, start=start, end=end, floor_share=below, wall_share=beside, sky_share=above)
 
 
-def _nearness(area: Area, face: Face) -> tuple[Array, Array]:
-    """At a = 0 and its slope, of the line on which a face stands."""
+def _inverse_distance(area: Area, face: Face) -> tuple[Array, Array]:
+    """Return the inverse distance at a = 0, and its slope, of the line on which a face stands."""
     side = face.right - face.left
     scale = dr.rcp(_cross(face.left - area.origin.xy, side))
     return _cross(area.ahead, side) * scale, _cross(area.right, side) * scale
 
 
 def _column_of(area: Area, point: Array, beyond: float) -> Array:
-    """Column a in which a point is seen; for points behind the eye, beyond all others on that side (±1)."""
+    """Return the column a in which a point is visible, or `beyond` (±1, outside the area) if it is behind the eye."""
     way = point - area.origin.xy
     across = _cross(area.right, way)
     return dr.select(across > 0, -_cross(area.ahead, way) / dr.select(across > 0, across, 1), beyond)
@@ -177,11 +177,11 @@ def _cross(a: Array, b: Array) -> Array:
 
 
 def _face_ends(walls: Walls) -> np.ndarray:
-    """Left and right end of each face as seen from in front, (face, 4): of the walls', then of the floor's rim, which
-    is seen from within."""
+    """Return the left and right end of each face, seen from the front, (face, 4): the walls' faces, then the floor's
+    rim, which is seen from inside."""
     found = []
     for (x0, y0), (x1, y1) in zip(walls.lower, walls.upper, strict=True):
-        # Those that face -x, +x, -y, +y.
+        # Faces in the order -x, +x, -y, +y.
         found += [(x0, y1, x0, y0), (x1, y0, x1, y1), (x0, y0, x1, y0), (x1, y1, x0, y1)]
     (x0, y0), (x1, y1) = walls.floor_lower, walls.floor_upper
     found += [(x0, y0, x0, y1), (x1, y1, x1, y0), (x1, y0, x0, y0), (x0, y1, x1, y1)]

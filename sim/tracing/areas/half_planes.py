@@ -1,4 +1,4 @@
-"""How much of something straight lines cut off: the two integrals that all shares of an area are made of."""
+"""Shares that straight lines cut off: the two integrals from which all shares of an area are computed."""
 
 from __future__ import annotations
 
@@ -6,18 +6,19 @@ import drjit as dr
 
 from optics.numerics.autodiff import Array
 
-# Lines this much steeper along one side than along the other are parallel to it: below float32's 1.2e-7 of the sum.
+# Smallest ratio of a line's slopes along the two sides: smaller ones are below float32's 1.2e-7 of the sum.
 PARALLEL = 1e-9
-# Between values closer than this, the mean of a clamped line is the clamped middle: wrong by an eighth of its square.
+# For values closer than this, the clamped middle replaces the mean of a clamped line: an error of an eighth of its
+# square.
 LEVEL = 1e-2
 
 
 def share_above(s: Array, p: Array, q: Array) -> Array:
-    """Share of the unit square, |a| and |b| up to 1/2, in which s + p a + q b > 0."""
+    """Return the share of the unit square, |a| and |b| up to 1/2, in which s + p a + q b > 0."""
     p, q = dr.abs(p), dr.abs(q)
     longer = dr.maximum(dr.maximum(p, q), PARALLEL)
     shorter = dr.maximum(dr.minimum(p, q), PARALLEL * longer)
-    below = dr.abs(s)  # the smaller share: a trapezium, or, where the line cuts a corner off, a triangle
+    below = dr.abs(s)  # the smaller share is a trapezium or, if the line cuts a corner off, a triangle
     reach = dr.maximum((longer + shorter) / 2 - below, 0)
     triangle = dr.minimum(reach * reach / (2 * longer * shorter), 0.5)
     trapezium = 0.5 - below / longer
@@ -26,7 +27,7 @@ def share_above(s: Array, p: Array, q: Array) -> Array:
 
 
 def mean_clamped(first: Array, last: Array) -> Array:
-    """Mean of max(0, min(x, 1)) while x goes evenly from first to last."""
+    """Return the mean of max(0, min(x, 1)) for x uniformly between first and last."""
     gap = last - first
     flat = (dr.abs(gap) < LEVEL) | (dr.minimum(first, last) >= 1) | (dr.maximum(first, last) <= 0)
     mean = (_antiderivative(last) - _antiderivative(first)) / dr.select(flat, 1, gap)

@@ -1,4 +1,4 @@
-"""The light that falls on a patch."""
+"""The light that falls on a patch past walls and bodies."""
 
 from __future__ import annotations
 
@@ -13,25 +13,25 @@ import numpy as np
 
 from optics.numerics.autodiff import Array
 from sim.tracing.areas.branches import only_where
+from sim.tracing.areas.illuminated_bodies import IlluminatedBodies, select
 from sim.tracing.areas.light_table import LightTables
-from sim.tracing.areas.lit_bodies import LitBodies, of
 from sim.tracing.areas.patch import Patch
 from sim.tracing.areas.shadows import WallShadows, lit_past_sphere
 from sim.tracing.areas.stripes import StripeTables
 from sim.tracing.closed_form_tracer import ClosedForm
 from sim.tracing.wall_intersection import CellTables
 
-REACH = 8  # radii; beyond, a body fills less than 1/64 of the view of what it lights or shades
-ITSELF_NONE = 2**16  # no body's number: a patch that is on none of them
+REACH = 8  # radii; a body further away fills less than 1/64 of the view from a patch that it lights or shades
+ITSELF_NONE = 2**16  # number of no body, for a patch that is on none of them
 
 
 @dataclass(frozen=True)
 class AreaTables:
-    """What kernels that see areas read of any world.
+    """Arrays that kernels for areas read in all worlds.
 
     faces: of walls, in eights, see `area_tracer` · face_ends: see `Columns` · cells: see `Footprints`
-    around: see `WallShadows` · stripes: textures · reflected: light that walls and floor send on to each other; None:
-        it is not followed
+    around: see `WallShadows` · stripes: textures · reflected: light that walls and floor send to each other; None: it
+        is not followed
     """
 
     faces: Array
@@ -43,24 +43,26 @@ class AreaTables:
 
 
 @dataclass(frozen=True)
-class Moment:
-    """What changes from call to call. bodies: centres of the spheres that move, the agent's last · inputs: tables
-    world: in which an area lies · lit: tables of `LitBodies`, world by world, where light that bodies reflect is
-    followed."""
+class FrameState:
+    """Inputs that change between calls.
+
+    bodies: centres of the moving spheres, the agent's last · inputs: tables · world: number of an area's world
+    body_light: tables of `IlluminatedBodies`, world by world, if light that bodies reflect is followed
+    """
 
     bodies: list[Array]
     inputs: AreaTables
     world: Array
-    lit: list[Array]
+    body_light: list[Array]
 
 
 class Illumination:
-    """Straight from the lights, past walls and bodies.
+    """The light that reaches patches, directly or reflected, past walls and bodies.
 
-    around: which cells around each one are walls, for the kernel · bodies: how they are lit
+    around: which cells around each cell are walls, for the kernel · bodies: the light on bodies
 
     Raises:
-        NoClosedForm: what WallShadows does not know.
+        NoClosedForm: shadows for which WallShadows has no closed form.
     """
 
     def __init__(self, rays: ClosedForm, radii: np.ndarray) -> None:
@@ -70,36 +72,38 @@ class Illumination:
         self._floor, self._floor_colour = rays.walls.floor, _mean_colour(rays, rays.faces[-1, 8:10])
         self._shadows = WallShadows(rays.walls, self._directions)
         self.around = self._shadows.around
-        self.bodies = LitBodies(self._shadows, self._directions, self._radii)
+        self.bodies = IlluminatedBodies(self._shadows, self._directions, self._radii)
 
-    def irradiance(self, patch: Patch, now: Moment) -> list[Array]:
-        """Per component: sum over the lights of level · cos θ · share that is lit."""
-        return self.arriving(patch.normal, self.lit(patch, now))
+    def irradiance(self, patch: Patch, now: FrameState) -> list[Array]:
+        """Return the irradiance per component: the sum over the lights of level · cos θ · visibility."""
+        return self.arriving(patch.normal, self.visibility(patch, now))
 
-    def lit(self, patch: Patch, now: Moment, itself: int = ITSELF_NONE) -> list[Array]:
-        """Share of a patch that each light reaches; itself: the body that the patch is part of."""
+    def visibility(self, patch: Patch, now: FrameState, itself: int = ITSELF_NONE) -> list[Array]:
+        """Return the share of a patch that each light reaches; itself: number of the body that the patch is part of."""
 
         def past(k: Array, lit: list[Array]) -> list[Array]:
-            left = lit_past_sphere(patch, self._directions, of(k, now.bodies), of(k, self._radii))
+            left = lit_past_sphere(patch, self._directions, select(k, now.bodies), select(k, self._radii))
             return [dr.select(k == itself, share, share * other) for share, other in zip(lit, left, strict=True)]
 
-        return self._for_bodies(past, self._shadows.lit(patch, self._directions, now.inputs.around))
+        return self._for_bodies(past, self._shadows.visibility(patch, self._directions, now.inputs.around))
 
     def arriving(self, normal: Array, lit: list[Array]) -> list[Array]:
-        """Per component: sum over the lights of level · cos θ · these shares."""
+        """Return the irradiance per component: the sum over the lights of level · cos θ · these shares."""
         total = [mi.Float(0) for _ in range(self._levels.shape[1])]
         for direction, level, share in zip(self._directions, self._levels, lit, strict=True):
             arrives = share * dr.maximum(dr.dot(normal, mi.Vector3f(*direction)), 0)
             total = [dr.fma(arrives, float(factor), sum_) for factor, sum_ in zip(level, total, strict=True)]
         return total
 
-    def past_bodies(self, patch: Patch, arriving: list[Array], now: Moment, itself: int = ITSELF_NONE) -> list[Array]:
-        """What is left of reflected light on its way to a patch, per component, where bodies stand in it, with what
-        they reflect themselves; what they hide is taken as average."""
+    def past_bodies(
+        self, patch: Patch, arriving: list[Array], now: FrameState, itself: int = ITSELF_NONE
+    ) -> list[Array]:
+        """Return the reflected light on a patch, per component, without the light that bodies hide and with the light
+        that they reflect themselves. The light that they hide is assumed to be average."""
 
         def past(k: Array, arriving: list[Array]) -> list[Array]:
-            radius = of(k, self._radii)
-            near = dr.squared_norm(of(k, now.bodies) - patch.point) < dr.square(REACH * radius)
+            radius = select(k, self._radii)
+            near = dr.squared_norm(select(k, now.bodies) - patch.point) < dr.square(REACH * radius)
             exchanged = partial(self._exchanged, patch, arriving, k, now)
             change = only_where(near & (k != itself), exchanged, [0.0] * len(arriving))
             return [a + c for a, c in zip(arriving, change, strict=True)]
@@ -107,7 +111,7 @@ class Illumination:
         return self._for_bodies(past, arriving)
 
     def _for_bodies(self, step: Callable[[Array, list[Array]], list[Array]], start: list[Array]) -> list[Array]:
-        """What is left after a step for each body: a loop of the kernel, which would be very long otherwise."""
+        """Run a step for each body. This is a loop in the kernel, which would be very long otherwise."""
         if len(self._radii) == 1:
             return step(mi.UInt32(0), start)
         _, found = dr.while_loop(
@@ -118,10 +122,10 @@ class Illumination:
         )
         return found
 
-    def _exchanged(self, patch: Patch, arriving: list[Array], k: Array, now: Moment) -> list[Array]:
-        """Light from a body instead of what it hides: sphere's form factor, where it rises over the patch's horizon
-        as Snyder (1996) has it."""
-        way, radius = of(k, now.bodies) - patch.point, of(k, self._radii)
+    def _exchanged(self, patch: Patch, arriving: list[Array], k: Array, now: FrameState) -> list[Array]:
+        """Return the light from a body minus the light that it hides, by the form factor of a sphere. A sphere that
+        crosses the patch's horizon has Snyder's (1996) form factor."""
+        way, radius = select(k, now.bodies) - patch.point, select(k, self._radii)
         distance = dr.maximum(dr.norm(way), radius)
         height = dr.dot(patch.normal, way)
         rising = dr.square(dr.maximum(height + radius, 0)) / (4 * radius)
@@ -130,11 +134,11 @@ class Illumination:
         exchanged = zip(sent, arriving, lost, strict=True)
         return [factor * (mine - hidden) - dark for mine, hidden, dark in exchanged]
 
-    def _shadow(self, k: Array, patch: Patch, now: Moment) -> list[Array]:
-        """What the floor does not send to a patch, per component, where a body's shadows lie: disks' form factors."""
-        centre, disk = of(k, now.bodies), math.pi * dr.square(of(k, self._radii))
+    def _shadow(self, k: Array, patch: Patch, now: FrameState) -> list[Array]:
+        """Return the light, per component, that a patch loses by a body's shadows on the floor: disks' form factors."""
+        centre, disk = select(k, now.bodies), math.pi * dr.square(select(k, self._radii))
         total = [mi.Float(0) for _ in range(self._levels.shape[1])]
-        lit = self.bodies.on_whole(k, now.world, now.lit)
+        lit = self.bodies.on_whole(k, now.world, now.body_light)
         for direction, level, share in zip(self._directions, self._levels, lit, strict=True):
             way = centre - mi.Vector3f(*direction) * ((centre.z - self._floor) / direction[2]) - patch.point
             area, apart = disk / direction[2], dr.squared_norm(way)
@@ -144,25 +148,25 @@ class Illumination:
             total = [dr.fma(factor, float(part), sum_) for part, sum_ in zip(taken, total, strict=True)]
         return total
 
-    def _sent(self, k: Array, towards: Array, nearness: Array, now: Moment) -> list[Array]:
-        """Radiosity of a body, per component, with its mean colour, in what light reaches the middle of the side that
-        is seen: Lambert's phase function from far away, what its nearest point receives from close by.
+    def _sent(self, k: Array, towards: Array, nearness: Array, now: FrameState) -> list[Array]:
+        """Return the radiosity of a body, per component, from its mean colour and the light on the middle of its
+        visible side: by Lambert's phase function from far away, by the irradiance of the nearest point from close by.
 
-        nearness: radius / distance; the share between the two is fitted (residual .05 of the light at most)
+        nearness: radius / distance; the weight of the two limits is fitted (residual at most 0.05 of the light)
         """
         near = nearness * (1.4 - 0.4 * nearness)
-        lit = self.bodies.on_side(k, towards, now.world, now.lit)
+        lit = self.bodies.on_side(k, towards, now.world, now.body_light)
         total = [mi.Float(0) for _ in range(self._levels.shape[1])]
         for direction, level, share in zip(self._directions, self._levels, lit, strict=True):
             cosine = dr.clip(dr.dot(towards, mi.Vector3f(*direction)), -1, 1)
             phase = dr.sqrt(1 - cosine * cosine) + (dr.pi - dr.acos(cosine)) * cosine
             arrives = share * dr.lerp(phase * (2 / (3 * np.pi)), dr.maximum(cosine, 0), near)
             total = [dr.fma(arrives, float(factor), sum_) for factor, sum_ in zip(level, total, strict=True)]
-        colours = [of(k, list(map(float, column))) for column in np.transpose(self._colours)]
+        colours = [select(k, list(map(float, column))) for column in np.transpose(self._colours)]
         return [colour * light for colour, light in zip(colours, total, strict=True)]
 
 
 def _mean_colour(rays: ClosedForm, place: np.ndarray) -> np.ndarray:
-    """Mean reflectance of the texture there, (component,), of those that light is reflected from."""
+    """Return the mean reflectance of the texture at this place, (component,), in the components of reflected light."""
     first, columns = map(int, place[:2])
     return rays.components.reflectance[first : first + columns].mean(axis=0)

@@ -1,6 +1,7 @@
-"""How the tables of reflected light are found: by brute force, with many rays from every node.
+"""Computation of the tables of reflected light by brute force, with many rays from every node.
 
-Nothing that moves is in the tables, but the shadow that a body casts on the floor from which light reaches it.
+The tables contain the static scene and, as the only effect of moving bodies, the shadow that a body casts on the floor
+that illuminates it.
 """
 
 from __future__ import annotations
@@ -16,27 +17,27 @@ from sim.tracing import lighting
 from sim.tracing.areas.light_nodes import BODY_SPACING, MARGIN, SIDES, SPACING, LightNodes, NodeLight, NodeTables
 from sim.tracing.closed_form_tracer import ClosedForm, Irradiance
 
-# Chosen. In navigation, nodes half as dense make the error twice as large; four times as many rays, or bodies' places
-# twice as dense, change it by a fiftieth.
-RAYS = 256  # from a node
-NORMALS = 96  # of a body's surface, to which sixteen harmonics are fitted
-FOURS = 4  # of floats: sixteen harmonics
-ORDERS = 16  # of reflections, at most; each is worth no more than the share of light that surfaces send on
-CHANGE = 1e-3  # of the most light that arrives anywhere: less is no change
+# Chosen. In navigation, half the density of nodes doubles the error. Four times the rays, or twice the density of
+# bodies' places, change it by a fiftieth.
+RAYS = 256  # rays from a node
+NORMALS = 96  # normals of a body's surface, to which sixteen harmonics are fitted
+FOURS = 4  # groups of four floats: sixteen harmonics
+ORDERS = 16  # largest number of reflections; each adds at most the share of light that surfaces reflect
+CHANGE = 1e-3  # share of the largest irradiance: smaller changes end the iteration
 LANES = 2**21  # rays traced at once
 
 
 class Baking:
-    """What has yet to be baked: for bodies of these kinds, radius and height of the centre [m]."""
+    """Tables that are not yet baked; kinds: of bodies, radius and height of the centre [m]."""
 
     def __init__(self, tracer: ClosedForm, nodes: LightNodes, kinds: list[tuple[float, float]]) -> None:
         self._tracer, self._nodes, self._kinds = tracer, nodes, kinds
         self._orders = ORDERS if tracer.light == lighting.ALL else 1
-        self._arriving: Irradiance | None = None  # what is known so far, where it is wanted
+        self._arriving: Irradiance | None = None  # light of fewer reflections, if it is to be added
 
     @property
     def ingredients(self) -> list[np.ndarray]:
-        """All that the tables depend on."""
+        """All arrays that the tables depend on."""
         walls, components = self._tracer.walls, self._tracer.components
         settings = [SPACING, BODY_SPACING, RAYS, NORMALS, MARGIN]
         lights = [light.direction for light in self._tracer.lights]
@@ -45,8 +46,8 @@ class Baking:
         return [np.asarray(a, np.float64) for a in (*surfaces, walls.floor, *light, self._kinds, settings)]
 
     def tables(self) -> dict[str, np.ndarray]:
-        """All of them, float32, flat, by name: one for each component. Each time round, light has been reflected once
-        more, until that changes nothing."""
+        """Return all tables by name, one for each component, float32, flat. Each iteration adds one reflection, until
+        the tables stop changing."""
         found = self._surfaces()
         for _ in range(self._orders - 1):
             self._arriving = self._between(found)
@@ -59,7 +60,7 @@ class Baking:
         return {name: np.ascontiguousarray(table) for name, table in found.items()}
 
     def _between(self, found: dict[str, np.ndarray]) -> Irradiance:
-        """What these tables say of any point."""
+        """Return a function for the irradiance at any point, interpolated in these tables."""
         light, count = NodeLight(self._nodes, len(self._tracer.basis)), range(len(self._tracer.basis))
         floor, walls = ([floats(found[f"bounced_{name}_{k}"]) for k in count] for name in ("floor", "walls"))
         tables = NodeTables(floats(self._nodes.cells), floor, walls)
@@ -74,7 +75,7 @@ class Baking:
         }
 
     def _on_floor(self) -> np.ndarray:
-        """(node, component), in order of cell, y and x."""
+        """Return the light on the floor, (node, component), in order of cell, y and x."""
         places = _within(self._nodes.grid.side, self._nodes.across)
         y, x = (a.ravel() for a in np.meshgrid(places, places, indexing="ij"))
         points = self._nodes.grid.corners[:, None] + np.stack([x, y], axis=-1)
@@ -82,7 +83,8 @@ class Baking:
         return self._gathered(points, np.tile([0.0, 0, 1], (len(points), 1)))
 
     def _on_walls(self) -> np.ndarray:
-        """(node, component), in order of cell, side, z and place along the wall; 0 where there is no wall."""
+        """Return the light on walls, (node, component), in order of cell, side, z and place along the wall; 0 without a
+        wall."""
         n, grid = self._nodes.across * self._nodes.up, self._nodes.grid
         light = np.zeros((len(grid.corners), len(SIDES), n, len(self._tracer.basis)))
         free = np.pad(grid.free, 1, constant_values=True)
@@ -105,7 +107,7 @@ class Baking:
         return light.reshape(-1, light.shape[-1])
 
     def _on_body(self, radius: float, height: float) -> np.ndarray:
-        """Harmonics (place, FOURS * 4, component) of the light on a body's surface, in order of cell, y and x."""
+        """Return harmonics (place, FOURS * 4, component) of the light on a body's surface, ordered by cell, y and x."""
         offsets = np.linspace(0, self._nodes.grid.side, self._nodes.places)
         y, x = (a.ravel() for a in np.meshgrid(offsets, offsets, indexing="ij"))
         centres = (self._nodes.grid.corners[:, None] + np.stack([x, y], axis=-1)).reshape(-1, 2)
@@ -122,20 +124,22 @@ class Baking:
     def _gathered(
         self, points: np.ndarray, normals: np.ndarray, shade: tuple[float, np.ndarray] | None = None
     ) -> np.ndarray:
-        """Irradiance of what walls and floor reflect onto points (n, 3), per component, (n, component); shade: radius
-        and centre of a body at each point that casts its shadow."""
+        """Return the irradiance of points (n, 3) by light that walls and floor reflect, (n, component).
+
+        shade: radius of a body that casts a shadow, and its centre for each point
+        """
         rays = RAYS
         samples = mi.Point2f(*(floats(np.tile(c, max(LANES // rays, 1))) for c in low_discrepancy(rays).T))
         dr.eval(samples)
         step, found = max(LANES // rays, 1), []
         for first in range(0, len(points), step):
             part = slice(first, first + step)
-            # As many lanes every time, so that one kernel serves all.
+            # The number of lanes is constant, so that one kernel serves all parts.
             point, normal, body = (
                 mi.Point3f(*(floats(np.repeat(np.resize(c, step), rays)) for c in a[part].T))
                 for a in (points, normals, shade[1] if shade else points)
             )
-            ray = lighting.onwards(point, mi.Normal3f(normal), samples)
+            ray = lighting.spawn_bounce_ray(point, mi.Normal3f(normal), samples)
             light = self._tracer.returned(ray, body, shade[0] if shade else 0.0, self._arriving)
             means = [dr.block_reduce(dr.ReduceOp.Add, c, rays) for c in light]
             dr.eval(means)
@@ -144,12 +148,12 @@ class Baking:
 
 
 def _within(length: float, nodes: int) -> np.ndarray:
-    """Their places, off the ends."""
+    """Return the places of nodes along a length, not at its ends."""
     return np.clip(np.linspace(0, length, nodes), MARGIN, length - MARGIN)
 
 
 def _evenly(n: int) -> np.ndarray:
-    """n directions (n, 3): Fibonacci's spiral."""
+    """Return n directions (n, 3) on Fibonacci's spiral."""
     i = np.arange(n) + 0.5
     z, azimuth = 1 - 2 * i / n, np.pi * (1 + np.sqrt(5)) * i
     r = np.sqrt(1 - z * z)
@@ -157,7 +161,7 @@ def _evenly(n: int) -> np.ndarray:
 
 
 def spherical_harmonics(x: Array, y: Array, z: Array) -> list[Array]:
-    """Spherical harmonics of degree 0 to 3 in the direction (x, y, z), not normalised."""
+    """Return the spherical harmonics of degree 0 to 3 in the direction (x, y, z), not normalised."""
     xx, yy, zz = x * x, y * y, z * z
     flat = [x * 0 + 1, x, y, z, x * y, y * z, z * x, xx - yy, 3 * zz - 1]
     cubic = [y * (3 * xx - yy), x * y * z, y * (5 * zz - 1), z * (5 * zz - 3), x * (5 * zz - 1), z * (xx - yy)]

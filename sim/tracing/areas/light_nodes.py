@@ -1,6 +1,6 @@
-"""Where the light that walls and floor send on to each other is known, and what it is in between.
+"""Nodes at which the light that walls and floor send to each other is known, and interpolation between them.
 
-Every free cell of the grid has nodes of its own on its floor and on each of the walls around it, and places for bodies.
+Every free cell of the grid has its own nodes on its floor and on each of the walls around it, and places for bodies.
 """
 
 from __future__ import annotations
@@ -18,19 +18,19 @@ from sim.tracing.areas.cell_grid import CellGrid
 from sim.tracing.areas.patch import Patch
 from sim.tracing.walls import NoClosedForm, Walls
 
-# Chosen. In navigation, nodes half as dense make the error twice as large; bodies' places twice as dense change it by a
-# fiftieth.
-SPACING = 0.25  # [m] of nodes on floor and walls, at most
-BODY_SPACING = 1.0  # [m] of the places of bodies, at most
-MARGIN = 0.02  # [m] from a cell's borders, at least: nodes lie on one side of each edge
+# Chosen. In navigation, half the density of nodes doubles the error; twice the density of bodies' places changes it by
+# a fiftieth.
+SPACING = 0.25  # largest spacing of nodes on floor and walls [m]
+BODY_SPACING = 1.0  # largest spacing of bodies' places [m]
+MARGIN = 0.02  # smallest distance from a cell's borders [m], so that nodes lie on one side of each edge
 MOST_NODES = 2**22
-SIDES = np.array([[-1, 0], [1, 0], [0, -1], [0, 1]])  # on which side of its cell a wall stands
+SIDES = np.array([[-1, 0], [1, 0], [0, -1], [0, 1]])  # sides of a cell, on which walls may stand
 
 
 @dataclass(frozen=True)
 class LightNodes:
-    """Where light is known. floor, top: heights of the floor and of the walls' tops [m] · across, up, places: nodes
-    along a cell, up a wall, and places of bodies along a cell."""
+    """Nodes of a world. floor, top: heights of the floor and of the walls' tops [m] · across, up, places: number of
+    nodes along a cell and up a wall, and of bodies' places along a cell."""
 
     grid: CellGrid
     floor: float
@@ -40,15 +40,15 @@ class LightNodes:
     places: int
 
     @classmethod
-    def of(cls, walls: Walls) -> LightNodes:
-        """Of a world of walls of one height.
+    def from_walls(cls, walls: Walls) -> LightNodes:
+        """Return the nodes of a world of walls of one height.
 
         Raises:
             NoClosedForm: no walls, or too many nodes.
         """
         if not len(walls):
             raise NoClosedForm("no walls, between which light would be reflected")
-        grid, floor, top = CellGrid.of(walls), walls.floor, float(walls.top.max())
+        grid, floor, top = CellGrid.from_walls(walls), walls.floor, float(walls.top.max())
         across, up = _count(grid.side, SPACING), _count(top - floor, SPACING)
         total = grid.free.sum() * across * (across + len(SIDES) * up)
         if total > MOST_NODES:
@@ -57,13 +57,13 @@ class LightNodes:
 
     @property
     def cells(self) -> np.ndarray:
-        """Their numbers, float32, flat, for the kernel."""
+        """Numbers of the cells, float32, flat, for the kernel."""
         return self.grid.numbers.astype(np.float32).ravel()
 
 
 @dataclass(frozen=True)
 class NodeTables:
-    """cells: numbers of the free ones · floor, walls: light at their nodes, an array per component"""
+    """cells: numbers of the free cells · floor, walls: light at their nodes, one array per component"""
 
     cells: Array
     floor: list[Array]
@@ -71,22 +71,22 @@ class NodeTables:
 
 
 class NodeLight:
-    """Light between the nodes; the tables that it reads are handed to each call.
+    """Light interpolated between nodes, from tables that are passed to each call.
 
-    nodes: where it is known · components: of light
+    nodes: at which the light is known · components: number of components of light
     """
 
     def __init__(self, nodes: LightNodes, components: int) -> None:
         self._nodes, self._components = nodes, components
 
     def on_floor(self, patch: Patch, tables: NodeTables) -> list[Array]:
-        """Irradiance of what is reflected onto a patch of the floor, per component."""
+        """Return the irradiance of a patch of the floor by reflected light, per component."""
         cell, x, y = self._nodes.grid.locate(patch.point, tables.cells)
         n = self._nodes.across
         return self._interpolate(tables.floor, cell * (n * n), (x, n), (y, n))
 
     def on_wall(self, patch: Patch, tables: NodeTables) -> list[Array]:
-        """The same of a wall."""
+        """Return the irradiance of a patch of a wall by reflected light, per component."""
         normal = patch.normal
         cell, x, y = self._nodes.grid.locate(patch.point + normal * MARGIN, tables.cells)
         along_y = dr.abs(normal.x) > 0.5
@@ -97,7 +97,7 @@ class NodeLight:
         return self._interpolate(tables.walls, first, (across, self._nodes.across), (z, self._nodes.up))
 
     def on_surface(self, point: Array, normal: Array, tables: NodeTables) -> list[Array]:
-        """The same at a point of the one or the other."""
+        """Return the irradiance at a point of the floor or of a wall by reflected light, per component."""
         nothing = mi.Vector3f(0)
         patch = Patch(point, normal, nothing, nothing)
         either = zip(self.on_floor(patch, tables), self.on_wall(patch, tables), strict=True)
@@ -110,7 +110,7 @@ class NodeLight:
 
 
 def corners(first: Array, *axes: tuple[Array, int]) -> Iterator[tuple[Array, Array]]:
-    """Index and weight of the four nodes around a place (x, y) in [0, 1], of so many nodes along each axis."""
+    """Yield index and weight of the four nodes around a place; axes: x and y in [0, 1], each with a number of nodes."""
     (x, nx), (y, ny) = axes
     x, y = dr.clip(x, 0, 1) * (nx - 1), dr.clip(y, 0, 1) * (ny - 1)
     i, j = dr.minimum(dr.floor(x), nx - 2), dr.minimum(dr.floor(y), ny - 2)

@@ -1,4 +1,4 @@
-"""Tables of reflected light are kept on disk: they take seconds to bake and are the same for the same world."""
+"""A cache on disk of tables of reflected light, which take seconds to bake and are the same for the same world."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ import numpy as np
 
 from sim.tracing.areas.light_baking import Baking
 
-VERSION = 1  # of what is baked: another one if the same ingredients give other tables
-KEPT = 200  # files, at most; the oldest go first
+VERSION = 1  # version of the tables, to be increased when the same ingredients give other tables
+KEPT = 200  # largest number of files; the oldest are deleted first
 
 
 def cache_folder() -> Path:
-    """Where they are kept."""
+    """Return the folder of the cache."""
     return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "rhabdom" / "light"
 
 
 def stored(baking: Baking) -> dict[str, np.ndarray]:
-    """The tables, from disk where they are there. Without a disk to write to they are baked every time."""
+    """Return the tables, from disk if they are there. Without a writable disk they are baked every time."""
     path = cache_folder() / f"{_digest(baking.ingredients)}.npz"
-    # A file that is missing, cut off or someone else's is baked anew.
+    # If a file is missing, truncated or foreign, the tables are baked again.
     with contextlib.suppress(OSError, ValueError, zipfile.BadZipFile, EOFError), np.load(path) as file:
         return {name: file[name] for name in file.files}
     tables = baking.tables()
@@ -44,7 +44,7 @@ def _digest(ingredients: list[np.ndarray]) -> str:
 
 
 def _write(path: Path, tables: dict[str, Any]) -> None:
-    """Whole or not at all, whoever else writes it at the same time."""
+    """Write the file completely or not at all, even if other processes write it at the same time."""
     path.parent.mkdir(parents=True, exist_ok=True)
     for old in sorted(path.parent.glob("*.npz"), key=lambda p: p.stat().st_mtime)[: -(KEPT - 1)]:
         old.unlink(missing_ok=True)

@@ -1,7 +1,7 @@
-"""Light that the world's own walls and floor send on to each other, looked up in tables that are baked beforehand.
+"""Light that the walls and the floor of a world send to each other, looked up in tables that are baked beforehand.
 
-Every free cell of the grid has a table of its own for its floor and for each of the walls around it, and one for bodies
-in it: how much light arrives on their surface from any side (`sim.tracing.areas.light_baking`).
+Every free cell of the grid has its own table for its floor and for each of the walls around it. It also has a table of
+the light that arrives from all sides on the surface of bodies in the cell (`sim.tracing.areas.light_baking`).
 """
 
 from __future__ import annotations
@@ -23,30 +23,30 @@ from sim.tracing.closed_form_tracer import ClosedForm
 
 @dataclass(frozen=True)
 class LightTables(NodeTables):
-    """bodies: harmonics of the light on bodies of each kind, an array per component"""
+    """bodies: harmonics of the light on bodies of each kind, one array per component"""
 
     bodies: list[list[Array]]
 
 
 class LightTable(NodeLight):
-    """tracer: of rays through the same world, whose components the tables have
-    radii, heights: of the bodies that are seen and of their centres [m]
+    """tracer: of rays through the same world; the tables have its components of light
+    radii, heights: of the visible bodies and of their centres [m]
 
     tables: for the kernel
 
     Raises:
-        NoClosedForm: no walls, or so many cells that their tables would be too large.
+        NoClosedForm: no walls, or too many cells for the tables.
     """
 
     def __init__(self, tracer: ClosedForm, radii: np.ndarray, heights: np.ndarray) -> None:
         kinds = [(float(r), float(h)) for r, h in zip(radii, heights, strict=True)]
         known = sorted(set(kinds))
         self._kinds = [known.index(kind) for kind in kinds]
-        super().__init__(LightNodes.of(tracer.walls), len(tracer.basis))
+        super().__init__(LightNodes.from_walls(tracer.walls), len(tracer.basis))
         self.tables = _tables(light_store.stored(Baking(tracer, self._nodes, known)), self._nodes, len(known))
 
     def on_body(self, body: int, centre: Array, tables: LightTables) -> list[list[Array]]:
-        """Harmonics of what arrives on a body, per component, for `sum_of`."""
+        """Return harmonics of the light that arrives on a body, per component, for `sum_of`."""
         cell, x, y = self._nodes.grid.locate(centre, tables.cells)
         n, found = self._nodes.places, []
         for table in tables.bodies[self._kinds[body]]:
@@ -61,7 +61,7 @@ class LightTable(NodeLight):
 
 
 def _tables(baked: dict[str, np.ndarray], nodes: LightNodes, kinds: int) -> LightTables:
-    """What was baked, on the device."""
+    """Return the baked tables on the device."""
 
     def of(name: str) -> list[Array]:
         count = sum(key.startswith(f"{name}_") for key in baked)
@@ -72,7 +72,7 @@ def _tables(baked: dict[str, np.ndarray], nodes: LightNodes, kinds: int) -> Ligh
 
 
 def sum_of(fours: list[Array], normal: Array) -> Array:
-    """What harmonics, in fours, say of a direction."""
+    """Return the sum of harmonics, given in fours, in a direction."""
     values = spherical_harmonics(normal.x, normal.y, normal.z)
     return sum((four[i] * v for four, i, v in _spread(fours, values)), mi.Float(0))
 

@@ -1,4 +1,4 @@
-"""Which share of a patch a light reaches: edges of shadows are straight lines across it."""
+"""The share of a patch that a light reaches: edges of shadows are straight lines across the patch."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from sim.tracing.areas.patch import Patch
 from sim.tracing.wall_intersection import NEVER_ZERO, cells_of
 from sim.tracing.walls import NoClosedForm, Walls
 
-BESIDE = 1e-3  # [m] in front of a wall: in the cell from which it is seen
+BESIDE = 1e-3  # distance in front of a wall [m], in the cell from which it is visible
 NEIGHBOURS = tuple((row, column) for row in (-1, 0, 1) for column in (-1, 0, 1))
 
 
 def lit_past_sphere(patch: Patch, directions: list[list[float]], centre: Array, radius: Array) -> list[Array]:
-    """Share of a patch on which a sphere casts no shadow, for each light."""
+    """Return the share of a patch on which a sphere casts no shadow, for each light."""
     way = centre - patch.point
     slope = max(math.hypot(*d[:2]) / d[2] for d in directions)
     patch_reach = (dr.norm(patch.along) + dr.norm(patch.across)) / 2
@@ -35,7 +35,8 @@ def lit_past_sphere(patch: Patch, directions: list[list[float]], centre: Array, 
 
 
 def _lit_past_sphere(patch: Patch, direction: list[float], way: Array, radius: Array) -> Array:
-    """Near the patch the shadow's rim is a straight line, or two; on larger patches it is a disk that lies within."""
+    """Return the share without the shadow for one light. On small patches the shadow's rim is one straight line or two;
+    on large patches the shadow is a disk that lies within."""
     towards = mi.Vector3f(*direction)
     ahead = dr.dot(way, towards)
     beside = way - ahead * towards
@@ -43,22 +44,22 @@ def _lit_past_sphere(patch: Patch, direction: list[float], way: Array, radius: A
     across = beside / dr.maximum(distance, NEVER_ZERO)
     p, q = dr.dot(across, patch.along), dr.dot(across, patch.across)
     strip = share_above(radius - distance, p, q) - share_above(-radius - distance, p, q)
-    seen = dr.abs(dr.dot(towards, dr.cross(patch.along, patch.across)))  # from the light
+    seen = dr.abs(dr.dot(towards, dr.cross(patch.along, patch.across)))  # area of the patch, seen from the light
     disk = math.pi * dr.square(radius) / dr.maximum(seen, NEVER_ZERO)
     return 1 - dr.select(ahead > 0, dr.minimum(strip, disk), 0)
 
 
 class WallShadows:
-    """Shadows that walls of one height cast, no further than into the next cell of the grid that they stand on.
+    """Shadows of walls of one height, which reach at most into the next cell of the walls' grid.
 
-    Seen from a point in a cell without a wall, light comes over the cell beside it, the cell before it and the one
-    across the corner. Which of them are walls is known per cell; on which the ray meets first, and whether it is above
-    their tops by then, is decided by three straight lines.
+    Light comes to a point in a free cell over the next cell along x, the next cell along y, or the cell across the
+    corner. A table states for each cell which of these are walls. Three straight lines across the patch decide which of
+    them the ray enters first, and whether it is above their tops there.
 
-    around: which cells around each one are walls, for the kernel; None: there are no walls
+    around: which cells around each cell are walls, for the kernel; None without walls
 
     Raises:
-        NoClosedForm: walls on no grid, and shadows that reach further.
+        NoClosedForm: walls on no grid, or shadows that reach further.
     """
 
     def __init__(self, walls: Walls, directions: list[list[float]]) -> None:
@@ -79,8 +80,8 @@ class WallShadows:
         self._corner, (self._rows, self._columns) = origin - self._side, around.shape
         self.around = floats(around)
 
-    def lit(self, patch: Patch, directions: list[list[float]], table: Array | None) -> list[Array]:
-        """Share of the patch that each light reaches."""
+    def visibility(self, patch: Patch, directions: list[list[float]], table: Array | None) -> list[Array]:
+        """Return the share of the patch that each light reaches."""
         if table is None:
             return [mi.Float(1) for _ in directions]
         clear = patch.point + patch.normal * BESIDE
@@ -99,7 +100,7 @@ class WallShadows:
         return only_where(concerns, lit, [1.0] * len(directions))
 
     def _lit_from(self, patch: Patch, direction: list[float], row: Array, column: Array, around: Array) -> Array:
-        """1 - share of what lies behind the cells that the ray crosses into along x, along y, or through the corner."""
+        """Return 1 - the share behind the cells that the ray enters along x, along y, or through the corner."""
         dx, dy = (math.copysign(max(abs(d), NEVER_ZERO), d) for d in direction[:2])
         dz = direction[2]
         crosses_x, crosses_y = (
@@ -125,7 +126,7 @@ def _share(value: Array, patch: Patch, gradient: tuple[float, float, float]) -> 
 
 
 def _behind(direction: list[float]) -> tuple[tuple[int, int], ...]:
-    """Neighbours (row, column) that light from there crosses: along x, along y, through the corner."""
+    """Return the neighbours (row, column) that light from a direction crosses: along x, along y, through the corner."""
     x, y = (1 if d > 0 else -1 for d in direction[:2])
     return (0, x), (y, 0), (y, x)
 

@@ -1,7 +1,7 @@
-"""How much of an area a sphere fills, and which patch of the sphere that is.
+"""The share of an area that a sphere fills, and the patch of the sphere that is visible there.
 
-A sphere's outline on the tangent plane is a conic. A few lines across the area are cut with it exactly; between them
-it is taken as straight.
+A sphere's outline on the tangent plane is a conic. A few lines across the area are intersected with it exactly. Between
+these lines, the outline is approximated by straight lines.
 """
 
 from __future__ import annotations
@@ -17,20 +17,20 @@ from sim.tracing.areas.half_planes import share_above
 from sim.tracing.areas.patch import Area, Patch, Rectangle
 from sim.tracing.areas.stripes import Texture
 
-# Chosen: strips across what an area sees of a sphere, and parts of each. Wide areas take more: else they would have to
-# be two (docs/measurements/rendering.md#area-sampling).
+# Chosen: strips across the visible part of a sphere, and slices of each strip. Wide areas have more, because they would
+# have to be split otherwise (docs/measurements/rendering.md#area-sampling).
 SIDES, SIDES_OF_WIDE = 3, 4
-WIDE = 0.0555  # on the plane at distance 1: 3.2 degrees
-# Cosine below which a surface does not slope further away from the eye: beyond, its patch would be longer than the
-# sphere.
+WIDE = 0.0555  # width on the plane at distance 1: 3.2 degrees
+# Smallest cosine between a surface's normal and the direction to the eye. Smaller ones would make its patch longer than
+# the sphere.
 GRAZING = 0.15
 TINY = 1e-12
-NEARLY_OPEN = 1e-4  # chosen: outlines that are longer than some 100 times their width are cut as if they were open
+NEARLY_OPEN = 1e-4  # chosen: outlines that are longer than some 100 times their width are cut like open ones
 
 
 @dataclass(frozen=True)
 class SphereTexture:
-    """column = to_column @ (u, v, 1), of a texture along one axis · frame: from the sphere's axes to the world's."""
+    """A texture along one axis: column = to_column @ (u, v, 1) · frame: from the sphere's axes to the world's."""
 
     texture: Texture
     to_column: np.ndarray
@@ -39,10 +39,10 @@ class SphereTexture:
 
 @dataclass(frozen=True)
 class Slice:
-    """Of what an area sees of a sphere.
+    """A slice of a sphere's visible part in an area.
 
-    share: of the area that it fills
-    seen, along, across: direction of its middle, and its sides on the area's plane · patch: what is seen there
+    share: of the area that the slice fills
+    seen, along, across: direction of its middle, and its sides on the area's plane · patch: of the sphere's surface
     """
 
     share: Array
@@ -51,29 +51,29 @@ class Slice:
     across: Array
     patch: Patch
 
-    def vergence(self, area: Area) -> Array:
-        """1/z along the eye's axis [1/m]."""
+    def inverse_distance(self, area: Area) -> Array:
+        """Return 1/z along the eye's axis [1/m]."""
         found: Array = dr.norm(self.seen) * dr.rcp(dr.norm(self.patch.point - area.origin))
         return found
 
 
 @dataclass(frozen=True)
 class Strip(Slice):
-    """Slices in a row, as one. part: which of the area that is, nearly"""
+    """A row of slices as one. part: the part of the area that it fills, approximately"""
 
     part: Rectangle
 
 
 class SphereView:
-    """What an area sees of a sphere: strips across what it fills, cut to as many slices each.
+    """The visible part of a sphere in an area, divided into strips, and each strip into slices.
 
-    sides: how many
+    sides: number of strips, and of slices in each strip
     """
 
     def __init__(self, area: Area, centre: Array, radius: float) -> None:
         self._area, self._centre = area, centre
         self._way = way = centre - area.origin
-        # Squared length of the lines that touch the sphere.
+        # Squared length of the tangents from the eye to the sphere.
         self._tangent = tangent = dr.maximum(dr.squared_norm(way) - radius * radius, TINY)
         self._ahead = ahead = area.direction(0, 0)
         right, up = mi.Vector3f(area.right.x, area.right.y, 0), mi.Vector3f(0, 0, area.height)
@@ -81,23 +81,23 @@ class SphereView:
         def slope(side: Array) -> Array:
             return dr.abs(dr.dot(way, ahead) * dr.dot(way, side) - tangent * dr.dot(ahead, side))
 
-        # Lines run towards the outline, so that they cut it steeply.
+        # Lines run towards the outline, so that they cut it at a steep angle.
         self._upright = upright = slope(right) <= slope(up)
         self._along, self._across = dr.select(upright, up, right), dr.select(upright, right, up)
         self._outline = _outline(way, radius, ahead, self._along, self._across)
         self.sides = dr.select(dr.norm(area.right) > WIDE, mi.UInt32(SIDES_OF_WIDE), mi.UInt32(SIDES))
 
     def whole(self) -> Strip:
-        """All that is seen, as if it were one."""
+        """Return the whole visible part as one strip."""
         return self._between(mi.Float(0), mi.Float(1))
 
     def strip(self, number: Array) -> Strip:
-        """One of them."""
+        """Return one of the strips."""
         per = dr.rcp(mi.Float(self.sides))
         return self._between(mi.Float(number) * per, (mi.Float(number) + 1) * per)
 
     def _between(self, low: Array, high: Array) -> Strip:
-        """With such shares of what is seen before its sides."""
+        """Return the strip between two cumulative shares of the visible part."""
         outline = self._outline
         one, other = outline.edge(low), outline.edge(high)
         place, width = (one.place + other.place) / 2, other.place - one.place
@@ -110,7 +110,7 @@ class SphereView:
         return Strip(length * width, seen, *sides, self._patch(seen, *sides), dr.select(self._upright, *upright))
 
     def slice(self, strip: Strip, number: Array) -> Slice:
-        """One of a strip's."""
+        """Return one slice of a strip."""
         per = dr.rcp(mi.Float(self.sides))
         seen = strip.seen + strip.along * ((mi.Float(number) + 0.5) * per - 0.5)
         sides = strip.along * per, strip.across
@@ -122,7 +122,7 @@ class SphereView:
 
 @dataclass(frozen=True)
 class _Edge:
-    """Of a strip. place: across the area, -1/2 to 1/2 · angle, sine: place = outline.middle + outline.half · sine"""
+    """An edge of a strip. place: across the area, ±1/2 at most · angle, sine: place = outline.middle + .half · sine"""
 
     place: Array
     angle: Array
@@ -131,12 +131,12 @@ class _Edge:
 
 @dataclass(frozen=True)
 class _Outline:
-    """A sphere's outline on an area's tangent plane, in sides of the area.
+    """A sphere's outline on an area's tangent plane, in units of the area's sides.
 
-    closed: an ellipse, which is what the rest is about · middle: of it, across and along the area
-    half: how far it reaches to either side of it across the area, and half of the chord through it along the area
-    slant: how far chords move along the area from one side to the other, by place
-    low, high: angles at which the area cuts it off
+    closed: whether it is an ellipse, which the other fields describe · middle: of it, across and along the area
+    half: half of the ellipse's width across the area, and half of the chord through its middle along the area
+    slant: shift of chords along the area per unit of place across it
+    low, high: angles at which the area cuts the ellipse off
     """
 
     closed: Array
@@ -147,15 +147,15 @@ class _Outline:
     high: Array
 
     def edge(self, share: Array) -> _Edge:
-        """Of strips, with such a share of them before it."""
+        """Return the edge of a strip that has this share of the visible part before it."""
         angle = dr.fma(self.high - self.low, share, self.low)
         sine = dr.sin(angle)
         place = dr.select(self.closed, dr.fma(self.half[0], sine, self.middle[0]), share - 0.5)
         return _Edge(dr.clip(place, -0.5, 0.5), angle, sine)
 
     def mean_chord(self, one: _Edge, other: _Edge) -> tuple[Array, Array]:
-        """Length and middle of what the area leaves of the chord that is as long as those between two edges are on
-        average: areas of ellipses are exact."""
+        """Return length and middle of a chord, cut to the area. The chord is as long as the average chord between two
+        edges, so that areas of ellipses are exact."""
         double = other.sine * dr.cos(other.angle) - one.sine * dr.cos(one.angle)
         mean = (other.angle - one.angle + double) / (2 * dr.maximum(other.sine - one.sine, TINY))
         middle = self.middle[1] + self.slant * ((one.place + other.place) / 2 - self.middle[0])
@@ -164,7 +164,7 @@ class _Outline:
 
 
 def _outline(way: Array, radius: float, ahead: Array, along: Array, across: Array) -> _Outline:
-    """Of v = ahead + x across + y along, those with |way × v|² < radius² |v|² meet the sphere."""
+    """Return the outline: v = ahead + x across + y along hits the sphere if |way × v|² < radius² |v|²."""
     x, y, z = (dr.cross(way, v) for v in (across, along, ahead))
     square = radius * radius
 
@@ -186,23 +186,23 @@ def _outline(way: Array, radius: float, ahead: Array, along: Array, across: Arra
 
 
 def may_see(area: Area, centre: Array, radius: float) -> Array:
-    """Whether an area might see a sphere: false where it surely does not."""
+    """Return whether a sphere may be visible in an area; false only if it certainly is not."""
     way = centre - area.origin
     ahead = area.direction(0, 0)
     beside = dr.cross(way, ahead)
     along = dr.dot(way, ahead)
-    # Tangent of the sphere's radius as seen from the area's middle, plus half of the area's diagonal, on its plane.
+    # Tangent of the sphere's angular radius around the area's middle, plus half of the area's diagonal, on its plane.
     half = dr.sqrt(dr.squared_norm(area.right) + dr.square(area.height)) / 2
     reach = radius * dr.norm(ahead) + half * dr.norm(way)
     return (dr.squared_norm(beside) < dr.square(reach)) & (along > -radius * dr.norm(ahead))
 
 
 def columns_of(texture: SphereTexture, patch: Patch, radius: float) -> tuple[Array, tuple[Array, Array]]:
-    """Where in the texture the middle of the patch is, and how many columns its sides span."""
+    """Return the column of the patch's middle in the texture, and the number of columns that each side spans."""
     to_local = mi.Matrix3f(texture.frame.T.tolist())
     n, along, across = (to_local @ mi.Vector3f(v) for v in (patch.normal, patch.along, patch.across))
     per_u, per_v, at = map(float, texture.to_column)
-    sine = dr.maximum(dr.square(n.x) + dr.square(n.y), 1e-4)  # squared, of the polar angle
+    sine = dr.maximum(dr.square(n.x) + dr.square(n.y), 1e-4)  # squared sine of the polar angle
     column, slopes = mi.Float(at), [mi.Float(0), mi.Float(0)]
     if per_u:
         u = dr.atan2(n.y, n.x) * dr.inv_two_pi
@@ -217,7 +217,7 @@ def columns_of(texture: SphereTexture, patch: Patch, radius: float) -> tuple[Arr
 
 
 def hidden_by(way: Array, radius: Array, slice_: Slice) -> Array:
-    """Share of a slice that another sphere hides, whose outline is taken as straight there; way: to its centre."""
+    """Return the share of a slice that another sphere hides, with a straight outline there; way: to its centre."""
     seen, sides = slice_.seen, (slice_.along, slice_.across)
     length, moment = dr.norm(seen), dr.cross(way, seen)
     beside = dr.maximum(dr.norm(moment), TINY)
@@ -226,8 +226,9 @@ def hidden_by(way: Array, radius: Array, slice_: Slice) -> Array:
 
 
 def _chord(way: Array, tangent: Array, start: Array, side: Array) -> tuple[Array, Array]:
-    """Length and middle, in sides, of where start + x side meets the sphere, |x| up to 1/2: where
-    q2 x² + 2 q1 x + q0 > 0, ahead of the eye."""
+    """Return length and middle, in units of `side`, of the chord on which start + x side hits the sphere.
+
+    Its points satisfy q2 x² + 2 q1 x + q0 > 0, have |x| up to 1/2 and lie ahead of the eye."""
     a, b = dr.dot(way, start), dr.dot(way, side)
     q2 = b * b - dr.squared_norm(side) * tangent
     q1 = a * b - dr.dot(start, side) * tangent
@@ -236,7 +237,7 @@ def _chord(way: Array, tangent: Array, start: Array, side: Array) -> tuple[Array
     root, per = dr.sqrt(dr.maximum(under, 0)), dr.rcp(dr.select(dr.abs(q2) < TINY, TINY, q2))
     one, other = (-q1 - root) * per, (-q1 + root) * per
     low, high = dr.minimum(one, other), dr.maximum(one, other)
-    # Where the sphere reaches beside the eye, the outline is open: from one of its branches on.
+    # If the sphere reaches to the side of the eye, the outline is open, and the chord starts at one of its branches.
     open_, right = q2 > 0, b > 0
     low, high = (
         dr.select(open_, dr.select(right, high, -dr.inf), low),
@@ -249,7 +250,7 @@ def _chord(way: Array, tangent: Array, start: Array, side: Array) -> tuple[Array
 
 
 def _patch(way: Array, tangent: Array, seen: Array, along: Array, across: Array, origin: Array, centre: Array) -> Patch:
-    """The patch around where a direction meets the sphere."""
+    """Return the patch around the point at which a direction hits the sphere."""
     length = dr.squared_norm(seen)
     ahead = dr.dot(way, seen)
     t = (ahead - dr.sqrt(dr.maximum(ahead * ahead - length * tangent, 0))) / length

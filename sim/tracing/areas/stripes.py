@@ -1,9 +1,8 @@
-"""Textures along one axis, averaged over stretches of it and over parallelograms: differences of integrals that are
-known beforehand.
+"""Averages of textures along one axis, over stretches and parallelograms, from differences of precomputed integrals.
 
-A stretch takes two looks at the integral, as prefix sums do; a parallelogram four looks at the integral of that.
-Between texels, textures are straight lines, so their integrals are parabolas and cubics. Only how a texture departs
-from its mean is integrated. Such integrals repeat with the texture and stay small, which float32 likes.
+A stretch takes two lookups of the first integral, as with prefix sums. A parallelogram takes four lookups of the second
+integral. Textures are linear between texels, so their integrals are parabolas and cubics. Only the deviation of a
+texture from its mean is integrated. Such integrals repeat with the texture and stay small, which suits float32.
 """
 
 from __future__ import annotations
@@ -18,16 +17,16 @@ import numpy as np
 from optics.numerics.autodiff import Array
 from sim.scene.device_arrays import floats
 
-# Texels: shorter stretches are as long. An integral of 100 texels is known to 4e-6, a mean over these to 1e-4.
+# Smallest length of a stretch [texels]. An integral of 100 texels is accurate to 4e-6, a mean over this length to 1e-4.
 LEAST = 0.1
-# Of a texture's columns, at least: sides of parallelograms are as long. Then the second integral, some 10⁻² of the
-# columns squared, is known well enough for a mean to 1e-3.
+# Smallest side of a parallelogram, as a share of the texture's columns. The second integral is about 10⁻² of the
+# columns squared. With this side it is accurate enough for a mean to 1e-3.
 LEAST_SIDE = 1 / 256
 
 
 @dataclass(frozen=True)
 class Texture:
-    """Where the kernel finds one: first: of its texels · columns: of them."""
+    """The place of a texture in the kernel's tables. first: its first texel · columns: number of its columns."""
 
     first: Array
     columns: Array
@@ -35,8 +34,12 @@ class Texture:
 
 @dataclass(frozen=True)
 class StripeTables:
-    """Of all textures, an array per component. rows: in fours, the second and the first integral up to each texel's
-    centre and how it and the next one depart from the texture's mean · means: that mean"""
+    """Tables of all textures, one array per component.
+
+    rows: in fours, the second and the first integral up to each texel's centre, and the deviations of this texel and of
+        the next one from the texture's mean
+    means: the textures' means, for each texel
+    """
 
     rows: list[Array]
     means: list[Array]
@@ -57,16 +60,16 @@ class Stripes:
             here = own - own.mean(axis=0)
             beyond = np.roll(here, -1, axis=0)
             once = _integral_up_to((here + beyond) / 2)
-            once -= (once + (2 * here + beyond) / 6).mean(axis=0)  # whose own integral then repeats, too
+            once -= (once + (2 * here + beyond) / 6).mean(axis=0)  # so that the second integral repeats, too
             twice = _integral_up_to(once + (2 * here + beyond) / 6)
             rows[first : first + columns] = np.stack([twice, once, here, beyond], axis=-1)
         count = range(self.components)
         self.tables = StripeTables([floats(rows[:, k]) for k in count], [floats(means[:, k]) for k in count])
 
     def mean(self, texture: Texture, ends: list[Array], spread: Array | float, tables: StripeTables) -> list[Array]:
-        """Mean reflectance, per component, over stretches one after the other that count the same.
+        """Return the mean reflectance, per component, over consecutive stretches of equal weight.
 
-        ends: of the stretches, texel centres at whole numbers · spread: what is seen beside, half to either side
+        ends: of the stretches, texel centres at whole numbers · spread: further width, half of it on either side
         """
         found = self._mean(texture, tables)
         for one, other in pairwise(ends):
@@ -80,9 +83,9 @@ class Stripes:
     def mean_over(
         self, texture: Texture, middle: Array, sides: tuple[Array, Array], tables: StripeTables
     ) -> list[Array]:
-        """Mean reflectance, per component, over a parallelogram.
+        """Return the mean reflectance, per component, over a parallelogram.
 
-        middle: of it, a column · sides: columns from one end to the other of either side, of any sign
+        middle: column of its middle · sides: number of columns that each side spans, of any sign
         """
         one, other = (dr.maximum(dr.abs(side), LEAST_SIDE * texture.columns) for side in sides)
         outer, inner, scale = (one + other) / 2, (one - other) / 2, dr.rcp(one * other)
@@ -96,17 +99,17 @@ class Stripes:
         return [dr.gather(mi.Float, tables.means[k], mi.UInt32(texture.first)) for k in range(self.components)]
 
     def _once(self, texture: Texture, x: Array, tables: StripeTables) -> list[Array]:
-        """Integral of the departures from the mean, up to x."""
+        """Return the integral of the deviation from the mean, up to x."""
         rows, past = self._rows(texture, x, tables)
         return [dr.fma(dr.fma((row.w - row.z) / 2, past, row.z), past, row.y) for row in rows]
 
     def _twice(self, texture: Texture, x: Array, tables: StripeTables) -> list[Array]:
-        """Integral of that."""
+        """Return the second integral of the deviation from the mean, up to x."""
         rows, past = self._rows(texture, x, tables)
         return [dr.fma(dr.fma(dr.fma((row.w - row.z) / 6, past, row.z / 2), past, row.y), past, row.x) for row in rows]
 
     def _rows(self, texture: Texture, x: Array, tables: StripeTables) -> tuple[list[Array], Array]:
-        """Of the texel below x, per component, and how far x is beyond its centre."""
+        """Return the rows of the texel below x, per component, and the distance of x from the texel's centre."""
         x = x - texture.columns * dr.floor(x / texture.columns)
         whole = dr.clip(dr.floor(x), 0, texture.columns - 1)
         index = mi.UInt32(texture.first + whole)
@@ -114,5 +117,5 @@ class Stripes:
 
 
 def _integral_up_to(steps: np.ndarray) -> np.ndarray:
-    """Sums of all steps before each one."""
+    """Return the sum of all steps before each step."""
     return np.cumsum(steps, axis=0) - steps

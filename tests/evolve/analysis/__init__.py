@@ -1,8 +1,8 @@
-"""Which test covers which module of evolve/analysis.
+"""Tests of evolve/analysis: which test covers which module.
 
 statistics: test_statistics.py, test_genealogy.py
 vision: test_vision.py
-mishaps: test_mishaps.py
+episode_failures: test_episode_failures.py
 genealogy: test_genealogy.py
 recorder: test_recorder.py, test_episode.py
 episode: test_episode.py, test_recorder.py

@@ -1,4 +1,4 @@
-"""Episodes compared."""
+"""Comparison of episodes."""
 
 import dataclasses
 from types import SimpleNamespace
@@ -7,7 +7,7 @@ import numpy as np
 
 
 def assert_same(one, other):
-    """Two episodes, bit for bit."""
+    """Assert that two episodes are equal, bit for bit."""
     for part in ("scene", "plan", "pictures"):
         np.testing.assert_equal(*(vars(getattr(each, part) or SimpleNamespace()) for each in (one, other)))
     plain = [vars(dataclasses.replace(each, scene=None, plan=None, pictures=None)) for each in (one, other)]

@@ -1,4 +1,4 @@
-"""A recorded episode: what it holds agrees with the worlds it was played in, and with its file."""
+"""A recorded episode agrees with the worlds in which it was played, and with its file."""
 
 import contextlib
 import dataclasses
@@ -30,7 +30,7 @@ from tests.evolve.small_run import PHENOTYPE, small_config
 
 
 def cut(episode, n):
-    """Its first n actions."""
+    """Return the episode's first n actions."""
     arrays = {k: v[:n] for k, v in vars(episode).items() if isinstance(v, np.ndarray) and len(v) == len(episode)}
     terms, beside = ({name: a[:n] for name, a in of.items()} for of in (episode.reward_terms, episode.beside))
     scene = {k: v[:n] for k, v in vars(episode.scene).items() if isinstance(v, np.ndarray)}
@@ -53,14 +53,14 @@ def test_what_happens_in_it_is_consistent(episode):
     np.testing.assert_array_equal(episode.beside["contact"][:, 0] > 0, episode.reward_terms["contact"] < 0)
     turns = np.diff(np.unwrap(episode.heading))
     np.testing.assert_allclose(turns, np.pi / 4 * episode.action[:-1, 1], atol=1e-6)
-    calm = (episode.reward_terms["goal"] == 0)[:-1]  # where the goal stays where it is
+    calm = (episode.reward_terms["goal"] == 0)[:-1]  # steps in which the goal does not move
     distance = np.linalg.norm(episode.objects[:, 0, :2] - episode.position, axis=1)
     progress = -1.5 * np.diff(distance)
     np.testing.assert_allclose(episode.reward_terms["progress"][:-1][calm], progress[calm], atol=1e-6)
 
 
 def test_signals_are_the_scene_at_the_recorded_pose_plus_noise(episode):
-    """Receptors see the mean of the radiance before them; noise has the spread the eye says (0.05), and no other."""
+    """Receptors see the mean of the radiance ahead of them. The noise has the eye's standard deviation (0.05)."""
     residual = episode.signals - episode.perfect_signals
     assert abs(residual.mean()) < 0.01
     # one ray per receptor against sixteen: aliasing at edges adds to the noise, but a wrong pose adds 0.1 and more
@@ -85,7 +85,7 @@ def test_file_holds_the_episode(episode, tmp_path):
 
 
 def test_a_file_holds_nothing_else_with_the_first_numpy_2(episode, tmp_path, monkeypatch):
-    """Whose savez takes every argument for an array."""
+    """NumPy 2.0's savez treats every argument as an array."""
     save = np.savez_compressed
 
     def of_2_0(file, **arrays):
@@ -130,7 +130,7 @@ def test_candidates_that_are_not_there_are_named(run, tmp_path):
 
 @pytest.mark.slow
 def test_an_agent_can_be_taken_out_of_its_run(run):
-    """As the tutorial says, through the package's own names."""
+    """The package's public names give the agent of a run, as in the tutorial."""
     opened = evolve.Run.open(run.path)
     best = opened.best
     worlds = sim.make_vec_env(
@@ -148,7 +148,7 @@ def test_policies_of_another_animal_or_damaged_are_named(run):
     try:
         seen = load_policy(policy).observation_space["eyes"].shape
         save_policy(build_policy(PolicyConfig((*seen[:-1], seen[-1] + 1), 8)), policy)
-        with pytest.raises(RunError, match=f"{policy.name} is another animal's: it sees .*, this one "):
+        with pytest.raises(RunError, match=f"{policy.name} is another animal's: its eyes have the shape "):
             record(run)
         for damage, named in (
             (math.nan, "it holds numbers that are not finite"),
@@ -168,8 +168,9 @@ def test_policies_of_another_animal_or_damaged_are_named(run):
 
 @pytest.mark.slow
 def test_perfect_eyes_are_shown_the_same_light():
-    """On the course a tenth of the light has been reflected more than once: a dusk eye sees it, and so do its
-    pictures."""
+    """A tenth of the light on the course has been reflected more than once. An eye in dim light sees it, and so do the
+    episode's images.
+    """
     config = small_config("navigation", noise_sigma=0.02)
     config = dataclasses.replace(config, eye=dataclasses.replace(config.eye, rays_per_receptor="auto"))
     animal = dataclasses.replace(PHENOTYPE, resolution=(4, 6), fov_deg=60.0)
@@ -196,7 +197,7 @@ def test_exr_files_hold_what_the_eyes_saw(episode, tmp_path):
     np.testing.assert_array_equal(right.receptors, episode.signals[64, 1])
     assert left.attributes["position_m"] == episode.position[64].tolist()
     assert left.attributes["eye_azimuth_deg"] == pytest.approx(30)
-    red, green, blue = left.peaks_nm  # by which previews choose their colours
+    red, green, blue = left.peaks_nm  # previews choose their colours by these peaks
     assert red > green > blue
 
 
@@ -215,7 +216,9 @@ def test_replay_sums_up_and_writes_a_page(run, episode):
 
 
 def test_a_maze_is_that_which_was_walked_through(episode, tmp_path):
-    """In the file, and in the ground plan; files from before there was a choice are of the first maze."""
+    """The maze of the world is in the file and in the ground plan. Files from before the setting show the first
+    maze.
+    """
     world = WorldConfig(mazes=2, unseen=True)
     columns, rest = of_first_form(dataclasses.replace(episode, task="maze", world=world))
     columns["objects"] = columns["objects"][:, :0]
@@ -236,7 +239,7 @@ def test_a_maze_is_that_which_was_walked_through(episode, tmp_path):
 
 
 def test_files_of_worlds_out_of_range_are_refused(episode, tmp_path):
-    """By the setting's name, before anything is built."""
+    """The error names the setting, before any world is built."""
     columns, rest = of_first_form(dataclasses.replace(episode, task="maze", world=WorldConfig(mazes=10**9)))
     np.savez(tmp_path / "large.npz", rest=np.array(json.dumps(rest)), **columns)
     with pytest.raises(ValueError, match=r"large\.npz holds no episode: world\.mazes = 1000000000: must be"):
@@ -244,7 +247,7 @@ def test_files_of_worlds_out_of_range_are_refused(episode, tmp_path):
 
 
 def test_archives_that_would_fill_the_memory_are_refused(tmp_path, monkeypatch):
-    """By their directory, before anything is unpacked; and what is no file at all."""
+    """The error follows from the archive's directory, before unpacking. A pipe is also refused."""
     bomb = tmp_path / "bomb.npz"
     np.savez_compressed(bomb, returns=np.zeros(2**22))
     monkeypatch.setattr(episode_file, "MOST_BYTES", 2**20)
@@ -256,7 +259,7 @@ def test_archives_that_would_fill_the_memory_are_refused(tmp_path, monkeypatch):
 
 
 def test_an_episode_of_a_run_in_little_light_is_dark_throughout(run):
-    """What a perfect lens would see of it, too: the noise and no other is what lies between."""
+    """The signals of a perfect lens are dim, too: they differ from the eye's signals only by the noise."""
     dusk = dataclasses.replace(run.config.world, least_light=1e-3)
     dark = dataclasses.replace(run, config=dataclasses.replace(run.config, world=dusk))
     plain, dim = (record(one, 0, seed=5, radiance_every=64) for one in (run, dark))
@@ -278,7 +281,7 @@ def test_an_episode_of_a_run_in_little_light_is_dark_throughout(run):
     ],
 )
 def test_an_episode_is_solved_if_the_first_thing_reached_is_a_goal(episode, tmp_path, goal, adversary, after, expected):
-    """Of the first form of files, also where one action reaches both."""
+    """The rule also holds for files of the first format, and if one action reaches both."""
     episode = cut(episode, len(goal))
     told = {"goal": np.array(goal), "adversary": np.array(adversary)}
     arrays, rest = of_first_form(dataclasses.replace(episode, reward_terms=episode.reward_terms | told), after)

@@ -1,4 +1,4 @@
-"""Descent follows the record's parents, the nearest where there are several."""
+"""Descent follows the parents on record, and the nearest one if there are several."""
 
 from dataclasses import replace
 
@@ -31,14 +31,14 @@ def test_nearest_parent_is_the_nearest_genome_and_the_earliest_of_equals():
     assert nearest_parent(FAMILY[4], KNOWN).id == 1
     assert nearest_parent(FAMILY[5], KNOWN).id in (0, 1)
     assert nearest_parent(FAMILY[0], KNOWN) is None
-    assert nearest_parent(FAMILY[7], KNOWN) is None, "parents that are not on record are nobody"
+    assert nearest_parent(FAMILY[7], KNOWN) is None, "parents that are not on record are ignored"
 
 
 def test_line_of_descent_begins_where_nobody_came_before():
     assert [member.id for member in descent(FAMILY[6], FAMILY)] == [0, 3, 6]
     assert [member.id for member in descent(FAMILY[2], FAMILY)] == [2]
     itself = replace(FAMILY[0], parents=(0,))
-    assert descent(itself, [itself]) == [itself], "a damaged record must not keep us here for ever"
+    assert descent(itself, [itself]) == [itself], "a damaged record must not cause an endless loop"
 
 
 def test_champions_are_the_best_so_far_and_never_a_failure():

@@ -1,4 +1,4 @@
-"""A run in a task of one's own, from the command line: evolved, resumed, replayed, reported, exported."""
+"""A run of a user task from the command line: evolved, resumed, replayed, reported, exported."""
 
 import json
 import re
@@ -27,7 +27,7 @@ NAMED = f"{BALL}:FindBall"
 SETTINGS = (
     *("search.population=2", "search.generations=1", "learning.n_envs=8", "learning.n_steps=16"),
     *("learning.total_steps=128", "learning.batch_size=64", "learning.n_epochs=1", "evaluation.episodes=2"),
-    # Eyes that see the ball, wherever the first animals look.
+    # Eyes that see the ball, whatever the directions of the first animals.
     *("eye.optics=false", "genome.placement_range_deg.start=40", "genome.fov_deg.start=60"),
     "genome.resolution.start=8",
     *("genome.elevation_deg.open=true", "genome.elevation_deg.low=-5", "genome.elevation_deg.high=5"),
@@ -36,7 +36,7 @@ SETTINGS = (
 
 @pytest.fixture(scope="module")
 def path(tmp_path_factory):
-    """A run of two animals, by the command."""
+    """Return the path of a run of two animals, made by the command."""
     path = tmp_path_factory.mktemp("own") / "run"
     settings = [part for setting in SETTINGS for part in ("--set", setting)]
     assert main(["run", NAMED, "--preset", "quick", "--workers", "1", "--quiet", "--out", str(path), *settings]) == 0
@@ -70,7 +70,8 @@ def test_an_episode_is_what_was_seen_and_done(path, episode):
     assert episode.pictures.pixels.shape == (20, 360, 480, 3)
     assert episode.plan is None
     assert episode.seconds == pytest.approx(0.1)
-    # Perfect lenses, so what was signalled is the recorded scene but for noise and rays; another episode's is not.
+    # Behind perfect lenses, signals equal the recorded scene except for noise and rays. The scene of another episode
+    # differs.
     other = record(Run.open(path, NAMED), seed=1)
     off = [np.square(episode.signals - seen.perfect_signals).mean() ** 0.5 for seen in (episode, other)]
     assert off[0] < 0.02
@@ -83,7 +84,8 @@ def test_the_fine_picture_is_the_same_scene(episode):
     height, width = episode.eyes.resolution
     shape = (*fine.shape[:3], height, fine.shape[3] // height, width, fine.shape[4] // width)
     coarse = fine.reshape(shape).mean(axis=(4, 6))
-    # 16 rays per receptor against 16 per pixel: an edge through a receptor is found to about 1/16 of its step.
+    # 16 rays per receptor against 16 per pixel: the position of an edge through a receptor is known to about 1/16 of
+    # its step.
     np.testing.assert_allclose(coarse, episode.perfect_signals[episode.radiance_frames], atol=0.08)
 
 
@@ -114,7 +116,7 @@ def test_replay_report_and_exr_show_it(path, call, tmp_path):
     assert film["pictures"]["shown"] == list(range(20))
     assert np.shape(film["action"]) == (20, 1)
     assert call("report", path, "--task", NAMED, "--out", tmp_path / "report.html")[0] == 0
-    assert "a task of one’s own" in (tmp_path / "report.html").read_text()
+    assert "a user task" in (tmp_path / "report.html").read_text()
     assert call("export", path, "--task", NAMED, "--out", tmp_path / "exr")[0] == 0
     views = sim.read_exr(sorted((tmp_path / "exr").glob("*.exr"))[0])
     assert views[0].attributes["eye_elevation_deg"] == pytest.approx(Run.open(path).best.phenotype.elevation_deg)
@@ -138,10 +140,10 @@ def test_the_latest_picture_is_shown(episode):
 def test_eyes_are_judged_by_the_scenes_of_the_task(path):
     run = Run.open(path, NAMED)
     seen = vision(run.best.phenotype, run.config)
-    assert seen.psnr_db > 60  # a perfect lens against itself: the same rays
+    assert seen.psnr_db > 60  # a perfect lens compared with itself: the same rays
     seen, perfect = seen_and_perfect(run.best.phenotype, run.config)
     assert len(seen) == SCENES
-    assert len(np.unique(perfect, axis=0)) > SCENES / 2, "the ball is elsewhere in each, but before few eyes"
+    assert len(np.unique(perfect, axis=0)) > SCENES / 2, "few eyes see the ball, whose position varies"
 
 
 def test_another_task_is_refused(path, call, tmp_path):
@@ -158,7 +160,7 @@ def test_another_task_is_refused(path, call, tmp_path):
 
 @pytest.mark.slow
 def test_light_that_varies_is_in_what_is_recorded(tmp_path):
-    """Dim light, and reddish: the scene as it is recorded is as dim, and the eyes report what is recorded."""
+    """The recorded scene has the same dim, reddish light as the signals."""
     films = []
     for level, kelvins in ((0.3, 2500), (1, DAYLIGHT)):
         vary = f'vary = {{"light": ({level}, {level}), "color_temperature": ({kelvins}, {kelvins})}}'

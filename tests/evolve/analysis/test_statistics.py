@@ -1,4 +1,4 @@
-"""Analysis against numbers worked out by hand."""
+"""Analysis against numbers that were calculated by hand."""
 
 import math
 from dataclasses import replace
@@ -56,7 +56,7 @@ GENERATIONS = [
 
 
 def test_generations_are_found_in_one_pass():
-    """A run may have thousands of them."""
+    """Generations are found in one pass, because a run may have thousands of them."""
 
     class Looked:
         looks = 0
@@ -119,7 +119,7 @@ def test_trajectory_before_anyone_finished():
         ({"n_eyes": 1}, 1 / (2 * 3.0)),
         ({"n_eyes": 91, "resolution": (1, 1)}, 1 / (2 * 1.0)),  # eyes 1 deg apart, receptors 45 deg
         ({"n_eyes": 1, "resolution": (9, 1)}, 1 / 90),  # the height does not count
-        ({"placement_range_deg": 0.0}, 1 / (2 * 3.0)),  # eyes that look the same way resolve nothing more
+        ({"placement_range_deg": 0.0}, 1 / (2 * 3.0)),  # eyes with the same direction do not add resolution
     ],
 )
 def test_acuity(changes, expected):
@@ -130,7 +130,7 @@ def test_gene_values_are_those_of_the_phenotype():
     values = gene_values(phenotype())
     assert values["resolution_height"] == 2
     assert values["resolution_width"] == 15
-    assert values["doe_01"] == pytest.approx(1 / 15)  # row-major: column grows first
+    assert values["doe_01"] == pytest.approx(1 / 15)  # row-major: the column index grows first
     assert values["doe_10"] == pytest.approx(4 / 15)
     assert len(values) == 5 + 20 + 3
 
@@ -170,11 +170,11 @@ def test_a_trajectory_is_of_those_that_have_the_gene():
     members = [candidate(i, 0, i, float(i), lambda_max_nm=p) for i, p in enumerate(peaks)]
     path = trajectory(members, lambda p: gene_values(p)["lambda_max_1_nm"])
     assert path.median.tolist() == [370.0]
-    assert np.isnan(path.best[0])  # the best has one type only
+    assert np.isnan(path.best[0])  # the best animal has one type only
 
 
 def test_bootstrap_covers_the_mean():
-    """Of 30 normal samples, the percentile interval's coverage is 93-95 %; 500 intervals tell to about 1 %."""
+    """The percentile interval of 30 normal samples has a coverage of 93-95 %. 500 intervals measure it to about 1 %."""
     random = np.random.default_rng(1)
     hits = 0
     for _ in range(500):
@@ -186,7 +186,7 @@ def test_bootstrap_covers_the_mean():
 def test_bootstrap_width_is_that_of_the_standard_error():
     samples = np.random.default_rng(2).normal(0, 1, 400)
     low, high = bootstrap_interval(samples)
-    assert high - low == pytest.approx(2 * 1.96 * samples.std() / 20, rel=0.08)  # 2000 resamples: 5 % at each end
+    assert high - low == pytest.approx(2 * 1.96 * samples.std() / 20, rel=0.08)  # 2000 resamples give each end to 5 %
 
 
 def test_bootstrap_takes_other_statistics_and_levels():
@@ -233,14 +233,14 @@ def test_image_quality_of_the_perfect_lens_is_what_noise_leaves():
 
 
 def test_image_quality_knows_focus_light_and_noise():
-    """A lens in focus beats the same pupil without relief; more noise than light leaves nothing."""
+    """A lens in focus is better than the same pupil without relief. If noise exceeds the light, the quality is 0."""
     focused = phenotype(relative_aperture=0.3, relief=LENS, resolution=(15, 15))
     flat = phenotype(relative_aperture=0.3, relief=(0.5,) * 16, resolution=(15, 15))
     calm, loud = EyeConfig(noise_sigma=0.0), EyeConfig(noise_sigma=0.1)
     quality = eye_image_quality(focused, calm)
-    assert 0.7 * 0.09 < quality < 0.09  # throughput a² = 0.09 times a contrast that the aperture keeps near 1
+    assert 0.7 * 0.09 < quality < 0.09  # the throughput a² = 0.09 times a contrast that the aperture keeps near 1
     assert eye_image_quality(flat, calm) < 0.7 * quality
-    assert eye_image_quality(focused, loud) == 0.0  # the noise floor, 0.1 / 0.09, lies above all contrast
+    assert eye_image_quality(focused, loud) == 0.0  # the noise floor, 0.1 / 0.09, exceeds all contrast
 
 
 def test_polychromatic_weighs_bands_by_daylight_and_receptors():
@@ -249,21 +249,24 @@ def test_polychromatic_weighs_bands_by_daylight_and_receptors():
     white = polychromatic(eye, psf)
     assert white.psf.shape == (1, *psf.psf.shape[1:])
     blue, red = (float(band.sum()) for band in psf.psf)
-    # channels look at white with weights 1, shared by the bands: their mean's share of the first band
+    # Channels see white with weights of sum 1, shared by the bands: the mean weight is the share of the first band.
     share = float(np.mean(eye.spectral_bands.weights[:, 0])) * DAYLIGHT_475
     assert white.psf.sum() == pytest.approx(share * blue + (1 - share) * red, rel=1e-5)
 
 
 @pytest.mark.parametrize("bands", [1, 4])
 def test_lens_in_focus_has_strehl_1_in_white_light(bands):
-    """Peaks go with 1/λ²: over four bands of 400 to 700 nm the peak at the mean wavelength is 5 % lower than theirs."""
+    """The peak of a PSF is proportional to 1/λ². Over four bands of 400 to 700 nm, the peak at the mean wavelength is 5
+    % lower than the mean of the peaks.
+    """
     plain = optics.Eye(bands=bands)
     eye = optics.Eye(optics.Pupil(30e-6, thin_lens_focal_length=plain.sensor_distance), bands=bands)
     psf = eye.psf()
-    assert white_strehl(eye, psf) == pytest.approx(1.0, abs=0.01), "the eye's tolerance"
+    assert white_strehl(eye, psf) == pytest.approx(1.0, abs=0.01), "beyond the eye's tolerance"
     assert optics.strehl_ratio(polychromatic(eye, psf))[0] == white_strehl(eye, psf)
     white = polychromatic(eye, psf)
-    unmixed = replace(white, shares=None, requests=white.requests if bands == 1 else ())  # as if of one wavelength
+    # an eye of a single wavelength
+    unmixed = replace(white, shares=None, requests=white.requests if bands == 1 else ())
     by_mean_wavelength = float(optics.strehl_ratio(unmixed)[0])
     assert by_mean_wavelength == pytest.approx(1.0 if bands == 1 else 1.05, abs=0.02)
 
@@ -272,7 +275,7 @@ DAYLIGHT_475 = 1.15392  # CIE D65 at 475 nm over that at 560 nm: 115.392 / 100
 
 
 def test_photons_count_in_image_quality():
-    """As much as the eye's own description says."""
+    """Photon noise lowers the quality as in the eye's own description."""
     animal, dusk = phenotype(relative_aperture=0.3, relief=LENS), EyeConfig(bands=2, illuminance=0.05)
     dim, bright = (eye_image_quality(animal, config) for config in (dusk, EyeConfig(bands=2)))
     assert dim < 0.9 * bright

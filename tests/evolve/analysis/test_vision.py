@@ -1,4 +1,4 @@
-"""What eyes see beside a perfect lens: by the definitions, and worse for worse eyes."""
+"""Signals of eyes compared with a perfect lens: measures by their definitions, and lower values for worse eyes."""
 
 import math
 from dataclasses import replace
@@ -23,7 +23,7 @@ def eye():
 
 
 def test_ssim_by_its_equation():
-    """One window over the whole picture; Wang et al. 2004, eq. 13."""
+    """The case is one window over the whole image (Wang et al. 2004, eq. 13)."""
     rng = np.random.default_rng(0)
     a, b = rng.random((2, 1, 7, 7))
     (mu, nu), cov = (a.mean(), b.mean()), np.cov(a.ravel(), b.ravel())
@@ -36,7 +36,7 @@ def test_ssim_by_its_equation():
 
 def test_ssim_of_a_line_of_receptors_is_no_number():
     assert math.isnan(ssim(np.zeros((3, 2, 8)), np.zeros((3, 2, 8))))
-    assert ssim(np.zeros((3, 4, 5)), np.zeros((3, 4, 5))) == 1.0, "window of 3 for a side of 4"
+    assert ssim(np.zeros((3, 4, 5)), np.zeros((3, 4, 5))) == 1.0, "a window of 3 for a side of 4"
 
 
 def test_perfect_lens_sees_itself(eye):

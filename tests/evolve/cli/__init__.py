@@ -1,4 +1,4 @@
-"""Which test covers which module of evolve/cli.
+"""Tests of evolve/cli: which test covers which module.
 
 main: test_main.py
 arguments: test_main.py

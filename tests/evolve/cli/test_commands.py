@@ -1,4 +1,6 @@
-"""What `evolve run`, `resume` and their kin say of runs, machines and clusters that they cannot use, and of Ctrl-C."""
+"""Messages of `evolve run`, `resume` and related commands about unusable runs, machines and clusters, and about
+Ctrl-C.
+"""
 
 import json
 import os
@@ -61,8 +63,9 @@ def test_machine_without_llvm_is_told_the_remedy_before_anything_is_written(tmp_
 
 @pytest.mark.slow
 def test_ctrl_c_saves_says_how_to_go_on_and_exits_130(tmp_path):
-    """As a terminal does it: the interrupt goes to the whole process group. (Where these tests run in the background,
-    interrupts may be ignored, and children inherit that.)"""
+    """A terminal sends the interrupt to the whole process group. (If these tests run in the background, interrupts may
+    be ignored, and children inherit that.)
+    """
     path = tmp_path / "run"
     small = ("search.population=2", "learning.total_steps=500000000", "learning.eval_interval=500000000")
     settings = [part for text in small for part in ("--set", text)]
@@ -76,7 +79,7 @@ def test_ctrl_c_saves_says_how_to_go_on_and_exits_130(tmp_path):
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     ) as child:
         assert b"generations" in child.stdout.readline()
-        time.sleep(1.0)  # into the workers' start; any moment must do
+        time.sleep(1.0)  # the workers are starting; the test holds at any moment
         os.killpg(child.pid, signal.SIGINT)
         try:
             _, err = child.communicate(timeout=60)
@@ -88,7 +91,7 @@ def test_ctrl_c_saves_says_how_to_go_on_and_exits_130(tmp_path):
     assert "Traceback" not in err.decode()
     assert Run.open(path).candidates == ()
     with Run.open(path).lock():
-        pass  # free again
+        pass  # the lock is free again
 
 
 def test_workers_and_seed_reach_the_run(call, tmp_path, monkeypatch):
@@ -102,7 +105,7 @@ def test_workers_and_seed_reach_the_run(call, tmp_path, monkeypatch):
             raise KeyboardInterrupt
 
         def __exit__(self, *_):
-            """Nothing to end."""
+            """Do nothing."""
 
     monkeypatch.setattr(carry_on, "LocalExecutor", Recorder)
     code, _, _ = call("run", "detection", "--workers", 3, "--seed", 5, "--out", tmp_path / "run")
@@ -111,7 +114,7 @@ def test_workers_and_seed_reach_the_run(call, tmp_path, monkeypatch):
 
 
 class Hostile:
-    """Leaves a mark where it is unpickled."""
+    """A class that leaves a mark when it is unpickled."""
 
     def __init__(self, mark):
         self.mark = str(mark)
@@ -132,7 +135,7 @@ def test_hostile_pickle_is_refused_and_never_run(call, finished, tmp_path, comma
     assert err.count("\n") == 1
     assert not mark.exists()
     pickle.loads(pickle.dumps(Hostile(mark)))
-    assert mark.exists(), "it would have been run"
+    assert mark.exists(), "the pickle was executed"
 
 
 @pytest.mark.parametrize("command", ["replay", "resume", "report", "export"])

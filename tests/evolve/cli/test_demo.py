@@ -1,4 +1,4 @@
-"""`evolve demo`: the run that ships is what it is said to be, and today's code replays and reports it."""
+"""The shipped run of `evolve demo` has the documented settings, and the current code replays and reports it."""
 
 import json
 from dataclasses import replace
@@ -24,13 +24,13 @@ def shipped():
 
 
 def test_it_is_a_finished_run_of_the_quick_preset(shipped):
-    """Who changes the preset ships another run: `python -m experiments.shipped_run`."""
+    """A change of the preset needs a new shipped run: `python -m experiments.shipped_run`."""
     assert finished(shipped)
     assert shipped.notice is None
     preset = assemble("detection", "quick", assignments=[f"seed={shipped.config.seed}"])
     passes = preset.learning.n_epochs
-    assert schedule(preset.learning, preset.learning.total_steps)[0] == passes, "else the run, which is older, differs"
-    older = replace(preset, search=replace(preset.search, active=True))  # than searches that are not
+    assert schedule(preset.learning, preset.learning.total_steps)[0] == passes, "the shipped run has no schedule"
+    older = replace(preset, search=replace(preset.search, active=True))  # the shipped run has an active search
     assert shipped.config == replace(older, learning=replace(older.learning, least_epochs=passes))
     require_policy(shipped.best, shipped.policy_path(shipped.best.id))
     assert shipped.best.policy is not None
@@ -45,7 +45,7 @@ def test_it_is_small_and_names_no_machine(shipped):
 
 
 def test_its_eyes_have_evolved(shipped):
-    """The median of its last generation is clearly above the first's, and its best animal finds most goals."""
+    """The median of the last generation is clearly above that of the first, and the best animal finds most goals."""
     import statistics
 
     first, *_, last = (
@@ -69,7 +69,7 @@ def test_demo_replays_reports_and_exports_it(call, tmp_path, monkeypatch):
     assert 'class="player"' in replay
     views = sim.read_exr(made["exr"][0])
     assert len(views) == Run.open(FOLDER).best.phenotype.n_eyes
-    # It still plays as it did: what it earns in one episode is within what it earned in those on record.
+    # The animal still plays in the same way: the return of one episode is within the range of the returns on record.
     code, out, _ = call("replay", made["directory"], "--json", "--out", tmp_path / "again.html")
     returns = Run.open(FOLDER).best.returns
     assert min(returns) <= json.loads(out)["return"] <= max(returns)
@@ -79,7 +79,7 @@ def test_demo_writes_over_nothing_of_others(call, tmp_path):
     (tmp_path / "mine.txt").write_text("mine")
     code, out, err = call("demo", "--out", tmp_path)
     assert (code, out) == (2, "")
-    assert err == f"evolve: error: {tmp_path} holds something else: choose another directory with --out\n"
+    assert err == f"evolve: error: {tmp_path} holds other files: choose another directory with --out\n"
     (tmp_path / "config.toml").write_text("mine")
     assert call("demo", "--out", tmp_path)[0] == 2
     assert (tmp_path / "config.toml").read_text() == "mine"

@@ -1,4 +1,4 @@
-"""The doctor names what is installed and its exit code tells whether an evolution can run."""
+"""`evolve doctor` lists the installed components, and its exit code reports whether an evolution can run."""
 
 import json
 
@@ -73,5 +73,5 @@ def test_namesakes_are_named(monkeypatch):
     monkeypatch.setattr(doctor, "namesakes", lambda: ["the project glass 9 holds a package optics too"])
     monkeypatch.setattr(doctor, "_render", lambda variants, environment: dict.fromkeys(variants, "works"))
     findings = doctor.examine()
-    assert findings["good"], "they are no harm"
+    assert findings["good"], "these findings are harmless"
     assert "note                the project glass 9 holds" in "\n".join(doctor._lines(findings))

@@ -1,4 +1,4 @@
-"""A stranger's run, given to every command: one line that names what is wrong, exit code 2, and no traceback."""
+"""A run from a stranger, given to every command: one line that names the fault, exit code 2, and no traceback."""
 
 import os
 
@@ -72,7 +72,7 @@ def test_damaged_configs_are_named_by_every_command(call, run, damage):
 @pytest.mark.parametrize("name", ["config.toml", "candidates.jsonl", "versions.json", "lock", "policies"])
 @pytest.mark.parametrize("kind", ["link", "FIFO"])
 def test_links_and_fifos_are_named_by_every_command_and_lead_nowhere(call, run, tmp_path, name, kind):
-    """Nobody waits for a FIFO's writer, either."""
+    """No command waits for a FIFO's writer, either."""
     victim = tmp_path / "thesis.tex"
     victim.write_text("all of it")
     place = run.path / name
@@ -86,7 +86,7 @@ def test_links_and_fifos_are_named_by_every_command_and_lead_nowhere(call, run, 
 
 
 def test_links_where_products_are_written_are_refused(call, finished, tmp_path):
-    """Pages replace what is there; a link, maybe one to somebody's page, is not what was there."""
+    """Pages replace an existing file. A link might lead to a user's own page, so it is refused."""
     victim = tmp_path / "thesis.html"
     victim.write_text("all of it")
     page = tmp_path / "page.html"

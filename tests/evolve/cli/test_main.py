@@ -1,4 +1,6 @@
-"""The command line: bad input gets one line on stderr and exit code 2, never a traceback; help comes at once."""
+"""The command line: invalid input gives one line on stderr and exit code 2, never a traceback, and help appears
+quickly.
+"""
 
 import json
 import shutil
@@ -35,12 +37,12 @@ BAD = {
     "seed out of range": (("run", "detection", "--seed", "-1"), "seed = -1: must be in [0, "),
     "absent config": (("run", "detection", "--config", "/absent.toml"), "/absent.toml: cannot be read"),
     "unwritable place": (("run", "detection", "--out", "/proc/run"), "/proc/run cannot be written"),
-    "resume of nothing": (("resume", "/absent"), "/absent is no run: there is no such directory"),
-    "status of nothing": (("status", "/tmp"), "/tmp is no run: it holds no config.toml"),
-    "report of nothing": (("report", "/absent"), "/absent is no run"),
-    "export of nothing": (("export", "/absent"), "/absent is no run"),
+    "resume of nothing": (("resume", "/absent"), "/absent is not a run: there is no such directory"),
+    "status of nothing": (("status", "/tmp"), "/tmp is not a run: it holds no config.toml"),
+    "report of nothing": (("report", "/absent"), "/absent is not a run"),
+    "export of nothing": (("export", "/absent"), "/absent is not a run"),
     "negative episode": (("replay", "/absent", "--seed", "-1"), "argument --seed: '-1': must be a whole number, 0 or"),
-    "replay of nothing": (("replay", "/absent"), "/absent is no run"),
+    "replay of nothing": (("replay", "/absent"), "/absent is not a run"),
 }
 
 
@@ -53,7 +55,7 @@ def test_bad_input_gets_one_line_and_exit_code_2(call, case, tmp_path, monkeypat
     assert complaint in err
     assert err.count("\n") == 1
     assert out == ""
-    assert list(tmp_path.iterdir()) == [], "nothing may be left behind"
+    assert list(tmp_path.iterdir()) == [], "no file may remain"
 
 
 def test_tables_name_every_task_and_gene(call):
@@ -68,7 +70,9 @@ def test_tables_name_every_task_and_gene(call):
 
 
 def test_help_comes_at_once_and_names_the_commands():
-    """Imports decide: 0.1 s without, 1.4 s with any one of the heavy libraries. Seconds differ by machine."""
+    """Imports determine the time: 0.1 s without the heavy libraries, 1.4 s with any of them. Times differ between
+    machines, so the test checks imports.
+    """
     code = (
         "import sys; from evolve.cli.main import main\n"
         "try: main(['--help'])\n"
@@ -142,7 +146,7 @@ def test_presets_say_what_they_are_for(call):
         "name": "lens",
         "task": "detection",
         "scales": ["laptop", "paper"],
-        "about": "Eyes learn to bend light.",
+        "about": "Evolution of pupils, then lenses.",
     }
     assert records["quick"]["task"] is None
     assert json.loads(call("tasks", "--json")[1]) == TASKS
@@ -171,7 +175,7 @@ def test_schema_knows_every_setting_and_its_range(call):
 
 
 def test_completion_completes(call, tmp_path):
-    """Bash itself says what it would complete."""
+    """The test uses Bash's own completion."""
     script = tmp_path / "evolve"
     script.write_text(call("completion", "bash")[1])
     ask = f"source {script}; COMP_WORDS=(evolve run --pre); COMP_CWORD=2; _shtab_evolve; echo ${{COMPREPLY[@]}}"

@@ -1,4 +1,4 @@
-"""Warnings as commands say them."""
+"""Warnings in the form in which commands print them."""
 
 import warnings
 
@@ -25,9 +25,9 @@ def test_what_is_warned_of_twice_is_said_once(capsys):
 def test_others_warnings_are_pythons():
     with warnings.catch_warnings(record=True) as seen, notes():
         warnings.simplefilter("always")
-        warnings.warn("of somebody else", UserWarning, stacklevel=1)
-        warnings.warn("of somebody else", UserWarning, stacklevel=1)
-    assert [str(each.message) for each in seen] == ["of somebody else"] * 2
+        warnings.warn("from another library", UserWarning, stacklevel=1)
+        warnings.warn("from another library", UserWarning, stacklevel=1)
+    assert [str(each.message) for each in seen] == ["from another library"] * 2
 
 
 def test_commands_say_them_so_and_afterwards_python_does(capsys, monkeypatch):

@@ -1,4 +1,4 @@
-"""The pace is measured on the real thing, and an animal that cannot be evaluated is named."""
+"""The pace is measured with real training, and an animal that cannot be evaluated is named."""
 
 import os
 from dataclasses import replace
@@ -20,7 +20,7 @@ from tests.evolve.small_run import PHENOTYPE, small_config
 
 @pytest.mark.slow
 def test_animal_that_cannot_be_evaluated_is_named():
-    """A retina far behind a rough relief of two millimetres: light spreads farther than optics follows it."""
+    """The retina is far behind a rough relief of two millimetres: light spreads farther than optics computes."""
     backend.require()
     config = small_config()
     config = replace(config, eye=replace(config.eye, relief_height=2e-3))
@@ -31,7 +31,7 @@ def test_animal_that_cannot_be_evaluated_is_named():
 
 
 def test_a_life_that_fails_says_why(monkeypatch):
-    """And not that a temporary file is missing."""
+    """The message gives the reason instead of a missing temporary file."""
     monkeypatch.setattr(evolve.cli.pace, "evaluate_candidate", lambda *_, **__: Evaluation.failed("weights are NaN"))
     with pytest.raises(ValueError, match=r"^weights are NaN$"):
         _short_life(small_config(), PHENOTYPE, 0)
@@ -41,7 +41,7 @@ def test_a_life_that_fails_says_why(monkeypatch):
 def test_a_process_that_dies_is_told_in_one_line(monkeypatch):
     monkeypatch.setattr(evolve.cli.pace, "_short_life", dies)
     monkeypatch.setattr(evolve.cli.pace, "prepare_device", None)
-    with pytest.raises(ExecutorError, match=r"^a process died that measured this machine's pace.*or free some$"):
+    with pytest.raises(ExecutorError, match=r"^a process that measured this machine's pace died.*or free some memory$"):
         measure_pace(small_config(), {"start": PHENOTYPE}, 1)
 
 
@@ -55,8 +55,9 @@ def test_pace_is_measured_with_the_real_thing(tmp_path, short_episodes):
     config = small_config()
     animal = develop(Genotype(config.genome).start, config)
     learning = replace(config.learning, total_steps=64 * config.learning.n_envs * config.learning.n_steps)
-    stages = replace(config, learning=learning, search=replace(config.search, rungs=4))  # more than four rollouts have
-    pace = measure_pace(stages, {"start": animal}, 1)["start"]
+    # the four measured rollouts are too few for these rungs
+    rungs = replace(config, learning=learning, search=replace(config.search, rungs=4))
+    pace = measure_pace(rungs, {"start": animal}, 1)["start"]
     assert evaluate(animal, config, 0, tmp_path / "policy").failure is None
     assert pace.policy_bytes == (tmp_path / "policy").stat().st_size
     assert pace.steps_per_s > 0
@@ -69,7 +70,7 @@ def test_the_slowest_of_many_lives_counts():
 
 
 class Clock:
-    """A machine on which starting takes 7 s, a step .001, a pass over it .0002, and an evaluation 3."""
+    """A machine on which starting takes 7 s, a step 0.001 s, a pass over it 0.0002 s, and an evaluation 3 s."""
 
     now = 0.0
 
@@ -106,7 +107,7 @@ def test_what_a_pass_takes_is_told_from_the_rest(monkeypatch, n_epochs, least_ep
 
 
 def test_a_pass_takes_no_more_than_the_whole(monkeypatch):
-    """A machine that had other work at first."""
+    """The machine is busy with other work at first."""
 
     class Busy(Clock):
         def evaluate(self, animal, config, seed, policy, progress):

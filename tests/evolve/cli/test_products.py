@@ -1,5 +1,6 @@
-"""`evolve report`, `replay` and `export` write where they are told, print what they are asked to, and open a browser;
-`resume` of a finished run does nothing."""
+"""`evolve report`, `replay` and `export` write to the given paths, print the requested output, and open a browser;
+`resume` of a finished run has no effect.
+"""
 
 import io
 import json
@@ -45,7 +46,7 @@ def test_names_that_no_page_can_have_are_refused_before_an_episode_is_played(cal
     for film in ("film.gif", "film.MP4", "film.rrd"):
         code, _, err = call("replay", run.path, "--gif", "--out", film)
         assert code == 2
-        assert f"out = {film}: names the page, such as film.html; with" in err
+        assert f"out = {film}: must name the page, such as film.html; --" in err
 
 
 def test_quiet_is_quiet_and_errors_are_not(call, run, browser, tmp_path):
@@ -80,7 +81,7 @@ def test_resume_of_a_finished_run_does_nothing_and_says_so(call, finished, brows
 
 
 class Terminal(io.StringIO):
-    """Somebody looks on."""
+    """A stream that is a terminal."""
 
     def isatty(self):
         return True
@@ -101,7 +102,7 @@ def test_a_wait_shows_what_is_done_on_a_terminal_alone():
 
 
 def test_where_no_episode_can_be_played_the_report_is_kept(call, finished, tmp_path):
-    """A run that was copied without its policies and EXR files."""
+    """The run was copied without its policies and EXR files."""
     run = shutil.copytree(finished, tmp_path / "run")
     (run / "report.html").write_text("of an hour ago")
     code, _, err = call("resume", run)
@@ -123,7 +124,7 @@ def test_a_run_that_is_deleted_while_its_report_is_made_stays_deleted(run, episo
 
 
 def test_who_is_stopped_among_the_exr_files_has_no_report_yet(finished, monkeypatch):
-    """So that `resume` knows that something is missing."""
+    """An export that was interrupted leaves no report, so that `resume` detects the missing files."""
 
     def stopped(*_):
         raise KeyboardInterrupt

@@ -1,4 +1,4 @@
-"""The plan: what it counts, and what it predicts from a pace."""
+"""The plan of a run: its counts, and its predictions from a measured pace."""
 
 import inspect
 import json
@@ -19,7 +19,7 @@ PACE = Pace(start_s=10.0, steps_per_s=1000.0, play_s=5.0, policy_bytes=50_000)
 
 @pytest.fixture
 def paced(monkeypatch):
-    """A machine of known pace."""
+    """Use a machine of known pace."""
     monkeypatch.setattr(
         evolve.cli.run_plan, "measure_pace", lambda config, animals, workers: dict.fromkeys(animals, PACE)
     )
@@ -30,18 +30,18 @@ def test_hours_count_rounds_of_workers_and_all_that_a_candidate_does(tmp_path, p
     config = assemble("detection", assignments=[*settings, "learning.eval_interval=30000"])
     candidate_s = 10 + 100 + (4 + 1) * 5
     assert PACE.candidate_s(config) == candidate_s
-    plan = RunPlan.of(config, tmp_path).measured()
+    plan = RunPlan.from_config(config, tmp_path).measured()
     assert plan.hours["start"] == pytest.approx(10 * 2 * candidate_s / 3600), "6 on 4 workers take two rounds"
-    steady = RunPlan.of(replace(config, search=replace(config.search, steady_state=True)), tmp_path).measured()
-    assert steady.hours["start"] == pytest.approx(15 * candidate_s / 3600), "60 on 4 workers, nobody waits"
-    many = RunPlan.of(replace(steady.config, workers=64), tmp_path).measured()
-    assert many.hours["start"] == pytest.approx(10 * candidate_s / 3600), "no more than 6 are under way at once"
+    steady = RunPlan.from_config(replace(config, search=replace(config.search, steady_state=True)), tmp_path).measured()
+    assert steady.hours["start"] == pytest.approx(15 * candidate_s / 3600), "60 on 4 workers without waiting"
+    many = RunPlan.from_config(replace(steady.config, workers=64), tmp_path).measured()
+    assert many.hours["start"] == pytest.approx(10 * candidate_s / 3600), "at most 6 are evaluated at once"
 
 
 def test_disk_holds_policies_and_record_and_a_small_disk_is_noticed(tmp_path, paced, monkeypatch):
     def plan(generations):
         settings = (f"search.generations={generations}", "search.population=2")
-        return RunPlan.of(assemble("detection", assignments=settings), tmp_path).measured()
+        return RunPlan.from_config(assemble("detection", assignments=settings), tmp_path).measured()
 
     per_candidate = (plan(20).disk_bytes - plan(10).disk_bytes) / 20
     assert 50_000 + 500 < per_candidate < 50_000 + 5_000
@@ -52,24 +52,24 @@ def test_disk_holds_policies_and_record_and_a_small_disk_is_noticed(tmp_path, pa
 
 def test_successive_halving_costs_what_its_stages_cost(tmp_path, paced):
     settings = ("search.population=6", "search.generations=10", "learning.total_steps=100000", "workers=4")
-    stages = ("search.rungs=2", "search.promoted=0.25")
-    config = assemble("detection", assignments=[*settings, *stages, "learning.eval_interval=30000"])
-    plan = RunPlan.of(config, tmp_path).measured()
+    rungs = ("search.rungs=2", "search.promoted=0.25")
+    config = assemble("detection", assignments=[*settings, *rungs, "learning.eval_interval=30000"])
+    plan = RunPlan.from_config(config, tmp_path).measured()
     first, second = 10 + 25 + (1 + 1) * 5, 10 + 75 + (3 + 1) * 5
     assert plan.hours["start"] == pytest.approx(10 * (2 * first + 1 * second) / 3600), "6 and 2 on 4 workers"
     assert plan.record()["steps"] == 10 * (6 * 28_672 + 2 * 73_728), "whole rollouts of 4,096"
-    assert "budget stages  6 to 25,000 steps, 2 to 100,000 steps" in "\n".join(plan.lines())
+    assert "rungs  6 to 25,000 steps, 2 to 100,000 steps" in "\n".join(plan.lines())
 
 
 def test_passes_that_late_stages_spare_are_in_the_hours_and_in_the_speed(tmp_path, monkeypatch):
-    """The second stage, from 4,178 steps on, makes 8 passes of 10; a whole training 10, 9 and 6."""
+    """The second rung, from step 4,178 on, makes 8 passes of 10. A whole training run makes 10, 9 and 6."""
     settings = ("search.population=4", "search.generations=1", "search.rungs=2", "search.promoted=0.34", "workers=4")
     learning = ("learning.total_steps=12288", "learning.eval_interval=100000", "learning.decay_after=3277")
     pace = replace(PACE, pass_s=5e-5)
     monkeypatch.setattr(
         evolve.cli.run_plan, "measure_pace", lambda config, animals, workers: dict.fromkeys(animals, pace)
     )
-    plan = RunPlan.of(assemble("detection", assignments=[*settings, *learning]), tmp_path).measured()
+    plan = RunPlan.from_config(assemble("detection", assignments=[*settings, *learning]), tmp_path).measured()
     first = 10 + 4.178 + 2 * 5
     second = 10 + 8.110 * (1 - 2 * 0.05) + 2 * 5
     assert plan.hours["start"] == pytest.approx((first + second) / 3600, rel=1e-3)

@@ -1,4 +1,4 @@
-"""`evolve status` and `evolve compare`: they tell what records hold, to people and to machines."""
+"""`evolve status` and `evolve compare` print the contents of records, as text and as JSON."""
 
 import json
 
@@ -55,7 +55,7 @@ def test_compare_puts_runs_side_by_side(call, finished, tmp_path):
 
 
 def test_compare_shows_settings_as_they_are_set(call, finished, tmp_path):
-    """Names in their letters, true and false as TOML has them."""
+    """Names appear as text, and booleans in TOML's form."""
     other = Run.create(tmp_path / "other", tiny("search.optimizer=DE", "search.active=true"))
     rows = {line.split("  ")[0]: line.split()[-2:] for line in call("compare", finished, other.path)[1].splitlines()}
     assert rows["search.optimizer"] == ["CMA", "DE"]
@@ -64,11 +64,11 @@ def test_compare_shows_settings_as_they_are_set(call, finished, tmp_path):
 
 @pytest.fixture
 def failed(tmp_path):
-    """A run of which nothing has succeeded."""
+    """Return a run in which no candidate has succeeded."""
     run = Run.create(tmp_path / "failed", tiny())
     genome = Genotype(run.config.genome).start
     outcome = Evaluation.failed("no luck")
-    run.append(Candidate.of(Place(0, 0, 0), tuple(genome), develop(genome, run.config), 1, outcome))
+    run.append(Candidate.from_evaluation(Place(0, 0, 0), tuple(genome), develop(genome, run.config), 1, outcome))
     return run
 
 
@@ -80,7 +80,7 @@ def test_status_names_the_last_failure(call, finished, failed):
 
 def test_what_is_no_number_is_null_for_machines(call, failed):
     def refuse(name):
-        raise AssertionError(f"{name} is no JSON")
+        raise AssertionError(f"{name} is not JSON")
 
     out = call("compare", failed.path, "--json")[1]
     (row,) = json.loads(out, parse_constant=refuse)["runs"]
@@ -91,18 +91,18 @@ def test_what_is_no_number_is_null_for_machines(call, failed):
 def test_a_single_episode_has_no_interval(call, failed):
     genome = Genotype(failed.config.genome).start
     alone = Evaluation(1.5, (1.5,), 1.0)
-    failed.append(Candidate.of(Place(1, 0, 1), tuple(genome), develop(genome, failed.config), 1, alone))
+    failed.append(Candidate.from_evaluation(Place(1, 0, 1), tuple(genome), develop(genome, failed.config), 1, alone))
     (line,) = (line for line in call("compare", failed.path)[1].splitlines() if line.startswith("95 % interval"))
     assert line.split() == ["95", "%", "interval", "-"]
     assert json.loads(call("compare", failed.path, "--json")[1])["runs"][0]["fitness_interval"] is None
 
 
 def test_status_of_many_generations_looks_at_each_candidate_once(finished, monkeypatch):
-    """With 100,000 generations, a look at all candidates for each is too many."""
+    """A scan of all candidates for each of 100,000 generations would be too slow."""
     run, looks = Run.open(finished), []
     whole = Run.evaluated_at
     monkeypatch.setattr(Run, "generation", None)
-    monkeypatch.setattr(Run, "evaluated_at", lambda run, stage: looks.append(stage) or whole(run, stage))
+    monkeypatch.setattr(Run, "evaluated_at", lambda run, rung: looks.append(rung) or whole(run, rung))
     now = standing(run)
     assert [g["evaluated"] for g in now["generations"]] == [4, 4, 4]
     assert now["state"] == "finished"

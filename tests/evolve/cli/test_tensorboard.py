@@ -1,4 +1,4 @@
-"""What TensorBoard shows is what is on record."""
+"""TensorBoard shows the values on record."""
 
 import shutil
 import threading
@@ -38,8 +38,8 @@ def test_only_what_goes_on_is_open(finished, tmp_path):
     with TensorBoardWriter(run) as writer:
         for candidate in learned:
             writer.evaluated(candidate)
-        assert threading.active_count() <= before + 2, "candidates' and generations'"
-        writer.evaluated(replace(learned[0], curve=((8192, 9.0),)))  # after another budget stage
+        assert threading.active_count() <= before + 2, "the writers of candidates and generations"
+        writer.evaluated(replace(learned[0], curve=((8192, 9.0),)))  # after another rung
     events = accumulator.EventAccumulator(str(run.path / "tensorboard" / "learning" / "000000"))
     events.Reload()
     shown = sorted((event.step, event.value) for event in events.Scalars("return"))

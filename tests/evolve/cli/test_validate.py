@@ -1,4 +1,4 @@
-"""`evolve validate` runs the proofs of the checkout, and tells which failed."""
+"""`evolve validate` runs the proofs of the checkout, and lists the failed ones."""
 
 import re
 import tomllib
@@ -16,7 +16,7 @@ NAMES = [path.rpartition("/")[2] for path in PROOFS]
 
 @pytest.fixture
 def ran(monkeypatch):
-    """Modules that would have run, and those that are to fail."""
+    """Record the modules that would run; some of them fail."""
     modules, failing = [], []
 
     def run(command, cwd, check):
@@ -69,7 +69,7 @@ def test_an_unknown_proof_ends_in_one_line(call, ran):
     code, _, err = call("validate", "psf_error_predictions")
     assert (code, ran.modules) == (2, [])
     assert err == (
-        "evolve: error: validate psf_error_predictions: there is no such proof; did you mean 'psf_error_prediction'? "
+        "evolve: error: validate psf_error_predictions: there is no such script; did you mean 'psf_error_prediction'? "
         "(see evolve validate --list)\n"
     )
 

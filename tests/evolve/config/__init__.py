@@ -1,4 +1,4 @@
-"""Which test covers which module of evolve/config.
+"""Tests of evolve/config: which test covers which module.
 
 run_config: test_run_config.py
 settings: test_assemble.py, test_run_config.py, test_parameters.py

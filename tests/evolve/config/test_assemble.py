@@ -1,4 +1,4 @@
-"""Configurations put together: precedence of sources, and one clear line for everything that is wrong."""
+"""Assembly of configurations: precedence of sources, and one clear line for every error."""
 
 import pytest
 
@@ -8,7 +8,7 @@ from evolve.config.sources import preset_names
 from evolve.genome.genes import TILT
 from evolve.genome.genotype import GENES
 
-OBLONG = [name for name in preset_names() if name != "bifurcation-detection"]  # of which navigators can have the eyes
+OBLONG = [name for name in preset_names() if name != "bifurcation-detection"]  # presets whose eyes a navigator can have
 
 
 @pytest.mark.parametrize(
@@ -23,7 +23,7 @@ def test_config_survives_being_written(tmp_path, task, preset):
 
 
 def test_written_config_needs_no_defaults(tmp_path):
-    """A run frozen today must mean the same after a default has changed."""
+    """A stored configuration must keep its meaning after a default has changed."""
     written = to_toml(assemble("detection"))
     for name in ("relief_height", "rays_per_receptor", "sigma", "gamma", "patience", "episodes", "workers", "seed"):
         assert f"\n{name} = " in f"\n{written}"
@@ -53,7 +53,7 @@ def test_groups_of_genes_freeze_together_and_the_narrower_name_wins():
     config = assemble("detection", assignments=["genome.optical.open=false"])
     assert not any(config.genome[name].open for name, gene in GENES.items() if gene.cluster == "optical")
     config = assemble("detection", assignments=["genome.doe_11.open=true", "genome.doe.open=false"])
-    assert not config.genome["doe_11"].open  # two assignments: the later one wins
+    assert not config.genome["doe_11"].open  # of two assignments, the later one applies
     file = "[genome.doe_11]\nopen = true\n[genome.doe]\nopen = false\nstart = 0.3\n"
     config = _from_text(file)
     assert config.genome["doe_11"].open

@@ -1,4 +1,4 @@
-"""Runs of a former format: opened as what they were, and continued by nobody."""
+"""Runs of an earlier format can be opened with their original meaning, but not continued."""
 
 import shutil
 from dataclasses import replace
@@ -53,7 +53,9 @@ def test_runs_that_say_nothing_of_active_searches_had_one():
 
 
 def test_what_somebody_asks_for_is_of_this_format(tmp_path):
-    """A file without a number is a wish, not a run; another run's whole config.toml may be one, too."""
+    """A file without a format number is a user's configuration and not a run. The whole config.toml of another run is
+    also accepted.
+    """
     file = tmp_path / "mine.toml"
     file.write_text('task = "navigation"\n')
     assert assemble(file=file).task == "navigation"

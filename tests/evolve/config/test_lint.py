@@ -1,4 +1,4 @@
-"""Odd settings are named: genes and starts that change nothing, and bands too few for the colours of a world."""
+"""Questionable settings are named: genes and starts without effect, and too few bands for the colours of a world."""
 
 from evolve.config.assemble import assemble
 from evolve.config.lint import idle_genes, idle_settings, idle_starts, lint
@@ -37,7 +37,9 @@ def test_starts_that_nothing_reads_are_named():
 
 
 def test_bands_too_few_for_the_colours_of_a_world_are_named():
-    """Four bands put the ultraviolet that a goal reflects where pigments of 410 nm look: 0.18 of white's signal."""
+    """Four bands move the ultraviolet that a goal reflects into the range of pigments of 410 nm: 0.18 of white's
+    signal.
+    """
 
     def notes(task, *settings):
         return lint(assemble(task, assignments=settings))
@@ -55,7 +57,7 @@ def test_bands_too_few_for_the_colours_of_a_world_are_named():
         "even 40 bands are not enough"
         in notes("foraging", "eye.receptors=honeybee", "eye.bands=40", "eye.noise_sigma=0")[0]
     )
-    assert notes("detection", "eye.bands=1") == [], "a grey world has no colours to misjudge"
+    assert notes("detection", "eye.bands=1") == [], "a grey world has no colours to misrepresent"
 
 
 def test_settings_that_nothing_reads_are_named():
@@ -64,7 +66,7 @@ def test_settings_that_nothing_reads_are_named():
 
     assert notes() == notes("eye.optics=false") == notes("genome.optical.opens_at=3") == []
     held = "genome.layers.opens_at=2"
-    assert notes(held) == ["genome.layers.opens_at has no effect: the gene is held; set genome.layers.open = true"]
+    assert notes(held) == ["genome.layers.opens_at has no effect: the gene is frozen; set genome.layers.open = true"]
     assert notes(held, "genome.layers.open=true") == []
     assert notes("search.promoted=0.3") == ["search.promoted has no effect: search.rungs = 1"]
     assert notes("search.promoted=0.3", "search.rungs=2") == []

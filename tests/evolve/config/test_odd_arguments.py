@@ -1,4 +1,6 @@
-"""Settings from Python given what they are not: a run's configuration, or one line. See the optics' test."""
+"""Settings of the wrong type or value from Python: a run's configuration, or a one-line error. See the test of the same
+name in optics.
+"""
 
 from dataclasses import fields
 
@@ -23,7 +25,7 @@ def test_sections_themselves():
 
 
 def test_a_run_that_cannot_begin(tmp_path):
-    """All else about it is refused, too, so that nothing runs."""
+    """All other settings are also refused, so that no run starts."""
     valid = {"preset": "quick", "settings": {}, "config": None, "scale": None, "start_from": None}
 
     def begun(**asked):

@@ -1,4 +1,4 @@
-"""Presets of experiments: they ask what they say, start where they say, and do as much as their scale allows."""
+"""Presets of experiments: they request the documented settings and starts, and do the amount of work of their scale."""
 
 import json
 from dataclasses import replace
@@ -51,7 +51,7 @@ def test_paper_scale_has_the_published_budget_and_laptop_a_tenth_of_it_at_most(p
     assert paper.learning.total_steps == 1_000_000
     steps = [config.candidates * config.learning.total_steps for config in (laptop, paper)]
     assert steps[0] < steps[1] / 10
-    # Fewer steps than it takes to tell good eyes from bad give selection nothing to see
+    # With fewer steps than it takes to distinguish good eyes from bad ones, selection has no effect
     # (docs/validation/learning_curves.md).
     assert laptop.learning.total_steps >= 130_000
 
@@ -63,7 +63,7 @@ def test_every_open_gene_changes_something_and_colours_are_seen_as_they_are(pres
 
 
 def test_bifurcations_differ_in_their_task_and_begin_with_one_photoreceptor():
-    """And in that of a navigator's eye only the width counts."""
+    """They also differ in the shape of the eye: only the width of a navigator's eye is a gene."""
     maze, field = (assemble(preset=f"bifurcation-{task}") for task in ("navigation", "detection"))
     assert (maze.task, field.task) == ("navigation", "detection")
     assert replace(maze.eye, square=True) == field.eye
@@ -81,8 +81,9 @@ def test_bifurcations_differ_in_their_task_and_begin_with_one_photoreceptor():
 
 @pytest.mark.parametrize("task", ["navigation", "detection"])
 def test_bifurcations_have_room_for_few_large_eyes_or_many_small_ones(task):
-    """A receptor takes 3° of the head: two eyes of 15 fit within 45°, ten of 4 within 108°, with less than a
-    receptor to spare."""
+    """A receptor takes 3° of the head. Two eyes of 15 receptors fit within 45°, and ten of 4 within 108°, with less
+    than a receptor to spare.
+    """
     config = assemble(preset=f"bifurcation-{task}")
     genotype = Genotype(config.genome)
     width = "resolution_width" if task == "navigation" else "resolution"
@@ -114,7 +115,9 @@ def test_lens_opens_the_pupil_first_and_then_what_bends_light(scale):
 
 @pytest.mark.parametrize(("index", "aperture"), [(1.5, 0.38), (2.0, 0.54)])
 def test_a_lens_in_focus_is_within_reach_of_the_lens_presets_genes(index, aperture):
-    """Behind wider pupils than the best hole, too, but hardly wider ones: control points span 16 R² / (4 f (n - 1))."""
+    """Lenses in focus are also possible behind pupils that are slightly wider than the best pinhole: control points
+    span 16 R² / (4 f (n - 1)).
+    """
     config = assemble(preset="lens")
     eye = animal(config).eyes(config.eye).eye()
     focal_length = eye.sensor_distance
@@ -179,7 +182,7 @@ def test_task_named_by_the_user_wins():
 
 
 def test_a_preset_made_for_a_task_wins_over_the_tasks_settings(monkeypatch):
-    """And one for any task does not: navigators' eyes are one row of receptors whatever it says."""
+    """A preset for any task does not take precedence: navigators' eyes still have one row of receptors."""
     own = {"task": "navigation", "learning": {"gamma": 0.5}}
     monkeypatch.setattr("evolve.config.assemble.preset_sources", lambda name, scale: [Source("preset", own)])
     assert assemble(preset="any").learning.gamma == 0.5

@@ -1,4 +1,4 @@
-"""Errors name the file and the line, or the option, that made them."""
+"""Errors name the file and line, or the option, of the setting."""
 
 import tomllib
 
@@ -57,7 +57,7 @@ def test_contradiction_names_every_place_that_made_it(tmp_path):
 
 
 def test_lines_are_found_by_halving(tmp_path, monkeypatch):
-    """A file of 6,000 remarks was parsed 6,000 times."""
+    """Otherwise a file of 6,000 comments would be parsed 6,000 times."""
     parsed = []
     whole = tomllib.loads
     monkeypatch.setattr(tomllib, "loads", lambda text: parsed.append(len(text)) or whole(text))
@@ -73,7 +73,7 @@ def test_lines_are_found_by_halving(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("spread", [1, 2, 7, 60])
 def test_line_is_the_same_as_by_trying_each(spread):
-    """Values that span lines cannot be cut; settings stand before, after and within them."""
+    """Values that span several lines cannot be cut. Settings stand before, after and within them."""
     value = "[\n" + ",\n".join("1" for _ in range(spread)) + "\n]"
     long = "text\n" * spread
     text = f'a = {value}\n# remark\n[t]\nb = """\n{long}"""\nc = {value}\n[t.u]\nd = 1\n'

@@ -1,4 +1,4 @@
-"""Starts of a relief that were spelled out for other eyes: the same surface, or a clear refusal."""
+"""Starts of a relief that were written for other eyes: the same surface, or a clear error."""
 
 import numpy as np
 import pytest
@@ -25,7 +25,7 @@ def test_relief_may_have_more_points_and_keeps_the_presets_surface():
         pupil = develop(Genotype(config.genome).start, config).pupil(config.eye)
         assert isinstance(pupil, optics.Pupil)
         heights[points] = pupil.height.height(x, y, types).numpy()
-    # A spline through a bicubic polynomial is that polynomial, up to rounding.
+    # A spline through a bicubic polynomial equals that polynomial, up to rounding.
     for points in (5, 9):
         assert heights[points] == pytest.approx(heights[4], rel=1e-9)
 
@@ -52,7 +52,9 @@ def test_symmetric_reliefs_have_no_genes_that_would_be_ignored():
 
 
 def test_a_symmetric_animal_begins_a_run_of_symmetric_reliefs():
-    """All sixteen heights of an animal are named; where they say one thing eightfold, they are three genes' starts."""
+    """All sixteen heights of an animal are named. If they are equal under the eight symmetries, they give the starts of
+    three genes.
+    """
     from evolve.config.provenance import Source
 
     heights = {f"doe_{i}{j}": {"start": 0.2 + 0.1 * min(i, 3 - i) * min(j, 3 - j)} for i in range(4) for j in range(4)}
@@ -73,7 +75,7 @@ def test_heights_of_more_points_become_no_other_number_of_them():
     from evolve.genome.relief_genes import doe_names
 
     heights = {name: {"start": 0.3} for name in doe_names(6)}
-    with pytest.raises(ConfigError, match="heights of 6 x 6 points cannot become so many; must be 6"):
+    with pytest.raises(ConfigError, match="heights of 6 x 6 points cannot be converted; must be 6"):
         assemble(
             "detection",
             assignments=["eye.relief_points=9"],

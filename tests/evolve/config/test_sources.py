@@ -1,4 +1,4 @@
-"""Sources of settings: presets and tasks are found by their names, and files of one are not taken for the other."""
+"""Sources of settings: presets and tasks are found by name, and files of one kind are not accepted as the other."""
 
 from dataclasses import asdict
 from importlib import resources
@@ -22,7 +22,7 @@ def test_a_tasks_file_is_what_its_task_sets(file):
     for section in tree.keys() - {"genome"}:
         for name, value in tree[section].items():
             assert settings[section][name] == value
-            assert any(other[section][name] != value for other in others), "a default that all tasks have says nothing"
+            assert any(other[section][name] != value for other in others), "a default that all tasks share is redundant"
     for gene, uses in tree["genome"].items():
         assert {key: settings["genome"][gene][key] for key in uses} == uses
 

@@ -1,4 +1,4 @@
-"""Square eyes: one gene for height and width, wherever either was set before."""
+"""Square eyes: one gene for height and width, in place of the settings for either."""
 
 import numpy as np
 import pytest
@@ -23,7 +23,7 @@ def test_one_gene_is_both_sides_of_a_square_eye():
 
 
 def test_eyes_that_are_not_square_have_the_genes_they_had():
-    """So that a genome on record means what it meant."""
+    """Genomes on record keep their meaning."""
     config = assemble("detection")
     assert "resolution" not in config.genome
     animal = develop(Genotype(config.genome).start, config)
@@ -36,7 +36,8 @@ def test_what_was_said_alike_of_both_sides_holds_for_a_square_eye():
     assert develop(Genotype(quick.genome).start, quick).resolution == (6, 6)
     larger = assemble("detection", "quick", assignments=[SQUARE, "genome.resolution.start=12"])
     assert develop(Genotype(larger.genome).start, larger).resolution == (12, 12)
-    grid = assemble(preset="scaling", assignments=[SQUARE]).genome  # which freezes the cluster, and opens both sides
+    # this preset freezes the cluster and opens both sides
+    grid = assemble(preset="scaling", assignments=[SQUARE]).genome
     assert grid["resolution"].open
     assert not grid["fov_deg"].open
 
@@ -66,8 +67,9 @@ def test_genes_that_such_eyes_have_not_are_refused(task, settings, named):
 
 @pytest.mark.parametrize("task", ["navigation", "maze"])
 def test_a_user_may_give_navigators_square_eyes(task):
-    """The task holds their height at one receptor; square eyes, which a user asks for, keep their height in degrees at
-    any resolution."""
+    """The task fixes the height at one receptor. Square eyes, on a user's request, have a fixed height in degrees at
+    any resolution.
+    """
     row, square = assemble(task), assemble(task, assignments=[SQUARE])
     assert develop(Genotype(row.genome).start, row).resolution == (1, 1)
     assert not row.genome["resolution_height"].open
@@ -82,6 +84,6 @@ def test_a_user_may_give_navigators_square_eyes(task):
 def test_a_preset_for_rows_gives_squares_of_the_same_width():
     square = assemble(preset="bifurcation-navigation", assignments=[SQUARE]).genome["resolution"]
     detection = assemble(preset="bifurcation-detection").genome["resolution"]
-    assert square == detection, "the two tasks then differ in their eyes' shape no longer"
+    assert square == detection, "the eyes of the two tasks then have the same shape"
     with pytest.raises(ConfigError, match="square eyes have the gene resolution"):
         assemble("navigation", assignments=[SQUARE, "genome.resolution_width.high=8"])

@@ -1,4 +1,4 @@
-"""A task of one's own in a run's settings: named, hashed, and never executed by who only reads."""
+"""A user task in a run's settings: named, hashed, and never executed by code that only reads the run."""
 
 from pathlib import Path
 
@@ -14,7 +14,7 @@ NAMED = f"{BALL}:FindBall"
 
 @pytest.fixture
 def trap(tmp_path):
-    """A task whose text leaves a mark if it is executed."""
+    """Return a task whose text leaves a mark when it is executed."""
     file = tmp_path / "trap.py"
     file.write_text(f"open({str(tmp_path / 'executed')!r}, 'w')\nclass Trap:\n    pass\n")
     return file
@@ -56,20 +56,20 @@ def test_line_ends_are_no_change(trap):
 def test_files_of_settings_name_no_code(trap, tmp_path):
     file = tmp_path / "settings.toml"
     file.write_text(to_toml(assemble(f"{trap}:Trap", "quick")))
-    with pytest.raises(ConfigError, match="a file names no code to run"):
+    with pytest.raises(ConfigError, match="a file cannot name code"):
         assemble(file=file)
-    with pytest.raises(ConfigError, match="a file names no code to run"):
+    with pytest.raises(ConfigError, match="a file cannot name code"):
         assemble("detection", assignments=["task=trap.py:Trap"])
     assert assemble(NAMED, file=file).task == "find_ball.py:FindBall"
 
 
 def test_what_only_our_agents_have_is_refused_and_eyes_look_up():
     for setting in ("learning.contact_ramp=100", "learning.first_speed=0.2", "learning.least_return=-5"):
-        with pytest.raises(ConfigError, match=r"is for rhabdom's own agents, not for find_ball\.py:FindBall"):
+        with pytest.raises(ConfigError, match=r"is for built-in tasks, not for find_ball\.py:FindBall"):
             assemble(NAMED, "quick", assignments=[setting])
     with pytest.raises(ConfigError, match=r"world\.mazes: is for the task maze"):
         assemble(NAMED, "quick", assignments=["world.mazes=2"])
-    with pytest.raises(ConfigError, match=r"genome\.elevation_deg: is for tasks of one's own"):
+    with pytest.raises(ConfigError, match=r"genome\.elevation_deg: is for user tasks"):
         assemble("detection", "quick", assignments=["genome.elevation_deg.open=true"])
     assert "elevation_deg" not in assemble("detection", assignments=["genome.morphological.open=true"]).genome
     assert assemble(NAMED, assignments=["genome.elevation_deg.open=true"]).genome["elevation_deg"].open

@@ -1,4 +1,4 @@
-"""Which test covers which module of evolve/genome.
+"""Tests of evolve/genome: which test covers which module.
 
 genes: test_genotype.py, test_rhabdoms.py
 genotype: test_genotype.py

@@ -1,4 +1,4 @@
-"""Genes and genomes: every genome is an animal, and the encoding loses nothing."""
+"""Genes and genomes: every genome is an animal, and the encoding is lossless."""
 
 from dataclasses import replace
 
@@ -36,7 +36,7 @@ def test_every_genome_decodes_into_the_genes_ranges(genome):
 
 
 def test_integers_share_the_unit_interval_equally():
-    """Rounding low + u (high - low) would give the ends half of what the others get."""
+    """Rounding low + u (high - low) would give the two ends half of the other values' share."""
     gene, use = GENES["n_eyes"], CONFIG.genome["n_eyes"]
     u = (np.arange(16_000) + 0.5) / 16_000
     values, counts = np.unique([gene.decode(x, use) for x in u], return_counts=True)
@@ -94,7 +94,7 @@ def test_groups_cover_all_genes_once():
     members = [name for cluster in CLUSTERS for name in group_members(cluster)]
     assert sorted(members) == sorted(ALL_GENES)
     assert set(GENES) < set(ALL_GENES)
-    assert len(group_members("doe")) == 81  # of 9 x 9, the largest relief
+    assert len(group_members("doe")) == 81  # the largest relief has 9 x 9 points
     assert group_members("lambda_max") == tuple(LAMBDA_MAX)
     assert group_members("spectral") == ("receptor_types", *LAMBDA_MAX)
     assert group_members("nonsense") == ()
@@ -115,20 +115,22 @@ def test_animals_on_record_that_name_no_encoder_have_one_of_16():
 
 
 def test_quick_preset_starts_behind_a_lens_in_focus():
-    """Its relief is the paraboloid h0 - r²/(2 f (n - 1)), to Rayleigh's quarter wave of optical path over the pupil."""
+    """The relief of the start is the paraboloid h0 - r²/(2 f (n - 1)), to Rayleigh's quarter wave of optical path over
+    the pupil.
+    """
     config = assemble("detection", "quick")
     animal = develop(Genotype(config.genome).start, config)
     eyes = animal.eyes(config.eye)
     radius, focal_length = eyes.optics.aperture_radius, eyes.eye().sensor_distance
     ideal = BSplineRelief.paraboloid(0.0, 1 / (focal_length * (animal.refractive_index - 1)), radius)
     difference = eyes.optics.height.control_points - ideal.control_points
-    # A B-spline lies within the hull of its control points.
+    # A B-spline lies within the convex hull of its control points.
     path_error = (animal.refractive_index - 1) * np.ptp(difference) / 2
     assert path_error < 550e-9 / 4
 
 
 def test_there_are_more_than_1e20_genotypes_and_a_tenth_of_a_range_makes_another_animal():
-    """Counted with ten values of each real gene, which all differ."""
+    """The count uses ten values of each real gene, which all give different animals."""
     assert GENOTYPE.count(10) == 16**3 * 10 * 512 * 10.0 ** (2 + 18)
     assert GENOTYPE.count(10) > 1e20
     for place, gene in enumerate(GENOTYPE.open_genes):
@@ -147,7 +149,7 @@ def test_pupils_have_every_shape_and_glass():
     for number, name in enumerate(APERTURE_SHAPES):
         pupil = replace(start, aperture_shape=number).pupil(config.eye)
         areas[name] = pupil.aperture.area
-    # In units of the pupil's radius squared: π, π (1 - 1/4), 4·4/17 and n/2 sin(2π/n).
+    # The areas in units of the squared pupil radius are π, π (1 - 1/4), 4·4/17 and n/2 sin(2π/n).
     polygons = {name: n / 2 * np.sin(2 * np.pi / n) for n, name in enumerate(APERTURE_SHAPES[3:], start=3)}
     assert areas == pytest.approx({"circle": np.pi, "annulus": 0.75 * np.pi, "slit": 16 / 17, **polygons})
     flint = replace(start, dispersion=1 / 30).pupil(config.eye)
@@ -172,13 +174,13 @@ def test_receptors_are_as_many_as_the_genes_say_and_peak_where_they_say():
     assert eye.channels == 4
     weights = replace(eye, bands=64).spectral_bands.weights
     wavelengths = 1e9 * replace(eye, bands=64).spectral_bands.wavelengths
-    # What a type catches of daylight peaks near its pigment's peak, within the 64 bands' 7 nm and daylight's slope.
+    # The quantum catch of each type peaks near its pigment's peak, up to the 64 bands' 7 nm and daylight's slope.
     for peak, caught in zip(animal.lambda_max_nm, weights, strict=True):
         assert abs(wavelengths[np.argmax(caught)] - peak) < 25, peak
 
 
 def test_receptors_that_are_not_inherited_are_the_runs():
-    """And what the spectral genes say changes nothing: the same animal."""
+    """The spectral genes then have no effect: the animal stays the same."""
     config = assemble("foraging", assignments=["eye.receptors=honeybee", "genome.lambda_max_0_nm.start=400"])
     animal = develop(Genotype(config.genome).start, config)
     assert animal.lambda_max_nm is None

@@ -1,4 +1,4 @@
-"""Intervals: what lies in them, and how messages quote them."""
+"""Intervals: membership, and their form in messages."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""Phenotypes from files: every animal that evolution can make reads back, and nothing that it cannot make does."""
+"""Phenotypes from files: all animals that evolution can produce are read back, and all others are refused."""
 
 import json
 from dataclasses import fields
@@ -22,7 +22,7 @@ NAMES = [f.name for f in fields(Phenotype)]
     ids=str,
 )
 def test_every_animal_that_evolution_can_make_reads_back(settings):
-    """Among them those at the ends of all ranges, where rounding may put a value just outside."""
+    """The animals include the ends of all ranges, where rounding may put a value just outside."""
     config = tiny(*settings)
     dimension = Genotype(config.genome).dimension
     random = np.random.default_rng(0)

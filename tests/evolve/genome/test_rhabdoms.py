@@ -1,4 +1,4 @@
-"""Rhabdoms in a run: their gene, their settings, and what contradicts itself."""
+"""Rhabdoms in a run: their gene, their settings, and contradictions between settings."""
 
 import json
 
@@ -78,7 +78,7 @@ def test_records_come_back():
         (("genome.rhabdom_diameter_um.start=3",), r"only eyes with rhabdoms have this gene; set eye\.rhabdoms = true"),
         (("eye.rhabdom_length=1e-4",), r"eye\.rhabdom_length: is for rhabdoms"),
         (("eye.rhabdom_index=1.4",), r"eye\.rhabdom_index: is for rhabdoms"),
-        (("eye.rhabdoms=true", "eye.optics=false"), r"eye\.optics = false has none"),
+        (("eye.rhabdoms=true", "eye.optics=false"), r"eye\.optics = false gives none"),
         (("eye.rhabdoms=true", "eye.rhabdom_absorption=7e3"), r"set eye\.rhabdom_length"),
         (("eye.rhabdoms=true", "eye.rhabdom_index=1.33"), r"must lie in \[0\.2, 0\.5\]"),
         (("eye.rhabdoms=true", "eye.rhabdom_index=1.9"), r"must lie in \[0\.2, 0\.5\]"),

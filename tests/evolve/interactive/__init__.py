@@ -1,4 +1,4 @@
-"""Which test covers which module of evolve/interactive.
+"""Tests of evolve/interactive: which test covers which module.
 
 run_from_python: test_run_from_python.py
 opened_run: test_opened_run.py, test_run_from_python.py, learning/test_animals_in_turn.py

@@ -1,4 +1,4 @@
-"""A run to look at in Python: its table, its figures, and what a notebook shows of it."""
+"""A run opened in Python: its table, its figures, and its form in a notebook."""
 
 import json
 from dataclasses import replace
@@ -17,7 +17,7 @@ matplotlib.use("Agg")
 
 @pytest.fixture(scope="module")
 def opened(tmp_path_factory):
-    """Six candidates, of which one failed with a hostile text."""
+    """Return a run of six candidates, including one that failed with hostile text."""
     return evolve.Run.open(make_run(tmp_path_factory.mktemp("opened") / "run").path)
 
 
@@ -53,7 +53,7 @@ def test_fitness_is_drawn_as_it_is(opened):
     lines = {line.get_label(): line.get_xydata() for line in opened.plot_fitness().lines}
     np.testing.assert_allclose(lines["best so far"][:, 1], [3.25, 41.75])
     np.testing.assert_allclose(lines["median"][:, 1], [np.median([-12.5, 3.25]), 7.0])
-    assert len(lines["candidates"]) == 5, "one has failed"
+    assert len(lines["candidates"]) == 5, "one candidate has failed"
     given = matplotlib.figure.Figure().subplots()
     assert opened.plot_fitness(given) is given
 
@@ -63,7 +63,7 @@ def test_eyes_are_drawn_as_they_are(opened):
     head, relief, psf = figure.axes[:3]
     wedges = [patch for patch in head.patches if hasattr(patch, "theta1")]
     middles = sorted((wedge.theta1 + wedge.theta2) / 2 for wedge in wedges)
-    np.testing.assert_allclose(middles, [60, 120])  # 60 degrees apart, heading up
+    np.testing.assert_allclose(middles, [60, 120])  # 60 degrees apart, with the heading upwards
     assert all(wedge.theta2 - wedge.theta1 == pytest.approx(33.0) for wedge in wedges)
     assert relief.get_title() == "relief of the pupil"
     assert psf.images[0].get_array().max() > 0
@@ -76,7 +76,7 @@ def test_a_perfect_lens_has_neither_relief_nor_blur(opened):
 
 
 def test_lines_of_the_record_are_the_same(opened):
-    """A candidate that knows its run is written down as any other."""
+    """A candidate that refers to its run is written to the record like any other."""
     plain = Run.open(opened.path).best
     assert opened.best.to_line() == plain.to_line()
     assert "eye" not in json.loads(opened.best.to_line())

@@ -1,12 +1,13 @@
-"""`evolve.run` and the command make the same record; notebooks are the tutorials, and run."""
+"""`evolve.run` and the command produce the same record; notebooks are generated from pages, and can be run."""
 
-import importlib.util
 import json
 import os
+import runpy
 import subprocess
 import sys
 from functools import partial
 from pathlib import Path
+from types import SimpleNamespace
 
 import nbformat
 import pytest
@@ -28,7 +29,7 @@ SETTINGS = {key: int(value) if str(value).isdecimal() else value for key, value 
 
 @pytest.fixture
 def closed_form(monkeypatch):
-    """The real engine with a fitness that is known."""
+    """Use the real engine with a known fitness."""
     monkeypatch.setattr(carry_on, "evaluate_candidate", bowl)
     monkeypatch.setattr(carry_on, "LocalExecutor", lambda evaluate, count, prepare: LocalExecutor(evaluate, count))
 
@@ -77,11 +78,11 @@ def test_a_callback_may_end_the_run_which_can_go_on(closed_form, tmp_path):
     starts = (run.path / "versions.json").read_bytes()
     run.resume()
     assert isinstance(evolve.resume(run.path), evolve.Run)
-    assert (run.path / "versions.json").read_bytes() == starts, "a finished run is left as it is"
+    assert (run.path / "versions.json").read_bytes() == starts, "a finished run stays unchanged"
 
 
 def test_a_task_of_ones_own_that_is_not_named_ends_before_anything_is_written(closed_form, tmp_path):
-    """Else every candidate would be on record as failed, for ever."""
+    """Otherwise every candidate would be on record as failed permanently."""
     task = f"{ROOT / 'examples' / 'find_ball.py'}:FindBall"
     config = assemble(task, "quick", assignments=["search.population=2", "search.generations=1", "workers=1"])
     path = Run.create(tmp_path / "run", config).path
@@ -119,7 +120,7 @@ def test_what_cannot_be_used_is_refused_before_anything_is_written(tmp_path):
 
 @pytest.mark.slow
 def test_a_script_needs_no_guard(tmp_path):
-    """Workers do not run the script again, which would begin another run in each of them."""
+    """Workers do not execute the script again, which would start another run in each of them."""
     script = tmp_path / "script.py"
     script.write_text(
         "from pathlib import Path\n"
@@ -140,31 +141,30 @@ def test_a_script_needs_no_guard(tmp_path):
     assert [path.name for path in (tmp_path / "runs").iterdir()] == ["detection-paper-1"]
 
 
-@pytest.fixture(scope="module")
-def maker():
-    spec = importlib.util.spec_from_file_location("notebooks", ROOT / "docs" / "site" / "notebooks.py")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+MAKER = SimpleNamespace(**runpy.run_path(str(ROOT / "docs" / "site" / "notebooks.py")))
 
 
-@pytest.mark.parametrize("name", ["optics", "rl", "evolution", "own_world", "python"])
-def test_notebooks_are_the_tutorials(maker, name):
-    """The pages' code is run by other tests, so that of the notebooks is too. (Else: python docs/site/notebooks.py.)"""
-    page = (ROOT / "docs" / "tutorial" / f"{name}.md").read_text()
+def test_every_notebook_has_a_page():
+    assert {path.stem for path in NOTEBOOKS.glob("*.ipynb")} == set(MAKER.SOURCES)
+
+
+@pytest.mark.parametrize("name", MAKER.SOURCES)
+def test_notebooks_are_their_pages(name):
+    """Other tests run the pages' code, and so that of the notebooks. (If this fails: python docs/site/notebooks.py.)"""
+    page = MAKER.SOURCES[name]
     stored = nbformat.read(NOTEBOOKS / f"{name}.ipynb", as_version=4)
-    assert stored == maker.notebook(page)
+    assert stored == MAKER.notebook(page)
     nbformat.validate(stored)
     code = "".join(f"{cell.source}\n" for cell in stored.cells if cell.cell_type == "code")
-    assert code == "".join(maker.CODE.findall(page))
+    assert code == "".join(MAKER.CODE.findall(page.read_text()))
     prose = "\n".join(cell.source for cell in stored.cells if cell.cell_type == "markdown")
-    for target in maker.LINK.findall(prose):
+    for target in MAKER.LINK.findall(prose):
         assert (NOTEBOOKS / target.partition("#")[0]).exists(), target
 
 
 @pytest.mark.slow
 def test_a_notebook_runs_as_jupyter_runs_it(tmp_path, monkeypatch):
-    """The one whose cells show tables and figures; they print what the page shows."""
+    """This notebook's cells show tables and figures. They print the output of the page."""
     monkeypatch.setenv("PYTHONPATH", str(ROOT))
     book = nbformat.read(NOTEBOOKS / "python.ipynb", as_version=4)
     NotebookClient(book, timeout=300, resources={"metadata": {"path": tmp_path}}).execute()

@@ -1,7 +1,7 @@
-"""Which test covers which module of evolve/learning.
+"""Tests of evolve/learning: which test covers which module.
 
 fitness: test_fitness.py
-worlds: test_fitness.py, test_task_module.py, test_animals_in_turn.py
+training_envs: test_fitness.py, test_task_module.py, test_animals_in_turn.py
 task_module: test_task_module.py, test_animals_in_turn.py
 task_trial: test_task_module.py
 ppo: test_ppo.py, test_learning.py, search/test_successive_halving.py
@@ -15,6 +15,6 @@ rollout_buffer: test_rollout_buffer.py
 adam: test_adam.py
 tensor_file: test_policy.py, store/test_regular_files.py
 checkpoint: search/test_successive_halving.py
-training_stage: search/test_successive_halving.py
+training_rung: search/test_successive_halving.py
 animal_task: test_task_module.py, test_fitness.py
 """

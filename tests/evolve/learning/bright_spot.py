@@ -1,4 +1,4 @@
-"""A world small enough to solve in seconds: walk to a bright spot, seen by eyes as sim's environments show theirs."""
+"""A world that is solved in seconds: go to a bright spot, seen by eyes with the observations of sim's environments."""
 
 from __future__ import annotations
 
@@ -11,13 +11,14 @@ from sim.tasks.find_goal import FindGoal
 
 
 class BrightSpot(VecEnv):
-    """Each world holds one Gaussian spot of light on a plane. Reward: progress towards it, and 1 for reaching it.
+    """A task in which each world has one Gaussian spot of light on a plane. The reward is the progress towards it, and
+    1 for reaching it.
 
-    blind eyes see nothing: the task cannot be solved with them but by luck.
+    blind eyes have no signal: the task can then be solved only by chance.
     """
 
     reach, limit, spread = 0.5, 40, 0.15
-    batch_task = FindGoal.__new__(FindGoal)  # actions, ramped terms and verdicts are those of detection
+    batch_task = FindGoal.__new__(FindGoal)  # its actions, ramped terms and verdicts are the same as in detection
 
     def __init__(self, n_envs=16, n_eyes=2, width=7, memory=1, blind=False):
         config = PolicyConfig((memory, n_eyes, 1, 1, width), neurons=1)

@@ -1,4 +1,4 @@
-"""Adam against torch's own, and what it saves."""
+"""Adam against torch's own, and the imports that it avoids."""
 
 import subprocess
 import sys
@@ -15,7 +15,7 @@ def trained(optimizer_class, **options):
     inputs, targets = torch.randn(30, 5), torch.randn(30, 2)
     optimizer = optimizer_class(net.parameters(), lr=1e-2, **options)
     for step in range(60):
-        optimizer.param_groups[0]["lr"] = 1e-2 / (1 + step)  # SB3's schedules set it so
+        optimizer.param_groups[0]["lr"] = 1e-2 / (1 + step)  # SB3's schedules set the rate in this way
         optimizer.zero_grad()
         (net(inputs) - targets).square().mean().backward()
         torch.nn.utils.clip_grad_norm_(net.parameters(), 0.5)
@@ -24,7 +24,9 @@ def trained(optimizer_class, **options):
 
 
 def test_steps_are_those_of_torchs_adam():
-    """To float32 rounding over 60 steps; another epsilon (torch's own 1e-8) moves the weights by far more."""
+    """Weights agree to float32 rounding over 60 steps. Another epsilon (torch's default of 1e-8) changes them by far
+    more.
+    """
     ours = trained(Adam)
     torch.testing.assert_close(ours, trained(torch.optim.Adam, eps=EPSILON), rtol=0, atol=2e-6)
     assert (ours - trained(torch.optim.Adam, eps=1e-2)).abs().max() > 1e-4
@@ -32,7 +34,7 @@ def test_steps_are_those_of_torchs_adam():
 
 @pytest.mark.slow
 def test_a_policy_is_built_without_torchs_compiler():
-    """torch._dynamo takes seconds to import; every worker process would pay for it."""
+    """torch._dynamo takes seconds to import in every worker process."""
     code = (
         "import sys; from evolve.learning.policy import PolicyConfig, build_policy\n"
         "policy = build_policy(PolicyConfig((1, 1, 1, 1, 1), 4)); policy.optimizer.zero_grad()\n"

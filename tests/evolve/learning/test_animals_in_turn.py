@@ -1,4 +1,4 @@
-"""Two animals of one world evolve in turn: one before the other's best, which is frozen, as its run's record has it."""
+"""Two animals of one world evolve in turn: one against the best animal of the other's run, which is frozen."""
 
 import shutil
 from contextlib import closing
@@ -40,7 +40,7 @@ class Hunter(Predator):
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
-    """The example, beside a run of its prey, and a predator that meets the best of it."""
+    """Return a folder with the example, a run of its prey, and a predator that plays against the best prey."""
     backend.require()
     folder = tmp_path_factory.mktemp("turns")
     shutil.copy(EXAMPLE, folder)
@@ -56,7 +56,7 @@ def lived(named):
 
 @pytest.mark.slow
 def test_a_frozen_animal_is_the_runs_best(folder):
-    """Its eyes, its memory and its policy, on the body it is given."""
+    """The frozen animal has the run's eyes, memory and policy, on the given body."""
     run = evolve.Run.open(folder / "prey")
     frozen = run.frozen(executed_task(lived(f"{folder / EXAMPLE.name}:Prey")[0].choice.named_code))
     best = run.best.phenotype
@@ -73,7 +73,7 @@ def test_a_frozen_animal_is_the_runs_best(folder):
 
 @pytest.mark.slow
 def test_the_other_evolves_before_it(folder):
-    """The hunter's life is another before prey that stands still, and the same twice."""
+    """The training run of the hunter differs with prey that stands still, and is reproducible."""
     config, animal = lived(f"{folder / 'hunter.py'}:Hunter")
     try_task(config)
     lives = [evaluate(animal, config, 3, folder / name) for name in ("one", "two")]
@@ -101,11 +101,11 @@ def with_policy(config, policy):
 
 
 def test_rays_of_frozen_animals_are_chosen_once(folder):
-    """And not anew in each of an animal's three environments."""
+    """They are not chosen again in each of an animal's three environments."""
     given = "    fidelity = sim.Fidelity(2, bands=4)\n"
     text = (folder / EXAMPLE.name).read_text()
     assert given in text
-    (folder / "auto.py").write_text(text.replace(given, "", 1))  # the predator's
+    (folder / "auto.py").write_text(text.replace(given, "", 1))  # the predator's fidelity
     config, _ = lived(f"{folder / 'auto.py'}:Prey")
     [predator] = executed_task(config.choice.named_code).others
     assert isinstance(predator.task.fidelity, sim.Fidelity)

@@ -1,4 +1,4 @@
-"""Features at every step of a rollout against those of the stacks of frames that an environment would give."""
+"""Features at every step of a rollout against features of an environment's stacks of frames."""
 
 import pytest
 import torch
@@ -7,7 +7,8 @@ from evolve.learning.eye_features import EyeFeatures
 from evolve.learning.policy import PolicyConfig
 
 SEGMENTS, STEPS = 3, 6
-AGE = torch.tensor([[0, 9, 2], [1, 9, 3], [2, 9, 0], [3, 0, 0], [4, 1, 1], [5, 2, 2]])  # (step, segment)
+# steps since the episode's first frame (step, segment)
+AGE = torch.tensor([[0, 9, 2], [1, 9, 3], [2, 9, 0], [3, 0, 0], [4, 1, 1], [5, 2, 2]])
 
 
 def features_of(memory):
@@ -31,8 +32,9 @@ def unstacked(memory):
 
 
 def stacked(observation, memory):
-    """The same by a plain loop: slot by slot so many steps back, but never further than the episode's first frame,
-    `age` steps back."""
+    """Return the result of a plain loop: each slot is a fixed number of steps back, but at most `age` steps, to the
+    episode's first frame.
+    """
     stacks = []
     for step in range(STEPS):
         for segment in range(SEGMENTS):
@@ -46,7 +48,7 @@ def stacked(observation, memory):
 def test_no_frame_is_remembered_from_before_the_episode(memory):
     features, observation = features_of(memory), unstacked(memory)
     found, expected = features(observation), features(stacked(observation, memory))
-    torch.testing.assert_close(found, expected, rtol=0, atol=1e-12)  # sums in another order
+    torch.testing.assert_close(found, expected, rtol=0, atol=1e-12)  # the order of summation differs
 
 
 @pytest.mark.parametrize("memory", [1, 4])

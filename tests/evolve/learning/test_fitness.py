@@ -1,4 +1,4 @@
-"""A candidate's life in sim's worlds."""
+"""Training and evaluation of a candidate in sim's worlds."""
 
 import math
 from dataclasses import replace
@@ -12,7 +12,7 @@ from evolve.learning import fitness
 from evolve.learning.fitness import evaluate
 from evolve.learning.policy import load_policy
 from evolve.learning.ppo import play
-from evolve.learning.training_stage import TrainingStage
+from evolve.learning.training_rung import TrainingRung
 from evolve.search.successive_halving import trained_steps
 from sim.envs.prepared_task import PreparedTask
 from tests.evolve.small_run import LEARNING, PHENOTYPE, small_config
@@ -37,7 +37,7 @@ def test_fitness_is_the_mean_return_of_the_evaluation_episodes(outcome):
 
 
 def test_a_plan_counts_the_steps_that_are_trained(tmp_path):
-    """Whole rollouts, 256 steps each, in two stretches that an evaluation parts."""
+    """The plan counts whole rollouts, 256 steps each, in two parts separated by an evaluation."""
     learning = replace(LEARNING, total_steps=600, eval_interval=300)
     config = small_config(learning=learning)
     trained = evaluate(PHENOTYPE, config, 5, tmp_path / "0.safetensors").steps
@@ -57,7 +57,7 @@ def test_progress_is_told(outcome):
 
 
 def test_the_stored_policy_earns_the_same_returns(outcome):
-    """The file holds the policy that was evaluated: in the same worlds it plays the same episodes."""
+    """The file contains the evaluated policy: in the same worlds it plays the same episodes."""
     evaluation, path, _ = outcome
     config = small_config()
     seed = int(np.random.SeedSequence(5).generate_state(3)[2])
@@ -81,8 +81,10 @@ def test_same_seed_same_life(outcome, tmp_path):
 @pytest.mark.parametrize(("most", "expected"), [(4096.0, None), (3.0, 3.0)])
 @pytest.mark.parametrize("resolution", [(3, 4), (1, 1)])
 def test_training_looks_less_closely_than_evaluation(resolution, most, expected, tmp_path, monkeypatch):
-    """At most so many samples for a receptor, whatever the eye; None: as the noise asks, 4 or 6 in the maze.
-    Fitness is measured with those in any case, and checkpoints as training is, in the same light."""
+    """Training uses at most this number of samples per receptor, whatever the eye. None: the number that the noise
+    requires, 4 or 6 in the maze. Fitness is always measured with the latter number, and checkpoints use the training's,
+    in the same light.
+    """
     fidelities = []
 
     def recorded(make):
@@ -107,7 +109,7 @@ def test_training_looks_less_closely_than_evaluation(resolution, most, expected,
 
 
 def test_a_training_that_diverges_is_a_failure_with_a_reason(tmp_path, monkeypatch):
-    """Signals that are no numbers: no exception leaves, no policy is written."""
+    """Signals are NaN: no exception is raised, and no policy is written."""
     monkeypatch.setattr(
         "sim.render.receptor_noise.NoiseModel.__call__", lambda _, signals, *__: np.full_like(signals, np.nan)
     )
@@ -120,7 +122,7 @@ def test_a_training_that_diverges_is_a_failure_with_a_reason(tmp_path, monkeypat
 
 @pytest.mark.slow
 def test_unseen_mazes_are_seen_by_the_evaluation_alone(tmp_path):
-    """The same training, other episodes after it; with more mazes, another training."""
+    """The training is the same and the episodes after it differ. More mazes change the training."""
     outcomes = {}
     for name, world in {
         "one": WorldConfig(),
@@ -138,7 +140,7 @@ def test_unseen_mazes_are_seen_by_the_evaluation_alone(tmp_path):
 
 @pytest.mark.slow
 def test_every_stage_has_chance_of_its_own(tmp_path, monkeypatch):
-    """A training that went on in the worlds of its first stage would learn them by heart."""
+    """A training run that continued in the worlds of its first rung would overfit to them."""
     seeds, make = [], fitness.worlds_of
 
     def recorded(phenotype, config, *two):
@@ -147,8 +149,8 @@ def test_every_stage_has_chance_of_its_own(tmp_path, monkeypatch):
 
     monkeypatch.setattr(fitness, "worlds_of", recorded)
     kept = tuple(tmp_path / str(number) for number in range(3))
-    evaluate(PHENOTYPE, small_config(), 5, tmp_path / "policy", stage=TrainingStage((256, 512, 768), kept))
+    evaluate(PHENOTYPE, small_config(), 5, tmp_path / "policy", rung=TrainingRung((256, 512, 768), kept))
     assert len(seeds) == 3
     assert len({seed for two in seeds for seed in two}) == 6
     evaluate(PHENOTYPE, small_config(), 5, tmp_path / "whole")
-    assert seeds[3] == seeds[0], "the first stage begins as a whole training does"
+    assert seeds[3] == seeds[0], "the first rung starts like a whole training run"

@@ -1,8 +1,8 @@
-"""Learning in sim's own worlds, as far as seconds allow.
+"""Learning in sim's own worlds, within seconds.
 
-Telling goal from adversary takes PPO some 100,000 steps (validation/evolve/learning_curves.py), longer than a test
-may. What is held instead: that signals and encoder suffice to tell them apart, which one receptor does not, and that
-PPO learns to reach objects at all.
+PPO needs about 100,000 steps to distinguish goal and adversary (validation/evolve/learning_curves.py), which takes too
+long for a test. Instead, the tests check that signals and encoder suffice for this distinction, that one receptor does
+not suffice, and that PPO learns to reach objects.
 """
 
 import numpy as np
@@ -21,7 +21,9 @@ SCENES, TRAINING_SCENES, BATCH = 256, 20, 512
 
 
 def scenes(random):
-    """Worlds with one object 1 to 4 m ahead of the agent, half of them the goal; the others are behind it."""
+    """Return worlds with one object 1 to 4 m ahead of the agent, half of them the goal. The others are behind the
+    agent.
+    """
     position = random.uniform([-5, -4], [5, 4], (SCENES, 2))
     heading = random.uniform(-np.pi, np.pi, SCENES)
     is_goal = np.arange(SCENES) % 2 == 0
@@ -37,7 +39,9 @@ def scenes(random):
 
 
 def accuracy_of_telling_goal_from_adversary(resolution, seed):
-    """Share of unseen scenes told right by the policy's features and one linear unit after 400 batches."""
+    """Return the share of unseen scenes that the policy's features and one linear unit classify correctly after 400
+    batches.
+    """
     random = np.random.default_rng(seed)
     eyes = sim.Eyes(n_eyes=1, resolution=resolution)
     renderer = sim.BatchedRenderer(sim.build_world("detection"), eyes, SCENES, sim.Fidelity(4, eyes.bands))
@@ -70,7 +74,7 @@ def accuracy_of_telling_goal_from_adversary(resolution, seed):
 
 @pytest.mark.slow
 def test_many_receptors_tell_goal_from_adversary_and_one_does_not():
-    """Measured over two seeds: above .99 and .53-.55; chance is .5. With units of tanh it was .93-.97."""
+    """Measured over two seeds: above 0.99 and 0.53-0.55; chance is 0.5. Units of tanh reached 0.93-0.97."""
     sharp = accuracy_of_telling_goal_from_adversary((15, 15), seed=0)
     single = accuracy_of_telling_goal_from_adversary((1, 1), seed=0)
     assert sharp > 0.98, (sharp, single)
@@ -79,8 +83,9 @@ def test_many_receptors_tell_goal_from_adversary_and_one_does_not():
 
 @pytest.mark.slow
 def test_ppo_learns_to_reach_objects():
-    """Untrained, an agent stays at a wall, which costs 1 per action. Measured over two seeds: return -2.2 and -2.5
-    after, goal first .36 and .42 (chance of an agent that reaches some object: 1/3)."""
+    """An untrained agent stays at a wall, which costs 1 per action. Measured over two seeds after training: returns of
+    -2.2 and -2.5, and 0.36 and 0.42 of first objects are goals (chance level of an agent that reaches an object: 1/3).
+    """
     eyes = sim.Eyes(n_eyes=2, resolution=(8, 8))
     config = LearningConfig(total_steps=40_960, eval_interval=40_960)
     worlds, others = (sim.make_vec_env("detection", eyes, 64, seed, rays_per_receptor=1) for seed in (0, 1000))

@@ -28,10 +28,10 @@ CONFIG = PolicyConfig(eyes=(3, 2, 3, 2, 4), neurons=8)
 def policy():
     torch.manual_seed(0)
     policy = build_policy(CONFIG)
-    with torch.no_grad():  # biases start at zero, where a misplaced one would not show
+    with torch.no_grad():  # biases start at zero, which would hide a misplaced one
         for parameter in policy.features_extractor.parameters():
             parameter += 0.1 * torch.randn_like(parameter)
-        for _ in range(2):  # signals of an odd mean and spread per receptor
+        for _ in range(2):  # signals have an arbitrary mean and spread per receptor
             policy.features_extractor.adapt(torch.rand(50, *CONFIG.eyes[1:]) * torch.rand(CONFIG.eyes[1:]) + 0.3)
     return policy
 
@@ -74,7 +74,9 @@ def test_features_are_those_of_a_loop_over_eyes_and_frames(policy):
 
 
 def test_receptors_adapt_to_mean_and_spread_of_all_they_have_seen(policy):
-    """In pieces of any size; one spread per eye, so that a receptor that sees little change is not made of noise."""
+    """The frames come in pieces of any size. Each eye has one spread, so that noise is not amplified in receptors with
+    little change.
+    """
     random = np.random.default_rng(1)
     seen = random.normal(0.4, 0.1, (70, *CONFIG.eyes[1:])).astype(np.float32)
     seen[:, 1] *= 3
@@ -87,7 +89,7 @@ def test_receptors_adapt_to_mean_and_spread_of_all_they_have_seen(policy):
 
 
 def test_dim_light_looks_like_bright_light_once_adapted(policy):
-    """Behind a pupil a tenth as wide, signals are a hundredth; what is learnt from them need not know."""
+    """A pupil one tenth as wide dims the signal a hundredfold; normalisation hides this from the learner."""
     random = np.random.default_rng(2)
     frames = random.uniform(0, 1, (40, *CONFIG.eyes[1:])).astype(np.float32)
     observation = random_observation(CONFIG, 5)
@@ -112,7 +114,7 @@ def test_an_eye_moves_its_own_features_only(policy):
 
 
 def test_memory_costs_temporal_weights_only():
-    """The same encoder sees every remembered frame; flattening the stack would give it ten times the weights."""
+    """One encoder processes every remembered frame; flattening the stack would need ten times the weights."""
 
     def encoder_weights(memory):
         policy = build_policy(PolicyConfig((memory, 2, 3, 2, 4), 8))
@@ -133,7 +135,7 @@ def test_a_stored_policy_acts_the_same(policy, tmp_path):
 
 
 def test_a_policy_whose_file_names_no_encoder_has_one_of_16(tmp_path):
-    """As all had: such a file loads, and acts the same."""
+    """Files of this form load, and their policies act in the same way."""
     torch.manual_seed(0)
     policy = build_policy(PolicyConfig((3, 2, 3, 2, 4), neurons=8, layers=2, encoder=16))
     path = tmp_path / "a.safetensors"
@@ -153,7 +155,7 @@ def test_a_policy_whose_file_names_no_encoder_has_one_of_16(tmp_path):
 
 @pytest.mark.parametrize(("neurons", "encoder"), [(1, 1), (4, 1), (5, 2), (64, 16), (512, 128)])
 def test_a_brain_is_as_narrow_as_its_gene_says_everywhere(neurons, encoder, tmp_path):
-    """Of all its layers the encoder's are a quarter as wide, and all of them learn."""
+    """The layers of the encoder have a quarter of this width, and all layers learn."""
     config = assemble("detection", assignments=["eye.optics=false", f"genome.neurons.start={neurons}"])
     animal = develop(Genotype(config.genome).start, config)
     torch.manual_seed(0)
@@ -177,7 +179,7 @@ def test_a_brain_is_as_narrow_as_its_gene_says_everywhere(neurons, encoder, tmp_
 
 
 def test_a_policy_of_other_units_is_refused(policy, tmp_path):
-    """Earlier ones were of tanh units; the same weights would act otherwise."""
+    """Earlier policies had tanh units; with the same weights they would act differently."""
     path = tmp_path / "a.safetensors"
     save_policy(policy, path)
     named = path.read_bytes()
@@ -188,7 +190,7 @@ def test_a_policy_of_other_units_is_refused(policy, tmp_path):
 
 
 class Hostile:
-    """Unpickling this writes a file."""
+    """A class that writes a file when it is unpickled."""
 
     def __init__(self, path):
         self.path = path
@@ -222,7 +224,7 @@ def test_a_damaged_file_is_refused_by_name(policy, tmp_path):
 
 
 def test_means_come_back_from_beyond_the_bounds_and_go_no_further():
-    """Gradients of a loss that wants every mean higher (lower): none for means above 1 (below -1)."""
+    """The loss has a gradient towards higher (lower) means everywhere, but it is zero for means above 1 (below -1)."""
     policy = build_policy(PolicyConfig((1, 1, 1, 1, 1), 1))
     policy.action_net.weight.data = torch.eye(2)[:, :1] + 0.0
     policy.action_net.bias.data.zero_()
@@ -263,7 +265,7 @@ def test_first_actions_are_as_fast_as_asked():
     ids=str,
 )
 def test_a_shape_that_the_tensors_do_not_have_is_refused_before_it_is_built(policy, tmp_path, shape, monkeypatch):
-    """A forged file of some kilobytes must not ask for gigabytes."""
+    """A forged file of some kilobytes must not allocate gigabytes."""
     path = tmp_path / "forged.safetensors"
     config = {**asdict(policy.config), "units": UNITS.__name__, **shape}
     save_file({n: t.detach().clone() for n, t in learnt(policy).items()}, path, {"config": json.dumps(config)})

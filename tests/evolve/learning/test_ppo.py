@@ -1,4 +1,6 @@
-"""The learner on a world that takes seconds: it learns, repeats itself exactly, stops in time and fails by name."""
+"""The learner on a world that takes seconds: it learns, is exactly reproducible, stops in time, and names its
+failures.
+"""
 
 import tempfile
 from dataclasses import replace
@@ -56,7 +58,7 @@ def test_progress_is_told_after_every_rollout():
 
 
 def test_stops_when_evaluations_stop_improving():
-    """The second evaluation is the best by far: `patience` more, and no further."""
+    """The second evaluation is by far the best: training stops after `patience` more evaluations."""
     config = LearningConfig(total_steps=20_000, n_envs=16, n_steps=32, batch_size=128, eval_interval=512, patience=3)
     training = train(Worlds(BrightSpot(16), Favouring(kind_evaluation=2)), SMALL, config, 0)
     assert [steps for steps, _ in training.curve] == [512, 1024, 1536, 2048, 2560]
@@ -83,7 +85,7 @@ def test_rewards_that_are_no_numbers_end_the_training():
 
 @pytest.mark.filterwarnings("ignore:.*encountered in:RuntimeWarning")
 def test_a_loss_that_overflows_ends_the_training():
-    """The critic's error squares to infinity; gradient clipping would turn it into a training that does nothing."""
+    """The critic's squared error is infinite. Gradient clipping would turn this into a training run without effect."""
     model = AdaptingPPO(BrightSpot(16), SMALL, QUICK, 0)
     model.learn(512)
     model.rollout_buffer.returns[:] = 1e30
@@ -104,7 +106,7 @@ def test_the_unit_of_rewards_does_not_matter():
 
 
 class Poor(BrightSpot):
-    """Pays nothing before its `first` step."""
+    """A world without rewards before its `first` step."""
 
     first, taken = np.inf, 0
 
@@ -115,7 +117,9 @@ class Poor(BrightSpot):
 
 
 def test_the_unit_stays_where_nothing_is_paid_and_is_that_of_the_first_rewards():
-    """Returns are then what the critic says, discounted: a unit that followed them would halve with each rollout."""
+    """Without rewards, returns are the critic's discounted predictions. A unit that followed them would halve with each
+    rollout.
+    """
     model = AdaptingPPO(Poor(16), SMALL, QUICK, 0)
     model.learn(6 * 512)
     assert model.env.unit == 1
@@ -143,7 +147,7 @@ PACED = LearningConfig(n_epochs=10, least_epochs=6, decay_after=640)
 
 
 class Touching(BrightSpot):
-    """Every action is in contact, and costs nothing else."""
+    """A world in which every action touches a wall, and has no other cost."""
 
     def step_wait(self):
         observation, reward, done, infos = super().step_wait()
@@ -156,15 +160,16 @@ class Touching(BrightSpot):
 def test_learners_pay_their_share_of_contact(ramp, cost):
     model = AdaptingPPO(Touching(16), SMALL, replace(QUICK, contact_ramp=ramp), 0)
     model.learn(512)
-    # Truncated episodes have the critic's guess of what follows added to their last reward.
+    # The critic's estimate of later rewards is added to the last reward of truncated episodes.
     assert np.median(-model.rollout_buffer.rewards) == pytest.approx(cost, rel=1e-6)
 
 
 @pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("pieces", [(2560,), (512, 2048), (512,) * 5])
 def test_learning_slows_down_with_steps_in_whatever_pieces(pieces):
-    """It stays as it is for 640 steps. Passes times rate then fall as one over the steps: by passes when the rate has
-    halved, until six are left."""
+    """The rate of learning is constant for 640 steps. Then passes times step size falls inversely with the steps: when
+    the step size has halved, the number of passes falls, to six at the lowest.
+    """
     config = replace(PACED, n_envs=16, n_steps=32, batch_size=128, learning_rate=4e-3)
     model = AdaptingPPO(BrightSpot(16), SMALL, config, 0)
     update, rates, batches = model.train, [], [0]
@@ -193,7 +198,7 @@ def test_large_brains_take_smaller_steps(neurons, rate):
 
 
 class Favouring(BrightSpot):
-    """Evaluation worlds that are kinder in one evaluation than in all others."""
+    """Evaluation worlds with a higher reward in a single evaluation."""
 
     def __init__(self, kind_evaluation):
         super().__init__(16)
@@ -209,7 +214,7 @@ class Favouring(BrightSpot):
 
 
 def test_the_best_policy_is_returned_not_the_last():
-    """Bit for bit the policy of a training that ended with that evaluation, adaptation included."""
+    """The policy equals, bit for bit, that of a training run that ends with this evaluation, including adaptation."""
 
     def policy(evaluations, kind_evaluation):
         config = LearningConfig(
@@ -236,14 +241,14 @@ def test_signals_that_are_no_numbers_end_the_training():
 
 
 def test_a_training_leaves_nothing_behind_in_the_temporary_folder(tmp_path, monkeypatch):
-    """SB3's own logger makes a folder there for each training: a long run would leave thousands."""
+    """SB3's own logger creates a folder for each training run, which would be thousands in a long run."""
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     learn(LearningConfig(total_steps=512, n_envs=16, n_steps=32, batch_size=128))
     assert list(tmp_path.iterdir()) == []
 
 
 def test_of_a_goal_and_an_adversary_in_one_action_the_first_counts():
-    """Of odd worlds the adversary; what is reached later, here the other, decides nothing."""
+    """The adversary is first in odd worlds. Objects that are reached later, here the other one, have no effect."""
 
     class Both(BrightSpot):
         steps = 0

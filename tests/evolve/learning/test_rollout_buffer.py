@@ -1,4 +1,4 @@
-"""The rollout buffer against stable-baselines3's own, which keeps every stacked observation."""
+"""The rollout buffer against stable-baselines3's own, which stores every stacked observation."""
 
 import numpy as np
 import pytest
@@ -14,7 +14,7 @@ STEPS, WORLDS = 24, 6
 
 @pytest.fixture(scope="module")
 def buffers():
-    """Two buffers filled with the same rollout: episodes end inside it, and it starts amid others."""
+    """Return two buffers with the same rollout: episodes end inside it, and it starts in the middle of others."""
     worlds = BrightSpot(WORLDS, memory=5)
     worlds.limit = 7
     ours, theirs = (
@@ -36,7 +36,9 @@ def buffers():
 
 
 def rows(batches, features):
-    """Samples in a canonical order: features, actions, values, log_probs, advantages, returns side by side."""
+    """Return samples in a canonical order, with features, actions, values, log_probs, advantages and returns
+    concatenated.
+    """
     table = []
     for batch in batches:
         with torch.no_grad():
@@ -48,11 +50,13 @@ def rows(batches, features):
 
 
 def test_samples_are_those_of_the_stacked_buffer(buffers):
-    """Same windows of frames at episode starts, amid episodes and across the rollout's edge, same everything."""
+    """Samples have the same windows of frames at starts of episodes, within episodes and across the rollout's edge, and
+    the same other values.
+    """
     ours, theirs = buffers
     torch.manual_seed(0)
     features = build_policy_features(theirs.observation_space)
-    # float32 through four layers; a frame from the wrong episode moves features by 0.01 and more
+    # float32 through four layers; a frame from the wrong episode changes features by 0.01 and more
     np.testing.assert_allclose(rows(ours.get(48), features), rows(theirs.get(48), features), atol=2e-6)
 
 

@@ -1,4 +1,4 @@
-"""How a training slows down."""
+"""The schedule by which learning slows down."""
 
 from dataclasses import replace
 
@@ -18,8 +18,8 @@ PACED = LearningConfig(n_envs=16, n_steps=32, n_epochs=10, least_epochs=6, decay
         (10, 3, 1280, 10, 0.5),
         (10, 3, 2560, 5, 0.5),
         (10, 3, 6400, 3, 1 / 3),
-        (10, 10, 2560, 10, 0.25),  # as many throughout
-        (2, 3, 2560, 2, 0.25),  # no more than at first
+        (10, 10, 2560, 10, 0.25),  # a constant number of passes
+        (2, 3, 2560, 2, 0.25),  # at most the initial number
         (1, 1, 6400, 1, 0.1),
     ],
 )
@@ -29,15 +29,15 @@ def test_the_step_size_halves_then_passes_fall_and_then_it_falls_again(n_epochs,
 
 
 def test_passes_of_a_stage_are_those_of_its_updates():
-    """Of 10, 10, 9, 7 and 6, after every 512 steps."""
+    """The updates after every 512 steps have 10, 10, 9, 7 and 6 passes."""
     assert mean_passes(PACED, 0, 512) == 10
     assert mean_passes(PACED, 0, 2560) == 8.4
     assert mean_passes(PACED, 512, 1536) == 9.5
-    assert mean_passes(PACED, 1024, 1100) == 9, "less than a rollout is one"
+    assert mean_passes(PACED, 1024, 1100) == 9, "less than a rollout counts as one"
 
 
 def test_a_short_training_is_none_other_than_with_all_passes():
-    """To the last bit, until the step size has halved."""
+    """The training is identical, bit for bit, until the step size has halved."""
     throughout = replace(PACED, least_epochs=10)
     assert all(schedule(PACED, steps) == schedule(throughout, steps) for steps in range(1, 1281))
     assert schedule(PACED, 1500) != schedule(throughout, 1500)

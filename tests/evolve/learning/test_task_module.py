@@ -1,4 +1,4 @@
-"""Tasks of one's own, executed: what an animal lives in, and what is refused before anything begins."""
+"""Execution of user tasks: the environment of an animal, and tasks that are refused at the start."""
 
 import dataclasses
 import pickle
@@ -21,7 +21,7 @@ from evolve.learning.observed import Entry
 from evolve.learning.policy import TrainingDiverged, load_policy
 from evolve.learning.task_module import executed_task
 from evolve.learning.task_trial import try_task
-from evolve.learning.worlds import worlds_of
+from evolve.learning.training_envs import worlds_of
 from evolve.search import dask_worker
 from evolve.search.job import Job
 from evolve.search.worker import evaluate_candidate
@@ -46,7 +46,7 @@ def small(*settings, named=f"{BALL}:FindBall"):
 
 
 def written(tmp_path, old, new):
-    """Our task with something wrong in it."""
+    """Return our task with an error in it."""
     text = BALL.read_text()
     assert old in text
     file = tmp_path / "mine.py"
@@ -63,7 +63,7 @@ def test_an_animal_lives_in_it_twice_alike(tmp_path):
     assert (tmp_path / "first").read_bytes() == (tmp_path / "second").read_bytes()
     policy = load_policy(tmp_path / "first")
     assert (policy.config.actions, policy.config.beside) == (1, (Entry("feels", 1),))
-    # The first observation, and all that was felt until the best of two evaluations.
+    # The first observation, and all proprioception until the better of two evaluations.
     assert policy.features_extractor.felt.seen.item() in (8 + 128, 8 + 256)
 
 
@@ -87,13 +87,13 @@ class FindBalls(sim.BatchTask):
     def succeeded(self, worlds):
         return np.abs(worlds.mocap_pos[:, 0, 1] - worlds.qpos[:, 0]) < 0.3
 
-    def feels(self, worlds):
+    def proprioception(self, worlds):
         return worlds.qvel
 """
 
 
 def test_a_batch_task_evolves_as_the_same_task_of_one_world_at_a_time(tmp_path):
-    """With the same numbers: returns, and the policy's bytes."""
+    """Returns and the policy's bytes are the same."""
     file = tmp_path / "balls.py"
     file.write_text(BATCH.format(model=executed_task(small()[0].choice.named_code).model))
     lives = []
@@ -113,11 +113,11 @@ def test_eyes_are_the_animals_own_where_the_task_puts_them():
     task = animal_task(animal, config).task
     assert [mount.azimuth_deg for mount in task.mounts] == [40, -40]
     assert {mount.elevation_deg for mount in task.mounts} == {20}
-    assert np.hypot(*task.mounts[0].offset[:2]) == pytest.approx(0.26)  # as far out, turned with the eye
+    assert np.hypot(*task.mounts[0].offset[:2]) == pytest.approx(0.26)  # at the same distance, rotated with the eye
     assert task.eye.resolution == animal.resolution
     assert task.eye.noise_sigma == config.eye.noise_sigma
     plain = executed_task(config.choice.named_code)
-    assert len(plain.mounts) == 1  # what belongs to the class is as it was
+    assert len(plain.mounts) == 1  # the class's own settings stay unchanged
 
 
 def test_rays_are_the_runs_or_the_tasks_and_few_in_lessons():
@@ -125,9 +125,9 @@ def test_rays_are_the_runs_or_the_tasks_and_few_in_lessons():
     for rays in ("auto", "12"):
         config, animal = small(f"eye.rays_per_receptor={rays}", "learning.rays_per_receptor=1")
         life = worlds_of(animal, config, 1, 2)
-        with closing(life.lessons), closing(life.checkpoints), closing(life.finals):
+        with closing(life.training), closing(life.selection), closing(life.test):
             worlds[rays] = [
-                part.renderer.fidelity.rays_per_receptor for part in (life.lessons, life.checkpoints, life.finals)
+                part.renderer.fidelity.rays_per_receptor for part in (life.training, life.selection, life.test)
             ]
     assert worlds == {"auto": [1, 1, 2], "12": [1, 1, 12]}
 
@@ -147,7 +147,7 @@ def test_what_eyes_do_not_see_of_a_model_is_said_before_and_not_by_every_candida
 
 
 def test_success_is_what_holds_at_the_end(tmp_path):
-    """A task that is done in its first step, and undone later, is not solved."""
+    """A task that succeeds in its first step, and is undone later, is not solved."""
     began = "return data.time < 0.15"
     named = written(tmp_path, "return abs(data.mocap_pos[0, 1] - data.qpos[0]) < 0.3", began)
     config, animal = small(named=named)
@@ -157,14 +157,15 @@ def test_success_is_what_holds_at_the_end(tmp_path):
 
 
 def test_what_fails_in_the_middle_of_a_life_is_counted(tmp_path):
-    """Every episode ends with its 11th action: 2 in each of 8 worlds within 32 actions of learning, and those of two
-    evaluations on the way and of the last one, 3 each."""
+    """Every episode ends with its 11th action. This gives 2 in each of 8 worlds within 32 actions of learning, and 3
+    each in two evaluations during training and in the last one.
+    """
     config, animal = small(named=written(tmp_path, "    def succeeded", FAILING))
     with pytest.warns(UserWarning, match=r"terminated, line \d+ of mine.py: KeyError: 'ball'; its episode ends here"):
         outcome = evaluate(animal, config, 3, tmp_path / "policy")
     assert outcome.failure is None
     assert outcome.steps == 256
-    ((said, episodes),) = outcome.mishaps
+    ((said, episodes),) = outcome.episode_failures
     assert re.fullmatch(r"terminated, line \d+ of mine.py: KeyError: 'ball'", said)
     assert episodes == 8 * 2 + (1 + 1 + 1) * 3
     reply = dask_worker._text(outcome), b"", b""
@@ -180,7 +181,7 @@ def test_what_failed_before_learning_diverged_is_counted_too(tmp_path, monkeypat
     with pytest.warns(UserWarning, match="its episode ends here"):
         outcome = evaluate(animal, config, 3, tmp_path / "policy")
     assert outcome.failure == "signals not finite"
-    assert [episodes for _, episodes in outcome.mishaps] == [8 * 2 + (1 + 1) * 3]
+    assert [episodes for _, episodes in outcome.episode_failures] == [8 * 2 + (1 + 1) * 3]
 
 
 FAILING = """    def terminated(self, data):
@@ -190,7 +191,7 @@ FAILING = """    def terminated(self, data):
 
 
 def test_a_job_carries_the_text_as_it_was(tmp_path):
-    """Whoever edits the file while a run goes on changes nothing in it."""
+    """Edits of the file during a run do not affect the run."""
     file = tmp_path / "mine.py"
     file.write_text(BALL.read_text())
     config, animal = small(named=f"{file}:FindBall")
@@ -200,7 +201,7 @@ def test_a_job_carries_the_text_as_it_was(tmp_path):
 
 
 def test_dask_is_sent_the_text(tmp_path):
-    """A worker elsewhere has neither the run's directory nor the file."""
+    """A remote worker has neither the run's directory nor the file."""
     file = tmp_path / "mine.py"
     file.write_text(BALL.read_text())
     config, animal = small(named=f"{file}:FindBall")

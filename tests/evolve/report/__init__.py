@@ -1,4 +1,4 @@
-"""Which test covers which module of evolve/report.
+"""Tests of evolve/report: which test covers which module.
 
 page: test_report_page.py
 write: test_report_page.py

@@ -1,4 +1,4 @@
-"""One run, one episode of its best and one page of both, for all tests of the report."""
+"""One run, one episode of its best animal and one page of both, for all tests of the report."""
 
 import pytest
 
@@ -19,7 +19,7 @@ def episode(run):
 
 @pytest.fixture(scope="package")
 def rendered(run, episode):
-    """The page, and what was reported while it was made."""
+    """Return the page, and the progress that was reported."""
     told = []
     return render(run, episode, lambda what, share: told.append((what, share))).decode(), told
 

@@ -1,4 +1,4 @@
-"""Recordings for rerun, read by its own reader."""
+"""Recordings for rerun, read with rerun's own reader."""
 
 import numpy as np
 import pytest
@@ -7,12 +7,14 @@ from evolve.report.rerun_recording import write_recording
 
 
 def read_back(episode, folder):
-    """Of each entity and component its values in order of the actions; of what is static, its value."""
+    """Return the values of each entity and component in order of the actions; for static components, their single
+    value.
+    """
     pytest.importorskip("rerun", reason="the extra rerun is not installed")
     from rerun.chunk import RrdReader
 
     path = write_recording(episode, folder / "episode.rrd")
-    assert [file.name for file in folder.iterdir()] == ["episode.rrd"], "nothing half written is left"
+    assert [file.name for file in folder.iterdir()] == ["episode.rrd"], "a partial file remains"
     rows = {}
     for chunk in RrdReader(path).stream():
         batch = chunk.to_record_batch()
@@ -23,7 +25,7 @@ def read_back(episode, folder):
                 found += zip(actions, batch.column(name).to_pylist(), strict=True)
     for (_, component), values in rows.items():
         if component == "Transform3D:translation" and len(values) > 1:
-            assert sorted(action for action, _ in values) == list(range(len(episode))), "each has a time of its own"
+            assert sorted(action for action, _ in values) == list(range(len(episode))), "each value has its own time"
     return {key: [value for _, value in sorted(values, key=lambda row: row[0])] for key, values in rows.items()}
 
 
@@ -32,12 +34,12 @@ def vectors(columns, entity, component):
 
 
 def frames(columns, entity):
-    """Rotations, from components that are by columns."""
+    """Return rotations from components stored by columns."""
     return vectors(columns, entity, "Transform3D:mat3x3").reshape(-1, 3, 3).swapaxes(1, 2)
 
 
 def views(episode, folder):
-    """Of a recording of it, each view that it opens with: what it shows of which entity, by kind."""
+    """Return the views of a recording: the entities in each view, by kind."""
     pytest.importorskip("rerun", reason="the extra rerun is not installed")
     from rerun.chunk import RrdReader
 

@@ -1,4 +1,4 @@
-"""A run worth a report, and what a browser would make of its page."""
+"""A run for reports, and a browser's view of its page."""
 
 import base64
 import io
@@ -33,7 +33,7 @@ VOID = {"meta", "input", "br", "img", "link"}
 
 
 class Page(HTMLParser):
-    """What a browser would make of a page, as far as these tests want to know."""
+    """A browser's view of a page, as far as these tests need it."""
 
     def __init__(self, content):
         super().__init__(convert_charrefs=True)
@@ -75,7 +75,9 @@ class Page(HTMLParser):
 
 
 def make_run(path, fitness=FITNESS, failure=HOSTILE):
-    """Two generations of three; all but the fitness and some traits is that of one really trained candidate."""
+    """Create a run of two generations of three candidates. All values except the fitness and some traits come from one
+    candidate with real training.
+    """
     config = RunConfig(
         "detection", eye=EyeConfig(rays_per_receptor=1), search=SearchConfig(3, 2, 0.2), learning=LEARNING
     )
@@ -87,7 +89,7 @@ def make_run(path, fitness=FITNESS, failure=HOSTILE):
         if value is not None:
             outcome = replace(trained, fitness=value, returns=(value - 1, value + 1), seconds=90.0)
         phenotype = replace(SEEING, fov_deg=30.0 + i, neurons=16 + (i != BEST) * i)
-        run.append(Candidate.of(Place.of(i, 3), genome, phenotype, 1000 + i, outcome))
+        run.append(Candidate.from_evaluation(Place.from_id(i, 3), genome, phenotype, 1000 + i, outcome))
     return run
 
 
@@ -96,6 +98,6 @@ def film_of(content):
 
 
 def picture(uri):
-    """Pixels (y, x, 3) of a PNG, decoded by someone else's code."""
+    """Return the pixels (y, x, 3) of a PNG, decoded by another library."""
     file = io.BytesIO(base64.b64decode(uri.removeprefix("data:image/png;base64,")))
     return np.rint(255 * imread(file, format="png")[..., :3]).astype(np.uint8)

@@ -10,20 +10,21 @@ from evolve.analysis.recorder import record
 from evolve.report import eye_figures
 from evolve.report.eye_figures import WhiteLight, diffraction_limit, relief_heights
 from evolve.report.markup import html
-from evolve.report.views import through
+from evolve.report.views import through_optics
 from optics.spectra.bands import daylight
 
 
 @pytest.mark.slow
 def test_noise_free_view_is_what_the_animal_sees(run):
-    """Convolution of the fine picture against rays drawn from the receptive fields: two ways to the same signals."""
+    """The convolution of the fine image agrees with rays drawn from the receptive fields."""
     calm = replace(run.config, eye=replace(run.config.eye, noise_sigma=0.0, rays_per_receptor=64))
     episode = record(replace(run, config=calm), radiance_every=64)
     eye = episode.eyes.eye()
-    views = np.array([[through(eye, one) for one in frame] for frame in episode.radiance])
+    views = np.array([[through_optics(eye, one) for one in frame] for frame in episode.radiance])
     seen = episode.signals[episode.radiance_frames]
     assert seen.max() > 0.02  # at most a² = 0.09
-    # what remains: edges of objects between 64 rays, and the scene beyond the picture, which the view can only guess
+    # the remaining error comes from edges of objects between 64 rays, and from the scene beyond the image, which the
+    # view can only estimate
     error = np.sqrt(np.mean((views - seen) ** 2))
     assert error < 0.03 * seen.max()
     for turned in (views[..., ::-1, :], views[..., ::-1]):
@@ -31,7 +32,7 @@ def test_noise_free_view_is_what_the_animal_sees(run):
 
 
 def test_height_map_is_the_pupils():
-    """A paraboloid is inside the gene's space; its height is a closed form."""
+    """A paraboloid is in the space of the genes, and its height is a closed form."""
     radius, curvature = 30e-6, 8e3
     relief = optics.BSplineRelief.paraboloid(20e-6, curvature, radius)
     heights, inside = relief_heights(optics.Pupil(radius, relief))
@@ -44,22 +45,25 @@ def test_height_map_is_the_pupils():
 @pytest.mark.parametrize("aperture", [optics.Slit(0.4, 1.6), optics.Polygon.regular(3, 90.0), optics.Annulus(0.5)])
 def test_height_map_ends_where_the_pupil_does(aperture):
     _, inside = relief_heights(optics.Pupil(30e-6, aperture=aperture))
-    assert 4 * inside.mean() == pytest.approx(aperture.area, rel=0.03)  # pixels of 1/80 of the radius at the edges
+    # edges are resolved to pixels of 1/80 of the radius
+    assert 4 * inside.mean() == pytest.approx(aperture.area, rel=0.03)
 
 
 def test_mtf_of_a_perfect_lens_is_the_diffraction_limit():
-    """The PSF's window lacks up to 1 % of the light, which lifts the contrast by as much."""
+    """The PSF's window omits up to 1 % of the light, which raises the contrast by the same share."""
     eye = optics.Eye(optics.Pupil(20e-6, thin_lens_focal_length=100e-6 / np.tan(np.radians(22.5))), (15, 15), 45.0)
-    light = WhiteLight.through(eye)
+    light = WhiteLight.from_eye(eye)
     frequency = np.array([0.1, 0.3, 0.5, 0.8]) * optics.mtf(light.psf).cutoff.max()
     contrast = optics.mtf(light.white).profile(frequency)[0]
     np.testing.assert_allclose(contrast, diffraction_limit(light, frequency), atol=0.01)
 
 
 def test_diffraction_limit_weighs_the_bands_by_their_light():
-    """At the shortest band's cutoff nothing passes; at that of the longest, only what the shorter ones pass."""
+    """The contrast is 0 beyond the shortest band's cutoff. At the cutoff of the longest band, only the shorter bands
+    contribute.
+    """
     eye = optics.Eye(optics.Pupil(20e-6, thin_lens_focal_length=241e-6), (15, 15), 45.0, bands=2)
-    light = WhiteLight.through(eye)
+    light = WhiteLight.from_eye(eye)
     short, long = optics.mtf(light.psf).cutoff
     s = long / short
     weights = eye.spectral_bands.weights.mean(axis=0) * daylight(eye.spectral_bands.wavelengths)
@@ -78,7 +82,7 @@ def test_height_map_lies_the_right_way_up():
 def test_the_mtf_is_drawn_beside_its_limit_up_to_the_cutoff(run, monkeypatch):
     drawn = []
     monkeypatch.setattr(eye_figures, "inline", lambda figure, *_: drawn.append(figure.axes[0]) or html("picture"))
-    light = WhiteLight.through(
+    light = WhiteLight.from_eye(
         optics.Eye(optics.Pupil(20e-6, thin_lens_focal_length=optics.Eye().sensor_distance), (5, 5))
     )
     eye_figures._mtf(light)
@@ -91,7 +95,7 @@ def test_the_mtf_is_drawn_beside_its_limit_up_to_the_cutoff(run, monkeypatch):
 
 
 def test_a_figure_that_cannot_be_known_is_one_line(monkeypatch):
-    """And the others are drawn."""
+    """A figure that cannot be computed is replaced by one line, and the others are drawn."""
 
     def refused(*_, **__):
         raise optics.AccuracyError("the MTF needs 4097 x 4097 samples")
@@ -105,9 +109,9 @@ def test_a_figure_that_cannot_be_known_is_one_line(monkeypatch):
 
     monkeypatch.setattr(optics, "mtf", refused)
     page = str(eye_figures.eye_figures(Animal(), None))
-    assert "<b>Contrast.</b> It is not known: the MTF needs 4097 x 4097 samples." in page
+    assert "<b>Contrast.</b> It cannot be computed: the MTF needs 4097 x 4097 samples." in page
     assert page.count("<figure") == 3
-    monkeypatch.setattr(WhiteLight, "through", refused)
+    monkeypatch.setattr(WhiteLight, "from_eye", refused)
     page = str(eye_figures.eye_figures(Animal(), None))
-    assert "<b>Point spread function.</b> It is not known" in page
+    assert "<b>Point spread function.</b> It cannot be computed" in page
     assert page.count("<figure") == 1

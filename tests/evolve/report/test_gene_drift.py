@@ -1,4 +1,4 @@
-"""Selection or drift: runs in which one gene is selected, and others are not."""
+"""Selection or drift: runs in which one gene is under selection and the others are not."""
 
 import json
 from dataclasses import replace
@@ -18,7 +18,7 @@ LONG = ("search.population=6", "search.generations=12")
 
 
 class WidestFirst:
-    """Fitness is the field of view; with `limit`, nobody comes any more after so many."""
+    """An executor whose fitness is the field of view; it interrupts the run after `limit` evaluations."""
 
     def __init__(self, limit=72):
         self.left = limit
@@ -35,7 +35,7 @@ class WidestFirst:
 
 @pytest.fixture(scope="module")
 def runs(tmp_path_factory):
-    """Two seeds."""
+    """Return runs of two seeds."""
     found = []
     for seed in (1, 2):
         run = Run.create(tmp_path_factory.mktemp("drift") / str(seed), tiny(f"seed={seed}", *LONG))
@@ -71,7 +71,7 @@ def test_runs_are_compared_as_far_as_all_of_them_have_come(runs, tmp_path):
 
 def test_what_cannot_be_compared_is_refused_in_a_line(runs, tmp_path):
     other = Run.create(tmp_path / "other", tiny("seed=5", *LONG, "search.sigma=0.1"))
-    with pytest.raises(RunError, match=r"differ in search\.sigma: runs .* may differ in their seeds only"):
+    with pytest.raises(RunError, match=r"differ in search\.sigma: runs .* may differ only in their seeds"):
         drift_of([runs[0], other])
     with pytest.raises(RunError, match="two of these runs have seed 1: they are the same search"):
         drift_of([runs[0], runs[0]])

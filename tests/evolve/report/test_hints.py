@@ -1,4 +1,4 @@
-"""Words of the report with a hint: each is the glossary's, and can be reached by pointing and by the keyboard."""
+"""Terms in the report with a hint: each is in the glossary, and accessible by mouse and keyboard."""
 
 import re
 from pathlib import Path

@@ -1,4 +1,6 @@
-"""The page leads with the animal: who it is, its replay, its head and eyes, first beside best."""
+"""The page starts with the animal: its description, its replay, its head and eyes, and the first animal next to the
+best.
+"""
 
 import re
 from dataclasses import replace
@@ -20,7 +22,7 @@ from tests.evolve.report.reported import BEST
 
 
 def polygons(drawn, kind):
-    """Their points; `kind` is what stands before them."""
+    """Return the points of polygons; `kind` is the markup before the points."""
     return [
         np.array([[float(v) for v in point.split(",")] for point in found.split()])
         for found in re.findall(rf'{kind} points="([^"]+)"', drawn.markup)
@@ -51,7 +53,7 @@ def test_first_and_best_are_the_records(run, content):
 def test_the_first_animal_is_of_the_first_generation_that_has_one(run, content):
     assert "<h4>The first generation’s best</h4>" in content
     failed = Evaluation.failed("no luck")
-    fell = {c.id: Candidate.of(c.place, c.genome, c.phenotype, c.seed, failed) for c in run.generation(0)}
+    fell = {c.id: Candidate.from_evaluation(c.place, c.genome, c.phenotype, c.seed, failed) for c in run.generation(0)}
     late = replace(run, record=replace(run.record, candidates=tuple(fell.get(c.id, c) for c in run.candidates)))
     shown = cards.lineup(late).markup
     assert "<h4>Generation 1’s best, the first to succeed</h4>" in shown
@@ -79,12 +81,12 @@ def test_every_eye_is_drawn_with_its_field(n_eyes):
 
 
 def test_eyes_in_front_hide_those_behind():
-    """Eyes all around: those on the far side are drawn before the head, which covers them."""
+    """Eyes are all around the head. Eyes on the far side are drawn before the head, which covers them."""
     eyes = sim.Eyes(n_eyes=8, resolution=(1, 1), fov_deg=20, placement_range_deg=180)
     drawn = agent_figure(eyes, "it", eyes.azimuths())
     before, after = drawn.markup.split("<circle r=")
     assert before.count('class="eye"') > 0
-    assert after.count('class="eye"') > before.count('class="eye"'), "the animal looks at the reader"
+    assert after.count('class="eye"') > before.count('class="eye"'), "the animal faces the reader"
 
 
 def test_the_family_tree_leads_to_the_table(run, content):
@@ -102,7 +104,9 @@ def test_durations_are_said_as_people_say_them(seconds, said):
 
 
 def test_eyes_are_drawn_where_a_task_of_ones_own_has_them(tmp_path):
-    """A `place` that puts them at the sides and behind; `fan`, which all others have, is as rhabdom's own."""
+    """A task's `place` method puts the eyes at the sides and behind. `fan`, the default, is the same as for built-in
+    tasks.
+    """
     eyes_at = "[sim.Mount('cart', a, offset=(9, 0, 9)) for a in (90, -170)]"
     place = f"    def place(self, n, *where):\n        return {eyes_at}\n\n"
     drawn = []

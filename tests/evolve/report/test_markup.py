@@ -1,4 +1,6 @@
-"""Text reaches a page through one door, which escapes; and the page's policy names all that a browser may run."""
+"""Text reaches a page through a single function that escapes it, and the page's policy lists everything that a browser
+may run.
+"""
 
 import ast
 import base64
@@ -9,22 +11,22 @@ from pathlib import Path
 import pytest
 
 import evolve.report
-from evolve.report.markup import Html, document, figure, html, joined, json_script, look, section, table
+from evolve.report.markup import Html, document, figure, html, joined, json_script, section, style, table
 from evolve.report.svg import drawing, inline, label
 from tests.evolve.report.reported import HOSTILE, Page
 
 SOURCES = sorted(Path(evolve.report.__file__).parent.glob("*.py"))
 SCRIPT = "<img src=x onerror=alert(1)>"
-MAKERS = {"markup.py", "svg.py"}  # of Html
+MAKERS = {"markup.py", "svg.py"}  # modules that create Html
 
 
 def test_whatever_is_filled_in_is_text_unless_it_is_html():
     assert html("<b>{}</b>", SCRIPT).markup == "<b>&lt;img src=x onerror=alert(1)&gt;</b>"
     assert html("<b>{}</b>", html("<i>{}</i>", "<")).markup == "<b><i>&lt;</i></b>"
     assert html('<b title="{}">', '" onclick="x').markup == '<b title="&quot; onclick=&quot;x">'
-    assert html("{}", "{}{0}{x}").markup == "{}{0}{x}", "what is filled in is no template"
+    assert html("{}", "{}{0}{x}").markup == "{}{0}{x}", "values are not templates"
     for pieces in ((), ("a", "b")):
-        with pytest.raises(ValueError, match="template has room for 1 pieces"):
+        with pytest.raises(ValueError, match="template has 1 placeholders"):
             html("<b>{}</b>", *pieces)
 
 
@@ -49,7 +51,7 @@ def test_text_that_utf8_or_html_cannot_hold_is_replaced():
 
 
 def test_html_is_made_from_templates_that_stand_in_the_code():
-    """Else a string put together elsewhere would pass for markup."""
+    """Otherwise a string built at run time would pass as markup."""
     for path in SOURCES:
         for call in (node for node in ast.walk(ast.parse(path.read_text())) if isinstance(node, ast.Call)):
             name = call.func.id if isinstance(call.func, ast.Name) else ""
@@ -93,7 +95,7 @@ def test_every_look_is_in_the_style_sheet(content, page):
 @pytest.mark.parametrize("declarations", ["a:b}", "a:b{", "</style>", "@import x", "a:\\62", "a:b/*", "a:\n"])
 def test_look_is_no_way_into_the_style_sheet(declarations):
     with pytest.raises(ValueError, match="must be CSS declarations"):
-        look(declarations)
+        style(declarations)
 
 
 def test_names_from_outside_are_no_formulas_and_no_markup_in_figures():

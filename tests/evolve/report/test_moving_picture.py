@@ -1,4 +1,4 @@
-"""A moving picture shows the episode: where the agent was, what its eyes reported, for as long as it took."""
+"""A video shows the episode: the agent's position and its eyes' signals, with the correct duration."""
 
 import dataclasses
 import sys
@@ -15,7 +15,7 @@ from evolve.report.theme import INK
 
 @pytest.fixture(scope="module")
 def short(episode):
-    """Its first 24 actions."""
+    """Return the episode's first 24 actions."""
     cut = {
         name: value[:24] for name, value in vars(episode).items() if isinstance(value, np.ndarray) and len(value) == 256
     }
@@ -37,7 +37,7 @@ def test_it_lasts_as_long_as_the_episode(short, frames):
 
 
 def test_the_agent_is_where_it_was(short, frames):
-    """The darkest spot of the world is its body."""
+    """The darkest spot of the world is the agent's body."""
     x0, _, _, y1 = (plan := short.plan).bounds
     scale = HEIGHT / (y1 - plan.bounds[1])
     dark = tuple(int(INK[i : i + 2], 16) for i in (1, 3, 5))
@@ -45,7 +45,7 @@ def test_the_agent_is_where_it_was(short, frames):
     for time in (0, 12, 23):
         x, y = (short.position[time, 0] - x0) * scale, (y1 - short.position[time, 1]) * scale
         assert np.abs(np.subtract(frames[time][0].getpixel((round(x), round(y))), dark)).max() < 40
-    assert np.hypot(*(short.position[23] - short.position[0])) * scale > 10, "it has moved"
+    assert np.hypot(*(short.position[23] - short.position[0])) * scale > 10, "the agent has moved"
 
 
 def test_the_eyes_are_beside_it(short, frames):
@@ -56,14 +56,14 @@ def test_the_eyes_are_beside_it(short, frames):
 
 
 def test_a_film_has_a_frame_for_every_action(short, frames, tmp_path):
-    """It shows the same as the GIF, as far as its compression lets it, and takes as long."""
+    """It shows the same images as the GIF, as far as its compression allows, with the same duration."""
     path = write_mp4(short, tmp_path / "episode.mp4")
-    assert [file.name for file in tmp_path.iterdir()] == ["episode.mp4"], "nothing half written is left"
+    assert [file.name for file in tmp_path.iterdir()] == ["episode.mp4"], "a partial file remains"
     film = imageio_ffmpeg.read_frames(str(path))
     told = next(film)
     width, height = told["source_size"]
     assert told["codec"].startswith("h264")
-    assert told["pix_fmt"].startswith("yuv420p"), "players know no other"
+    assert told["pix_fmt"].startswith("yuv420p"), "players support only this format"
     shown = [np.frombuffer(frame, np.uint8).reshape(height, width, 3) for frame in film]
     assert len(shown) == len(short)
     assert told["duration"] == pytest.approx(len(short) * short.seconds / SPEED, rel=0.02)

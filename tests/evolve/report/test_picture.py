@@ -1,4 +1,4 @@
-"""Signals as pictures: sRGB, PNG that others read, sheets of frames."""
+"""Signals as images: sRGB, PNG for other programs, sheets of frames."""
 
 import numpy as np
 
@@ -8,7 +8,7 @@ from tests.evolve.report.reported import picture
 
 def test_display_is_srgb():
     signals = np.array([-1.0, 0.0, 0.002, 0.2140411, 0.5, 1.0, 2.0]).reshape(1, 1, 7).repeat(3, axis=0)
-    assert display(signals)[0, :, 0].tolist() == [0, 0, 7, 127, 188, 255, 255]  # IEC 61966-2-1, table values
+    assert display(signals)[0, :, 0].tolist() == [0, 0, 7, 127, 188, 255, 255]  # table values of IEC 61966-2-1
     assert display(signals[:1])[0, :, 2].tolist() == display(signals)[0, :, 0].tolist()
     assert display(0.25 * signals, gain=4.0).tolist() == display(signals).tolist()
 

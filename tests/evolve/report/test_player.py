@@ -1,4 +1,4 @@
-"""The player's film is the episode, frame by frame, on the ground plan of its world."""
+"""The player's film shows the episode frame by frame on the ground plan of its world."""
 
 import re
 from dataclasses import replace
@@ -74,7 +74,7 @@ def test_long_films_of_many_receptors_are_thinned(episode, tmp_path):
     steps = np.diff(film["times"])
     assert steps[0] > 0.2
     assert steps[:-1] == pytest.approx(steps[0])
-    assert film["times"][-1] == pytest.approx(255 * 0.2), "with the last action comes all that was earned"
+    assert film["times"][-1] == pytest.approx(255 * 0.2), "the last action's time includes the final return"
     assert film["total"][-1] == pytest.approx(many.reward.sum(), abs=1e-3)
     assert len(film["times"]) * fine[0, :, 0].size * 3 <= 1.6e6
     assert len(film["position"]) == len(film["total"]) == len(film["times"])
@@ -82,7 +82,7 @@ def test_long_films_of_many_receptors_are_thinned(episode, tmp_path):
 
 @pytest.mark.slow
 def test_a_task_may_name_no_reward(tmp_path):
-    """One of somebody's own; what it earned is then nothing, at every moment."""
+    """A user task may return no reward terms. The player then shows a return of zero at every moment."""
     config, animal = small("genome.placement_range_deg.start=40", named=written(tmp_path, NEAR, "{}"))
     assert evaluate(animal, config, 3, tmp_path / "policy").failure is None
     episode = Recorder(animal, config, load_policy(tmp_path / "policy")).play(0, 1)
@@ -103,7 +103,7 @@ def test_the_plan_is_the_world(episode):
 
 def test_ground_plan_of_the_maze_leaves_free_cells_free():
     world = sim.build_world("navigation")
-    spots, plan = world.agent_spawn, GroundPlan.of(world, np.zeros(2))
+    spots, plan = world.agent_spawn, GroundPlan.from_world(world, np.zeros(2))
     gap = np.abs(spots[:, None] - plan.walls[None, :, :2]) - plan.walls[None, :, 2:]
     assert (gap.max(axis=-1) > 0.5).all()  # a cell's centre is 1 m from the next wall
     x0, y0, x1, y1 = plan.bounds

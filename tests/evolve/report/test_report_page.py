@@ -1,4 +1,6 @@
-"""The report: every number in it is the store's, nothing in it comes from elsewhere, nothing in it is executed."""
+"""The report: every number in it comes from the store, and it loads no external content and executes no content of the
+run.
+"""
 
 import re
 import shutil
@@ -57,7 +59,7 @@ def test_every_section_and_every_open_gene_is_there(run, page):
         "Pupil.",
         "Point spread function",
         "Modulation transfer",
-        "What it sees",
+        "Views at",
     ):
         assert caption in page.texts["all"]
 
@@ -119,7 +121,7 @@ def test_a_run_of_failures_is_reported(tmp_path):
     run = Run.create(tmp_path / "failed", RunConfig("detection"))
     genome = tuple(Genotype(run.config.genome).start.tolist())
     for i in range(2):
-        run.append(Candidate.of(Place(i, 0, i), genome, SEEING, i, Evaluation.failed(f"reason {i}")))
+        run.append(Candidate.from_evaluation(Place(i, 0, i), genome, SEEING, i, Evaluation.failed(f"reason {i}")))
     page = Page(write(run).read_text())
     assert [row[-1] for row in page.rows["failures"][1:]] == ["reason 0", "reason 1"]
     assert "No candidate has been evaluated successfully" in page.texts["all"]
@@ -158,7 +160,9 @@ def test_reliefs_of_more_genes_and_receptors_of_genes_are_reported(tmp_path):
     run = Run.create(tmp_path / "fine", config)
     genome = Genotype(config.genome).start
     animal = develop(genome, config)
-    run.append(Candidate.of(Place(0, 0, 0), tuple(genome.tolist()), animal, 1, Evaluation(1.0, (0.5, 1.5), 0.5)))
+    run.append(
+        Candidate.from_evaluation(Place(0, 0, 0), tuple(genome.tolist()), animal, 1, Evaluation(1.0, (0.5, 1.5), 0.5))
+    )
     genes = {row[0]: row[2] for row in Page(best_genes(run, run.best).markup).rows["genes-of-the-best"][1:]}
     assert genes["doe_40 … doe_44"].split() == ["0.500"] * 5
     assert genes["lambda_max_3_nm"] == "–", "three types have no fourth peak"
@@ -172,7 +176,7 @@ def test_symmetric_reliefs_are_reported_by_the_genes_that_they_have(tmp_path):
     run = Run.create(tmp_path / "symmetric", config)
     genome = Genotype(config.genome).start
     outcome = Evaluation(1.0, (0.5, 1.5), 0.5)
-    run.append(Candidate.of(Place(0, 0, 0), tuple(genome.tolist()), develop(genome, config), 1, outcome))
+    run.append(Candidate.from_evaluation(Place(0, 0, 0), tuple(genome.tolist()), develop(genome, config), 1, outcome))
     genes = {row[0]: row[2] for row in Page(best_genes(run, run.best).markup).rows["genes-of-the-best"][1:]}
     assert [name for name in genes if name.startswith("doe_")] == ["doe_00 … doe_01", "doe_11"]
     text = Page(genes_section(run).markup).texts["all"]
@@ -193,11 +197,11 @@ def test_a_population_is_drawn_as_its_median_between_its_tenth_and_its_ninetieth
 
 
 def test_who_waits_is_told_what_is_made_and_how_much_has_been(rendered):
-    """Every section once, and each champion whose view is computed."""
+    """Progress names every section once, and each champion whose view is computed."""
     _, told = rendered
     shares = [share for _, share in told]
     assert shares[0] == 0
     assert shares == sorted(shares)
     assert 0.5 < shares[-1] < 1
-    assert {"the best eye", "facts of the run", f"what candidate {BEST} sees"} <= {what for what, _ in told}
+    assert {"the best eye", "facts of the run", f"views of candidate {BEST}"} <= {what for what, _ in told}
     assert len({what for what, _ in told}) == len(told)

@@ -1,4 +1,4 @@
-"""A recording of a task of somebody's own, read back: MuJoCo, stepped once more, is where it says."""
+"""A recording of a user task, read back: poses agree with a second simulation by MuJoCo."""
 
 import copy
 from contextlib import closing
@@ -17,7 +17,7 @@ from tests.evolve.learning.test_task_module import BALL, small
 from tests.evolve.report.read_back import frames, read_back, vectors, views
 
 SEED = 5
-# An arm of every kind of geom swings on the cart; it is turned, and so are they.
+# An arm with every kind of geom swings on the cart. The arm and its geoms are rotated.
 ARM = """<geom type="box" size=".15 .2 .1" rgba=".2 .4 .8 1" mass="1"/>
           <body name="arm/left" pos="-.3 .1 .2" euler="10 20 30">
             <joint name="swing" type="hinge" axis="0 0 1" range="-170 170"/>
@@ -40,7 +40,7 @@ CHANGES = {
 
 @pytest.fixture(scope="module")
 def life(tmp_path_factory):
-    """Config, animal and a hardly trained policy."""
+    """Return a configuration, an animal, and a policy with minimal training."""
     folder = tmp_path_factory.mktemp("armed")
     text = BALL.read_text()
     for old, new in CHANGES.items():
@@ -67,7 +67,7 @@ def columns(episode, tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def moments(life, episode):
-    """The model of the episode, and its data before each action, by MuJoCo that does the same once more."""
+    """Return the model of the episode, and its data before each action, from a second simulation by MuJoCo."""
     config, animal, _ = life
     datas = []
     with closing(PreparedTask(animal_task(animal, config)).vec_env(1, SEED)) as worlds:
@@ -87,7 +87,7 @@ def entity(model, geom):
 
 
 def turned(columns, name):
-    """Rotation of what does not change."""
+    """Return the rotation of a static entity."""
     x, y, z, w = columns[name, "Transform3D:quaternion"][0][0]
     matrix = np.empty(9)
     mujoco.mju_quat2Mat(matrix, [w, x, y, z])
@@ -104,7 +104,7 @@ def test_every_geom_is_where_mujoco_has_it(columns, moments):
         body = name.rsplit("/", 1)[0]
         places, rotations = vectors(columns, body, "Transform3D:translation"), frames(columns, body)
         offset, own = columns[name, "Transform3D:translation"][0][0], turned(columns, name)
-        # Recordings are of float32.
+        # Recordings contain float32.
         np.testing.assert_allclose(
             places + rotations @ offset, [data["geom_xpos"][g] for data in datas], atol=1e-6, err_msg=name
         )
@@ -112,17 +112,17 @@ def test_every_geom_is_where_mujoco_has_it(columns, moments):
         np.testing.assert_allclose(rotations @ own, truth, atol=1e-6, err_msg=name)
     assert not any("hidden" in key[0] for key in columns)
     swung = frames(columns, r"/world/bodies/arm\/left")
-    assert np.abs(swung[-1] - swung[0]).max() > 0.01, "something turns"
+    assert np.abs(swung[-1] - swung[0]).max() > 0.01, "the arm turns"
 
 
 def test_shapes_are_those_of_the_episodes_own_model(columns, moments):
-    """The ball is as large and of the colour as it was, which no other episode's is."""
+    """The ball has the episode's own size and colour, which differ between episodes."""
     model, _ = moments
     sizes = {model.geom(g).name: model.geom_size[g] for g in range(model.ngeom)}
     of = {name: entity(model, model.geom(name).id) for name in sizes if name}
     (half,) = vectors(columns, of["ball"], "Ellipsoids3D:half_sizes")
     np.testing.assert_allclose(half, np.repeat(sizes["ball"][0], 3), rtol=1e-6)
-    assert abs(half[0] - 0.3) > 0.01, "it differs"
+    assert abs(half[0] - 0.3) > 0.01, "the size differs from the default"
     color = columns[of["ball"], "Ellipsoids3D:colors"][0][0]
     np.testing.assert_allclose(
         [(color >> shift) & 255 for shift in (24, 16, 8, 0)], 255 * model.geom("ball").rgba, atol=0.5
@@ -132,7 +132,7 @@ def test_shapes_are_those_of_the_episodes_own_model(columns, moments):
     for name, kind, long in (("shank", "Capsules3D", 0.4), ("drum", "Cylinders3D", 0.04)):
         assert columns[of[name], f"{kind}:lengths"][0][0] == pytest.approx(long)
         assert columns[of[name], f"{kind}:radii"][0][0] == pytest.approx(sizes[name][0])
-    # A capsule of rerun's begins at the middle of an end, MuJoCo's is around its middle.
+    # Rerun's capsules start at the centre of one end, and MuJoCo's are centred.
     ends = vectors(columns, of["shank"], "Capsules3D:translations")[0]
     np.testing.assert_allclose(ends, [0, 0, -0.2], atol=1e-7)
     corners = np.array(columns[of["wedge"], "Mesh3D:vertex_positions"][0])
@@ -143,7 +143,9 @@ def test_shapes_are_those_of_the_episodes_own_model(columns, moments):
 
 
 def test_eyes_are_cameras_that_look_where_the_eyes_look(columns, moments, episode):
-    """At azimuths of ±40° and an elevation of 15° from the cart, 0.26 m out, in MuJoCo's frame of the cart."""
+    """The eyes are at azimuths of ±40° and an elevation of 15° from the cart, 0.26 m out, in MuJoCo's frame of the
+    cart.
+    """
     model, datas = moments
     cart = model.body("cart").id
     for name, azimuth in zip(episode.eyes.names(), np.radians([40, -40]), strict=True):
@@ -154,7 +156,7 @@ def test_eyes_are_cameras_that_look_where_the_eyes_look(columns, moments, episod
             rotation = data["xmat"][cart].reshape(3, 3)
             np.testing.assert_allclose(camera[t] @ [0, 0, 1], rotation @ ahead, atol=1e-6)
             assert np.linalg.det(camera[t]) == pytest.approx(1, abs=1e-5)
-            assert (camera[t] @ [0, -1, 0])[2] == pytest.approx(np.cos(np.radians(15)), abs=1e-6), "its top is up"
+            assert (camera[t] @ [0, -1, 0])[2] == pytest.approx(np.cos(np.radians(15)), abs=1e-6), "not upright"
         place = vectors(columns, f"/world/eyes/{name}", "Transform3D:translation")
         truth = [d["xpos"][cart] + d["xmat"][cart].reshape(3, 3) @ (0.26 * out + [0, 0, 0.12]) for d in datas]
         np.testing.assert_allclose(place, truth, atol=1e-6)
@@ -176,7 +178,7 @@ def test_signals_pictures_and_times_are_the_episodes(columns, episode):
 
 
 def test_reward_terms_sum_to_the_return(columns, episode):
-    """One of them has a name of two words, and one is called as the sum might be."""
+    """One term has a name of two words, and one has the default name of the sum."""
     terms = [vectors(columns, f"/reward/{name}", "Scalars:scalars") for name in ("total", r"quite\ near")]
     total = vectors(columns, "/reward", "Scalars:scalars")
     np.testing.assert_allclose(np.sum(terms, axis=0), total, atol=1e-6)
@@ -203,7 +205,7 @@ def test_it_opens_with_the_world_the_eyes_and_how_it_ended(columns, episode, tmp
     shown = views(episode, tmp_path)
     there = {entity for entity, _ in columns}
     elsewhere = {origin for origins in shown.values() for origin in origins} - there
-    assert elsewhere <= {"/world", "/action", "/feels"}, "or what is below them"
+    assert elsewhere <= {"/world", "/action", "/feels"}, "only these entities or their children"
     assert shown["TextLog"] == {"/outcome"}
     eyes = {entity for entity, _ in columns if entity.startswith("/world/eyes/")}
     assert eyes

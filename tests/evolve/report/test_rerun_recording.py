@@ -1,4 +1,4 @@
-"""A recording for rerun, read back: it holds the episode, number by number."""
+"""A recording for rerun, read back: it contains the numbers of the episode."""
 
 import sys
 

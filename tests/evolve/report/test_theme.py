@@ -1,4 +1,4 @@
-"""The theme: every colour that a figure is drawn with becomes one of the page's own, in light and in dark."""
+"""The theme: every colour in a figure becomes one of the page's colours, in light and dark mode."""
 
 import re
 
@@ -27,7 +27,7 @@ def test_figures_are_drawn_in_the_pages_colours():
 
 
 def luminance(colour):
-    """Relative luminance (WCAG 2.2)."""
+    """Return the relative luminance (WCAG 2.2)."""
     parts = [int(colour[i : i + 2], 16) / 255 for i in (1, 3, 5)]
     linear = [part / 12.92 if part <= 0.04045 else ((part + 0.055) / 1.055) ** 2.4 for part in parts]
     return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
@@ -39,13 +39,13 @@ def contrast(one, other):
 
 
 def test_text_can_be_read_in_light_and_in_dark():
-    """Contrast of 4.5 at least (WCAG 2.2, 1.4.3), which the palette's own green and vermillion have not."""
+    """The contrast is at least 4.5 (WCAG 2.2, 1.4.3), which the palette's own green and vermillion do not reach."""
     values = {name: re.findall(rf"--{name}:(#[0-9a-f]{{6}})", CSS)[:2] for name in VARIABLES_BY_NAME}
     for name in ("ink", "muted", "accent", "vermillion", "green", "purple"):
         for background in ("paper", "panel"):
             for text, behind in zip(values[name], values[background], strict=True):
                 assert contrast(text, behind) >= 4.5, (name, background)
-    for wall, behind in zip(values["wall"], values["panel"], strict=True):  # 1.4.11: what is not text
+    for wall, behind in zip(values["wall"], values["panel"], strict=True):  # 1.4.11: other elements than text
         assert contrast(wall, behind) >= 3
     assert contrast("#009e73", "#fefefe") < 4.5
     assert contrast("#000000", "#ffffff") == 21

@@ -1,4 +1,4 @@
-"""Which test covers which module of evolve/runs.
+"""Tests of evolve/runs: which test covers which module.
 
 begin: test_two_faces.py
 resume: test_two_faces.py

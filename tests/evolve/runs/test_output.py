@@ -1,4 +1,4 @@
-"""What reaches the terminal: text, whatever it says; and runs that go on, or say so, whoever reads."""
+"""Output to the terminal: it is printable text, and runs continue, or report an error, if the reader disappears."""
 
 import io
 import os
@@ -17,7 +17,7 @@ from tests.evolve.store.records import candidate
 ROOT = Path(__file__).parents[3]
 HOSTILE = "\x1b]0;owned\x07\x1b[2J\x1b[31mred\x9b1m \r\u202eright\u2069\udcff\x00"
 SHOWN = r"\x1b]0;owned\x07\x1b[2J\x1b[31mred\x9b1m \x0d\u202eright\u2069\udcff\x00"
-# A run whose candidates take a millisecond: everything else is as it is.
+# A run whose candidates take a millisecond; all other parts are real.
 DRIVER = """
 import sys
 import evolve.cli.commands.run as commands
@@ -33,7 +33,7 @@ SMALL = ("search.population=2", "search.generations=2", "genome.optical.open=fal
 
 
 def begin(folder, evaluate, *options, **streams):
-    """`evolve run` in a process of its own."""
+    """Start `evolve run` in a separate process."""
     (folder / "driver.py").write_text(DRIVER)
     settings = [part for text in SMALL for part in ("--set", text)]
     command = [sys.executable, str(folder / "driver.py"), evaluate, "run", "detection", "--workers", "1", *settings]
@@ -81,7 +81,7 @@ def test_failure_texts_and_names_of_directories_do_not_steer_the_terminal(call, 
 @pytest.mark.parametrize("options", [(), ("--json",)], ids=["text", "json"])
 @pytest.mark.parametrize("closed", [("stdout",), ("stdout", "stderr")], ids=["head -1", "2>&1 head -1"])
 def test_a_run_goes_on_when_nobody_reads_any_more(tmp_path, options, closed):
-    """Its reader takes the first line and leaves, as `head -1` does."""
+    """The reader takes the first line and closes the pipe, like `head -1`."""
     reader, writer = os.pipe()
     streams = {name: writer if name in closed else subprocess.PIPE for name in ("stdout", "stderr")}
     child = begin(tmp_path, "bowl", *options, **streams)
@@ -125,11 +125,11 @@ def test_a_run_that_is_deleted_stays_deleted_and_says_so(tmp_path, evaluate):
 
 @pytest.mark.slow
 def test_a_run_that_was_begun_anew_gets_nothing_from_the_former_one(tmp_path):
-    """Both records are empty, and the new one may even be the same inode."""
+    """Both records are empty, and the new one may even have the same inode."""
     child = begin(tmp_path, "begins_another_run", stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     _, err = child.communicate(timeout=120)
     assert child.returncode == 2
-    assert "is no longer as this process left it; nothing is added" in err
+    assert "was changed by another process; nothing is added" in err
     other = Run.open(tmp_path / "run")
     assert other.config.seed == 77
     assert other.candidates == ()

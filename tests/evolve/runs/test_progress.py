@@ -1,4 +1,4 @@
-"""Progress: what it counts, and that it suits a terminal and a log."""
+"""Progress: its counts, and its form in a terminal and a log."""
 
 import io
 import json
@@ -43,7 +43,11 @@ def run(tmp_path):
 
 def add(run, identity, fitness, steps=1000, failure=None):
     outcome = Evaluation(fitness, steps=steps, failure=failure)
-    run.append(Candidate.of(Place.of(identity, 4), tuple(GENOME.tolist()), develop(GENOME, CONFIG), 1, outcome))
+    run.append(
+        Candidate.from_evaluation(
+            Place.from_id(identity, 4), tuple(GENOME.tolist()), develop(GENOME, CONFIG), 1, outcome
+        )
+    )
     return run.candidates[-1]
 
 
@@ -66,7 +70,7 @@ def test_pace_and_time_left_count_what_is_in_training(run, clock):
     tally.training(0, 250, 1000)
     tally.training(1, 750, 1000)
     clock.now = 10.0
-    # One of eight candidates' worth in 10 s.
+    # One eighth of the run is done in 10 s.
     assert tally.done == pytest.approx(1.0)
     assert tally.seconds_left == pytest.approx(70.0)
     assert tally.steps_per_second == pytest.approx(100.0)
@@ -80,7 +84,7 @@ def test_continued_run_is_timed_from_where_it_goes_on(run, clock):
     tally = Tally(run)
     tally.training(4, 1000, 1000)
     clock.now = 10.0
-    assert tally.seconds_left == pytest.approx(30.0), "three to go at 10 s each; what was on record took no time"
+    assert tally.seconds_left == pytest.approx(30.0), "three remain at 10 s each; candidates on record took no time"
     assert tally.steps_per_second == pytest.approx(100.0)
 
 
@@ -122,7 +126,9 @@ def test_terminal_gets_a_bar(run):
 
 
 def _all_of(terminal):
-    """What was written to a terminal whose other side is closed; Linux says so by an error, others by nothing."""
+    """Return the output to a terminal whose other side is closed. Linux reports this by an error, and other systems by
+    an empty read.
+    """
     written = b""
     try:
         while part := os.read(terminal, 4096):

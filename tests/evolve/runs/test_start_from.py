@@ -39,7 +39,7 @@ def test_an_animals_lens_keeps_its_size_in_another_run(tmp_path, optics):
     parent, _ = carry(tmp_path / "run", assemble("detection", assignments=settings))
     eye = assemble("detection", starts=starts_from(f"{parent.path}:0")).eye
     lengths = (50e-6, 300e-6) if optics == "true" else (100e-6, 200e-6)
-    assert (eye.relief_height, eye.sensor_width) == lengths, "a perfect lens has no size to keep"
+    assert (eye.relief_height, eye.sensor_width) == lengths, "a perfect lens has no size"
 
 
 @pytest.mark.parametrize("settings", [("eye.square=true",), ()])
@@ -47,6 +47,6 @@ def test_an_animal_with_square_eyes_starts_a_run_with_either(tmp_path, settings)
     config = assemble("detection", assignments=["eye.square=true", "eye.optics=false", "genome.resolution.start=6"])
     run, genome = Run.create(tmp_path / "run", config), Genotype(config.genome).start
     outcome = Evaluation(1.0, (1.0,), 0.0, 10, 1.0)
-    run.append(Candidate.of(Place(0, 0, 0), tuple(genome), develop(genome, config), 1, outcome))
+    run.append(Candidate.from_evaluation(Place(0, 0, 0), tuple(genome), develop(genome, config), 1, outcome))
     other = assemble("detection", assignments=settings, starts=starts_from(f"{run.path}:0"))
     assert develop(Genotype(other.genome).start, other).resolution == (6, 6)

@@ -1,4 +1,6 @@
-"""The command and Python begin, resume and carry on runs by the same code: same records, same refusals, same steps."""
+"""The command and Python start, resume and continue runs with the same code: same records, same refusals, same
+steps.
+"""
 
 import json
 import re
@@ -24,7 +26,7 @@ FAILS = "import sim\nclass Mine(sim.Task):\n    def __init__(self):\n        rai
 
 @pytest.fixture
 def closed_form(monkeypatch):
-    """The real engine in one process, with a fitness that is known, and no report at the end."""
+    """Use the real engine in one process, with a known fitness and without a report at the end."""
     import evolve.cli.commands.run as command
 
     monkeypatch.setattr(carry_on, "evaluate_candidate", leaves_a_policy)
@@ -33,7 +35,7 @@ def closed_form(monkeypatch):
 
 
 def values(assignments):
-    """Settings as Python takes them."""
+    """Return settings in the form for Python."""
     pairs = dict(text.split("=", 1) for text in assignments)
     return {key: json.loads(value) for key, value in pairs.items()}
 
@@ -81,7 +83,7 @@ def faces(call):
 
 
 def files(path):
-    """The files of a run and its starts, without times and process numbers."""
+    """Return the files of a run and its starts, without times and process numbers."""
     found = {file.relative_to(path): file.read_bytes() for file in path.rglob("*") if file.is_file()}
     for name in ("lock", "policies/calls.log"):
         found.pop(Path(name))
@@ -90,7 +92,7 @@ def files(path):
 
 
 def cut(path):
-    """A run as it is when it was killed after five of twelve candidates."""
+    """Cut a run to its state after five of twelve candidates, as if it had been killed."""
     record = path / "candidates.jsonl"
     record.write_bytes(b"".join(record.read_bytes().splitlines(keepends=True)[:5]))
 
@@ -212,13 +214,13 @@ def test_both_carry_on_by_the_same_steps(closed_form, faces, tmp_path, monkeypat
 
 
 def refusing(step):
-    """A function that raises, as its method does."""
+    """Return a function that raises the error of its method."""
     error = BackendError(f"{step}: refused")
     return mock.Mock(side_effect=error, make_ready=mock.Mock(side_effect=error))
 
 
 def test_only_the_command_prints_notes(closed_form, call, tmp_path, capsys):
-    """They report changed settings and lost policies; `--quiet` silences them."""
+    """Notes report changed settings and lost policies; `--quiet` suppresses them."""
     paths = [tmp_path / name for name in ("told", "quiet", "python")]
     for path in paths:
         evolve.run("detection", settings=values(SETTINGS), out=path, progress=False)
@@ -233,7 +235,7 @@ def test_only_the_command_prints_notes(closed_form, call, tmp_path, capsys):
     assert re.findall(r"^note: .*", told, re.MULTILINE) == [
         f"note: {lost}",
         "note: config.toml has changed since the last start. Candidates from 5 on are trained and evaluated with other "
-        "settings than those before",
+        "settings than earlier ones",
     ]
     assert "note: " not in call("resume", paths[1], "--quiet")[2]
     evolve.resume(paths[2], progress=False)

@@ -1,4 +1,4 @@
-"""Which test covers which module of evolve/search.
+"""Tests of evolve/search: which test covers which module.
 
 ask_tell: test_ask_tell.py
 loop: test_loop.py, test_ask_tell.py, test_kill.py

@@ -1,9 +1,9 @@
-"""kill -9 at random moments of a run, again and again, until it is finished; the same run, killed by nobody, beside it.
+"""Kill a run at random moments with `kill -9` until it is finished, and compare it with the same run without kills.
 
     RHABDOM_KILLS=500 python -m pytest --all tests/evolve/search/test_kill.py
 
 Each child is forked from a process that has loaded everything, so that a kill costs milliseconds and can hit any line
-of search, record and lock. What is evaluated is known in closed form and takes a millisecond.
+of search, record and lock. The fitness is known in closed form and takes a millisecond.
 """
 
 import os
@@ -24,11 +24,11 @@ from tests.evolve.closed_form import tiny
 from tests.evolve.remote_form import in_stages
 
 HALVING = ("search.rungs=3", "learning.total_steps=16384")
-KINDS = ((), ("search.steady_state=true",), HALVING)  # of runs
+KINDS = ((), ("search.steady_state=true",), HALVING)  # kinds of runs
 
 
 class Here:
-    """Evaluates in this process, and leaves a line for each that it has begun."""
+    """An executor in this process that writes a line for each evaluation that it starts."""
 
     def __init__(self, log):
         self.log = log
@@ -37,9 +37,9 @@ class Here:
         while jobs:
             job = jobs.popleft()
             with self.log.open("a") as log:
-                log.write(f"{job.id} {job.stage.number if job.stage else 0}\n")
+                log.write(f"{job.id} {job.rung.number if job.rung else 0}\n")
             time.sleep(0.001)
-            if job.stage is not None:
+            if job.rung is not None:
                 yield job, in_stages(*job.arguments, lambda *steps: None)
                 continue
             write_whole(job.policy_path, f"policy {job.seed}".encode())
@@ -48,17 +48,17 @@ class Here:
 
 
 class Nobody:
-    """Watches and says nothing."""
+    """A watcher that prints nothing."""
 
     def training(self, *report):
-        """Nothing."""
+        """Do nothing."""
 
     def evaluated(self, candidate):
-        """Nothing."""
+        """Do nothing."""
 
 
 def carry(path, config):
-    """Begin a run, or go on with it, and bring it to its end."""
+    """Start a run or continue it, and finish it."""
     run = Run.open(path) if (path / "config.toml").exists() else Run.create(path, config)
     with run.lock():
         run.repair()
@@ -66,7 +66,7 @@ def carry(path, config):
 
 
 def child_killed_after(seconds, path, config, carry=carry):
-    """Whether the run was killed before its end."""
+    """Return whether the run was killed before its end."""
     pid = os.fork()
     if pid == 0:
         try:
@@ -94,13 +94,15 @@ def history(run):
 
 
 def begun(log):
-    """How often each candidate's evaluation was begun, in each budget stage."""
+    """Return the number of starts of each candidate's evaluation in each rung."""
     names = log.read_text().splitlines()
     return {name: names.count(name) for name in names}
 
 
 def endure(kills, seed, folder):
-    """Runs that are killed `kills` times in all; asserts what a week-long run relies on. Returns runs finished."""
+    """Make runs that are killed `kills` times in total, and assert all that a week-long run depends on. Return the
+    number of finished runs.
+    """
     chance, done, endured = random.Random(seed), 0, 0
     while done < kills:
         config = tiny(f"seed={endured}", *KINDS[endured % len(KINDS)])
@@ -114,22 +116,22 @@ def endure(kills, seed, folder):
             record = path / "candidates.jsonl"
             now = record.read_bytes() if record.exists() else b""
             complete = now[: now.rfind(b"\n") + 1]
-            assert complete.startswith(kept), "something written was lost"
+            assert complete.startswith(kept), "a written line was lost"
             kept = complete
         run = Run.open(path)
         assert finished(run)
-        assert history(run) == history(Run.open(whole)), "another history than that of a run that nobody killed"
+        assert history(run) == history(Run.open(whole)), "the history differs from that of a run without kills"
         again = {name: count - 1 for name, count in begun(folder / f"{path.name}.log").items() if count > 1}
         assert sum(again.values()) <= deaths, "a completed candidate was evaluated again"
         places = (path, path / "policies", path / "trainings")
         left = [entry.name for place in places if place.exists() for entry in place.glob(".*")]
-        assert not left, f"files half written are left: {left}"
+        assert not left, f"partial files are left: {left}"
         done, endured = done + deaths, endured + 1
     return endured
 
 
 def main(kills, seed=None):
-    Search(tiny())  # loads what children would each load again
+    Search(tiny())  # loads modules that each child would otherwise load again
     seed = random.randrange(2**32) if seed is None else seed
     print(f"seed {seed}", flush=True)
     with TemporaryDirectory() as folder:

@@ -1,4 +1,4 @@
-"""The real loop proposes what a plain ask/tell loop does, and that loop finds the best."""
+"""The real loop makes the same proposals as a plain loop around `ask` and `tell`, and that loop finds the optimum."""
 
 from collections.abc import Iterator
 
@@ -19,17 +19,17 @@ SETTINGS = ("search.population=6", "search.generations=5", "seed=11")
 
 
 def fitness(phenotype):
-    """Best at 70 degrees, three eyes and few neurons; no two animals alike."""
+    """Return a fitness with its optimum at 70 degrees, three eyes and few neurons; all animals differ."""
     return -abs(phenotype.fov_deg - 70.0) / 10 - abs(phenotype.n_eyes - 3) - phenotype.neurons / 100
 
 
 def coarse(phenotype):
-    """Many are equally fit, and CMA-ES ranks these in the order in which it is told."""
+    """Return a fitness with many ties, which CMA-ES ranks in the order in which it receives them."""
     return float(round(fitness(phenotype)))
 
 
 class LastFirst:
-    """An executor in closed form that hands the last candidate back first."""
+    """An executor in closed form that returns the last candidate first."""
 
     def __init__(self, value):
         self.value = value
@@ -55,12 +55,12 @@ def test_the_loop_proposes_what_asking_and_telling_does(tmp_path, value):
     assert [candidate.genome for candidate in run.candidates] == genomes
     negated = plainly(config, lambda genome: -value(develop(genome, config)))
     assert negated[:6] == genomes[:6]
-    assert negated[6:] != genomes[6:], "fitness must matter for this to show anything"
+    assert negated[6:] != genomes[6:], "fitness must affect the search for this test to be valid"
 
 
 @pytest.mark.parametrize("seed", [0, 1])
 def test_it_finds_the_top_of_a_paraboloid(seed):
-    """Log-linearly; told the wrong sign it runs to a corner instead."""
+    """The search converges log-linearly. With the wrong sign of the fitness it ends in a corner."""
     best = np.array([0.7, 0.3, 0.6])
     search = SearchConfig(population=8, generations=30)
     generations = list(ask_tell(lambda genome: -float(np.sum((genome - best) ** 2)), np.full(3, 0.5), search, seed))

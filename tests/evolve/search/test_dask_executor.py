@@ -1,4 +1,6 @@
-"""A real Dask cluster, a scheduler and two worker processes: same history as here, whoever dies."""
+"""A real Dask cluster with a scheduler and two worker processes: the same history as the local one, even if processes
+die.
+"""
 
 import os
 import signal
@@ -31,7 +33,7 @@ ROOT = Path(__file__).parents[3]
 
 
 class Cluster:
-    """Processes of a scheduler and its workers; with `tls`, a certificate and its key, they speak to nobody else."""
+    """Processes of a scheduler and its workers; `tls` is a certificate and its key, required for all connections."""
 
     def __init__(self, folder, tls=()):
         self.folder, self.protocol = folder, "tls" if tls else "tcp"
@@ -63,7 +65,7 @@ class Cluster:
         log.close()
 
     def kill(self):
-        """All of it at once, nannies and their workers too."""
+        """Kill all processes at once, including nannies and their workers."""
         for process in self.processes:
             os.killpg(process.pid, signal.SIGKILL)
             process.wait()
@@ -73,7 +75,7 @@ class Cluster:
         return DaskExecutor(Scheduler(self.address, *self.files), f"tests.evolve.remote_form:{function}", patience_s=60)
 
     def calls(self):
-        """How often each candidate has been begun, since asked last."""
+        """Return the number of starts of each candidate since the last call."""
         log = self.folder / "calls.log"
         names = [int(line.split()[0]) for line in log.read_text().splitlines()] if log.exists() else []
         log.unlink(missing_ok=True)
@@ -82,7 +84,7 @@ class Cluster:
 
 @pytest.fixture(autouse=True)
 def _any_commit(monkeypatch):
-    """A checkout that is being worked on changes between one process's start and another's."""
+    """Ignore the commit, because a checkout in use changes between the starts of two processes."""
     software = {**present(), "commit": ""}
     monkeypatch.setattr(dask_worker, "_software", lambda: software)
 
@@ -110,7 +112,7 @@ def test_history_is_the_local_one(tmp_path, cluster):
     local, _ = carried(tmp_path / "local", config, LocalExecutor(bowl, 2))
     assert history(far) == history(local)
     assert [c.curve for c in far.candidates] == [c.curve for c in local.candidates]
-    assert onlooker.steps > 0, "progress comes through"
+    assert onlooker.steps > 0, "progress is reported"
     assert cluster.calls() == dict.fromkeys(range(12), 1)
     for candidate in local.candidates:
         assert far.policy_path(candidate.id).read_bytes() == f"policy {candidate.seed}".encode()
@@ -118,7 +120,7 @@ def test_history_is_the_local_one(tmp_path, cluster):
 
 @pytest.mark.slow
 def test_history_of_successive_halving_is_the_local_one(tmp_path, cluster, monkeypatch):
-    """Trainings go from worker to worker, and a worker has no files of another's."""
+    """Training runs move between workers, and a worker has no files of another one."""
     monkeypatch.setenv("RHABDOM_TEST", str(tmp_path))
     config = tiny("search.rungs=3", "learning.total_steps=16384")
     far, _ = carried(tmp_path / "dask", config, cluster.executor("in_stages"))
@@ -129,7 +131,7 @@ def test_history_of_successive_halving_is_the_local_one(tmp_path, cluster, monke
     assert len(whole) == 3
     for candidate in whole:
         assert far.policy_path(candidate.id).read_bytes() == local.policy_path(candidate.id).read_bytes()
-    assert set(cluster.calls().values()) == {1, 2, 3}, "nobody begins a stage twice"
+    assert set(cluster.calls().values()) == {1, 2, 3}, "no rung starts twice"
 
 
 @pytest.mark.slow
@@ -146,7 +148,7 @@ def test_failures_and_infinities_come_through(tmp_path, cluster):
 def test_a_full_disk_is_no_animals_failure(tmp_path, cluster):
     with (
         cluster.executor("disk_full") as executor,
-        pytest.raises(ExecutorError, match=r"a worker's machine refuses: .*No space left on device"),
+        pytest.raises(ExecutorError, match=r"error on a worker's machine: .*No space left on device"),
     ):
         list(executor.run(jobs(tmp_path)))
 
@@ -194,7 +196,7 @@ def test_what_is_added_meanwhile_is_evaluated_too(tmp_path, cluster):
 
 @pytest.mark.slow
 def test_candidate_that_nobody_wants_any_more_is_given_up(tmp_path, cluster):
-    """As after Ctrl-C: it would go on for half a minute."""
+    """After Ctrl-C, for example, the candidate would continue for half a minute."""
     told, beats = [], cluster.folder / "beats.log"
     with cluster.executor("endless") as executor:
         running = executor.run(jobs(tmp_path, 1), lambda *report: told.append(report) or interrupt())
@@ -211,7 +213,7 @@ def test_candidate_that_nobody_wants_any_more_is_given_up(tmp_path, cluster):
         time.sleep(1.0)
         if beats.stat().st_size == before:
             break
-        assert time.monotonic() < deadline, "it goes on"
+        assert time.monotonic() < deadline, "the candidate continues"
 
 
 @pytest.mark.slow
@@ -256,7 +258,7 @@ def test_scheduler_that_comes_back_is_asked_again(tmp_path):
 
 @pytest.mark.slow
 def test_behind_certificates_the_history_is_the_same_and_strangers_stay_outside(tmp_path):
-    """Whoever holds no certificate that the scheduler knows gets no answer: no encryption, or another's."""
+    """A client without encryption, or with a certificate that the scheduler does not accept, gets no answer."""
     own, another = certificates(tmp_path), certificates(tmp_path, "another")
     cluster = Cluster(tmp_path, own)
     cluster.start(workers=1)
@@ -280,8 +282,8 @@ def test_behind_certificates_the_history_is_the_same_and_strangers_stay_outside(
 
 @pytest.mark.slow
 def test_a_scheduler_that_is_gone_for_good_ends_the_run(tmp_path):
-    """A closed connection is made anew, for as long as patience lasts."""
+    """A closed connection is opened again until the patience is exhausted."""
     executor = DaskExecutor("tcp://127.0.0.1:9", patience_s=0.5)
     executor._client = SimpleNamespace(status="closed")
-    with pytest.raises(ExecutorError, match=r"the scheduler has been gone for 0\.5 s"):
+    with pytest.raises(ExecutorError, match=r"the scheduler has been unreachable for 0\.5 s"):
         list(executor.run(jobs(tmp_path, 1)))

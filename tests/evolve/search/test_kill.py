@@ -1,4 +1,4 @@
-"""kill -9 in the middle of a real run: it resumes, evaluates nothing twice, and ends as if nothing had happened."""
+"""Kill a real run with `kill -9`: it resumes, evaluates no candidate twice, and ends with the same result."""
 
 import json
 import os
@@ -50,12 +50,12 @@ def record(path):
 
 
 def lives(path):
-    """All that a record says but how long it took, by candidate."""
+    """Return the contents of a record by candidate, without durations."""
     return sorted(tuple(json.dumps(line[name]) for name in LIFE) for line in record(path))
 
 
 def tensors(policy):
-    """A safetensors file's numbers: what follows its header, whose entries come in no fixed order."""
+    """Return the numbers of a safetensors file, after its header, whose entries have no fixed order."""
     content = policy.read_bytes()
     return content[8 + int.from_bytes(content[:8], "little") :]
 
@@ -76,7 +76,7 @@ def test_killed_run_resumes_to_the_history_of_an_uninterrupted_one(tmp_path):
     kept = lines.read_bytes()
     policies = {path: path.stat().st_mtime_ns for path in (tmp_path / "killed" / "policies").iterdir()}
     done = [line["id"] for line in record(tmp_path / "killed")]
-    assert 1 <= len(done) < 4, "killed too late to show anything"
+    assert 1 <= len(done) < 4, "the kill was too late for the test"
 
     assert "on record" in complete(begin("resume", tmp_path / "killed"))
     complete(whole)
@@ -95,7 +95,7 @@ def test_killed_run_resumes_to_the_history_of_an_uninterrupted_one(tmp_path):
     ids=["search", "search again and again", "training"],
 )
 def test_kills_at_random_moments_change_nothing(tmp_path, script, kills):
-    """In a process of its own, because it forks; its seed is printed, for those who want to see a failure again."""
+    """The test runs in a separate process, because it forks. The printed seed allows a failure to be repeated."""
     environment = {**os.environ, "PYTHONPATH": str(ROOT), "TMPDIR": str(tmp_path)}
     command = [sys.executable, Path(__file__).with_name(script), str(kills)]
     child = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)

@@ -1,4 +1,4 @@
-"""Worker processes: every job comes out once, whatever happens to the worker."""
+"""Worker processes: every job is returned once, whatever happens to the worker."""
 
 import os
 import platform
@@ -63,7 +63,7 @@ def test_every_job_comes_out_once_with_its_own_outcome(tmp_path, evaluate):
 
 
 def test_a_full_disk_is_no_animals_failure(tmp_path):
-    with pytest.raises(ExecutorError, match=r"No space left on device.*000001.*go on with evolve resume"):
+    with pytest.raises(ExecutorError, match=r"No space left on device.*000001.*use evolve resume"):
         outcomes(disk_full, tmp_path, workers=1)
 
 
@@ -76,7 +76,7 @@ def test_settings_that_cannot_be_used_are_no_animals_failure(tmp_path):
 @pytest.mark.parametrize(
     ("evaluate", "reason"),
     [
-        (memory_full, r"^out of memory \(Unable to allocate 3\.00 GiB\); take fewer workers .* evolve resume$"),
+        (memory_full, r"^out of memory \(Unable to allocate 3\.00 GiB\); use fewer workers .* evolve resume$"),
         (torch_memory_full, r"^out of memory \(RuntimeError: \[enforce fail\] DefaultCPUAllocator: .* evolve resume$"),
         (starved, r"^the worker of candidate 1 was killed 3 times \(SIGKILL\), .* evolve resume$"),
     ],
@@ -86,9 +86,9 @@ def test_memory_that_is_wanting_is_no_animals_failure(tmp_path, evaluate, reason
         outcomes(evaluate, tmp_path, workers=1)
 
 
-@pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="tells a process's memory on Linux alone")
+@pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="a process's memory is read from Linux's /proc")
 def test_a_worker_gives_back_what_candidates_leave_free(tmp_path):
-    """Of 200 MB each, of which 2 stay in use."""
+    """Each candidate allocates 200 MB and keeps 2 MB."""
     found = outcomes(leaves_gaps, tmp_path, count=3, workers=1)
     assert found[2].fitness - found[0].fitness < 40
 
@@ -104,7 +104,7 @@ def test_exception_is_its_candidates_failure_and_nobody_elses(tmp_path):
     found = outcomes(fails_for_some, tmp_path)
     assert [found[i].failure is None for i in range(4)] == [True, False, True, False]
     assert found[1].failure.startswith("ValueError: no such luck (closed_form.py:")
-    assert found[1].seconds > 0, "a failure takes time too"
+    assert found[1].seconds > 0, "a failure also takes time"
 
 
 def test_killed_worker_is_replaced_and_its_candidate_evaluated_again(tmp_path):
@@ -187,7 +187,7 @@ def test_killed_parent_takes_its_workers_along(tmp_path):
 
 
 def _alive(pid):
-    """Running, and not merely waiting to be reaped by whoever adopted it."""
+    """Return whether a process is running, and not a zombie that its parent has not reaped."""
     try:
         return Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0] != "Z"
     except OSError:
@@ -210,7 +210,7 @@ for child in children:
 
 @pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="blocked signals are read from Linux's /proc")
 def test_interrupts_are_held_from_every_child_the_first_included():
-    """In a fresh process: only there is the first child the first."""
+    """The test needs a fresh process, in which the first child is really the first."""
     found = subprocess.run([sys.executable, "-c", CHILDREN], capture_output=True, text=True, check=True, cwd=ROOT)
     blocked = [int(line, 16) >> (signal.SIGINT - 1) & 1 for line in found.stdout.split()]
     assert blocked == [1, 1]
@@ -237,10 +237,10 @@ print(mapped, faults())
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="other libraries are left alone")
+@pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="only glibc is configured")
 def test_freed_memory_is_kept_for_the_next_arrays():
-    """In a process of its own, which stays as it has been set: pages are mapped once, and not each time."""
+    """The test needs a separate process, whose allocator stays configured: pages are mapped once, and not each time."""
     done = subprocess.run([sys.executable, "-c", FAULTS], capture_output=True, text=True, check=True)
     mapped, kept = map(int, done.stdout.split())
-    assert mapped > 10_000, "the test shows nothing"
+    assert mapped > 10_000, "the test is not valid"
     assert kept < mapped / 100

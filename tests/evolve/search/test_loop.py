@@ -1,4 +1,4 @@
-"""The loop: same history in one go, interrupted anywhere, and with any number of workers."""
+"""The loop: the same history without interruption, with interruption at any point, and with any number of workers."""
 
 import heapq
 
@@ -15,7 +15,7 @@ from tests.evolve.closed_form import bowl, calls, fails_for_some, slow_for_some,
 
 
 class SilentWatcher:
-    """Watches; interrupts after a number of candidates."""
+    """A watcher that interrupts the run after a number of candidates."""
 
     def __init__(self, until=None):
         self.until, self.seen, self.steps = until, [], 0
@@ -65,12 +65,12 @@ def test_interrupted_run_continues_to_the_same_history(tmp_path, whole, until):
     assert len(Run.open(path).candidates) == until
     run, onlooker = carry(path, tiny())
     assert history(run) == history(whole)
-    assert onlooker.seen == list(range(until, 12)), "none on record is evaluated again"
+    assert onlooker.seen == list(range(until, 12)), "candidates on record are not evaluated again"
 
 
 def test_history_does_not_depend_on_workers_or_order(tmp_path, whole):
     run, onlooker = carry(tmp_path / "run", tiny(), slow_for_some, workers=2)
-    assert onlooker.seen != sorted(onlooker.seen), "the test must mix the order to show anything"
+    assert onlooker.seen != sorted(onlooker.seen), "the order must be mixed for this test to be valid"
     assert history(run) == history(whole)
 
 
@@ -88,7 +88,7 @@ def test_other_search_than_the_one_on_record_is_refused(tmp_path):
     config = path / "config.toml"
     config.write_text(config.read_text().replace("seed = 0", "seed = 1"))
     kept = (path / "candidates.jsonl").read_bytes()
-    with pytest.raises(RunError, match="cannot be continued: candidate 0 is not what the search proposes") as caught:
+    with pytest.raises(RunError, match="cannot be continued: candidate 0 differs from the search's proposal") as caught:
         carry(path, tiny())
     assert "nevergrad 1." in str(caught.value)
     assert (path / "candidates.jsonl").read_bytes() == kept
@@ -112,19 +112,21 @@ def steady(tmp_path_factory):
 @pytest.mark.parametrize("until", [1, 4, 7])
 @pytest.mark.parametrize("optimizer", ["CMA", "mutation", "DE"])
 def test_interrupted_steady_state_continues_to_the_same_history(tmp_path, optimizer, until):
-    """One worker finishes candidates in their order, so even the steady state has only one history."""
+    """One worker finishes candidates in order, so that even the steady state has only one history."""
     config = tiny(*STEADY, f"search.optimizer={optimizer}", "genome.fov_deg.opens_at=1")
     whole, _ = carry(tmp_path / "whole", config)
     with pytest.raises(KeyboardInterrupt):
         carry(tmp_path / "run", config, until=until)
     run, _ = carry(tmp_path / "run", config)
     assert history(run) == history(whole)
-    assert max(calls(run.path).values()) <= 2, "only those under way may be begun again"
+    assert max(calls(run.path).values()) <= 2, "only unfinished candidates may start again"
 
 
 @pytest.mark.slow
 def test_steady_state_proposes_from_what_is_known_by_then(tmp_path, steady):
-    """The fifth candidate is proposed when the first is done, so it cannot know of the others; nor does it wait."""
+    """The fifth candidate is proposed when the first is done, without waiting for the others and without their
+    results.
+    """
     assert [c.id for c in steady.in_order_of_finish] == list(range(12))
     by_generations, _ = carry(tmp_path / "run", tiny("search.population=4"))
     assert history(steady)[:4] == history(by_generations)[:4]
@@ -137,7 +139,7 @@ def test_steady_state_proposes_from_what_is_known_by_then(tmp_path, steady):
 
 
 class Imagined:
-    """Workers in a time of their own; a candidate's seed says how long it takes, log-normally."""
+    """Simulated workers with simulated time; a candidate's seed determines its duration, which is log-normal."""
 
     def __init__(self, workers):
         self.workers, self.now, self.busy = workers, 0.0, 0.0
@@ -161,7 +163,7 @@ class Imagined:
 @pytest.mark.slow
 @pytest.mark.parametrize("workers", [8, 16])
 def test_steady_state_keeps_workers_busy_that_would_wait_for_a_generation(tmp_path, workers):
-    """Sixteen workers for a generation of sixteen: all wait for the slowest. docs/cluster.md has the numbers."""
+    """Sixteen workers for a generation of sixteen all wait for the slowest. docs/cluster.md has the numbers."""
     found = {}
     for steady in ("false", "true"):
         run = Run.create(

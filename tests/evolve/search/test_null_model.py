@@ -1,4 +1,4 @@
-"""The null model is the search itself with fitness by chance, and its p is right where nothing is selected."""
+"""The null model is the search itself with random fitness, and its p-value is correct without selection."""
 
 from dataclasses import replace
 
@@ -17,7 +17,7 @@ OPEN = ("n_eyes", "fov_deg", "resolution_width")
 
 
 class Chance:
-    """Whoever comes gets a fitness that has nothing to do with it."""
+    """An executor whose fitness does not depend on the candidate."""
 
     training = evaluated = None
 
@@ -31,10 +31,10 @@ class Chance:
 
 class Nobody:
     def training(self, candidate_id, steps, planned):
-        """Nothing."""
+        """Do nothing."""
 
     def evaluated(self, candidate):
-        """Nothing."""
+        """Do nothing."""
 
 
 def measured(animal):
@@ -62,7 +62,9 @@ def test_every_search_has_a_seed_of_its_own():
 
 
 def test_what_few_candidates_have_counts_by_how_many():
-    """A search in which nobody has it is left out."""
+    """Generations are weighted by the number of candidates that have the quantity. A search without any such candidate
+    is omitted.
+    """
     nan = np.nan
     means = np.array([[9.0, 1.0, 4.0], [9.0, nan, 2.0], [9.0, nan, nan]])
     model = NullModel({"x": means}, {"x": np.array([[5, 3, 1], [5, 0, 2], [5, 0, 0]])})
@@ -78,8 +80,9 @@ def test_a_phase_ends_with_its_own_last_generations():
 
 
 def test_p_is_uniform_where_nothing_is_selected():
-    """As many searches with other seeds, and means of three of them: a p of less than .05 comes in 5 % of the cases.
-    (300 draws; a p that were one-sided, or that took the mean of three for one, fails at once.)"""
+    """The cases are single searches with other seeds, and means of three of them: p is below 0.05 in 5 % of the cases.
+    (With 300 draws, a one-sided p, or one that treats the mean of three as a single search, fails at once.)
+    """
     chance = np.random.default_rng(1)
     ends = chance.gamma(2.0, size=999)
     for several in (1, 3):

@@ -1,4 +1,4 @@
-"""A search may come to other last digits on another processor; another search is refused."""
+"""A search on another processor may differ in the last digits, but a different search is refused."""
 
 import shutil
 
@@ -17,7 +17,7 @@ def run(finished):
 
 
 def off(candidate, by):
-    """What a search proposes that is `by` off the record in one coordinate."""
+    """Return a proposal that differs from the record by `by` in one coordinate."""
     genome = (candidate.genome[0] + by, *candidate.genome[1:])
     return Proposal(Place(candidate.id, candidate.generation, candidate.index), genome, candidate.parents)
 
@@ -49,7 +49,7 @@ def test_other_libraries_must_come_to_the_same(run, monkeypatch):
 
 
 def test_other_budget_stages_than_those_on_record_are_refused_before_anybody_is_trained(finished, tmp_path):
-    """With two, the better half of the first generation lacks its second."""
+    """The better half of the first generation lacks its second evaluation if there are two rungs."""
     copy = shutil.copytree(finished, tmp_path / "run")
     text = (copy / "config.toml").read_text()
     text = text.replace("rungs = 1", "rungs = 2").replace("total_steps = 4096", "total_steps = 8192")
@@ -68,5 +68,5 @@ class Nobody:
 
 
 def test_what_was_never_proposed_is_refused(run):
-    with pytest.raises(RunError, match="is not what the search proposes here"):
+    with pytest.raises(RunError, match="differs from the search's proposal here"):
         SameSearch(run).require(None, run.generation(0)[0])

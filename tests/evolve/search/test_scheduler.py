@@ -1,4 +1,4 @@
-"""Schedulers that are none, that do not answer, and whose certificates are of no use: one line, at once."""
+"""Addresses without a scheduler, schedulers that do not answer, and invalid certificates give one line at once."""
 
 import shutil
 import socket
@@ -15,7 +15,7 @@ pytest.importorskip("distributed")
 
 
 def certificates(folder, name="own"):
-    """A certificate that vouches for itself, and its key, made as docs/cluster.md says."""
+    """Return a self-signed certificate and its key, created by the commands in docs/cluster.md."""
     if shutil.which("openssl") is None:
         pytest.skip("openssl is not installed")
     cert, key = folder / f"{name}-cert.pem", folder / f"{name}-key.pem"
@@ -39,7 +39,7 @@ def test_addresses_are_taken_as_dask_writes_them(address):
 
 
 def test_a_scheduler_that_is_not_there_is_no_run(tmp_path, capsys, monkeypatch):
-    """Dask is not even asked: it would try for a minute."""
+    """Dask is not called, because it would retry for a minute."""
     monkeypatch.setattr("distributed.Client", None)
     monkeypatch.setattr("evolve.search.scheduler.ANSWER_S", 1.0)
     with socket.socket() as free:

@@ -1,4 +1,6 @@
-"""The search proposes by seed alone, spreads as asked, improves, opens genes in time, and takes failures as worst."""
+"""The search depends only on its seed, has the requested spread, improves, opens genes in time, and ranks failures
+last.
+"""
 
 import math
 import warnings
@@ -18,7 +20,7 @@ def sphere(genomes, best=0.7):
 
 
 def history(config, fitness=sphere):
-    """Genomes asked, (generation, candidate, dimension)."""
+    """Return the proposed genomes, (generation, candidate, dimension)."""
     search, asked = Search(config), []
     for _ in range(config.search.generations):
         proposals = search.propose_generation()
@@ -48,18 +50,19 @@ def test_genomes_stay_in_the_unit_cube(optimizer):
 @pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("frozen", [(), ("genome.morphological.open=false",)], ids=["many genes", "few genes"])
 def test_first_generation_spreads_by_sigma_around_the_start(frozen):
-    """nevergrad scales the step in bounded spaces, by dimension; ours must not depend on that."""
+    """nevergrad scales the step in bounded spaces by dimension; our step must not depend on it."""
     start = ("genome.n_eyes.start=8", "genome.resolution_width.start=8", "genome.resolution_height.start=8")
     centre = ("genome.memory_frames.start=5", "genome.neurons.start=256", "genome.doe.open=true")
     config = tiny("search.population=4000", "search.sigma=0.05", *start, *centre, *frozen)
     genomes = np.array([proposal.genome for proposal in Search(config).propose_generation()])
-    # 4000 draws: the mean is good to 0.05/sqrt(4000), the standard deviation to 1.1 %; five of each allowed.
+    # With 4000 draws, the mean is accurate to 0.05/sqrt(4000) and the standard deviation to 1.1 %; five of each are
+    # allowed.
     np.testing.assert_allclose(genomes.mean(axis=0), Genotype(config.genome).start, atol=5 * 0.05 / math.sqrt(4000))
     np.testing.assert_allclose(genomes.std(axis=0), 0.05, rtol=0.06)
 
 
 def test_search_converges():
-    """CMA-ES on a sphere converges log-linearly; a search told the wrong sign, or out of order, does not."""
+    """CMA-ES on a sphere converges log-linearly; with the wrong sign, or in the wrong order, it does not."""
     asked = history(tiny("search.population=12", "search.generations=40", "genome.fov_deg.open=false"))
     distance = np.linalg.norm(asked - 0.7, axis=2).mean(axis=1)
     assert distance[-1] < 0.05 * distance[0]
@@ -69,8 +72,9 @@ def test_search_converges():
 @pytest.mark.parametrize("seed", [0, 1])
 @pytest.mark.parametrize("genes", ["morphological", "neural"])
 def test_search_converges_where_the_best_lies_at_the_end_of_all_ranges(genes, seed):
-    """As for many a gene it does. CMA-ES that learns from the worse half does not get there: what bouncing at a bound
-    leaves of its samples makes its covariance degenerate, and then its steps explode."""
+    """Many genes have their optimum at an end. CMA-ES that learns from the worse half does not reach it: samples that
+    bounce at a bound make the covariance degenerate, and then the steps explode.
+    """
 
     def distance(active):
         settings = ("search.population=16", "search.generations=60", f"genome.{genes}.open=false", f"seed={seed}")
@@ -78,11 +82,11 @@ def test_search_converges_where_the_best_lies_at_the_end_of_all_ranges(genes, se
         return np.abs(asked - 1).mean(axis=(1, 2))[-3:].mean()
 
     assert distance("false") < 1e-3  # 1e-4 and less in eight searches
-    assert distance("true") > 0.01  # .02 to .5 in twelve; another processor's last bits lead it elsewhere
+    assert distance("true") > 0.01  # 0.02 to 0.5 in twelve searches; another processor's last bits lead to other values
 
 
 def test_mutations_come_to_within_their_own_step():
-    frozen = ("genome.neurons.open=false",)  # of 512 values, in steps of one
+    frozen = ("genome.neurons.open=false",)  # 512 values, in steps of one
     settings = ("search.population=12", "search.generations=40", "search.optimizer=mutation", "search.sigma=0.05")
     distance = np.linalg.norm(history(tiny(*settings, *frozen)) - 0.7, axis=2).mean(axis=1)
     assert distance[-1] < 0.3 * distance[0]
@@ -94,7 +98,7 @@ def test_mutation_is_gaussian_in_real_genes_and_one_at_most_in_integers():
     genotype = Genotype(config.genome)
     genomes = np.array([proposal.genome for proposal in Search(config).propose_generation()])
     place = {gene.name: i for i, gene in enumerate(genotype.open_genes)}
-    # 2000 draws: the standard deviation is good to 1.6 %.
+    # With 2000 draws, the standard deviation is accurate to 1.6 %.
     assert genomes[:, place["fov_deg"]].std() == pytest.approx(0.05, rel=0.08)
     for name, start in (("n_eyes", 8), ("neurons", 100)):
         values, counts = np.unique([genotype.decode(genome)[name] for genome in genomes], return_counts=True)
@@ -140,19 +144,19 @@ def test_genes_open_in_their_generation_and_the_search_goes_on_from_the_best(opt
     place = {gene.name: i for i, gene in enumerate(genotype.open_genes)}
     for name, opens_at in (("fov_deg", 3), ("neurons", 5), ("n_eyes", 0)):
         varies = np.ptp(asked[:, :, place[name]], axis=1) > 0
-        if name == "fov_deg" or optimizer == "CMA":  # a step of ±1 may leave an integer where it was
+        if name == "fov_deg" or optimizer == "CMA":  # a step of ±1 may leave an integer unchanged
             assert varies.tolist() == [generation >= opens_at for generation in range(8)]
         assert not varies[:opens_at].any()
         assert np.all(asked[:opens_at, :, place[name]] == genotype.start[place[name]])
     if optimizer == "CMA":
         best = max(asked[:3].reshape(24, -1), key=lambda genome: sphere([genome])[0])
-        # Mean of 8 draws: 0.02/sqrt(8) each, five of that allowed.
+        # The mean of 8 draws has a standard error of 0.02/sqrt(8); five of them are allowed.
         np.testing.assert_allclose(asked[3].mean(axis=0), best, atol=5 * 0.02 / math.sqrt(8))
 
 
 @pytest.mark.parametrize("optimizer", ["CMA", "mutation", "DE"])
 def test_a_later_phase_descends_from_the_fittest(optimizer):
-    """Its optimizer knows nobody yet, but begins around the best genome so far."""
+    """The new optimizer has no results yet, but starts around the best genome so far."""
     late = ("genome.fov_deg.opens_at=2", "search.population=6", f"search.optimizer={optimizer}")
     search = Search(tiny(*late))
     for generation in range(4):
@@ -162,7 +166,7 @@ def test_a_later_phase_descends_from_the_fittest(optimizer):
             assert parents == {()}
         if generation == 2:
             assert parents == {(4,)}
-        if generation == 3 and optimizer != "DE":  # which may well try somebody without parents
+        if generation == 3 and optimizer != "DE":  # DE may propose a candidate without parents
             assert all(one >= 12 for ids in parents for one in ids)
         search.tell([(p.id, 100.0 if p.id == 4 else -float(p.id)) for p in proposals])
 
@@ -201,7 +205,7 @@ def test_generation_of_failures_alone_is_survived():
 
 
 def test_failure_before_any_success_is_no_parent():
-    """In the steady state fitness comes one by one, and mean returns are often negative."""
+    """Fitness values arrive one by one in the steady state, and mean returns are often negative."""
     search = Search(tiny("search.optimizer=mutation"))
     search.propose_generation()
     for told in ((0, -math.inf), (1, -5.0), (2, -6.0), (3, -7.0)):
@@ -212,12 +216,12 @@ def test_failure_before_any_success_is_no_parent():
 def test_tell_must_match_what_was_proposed():
     search = Search(tiny())
     search.propose_generation()
-    with pytest.raises(ValueError, match="candidate 4 has not been proposed"):
+    with pytest.raises(ValueError, match="candidate 4 was not proposed"):
         search.tell([(4, 0.0)])
     search.tell([(1, 0.0)])
-    with pytest.raises(ValueError, match="candidate 1 has not been proposed, or has been told already"):
+    with pytest.raises(ValueError, match="candidate 1 was not proposed, or already has a fitness"):
         search.tell([(1, 0.0)])
-    with pytest.raises(RuntimeError, match="not been told"):
+    with pytest.raises(RuntimeError, match="is not complete"):
         search.propose_generation()
 
 
@@ -234,7 +238,7 @@ def test_training_seeds_are_fresh_for_every_candidate_and_run():
 
 
 def test_what_pycma_warns_of_is_not_told():
-    """It is expected here, generation after generation; other warnings pass."""
+    """The warning is expected in every generation. Other warnings are shown."""
     with warnings.catch_warnings(record=True) as told:
         warnings.simplefilter("always")
         with _quiet():

@@ -1,4 +1,4 @@
-"""Successive halving: who is promoted, what it costs, and that a training in stages is one training."""
+"""Successive halving: promotion, cost, and a training run in rungs that equals a whole one."""
 
 import json
 from dataclasses import replace
@@ -11,7 +11,7 @@ from evolve.config.run_config import ConfigError, LearningConfig, SearchConfig
 from evolve.interactive.opened_run import OpenedRun
 from evolve.learning.checkpoint import load_checkpoint
 from evolve.learning.fitness import evaluate
-from evolve.learning.training_stage import TrainingStage
+from evolve.learning.training_rung import TrainingRung
 from evolve.runs import progress
 from evolve.search.local_executor import LocalExecutor
 from evolve.search.loop import evolve
@@ -35,7 +35,7 @@ def test_budgets_and_sizes_halve():
     quarters = replace(THREE, rungs=2, promoted=0.25)
     assert budgets(quarters, learning) == (25_000, 100_000)
     assert sizes(quarters) == (7, 2)
-    assert sizes(replace(THREE, population=2, rungs=4)) == (2, 1, 1, 1), "somebody is trained to the end"
+    assert sizes(replace(THREE, population=2, rungs=4)) == (2, 1, 1, 1), "at least one candidate is trained to the end"
     one = SearchConfig(population=7)
     assert (budgets(one, learning), sizes(one)) == ((100_000,), (7,))
 
@@ -66,7 +66,7 @@ def carry(path, config, monkeypatch, evaluate=in_stages, until=None):
 
 
 def lines(run):
-    """The record, whoever finished first."""
+    """Return the record independently of the order of finishing."""
     return sorted((c.id, c.rung, c.genome, c.fitness, c.steps, c.curve) for c in run.in_order_of_finish)
 
 
@@ -83,7 +83,7 @@ def test_the_better_go_on_and_the_search_is_told_how_far_each_came(tmp_path, mon
     assert {c.rung: c.steps for c in run.candidates} == {0: 4096, 1: 8192, 2: 16384}
     trained = next(c for c in run.candidates if c.rung == 2)
     assert run.policy_path(trained.id).read_text().count(" to ") == 3
-    assert not list((run.path / "trainings").iterdir()), "a generation that is done leaves no trainings behind"
+    assert not list((run.path / "trainings").iterdir()), "a finished generation leaves no training state behind"
 
 
 @pytest.mark.fast_cases(1)
@@ -111,7 +111,9 @@ def test_who_is_killed_after_the_last_line_leaves_no_trainings_behind(tmp_path, 
 
 
 def test_what_was_lived_before_a_stage_that_fails_is_kept(tmp_path, monkeypatch):
-    """Steps, curve and mishaps of the stage before, and of mishaps also where nothing fails."""
+    """Steps, curve and failures of episodes in the rung before are kept. Failures of episodes are also kept if no rung
+    fails.
+    """
     run, _ = carry(tmp_path / "run", tiny(*HALVING, "search.generations=1"), monkeypatch, fails_late)
     failed = [c for c in run.candidates if c.failure is not None]
     assert {c.rung for c in failed} == {1}
@@ -120,11 +122,11 @@ def test_what_was_lived_before_a_stage_that_fails_is_kept(tmp_path, monkeypatch)
         if candidate.failure is not None:
             assert candidate.steps == before.steps == 4096
             assert candidate.curve == before.curve != ()
-            assert candidate.mishaps == before.mishaps == MISHAPS
+            assert candidate.episode_failures == before.episode_failures == MISHAPS
     whole = next(c for c in run.candidates if c.rung == 2)
     assert whole.steps == 16384
-    # Of four kinds and others, three times: others stay what is not told by name.
-    assert dict(whole.mishaps) == {said: 3 * number for said, number in MISHAPS}
+    # Four kinds and others, three times. The others are failures that are not named.
+    assert dict(whole.episode_failures) == {said: 3 * number for said, number in MISHAPS}
 
 
 def test_progress_of_a_stage_that_fails_never_runs_backwards(tmp_path, monkeypatch):
@@ -133,14 +135,14 @@ def test_progress_of_a_stage_that_fails_never_runs_backwards(tmp_path, monkeypat
             self.tally, self.paces = None, []
 
         def training(self, candidate_id, steps, planned):
-            """Nothing."""
+            """Do nothing."""
 
         def evaluated(self, candidate):
             self.tally.evaluated(candidate)
             self.paces.append(self.tally.steps_per_second)
 
     monkeypatch.setenv("RHABDOM_TEST", str(tmp_path))
-    monkeypatch.setattr(progress, "time", SimpleNamespace(monotonic=lambda: 0.0))  # only steps tell paces apart
+    monkeypatch.setattr(progress, "time", SimpleNamespace(monotonic=lambda: 0.0))  # only steps distinguish the paces
     run, counting = Run.create(tmp_path / "run", tiny(*HALVING, "search.generations=1")), Counting()
     counting.tally = progress.Tally(run)
     with LocalExecutor(fails_late, 1) as executor:
@@ -167,7 +169,7 @@ def test_a_record_whose_rungs_do_not_follow_each_other_is_damaged(tmp_path, monk
     written = [json.loads(line) for line in record.read_text().splitlines()]
     orphan = next(line for line in written if line["rung"] == 1)
     record.write_text(json.dumps(orphan) + "\n")
-    with pytest.raises(RunError, match=r"line 1: is damaged: .* is on rung 1, but has not been one below"):
+    with pytest.raises(RunError, match=r"line 1: is damaged: .* is on rung 1, but the rung below is missing"):
         Run.open(run.path)
     record.write_text(json.dumps({**orphan, "rung": 3}) + "\n")
     with pytest.raises(RunError, match=r"rung = 3: must be at least 0 and below search\.rungs = 3"):
@@ -177,21 +179,24 @@ def test_a_record_whose_rungs_do_not_follow_each_other_is_damaged(tmp_path, monk
 def test_stages_that_cannot_be_are_refused():
     with pytest.raises(ConfigError, match=r"search\.rungs = 2: successive halving needs generations"):
         assemble("detection", assignments=["search.rungs=2", "search.steady_state=true"])
-    with pytest.raises(ConfigError, match="the first budget stage, 3906 steps, is less than one rollout of 4096"):
+    with pytest.raises(ConfigError, match="the first rung, 3906 steps, is less than one rollout of 4096"):
         assemble("detection", assignments=["search.rungs=9"])
     with pytest.raises(ConfigError, match=r"search\.promoted = 1\.0: must be in \(0, 0\.9\]"):
         assemble("detection", assignments=["search.promoted=1.0"])
 
 
 def test_a_training_in_stages_is_one_training(tmp_path, short_episodes):
-    """Bit for bit: whether each stage takes up what the one before has stored, or all is trained in one process."""
+    """The result is the same bit for bit, whether each rung continues from stored state or all rungs run in one
+    process.
+    """
     plain = small_config()
     whole_training = replace(plain.learning, total_steps=1024)
-    config = replace(plain, learning=whole_training, search=replace(plain.search, rungs=3))  # as a run has it
+    # the configuration of a whole run
+    config = replace(plain, learning=whole_training, search=replace(plain.search, rungs=3))
 
     def life(name, ends):
         kept = tuple(tmp_path / f"{name}-{number}" for number in range(len(ends)))
-        outcome = evaluate(PHENOTYPE, config, 5, tmp_path / name, stage=TrainingStage(ends, kept))
+        outcome = evaluate(PHENOTYPE, config, 5, tmp_path / name, rung=TrainingRung(ends, kept))
         return outcome, kept
 
     ends = (256, 512, 1024)
@@ -211,11 +216,11 @@ def test_the_first_stage_is_a_short_training_and_the_next_goes_on_from_it(tmp_pa
     short = replace(config, learning=replace(config.learning, total_steps=256))
     plain = evaluate(PHENOTYPE, short, 5, tmp_path / "plain")
     kept = (tmp_path / "0", tmp_path / "1")
-    first = evaluate(PHENOTYPE, config, 5, tmp_path / "policy", stage=TrainingStage((256,), kept[:1]))
+    first = evaluate(PHENOTYPE, config, 5, tmp_path / "policy", rung=TrainingRung((256,), kept[:1]))
     assert (first.returns, first.curve) == (plain.returns, plain.curve)
     told = []
     goes_on = evaluate(
-        PHENOTYPE, config, 5, tmp_path / "policy", lambda *s: told.append(s), TrainingStage((256, 512), kept)
+        PHENOTYPE, config, 5, tmp_path / "policy", lambda *s: told.append(s), TrainingRung((256, 512), kept)
     )
     assert told == [(512, 512)]
     assert goes_on.curve[0] == plain.curve[0]

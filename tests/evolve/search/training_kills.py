@@ -1,9 +1,10 @@
-"""kill -9 at random moments of real PPO trainings, in stages and whole, against the same runs, killed by nobody.
+"""Kill real PPO training at random moments with `kill -9`, in rungs and whole, and compare it with the same runs
+without kills.
 
     RHABDOM_TRAINING_KILLS=100 python -m pytest --all tests/evolve/search/test_kill.py -k training
 
-As `kills`, but each candidate learns: children are forked from a process that has loaded the libraries, and has not yet
-started a thread of theirs.
+The method is that of `kills`, but each candidate learns. Children are forked from a process that has loaded the
+libraries, but not yet started any of their threads.
 """
 
 import os
@@ -49,7 +50,7 @@ KINDS = ((), ("search.rungs=2",))
 
 
 class Learning:
-    """Evaluates in this process, as a worker would."""
+    """An executor in this process that evaluates like a worker."""
 
     def run(self, jobs, progress):
         while jobs:
@@ -58,7 +59,7 @@ class Learning:
 
 
 def carry(path, config):
-    """Begin a run, or go on with it, and bring it to its end."""
+    """Start a run or continue it, and finish it."""
     torch.set_num_threads(1)
     prepare_device()
     run = Run.open(path) if (path / "config.toml").exists() else Run.create(path, config)
@@ -68,12 +69,14 @@ def carry(path, config):
 
 
 def policies(run):
-    """Numbers of all policies that are left, by name."""
+    """Return the numbers of all remaining policies, by name."""
     return {path.name: tensors(path) for path in (run.path / "policies").iterdir()}
 
 
 def endure(kills, seed, folder):
-    """Runs that are killed `kills` times in all, and end as if nobody had touched them; returns moments of death."""
+    """Make runs that are killed `kills` times in total, and compare them with undisturbed runs. Return the moments of
+    the kills.
+    """
     chance, moments, number = random.Random(seed), [], 0
     while len(moments) < kills:
         config = assemble("detection", "quick", assignments=[*SMALL, f"seed={number}", *KINDS[number % len(KINDS)]])
@@ -86,19 +89,20 @@ def endure(kills, seed, folder):
             moments.append(moment)
             record = path / "candidates.jsonl"
             now = record.read_bytes() if record.exists() else b""
-            assert now.startswith(kept), "something written was lost"
+            assert now.startswith(kept), "a written line was lost"
             kept = now[: now.rfind(b"\n") + 1]
         undisturbed, run = Run.open(whole), Run.open(path)
         assert finished(run)
         assert all(candidate.failure is None for candidate in run.candidates)
-        assert history(run) == history(undisturbed), "another history than that of a run that nobody killed"
+        assert history(run) == history(undisturbed), "the history differs from that of a run without kills"
         assert policies(run) == policies(undisturbed)
         number += 1
     return moments
 
 
 def main(kills, seed=None):
-    Search(assemble("detection", "quick", assignments=SMALL))  # loads what children would each load again
+    # loads modules that each child would otherwise load again
+    Search(assemble("detection", "quick", assignments=SMALL))
     seed = random.randrange(2**32) if seed is None else seed
     print(f"seed {seed}", flush=True)
     with TemporaryDirectory() as folder:

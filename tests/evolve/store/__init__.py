@@ -1,4 +1,4 @@
-"""Which test covers which module of evolve/store.
+"""Tests of evolve/store: which test covers which module.
 
 directory: test_directory.py
 record: test_record.py

@@ -1,4 +1,4 @@
-"""A run to write to."""
+"""An empty run for tests that write to it."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""Files are written whole or not at all, and what a killed writer left is swept up."""
+"""Files are written completely or not at all, and the remains of a killed writer are removed."""
 
 import os
 import stat
@@ -21,13 +21,13 @@ def test_a_writer_that_fails_leaves_the_old_file_and_nothing_else(tmp_path, monk
     monkeypatch.setattr(os, "fsync", full)
     with pytest.raises(OSError, match="No space left") as caught:
         write_whole(path, b"new, and longer")
-    assert caught.value.filename == str(path), "not the name of the file in between"
+    assert caught.value.filename == str(path), "the error must not name the temporary file"
     assert path.read_bytes() == b"old"
     assert list(path.parent.iterdir()) == [path]
 
 
 def test_an_error_that_has_a_message_alone_keeps_it(tmp_path):
-    """As libraries raise them that write pictures."""
+    """Libraries that write images raise such errors."""
     with pytest.raises(OSError, match="no room for a picture") as caught, unfinished(tmp_path / "file"):
         raise OSError("no room for a picture")
     assert (caught.value.strerror, caught.value.filename) == ("no room for a picture", str(tmp_path / "file"))
@@ -44,7 +44,7 @@ def test_only_folders_of_a_run_that_is_there_are_made(tmp_path):
 
 
 def test_what_killed_writers_left_is_swept_up(tmp_path):
-    """What a process writes that lives stays: a film, say, of which nobody told the run."""
+    """Temporary files of a living process stay, such as a video that is not part of the run's files."""
     write_whole(tmp_path / "file", b"whole")
     living = f".film.mp4.{os.getppid()}{UNFINISHED}"
     for name in (f".file.{NOBODY}{UNFINISHED}", f".file.{os.getpid()}{UNFINISHED}", f".file{UNFINISHED}", living):
@@ -60,7 +60,7 @@ def test_a_directory_is_no_name_for_a_file(path):
 
 
 def test_content_is_on_the_disk_before_the_name_and_the_name_before_anybody_is_told(tmp_path, monkeypatch):
-    """A machine that dies between any two of these steps keeps the old file, or all of the new one."""
+    """The old file or the complete new one remains if the machine fails between any two of these steps."""
     steps, sync, named = [], os.fsync, Path.replace
 
     def synced(descriptor):

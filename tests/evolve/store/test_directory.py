@@ -1,4 +1,4 @@
-"""Run directories: begun once, named when they cannot be used, repaired after a crash."""
+"""Run directories: created once, named in errors if they cannot be used, and repaired after a crash."""
 
 import errno
 import os
@@ -32,7 +32,7 @@ def test_directory_with_something_in_it_is_refused(tmp_path):
 
 
 def test_two_that_create_at_once_do_not_mix(tmp_path, monkeypatch):
-    """The second comes while the first is between its look at the directory and its config."""
+    """The second process starts between the first one's check of the directory and its config."""
 
     def meanwhile(*arguments):
         with pytest.raises(LockedError, match=f"in use by process {os.getpid()}"):
@@ -76,7 +76,7 @@ def test_default_directory_is_the_first_that_is_free(tmp_path):
 
 
 def test_two_that_begin_at_once_have_a_directory_each(tmp_path, monkeypatch):
-    """Both have chosen the same name before either has made it."""
+    """Both processes have chosen the same name before either has created the directory."""
     monkeypatch.chdir(tmp_path)
     chosen = iter([Path("runs/detection-quick-1"), Path("runs/detection-quick-1"), Path("runs/detection-quick-2")])
     monkeypatch.setattr("evolve.store.directory.next_directory", lambda *_: next(chosen))
@@ -86,7 +86,7 @@ def test_two_that_begin_at_once_have_a_directory_each(tmp_path, monkeypatch):
 
 
 def test_where_no_run_can_be_written_one_directory_is_tried(tmp_path, monkeypatch):
-    """On a file system without locks, say."""
+    """One example is a file system without locks."""
 
     def none(*_):
         raise OSError(errno.ENOLCK, "No locks available")
@@ -121,13 +121,13 @@ def test_a_config_that_changed_since_the_run_was_opened_is_not_overlooked(run):
 
 
 def test_a_run_that_is_begun_again_comes_from_where_this_attempt_says(tmp_path):
-    record_start(tmp_path, 0, "runs/a:3", "0")  # and then it was killed
+    record_start(tmp_path, 0, "runs/a:3", "0")  # the process was then killed
     Run.create(tmp_path, CONFIG)
     assert origin(tmp_path) is None
 
 
 def test_run_killed_while_it_is_created_can_be_begun_again(tmp_path):
-    """config.toml is written last; before it there is nothing to lose."""
+    """config.toml is written last; before that, the directory has no data to lose."""
     for left in ((), ("versions.json",), ("versions.json", "candidates.jsonl", f".config.toml.{NOBODY}.unfinished")):
         path = tmp_path / str(len(left))
         (path / "policies").mkdir(parents=True)
@@ -150,7 +150,7 @@ def test_repair_removes_what_was_half_written(run):
 
 
 def test_read_only_directory_is_named_and_can_still_be_read(tmp_path):
-    """In a process of its own, which gives up root's rights if it has them: root may write anywhere."""
+    """The test runs in a separate process that drops root's rights if necessary, because root may write anywhere."""
     run = Run.create(tmp_path / "run", CONFIG)
     run.append(candidate(0))
     kept = (run.path / "candidates.jsonl").read_bytes()
@@ -170,7 +170,8 @@ def test_read_only_directory_is_named_and_can_still_be_read(tmp_path):
         "    except Exception as error:\n"
         "        print(f'{type(error).__name__}: {error}')\n"
     )
-    for place in (tmp_path, *tmp_path.parents):  # all that pytest made, however deep its workers nest it
+    # all directories that pytest created, however deeply its workers nest them
+    for place in (tmp_path, *tmp_path.parents):
         if "pytest" in str(place):
             place.chmod(0o755)
     run.path.chmod(0o555)
@@ -191,10 +192,12 @@ def test_steps_are_those_of_the_candidate_and_its_furthest_stage(run):
     run.append(replace(candidate(0), rung=1, steps=300))
 
     class Asked(dict):
-        """A record has thousands of lines, and progress asks after every rollout."""
+        """Lines of a record that must not be scanned: there are thousands, and progress reads steps after every
+        rollout.
+        """
 
         def values(self):
-            raise AssertionError("all lines are gone through")
+            raise AssertionError("all lines were scanned")
 
     run.record.lines = Asked(run.record.lines)
     assert [run.steps_of(identity) for identity in (0, 1, 2)] == [300, 900, 0]

@@ -1,4 +1,4 @@
-"""One process at a time works on a run, and its lock ends with it."""
+"""One process at a time works on a run, and the lock ends with the process."""
 
 import os
 import subprocess

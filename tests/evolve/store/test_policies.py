@@ -1,4 +1,4 @@
-"""A policy that is lost or exchanged is noticed, and the message says what to do."""
+"""A lost or exchanged policy is detected, and the message gives a remedy."""
 
 from dataclasses import replace
 
@@ -40,17 +40,17 @@ def test_lost_policies_are_noticed_at_once(run, call):
     for number in (1, 2, 3, 5, 6, 7):
         run.policy_path(number).unlink()
     notice = Run.open(run.path).notice
-    assert "policies of 6 candidates are lost (1, 2, 3, 5, 6, ...): put the file back from a copy" in notice
+    assert "policies of 6 candidates are lost (1, 2, 3, 5, 6, ...): restore the file from a copy" in notice
     assert notice in call("status", run.path)[2]
-    assert lost([candidate(1)], run.policy_path) is None, "a former version told nothing of it"
+    assert lost([candidate(1)], run.policy_path) is None, "records of an earlier version contain no hash"
 
 
 def test_an_exchanged_policy_is_not_played(run):
     run.append(replace(candidate(0), policy="00" * 32))
-    with pytest.raises(RunError, match=r"no policy at .*000000\.safetensors: put the file back"):
+    with pytest.raises(RunError, match=r"no policy at .*000000\.safetensors: restore the file"):
         require_policy(run.candidates[0], run.policy_path(0))
     write_whole(run.policy_path(0), b"another")
-    with pytest.raises(RunError, match="is not the policy with which candidate 0 was evaluated: put the file back"):
+    with pytest.raises(RunError, match="is not the policy with which candidate 0 was evaluated: restore the file"):
         require_policy(run.candidates[0], run.policy_path(0))
     require_policy(candidate(0), run.policy_path(0))
 
@@ -58,7 +58,7 @@ def test_an_exchanged_policy_is_not_played(run):
 def test_a_policy_that_never_was_is_not_looked_for_in_copies(run):
     for one, message in (
         (candidate(0, -np.inf, "rewards are not finite"), r"^candidate 0 has no policy, as it failed: rewards are"),
-        (candidate(1), r"^no policy at .*000001\.safetensors, and the record names none that was kept: choose another"),
+        (candidate(1), r"^no policy at .*000001\.safetensors, and none is on record: choose another"),
     ):
         with pytest.raises(RunError, match=message) as caught:
             require_policy(one, run.policy_path(one.id))
@@ -66,6 +66,6 @@ def test_a_policy_that_never_was_is_not_looked_for_in_copies(run):
 
 
 def test_the_policy_of_an_earlier_stage_is_not_played_for_one_that_failed_later(run):
-    write_whole(run.policy_path(0), b"of the first stage")
+    write_whole(run.policy_path(0), b"of the first rung")
     with pytest.raises(RunError, match="candidate 0 has no policy, as it failed: loss not finite"):
         require_policy(candidate(0, -np.inf, "loss not finite"), run.policy_path(0))

@@ -1,4 +1,6 @@
-"""The record: read back bit for bit, never overwritten, whole after any crash, and damage named by file and line."""
+"""The record is read back bit for bit, never overwritten, and complete after any crash; errors name file and line of
+damage.
+"""
 
 import errno
 import json
@@ -30,7 +32,9 @@ def test_failures_have_the_worst_fitness_and_valid_json(run):
     run.append(candidate(0, -5.0))
     run.append(candidate(1, math.nan))
     run.append(
-        Candidate.of(Place(2, 0, 2), (0.5,) * DIMENSION, run.candidates[0].phenotype, 1, Evaluation.failed("it\nbroke"))
+        Candidate.from_evaluation(
+            Place(2, 0, 2), (0.5,) * DIMENSION, run.candidates[0].phenotype, 1, Evaluation.failed("it\nbroke")
+        )
     )
     lines = (run.path / "candidates.jsonl").read_text().splitlines()
     assert [json.loads(line, parse_constant=pytest.fail)["fitness"] for line in lines] == [-5.0, None, None]
@@ -48,21 +52,21 @@ def test_candidate_is_written_once(run):
 
 @pytest.mark.parametrize("begun_anew", [True, False], ids=["begun anew", "deleted"])
 def test_a_run_that_is_somebody_elses_by_now_gets_no_more_lines(run, begun_anew):
-    """Its directory was deleted under its process, and perhaps another run begun in the same place."""
+    """The run's directory was deleted during the run, and in one case another run was created in the same place."""
     run.append(candidate(0))
     record = run.path / "candidates.jsonl"
     record.unlink()
     if begun_anew:
         record.write_text(candidate(0).to_line() + candidate(1).to_line())
-    with pytest.raises(RunError, match="no longer as this process left it"):
+    with pytest.raises(RunError, match="was changed by another process"):
         run.append(candidate(2))
     assert (len(record.read_text().splitlines()) if record.exists() else 0) == 2 * begun_anew
-    assert record.exists() == begun_anew, "what was deleted stays deleted"
+    assert record.exists() == begun_anew, "deleted files stay deleted"
 
 
 @pytest.mark.parametrize("kept", [1, 40, -2, -1])
 def test_unfinished_last_line_is_dropped_with_a_notice_and_cut_off_on_repair(run, kept):
-    """At any byte but the newline, which makes a line whole."""
+    """The last line is cut at any byte before the newline, which completes a line."""
     run.append(candidate(0))
     whole = (run.path / "candidates.jsonl").read_bytes()
     torn = candidate(1).to_line().encode()[:kept]
@@ -116,11 +120,11 @@ def test_full_disk_is_named(run, monkeypatch):
     monkeypatch.setattr(os, "fsync", full)
     with pytest.raises(RunError, match=r"candidates\.jsonl: cannot be written: No space left"):
         run.append(candidate(0))
-    assert run.candidates == (), "what is not on disk is not on record"
+    assert run.candidates == (), "candidates that are not on disk are not on record"
 
 
 def test_a_record_that_may_not_grow_loses_nothing(run):
-    """A limit of the file's size stands for a disk that is full from here on."""
+    """A limit of the file's size stands in for a full disk."""
     run.append(candidate(0))
     record = run.path / "candidates.jsonl"
     kept = record.read_bytes()
@@ -132,11 +136,11 @@ def test_a_record_that_may_not_grow_loses_nothing(run):
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
     assert record.read_bytes() == kept
-    assert [c.id for c in run.candidates] == [0], "what is not on disk is not on record"
+    assert [c.id for c in run.candidates] == [0], "candidates that are not on disk are not on record"
 
 
 def test_one_line_more_looks_at_few_others(run, monkeypatch):
-    """What `append` makes of the candidates is what a new reader makes of the lines, in any order of ids."""
+    """The result of `append` equals that of a new reader, for lines with ids in any order."""
     monkeypatch.setattr("evolve.store.record._furthest", None)
     for identity in (5, 0, 7, 3, 11, 4):
         run.append(candidate(identity))

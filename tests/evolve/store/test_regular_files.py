@@ -1,4 +1,6 @@
-"""A stranger's run: whatever bears the name of a file in it, nothing outside is read, written or waited for."""
+"""A run from a stranger: whatever the files in it are, no file outside the run is read or written, and no command
+waits.
+"""
 
 import os
 import socket
@@ -31,7 +33,7 @@ def victim(tmp_path):
 
 
 def put(kind, path, victim):
-    """Something strange under a file's name."""
+    """Put a link, FIFO, socket or similar under a file's name."""
     path.unlink(missing_ok=True)
     if kind == "link":
         path.symlink_to(victim)
@@ -41,7 +43,7 @@ def put(kind, path, victim):
         os.mkfifo(path)
     elif kind == "socket":
         with socket.socket(socket.AF_UNIX) as one:
-            one.bind(os.path.relpath(path))  # whole paths are too long for a socket's name
+            one.bind(os.path.relpath(path))  # absolute paths are too long for a socket's name
     else:
         path.mkdir()
 
@@ -70,7 +72,7 @@ def test_devices_are_refused(tmp_path):
 
 
 def test_what_is_looked_at_is_what_was_opened(tmp_path, victim, monkeypatch):
-    """A link that comes between the look at a name and its opening is not followed either."""
+    """A link that is created between the check of a name and its opening is not followed either."""
     path = tmp_path / "file"
     monkeypatch.setattr("evolve.store.regular_files.require_regular", lambda path: put("link", path, victim))
     with pytest.raises(OSError, match="symbolic links"):
@@ -159,7 +161,7 @@ def test_record_that_becomes_a_link_gets_no_line(run, victim):
 
 
 def test_links_that_wait_for_a_writers_next_file_lead_nowhere(run, victim):
-    """The name of a file that is being written can be guessed; whoever put a link there gains nothing."""
+    """The name of a temporary file can be guessed. A link that was put there has no effect."""
     waiting = run.path / f".report.html.{os.getpid()}.unfinished"
     waiting.symlink_to(victim)
     write_whole(run.path / "report.html", b"page")
@@ -180,7 +182,7 @@ def test_lock_of_a_run_that_was_begun_anew_stands_no_more(tmp_path):
         assert lock.stands
         (run.path / "lock").unlink()
         assert not lock.stands
-        with pytest.raises(RunError, match="no longer as this process left it"):
+        with pytest.raises(RunError, match="was changed by another process"):
             run.append(candidate(0))
         (run.path / "lock").touch()
         assert not lock.stands

@@ -1,4 +1,4 @@
-"""What a run was made with is recorded, and settings that change meanwhile are noticed."""
+"""The versions behind a run are recorded, and settings that change later are detected."""
 
 import json
 
@@ -14,7 +14,9 @@ def test_versions_are_recorded_at_each_start(run):
 
 
 def test_settings_that_change_meanwhile_are_noticed(run):
-    """What decides nothing may change: how many work, and for how long."""
+    """Settings that leave existing results unchanged may change: the number of workers, and the number of
+    generations.
+    """
     config = run.path / "config.toml"
     began = config.read_text()
     changes = (
@@ -29,6 +31,6 @@ def test_settings_that_change_meanwhile_are_noticed(run):
         config.write_text(changed)
         assert altered(run.path) == noticed
     record_start(run.path, 3)
-    assert not altered(run.path), "it was told once"
+    assert not altered(run.path), "the change was already reported"
     (run.path / "versions.json").unlink()
     assert not altered(run.path)

@@ -1,4 +1,4 @@
-"""Which test fails when a module of optics/apertures is broken.
+"""Tests that fail when a module of optics/apertures is broken.
 
 aperture: test_aperture.py
 boundary: test_combined.py

@@ -42,7 +42,7 @@ def closed_spectrum(shape, fx, fy):
 
 
 def frequencies(lowest, highest, n=60):
-    """Vectors of these sizes in directions from a fixed seed."""
+    """Vectors of these lengths in directions from a fixed seed."""
     angle = np.random.default_rng(0).uniform(0, 2 * np.pi, n)
     f = np.linspace(lowest, highest, n)
     return f * np.cos(angle), f * np.sin(angle)
@@ -55,7 +55,7 @@ def at(soft, x, y):
 
 def grid_spectrum(soft, fx, fy, rate):
     n = int((1 + soft.reach) * rate + 2)
-    x = (np.arange(-n, n + 1) + 0.3) / rate  # no symmetry of shape and grid may help
+    x = (np.arange(-n, n + 1) + 0.3) / rate  # an offset, so that symmetry of shape and grid cannot hide errors
     sampled = at(soft, x[None, :], x[:, None])
     waves_x, waves_y = np.exp(-2j * np.pi * np.outer(fx, x)), np.exp(-2j * np.pi * np.outer(fy, x))
     return np.einsum("fy,yx,fx->f", waves_y, sampled, waves_x) / rate**2
@@ -65,7 +65,7 @@ def grid_spectrum(soft, fx, fy, rate):
 @shapes
 @pytest.mark.parametrize(("ripple", "passband"), [(1e-3, 6.0), (1e-6, 2.0), (1e-8, 15.0), (1e-10, 4.0)])
 def test_spectrum_is_the_closed_form_then_nothing(shape, ripple, passband):
-    """Sampled as coarsely as its band allows: what aliases falls beyond the passband, unless the edge is not soft."""
+    """Samples are spaced as coarsely as the band allows: aliases fall beyond the passband if the edge is soft."""
     soft = shape.soften(passband, ripple)
     fx, fy = frequencies(1e-3, passband)
     error = grid_spectrum(soft, fx, fy, soft.passband + soft.stopband) - closed_spectrum(shape, fx, fy)
@@ -130,7 +130,7 @@ def test_nodes_integrate_plane_waves(shape, cycles, digits):
 @pytest.mark.parametrize("name", ["circle", "annulus", "hexagon", "U", "slit"])
 @pytest.mark.parametrize(("cycles", "digits"), [(10.0, 6), (40.0, 9)])
 def test_nodes_are_not_wasted(name, cycles, digits):
-    """The rule for 30 % fewer nodes misses the digits."""
+    """A rule with 30 % fewer nodes misses the requested digits."""
     shape = SHAPES[name]
     enough, digits_left = len(shape.nodes(cycles, digits)), digits
     while len(nodes := shape.nodes(cycles, digits_left)) > 0.7 * enough:
@@ -143,7 +143,7 @@ def test_nodes_are_not_wasted(name, cycles, digits):
 @pytest.mark.parametrize("name", ["circle", "central stop", "hexagon", "star", "slit"])
 @pytest.mark.parametrize("mode", ["forward", "backward"])
 def test_derivatives(name, mode):
-    """Against fourth-order differences; at the centre, on an edge and at a corner too."""
+    """The reference is a fourth-order difference, also at the centre, on an edge and at a corner."""
     shape = SHAPES[name]
     soft = shape.soften(10.0, 1e-8)
     corners = soft.vertices if name not in ("circle", "central stop") else np.array([[1.0, 0.0], [0.05, 0.0]])
@@ -166,7 +166,8 @@ def test_derivatives(name, mode):
 
 
 def test_power_of_the_soft_disk():
-    """Parseval: the sum of squares over the grid is the closed spectrum's, under the kernel's, squared."""
+    """Parseval: the sum of squares over the grid equals the integral of the squared spectrum, damped by the
+    kernel's."""
     soft = Circle().soften(5.0, 1e-6)
     rate = 2.01 * soft.stopband
     x = np.arange(-int(1.3 * rate), int(1.3 * rate) + 1) / rate
@@ -179,7 +180,7 @@ def test_power_of_the_soft_disk():
 
 
 def test_ripple_converges():
-    """Where the mask lets a closed form be known, its error follows the ripple down."""
+    """The error against the closed form falls with the ripple."""
     fx, fy = frequencies(0.1, 5.0)
     shape = SHAPES["star"]
     errors = []

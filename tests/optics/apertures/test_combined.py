@@ -36,7 +36,7 @@ def disk_at(radius, centre, fx, fy):
 
 
 def vane(n):
-    """Spectrum of one vane's part in the ring: its ends are arcs, here polygons of n sides that lie on them."""
+    """Outline of one vane's part in the ring: its ends are arcs, approximated by polygons of n sides."""
     ends = []
     for radius, way in ((1.0, 1), (0.3, -1)):
         half = math.asin(0.02 / radius)
@@ -92,7 +92,7 @@ def test_soft_spectrum_and_nodes_are_the_closed_form(name):
 
 @pytest.mark.parametrize("shape", [OVERLAPPING, BEYOND], ids=["overlapping", "beyond the pupil"])
 def test_soft_edge_and_nodes_agree_where_edges_cross(shape):
-    """Two ways that know nothing of each other: integrals along the edge, and sums over the inside."""
+    """Two independent methods agree: integrals along the edge, and sums over the inside."""
     soft = shape.soften(4.0, 1e-7)
     fx, fy = frequencies(1e-3, 4.0, 30)
     nodes = shape.nodes(4.0, 9.0)
@@ -122,7 +122,7 @@ def test_a_ring_is_a_difference():
 
 
 def test_small_disks_are_softened_from_both_ends():
-    """A stop smaller than the kernel's reach: arcs come within it at both of their ends."""
+    """For a stop smaller than the kernel's reach, both ends of its arcs lie within the reach."""
     x, y = np.random.default_rng(1).uniform(-0.4, 0.4, (2, 1000))
     shape, edge = difference(Circle(), Disk(0.07, (0.05, 0.02))), Circle().soften(4.0, 1e-7).edge
     assert edge.reach > 0.14
@@ -132,7 +132,7 @@ def test_small_disks_are_softened_from_both_ends():
 
 
 def test_segments_without_gaps_are_one_opening():
-    """Edges that two of them share are none."""
+    """Edges shared by two segments do not count as edges."""
     whole = hexagonal_segments(1)
     assert len(whole.outline.segments) == 18
     assert whole.area == pytest.approx(sum(part.area for part in whole.shapes), rel=1e-12)
@@ -220,7 +220,7 @@ def test_shapes_that_touch_are_cut_where_they_touch(name):
 
 
 def test_a_small_hole_within_the_soft_edge_is_a_ring():
-    """Of arcs that are empty no turn is missing: the softened difference is the softened ring."""
+    """Empty arcs do not lose a full turn: the softened difference is the softened ring."""
     x, y = np.meshgrid(np.linspace(-1, 1, 101), np.linspace(-1, 1, 101))
     hole, ring = (at(shape.soften(3.0, 1e-5), x, y) for shape in (difference(Circle(), Disk(0.1)), Annulus(0.1)))
     assert np.abs(hole - ring).max() < 1e-5

@@ -1,4 +1,4 @@
-"""Quadrature over openings in pixels: against the openings' own edge-fitted rules, which know nothing of pixels."""
+"""Quadrature over pixelated openings, against the openings' own edge-fitted rules, which do not depend on pixels."""
 
 import numpy as np
 import pytest
@@ -18,7 +18,7 @@ CYCLES = 3.0
 
 
 def wave(x, y):
-    """At most three cycles per radius, in neither axis' direction alone."""
+    """A wave of at most three cycles per radius, oblique to both axes."""
     return np.exp(2j * np.pi * (1.7 * x - 2.4 * y) + 0.3j * x * x)
 
 
@@ -37,7 +37,8 @@ def exact(opening):
 @pytest.mark.parametrize("count", [1, 2, 5, 16, 33])
 @pytest.mark.parametrize("digits", [3.0, 6.0, 10.0])
 def test_nodes_are_as_good_as_they_are_asked_to_be(opening, exact, count, digits):
-    """33 pixels have borders on neither the axes nor the square's sides, 16 have; 1 is no pixels at all."""
+    """Borders of 33 pixels lie neither on the axes nor on the square's sides, and some borders of 16 do; 1 is a single
+    pixel."""
     nodes = PixelatedAperture(opening, count).nodes(CYCLES, digits)
     assert abs(np.sum(nodes.weight * wave(nodes.x, nodes.y)) - exact) < 10**-digits * opening.area
     assert np.all(opening.contains(nodes.x, nodes.y))
@@ -54,8 +55,8 @@ def test_rows_and_columns_of_nodes_are_as_good(opening, exact, count, digits):
 
 
 def test_pixels_cannot_be_left_out_or_taken_whole():
-    """The usual way, a pixel being open where its centre is: its staircase of an edge errs by 3e-3 with 33 pixels, a
-    thousand times what is asked above."""
+    """The usual way takes a pixel as open if its centre is: the staircase edge has an error of 3e-3 with 33 pixels, a
+    thousand times the tolerance above."""
     count, circle = 33, Circle()
     centres = (np.arange(count) + 0.5) * 2 / count - 1
     x, y = np.meshgrid(centres, centres)
@@ -67,7 +68,7 @@ def test_pixels_cannot_be_left_out_or_taken_whole():
 @pytest.mark.fast_cases(3)
 @pytest.mark.parametrize("count", [5, 16])
 def test_no_panel_crosses_a_border_between_pixels(opening, count):
-    """A function that jumps there, another number in every pixel, is integrated like each pixel by itself."""
+    """A function with a different value in every pixel jumps at the borders; it is integrated as if pixel by pixel."""
     heights = np.random.default_rng(0).random((count, count))
 
     def jumping(nodes):
@@ -77,11 +78,11 @@ def test_no_panel_crosses_a_border_between_pixels(opening, count):
     coarse, fine = (jumping(PixelatedAperture(opening, count).nodes(CYCLES, digits)) for digits in (6.0, 12.0))
     assert coarse == pytest.approx(fine, abs=1e-6)
     ignorant = [jumping(PixelatedAperture(opening, count - 1).nodes(CYCLES, digits)) for digits in (6.0, 12.0)]
-    assert abs(ignorant[0] - ignorant[1]) > 1e-4, "nodes fitted to other pixels are far from that"
+    assert abs(ignorant[0] - ignorant[1]) > 1e-4, "nodes fitted to other pixels have a large error"
 
 
 def test_coarse_pixels_have_no_rows_and_columns():
-    """Polynomials through more than 32 nodes would be needed."""
+    """The rule would need polynomials through more than 32 nodes."""
     assert PixelatedAperture(Circle(), 2).nodes_across(20.0, 6.0) is None
     assert PixelatedAperture(Circle(), 2).nodes_across(3.0, 6.0) is not None
 
@@ -102,7 +103,8 @@ def test_a_soft_edge_is_refused():
 )
 @pytest.mark.parametrize(("count", "cycles"), [(1, 10.0), (2, 10.0), (4, 30.0)])
 def test_edges_that_slant_have_nodes_for_what_they_slide_by(opening, count, cycles):
-    """Nodes along a flat side move much in x while they move little in y: by y alone they are too few by 1e-3."""
+    """Nodes along a slanted side move far in x while they move little in y: chosen by y alone they leave an error of
+    1e-3."""
     angle = np.deg2rad(25)
 
     def turning(nodes):

@@ -26,7 +26,7 @@ def test_areas():
 
 
 def test_regular_polygon_tends_to_the_circle():
-    """Like n^-2, the sagitta of an edge, once edges are shorter than the kernel resolves."""
+    """The difference falls like n^-2, the sagitta of an edge, once edges are shorter than the kernel resolves."""
     x, y = np.random.default_rng(0).uniform(-1.1, 1.1, (2, 2000))
     circle = at(Circle(), x, y)
     error = [np.abs(at(Polygon.regular(n), x, y) - circle).max() for n in (128, 256, 512)]
@@ -37,7 +37,7 @@ def test_regular_polygon_tends_to_the_circle():
 
 
 def test_corner_and_edge_values():
-    """At a corner the kernel's share is the angle's; on an edge far from corners, a half."""
+    """The transmittance at a corner is the angle's share of a turn; on an edge far from corners it is a half."""
     hexagon = Polygon.regular(6)
     soft = hexagon.soften(30.0, 1e-8)
     middle = (hexagon.vertices + np.roll(hexagon.vertices, -1, axis=0)) / 2
@@ -49,7 +49,7 @@ def test_corner_and_edge_values():
 def test_slit_is_the_rectangle():
     x, y = np.random.default_rng(0).uniform(-1.1, 1.1, (2, 500))
     rectangle = Polygon([(-0.05, -0.9), (-0.05, 0.9), (0.05, 0.9), (0.05, -0.9)])
-    # The slit's narrow half width asks for another transition, so they are compared at one reach.
+    # The slit's narrow half width leads to another transition, so both are compared at the same reach.
     slit = Slit(0.1, 1.8)
     assert slit.half_widths == rectangle.half_widths
     np.testing.assert_allclose(at(slit, x, y), at(rectangle, x, y), atol=1e-12)
@@ -65,7 +65,7 @@ def test_turning_the_polygon_turns_the_mask():
 
 @pytest.mark.parametrize("seed", range(5))
 def test_triangles_cover_any_simple_polygon(seed):
-    """Each point lies in as many triangles as in the polygon."""
+    """The number of triangles around a point is 1 inside the polygon and 0 outside."""
     rng = np.random.default_rng(seed)
     angle = np.sort(rng.uniform(0, 2 * np.pi, 15))
     radius = rng.uniform(0.1, 1, 15)
@@ -110,7 +110,8 @@ def test_bad_input_names_itself(make, message):
 
 
 def test_segments_that_only_touch_share_a_point():
-    """The end of one on the middle or the end of the other, to rounding; a gap of a millionth is one."""
+    """Segments meet if the end of one lies on the middle or the end of the other, up to rounding; a gap of a millionth
+    separates them."""
     a, along = np.array([0.0, 0.0]), np.array([2.0, 0.0])
     starts = np.array([[1.0, 0.0], [2.0, 0.0], [1.0, 1e-6], [1.0, -1.0], [2.000001, -1.0]])
     ends = np.array([[1.0, 1.0], [3.0, 1.0], [1.0, 1.0], [1.0, 0.0], [2.000001, 1.0]])

@@ -1,4 +1,4 @@
-"""The soft edge's kernel: its spectrum is 1, then 0, to the ripple; its transition costs the fewest samples."""
+"""The soft edge's kernel: its spectrum is 1, then 0, up to the ripple; its transition needs the fewest samples."""
 
 import numpy as np
 import pytest
@@ -25,7 +25,7 @@ def test_spectrum_keeps_its_ripple(ripple, passband):
 
 
 def test_kaisers_rule_alone_misses_the_ripple():
-    """Why the margin: in the plane, side lobes from all directions meet at frequency 0."""
+    """The kernel needs a margin, because in the plane side lobes from all directions meet at frequency 0."""
     edge = SoftEdge.cheapest(0.5, 1e-8, 0.25)
     bare = SoftEdge(0.5, 0.5 + kaiser_beta(1e-8) / np.pi / 0.25, (1e-8 * 9) ** (1 / 1.08))
     assert bare.reach == pytest.approx(edge.reach)
@@ -52,14 +52,14 @@ def test_reach_has_a_limit():
 
 @pytest.mark.parametrize("attenuation", [30.0, 45.0, 49.9, 50.1, 80.0])
 def test_kaisers_rule_is_his(attenuation):
-    """Below an attenuation of about 25 dB ours stays at 1."""
+    """Below an attenuation of about 25 dB, our value stays at 1."""
     assert kaiser_beta(10 ** (-attenuation / 20)) == pytest.approx(signal.kaiser_beta(attenuation), rel=1e-9)
     assert kaiser_beta(0.1) == 1.0
 
 
 @pytest.mark.parametrize(("passband", "ripple"), [(0.01, 0.1), (3.0, 1e-3), (200.0, 1e-3), (100.0, 1e-10)])
 def test_the_kernel_is_a_jinc_under_its_window_and_sums_to_one(passband, ripple):
-    """Near the axis, too, relative to what it is there."""
+    """The relative accuracy also holds near the axis."""
     edge = SoftEdge(passband, 1.01 * passband + 0.5, ripple)
     r = np.append(np.linspace(0, edge.reach, 5000), edge.reach * 10.0 ** np.arange(-9, 0))
     cutoff = (edge.passband + edge.stopband) / 2

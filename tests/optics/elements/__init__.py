@@ -1,4 +1,4 @@
-"""Which test fails when a module of optics/elements is broken.
+"""Tests that fail when a module of optics/elements is broken.
 
 beam: methods/test_textbook.py
 exit_pupil: test_exit_pupil.py

@@ -1,4 +1,4 @@
-"""Lenses of other programs, played by a ray tracer of this test's own: Navarro's eye."""
+"""Lenses exported by other programs, simulated by a ray tracer in this test: Navarro's eye."""
 
 import math
 from types import SimpleNamespace
@@ -21,7 +21,7 @@ NAVARRO = (
 
 
 def surface(points, away, radius, conic):
-    """Where rays meet a conic through the origin, and its normal there."""
+    """Hit points of rays on a conic through the origin, and its normals there."""
     c = 1 / radius
     (x, y, z), (l, m, n) = points, away
     a = c * (l * l + m * m + (1 + conic) * n * n)
@@ -34,7 +34,8 @@ def surface(points, away, radius, conic):
 
 
 def traced(image_shift=0.0, diameter=4.0, rings=12):
-    """What optiland's WavefrontData holds of the eye on its axis, the image's plane moved by so much [mm]."""
+    """The contents of optiland's WavefrontData for the eye on its axis, with the image plane moved by `image_shift`
+    [mm]."""
     turns = np.arange(1, 6 * rings * (rings + 1) // 2 + 1)
     r, angle = diameter / 2 * np.sqrt((turns - 0.5) / turns[-1]), turns * np.pi * (3 - np.sqrt(5))
     r, angle = np.append(r, np.full(64, diameter / 2)), np.append(angle, np.arange(64) / 64 * 2 * np.pi)
@@ -52,7 +53,7 @@ def traced(image_shift=0.0, diameter=4.0, rings=12):
     sphere = 15.0 + image_shift
     offset = points - centre[:, None]
     along = np.sum(offset * away, axis=0)
-    t = -along - np.sqrt(along**2 - np.sum(offset**2, axis=0) + sphere**2)  # back from the image, before it
+    t = -along - np.sqrt(along**2 - np.sum(offset**2, axis=0) + sphere**2)  # back from the image, in front of it
     met, path = points + t * away, path + before * t
     names = dict(zip(("pupil_x", "pupil_y", "pupil_z"), met, strict=True))
     return SimpleNamespace(
@@ -71,8 +72,8 @@ def strehl(read):
 
 
 def test_navarro_s_eye_is_as_sharp_as_its_rays_say():
-    """Strehl ratio on the axis against the mean of e^{2πiW} over rays that are even in the pupil they enter; optiland
-    0.6.3 finds a root mean square of 0.0784 waves and 0.780 at the peak of its PSF, from samples that end short of the
+    """Strehl ratio on the axis against the mean of e^{2πiW} over rays spaced evenly in the entrance pupil. optiland
+    0.6.3 gives a root mean square of 0.0784 waves and 0.780 at the peak of its PSF, from samples that end short of the
     rim."""
     system = traced()
     read = read_exit_pupil(system, WAVE, medium_n=1.336)
@@ -85,7 +86,8 @@ def test_navarro_s_eye_is_as_sharp_as_its_rays_say():
 
 
 def test_the_wave_is_ahead_where_the_other_program_says():
-    """A plane 0.1 mm behind is that plane, read there or looked at from here; a wavefront of the other sign is not."""
+    """The image 0.1 mm behind is the same, whether the exit pupil is read there or the sensor is moved there; a
+    wavefront of the opposite sign gives another image."""
     here, behind = (read_exit_pupil(traced(shift), WAVE, medium_n=1.336) for shift in (0.0, 0.1))
     there = axis(behind.pupil, behind.distance)
     assert axis(here.pupil, here.distance + 0.1e-3) == pytest.approx(there, rel=0.03)
@@ -104,7 +106,7 @@ def test_the_sphere_s_centre_is_found_where_nobody_says():
 
 
 def wavefront(n=64, waves=0.7, pitch=0.05):
-    """Like prysm's: a round opening, astigmatism and coma of several turns."""
+    """A wavefront in prysm's form: a round opening, with several turns of astigmatism and coma."""
     x = (np.arange(n) - n // 2) * pitch / (n // 2 * pitch * 0.9)
     inside = x[None, :] ** 2 + x[:, None] ** 2 <= 1
     phase = 2 * np.pi * waves * (mode(2, 2, x[None, :], x[:, None]) + 0.3 * mode(3, 1, x[None, :], x[:, None]))
@@ -145,8 +147,8 @@ FOCUSED = {"focal_length": 0.1}
         (changed(traced(), pupil_y=np.ones(3)), {}, "pupil_y has 3 numbers: must have one for each ray, 533 as"),
         (changed(traced(), opd=np.ones(3)), {}, "opd has 3 numbers: must have one for each ray"),
         (changed(traced(), intensity=np.ones(3)), {}, "intensity has 3 numbers: must have one for each ray"),
-        (changed(traced(), intensity=0 * traced().opd), {}, "intensity: no ray has light"),
-        (changed(traced(), opd=math.nan * traced().opd), {}, "intensity: no ray has light and a finite place"),
+        (changed(traced(), intensity=0 * traced().opd), {}, "intensity: no ray has positive intensity"),
+        (changed(traced(), opd=math.nan * traced().opd), {}, "no ray has positive intensity and finite position"),
         (changed(traced(), opd="glass"), {}, "opd = 'glass': must be real numbers"),
         (changed(traced(), radius=None), {}, "radius = None: must be a finite number"),
         (changed(traced(), reference_center=(0.0, 0.0)), {}, r"reference_center = \(0.0, 0.0\): must be three"),
@@ -159,13 +161,13 @@ def test_what_cannot_be_read_is_said_in_a_line(system, more, says):
 
 
 def test_obscured_and_uneven_pupils_are_refused():
-    """Their rims are round: read as open circles they would be other lenses, in silence."""
+    """The rims of these pupils are round: read as open circles, they would be other lenses without any warning."""
     at = (np.arange(64) - 32) / (32 * 0.9)
     r = np.hypot(at[None, :], at[:, None])
     for amplitude in (r > 0.5, np.exp(-(r**2)), r > 0.1):
         system = wavefront()
         system.data = system.data * amplitude
-        with pytest.raises(ValueError, match="obscured, not round, or its light uneven: only open circles"):
+        with pytest.raises(ValueError, match="obscured, not round, or unevenly lit: only open circles"):
             read_exit_pupil(system, WAVE, focal_length=0.1, order=2)
     system = traced()
     off = np.hypot(system.pupil_x, system.pupil_y)
@@ -178,7 +180,7 @@ def test_obscured_and_uneven_pupils_are_refused():
 
 @pytest.mark.parametrize("rings", [2, 3, 4, 5, 9])
 def test_few_rings_of_rays_are_no_obscured_pupil(rings):
-    """Hexapolar ones, 6k rays in the k-th; a pupil of half the width in their middle leaves too few."""
+    """The k-th ring of a hexapolar grid has 6k rays; without its inner half the pupil is obscured."""
     rays = [(0.0, 0.0)] + [
         (k / rings * math.cos(turn), k / rings * math.sin(turn))
         for k in range(1, rings + 1) for turn in np.arange(6 * k) * math.pi / (3 * k)

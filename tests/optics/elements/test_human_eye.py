@@ -1,4 +1,5 @@
-"""Published human eyes: what their authors computed from the same coefficients, and what others measured."""
+"""Published human eyes: results that their authors computed from the same coefficients, and results of other
+measurements."""
 
 import math
 from functools import cache
@@ -10,11 +11,11 @@ import optics
 from optics import HumanEye, Zernike, mean_human_mtf
 from optics.spectra.spectrum import cone_fundamentals
 
-# Autrusseau, Thibos & Shevell (2011), figure 11, read off by the authors of ISETBio: contrast of vertical gratings to
-# L and M cones in white light of equal energy, 6 mm. Their point at 1 cycle per degree suffers from a window of 1°.
+# Autrusseau, Thibos & Shevell (2011), figure 11, read off by the authors of ISETBio: contrast of vertical gratings to L
+# and M cones in white light of equal energy, 6 mm. Their point at 1 cycle per degree suffers from a window of 1°.
 CYCLES = np.array([5, 10, 20, 30, 40])
 FIGURE_11 = np.array([[0.368, 0.228, 0.103, 0.0563, 0.0387], [0.320, 0.195, 0.0962, 0.0554, 0.0356]])
-READING = 0.05  # relative, of points read off a figure; what is read otherwise is off by three times as much
+READING = 0.05  # relative error of points read off a figure; a wrong model differs by three times this value
 
 
 @cache
@@ -23,7 +24,7 @@ def standard_contrasts():
 
 
 def contrasts(eye, axis):
-    """(cone, frequency), by wavelengths 20 nm apart: cones' spectra are five times as wide."""
+    """Contrasts (cone, frequency) with wavelengths 20 nm apart: cones' spectra are five times as wide."""
     nm, dx, side = np.arange(440, 681, 20), 1.2e-6, 193
     energy = np.array([cone.at(nm * 1e-9) * nm for cone in cone_fundamentals()[:2]])
     places = (np.arange(side) - side // 2) * dx
@@ -49,9 +50,9 @@ def test_standard_observer_has_the_contrasts_of_its_authors():
 @pytest.mark.parametrize(
     "change",
     [
-        lambda n, m, value: ((n, m), -value),  # the sign of light that enters
-        lambda n, m, value: ((n, m), value / 1.3),  # another unit, or pupil
-        lambda n, m, value: ((n, -m), value),  # sines for cosines
+        lambda n, m, value: ((n, m), -value),  # the sign of incoming light
+        lambda n, m, value: ((n, m), value / 1.3),  # another unit, or another pupil
+        lambda n, m, value: ((n, -m), value),  # sines in place of cosines
     ],
     ids=["sign", "unit", "order"],
 )
@@ -63,7 +64,7 @@ def test_and_no_other_reading_of_the_table_has(change):
 @pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("radius", [1e-3, 3e-3])
 def test_without_aberrations_it_is_perfect_in_570_nm(radius):
-    """The paraboloid alone has 4 µm of spherical aberration at 3 mm, which leaves nothing of the peak."""
+    """The paraboloid alone has 4 µm of spherical aberration at 3 mm, which removes the peak."""
     eye = HumanEye(radius, None)
     seen = optics.psf(eye.pupil, [570e-9], eye.focal_length, dx=0.5e-6, shape=(33, 33), tolerance=1e-4)
     assert optics.strehl_ratio(seen)[0] == pytest.approx(1, abs=2e-4)
@@ -71,7 +72,7 @@ def test_without_aberrations_it_is_perfect_in_570_nm(radius):
 
 
 def test_chromatic_aberration_is_that_of_humans():
-    """Defocus of Thibos et al. (1992) in µm, D r²/4√3, makes up for it at 460 nm: Strehl's ratio is 1 again."""
+    """The defocus of Thibos et al. (1992) in µm, D r²/4√3, compensates it at 460 nm: the Strehl ratio is 1 again."""
     radius = 1e-3
     dioptres = -0.63346 * (1 / (0.460 - 0.2141) - 1 / (0.570 - 0.2141))
     um = dioptres * radius**2 / (4 * math.sqrt(3)) * 1e6
@@ -91,7 +92,7 @@ def test_a_known_wavefront_serves_its_middle():
 
 
 def test_mean_mtf():
-    """At 10 cycles per degree and 4 mm; and nothing is left beyond a perfect lens's frequencies."""
+    """The value at 10 cycles per degree and 4 mm agrees, and contrast is 0 beyond a perfect lens's cut-off."""
     u1 = 21.95 - 5.512 * 4 + 0.3922 * 16
     perfect = 2 / math.pi * (math.acos(s := 10 * 180 * 555e-9 / (math.pi * 4e-3)) - s * math.sqrt(1 - s * s))
     expected = math.sqrt(perfect) / (1 + (10 / u1) ** 2) ** 0.62
@@ -101,7 +102,8 @@ def test_mean_mtf():
 
 @pytest.mark.slow
 def test_standard_observer_is_near_the_mean_of_two_hundred():
-    """White light and 6 mm, where aberrations count most: within .05, where a perfect lens is off by more than .7."""
+    """White light and 6 mm, the case with the strongest aberrations: the error is below 0.05, and that of a perfect
+    lens above 0.7."""
     seen = standard_contrasts().mean(axis=0)
     mean = mean_human_mtf(CYCLES, 6e-3)
     assert np.abs(seen[1:] - mean[1:]).max() < 0.05
@@ -134,16 +136,17 @@ def test_derivatives_are_refused():
 
     value = Float64(0.1)
     dr.enable_grad(value)
-    with pytest.raises(ValueError, match="wavefront asks for a derivative"):
+    with pytest.raises(ValueError, match="wavefront requires a derivative"):
         HumanEye(wavefront=Zernike({(2, 0): value}))
 
 
 def test_an_eye_of_its_retina_is_as_long_as_it_is():
-    """And sees as many degrees as it should: the image of a point 0.4° aside lies f tan(0.4°)/n from the axis."""
+    """The eye's field of view is correct, too: the image of a point at 0.4° lies f tan(0.4°)/n from the axis."""
     human = HumanEye(1e-3, wavefront=None)
     width = human.sensor_width(1.0)
     eye = optics.Eye(pupil=human.pupil, full_aperture=8e-3, fov_deg=1.0, sensor_width=width, resolution=(15, 15))
-    assert eye.retina_distance == pytest.approx(human.focal_length, rel=1e-3)  # decision 052: indices of other bands
+    # the two eyes take the index at different wavelengths
+    assert eye.retina_distance == pytest.approx(human.focal_length, rel=1e-3)
     angle = math.radians(0.4)
     seen = optics.psf(human.pupil, [570e-9], human.focal_length, source_angle=(angle, 0.0), dx=1e-6, shape=(257, 257))
     brightest = float(seen.x[seen.psf[0].max(axis=0).argmax()])

@@ -1,4 +1,4 @@
-"""Media before and behind a pupil, and their colours: refraction, and the human eye's chromatic focus."""
+"""Media in front of and behind a pupil, and their dispersion: refraction, and the human eye's chromatic focus."""
 
 import math
 
@@ -33,7 +33,7 @@ def test_snell_bends_what_comes_aslant(before, behind):
 
 
 def test_a_point_before_the_lens_has_its_image_at_n_over_z():
-    """n/z = n/f - n₀/s, whatever the colour."""
+    """n/z = n/f - n₀/s at every wavelength."""
     s, water = 8e-3, medium("water")
     pupil = Pupil(R, thin_lens_focal_length=1e-3, medium_n=water, object_n=1.0)
     z = pupil.image_distance(s)
@@ -48,7 +48,7 @@ def test_a_point_before_the_lens_has_its_image_at_n_over_z():
 
 @pytest.mark.parametrize("source", [math.inf, 5e-3])
 def test_picture_is_the_direct_sum(source):
-    """Written out: n₀ to the source, n - n₀ through the glass, n behind it."""
+    """The direct sum has the index n₀ to the source, n - n₀ through the glass, and n behind it."""
     z, before, behind, glass = 300e-6, 1.1, 1.4, 1.6
     relief = BSplineRelief(np.random.default_rng(2).random((4, 4)) * 1e-6)
     pupil = Pupil(R, relief, glass, behind, z, wavefront=Zernike({(3, 1): 0.05}), object_n=before)
@@ -113,7 +113,7 @@ def test_curves():
 
 
 def best_distance(eye, wavelength, near):
-    """[m] behind the pupil at which the picture is sharpest."""
+    """Distance behind the pupil at which the PSF is sharpest [m]."""
 
     def blur(z):
         seen = optics.psf(eye, [wavelength], z, dx=0.5e-6, shape=(3, 3), tolerance=1e-5, dtype="float64")

@@ -1,4 +1,4 @@
-"""Reliefs of pixels: gratings and lenses of steps against closed forms, both methods against each other."""
+"""Pixelated reliefs: stepped gratings and lenses against closed forms, and both methods against each other."""
 
 import drjit as dr
 import numpy as np
@@ -19,7 +19,7 @@ def centres(count, radius):
 
 
 class TestGratings:
-    """f/50: order m lies at m λf/period, and its peak over that of the open slit is the order's efficiency."""
+    """Order m lies at m λf/period (f/50), and its peak over that of the open slit is the order's efficiency."""
 
     RADIUS, FOCAL_LENGTH, PERIODS = 0.5e-3, 50e-3, 20
     OPENING = Slit(1.4, 1.4)  # 14 whole periods
@@ -39,14 +39,14 @@ class TestGratings:
     @pytest.mark.fast_cases(1)
     @pytest.mark.parametrize(("levels", "order"), [(2, 1), (4, 1), (2, -1), (2, 3), (4, -3), (8, 1), (8, -7)])
     def test_efficiency_of_a_staircase(self, levels, order):
-        """sinc²(m/N), 0.405, 0.811, 0.950 in the first order (Swanson 1989). Off the axis the lens focuses a little
-        nearer, and less light goes aslant: 1 % in the seventh order."""
+        """sinc²(m/N): 0.405, 0.811, 0.950 in the first order (Swanson 1989). Off the axis the lens focuses a little
+        nearer, and less light leaves at a slant: 1 % in the seventh order."""
         expected = reference.staircase_grating_efficiency(order, levels)
         assert self.efficiency(levels, order) == pytest.approx(expected, rel=0.02)
 
     @pytest.mark.slow
     def test_splines_through_the_same_heights_are_another_grating(self):
-        """What PixelRelief is there for: the same samples joined smoothly have half the efficiency."""
+        """PixelRelief is needed here: a smooth spline through the same samples has half the efficiency."""
         steps = self.efficiency(4, 1)
         splines = self.efficiency(4, 1, optics.HeightMap)
         assert splines < 0.85 * steps
@@ -70,8 +70,8 @@ class TestLenses:
     @pytest.mark.slow
     @pytest.mark.parametrize("levels", [2, 4, 8])
     def test_a_lens_of_levels_focuses_as_a_grating_of_as_many(self, levels):
-        """sinc²(1/N), beside the lens of as many pixels of any height (pixels by themselves cost 2 %). Of two levels
-        the other orders, which are not far off, send 3 % to the focus."""
+        """sinc²(1/N), relative to the lens with the same pixels at any height (the pixels alone cost 2 %). With two
+        levels the other orders are close enough to send 3 % to the focus."""
         smooth = self.strehl(self.lens(128))
         expected = reference.staircase_grating_efficiency(1, levels)
         assert self.strehl(self.lens(128, levels)) / smooth == pytest.approx(
@@ -80,13 +80,13 @@ class TestLenses:
 
     @pytest.mark.slow
     def test_whole_waves_change_nothing(self):
-        """A wrapped lens is the lens: the pixels of a Fresnel lens, at its wavelength."""
+        """A wrapped lens equals the full lens: the pixels of a Fresnel lens, at its wavelength."""
         whole = self.lens(24)
         assert self.strehl(whole % WAVE) == pytest.approx(self.strehl(whole), rel=1e-5)
 
     @pytest.mark.slow
     def test_finer_pixels_become_the_smooth_relief(self):
-        """Each pixel's phase is off by its slope times the place in it, in the mean by the square of its width."""
+        """Each pixel's phase error is its slope times the position in it; the mean falls with the width squared."""
         counts, off = (64, 128, 256), []
         smooth = Pupil(self.RADIUS, thin_lens_focal_length=self.FOCAL_LENGTH)
         limit = optics.strehl_ratio(optics.psf(smooth, [WAVELENGTH], self.FOCAL_LENGTH, shape=(65, 65)))[0]
@@ -147,7 +147,7 @@ class TestMethods:
         assert "cheapest" in plan.why
 
     def test_wide_windows_are_not_for_the_direct_sum(self):
-        """Nor for the matrix product, whose rank they raise: the spectrum is quicker by ten times at the least."""
+        """They also raise the rank of the matrix product; the spectrum is at least ten times faster."""
         options = {
             option.method: option.seconds
             for option in optics.plan(self.PUPIL, WAVELENGTH, 150e-6, shape=(801, 801)).options
@@ -163,7 +163,7 @@ class TestMethods:
     @pytest.mark.parametrize("method", METHODS)
     @pytest.mark.parametrize("name", ["radius", "n", "distance"])
     def test_derivatives(self, method, name):
-        """Against central differences, forwards."""
+        """The reference is a central difference, in forward mode."""
         import drjit as dr
 
         def total(values):
@@ -207,15 +207,15 @@ class TestMethods:
 
 
 class TestScatter:
-    """Where pixels send light that smooth glass would not."""
+    """Pixels scatter light to places that smooth glass does not reach."""
 
     def test_of_a_grating_it_is_the_order_that_the_share_reaches(self):
-        """Two levels: 0.811 of the light in the first orders, 0.09 in the third, 0.032 in the fifth, half on a side."""
+        """Two levels: 0.811 of the light in the first orders, 0.09 in the third, 0.032 in the fifth, on both sides."""
         count, periods = 128, 32
         heights = np.broadcast_to(np.arange(count) // 2 % 2 * WAVE / 2, (count, count))
         pupil = Pupil(1e-3, PixelRelief(heights), aperture=Slit(1.4, 1.4))
         for share, order in ((0.5, 1), (0.3, 3), (0.17, 5)):
-            # Along y the slit alone spreads; along x half of the share counts.
+            # Along y only the slit spreads light; along x half of the share counts.
             assert pupil.scatter(WAVELENGTH, share) * 2e-3 / periods == pytest.approx(order, abs=0.1)
 
     def test_smooth_and_level_reliefs_scatter_nothing(self):
@@ -224,8 +224,8 @@ class TestScatter:
         assert Pupil(1e-3, PixelRelief(smooth.control_points), n=1.0).scatter(WAVELENGTH, 0.01) == 0
 
     def test_an_eye_sees_by_pixels(self):
-        """A lens of 0.8 µm pixels beside the ideal one, an edge before them: what goes astray is missing on the bright
-        side, and little of it reaches the dark one."""
+        """A lens of 0.8 µm pixels next to the ideal one, looking at an edge: the scattered light is missing on the
+        bright side, and little of it reaches the dark side."""
         eye = optics.Eye(pupil=None, resolution=(9, 9), fov_deg=45, bands=1)
         focal_length = eye.sensor_distance
         x = centres(64, 25e-6)
@@ -254,7 +254,7 @@ class TestScatter:
 
     @pytest.mark.slow
     def test_light_that_goes_everywhere_is_seen_too(self):
-        """Of noise in glass, as far as the eye's rim: its cells together have what a wide window holds of the light."""
+        """Noise scatters light up to the eye's rim; the eye's cells together hold the light of a wide window."""
         noise = PixelRelief(np.random.default_rng(0).random((32, 32)) * 1e-6)
         eye = optics.Eye(pupil=Pupil(25e-6, noise), resolution=(9, 9), fov_deg=45, bands=1)
         kernel = eye.kernel(1)
@@ -276,12 +276,12 @@ def test_bad_heights_are_named(heights):
 
 def test_a_stack_says_that_it_cannot():
     pupil = Pupil(1e-4, PixelRelief(RANDOM))
-    with pytest.raises(ValueError, match="PixelRelief jumps"):
+    with pytest.raises(ValueError, match="PixelRelief has jumps"):
         optics.propagate_through([pupil, optics.FreeSpace(1e-3)], wavelength=WAVELENGTH, out_dx=1e-6, out_shape=(9, 9))
 
 
 def test_a_message_takes_one_line_whatever_it_is_about():
-    """By kind and shape where a value would fill a page."""
+    """A value that would fill a page is named by its kind and shape."""
     relief = PixelRelief(np.zeros((16, 16)))
     for wrong, named in (
         (relief, "aperture_radius = PixelRelief"),
@@ -293,7 +293,7 @@ def test_a_message_takes_one_line_whatever_it_is_about():
 
 
 def test_a_flat_relief_is_known_to_be_flat_unless_it_may_change():
-    """A flat one is a plate, rotationally symmetric; one with derivatives is not, as its pixels may part."""
+    """A flat relief is rotationally symmetric; one with derivatives is not, because its pixels may change."""
     assert PixelRelief(np.full((3, 3), 1e-7)).rotationally_symmetric
     assert not PixelRelief(np.diag([1e-7, 0.0, 0.0])).rotationally_symmetric
     types = precision("float64")

@@ -1,4 +1,4 @@
-"""The pupil's optical path, and what bad pupils are told."""
+"""The pupil's optical path, and messages about bad pupils."""
 
 import math
 
@@ -68,8 +68,8 @@ def test_wavelengths_share_slopes_where_the_glass_does_not_disperse():
 
 
 def test_slopes_of_a_lens_hold_out_to_the_rim_of_its_soft_edge():
-    """A lens turns by thousands of waves; a slope of first order at the grid's ends would add its own to what is left
-    of them in the focus, and samples with it."""
+    """A lens turns the phase by thousands of waves. First-order slopes at the grid's ends would add an error to the
+    small difference that remains in the focus, and would need more samples."""
     f = 100e-6
     slopes = Pupil(30e-6, thin_lens_focal_length=f).slopes(550e-9, PointSource())
     x, y = slopes.grid.x[None, :], slopes.grid.y[:, None]
@@ -107,7 +107,8 @@ def test_bad_pupils(arguments, message):
 
 
 def test_path_and_pupil_turn_together_most_at_the_rim():
-    """Without a relief the path's slope to a point on the axis is n sin of the angle to the rim, R / √(R² + D²)."""
+    """Without a relief, the path's slope towards a point on the axis is n sin of the angle to the rim, R / √(R² +
+    D²)."""
     radius, distance = 30e-6, 200e-6
     slopes = Pupil(radius, medium_n=1.33).slopes(550e-9, PointSource())
     soft, disk = slopes.turning(distance, Grid((1, 1), 1e-6), 1.33)

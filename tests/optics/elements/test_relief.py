@@ -51,7 +51,7 @@ def test_rows_are_y_and_columns_x():
 
 @pytest.mark.parametrize("n", [4, 5, 16, 33])
 def test_map_is_exact_for_cubics(n):
-    """Also in the half cell between the outermost centres and the pupil's edge."""
+    """The map is also exact in the half cell between the outermost centres and the pupil's edge."""
 
     def cubic(x, y):
         return 1 + x - 2 * x**3 + (y**3 - y**2) * (0.5 + x**2)

@@ -1,4 +1,4 @@
-"""Masks and cut openings behind a lens: closed forms, methods that share nothing, and derivatives."""
+"""Masks and cut openings behind a lens: closed forms, independent methods, and derivatives."""
 
 import math
 
@@ -21,14 +21,14 @@ def lens(mask=None, **others):
 
 
 def smooth(side=40):
-    """Amplitudes of no symmetry."""
+    """Amplitudes without any symmetry."""
     at = (np.arange(side) + 0.5) * 2 / side - 1
     x, y = at[None, :], at[:, None]
     return 0.6 + 0.3 * np.sin(2.1 * x + 0.4) * np.cos(1.3 * y) - 0.1 * y
 
 
 def test_a_gaussian_beam_stays_one():
-    """Focused to the waist λf/πw, if the pupil cuts off nothing: intensity exp(-2r²/w²), as of a laser."""
+    """The beam focuses to the waist λf/πw if the pupil cuts off nothing, with a laser's intensity exp(-2r²/w²)."""
     waist = R / 4
     result = optics.psf(lens(GaussianMask(waist)), **ASKED, tolerance=1e-5)
     focus = WAVE * F / (math.pi * waist)
@@ -53,8 +53,9 @@ def test_what_a_mask_lets_through():
 
 @pytest.mark.parametrize("waveguide", [None, optics.Waveguide(2e-6)])
 def test_signals_hold_a_masks_share_once(waveguide):
-    """Of light that an even mask halves in amplitude a quarter arrives: as the eye says of white, and as it sees it.
-    To a tenth of the tolerance that kernels have here; counted twice it is a sixteenth."""
+    """An even mask that halves the amplitude passes a quarter of the light, both in the reported white signal and in
+    the rendered signals. The tolerance is a tenth of the kernels' tolerance; counted twice, the share would be a
+    sixteenth."""
     plain, masked = (
         optics.Eye(optics.Pupil(30e-6, thin_lens_focal_length=240e-6, mask=mask), (3, 3), bands=1, waveguide=waveguide)
         for mask in (None, MaskMap(np.full((4, 4), 0.5), reach=40e-6))
@@ -65,7 +66,7 @@ def test_signals_hold_a_masks_share_once(waveguide):
 
 
 def test_a_masks_share_has_its_derivative_each_time():
-    """A graph serves one backward pass: one that was kept would leave nothing to the second."""
+    """A graph allows one backward pass, so a cached one would give the second pass no derivative."""
     waist, found = Float64(R / 2), []
     dr.enable_grad(waist)
     pupil = lens(GaussianMask(waist))
@@ -79,7 +80,8 @@ def test_a_masks_share_has_its_derivative_each_time():
 
 @pytest.mark.parametrize("of", ["waist", "samples", "radius"])
 def test_a_share_that_was_told_before_has_its_derivative_once_it_is_asked_for(of):
-    """By a plain number first, which must not be kept: ∂T/∂w against T = w²/2R² (1 - e^{-2R²/w²})."""
+    """The first request returns a plain number, which must not be cached: ∂T/∂w against T = w²/2R² (1 -
+    e^{-2R²/w²})."""
     waist, radius = Float64(R / 2), Float64(R)
     samples = TensorXf64(np.full((4, 4), 0.5))
     mask = MaskMap(samples) if of == "samples" else GaussianMask(waist if of == "waist" else R / 2)
@@ -94,7 +96,7 @@ def test_a_share_that_was_told_before_has_its_derivative_once_it_is_asked_for(of
 
 
 def test_contrast_behind_a_gaussian_is_gaussian():
-    """The OTF is the amplitude's autocorrelation, exp(-(λfF)²/2w²), and 1 at 0 whatever is let through."""
+    """The OTF is the amplitude's autocorrelation, exp(-(λfF)²/2w²), and 1 at 0 for any transmission."""
     waist = R / 4
     found = optics.mtf(optics.psf(lens(GaussianMask(waist)), **{**ASKED, "shape": (61, 61)}))
     closed = np.exp(-((WAVE * F * found.fx) ** 2) / (2 * waist**2))
@@ -117,7 +119,7 @@ def test_samples_of_a_gaussian_are_one():
 @pytest.mark.parametrize("aperture", [TELESCOPE, optics.Circle(), Rings([0.2, 0.5, 0.7, 1.0])], ids=repr)
 @pytest.mark.parametrize("method", ["low_rank", "far_field", "angular_spectrum", "split_angular_spectrum"])
 def test_methods_agree(aperture, method):
-    """Samples under a soft edge and the sum over nodes, which share no sample."""
+    """Samples under a soft edge agree with the sum over nodes, which has no sample in common with them."""
     pupil = lens(MaskMap(smooth()), aperture=aperture)
     exact = optics.psf(pupil, **ASKED, method="rayleigh_sommerfeld", tolerance=1e-6, dtype="float64").psf
     assert relative_l2(optics.psf(pupil, **ASKED, method=method, tolerance=1e-4).psf, exact) < 1e-5
@@ -133,7 +135,7 @@ def test_rings_by_transforms_of_radii(mask):
 
 
 def test_a_zone_plate_has_a_focus():
-    """On the axis each edge adds z/L e^{ikL} with its sign (first Rayleigh-Sommerfeld integral); a tenth of the light,
+    """Each edge adds z/L e^{ikL} with its sign on the axis (first Rayleigh-Sommerfeld integral); a tenth of the light,
     1/π², is in the focus."""
     z, radius = 2e-3, 100e-6
     plate = Rings.zone_plate(radius, z, WAVE)
@@ -142,7 +144,7 @@ def test_a_zone_plate_has_a_focus():
     result = optics.psf(Pupil(radius, aperture=plate), [WAVE], z, dx=1e-6, shape=(41, 41), tolerance=1e-4)
     area = plate.area * radius**2
     assert result.psf[0, 20, 20] == pytest.approx(abs(field) ** 2 / area, rel=1e-4)
-    # Of what falls on the whole disk, not on its open half alone.
+    # The share refers to the light on the whole disk, not only to that on the open half.
     focus = optics.encircled_energy(result, 8e-6)[0, 0] * plate.area / math.pi
     assert focus == pytest.approx(1 / math.pi**2, rel=0.1)
     assert abs(field) ** 2 == pytest.approx(len(path) ** 2, rel=0.05)
@@ -157,7 +159,7 @@ def test_pixels_and_masks_go_together():
 
 
 def test_vector_theory_sees_masks_and_rings():
-    """As scalar theory does, at an aperture as small as NA 0.1."""
+    """It agrees with scalar theory at an aperture of NA 0.1."""
     wide = {"aperture_radius": 0.2e-3, "thin_lens_focal_length": 2e-3}
     spot = optics.vector_focus(Pupil(**wide, mask=GaussianMask(0.1e-3)), shape=(9, 9), dx=1e-6)
     known = optics.psf(Pupil(**wide, mask=GaussianMask(0.1e-3)), dx=1e-6, shape=(9, 9)).psf[0]
@@ -228,7 +230,8 @@ def test_bad_input_names_itself(make, message):
 
 
 def test_rays_do_not_judge_a_mask():
-    """A mask that is narrow against its pupil spreads light as no ray tells: approximations are never chosen."""
+    """A mask that is narrow relative to its pupil spreads light in a way that rays cannot predict: approximations are
+    never chosen."""
     asked = {"tolerance": 0.3, "dx": 20e-6, "shape": (9, 9)}
     approximate = ("fresnel", "fraunhofer", "geometric", "pinhole")
     assert optics.plan(lens(GaussianMask(1e-6)), WAVE, F, **asked).method not in approximate

@@ -1,4 +1,4 @@
-"""Wavefronts by Zernike's polynomials and as samples: order, sign and normalisation, and the pictures they make."""
+"""Wavefronts as Zernike polynomials and as samples: order, sign and normalisation, and their PSFs."""
 
 import math
 
@@ -19,7 +19,7 @@ ASKED = {"wavelengths": [WAVE], "sensor_distance": F, "dx": 1.5e-6, "shape": (15
 
 
 def disk(n, spokes):
-    """Nodes (x, y) and weights of a quadrature of the unit disk's mean: Gauss in ρ², evenly in the angle."""
+    """Nodes (x, y) and weights of a quadrature for the unit disk's mean: Gauss in ρ², even in the angle."""
     square, weight = np.polynomial.legendre.leggauss(n)
     rho, angle = np.meshgrid(np.sqrt((square + 1) / 2), np.arange(spokes) * 2 * np.pi / spokes)
     return rho * np.cos(angle), rho * np.sin(angle), np.broadcast_to(weight / 2 / spokes, rho.shape)
@@ -63,7 +63,7 @@ def test_they_are_orthonormal():
     x, y, weight = disk(24, 48)
     values = np.array([mode(n, m, x, y) for n, m in [*MODES, (20, 0), (21, -7), (30, 0), (30, 2)]])
     gram = np.einsum("ayx,byx,yx->ab", values, values, weight)
-    # A mode of order 30 twice has degree 60; angles of 48 spokes tell those up to 24 apart.
+    # The product of two modes of order 30 has degree 60; 48 spokes distinguish angular orders up to 24 apart.
     np.testing.assert_allclose(gram, np.eye(len(values)), atol=1e-11)
 
 
@@ -128,8 +128,8 @@ def test_picture_is_the_direct_sum(medium_n):
 
 @pytest.mark.parametrize("key", [(2, 0), (4, 0), (2, 2), (3, 3), (4, -2)])
 def test_strehl_ratio_goes_to_mahajans(key):
-    """exp(-(2πσ/λ)²) is right to fourth order: half the aberration, a sixteenth of the error."""
-    far = 20e-3  # where no ray is steep enough to count less than others
+    """exp(-(2πσ/λ)²) is right to fourth order: half the aberration gives a sixteenth of the error."""
+    far = 20e-3  # where all rays are too flat for obliquity to matter
     one = {"wavelengths": [WAVE], "sensor_distance": far, "shape": (1, 1), "tolerance": 1e-8, "dtype": "float64"}
     ideal = optics.psf(Pupil(R, thin_lens_focal_length=far), **one).psf[0, 0, 0]
     errors = []
@@ -152,7 +152,7 @@ def test_samples_are_the_polynomials():
 
 @pytest.mark.parametrize("kind", ["zernike", "map"])
 def test_wider_than_the_pupil(kind):
-    """Over twice the radius: the middle quarter of the coefficient's defocus."""
+    """Over twice the radius, the middle has a quarter of the coefficient's defocus."""
     x = (np.arange(32) + 0.5) / 16 - 1
     wide = Zernike({(2, 0): 0.8}, radius=2 * R)
     if kind == "map":
@@ -168,7 +168,7 @@ def asking(numbers):
 
 
 def brightness(wavefront):
-    """Of one sample beside the axis."""
+    """Brightness of one sample next to the axis."""
     result = optics.psf(eye(wavefront), [WAVE], F, dx=2e-6, shape=(3, 3), tolerance=1e-5, dtype="float64")
     return dr.gather(Float64, dr.ravel(result.tensor), UInt32(5))
 
@@ -217,7 +217,7 @@ def test_a_population_has_them_too():
 
 
 def test_beside_a_relief_of_pixels():
-    """Pixels as steps, and the wavefront beside them: half a wave of defocus is taken back by a lens."""
+    """A stepped relief combined with a wavefront: a lens compensates half a wave of defocus."""
     steps = optics.PixelRelief(np.where(np.add.outer(np.arange(8), np.arange(8)) % 2, 2e-7, 0))
     bent = 1e6 * 40.0 * R**2 / (4 * math.sqrt(3))
     plain = Pupil(R, steps, thin_lens_focal_length=1 / (1 / F + 40.0), aperture=Slit(1, 1))
@@ -227,7 +227,8 @@ def test_beside_a_relief_of_pixels():
 
 
 def test_vector_focus_takes_wavefronts():
-    """Maréchal's Strehl ratio of spherical aberration, and of astigmatism, which is not the same all around."""
+    """Maréchal's Strehl ratio holds for spherical aberration, and for astigmatism, which is not rotationally
+    symmetric."""
     assert eye(Zernike({(4, 0): 0.1, (2, 2): 0.0})).rotationally_symmetric(WAVE)
     round_, ideal = (
         optics.vector_focus(Pupil(2 * R, thin_lens_focal_length=F, wavefront=each), WAVE)

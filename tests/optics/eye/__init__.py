@@ -1,4 +1,4 @@
-"""Which test fails when a module of optics/eye is broken.
+"""Tests that fail when a module of optics/eye is broken.
 
 band_choice: spectra/test_bands.py, test_sight_tolerance.py
 cell_integrals: test_cell_integrals.py

@@ -1,4 +1,5 @@
-"""The eye: orientation, throughput, kernels against finer PSFs and geometric shadows, points on the right receptor."""
+"""The eye: orientation, throughput, kernels against finer PSFs and geometric shadows, and points seen by the right
+receptor."""
 
 import math
 
@@ -21,7 +22,7 @@ def white(eye, cells):
 
 
 def centroid(kernel):
-    """(row, column) of a kernel's centre of gravity, in cells from its centre."""
+    """Centre of gravity of a kernel, (row, column), in cells from its centre."""
     rows, columns = (np.arange(n) - n // 2 for n in kernel.shape)
     total = kernel.sum()
     return (kernel.sum(axis=1) @ rows) / total, (kernel.sum(axis=0) @ columns) / total
@@ -65,7 +66,7 @@ class TestOrientation:
 
     @pytest.mark.parametrize("axis", [0, 1])
     def test_prism_shifts_the_scene_away_from_its_thick_side(self, axis):
-        """Light bent towards +x lands at +x; the retina's image is upside down, so it is seen at -x."""
+        """Light bent towards +x lands at +x; the retina's image is upside down, so the point appears at -x."""
         eye = Eye(Pupil(15e-6, prism(15e-6, 0.15, axis)), bands=1)
         shift = eye.sensor_distance * math.tan(math.asin(0.15)) / (eye.receptor_pitch / S)
         expected = (-shift, 0) if axis == 0 else (0, -shift)
@@ -106,7 +107,7 @@ class TestKernel:
 
     @pytest.mark.parametrize("relative_aperture", [0.3, 1.0])
     def test_open_pupil_casts_its_geometric_shadow(self, relative_aperture):
-        """Without glass the kernel is the pupil's disk, smeared by diffraction only near its edge."""
+        """Without glass the kernel is the pupil's disk, blurred by diffraction only near its edge."""
         eye = Eye(Pupil(relative_aperture * 100e-6), resolution=(20, 20), fov_deg=80, bands=1)
         kernel = eye.kernel(2)[0]
         cell = eye.receptor_pitch / 2
@@ -120,7 +121,8 @@ class TestKernel:
         assert 0.99 < kernel.sum() < 1.001
 
     def test_strong_relief_follows_its_rays(self):
-        """60 µm of random glass: waves and rays put the light in the same place, to the diffraction's width."""
+        """Waves and rays through 60 µm of random glass put the light in the same place, up to the width of
+        diffraction."""
         pupil = Pupil(60e-6, BSplineRelief(np.random.default_rng(5).random((4, 4)) * 60e-6), n=1.6)
         eye = Eye(pupil, bands=1)
         kernel = eye.kernel(2)[0][::-1, ::-1].astype(np.float64)
@@ -179,7 +181,7 @@ class TestKernel:
 
 class TestSee:
     def test_light_falls_with_the_aperture_squared(self):
-        """A wide white field: throughput a², less what the kernel loses."""
+        """A wide white field gives the throughput a², minus the kernel's loss."""
         signals = []
         for radius in (50e-6, 25e-6):
             eye = Eye(Pupil(radius, thin_lens_focal_length=Eye().sensor_distance), resolution=(3, 3))
@@ -196,7 +198,7 @@ class TestSee:
         np.testing.assert_array_equal(eye.see(scene, S, np.random.default_rng(0)) - eye.see(scene, S), noise)
 
     def test_blur_averages(self):
-        """Stripes finer than the kernel vanish; the perfect lens keeps them."""
+        """Stripes finer than the kernel vanish; the perfect lens preserves them."""
         blind = Eye(Pupil(80e-6), resolution=(16, 16))
         scene = white(blind, (64, 64)) * (np.arange(64) // S % 2)
         assert np.ptp(Eye(resolution=(16, 16)).see(scene, S)[0, 8]) == pytest.approx(1, rel=1e-5)
@@ -244,7 +246,7 @@ def test_bad_distance():
 
 
 class TestBands:
-    """bands="auto", held against the same eye with 64."""
+    """bands="auto" is compared with the same eye with 64 bands."""
 
     @pytest.mark.fast_cases(1)
     @pytest.mark.parametrize(("tolerance", "seed"), [(0.1, 0), (0.05, 1)])

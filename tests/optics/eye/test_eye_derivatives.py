@@ -1,4 +1,4 @@
-"""Derivatives of what an eye sees, forward and backward, against central differences."""
+"""Derivatives of an eye's signals, forward and backward, against central differences."""
 
 import math
 
@@ -20,7 +20,7 @@ def types():
 
 
 def eye_of(radius, relief, n, fov):
-    """The relief's control points are scaled together and apart: c (1 + (scale - 1) (1 + (i mod 3)))."""
+    """The relief's control points are scaled by different factors: c (1 + (scale - 1) (1 + (i mod 3)))."""
     pattern = 1 + np.arange(16) % 3
     if isinstance(relief, float):
         points = RELIEF * (1 + (relief - 1) * pattern.reshape(4, 4))
@@ -33,7 +33,7 @@ def eye_of(radius, relief, n, fov):
 
 
 def seen(radius, relief, n, z, fov):
-    """One number: signals of a random scene, weighted at random."""
+    """One number: signals of a random scene, with random weights."""
     rng = np.random.default_rng(5)
     eye = eye_of(radius, relief, n, fov)
     signal = eye.see(rng.random((1, 12, 14)), S, z=z * 2e-3)
@@ -46,7 +46,7 @@ def seen(radius, relief, n, z, fov):
 
 
 def difference(name):
-    """By central differences, Richardson's step included: error O(STEP⁴)."""
+    """Central difference with Richardson's step: error O(STEP⁴)."""
     at = [seen(**START | {name: 1 + k * STEP}) for k in (-2, -1, 1, 2)]
     return (8 * (at[2] - at[1]) - (at[3] - at[0])) / (12 * STEP)
 
@@ -66,14 +66,14 @@ def test_see_follows_central_differences(name):
     backward = dr.grad(value)[0]
     expected = difference(name)
     assert abs(expected) > 1e-4
-    # Another fov moves the PSF's samples too: differences hold what splines between them err.
+    # Another fov moves the PSF's samples, too: the differences contain the error of the splines between them.
     assert forward == pytest.approx(expected, rel=5e-4 if name == "fov" else 1e-4)
     assert backward == pytest.approx(forward, rel=1e-9)
 
 
 @pytest.mark.slow
 def test_kernel_follows_central_differences():
-    """Cell by cell: how the kernel changes as the object comes nearer."""
+    """The derivative of every cell of the kernel by the object's distance agrees."""
     import drjit as dr
 
     z = types().Float64(2e-3)
@@ -90,7 +90,7 @@ def test_kernel_follows_central_differences():
 
 @pytest.mark.slow
 def test_image_quality_follows_the_aperture_through_the_throughput():
-    """At a noise floor, a wider pupil is brighter: quality's derivative holds the one of a² too."""
+    """A wider pupil is brighter at a fixed noise floor: the derivative of quality includes that of a²."""
     import drjit as dr
 
     def quality(radius):
@@ -102,8 +102,8 @@ def test_image_quality_follows_the_aperture_through_the_throughput():
     result = quality(radius)
     dr.forward(radius)
     expected = (quality(1 + STEP) - quality(1 - STEP)) / (2 * STEP)
-    # The window follows the radius, and with it the frequencies between which the MTF is interpolated: 3e-3. Without
-    # the throughput's share, 2 quality / radius, it would be less than half as large.
+    # The window follows the radius, and so do the frequencies between which the MTF is interpolated: 3e-3. Without the
+    # throughput's part, 2 quality / radius, the derivative would be less than half as large.
     found = dr.grad(result).numpy()
     np.testing.assert_allclose(found, expected, rtol=6e-3)
     assert (2 * quality(1.0) > found / 2).all()

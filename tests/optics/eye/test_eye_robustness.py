@@ -1,4 +1,4 @@
-"""Whatever is asked of an eye: a finite answer, or one line that says what is wrong. Nothing else."""
+"""An eye with arbitrary arguments gives a finite answer or a one-line error."""
 
 import math
 from dataclasses import replace
@@ -14,7 +14,7 @@ from optics.eye.band_choice import choose_bands
 from tests.slow_part import sweep
 
 ODD = [0, -1, 0.5, math.nan, math.inf, -math.inf, 1e-300, 1e300, "auto", "much", None, (1, 2), [], b"x"]
-# The first few are what people mean.
+# The first values are meaningful ones.
 numbers = st.one_of(st.floats(0.01, 50), st.integers(1, 20), st.sampled_from(ODD))
 
 
@@ -79,7 +79,7 @@ def test_any_lens_is_described_or_refused(a, defocus, fov_deg, sigma):
     tolerance=st.one_of(st.none(), st.floats(0.05, 0.5), numbers),
 )
 def test_any_perfect_sight_or_a_refusal(z, depth_layers, field_zones, tolerance):
-    """Behind a perfect lens, where kernels cost nothing: arguments are checked all the same."""
+    """Behind a perfect lens kernels cost nothing, but arguments are still checked."""
     try:
         sight = Eye(resolution=(2, 3), bands=1).sight(2, z, depth_layers, field_zones, tolerance)
     except ValueError as error:
@@ -129,7 +129,7 @@ def test_what_is_of_another_kind_is_named():
 
 
 def test_as_many_cells_as_a_spot_may_have_and_no_more(monkeypatch):
-    """The limit itself is allowed."""
+    """A spot may have exactly the limit of cells, but not one more."""
     eye = Eye(Pupil(25e-6, thin_lens_focal_length=Eye().sensor_distance), (7, 9), bands=1)
     counted, count = [], receptive_field._cells_within
 
@@ -144,5 +144,5 @@ def test_as_many_cells_as_a_spot_may_have_and_no_more(monkeypatch):
     monkeypatch.setattr(receptive_field, "MOST_CELLS", most)
     replace(eye, fov_deg=eye.fov_deg).kernel(2)
     monkeypatch.setattr(receptive_field, "MOST_CELLS", most - 1)
-    with pytest.raises(AccuracyError, match=rf"at most {most - 1}; widen"):
+    with pytest.raises(AccuracyError, match=rf"at most {most - 1}; increase"):
         replace(eye, fov_deg=eye.fov_deg).kernel(2)

@@ -1,4 +1,4 @@
-"""Receptors that are waveguides: an eye of them sees what an ommatidium does."""
+"""Receptors as waveguides: an eye with such receptors agrees with an ommatidium."""
 
 import math
 
@@ -20,7 +20,8 @@ def eye_of(guide, pupil=LENS, receptors=9, bands=1, **others):
 
 
 def seen_by(ommatidium, eye, cells, side):
-    """Means over cells of what an ommatidium takes, turned as a kernel is: of points on the other side (tangents)."""
+    """Means over cells of an ommatidium's sensitivity, turned like a kernel: a cell belongs to points on the opposite
+    side (tangents)."""
     node, weight = np.polynomial.legendre.leggauss(4)
     at = (np.arange(side)[:, None] + 0.5 + node / 2 - side / 2).ravel() * PITCH / cells / FOCAL
     x, y = np.meshgrid(at, at)
@@ -32,7 +33,8 @@ def seen_by(ommatidium, eye, cells, side):
 @pytest.mark.parametrize("cells", [4, 5])
 @pytest.mark.parametrize("diameter", [1.4e-6, 2.4e-6])
 def test_an_eye_of_one_receptor_is_an_ommatidium(cells, diameter):
-    """Cell by cell, with even and odd numbers of cells across a receptor; half the eye's tolerance of 1e-2."""
+    """Each cell agrees, with even and odd numbers of cells across a receptor, within half the eye's tolerance of
+    1e-2."""
     guide = Waveguide(diameter, length=100e-6)
     eye = eye_of(guide)
     kernel = eye.kernel(cells)[0]
@@ -43,7 +45,7 @@ def test_an_eye_of_one_receptor_is_an_ommatidium(cells, diameter):
 
 @pytest.mark.slow
 def test_a_lopsided_pupil_turns_nothing_round():
-    """A wavefront with coma and tilt: kernels are fields turned by 180°."""
+    """Kernels are receptive fields turned by 180°, also with coma and tilt in the wavefront."""
     bent = Pupil(
         12.5e-6,
         thin_lens_focal_length=1.34 * FOCAL,
@@ -74,11 +76,11 @@ def test_errors_fall_with_the_tolerance():
 
 @pytest.mark.slow
 def test_a_wide_guide_integrates_intensity_over_its_section():
-    """Dozens of modes: the kernel is the PSF over the disk, which white fills. Evanescent fields, V times shorter than
-    the radius, also take light around it."""
+    """The kernel of dozens of modes is the PSF integrated over the disk, which white light fills. Evanescent fields, V
+    times shorter than the radius, also collect light around it."""
     guide = Waveguide(5e-6, 1.42, 1.34)
     eye = Eye(LENS, (3, 3), 2 * math.degrees(math.atan(9e-6 / FOCAL)), 18e-6, 1, waveguide=guide, full_aperture=1e-4)
-    kernel = 144 * eye.kernel(12)[0].astype(float)  # of a square of 6 µm
+    kernel = 144 * eye.kernel(12)[0].astype(float)  # for a square of 6 µm
     light = optics.psf(LENS, eye.spectral_bands.wavelengths, eye.retina_distance, dx=0.1e-6, shape=(241, 241))
     u = (np.arange(len(kernel)) - (len(kernel) - 1) / 2) * 0.5e-6
     away = np.hypot(u[:, None], u)
@@ -93,18 +95,18 @@ def test_a_wide_guide_integrates_intensity_over_its_section():
 
 
 def test_acceptance_of_one_mode_is_narrower_than_snyders():
-    """Snyder's √((λ/D)² + (d/f)²) has no waveguide in it: it is 1.4 times too wide for one mode (1.97° for 1.398°)."""
+    """Snyder's √((λ/D)² + (d/f)²) ignores the waveguide: it is 1.4 times too wide for one mode (1.97° for 1.398°)."""
     eye = eye_of(Waveguide(1.4e-6), tolerance=5e-3)
     wavelength = float(eye.spectral_bands.wavelengths[0])
     found = eye.describe().acceptance_angle_deg
     exact = math.degrees(Ommatidium(LENS, Waveguide(1.4e-6), eye.retina_distance).acceptance_angle(wavelength))
-    assert found == pytest.approx(exact, rel=0.02)  # cells of a few hundredths of it are averaged over
+    assert found == pytest.approx(exact, rel=0.02)  # cells of a few hundredths of the angle are averaged
     assert found < 0.8 * math.degrees(snyder_acceptance(25e-6, FOCAL, 1.4e-6, wavelength))
 
 
 @pytest.mark.parametrize("cells", [3, 4])
 def test_seeing_is_the_sum_over_the_scene(cells):
-    """Not the mean over a receptor's cells; and white gives `white_signal`."""
+    """The signal is not the mean over a receptor's cells; white light gives `white_signal`."""
     eye = eye_of(Waveguide(1.8e-6), receptors=5, bands=2)
     side = 5 * cells + 40
     white = np.broadcast_to(daylight(eye.spectral_bands.wavelengths)[:, None, None], (2, side, side))
@@ -113,15 +115,15 @@ def test_seeing_is_the_sum_over_the_scene(cells):
     scene, kernel = np.zeros((2, side, side)), eye.kernel(cells)
     row, column = 20 + cells, 20 + 3 * cells  # upper left cell of receptor (1, 3)
     scene[:, row, column] = 1
-    # From the receptor's middle to the cell's, in cells: the kernel is counted from its own middle.
+    # From the receptor's middle to the cell's, in cells: the kernel's origin is its own middle.
     place = round((kernel.shape[1] - 1) / 2 + (cells - 1) / 2)
     caught = eye.spectral_bands.weights @ kernel[:, place, place] * eye.throughput
     np.testing.assert_allclose(eye.see(scene, cells)[:, 1, 3], caught, rtol=1e-3)
 
 
 def test_guides_off_the_axis_point_at_the_pupil():
-    """A facet's field 20° off the axis is that on the axis, but for the lens' own coma there; a guide that stood
-    upright would see next to nothing of a pupil that it sees under 20°."""
+    """A facet's field at 20° equals that on the axis, except for the lens' coma; an upright guide would collect almost
+    no light from a pupil that it sees at 20°."""
     guide = Waveguide(1.4e-6)
     slow = Pupil(12.5e-6, thin_lens_focal_length=4 * FOCAL)
     eye = Eye(slow, (9, 9), 2 * math.degrees(math.atan(13.5e-6 / (4 * FOCAL))), 27e-6, 1, waveguide=guide)
@@ -138,7 +140,7 @@ def test_length_absorbs_what_the_core_carries():
 
 
 def test_as_many_kernels_as_guides_need():
-    """Depth is judged by a guide's own field, not by its mean over the receptor's square."""
+    """The number of depth layers depends on a guide's own field, not on its mean over the receptor's square."""
     from optics.eye.kernel_interpolation import worst_difference
 
     eye = eye_of(Waveguide(1.4e-6), bands=1)
@@ -154,7 +156,7 @@ def test_as_many_kernels_as_guides_need():
         (lambda: Eye(None, waveguide=Waveguide(2e-6)), ValueError, "waveguide is given and pupil = None"),
         (lambda: eye_of(2e-6), ValueError, "waveguide = 2e-06"),
         (lambda: eye_of(Waveguide(4e-6)), ValueError, r"waveguide.diameter = 4e-06: must be at most .* = 3e-06 m"),
-        (lambda: eye_of(Waveguide(0.1e-6)).kernel(4), ValueError, "guides nothing at"),
+        (lambda: eye_of(Waveguide(0.1e-6)).kernel(4), ValueError, "has no guided mode at"),
         (lambda: eye_of(Waveguide(2e-6, 1.33)).kernel(4), ValueError, "n_core = 1.33"),
         (
             lambda: eye_of(

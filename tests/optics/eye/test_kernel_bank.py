@@ -1,4 +1,4 @@
-"""Levels of depth and field: each held against the more exact one; errors predicted before they are seen."""
+"""Levels of depth and field: each is compared with the more exact one, and errors are predicted in advance."""
 
 import math
 from dataclasses import replace
@@ -24,7 +24,7 @@ def flat_scene(rng, eye, margin=4):
 
 
 def reference(eye, radiance, kernel_of):
-    """Every cell of the scene spread by a kernel of its own."""
+    """Signals with every cell of the scene spread by its own kernel."""
     total = np.zeros((eye.bands, *radiance.shape[1:]))
     height, width = radiance.shape[1:]
     for i, j in np.ndindex(height, width):
@@ -65,7 +65,7 @@ class TestDepth:
         bank = LENS.sight(S, z, tolerance=tolerance, light_from="centres")
         (layers,), predicted = bank.choices[0].counts, bank.choices[0].predicted_error
         assert predicted <= tolerance
-        weight = LENS.spectral_bands.weights.max()  # scene cells here reach 1, not white's daylight
+        weight = LENS.spectral_bands.weights.max()  # scene cells reach 1 here, not white daylight
         actual = np.abs(LENS.see(radiance, S, z=z, sight=bank) - exact).max() / LENS.throughput
         assert actual <= predicted * max(weight, 1)
         assert layers <= {0.3: 3, 0.05: 5, 0.01: 9}[tolerance]
@@ -80,7 +80,7 @@ class TestDepth:
         np.testing.assert_array_equal(LENS.see(scene, S, z=everywhere), LENS.see(scene, S, z=2e-3))
 
     def test_far_scenes_need_one_layer(self):
-        """From 10 m on the light is as good as parallel: R² / (2 z λ) = 6e-5 waves."""
+        """Light from 10 m on is practically parallel: R² / (2 z λ) = 6e-5 waves."""
         bank = LENS.sight(S, (10.0, math.inf))
         assert bank.choices[0].counts == (1,)
         assert bank.choices[0].predicted_error < 1e-3
@@ -98,7 +98,7 @@ class TestField:
     WIDE = Eye(Pupil(30e-6, thin_lens_focal_length=240e-6), (1, 15), 45.0, bands=1)
 
     def test_light_from_the_side_lands_on_its_geometric_image(self):
-        """A slow ideal lens: the kernel off the axis is centred where the direction says, for all four quadrants."""
+        """For a slow ideal lens, the off-axis kernel is centred on the direction in all four quadrants."""
         eye = Eye(Pupil(8e-6, thin_lens_focal_length=Eye().sensor_distance), bands=1)
         for direction in ((10, 0), (0, 10), (-15, 5), (12, -12)):
             kernel = eye.kernel(8, direction_deg=direction)[0]
@@ -108,8 +108,8 @@ class TestField:
             assert kernel.sum() == pytest.approx(1, abs=0.02)
 
     def test_a_prism_turns_light_from_its_side_onto_the_axis(self):
-        """Which side is which: a relief thick on the right of row and column order deflects towards +x, so that its
-        off-axis kernel keeps the same shift, and a tilted source alone does not."""
+        """The sides are right: a relief that is thick on the right in row and column order deflects towards +x. Its
+        off-axis kernel has the same shift; that of a tilted source alone would not."""
         ramp = 0.1 / 0.5 * (2 * np.arange(4) - 3) * 15e-6
         eye = Eye(Pupil(15e-6, BSplineRelief(np.broadcast_to(ramp, (4, 4)))), bands=1)
 
@@ -120,7 +120,7 @@ class TestField:
         cell = eye.receptor_pitch / 4 / eye.sensor_distance
         for degrees in (-15, 0, 15):
             tangent = math.tan(math.radians(degrees))
-            sine = 0.1 - math.sin(math.radians(degrees))  # deflected towards +x; from the right, light heads to -x
+            sine = 0.1 - math.sin(math.radians(degrees))  # towards +x; light from the right travels to -x
             image = sine / math.sqrt(1 - sine**2)
             assert shift((degrees, 0)) == pytest.approx(-(image + tangent) / cell, abs=1.0)
 
@@ -136,7 +136,7 @@ class TestField:
             return eye.kernel(S, direction_deg=tuple(math.degrees(math.atan(t)) for t in (right, -down)))
 
         def kernel_of(i, j):
-            """The eye is symmetric: one quadrant's kernels, mirrored, are those of all directions."""
+            """Kernel of a symmetric eye: one quadrant's kernels, mirrored, give the kernels of all directions."""
             right, down = (j - (width - 1) / 2) * cell, (i - (height - 1) / 2) * cell
             return corner(abs(right), abs(down))[:, :: (1 if down > 0 else -1), :: (1 if right > 0 else -1)]
 
@@ -160,7 +160,7 @@ class TestField:
         assert depth.counts == (1,)
 
     def test_mirror_images(self):
-        """A symmetric eye sees a mirrored scene mirrored, zones and all."""
+        """A symmetric eye gives mirrored signals for a mirrored scene, including the zones."""
         eye = self.WIDE
         scene = flat_scene(np.random.default_rng(1), eye)
         bank = eye.sight(S, field_zones=3)
@@ -183,7 +183,7 @@ class TestNodeChoice:
             np.testing.assert_allclose(linear_weights(at, nodes(count)).sum(axis=0), 1)
 
     def test_the_worst_scene_reaches_the_worst_difference(self):
-        """Light only where the receptive field grew."""
+        """The worst scene has light only where the receptive field grew."""
         rng = np.random.default_rng(0)
         a, b = rng.random((1, 5, 5)), rng.random((1, 7, 7))
         padded = b - np.pad(a, ((0, 0), (1, 1), (1, 1)))
@@ -194,7 +194,7 @@ class TestNodeChoice:
         assert worst_difference([(1, b), (-1, a)], 2) == pytest.approx(expected)
 
     def test_a_quadratic_family_errs_as_predicted(self):
-        """Kernels linear in t² between nodes at distance h: error h²/4 halfway."""
+        """Kernels linear in t² between nodes at distance h have an error of h²/4 halfway."""
         choice = NodeChoice("test", lambda at: np.full((1, 1, 1), at[0] ** 2), [(3,), (5,), (9,)], 1)
         assert [choice.error((n,)) for n in (3, 5, 9)] == pytest.approx([1 / 4, 1 / 16, 1 / 64])
         assert choice.choose(0.1).counts == (5,)
@@ -243,7 +243,7 @@ def test_bad_directions(direction):
 
 
 class TestLightFrom:
-    """A picture's cells shine all over: signals then do not depend on how finely the same picture is cut."""
+    """Light comes from the whole area of a scene's cells, so signals do not depend on the scene's resolution."""
 
     def stripes(self, s):
         height, width = LENS.resolution
@@ -255,7 +255,7 @@ class TestLightFrom:
             np.testing.assert_allclose(one, seen[0], atol=1e-4 * LENS.throughput)
 
     def test_stripes_are_what_the_diffraction_limit_leaves_of_them(self):
-        """Box scene x Airy's OTF (Goodman, eq. 6-32) x box receptor, at the stripes' own odd harmonics."""
+        """Box scene x Airy's OTF (Goodman, eq. 6-32) x box receptor, at the stripes' odd harmonics."""
         eye = replace(LENS, resolution=(41, 41), sensor_width=41 / 9 * LENS.sensor_width, tolerance=1e-3)
         eye = replace(eye, fov_deg=math.degrees(2 * math.atan(eye.sensor_width / 2 / LENS.sensor_distance)))
         assert eye.sensor_distance == pytest.approx(LENS.sensor_distance)
@@ -269,11 +269,11 @@ class TestLightFrom:
             contrast += otf * 2 * (2 / math.pi / harmonic) ** 2
         assert bright - dark == pytest.approx(contrast, abs=2e-3)
         centres = eye.see(scene, 1, sight=eye.sight(1, light_from="centres"))[0, 20, 20:22] / eye.throughput
-        assert np.diff(centres)[0] / eye.spectral_bands.weights[0, 0] < -contrast - 0.03, "points are another scene"
+        assert np.diff(centres)[0] / eye.spectral_bands.weights[0, 0] < -contrast - 0.03, "points differ"
 
     def test_detail_within_cells_is_better_put_at_their_centres(self):
-        """Smooth waves, given as their means over cells: errors fall with the square of the cells once these resolve
-        the PSF (0.2 of a receptor); at all sizes light from the centres errs less than half as much."""
+        """Smooth waves are given as their means over cells. Errors fall with the square of the cell size once cells
+        resolve the PSF (0.2 of a receptor); at all sizes light from the centres has less than half the error."""
         eye = replace(LENS, tolerance=1e-4)
         height, width = eye.resolution
         fine = self.waves(32)

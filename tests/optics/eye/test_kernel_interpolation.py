@@ -1,4 +1,4 @@
-"""What two kernels may make of one scene."""
+"""The largest difference between the signals of two kernels for one scene."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Narrow views through strong reliefs: light goes everywhere, and kernels are had all the same."""
+"""Narrow views through strong reliefs: light goes everywhere, and kernels can still be computed."""
 
 import math
 
@@ -11,7 +11,7 @@ import optics
 @pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("seed", [0, 1])
 def test_cells_hold_the_light_that_the_direct_sum_sends_there(seed):
-    """140 waves of glass over 38 µm; before few nodes stood for all, the kernel was refused."""
+    """The glass is 140 waves high over 38 µm, so that the kernel needs the far field by a few nodes."""
     pupil = optics.Pupil(19e-6, optics.BSplineRelief(150e-6 * np.random.default_rng(seed).random((4, 4))))
     eye = optics.Eye(pupil, (15, 15), 20.0, bands=1)
     kernel = eye.kernel(4)[0]
@@ -21,7 +21,7 @@ def test_cells_hold_the_light_that_the_direct_sum_sends_there(seed):
     for at in brightest[[0, 500, 5000]]:
         down, right = np.array(np.divmod(at, len(kernel))) - len(kernel) // 2
         dx = cell / parts
-        middle = -right * cell + dx / 2, -down * cell + dx / 2  # of an even number of samples, turned by 180°
+        middle = -right * cell + dx / 2, -down * cell + dx / 2  # for an even number of samples, turned by 180°
         there = optics.psf(
             pupil,
             eye.spectral_bands.wavelengths,
@@ -40,7 +40,7 @@ def test_cells_hold_the_light_that_the_direct_sum_sends_there(seed):
     "aperture", [optics.Circle(), optics.Slit(0.05, 1.0), optics.Annulus(0.95)], ids=["circle", "slit", "ring"]
 )
 def test_kernels_lose_no_more_than_the_tolerance_whatever_the_edge(aperture):
-    """Diffracted light goes with perimeter over area: of a slit it is twenty times a circle's."""
+    """Diffracted light is proportional to perimeter over area: for a slit it is twenty times a circle's."""
     focal = 2e-3
     width = 2 * focal * math.tan(math.radians(22.5))
     pupil = optics.Pupil(100e-6, thin_lens_focal_length=focal, aperture=aperture)

@@ -18,7 +18,7 @@ PATCH = {"sensor_width": 200e-6 * 5 / 15, "full_aperture": 200e-6, "resolution":
 
 
 def test_a_patch_sees_what_the_middle_of_the_whole_sees():
-    """Also where it is narrower than the pupil."""
+    """The patch is also narrower than the pupil."""
     patch = Eye(WHOLE.pupil, fov_deg=fov(PATCH["sensor_width"], 240e-6), **PATCH)
     assert patch.sensor_width < 2 * WHOLE.pupil.radius
     assert patch.throughput == pytest.approx(WHOLE.throughput)
@@ -35,7 +35,8 @@ def test_a_patch_aside_has_the_kernel_of_its_direction():
 
 
 def test_the_kernel_aside_is_the_picture_aside():
-    """Summed up in cells around the geometric image and turned about, of a PSF that psf makes over the same place."""
+    """The reference is a PSF computed at the same place, summed in cells around the geometric image and turned by
+    180°."""
     direction, cells = (15.0, 8.0), 3
     kernel = WHOLE.kernel(cells, direction_deg=direction)[0]
     angle = [math.radians(-at) for at in direction]
@@ -51,7 +52,7 @@ def test_the_kernel_aside_is_the_picture_aside():
 
 
 def test_a_patch_of_a_human_fovea():
-    """A pupil of 1.5 mm before half a millimetre of retina: contrast of stripes as diffraction allows."""
+    """A pupil of 1.5 mm in front of half a millimetre of retina: the contrast of stripes agrees with diffraction."""
     focal, n = 16.7e-3, medium("vitreous").at(550e-9)
     pupil = Pupil(0.75e-3, thin_lens_focal_length=focal * n, medium_n=medium("vitreous"), object_n=1.0)
     asked = {"resolution": (32, 32), "fov_deg": fov(96e-6, focal), "sensor_width": 96e-6}
@@ -63,15 +64,16 @@ def test_a_patch_of_a_human_fovea():
     seen = eye.see(scene, 2)[0, 16]
     contrast = (seen.max() - seen.min()) / (seen.max() + seen.min())
     wavelength = float(eye.spectral_bands.wavelengths[0])
-    s = 1 / (period * eye.receptor_pitch) * wavelength * focal / 1.5e-3  # in units of the cut-off, in air's measure
+    s = 1 / (period * eye.receptor_pitch) * wavelength * focal / 1.5e-3  # in units of the cut-off, measured in air
     diffraction = 2 / math.pi * (math.acos(s) - s * math.sqrt(1 - s * s))
-    cells = np.sinc(1 / period) * np.sinc(1 / (2 * period))  # receptor's aperture; light from all over a cell
-    sampled = math.cos(math.pi / period)  # receptors beside the stripes' middle
+    cells = np.sinc(1 / period) * np.sinc(1 / (2 * period))  # receptor's aperture; light from the whole cell
+    sampled = math.cos(math.pi / period)  # receptors next to the stripes' middle
     assert contrast == pytest.approx(diffraction * cells * sampled, rel=0.03)
 
 
 def test_a_retina_behind_water_sees_the_angles_before_it():
-    """Of a fish's eye that is taken out of the water: f stays, and with it where directions fall."""
+    """For a fish's eye taken out of the water, f stays the same, and so do the positions of directions on the
+    retina."""
     f = WHOLE.sensor_distance
     pupil = Pupil(30e-6, thin_lens_focal_length=1.33 * f, medium_n=1.33, object_n=1.0)
     eye = Eye(pupil, (15, 15), WHOLE.fov_deg, 200e-6, 1)

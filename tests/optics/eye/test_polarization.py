@@ -1,4 +1,4 @@
-"""Microvilli in eyes: Malus' law and partial polarisation, and the vector focus of a scene polarised in two ways."""
+"""Microvilli in eyes: Malus' law and partial polarisation, and the vector focus of a scene with two polarisations."""
 
 import math
 from dataclasses import replace
@@ -18,7 +18,8 @@ WHITE = np.ones((2, 6, 8))
 
 
 def factor(angle, degree, azimuth, ratio):
-    """(ratio cos² + sin²) of what is polarised and (ratio + 1)/2 of what is not, over the latter."""
+    """Signal relative to unpolarised light: (ratio cos² + sin²) for the polarised part and (ratio + 1)/2 for the rest,
+    divided by the latter."""
     turn = math.radians(angle - azimuth)
     along, across = (1.0, 0.0) if math.isinf(ratio) else (ratio, 1.0)
     plain = (along + across) / 2
@@ -52,7 +53,8 @@ def test_rows_of_microvilli_are_repeated_from_the_top_left():
 
 
 def test_bands_and_places_may_be_polarised_differently():
-    """Each receptor and type catches its own mixture of bands, the left half at another angle than the right."""
+    """Each receptor and type has its own mixture of bands; the left half is polarised at another angle than the
+    right."""
     eye = replace(PERFECT, microvilli=Microvilli(0.0, 6.0))
     angle = np.where(np.arange(8) < 4, 0.0, 70.0) * np.ones((6, 1))
     found = eye.see(WHITE, 2, polarization=(np.array([0.2, 0.9]), angle))
@@ -62,9 +64,9 @@ def test_bands_and_places_may_be_polarised_differently():
 
 
 def by_vector_focus(pupil, receptor, places, cells, left, right):
-    """What receptors of a width take of a scene that is polarised at one angle to the left of its middle and at another
-    to the right: over the vector focus, which the retina has upside down, the sum of the share of each receptor that is
-    lit from there."""
+    """Signals of receptors for a scene that is polarised at one angle left of its middle and at another right of it.
+    The reference sums the vector focus, upside down on the retina, times the part of each receptor lit from each
+    side."""
     dx = WAVE / math.sin(math.atan(pupil.radius / F)) / 8
     found = np.zeros(len(places))
     for angle, side in ((left, 1), (right, -1)):
@@ -85,7 +87,7 @@ def by_vector_focus(pupil, receptor, places, cells, left, right):
     ],
 )
 def test_a_scene_polarised_in_two_ways_is_the_vector_focus_of_both(left, right, wavefront):
-    """A middle receptor, through which the border runs, and its neighbours, which see it by blur alone."""
+    """A middle receptor on the border, and its neighbours, which see the border only through blur."""
     pupil = optics.Pupil(0.4e-3, thin_lens_focal_length=F, wavefront=wavefront)
     receptor, azimuth = 5e-6, 15.0
     eye = Eye(
@@ -104,13 +106,14 @@ def test_a_scene_polarised_in_two_ways_is_the_vector_focus_of_both(left, right, 
     found = (eye.see(scene, 2, polarization=(1.0, angle)) / eye.see(scene, 2))[0, 1]
     places = receptor * np.array([-1.0, 0.0, 1.0])
     expected = by_vector_focus(pupil, receptor, places, eye.microvilli[0][0], left, right)
-    np.testing.assert_allclose(found, expected, atol=0.012)  # .0062 of steep rays, the rest beyond the windows
+    np.testing.assert_allclose(found, expected, atol=0.012)  # 0.0062 from steep rays, the rest beyond the windows
     sides = [factor(at, 1.0, azimuth, 8.0) for at in (left, right)]
-    assert np.abs(found[[0, 2]] - sides).min() > 0.024  # of what would be seen without blur
+    assert np.abs(found[[0, 2]] - sides).min() > 0.024  # larger than the signals without blur would allow
 
 
 def worst(pupil, z, sine):
-    """Integral over the picture of what the vector focus differs from Malus' law times scalar theory, over white's."""
+    """Integral over the image of the difference between the vector focus and Malus' law times scalar theory, relative
+    to white."""
     dx = WAVE / sine / 5
     light = optics.vector_focus(pupil, WAVE, z, dx=dx, shape=(121, 121))
     found = []
@@ -127,7 +130,7 @@ def worst(pupil, z, sine):
 @pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("seed", range(12))
 def test_steep_rays_err_by_less_than_eyes_allow(seed):
-    """To NA .5, for circles, hexagons, slits and rings, in focus and out of it, with and without aberrations."""
+    """NA up to 0.5, for circles, hexagons, slits and rings, in focus and out of it, with and without aberrations."""
     rng = np.random.default_rng(seed)
     sine = float(rng.choice([0.1, 0.2, 0.35, 0.5]))
     aperture = (optics.Circle(), optics.Polygon.regular(6), optics.Slit(0.9, 1.7), optics.Annulus(0.6))[seed % 4]
@@ -143,7 +146,7 @@ def test_steep_rays_err_by_less_than_eyes_allow(seed):
 @pytest.mark.slow
 @pytest.mark.parametrize("angle", [(0.5, 0.0), (0.3, -0.4)])
 def test_so_do_they_off_the_axis_across_their_own_ray(angle):
-    """Field and microvilli turned with the ray through the pupil's centre, by Rodrigues' matrix."""
+    """The field and the microvilli are turned with the ray through the pupil's centre, by Rodrigues' matrix."""
     pupil = optics.Pupil(F * math.tan(math.asin(0.1)), thin_lens_focal_length=F)
     ray = np.array([math.tan(angle[0]), math.tan(angle[1]), 1.0])
     ray /= np.linalg.norm(ray)
@@ -172,7 +175,7 @@ def test_modes_of_rhabdoms_take_polarised_light_as_squares_do():
 
 
 def test_derivatives_are_those_of_unpolarised_light_times_the_same():
-    """By the pupil's radius and a mask's waist, of a scene that is polarised alike all over."""
+    """Derivatives by the pupil's radius and a mask's waist, for a scene with the same polarisation everywhere."""
     slopes = {}
     for polarization in (None, (0.7, 30.0)):
         radius, waist = Float64(12e-6), Float64(10e-6)
@@ -187,7 +190,7 @@ def test_derivatives_are_those_of_unpolarised_light_times_the_same():
 
 
 def test_photons_are_those_of_the_polarised_signal():
-    """Shot noise: its variance goes with the signal."""
+    """The variance of shot noise is proportional to the signal."""
     eye = replace(
         PERFECT, resolution=(40, 40), microvilli=Microvilli(0.0, math.inf), photon_budget=optics.PhotonBudget(1.0)
     )
@@ -209,7 +212,7 @@ CELLS = Microvilli(0.0)
         (lambda: replace(PERFECT, microvilli=[[CELLS], [CELLS, CELLS]]), "rows of them, all as long"),
         (lambda: replace(PERFECT, microvilli=[]), "microvilli = "),
         (lambda: replace(PERFECT, microvilli=[[CELLS, None]]), "microvilli = "),
-        (lambda: PERFECT.see(WHITE, 2, polarization=(1.0, 0.0)), "receptors of this eye know none"),
+        (lambda: PERFECT.see(WHITE, 2, polarization=(1.0, 0.0)), "this eye has no microvilli"),
         (lambda: seen((1.5, 0.0)), r"degree = 1.5: must be in \[0, 1\]"),
         (lambda: seen((1.0, math.nan)), "angle holds NaN"),
         (lambda: seen(0.5), r"polarization = 0.5: must be \(degree, angle_deg\)"),

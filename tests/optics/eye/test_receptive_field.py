@@ -1,4 +1,4 @@
-"""How wide a window kernels are summed from: the share of rays that it holds, and samples beside it."""
+"""Size of the window that kernels are summed from: the share of rays in it, and extra samples around it."""
 
 import numpy as np
 import pytest
@@ -23,8 +23,8 @@ def test_a_square_holds_the_share_of_rays_and_no_more(share):
 
 
 def test_splines_err_at_their_ends():
-    """Light is as bright at the last cell as in the middle, 3.5 samples per wave. With four samples more
-    at either end the error there is a twenty-fourth; a tenth is asked."""
+    """Light is as bright at the last cell as in the middle, with 3.5 samples per wave. With four more samples at either
+    end the error there is a twenty-fourth; the test requires a tenth."""
     size, count, waves = 4.0, 15, 1 / 3.5
     edges = (np.arange(count + 1) - count / 2) * size
     exact = size + np.diff(np.sin(2 * np.pi * waves * edges)) / (2 * np.pi * waves)
@@ -49,7 +49,7 @@ def test_kernels_have_samples_beside_the_square_that_holds_their_light(monkeypat
         return pictures(requests, **how)
 
     eye = Eye(Pupil(15e-6, thin_lens_focal_length=250e-6), (3, 3), 45.0)
-    assert eye.spectral_bands.wavelengths.size  # chosen by kernels of their own
+    assert eye.spectral_bands.wavelengths.size  # this choice computes kernels of its own
     monkeypatch.setattr(receptive_field, "spot_of", spot)
     monkeypatch.setattr(receptive_field, "pictures", noted)
     eye.kernel(16)

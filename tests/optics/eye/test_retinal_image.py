@@ -38,7 +38,7 @@ def test_a_point_shows_the_kernel():
 @pytest.mark.parametrize("shape", [(2, 1), (4, 5), (12, 11)])
 @pytest.mark.parametrize("size", [(3, 5), (25, 41)])
 def test_only_what_is_seen_is_computed(shape, size):
-    """Scene and kernel are cut to what reaches the middle: nothing wraps around into it."""
+    """Scene and kernel are cut to the part that reaches the middle, and nothing wraps around into it."""
     rng = np.random.default_rng(1)
     scene, kernel = rng.random((1, shape[0] + 8, shape[1] + 6)), rng.random((1, *size))
     whole = blurred(scene, kernel)

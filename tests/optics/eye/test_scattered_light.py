@@ -1,4 +1,4 @@
-"""Light that masks and ripples send off their rays lands in the kernel, but for less than the tolerance."""
+"""Light scattered by masks and ripples reaches the kernel, except for less than the tolerance."""
 
 import math
 
@@ -37,8 +37,8 @@ EYES = {
 @pytest.mark.fast_cases(3)
 @pytest.mark.parametrize("name", EYES)
 def test_kernels_lose_no_more_than_the_tolerance_of_what_is_let_through(name):
-    """By energy: all that a mask lets through lands somewhere. When windows were made for rays and edges alone, a third
-    was lost of the mask's light, two thirds of the beam's, .06 to .15 of the others'."""
+    """Energy balance: all the light that a mask transmits reaches the sensor. Windows chosen from rays and edges alone
+    would lose a third of the mask's light, two thirds of the beam's, and 0.06 to 0.15 of the others'."""
     eye = EYES[name]()
     lost = 1 - eye.kernel(4).sum() / eye.pupil.transmission
     assert -2e-3 < lost < eye.tolerance
@@ -46,7 +46,8 @@ def test_kernels_lose_no_more_than_the_tolerance_of_what_is_let_through(name):
 
 @pytest.mark.slow
 def test_waveguides_see_a_masks_orders():
-    """What a kernel loses, Parseval's theorem tells: see `test_guided_field.py`. At a tolerance of .05 it was 34 %."""
+    """Parseval's theorem gives a kernel's loss: see `test_guided_field.py`. A window without the orders would lose 34 %
+    at a tolerance of 0.05."""
     focal, width = 50e-6, 27e-6
     mask = optics.MaskMap((1 + ripple(6)) / 2)
     pupil = optics.Pupil(12.5e-6, thin_lens_focal_length=67e-6, medium_n=1.34, object_n=1.0, mask=mask)
@@ -59,6 +60,6 @@ def test_waveguides_see_a_masks_orders():
 
 
 def test_windows_of_even_masks_are_no_wider():
-    """Of amplitude 1/2 all over: nothing is scattered."""
+    """An amplitude of 1/2 everywhere scatters nothing."""
     plain, masked = behind(), behind(mask=optics.MaskMap(np.full((4, 4), 0.5)))
     assert masked.kernel(4).shape == plain.kernel(4).shape

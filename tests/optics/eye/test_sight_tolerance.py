@@ -1,5 +1,5 @@
-"""What a tolerance of sight and bands means: of white's signal, whatever a mask or a waveguide leaves of it, and of all
-errors together."""
+"""The tolerance of sight and bands refers to the white signal behind the mask or waveguide, and to the sum of all
+errors."""
 
 import itertools
 import math
@@ -25,8 +25,9 @@ def lens(amplitude, **others):
 
 @pytest.mark.parametrize("tolerance", [0.1, 0.03])
 def test_an_even_mask_changes_no_choice(tolerance):
-    """It dims the scene's light and white's alike. Of an amplitude of .2 a 25th is left, and errors were said to be as
-    much smaller: one layer for three, three for five."""
+    """The mask dims the scene and white alike. An amplitude of 0.2 leaves a 25th of the light. An error measured
+    against the undimmed white would be smaller by the same factor, and one layer would be chosen for three, three for
+    five."""
     open_, dim = (lens(amplitude).sight(S, DEPTHS, tolerance=tolerance).choices[0] for amplitude in (1, 0.2))
     assert dim.counts == open_.counts
     assert dim.counts[0] > 1
@@ -48,8 +49,8 @@ def distance(near, far, place):
 
 @pytest.mark.slow
 def test_waveguides_err_by_no_more_of_what_they_leave_of_white():
-    """A rhabdom of 1.4 µm takes .16 of a square's light: against the raw tolerance one layer would do, which errs by
-    .2 of white."""
+    """A rhabdom of 1.4 µm collects 0.16 of a square's light. Against the raw tolerance one layer would be enough, with
+    an error of 0.2 of white."""
     focal, width = 50e-6, 27e-6
     pupil = Pupil(12.5e-6, thin_lens_focal_length=67e-6, medium_n=1.34, object_n=1.0)
     fov = 2 * math.degrees(math.atan(width / 2 / focal))
@@ -81,13 +82,13 @@ def test_dim_kernels_need_as_many_bands():
 
 @pytest.mark.slow
 def test_depth_and_field_share_a_tolerance():
-    """At a corner, between two layers, both err. When each had all of the tolerance, one layer and five zones were
-    taken of this, which err by .068."""
+    """Both errors add up at a corner between two layers. If each had the whole tolerance, one layer and five zones
+    would be chosen, with an error of 0.068."""
     eye = Eye(Pupil(30e-6, thin_lens_focal_length=240e-6), (1, 15), 45.0, bands=1)
     near, far, tolerance = 2e-3, 1.0, 0.065
     bank = eye.sight(S, [near, far], field_zones="auto", tolerance=tolerance, light_from="centres")
     assert sum(choice.predicted_error for choice in bank.choices) <= tolerance
-    assert "within the tolerance of 0.065, of which these may take" in str(bank)
+    assert "within the tolerance of 0.065, of which" in str(bank)
     worst = 0.0
     for deep, right in itertools.product(np.linspace(-1, 1, 5), np.linspace(0.5, 1, 5)):
         aside = math.degrees(math.atan(right * math.tan(math.radians(22.5))))
@@ -101,14 +102,14 @@ def test_depth_and_field_share_a_tolerance():
 def test_a_share_of_the_tolerance_is_named_where_it_is_too_small():
     choice = NodeChoice("test", lambda at: np.full((1, 1, 1), at[0] ** 2), [(3,), (5,)], 1)
     with pytest.raises(
-        AccuracyError, match=r"tolerance = 0\.09, of which test may take 0\.05: 5 test nodes leave 8\.1e-02"
+        AccuracyError, match=r"tolerance = 0\.09, of which test may use 0\.05: 5 test nodes leave 8\.1e-02"
     ):
         choice.choose(0.09, 0.05)
     assert choice.choose(0.09).counts == (5,)
 
 
 def test_no_light_is_no_error():
-    """Where white is 0, so are all errors."""
+    """All errors are 0 if white is 0."""
     dark = NodeChoice("test", lambda at: np.zeros((1, 3, 3)), [(1,)], 1, white=0.0)
     assert dark.choose(1e-6).predicted_error == 0
 
@@ -124,7 +125,7 @@ def test_the_field_comes_first_where_half_is_too_little_for_depth():
 
 
 def test_what_is_left_of_white_is_not_asked_where_no_error_is_told():
-    """Of a waveguide it takes a kernel to know."""
+    """The white signal of a waveguide needs a kernel, so it is computed only if an error is predicted."""
 
     def nobody_asks():
         raise AssertionError

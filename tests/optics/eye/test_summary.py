@@ -35,7 +35,7 @@ def test_angles_and_light():
 @pytest.mark.fast_cases(1)
 @pytest.mark.parametrize(("before", "behind"), [(1.0, 1.336), (1.336, 1.336), (1.33, 1.5)])
 def test_f_number_between_media_says_how_bright_the_image_is(before, behind):
-    """1/(2 (n/n₀) sin θ), paraxially: of a scene's radiance its image has π (n/n₀)² sin² θ (Born & Wolf, §4.8)."""
+    """1/(2 (n/n₀) sin θ), paraxially: the image has π (n/n₀)² sin² θ of a scene's radiance (Born & Wolf, §4.8)."""
     pupil = Pupil(10e-6, thin_lens_focal_length=F * behind / before, medium_n=behind, object_n=before)
     eye = Eye(pupil, bands=1)
     sine = math.sin(math.atan(10e-6 / eye.retina_distance))
@@ -72,11 +72,11 @@ def test_each_limit_can_bind():
     loud = lens(noise_sigma=0.06).describe()
     assert loud.binding == "noise"
     assert loud.acuity_cpd == loud.noise_cpd
-    assert lens(noise_sigma=0.1).describe().acuity_cpd == 0  # 0.1 > a² = 0.0625: drowned
+    assert lens(noise_sigma=0.1).describe().acuity_cpd == 0  # 0.1 > a² = 0.0625: the signal is below the noise
 
 
 def test_photons_set_the_noise():
-    """√(σ² + T/N): N photons at a signal of 1, of which white leaves T N to each receptor."""
+    """√(σ² + T/N): N photons at a signal of 1, and T N photons per receptor for white."""
     eye = lens(noise_sigma=0.0, photon_budget=PhotonBudget(illuminance=0.1))
     found = eye.describe()
     assert found.photons == pytest.approx(found.throughput * eye.photons.mean())
@@ -102,7 +102,7 @@ def test_acceptance_angle_of_a_sharp_eye_is_its_receptors():
 
 
 def test_acceptance_angle_is_that_of_the_kernel_cut_finely():
-    """PSF ⊗ receptor along the middle row, 15 places per receptor; at 4 it would be 2 % wider."""
+    """PSF ⊗ receptor along the middle row, 15 places per receptor; with 4 it would be 2 % wider."""
     eye, cells = lens(resolution=(63, 63)), 15
     field = eye.kernel(cells)[0].astype(np.float64)
     for _ in range(2):
@@ -118,7 +118,7 @@ def test_acceptance_angle_is_that_of_the_kernel_cut_finely():
 
 
 def test_acceptance_angle_of_a_small_pupil_is_the_airy_disks():
-    """1.029 λ/D, wider by (0.3 λ/D receptors of) a narrow receptor: variances add (Snyder 1977)."""
+    """1.029 λ/D, widened by a narrow receptor of 0.3 λ/D: variances add (Snyder 1977)."""
     eye = lens(4e-6, resolution=(100, 100))
     airy, receptor = 1.029 * 550e-9 / 8e-6, 2e-6 / F
     found = math.radians(eye.describe().acceptance_angle_deg)
@@ -151,17 +151,17 @@ def test_the_table_names_every_limit():
 
 
 def test_what_the_light_cannot_tell_is_one_named_line(monkeypatch):
-    """The rest of the table stays."""
+    """The rest of the table remains."""
 
     def refused(*_, **__):
-        raise AccuracyError("tolerance = 0.02: contrasts err by up to 0.5")
+        raise AccuracyError("tolerance = 0.02: contrasts have an error of up to 0.5")
 
     monkeypatch.setattr(summary, "image_quality", refused)
     monkeypatch.setattr(summary, "mtf", refused)
     described = lens().describe()
     assert math.isnan(described.image_quality)
     assert described.binding in ("diffraction", "sampling")
-    assert math.isnan(described.acuity_cpd), "whatever the unknown limit is, it may be the least"
+    assert math.isnan(described.acuity_cpd), "the unknown limit may be the lowest one"
     assert "at most 0.158 cycles/degree, sampling binds" in str(described)
     assert [line.split(":")[0] for line in described.unknown] == ["image quality", "limit by noise"]
     assert "not known (1)       image quality: tolerance = 0.02" in str(described)
@@ -170,11 +170,11 @@ def test_what_the_light_cannot_tell_is_one_named_line(monkeypatch):
 
 
 def test_advice_is_for_who_can_follow_it(monkeypatch):
-    """An eye takes no dx; its pupil's PSF does."""
+    """An eye has no argument dx; its pupil's PSF has."""
 
     def refused(*_, **__):
-        raise AccuracyError("it needs 9 x 9 samples", "ask for dx=1e-07, shape=(9, 9)")
+        raise AccuracyError("it needs 9 x 9 samples", "set dx=1e-07, shape=(9, 9)")
 
     monkeypatch.setattr(summary, "strehl_ratio", refused)
     [line] = lens().describe().unknown
-    assert line == "Strehl ratio: it needs 9 x 9 samples; of optics.psf(eye.pupil), ask for dx=1e-07, shape=(9, 9)"
+    assert line == "Strehl ratio: it needs 9 x 9 samples; of optics.psf(eye.pupil), set dx=1e-07, shape=(9, 9)"

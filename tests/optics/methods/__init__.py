@@ -1,4 +1,4 @@
-"""Which test fails when a module of optics/methods is broken. The oracles are closed forms that all methods meet.
+"""Tests that fail when a module of optics/methods is broken. The oracles are closed forms that all methods satisfy.
 
 angular_spectrum: test_angular_spectrum.py, test_textbook.py, test_oracles_waves.py, test_even_pupils.py
 carrier: point_spread/test_field.py

@@ -1,4 +1,4 @@
-"""Random pupils, and how wrong the approximations are on them."""
+"""Random pupils, and the errors of the approximations on them."""
 
 import numpy as np
 
@@ -32,9 +32,10 @@ def random_case(rng, fresnel_numbers=(0.01, 30.0)):
 
 
 def predicted_and_actual(case, method):
-    """What the planner says of a method asked for by name, and its error against the exact integral."""
+    """The planner's predicted error of a method requested by name, its actual error against the exact integral, and the
+    plan's prediction."""
     pupil, wavelength, z, window = case
-    task = Problem.of(Beam(pupil, PointSource(), wavelength, z), window, 1e-3)
+    task = Problem.from_beam(Beam(pupil, PointSource(), wavelength, z), window, 1e-3)
     settings = {"dx": window.dx, "shape": window.shape}
     found = optics.psf(pupil, [wavelength], z, **settings, method=method)
     exact = optics.psf(pupil, [wavelength], z, **settings, method="exact", tolerance=1e-4)

@@ -1,4 +1,4 @@
-"""What spectra are made of: obliquity, where they fade out, and which tapers are tried."""
+"""Parts of a spectrum: obliquity, the limits of its taper, and the tapers that are tried."""
 
 import math
 
@@ -20,21 +20,21 @@ METHODS = {"angular_spectrum": whole_spectrum, "split_angular_spectrum": split_s
 
 
 def problems():
-    """Pupils of some microns to a millimetre, before their focus, in it and behind it."""
+    """Pupils of some microns to a millimetre, with the sensor in front of their focus, in it and behind it."""
     for radius in (5e-6, 40e-6, 1e-3):
         for distance in (3 * radius, 30 * radius):
             for focus in (0.7, 1.0, 30.0):
                 pupil = optics.Pupil(radius, thin_lens_focal_length=focus * distance)
                 beam = Beam(pupil, PointSource(), 550e-9, distance)
                 window = Grid.square(65, 550e-9 * distance / radius / 4)
-                yield from (Problem.of(beam, window, tolerance) for tolerance in (1e-4, 1e-2))
+                yield from (Problem.from_beam(beam, window, tolerance) for tolerance in (1e-4, 1e-2))
 
 
 def test_versine_keeps_its_digits_near_the_axis():
-    """1 - cos θ by itself has four digits left at θ = 1e-6."""
+    """The plain expression 1 - cos θ has four digits left at θ = 1e-6."""
     theta = np.array([1e-6, 1e-4, 1e-2, 0.3, 1.0, math.pi / 2])
     found = versine(precision("float64").Float64(np.sin(theta) ** 2)).numpy()
-    # Ten roundings of float64: some are sin² itself.
+    # Ten roundings of float64, because some are in sin² itself.
     np.testing.assert_allclose(found, 2 * np.sin(theta / 2) ** 2, rtol=10 * 2.2e-16)
 
 

@@ -1,4 +1,4 @@
-"""Pupils that are the same where x or y is mirrored: on a quarter of the plane they give what the whole one does."""
+"""Pupils that are mirror-symmetric in x and y: a quarter of the plane gives the result of the whole plane."""
 
 import math
 from dataclasses import replace
@@ -27,7 +27,7 @@ def on_both_sides(seed=0, side=4):
 
 def problem_of(pupil, shape=(65, 65), source=None, **window):
     beam = Beam(pupil, source or PointSource(), LAMBDA, Z)
-    return beam, Problem.of(beam, Grid(shape, 1.2e-6, **window), 1e-3)
+    return beam, Problem.from_beam(beam, Grid(shape, 1.2e-6, **window), 1e-3)
 
 
 EVEN = {
@@ -74,7 +74,7 @@ def test_what_is_not_even_is_not_taken_for_it(name):
 
 
 def test_derivatives_by_control_points_are_those_of_the_whole_pupil():
-    """One of them alone moves out of the symmetry; the index does not."""
+    """A change of one control point breaks the symmetry; a change of the index does not."""
     heights = on_both_sides()
     points = precision("float64").Tensor64(heights)
     assert not optics.BSplineRelief(points).mirror_symmetric

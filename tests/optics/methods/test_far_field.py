@@ -1,4 +1,4 @@
-"""The far field by a few nodes, against the direct sum; and how few these are."""
+"""The far field by a few nodes, against the direct sum; and the number of nodes."""
 
 import math
 
@@ -20,11 +20,12 @@ LAMBDA = 430e-9
 
 
 def problem_of(radius, z, degrees, tolerance, seed=0, dtype="float32", side=61):
-    """Of glass bent by several waves; the window reaches as far from the axis as rays of so many degrees."""
+    """A problem with glass that bends light by several waves; the window reaches from the axis as far as rays of
+    `degrees`."""
     heights = 0.6 * radius * np.random.default_rng(seed).random((4, 4))
     beam = Beam(optics.Pupil(radius, optics.BSplineRelief(heights)), PointSource(), LAMBDA, z)
     window = Grid.square(side, 2 * z * math.tan(math.radians(degrees)) / side)
-    return beam, Problem.of(beam, window, tolerance, dtype)
+    return beam, Problem.from_beam(beam, window, tolerance, dtype)
 
 
 def exactly(beam, problem):
@@ -45,7 +46,8 @@ def test_a_few_nodes_stand_for_all(radius, z, degrees, tolerance):
 
 
 def test_nodes_that_forget_the_rest_s_size_are_wrong():
-    """The rest's phase alone would pick nodes as few, and miss by more than the tolerance: its size counts, too."""
+    """The phase of the slow part alone would choose the same number of nodes and miss the tolerance: its size matters,
+    too."""
     _, problem = problem_of(5e-6, 100e-6, 40, 1e-3)
     [how] = far_field(problem)
     x, y = 5e-6 * np.random.default_rng(1).uniform(-0.7, 0.7, (2, 60))
@@ -84,7 +86,7 @@ def test_fewer_nodes_for_looser_tolerances_and_smaller_pupils():
 
 
 def test_few_nodes_carry_the_derivative_by_the_distance():
-    """Which stand for the others is told by the rest itself; they do for its derivative."""
+    """The slow part itself selects the nodes; they also serve its derivative."""
     beam, problem = problem_of(14e-6, 567e-6, 40, 1e-3, dtype="float64", side=15)
     [how] = far_field(problem)
     z = precision("float64").Float64(beam.distance)
@@ -106,7 +108,7 @@ def test_few_nodes_carry_the_derivative_by_the_distance():
 
 @pytest.mark.filterwarnings("error")
 def test_a_window_of_one_sample_is_answered():
-    """It has no width, and directions are counted in half angles of the window."""
+    """The window has no width, although directions are counted in half angles of the window."""
     pupil = optics.Pupil(25e-6)
     seen, exact = (
         optics.psf(pupil, shape=(1, 1), method=method).psf[0, 0, 0] for method in ("far_field", "rayleigh_sommerfeld")

@@ -1,4 +1,4 @@
-"""The paraxial methods: Airy is theirs exactly; how wrong they are, and that they say so."""
+"""The paraxial methods: they give Airy's pattern exactly, and they report their error."""
 
 import numpy as np
 import pytest
@@ -28,12 +28,12 @@ def test_a_paraxial_lens_makes_airys_pattern_in_fresnels_integral_and_in_no_exac
     assert relative_l2(paraxial.psf[0], airy) < 1e-6
     exact = optics.psf(lens, [WAVELENGTH], f, **settings, method="exact")
     departure = relative_l2(exact.psf[0], airy)
-    assert departure > 1e-3  # what the oracle must fail
+    assert departure > 1e-3  # the oracle must reject this
     assert departure < paraxial.plan.predicted_error < 30 * departure
 
 
 def test_fresnel_keeps_lommels_defocus():
-    """Out of focus the quadratic phases of lens and path no longer cancel (Lommel; paraxial)."""
+    """Out of focus the quadratic phases of lens and path do not cancel (Lommel; paraxial)."""
     radius, f, z = 30e-6, 300e-6, 330e-6
     found = optics.psf(
         paraboloid_lens(radius, f), [WAVELENGTH], z, dx=1e-6, shape=(41, 41), tolerance=1e-6, dtype="float64",
@@ -72,7 +72,7 @@ def errors(method, cases):
 
 
 def test_fresnels_error_falls_with_the_square_of_the_angle():
-    """At a fixed Fresnel number N the neglected phase a⁴/λz³ is N³ (λ/a)², and obliquity with (a/z)² = N² (λ/a)²."""
+    """The neglected phase a⁴/λz³ at a fixed Fresnel number N is N³ (λ/a)², and obliquity with (a/z)² = N² (λ/a)²."""
     radii = np.array([10e-6, 20e-6, 40e-6])
     cases = [(a, a**2 / WAVELENGTH, 1.5 * a) for a in radii]
     assert order_of_convergence(radii / radii[0], errors("fresnel", cases)) == pytest.approx(-2, abs=0.1)
@@ -88,7 +88,8 @@ def test_fraunhofers_error_falls_with_the_fresnel_number():
 @pytest.mark.fast_cases(1)
 @pytest.mark.parametrize(("method", "close"), [("fresnel", 0.95), ("fraunhofer", 0.8)])
 def test_predicted_error_bounds_the_actual_one(method, close):
-    """100 random pupils were 100 % bounded, fresnel 100 % and fraunhofer 90 % of them within 30x."""
+    """The bound held for 100 % of 100 random pupils; it was within 30x for 100 % (fresnel) and 90 % (fraunhofer) of
+    them."""
     rng = np.random.default_rng(3)
     planned, actual, seen = np.array([predicted_and_actual(random_case(rng), method) for _ in range(25)]).T
     assert np.mean(planned >= actual) >= 0.96
@@ -99,7 +100,7 @@ def test_predicted_error_bounds_the_actual_one(method, close):
 
 
 def test_auto_takes_fresnel_where_it_is_right_and_cheaper():
-    """A wide window far behind a small bent pupil at a loose tolerance: exact methods cost several times as much."""
+    """A wide window far behind a small bent pupil at a loose tolerance: exact methods cost several times more."""
     bent = Pupil(60e-6, BSplineRelief(2e-6 * np.random.default_rng(0).random((4, 4))))
     case = {"dx": 4e-6, "shape": (129, 129), "tolerance": 0.05}
     found = optics.psf(bent, [WAVELENGTH], 6e-3, **case)

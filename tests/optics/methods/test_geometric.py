@@ -1,4 +1,4 @@
-"""Ray density and pinhole: shadows, power, order, and what they cannot do."""
+"""Ray density and pinhole: shadows, power, order, and their limits."""
 
 import math
 
@@ -17,7 +17,8 @@ WAVELENGTH = 550e-9
 
 @pytest.mark.parametrize("aperture", [optics.Circle(), optics.Annulus(0.5), Polygon.regular(6)])
 def test_a_flat_pupil_throws_its_shadow(aperture):
-    """1/area where a straight line back hits the opening and 0 where not, but for the two cells that a splat covers."""
+    """The PSF is 1/area if a straight line back hits the opening and 0 otherwise, except for the two cells that a splat
+    covers."""
     pupil, z, angle = Pupil(30e-6, aperture=aperture), 50e-6, 0.3
     found = optics.psf(pupil, [WAVELENGTH], z, source_angle=(angle, 0.0), dx=1e-6, shape=(121, 121), method="geometric")
     x, y = np.meshgrid((found.x - z * math.tan(angle)) / 30e-6, found.y / 30e-6)
@@ -55,7 +56,7 @@ def test_evanescent_rays_do_not_arrive():
 
 
 def test_error_falls_with_the_fourth_root_of_the_fresnel_number():
-    """Fringes one Fresnel zone √(λz) wide along the shadow's rim; cells held at a tenth of a zone."""
+    """Fringes one Fresnel zone √(λz) wide lie along the shadow's rim; cells are fixed at a tenth of a zone."""
     distances = np.array([20e-6, 80e-6, 320e-6])
     errors = []
     for z in distances:
@@ -72,7 +73,7 @@ def test_error_falls_with_the_fourth_root_of_the_fresnel_number():
 @pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("method", ["geometric", "pinhole"])
 def test_predicted_error_bounds_the_actual_one(method):
-    """Of 120 random pupils all were bounded within a factor 1.2, and within 30x."""
+    """For 120 random pupils the prediction was always a bound within a factor of 1.2, and always within 30x."""
     rng = np.random.default_rng(4)
     planned, actual, seen = np.array([predicted_and_actual(random_case(rng), method) for _ in range(20)]).T
     assert np.mean(planned >= actual) >= 0.9
@@ -89,20 +90,20 @@ def test_auto_takes_rays_only_within_the_tolerance():
     assert coarse.predicted_error <= 0.5
     assert optics.plan(Pupil(2e-3), WAVELENGTH, 2e-3, **wide, tolerance=1e-2).method == "hankel"
     hexagon = Pupil(2e-3, aperture=optics.Polygon.regular(6))
-    with pytest.raises(optics.AccuracyError):  # no method can, and none is taken that errs by more
+    with pytest.raises(optics.AccuracyError):  # no method can, and none with a larger error is chosen
         optics.plan(hexagon, WAVELENGTH, 2e-3, **wide, tolerance=1e-2)
 
 
 @pytest.mark.slow
 def test_rays_have_no_derivatives_on_a_gpu(monkeypatch):
-    """As if this were one: who asks for rays is told so, and "auto" takes waves."""
+    """A request for rays is refused with a reason on a simulated GPU, and "auto" chooses waves."""
     import drjit as dr
 
     monkeypatch.setattr(geometric, "device", lambda: "cuda")
     radius = Float64(2e-3)
     dr.enable_grad(radius)
     asked = {"wavelengths": [WAVELENGTH], "sensor_distance": 2e-3, "dx": 40e-6, "shape": (9, 9), "tolerance": 0.5}
-    with pytest.raises(ValueError, match="has no derivatives on a GPU; ask for 'exact'"):
+    with pytest.raises(ValueError, match="has no derivatives on a GPU; use 'exact'"):
         optics.psf(Pupil(radius), **asked, method="geometric")
     found = optics.psf(Pupil(radius), **asked)
     assert found.plan.method == "hankel"
@@ -137,7 +138,7 @@ class TestPinhole:
             optics.psf(Pupil(20e-6), [WAVELENGTH], distance, source_angle=(0.1, 0.0), method="pinhole")
 
     def test_a_masks_derivative_is_refused_as_well(self):
-        """It changes how much light there is in the cell, if not which cell."""
+        """The mask changes the amount of light in the cell, though not the choice of cell."""
         import drjit as dr
 
         waist = Float64(10e-6)

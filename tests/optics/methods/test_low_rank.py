@@ -1,4 +1,5 @@
-"""The rank of the slow rest is what the tolerance needs: it holds at every tolerance, and is no larger than that."""
+"""The rank of the slow part follows the tolerance: it is sufficient at every tolerance, and not larger than
+necessary."""
 
 import numpy as np
 import pytest
@@ -24,7 +25,7 @@ def eyes(count):
 def errors(tolerance, count=8):
     found = []
     for beam in eyes(count):
-        problem, exactly = (Problem.of(beam, WINDOW, each, "float64") for each in (tolerance, 1e-8))
+        problem, exactly = (Problem.from_beam(beam, WINDOW, each, "float64") for each in (tolerance, 1e-8))
         (how,), (reference,) = low_rank(problem), nodes(exactly)
         exact = reference.intensity(beam, exactly).numpy()
         found.append(np.linalg.norm(how.intensity(beam, problem).numpy() - exact) / np.linalg.norm(exact))
@@ -34,7 +35,7 @@ def errors(tolerance, count=8):
 @pytest.mark.fast_cases(2)
 @pytest.mark.parametrize("tolerance", [1e-1, 1e-2, 1e-3, 1e-5])
 def test_sampling_takes_no_more_than_half_the_tolerance(tolerance):
-    """That is what a plan promises; rays' amplitudes err by less than the rim's, which the rank was chosen by."""
+    """A plan guarantees this; rays' amplitudes have a smaller error than the rim's, which determines the rank."""
     assert errors(tolerance).max() < tolerance / 2
 
 
@@ -48,9 +49,9 @@ def test_a_rank_chosen_for_far_more_error_breaks_the_promise(monkeypatch):
 @pytest.mark.parametrize("centre", [(0.0, 0.0), (9e-6, -4e-6)])
 @pytest.mark.parametrize("shape", [(1, 1), (1, 8), (9, 1), (33, 65), (16, 17), (17, 16)])
 def test_windows_of_any_shape_are_the_direct_sum_s(shape, centre, relief):
-    """Halves about the middle: with an even number of samples one side has none that mirrors its last."""
+    """The sum uses halves about the middle; with an even number of samples, one sample has no mirror image."""
     beam = next(eyes(1)) if relief is None else Beam(Pupil(15e-6, relief), PointSource(), 550e-9, Z)
-    problem = Problem.of(beam, Grid(shape, 0.25e-6, centre), 1e-6, "float64")
+    problem = Problem.from_beam(beam, Grid(shape, 0.25e-6, centre), 1e-6, "float64")
     (how,), (reference,) = low_rank(problem), nodes(problem)
     exact = reference.intensity(beam, problem).numpy()
     assert np.linalg.norm(how.intensity(beam, problem).numpy() - exact) < 1e-6 * np.linalg.norm(exact)
@@ -58,12 +59,12 @@ def test_windows_of_any_shape_are_the_direct_sum_s(shape, centre, relief):
 
 @pytest.mark.parametrize("dtype", ["float32", "float64"])
 def test_the_matrix_is_limited_in_bytes_and_not_in_samples_across(dtype):
-    """A strongly aberrated focus of a thousand zones, rank 7 of 700 samples, took the direct sum and 24 s before."""
+    """A strongly aberrated focus of a thousand zones has rank 7 of 700 samples; the direct sum would take 24 s."""
     tangent = 0.3 / np.sqrt(1 - 0.3**2)
     radius = 1000 * 550e-9 / tangent
     lens = Pupil(radius, thin_lens_focal_length=radius / tangent, wavefront=Zernike({(6, 2): 0.08, (5, 5): 0.08}))
     beam = Beam(lens, PointSource(), 550e-9, radius / tangent)
-    found = low_rank(Problem.of(beam, Grid.square(513, 550e-9 / 0.3 / 8), 1e-3, dtype))
+    found = low_rank(Problem.from_beam(beam, Grid.square(513, 550e-9 / 0.3 / 8), 1e-3, dtype))
     if dtype == "float64":
         assert found == []
         return
@@ -73,9 +74,9 @@ def test_the_matrix_is_limited_in_bytes_and_not_in_samples_across(dtype):
 
 
 def test_it_is_not_offered_close_to_the_pupil():
-    """A wavelength behind a pupil sixty times as wide it erred by 0.2 where 5e-3 was predicted."""
+    """One wavelength behind a pupil sixty times as wide, its error would be 0.2 where 5e-3 is predicted."""
     window = {"sensor_distance": 0.5e-6, "dx": 0.1e-6, "shape": (9, 9)}
-    even = optics.MaskMap(np.ones((4, 4)))  # only without symmetry is it the cheapest
+    even = optics.MaskMap(np.ones((4, 4)))  # the cheapest only without symmetry
     found = optics.psf(optics.Pupil(30e-6, mask=even), [500e-9], tolerance=1e-2, **window)
     exact = optics.psf(optics.Pupil(30e-6), [500e-9], tolerance=1e-6, dtype="float64", **window)
     assert np.linalg.norm(found.psf - exact.psf) < found.plan.predicted_error * np.linalg.norm(exact.psf)

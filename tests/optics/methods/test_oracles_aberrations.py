@@ -1,4 +1,4 @@
-"""Strehl ratios of aberrated pupils: the relief carries the aberration, the oracle says what it costs.
+"""Strehl ratios of aberrated pupils: the relief carries the aberration, and the oracle gives the loss.
 
 f/20: the exact integral's weights differ from the paraxial ones by NA², 6e-4.
 """
@@ -26,7 +26,8 @@ def aberrated(wavefront, **changes):
 
 
 def on_axis(pupil, distance=FOCAL_LENGTH):
-    """The PSF at the reference point over an unaberrated one: aberrated light may be brighter elsewhere."""
+    """The PSF at the reference point relative to an unaberrated one; aberrated light may be brighter at another
+    point."""
     result = optics.psf(pupil, [WAVELENGTH], distance, dx=1e-6, shape=(1, 1), tolerance=1e-5, dtype="float64")
     return float(result.psf[0, 0, 0]) * pupil.area / abs(converging(pupil.aperture_radius, distance)) ** 2
 
@@ -63,14 +64,14 @@ class TestStrehlRatio:
         got = on_axis(aberrated(wavefront(w)))
         assert got == pytest.approx(expected, abs=1e-3)
         assert got == pytest.approx(reference.marechal_strehl(sigma), abs=0.003 if sigma < 0.1 else 0.08)
-        # the same with an RMS off by a tenth, or a wave taken for a radian, is told apart
+        # an RMS off by a tenth, or a wave taken for a radian, gives a different result
         assert abs(law(1.1 * w) - expected) > 0.015
         assert abs(law(w / (2 * np.pi)) - expected) > 0.09
 
     @pytest.mark.parametrize("sigma", [0.05, 0.15])
     def test_peak_of_coma_lies_where_a_tilt_balances_it(self, sigma):
-        """`strehl_ratio` is that of the brightest place, wherever samples lie: the greatest of the closed form over all
-        tilts. On the axis there is less, and a window that ends there is refused."""
+        """`strehl_ratio` refers to the brightest place, wherever samples lie: the maximum of the closed form over all
+        tilts. The value on the axis is lower, and a window that ends there is refused."""
         w = sigma / reference.RMS_PER_WAVE["coma"]
         best = minimize_scalar(lambda tilt: -reference.strehl_coma(w, tilt), bounds=(-w, 0), options={"xatol": 1e-6})
         pupil = aberrated(WAVEFRONTS["coma"][0](w))
@@ -80,24 +81,24 @@ class TestStrehlRatio:
         assert error < 1e-3
         assert reference.strehl_coma(w) < 0.93 * got
         one = optics.psf(pupil, [WAVELENGTH], FOCAL_LENGTH, dx=1e-6, shape=(1, 1))
-        with pytest.raises(optics.AccuracyError, match="grows towards"):
+        with pytest.raises(optics.AccuracyError, match="increases towards"):
             optics.strehl_ratio(one)
 
     @pytest.mark.parametrize("j", range(4, 16))
     def test_zernikes_cost_by_their_rms_alone(self, j):
-        """0.04 waves of any of them: exp(-(2πσ)²), to the third moments of order σ³."""
+        """0.04 waves of any Zernike mode give exp(-(2πσ)²), up to third moments of order σ³."""
         got = on_axis(aberrated(0.04 * reference.zernike(j, RHO, THETA)))
         assert got == pytest.approx(reference.marechal_strehl(0.04), abs=3e-3)
 
     def test_balance_has_a_sign(self):
-        """W040 with W020 = -W040 is balanced; +W040 in place of it is as bad as it gets."""
+        """W040 with W020 = -W040 is balanced; +W040 instead gives the worst case."""
         right, wrong = (on_axis(aberrated(1.5 * (RHO**4 + sign * RHO**2))) for sign in (-1, 1))
         assert right == pytest.approx(reference.strehl_spherical(1.5, -1.5), abs=2e-3)
         assert wrong == pytest.approx(reference.strehl_spherical(1.5, 1.5), abs=2e-3)
         assert right > 20 * wrong
 
     def test_sensor_balances_what_glass_adds(self):
-        """Glass thicker at the rim delays the rim: W > 0 diverges, so the sensor has to go back, not forward.
+        """Glass that is thicker at the rim delays the rim: W > 0 diverges, so the sensor has to move back, not forward.
 
         Sensor shift: W020 = R² (1/z - 1/f) / (2λ), paraxially.
         """
@@ -111,7 +112,7 @@ class TestStrehlRatio:
 
     @pytest.mark.parametrize("waves", [-0.8, -0.3, 0.3, 0.8])
     def test_defocus_by_lens_relief_or_sensor_is_the_same(self, waves):
-        """sinc² three ways; the glass also bends by (n - 1) h, so n, λ and h are all in it."""
+        """sinc² in three ways; the glass bends light by (n - 1) h, so the test covers n, λ and h."""
         expected = reference.strehl_defocus(waves)
         curvature = waves * 2 * WAVELENGTH / RADIUS**2
         by_relief = on_axis(aberrated(waves * RHO**2))
@@ -137,7 +138,7 @@ class TestStrehlRatio:
         assert reference.order_of_convergence(apertures, errors) > 1.8
 
     def test_samples_of_the_relief_converge_with_the_fourth_power(self):
-        """Cubic splines through cell centres: an uneven wavefront of half a wave on 8, 16, 32 samples."""
+        """Cubic splines through cell centres: an asymmetric wavefront of half a wave on 8, 16, 32 samples."""
 
         def strehl(count):
             x = (np.arange(count) + 0.5) * 2 / count - 1

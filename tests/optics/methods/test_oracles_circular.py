@@ -33,7 +33,8 @@ def exact_psf(result):
 class TestExactIntegral:
     @pytest.mark.parametrize("f_number", [1.4, 2, 2.8, 4, 8, 16])
     def test_lens_in_focus(self, f_number):
-        """±10 λ f#. Seven digits asked and given; Airy's pattern would be off by 2e-3 at f/16, 0.1 at f/1.4."""
+        """±10 λ f#. Seven digits are requested and obtained; Airy's pattern would have an error of 2e-3 at f/16, 0.1 at
+        f/1.4."""
         result = optics.psf(
             lens(f_number), [WAVELENGTH], 300e-6, dx=WAVELENGTH * f_number / 4, shape=(81, 81), tolerance=1e-7,
             dtype="float64",
@@ -68,7 +69,7 @@ class TestExactIntegral:
 
     @pytest.mark.parametrize("z", [5e-6, 17e-6, 40e-6, 300e-6, 2e-3])
     def test_axis_behind_an_aperture(self, z):
-        """From a quarter of the radius to Fresnel number 0.36."""
+        """Distances from a quarter of the radius to Fresnel number 0.36."""
         result = optics.psf(
             optics.Pupil(20e-6),
             [WAVELENGTH],
@@ -79,15 +80,15 @@ class TestExactIntegral:
             dtype="float64",
         )
         exact = reference.circular_aperture_on_axis(20e-6, z, WAVELENGTH)
-        # the tolerance is on the window's norm; where the axis is dark it is a share of its surroundings
+        # the tolerance refers to the window's norm; on a dark axis it is a share of the surroundings
         bright = float(np.sqrt(np.mean(result.psf**2))) * result.pupil.area
         assert result.psf[0, 4, 4] * result.pupil.area == pytest.approx(exact, abs=5e-6 * bright)
 
     @pytest.mark.parametrize("pitch", [1e-3, 0.03])
     @pytest.mark.parametrize("f_number", [1.4, 2, 2.8, 8])
     def test_nodes_suffice_where_hardly_a_wave_turns(self, f_number, pitch):
-        """About a focus all paths are the same: nodes are needed for the obliquity alone. Two that would do for the
-        phase err by 6e-4 at f/2, and no check by as few could tell."""
+        """All paths are equal at a focus, so nodes are needed for the obliquity alone. The two nodes that suffice for
+        the phase have an error of 6e-4 at f/2, and a check with equally few nodes could not detect it."""
         result = optics.psf(
             lens(f_number), [WAVELENGTH], 300e-6, dx=pitch * WAVELENGTH * f_number, shape=(9, 9), tolerance=1e-7,
             dtype="float64", method="rayleigh_sommerfeld",
@@ -96,7 +97,7 @@ class TestExactIntegral:
 
     @pytest.mark.parametrize("f_number", [0.7, 1, 2, 8])
     def test_peak_of_a_converging_wave(self, f_number):
-        """Strehl ratio 1 at any aperture, against the oracle's own peak: Airy's is 25 % too high at f/0.7."""
+        """The Strehl ratio is 1 at any aperture, against the oracle's own peak: Airy's is 25 % too high at f/0.7."""
         result = optics.psf(
             lens(f_number),
             [WAVELENGTH],
@@ -111,7 +112,7 @@ class TestExactIntegral:
         assert optics.strehl_ratio(result)[0] == pytest.approx(1, abs=2e-6)
 
     def test_finite_source(self):
-        """A point at 500 µm, sensor before, in and behind its image: the exact integral with both phases."""
+        """A point at 500 µm, sensor in front of, in and behind its image: the exact integral with both phases."""
         pupil = lens(4, 200e-6)
         image = reference.thin_lens_image_distance(200e-6, 500e-6)
         for z in (0.9 * image, image, 1.1 * image):
@@ -132,12 +133,12 @@ class TestExactIntegral:
 
 
 class TestParaxialLimits:
-    """Closed forms of the paraxial theory are limits: the package must leave them like the aperture squared."""
+    """Closed forms of the paraxial theory are limits: the package must deviate from them like the aperture squared."""
 
     APERTURES = (0.05, 0.1, 0.2)
 
     def departure(self, defocus_waves, closed_form, fresnel_number=20.0):
-        """Misfit at constant Fresnel number and defocus, where the paraxial pattern is always the same."""
+        """Misfit at constant Fresnel number and defocus, which give the same paraxial pattern."""
         errors = []
         for aperture in self.APERTURES:
             f = fresnel_number * WAVELENGTH / aperture**2
@@ -162,7 +163,7 @@ class TestParaxialLimits:
         errors = self.departure(waves, paraxial)
         assert errors[0] < 1e-2
         assert reference.order_of_convergence(self.APERTURES, errors) == pytest.approx(2, abs=0.15)
-        # Debye's form, symmetric about the focus, is not that limit: it misses the scale z/f
+        # Debye's form, symmetric about the focus, is not that limit: it lacks the scale z/f
         debye = self.departure(
             waves,
             lambda r, radius, f, z: (
@@ -179,28 +180,30 @@ class TestQuality:
     SLOW = optics.Pupil(0.5e-3, thin_lens_focal_length=50e-3)  # f/50, Fresnel number 9, NA 0.01: Airy to 1e-4
 
     def window(self, rings, samples_per_ring=8):
-        """Window in units of λ f#."""
+        """PSF on a window in units of λ f#."""
         n = 2 * rings * samples_per_ring + 1
         return optics.psf(
             self.SLOW, [WAVELENGTH], 50e-3, dx=50 * WAVELENGTH / samples_per_ring, shape=(n, n), tolerance=1e-4
         )
 
     def test_mtf_is_that_of_a_disk_as_the_window_grows(self):
-        """A window of W rings misses 2/(π² W) of the light, which would lift all frequencies: order -1. Relative to all
-        light that arrives, only the sharp edge of the window is left; what is missing is the predicted error."""
+        """A window of W rings misses 2/(π² W) of the light, which would raise all frequencies: order -1. Relative to
+        all the light that arrives, only the sharp edge of the window remains as an error; the missing light is the
+        predicted error."""
         f = np.linspace(0.1, 0.9, 9) / (50 * WAVELENGTH)
         expected = reference.circular_mtf(f, WAVELENGTH, 0.5e-3, 50e-3)
         rings, lifted, errors, predicted = (4, 8, 16), [], [], []
         for count in rings:
             result = self.window(count, 4)
-            transfer = optics.mtf(result, tolerance=1)  # as the window is
+            transfer = optics.mtf(result, tolerance=1)  # for the window as it is
             contrast = transfer.profile(f)[0]
             lifted.append(np.abs(contrast / result.power[0] - expected).mean())
             errors.append(np.abs(contrast - expected))
             predicted.append(transfer.predicted_error[0])
         assert reference.order_of_convergence(rings, lifted) == pytest.approx(-1, abs=0.25)
         assert reference.order_of_convergence(rings, predicted) == pytest.approx(-1, abs=0.25)
-        # Fast, since frequencies lie where they are asked for: on straight lines between a grid's the order was -1.2.
+        # The order is high because frequencies are evaluated exactly; on straight lines between grid frequencies it was
+        # -1.2.
         assert reference.order_of_convergence(rings, [error.mean() for error in errors]) < -2
         assert all(error.max() < bound < 0.05 for error, bound in zip(errors, predicted, strict=True))
         assert errors[-1].mean() < 1e-4
@@ -215,7 +218,8 @@ class TestQuality:
         assert np.abs(transfer.profile(f)[0] - expected).max() < transfer.predicted_error[0] < 0.02
 
     def test_encircled_energy_is_airys(self):
-        """At any pitch, to the 2e-5 of Airy itself. Four clipped cells to a ring would err by more."""
+        """The energy agrees at any pitch, up to the 2e-5 of Airy's own error. Four clipped cells per ring would have a
+        larger error."""
         zeros = reference.AIRY_ZEROS[:4] / np.pi * 50 * WAVELENGTH
         expected = reference.airy_encircled_energy(zeros, WAVELENGTH, 0.5e-3, 50e-3)
         for count in (4, 8, 16):
@@ -229,7 +233,7 @@ class TestQuality:
 
 
 class TestOrdersOfConvergence:
-    """A hard edge on a grid converges like N^-1 to N^-1.5; the soft edge of `psf` gives what is asked."""
+    """A hard edge on a grid converges like N^-1 to N^-1.5; the soft edge of `psf` reaches the tolerance."""
 
     RADIUS, Z = 20e-6, 60e-6
 
@@ -253,7 +257,7 @@ class TestOrdersOfConvergence:
 
     @pytest.mark.parametrize("method", ["angular_spectrum", "rayleigh_sommerfeld", "auto"])
     def test_soft_edge(self, method):
-        """Five more digits for less than four times the samples across."""
+        """Five more digits for less than four times the number of samples across."""
         samples, errors = [], []
         for tolerance in (1e-3, 1e-5, 1e-8):
             result = optics.psf(

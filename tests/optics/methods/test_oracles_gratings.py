@@ -49,23 +49,23 @@ class TestFieldOrders:
     @pytest.mark.fast_cases(4)
     @pytest.mark.parametrize("name", CASES)
     def test_every_order_has_its_share(self, name):
-        """16 samples per period: order m of a step is off by 1 - sinc²(m/16), 4 % of it at m = 2."""
+        """16 samples per period: order m of a step has an error of 1 - sinc²(m/16), 4 % at m = 2."""
         phase, law = self.CASES[name]
         orders = (-2, -1, 0, 1, 2)
         got = self.efficiencies(phase, 16, orders)
         expected = np.array([law(m) for m in orders])
         np.testing.assert_allclose(got, expected, rtol=0.06, atol=3e-3)
         if name not in ("binary", "shallow binary", "narrow binary", "sinusoidal"):
-            assert np.abs(got - expected[::-1]).max() > 0.5  # a sawtooth that falls sends its light to the other side
+            assert np.abs(got - expected[::-1]).max() > 0.5  # a falling sawtooth sends its light to the other side
 
 
 class TestReliefs:
-    """The same laws where the grating is glass on a pupil: peaks of its orders over the peak without it."""
+    """The same laws for a glass grating on a pupil: peaks of its orders over the peak without it."""
 
     RADIUS, PERIODS, N, Z = 100e-6, 16.2473, 1.5, 4e-3  # π x periods is a zero of J1: order 0 is dark at order 1
 
     def peak(self, height, order, n=1.5, wavelength=WAVELENGTH):
-        """PSF at an order's place, of a pupil with an ideal lens; orders are 16 Airy radii apart."""
+        """PSF at an order's place, for a pupil with an ideal lens; orders are 16 Airy radii apart."""
         pupil = optics.Pupil(self.RADIUS, height, n=n, thin_lens_focal_length=self.Z)
         place = self.Z * np.tan(np.arcsin(order * wavelength * self.PERIODS / (2 * self.RADIUS)))
         dx = abs(place) if order else 1e-6
@@ -83,13 +83,14 @@ class TestReliefs:
         flat = self.peak(None, 0)
         for order in (-1, 0, 1):
             law = reference.sinusoidal_grating_efficiency(order, depth)
-            # neighbours' rings and the lens's coma at 4°: a per cent of the brightest
+            # neighbours' rings and the lens's coma at 4°: one per cent of the brightest order
             assert self.peak(height, order) / flat == pytest.approx(law, abs=0.01)
         assert self.peak(height, 0, n=1.0) == pytest.approx(flat, rel=1e-6)
 
     @pytest.mark.slow
     def test_binary_relief_starves_order_zero(self):
-        """Half a wave of glass at half the duty: 0 and 40.5 %; the spline rounds the steps, which converges."""
+        """Half a wave of glass at half the duty: 0 and 40.5 %; the spline rounds the steps, with an error that
+        converges."""
         errors, samples = [], (128, 256)
         flat = self.peak(None, 0)
         for count in samples:

@@ -1,4 +1,4 @@
-"""Where light comes to a focus: over wavelength, source distance, and the radius of a pinhole."""
+"""Positions of foci: over wavelength, source distance, and the radius of a pinhole."""
 
 import math
 
@@ -18,16 +18,16 @@ def peak(pupil, wavelength, z, **options):
 
 
 class TestChromaticFocus:
-    RADIUS, FOCAL_LENGTH = 60e-6, 2e-3  # f/17: paraxial to NA², 1e-3
+    RADIUS, FOCAL_LENGTH = 60e-6, 2e-3  # f/17: paraxial up to NA², 1e-3
 
     @pytest.mark.parametrize("wavelength", [420e-9, 550e-9, 680e-9])
     def test_refractive_relief(self, wavelength):
-        """Dispersive glass, n(λ) - 1 over f: through focus, the axis follows Fresnel's closed form of that f(λ)."""
+        """Dispersive glass, n(λ) - 1 over f: through focus, the axis follows Fresnel's closed form with that f(λ)."""
         glass = optics.RefractiveIndex.from_abbe(1.62, 20.0)
         curvature_radius = self.FOCAL_LENGTH * 0.62
         relief = optics.BSplineRelief.paraboloid(2e-6, 1 / curvature_radius, self.RADIUS)
         pupil = optics.Pupil(self.RADIUS, relief, n=glass)
-        index = 1.62 + glass.b * (1 / wavelength**2 - 1 / 587.562e-9**2)  # Cauchy's term, by hand
+        index = 1.62 + glass.b * (1 / wavelength**2 - 1 / 587.562e-9**2)  # Cauchy's term, written out
         f = reference.refractive_focal_length(curvature_radius, index)
         distances = f * np.array([0.8, 0.95, 1.0, 1.15, 1.4])
         got = np.array([peak(pupil, wavelength, z) for z in distances])
@@ -75,7 +75,7 @@ class TestChromaticFocus:
         return float(np.abs(out.u[4, 4]) ** 2 / (np.pi * radius**2))
 
     def test_the_two_shift_in_opposite_directions(self):
-        """Blue focuses nearer behind glass, farther behind zones: by the PSF's own best distance."""
+        """Blue focuses nearer behind glass and farther behind zones, by the PSF's own best distance."""
         glass = optics.RefractiveIndex.from_abbe(1.62, 20.0)
         assert glass.at(440e-9) > glass.at(660e-9)
         refractive = [reference.refractive_focal_length(1.24e-3, glass.at(w)) for w in (440e-9, 660e-9)]
@@ -92,7 +92,7 @@ class TestChromaticFocus:
 class TestThinLens:
     @pytest.mark.parametrize("conjugate", [1.5, 2.0, 4.0])
     def test_image_of_a_finite_source_is_airys(self, conjugate):
-        """f/17 to NA²: Airy's pattern on the image plane, with the image distance as its focal length."""
+        """f/17, up to NA²: Airy's pattern on the image plane, with the image distance as its focal length."""
         f, radius = 2e-3, 60e-6
         pupil = optics.Pupil(radius, thin_lens_focal_length=f)
         source = conjugate * f
@@ -105,7 +105,7 @@ class TestThinLens:
         assert reference.relative_l2(unfocused.psf[0], reference.airy_psf(r, DESIGN, radius, image)) > 0.2
 
     def test_magnification(self):
-        """A source in direction θ comes to z tan θ, the ray through the centre, upside down."""
+        """A source in direction θ has its image at z tan θ, on the ray through the centre, upside down."""
         f, angle = 2e-3, 0.05
         image = reference.thin_lens_image_distance(f, 3 * f)
         pupil = optics.Pupil(60e-6, thin_lens_focal_length=f)
@@ -117,7 +117,7 @@ class TestThinLens:
         assert result.x[np.argmax(result.psf[0, 0])] == pytest.approx(place, rel=1e-6)
 
     def test_through_focus_is_lommels(self):
-        """On the axis, over distance, for a finite source: 1/f - 1/s in place of 1/f."""
+        """The axis over distance for a finite source: 1/f - 1/s in place of 1/f."""
         f, s, radius = 2e-3, 5e-3, 80e-6
         image = reference.thin_lens_image_distance(f, s)
         pupil = optics.Pupil(radius, thin_lens_focal_length=f)
@@ -132,9 +132,10 @@ class TestThinLens:
 
 class TestPinhole:
     def test_sharpest_radius(self):
-        """The PSF's peak over the hole's radius: highest at √(0.742 λz), by a parabola through the package's own peaks.
+        """The PSF's peak over the pinhole's radius: highest at √(0.742 λz), by a parabola through the package's own
+        peaks.
 
-        NA = 0.02: paraxial to 4e-4.
+        NA = 0.02: paraxial up to 4e-4.
         """
         z = 1e-3
         best = reference.pinhole_radius(DESIGN, z)
@@ -144,7 +145,7 @@ class TestPinhole:
         assert -fit[1] / (2 * fit[0]) == pytest.approx(1, abs=0.01)  # the parabola's cubic remainder
         expected = float(reference.defocused_psf(0.0, DESIGN, best, math.inf, z))
         assert peaks[2] == pytest.approx(expected, rel=2e-3)
-        # not the geometric balance, nor the brightest axis
+        # neither the geometric balance nor the brightest axis
         for other in (math.sqrt(0.61 / 0.742), math.sqrt(1 / 0.742)):
             assert peak(optics.Pupil(best * other), DESIGN, z) < 0.99 * peaks[2]
 

@@ -1,4 +1,4 @@
-"""Plane-to-plane propagation against waves whose propagation is known, and against the laws all waves obey."""
+"""Plane-to-plane propagation against waves with a known propagation, and against laws that all waves obey."""
 
 import numpy as np
 import pytest
@@ -19,7 +19,7 @@ def radii(n, dx):
 
 
 def plateau(n, dx, half_width, edge):
-    """1 in the middle, falling smoothly: its edges send light only where their narrow spectrum leads."""
+    """A profile of 1 in the middle that falls smoothly: its edges send light only within their narrow spectrum."""
     x = positions(n, dx)
     profile = (erf((x + half_width) / edge) - erf((x - half_width) / edge)) / 2
     return profile[:, None] * profile[None, :]
@@ -42,7 +42,7 @@ class TestGaussian:
         ],
     )
     def test_exact(self, waist, z, dtype, bound):
-        """Amplitude and phase; at λ/(πw0) = 0.27 a field of 2e-7 leaves at grazing and is not kept, at 0.05 none."""
+        """Amplitude and phase; at λ/(πw0) = 0.27 a grazing field of 2e-7 leaves and is cut off, at 0.05 none."""
         dx, n = waist / 6, 64
         out_dx = waist * np.hypot(1, z * WAVELENGTH / (np.pi * waist**2)) / 8
         out = optics.propagate(
@@ -63,7 +63,7 @@ class TestGaussian:
 
     @pytest.mark.parametrize("z", [-60e-6, 5e-6, 60e-6])
     def test_paraxial(self, z):
-        """Width, curvature and Gouy's phase, before and behind the waist."""
+        """Width, curvature and Gouy's phase, in front of and behind the waist."""
         waist, n, dx = 3e-6, 64, 0.5e-6
         out = optics.propagate(
             np.exp(-((radii(n, dx) / waist) ** 2)),
@@ -161,7 +161,7 @@ class TestTalbot:
         paraxial = reference.paraxial_talbot_distance(self.PERIOD, WAVELENGTH)
         assert reference.relative_l2(np.abs(self.row(exact)) ** 2, start) < 1e-3
         assert reference.relative_l2(np.abs(self.row(paraxial)) ** 2, start) > 0.1
-        # Fresnel's method has its image at the paraxial distance: the test does tell the two theories apart
+        # Fresnel's method has its image at the paraxial distance, so the test distinguishes the two theories
         assert reference.relative_l2(np.abs(self.row(paraxial, "fresnel")) ** 2, start) < 1e-3
         assert reference.relative_l2(np.abs(self.row(exact, "fresnel")) ** 2, start) > 0.1
 
@@ -176,7 +176,7 @@ class TestEdges:
         return slit[:, None] * slit[None, :]
 
     def square(self, samples, method="fresnel"):
-        """Odd, so that the edges fall midway between samples."""
+        """The number of samples is odd, so that the edges fall midway between samples."""
         u = np.ones((samples, samples))
         settings = {"wavelength": WAVELENGTH, "distance": self.Z, "out_dx": self.OUT, "out_shape": (41, 41)}
         out = optics.propagate(
@@ -200,7 +200,7 @@ class TestEdges:
         assert reference.relative_l2(np.abs(sinc[:, None] * sinc), np.abs(self.slits())) > 0.2
 
     def test_a_wide_screen_shows_the_knife_edge(self):
-        """80 µm wide, seen within 6 µm of one edge: the other one is too far to tell, the pitch counts, squared."""
+        """80 µm wide, observed within 6 µm of one edge: the other is too far away, so the error goes with pitch²."""
         width, z, pitches, errors = 80e-6, 20e-6, (0.5e-6, 0.25e-6, 0.125e-6), []
         for dx in pitches:
             n, m = int(width / dx), int(40e-6 / dx) | 1
@@ -218,7 +218,7 @@ class TestEdges:
 
 
 class TestNothingComesBack:
-    """Light that walks out of the window must not wrap around into it: against the sum over samples, one by one."""
+    """Light that leaves the window must not wrap around into it; the reference is a sum over samples."""
 
     @pytest.mark.parametrize(("sine", "z"), [(0.5, 60e-6), (0.6, 40e-6), (0.8, 20e-6), (0.8, 40e-6), (0.9, 40e-6)])
     @pytest.mark.parametrize("tolerance", [1e-2, 1e-3])
@@ -231,7 +231,7 @@ class TestNothingComesBack:
         try:
             out = optics.propagate(u, **settings, tolerance=tolerance)
         except optics.AccuracyError:
-            assert sine * tolerance < 1e-3  # only so much light so near to grazing may be refused
+            assert sine * tolerance < 1e-3  # only this little light at grazing angles may be refused
             return
         assert reference.relative_l2(np.abs(out.u[n // 2]) ** 2, np.abs(exact) ** 2) < tolerance
 
@@ -249,7 +249,7 @@ class TestLaws:
         return coarse[0] + 1j * coarse[1]
 
     def test_parseval(self):
-        """Power into a window that holds all light, less what does not propagate, by an independent transform."""
+        """Power in a window that holds all light, minus the evanescent part, by an independent transform."""
         n, dx = 64, 0.2e-6  # frequencies up to 1.25/λ along an axis
         u = self.random(n, 1)
         spectrum = np.abs(np.fft.fft2(u, (1024, 1024))) ** 2
@@ -263,10 +263,10 @@ class TestLaws:
         arrived = np.sum(np.abs(out.u) ** 2) / np.sum(np.abs(u) ** 2)
         # grazing light leaves even this window
         assert arrived == pytest.approx(1 - evanescent, abs=0.02)
-        assert abs(1 - arrived) > 0.03  # |H| = 1 everywhere would keep it all
+        assert abs(1 - arrived) > 0.03  # |H| = 1 everywhere would preserve it all
 
     def test_reciprocity(self):
-        """∫ v (P t Q u) = ∫ u (Q t P v): source and sensor swapped behind a random screen see the same amplitude.
+        """∫ v (P t Q u) = ∫ u (Q t P v): source and sensor swapped behind a random screen have the same amplitude.
 
         A kernel shifted by half a sample, or one that is not even, breaks it.
         """
@@ -285,7 +285,7 @@ class TestLaws:
         assert abs(shifted - there) > 1e-2 * abs(there)
 
     def test_reciprocity_of_source_and_sensor(self):
-        """On the axis of a lens: z² PSF(s -> z) = s² PSF(z -> s), to the aperture squared (unit waves on the pupil)."""
+        """Law on a lens' axis: z² PSF(s -> z) = s² PSF(z -> s), to the aperture squared (unit waves on the pupil)."""
         errors, apertures = [], (0.05, 0.1, 0.2)
         for aperture in apertures:
             f = 20 * WAVELENGTH / aperture**2

@@ -1,4 +1,5 @@
-"""What plans say of scalar theory: against Richards and Wolf's integrals, and the vector focus of many pupils."""
+"""The error of scalar theory that plans report: against Richards and Wolf's integrals, and the vector focus of many
+pupils."""
 
 import math
 
@@ -19,8 +20,8 @@ def lens(sine, **others):
 
 
 def in_focus(sine):
-    """Relative L2 errors over the plane in light polarised along x and unpolarised: around the axis a field
-    (I₀ + I₂ cos 2φ, I₂ sin 2φ, -2i I₁ cos φ) has the intensity a + b cos 2φ."""
+    """Relative L2 errors over the plane in light polarised along x and unpolarised. A field around the axis of (I₀ + I₂
+    cos 2φ, I₂ sin 2φ, -2i I₁ cos φ) has the intensity a + b cos 2φ."""
     rho = np.linspace(0, 25 / sine, 1500) * WAVE
     light = Light(lambda theta: 1 / np.cos(theta))
     along, axial, twice, scalar = focal_integrals(rho, 2 * math.pi / WAVE, F, (0.0, math.asin(sine)), light)
@@ -41,7 +42,7 @@ def test_a_round_pupil_in_focus_errs_as_tabulated(sine):
 @pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("sine", [0.1, 0.3])
 def test_unpolarised_light_errs_by_what_curvature_it_has(sine):
-    """Of second order it is -∇²I/4k², here of Airy's disk and without any vector."""
+    """The error is -∇²I/4k² to second order, here for Airy's disk and without any vector theory."""
     u = np.linspace(1e-6, 80, 20001)
     from scipy.special import j1, jv
 
@@ -72,14 +73,14 @@ def test_steep_plans_name_it_and_others_do_not():
         optics.Pupil(62e-6, thin_lens_focal_length=30e-6), WAVE, 30e-6, dx=0.1e-6, shape=(33, 33), tolerance=1e-2
     )
     assert steep.scalar_error == pytest.approx(MARGIN * in_focus(0.9)[0], rel=0.02)
-    assert "scalar theory    errs by up to 0.6" in str(steep)
+    assert "scalar theory    error up to 0.6" in str(steep)
     hole = optics.plan(optics.Pupil(30e-6), WAVE, 30e-6, dx=0.5e-6, shape=(33, 33), tolerance=1e-2)
-    assert hole.scalar_error < 1e-3  # as wide an angle, but the light goes straight on
+    assert hole.scalar_error < 1e-3  # the same angle, but the light goes straight on
     assert "scalar theory" not in str(hole)
 
 
 def test_a_population_says_it_too():
-    """As the pupil alone."""
+    """Plans of a population report the error, equal to that of a single pupil."""
     eye = optics.Pupil(20e-6, aperture=optics.Annulus(0.5), thin_lens_focal_length=100e-6)
     window = {"dx": 0.3e-6, "shape": (33, 33), "tolerance": 0.02}
     [together] = optics.psf_batch([eye], [WAVE], **window).plans
@@ -94,7 +95,7 @@ def test_a_population_says_it_too():
 
 
 def pupils(rng):
-    """Of all kinds, aberrated by up to .6 waves, and how far out of focus [λ/sine²]."""
+    """Random pupils of all kinds, aberrated by up to 0.6 waves, and their defocus [λ/sine²]."""
     sine = float(rng.choice([0.1, 0.3, 0.5, 0.7, 0.85, 0.9]))
     weights = rng.normal(size=len(MODES))
     rms = float(rng.choice([0.0, 0.03, 0.07, 0.15, 0.3, 0.6])) * WAVE * 1e6
@@ -115,7 +116,8 @@ def pupils(rng):
 
 
 def errors(light, rng):
-    """Of scalar theory, over windows of several widths about the brightest sample, unpolarised and along 8 planes."""
+    """Errors of scalar theory, over windows of several widths about the brightest sample, unpolarised and along 8
+    planes."""
     y, x = np.unravel_index(light.scalar.argmax(), light.scalar.shape)
     turns = np.arange(8) * np.pi / 8
     fields = np.tensordot(np.stack([np.cos(turns), np.sin(turns)], 1), light.parts, axes=1) * math.sqrt(2)

@@ -1,4 +1,4 @@
-"""Samples in sines: every aperture, on and off the axis, to the tolerance asked; and few where zones are many."""
+"""Samples in sines: every aperture, on and off the axis, reaches the tolerance; many zones need few samples."""
 
 import dataclasses
 import math
@@ -21,8 +21,8 @@ APERTURES = {"circle": Circle(), "ring": Annulus(0.6), "hexagon": Polygon.regula
 
 
 def error(beam, window, tolerance):
-    """Actual, of low_rank's picture against the sum over nodes; float64."""
-    problem, exactly = (Problem.of(beam, window, each, "float64") for each in (tolerance, 1e-3 * tolerance))
+    """Actual error of low_rank's PSF against the sum over nodes; float64."""
+    problem, exactly = (Problem.from_beam(beam, window, each, "float64") for each in (tolerance, 1e-3 * tolerance))
     (how,), (reference,) = low_rank(problem), nodes(exactly)
     assert isinstance(how.pupil, SineSamples)
     exact = reference.intensity(beam, exactly).numpy()
@@ -41,7 +41,8 @@ def bent(radius, distance, aperture, seed):
 @pytest.mark.parametrize("tolerance", [1e-2, 1e-4, 1e-7])
 @pytest.mark.parametrize("place", [0.0, 0.7])
 def test_half_the_tolerance_holds_for_every_aperture_on_and_off_the_axis(name, tolerance, place):
-    """At half a right angle, too, where a sine's step is several times as long on the pupil as on its axis."""
+    """It also holds at half a right angle, where a step in sines is several times as long on the pupil as on its
+    axis."""
     distance = 100e-6
     source = PointSource(300e-6, (math.atan(place), -math.atan(place / 2)))
     centre = (place * distance, -place / 2 * distance)
@@ -53,8 +54,8 @@ def test_half_the_tolerance_holds_for_every_aperture_on_and_off_the_axis(name, t
 
 @pytest.mark.slow
 def test_many_zones_take_no_more_samples_than_their_aberrations():
-    """About the focus of a lens of Fresnel number N: the samples are those of Zernike's waves and of the window,
-    whatever N, and the picture that of the direct sum."""
+    """About the focus of a lens of Fresnel number N, the samples depend on the Zernike waves and the window but not on
+    N, and the PSF agrees with the direct sum."""
     counts = []
     for zones in (1e2, 1e3, 1e4):
         for aperture in (0.1, 0.3):
@@ -64,14 +65,15 @@ def test_many_zones_take_no_more_samples_than_their_aberrations():
                 radius, wavefront=Zernike({(2, 2): 0.1, (3, 1): 0.2, (4, 0): 0.1}), thin_lens_focal_length=distance
             )
             beam = Beam(pupil, PointSource(), WAVE, distance)
-            problem = Problem.of(beam, Grid.square(129, WAVE / aperture / 8), 1e-3)
+            problem = Problem.from_beam(beam, Grid.square(129, WAVE / aperture / 8), 1e-3)
             counts.append(len(sine_samples(problem).at))
             assert error(beam, Grid.square(65, WAVE / aperture / 8), 1e-4) < 0.5e-4
     assert max(counts) < 1.15 * min(counts)
 
 
 def test_samples_spaced_for_the_middle_alias_at_the_rim(monkeypatch):
-    """Sines are spaced for the map's stretch at the rim; without it the promise breaks."""
+    """The spacing in sines accounts for the map's stretch at the rim; without this factor the error exceeds the
+    tolerance."""
     beam = Beam(bent(40e-6, 60e-6, Circle(), 1), PointSource(), WAVE, 60e-6)
     window = Grid.square(33, 0.3e-6)
     assert error(beam, window, 1e-6) < 0.5e-6
@@ -88,26 +90,28 @@ def test_samples_spaced_for_the_middle_alias_at_the_rim(monkeypatch):
 
 def test_sines_that_crowd_leave_the_pupil_to_an_even_grid():
     near = Beam(bent(12e-6, 5e-6, Circle(), 0), PointSource(), WAVE, 5e-6)
-    problem = Problem.of(near, Grid.square(9, 0.2e-6), 1e-2)
+    problem = Problem.from_beam(near, Grid.square(9, 0.2e-6), 1e-2)
     assert sine_samples(problem) is None
     (how,) = low_rank(problem)
     assert isinstance(how.pupil, GridSamples)
 
 
 def test_a_grid_that_no_memory_holds_is_not_made():
-    """A high mode goes on, and grows, in the soft edge beyond its circle; as rings of radii it is had all the same."""
+    """A high mode continues, and grows, in the soft edge beyond its circle; radial rings still give the PSF."""
     bent_far = Pupil(25e-6, thin_lens_focal_length=240e-6, wavefront=Zernike({(28, 0): 0.06}))
-    assert sine_samples(Problem.of(Beam(bent_far, PointSource(), WAVE, 240e-6), Grid.square(65, 1e-6), 1e-2)) is None
+    assert (
+        sine_samples(Problem.from_beam(Beam(bent_far, PointSource(), WAVE, 240e-6), Grid.square(65, 1e-6), 1e-2))
+        is None
+    )
     assert psf(bent_far, [WAVE], 240e-6, dx=1e-6, shape=(65, 65), tolerance=1e-2).plan.method == "hankel"
 
 
 def test_every_sample_stands_for_its_area():
-    """Behind an open hole samples add up to the hole's area, times the pupil's field; in sines areas differ by
-    1/cos⁴."""
+    """Behind an open pinhole samples add up to its area times the pupil's field; in sines, areas differ by 1/cos⁴."""
     distance, radius = 50e-6, 30e-6
     beam = Beam(Pupil(radius), PointSource(), WAVE, distance)
     for centre in ((0.0, 0.0), (20e-6, -10e-6)):
-        problem = Problem.of(beam, Grid((9, 9), 1e-6, centre), 1e-6, "float64")
+        problem = Problem.from_beam(beam, Grid((9, 9), 1e-6, centre), 1e-6, "float64")
         samples = sine_samples(problem)
         assert float(np.sum(samples.field(beam, precision("float64")).re.numpy())) == pytest.approx(
             beam.pupil.area, rel=1e-6

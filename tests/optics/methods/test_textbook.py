@@ -1,4 +1,4 @@
-"""Every exact method gives what the textbook's angular spectrum gives, which tells wrong physics from right."""
+"""Every exact method agrees with the textbook's angular spectrum, which detects wrong physics."""
 
 import numpy as np
 import pytest
@@ -10,12 +10,12 @@ from validation.reference import relative_l2
 
 WAVELENGTH, N = 550e-9, 1.5
 WINDOW = 21  # samples across
-# The textbook's grid errs by the edge that it samples and by light that wraps around, 0.7 % here at most.
+# The error of the textbook's grid comes from the sampled edge and from light that wraps around, 0.7 % here at most.
 CLOSE = 0.01
 
 
 class Case:
-    """A pupil, and the same as optical paths on the textbook's grid."""
+    """A pupil, and the same pupil as optical paths on the textbook's grid."""
 
     def __init__(self, radius, distance, dx, samples, focal_length=None, relief=None):
         self.radius, self.distance, self.dx = radius, distance, dx
@@ -61,7 +61,7 @@ def test_a_lens_of_the_wrong_sign_does_not():
 
 
 def test_fresnels_approximation_does_not_at_high_aperture():
-    """The paraxial transfer function, and the paraxial lens."""
+    """Both the paraxial transfer function and the paraxial lens fail."""
     case = CASES["focus at high aperture"]
     x, y = positions(len(case.path), case.dx)
     assert relative_l2(case.fast("fresnel"), case.textbook()) > 10 * CLOSE
@@ -69,7 +69,7 @@ def test_fresnels_approximation_does_not_at_high_aperture():
 
 
 def test_power_arrives_whole():
-    """Of the pupil's, all but what is evanescent: nothing is renormalised."""
+    """The pupil's power arrives, except for the evanescent part: nothing is renormalised."""
     case = CASES["defocused lens"]
     whole = angular_spectrum_psf(case.path, case.dx, case.radius, WAVELENGTH, case.distance)
     assert np.sum(whole) * case.dx**2 == pytest.approx(1, abs=0.01)

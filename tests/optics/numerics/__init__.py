@@ -1,4 +1,4 @@
-"""Which test fails when a module of optics/numerics is broken.
+"""Tests that fail when a module of optics/numerics is broken.
 
 accuracy: point_spread/test_psf.py
 arguments: test_arguments.py, test_any_input.py
@@ -17,5 +17,6 @@ matrices: test_fourier.py
 precision: test_precision.py
 quadrature: test_quadrature.py
 radial_profile: test_radial_profile.py
+renamed: test_renamed.py
 scattered_sum: test_scattered_sum.py
 """

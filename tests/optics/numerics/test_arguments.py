@@ -1,4 +1,4 @@
-"""Checks of arguments: their bounds are allowed, and what is beyond is named."""
+"""Checks of arguments: the bounds are allowed, and values beyond them are named."""
 
 import math
 

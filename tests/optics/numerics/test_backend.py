@@ -1,4 +1,4 @@
-"""The LLVM check tells good, missing, refused and aborting libraries apart without dying of them."""
+"""The LLVM check distinguishes good, missing, refused and aborting libraries and survives all of them."""
 
 import os
 import subprocess
@@ -52,7 +52,7 @@ def test_library_that_is_not_llvm(tmp_path):
 
 
 def test_abort_of_the_child_is_survived(monkeypatch):
-    """What LLVM 15 and 16 do, whatever libraries this machine has: the process ends by SIGABRT."""
+    """LLVM 15 and 16 end the process by SIGABRT; the test simulates this on every machine."""
     monkeypatch.setattr(backend, "PROBE", "import os; os.abort()")
     assert backend.prove("libLLVM.so").verdict == "aborts"
 
@@ -117,7 +117,7 @@ def test_require_points_drjit_at_the_library():
 
 @pytest.mark.parametrize("verdict", ["broken", "too old", "missing"])
 def test_what_may_be_mended_under_the_same_path_is_proved_again(verdict, tmp_path, monkeypatch):
-    """libatomic is installed, say: the library is the same file as before, and works now."""
+    """A fix such as installing libatomic makes the same library file work, so it must be tested again."""
     library = tmp_path / "libLLVM.so"
     library.write_bytes(b"one")
     verdicts = iter([verdict, "good"])

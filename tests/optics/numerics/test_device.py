@@ -1,4 +1,4 @@
-"""The processor unless a GPU is asked for; what is computed on either is the same."""
+"""Computation runs on the processor unless a GPU is requested; results are the same on both."""
 
 import os
 import subprocess
@@ -68,7 +68,8 @@ found = venv.reset()["eyes"]
 
 
 def test_arrays_of_another_device_are_refused(monkeypatch):
-    """`drjit.auto` makes them on a GPU wherever there is one. The other way round fails alike: no GPU is needed."""
+    """`drjit.auto` makes arrays on a GPU if there is one. The opposite case fails in the same way, so the test needs no
+    GPU."""
     monkeypatch.setenv(device.VARIABLE, "cpu")
     radius = precision("float64").Float64(30e-6)
     monkeypatch.setenv(device.VARIABLE, "cuda")
@@ -86,5 +87,5 @@ def test_the_gpu_computes_the_same(code, tolerance):
 
 @pytest.mark.parametrize("code", [PSF, slow(SIGNALS)], ids=["optics", "sim"])
 def test_what_the_gpu_is_asked_for_runs_on_the_processor(code):
-    """The same scripts, so that they are known to work where no GPU is."""
+    """The GPU tests' scripts also run on the processor, so that they are known to work without a GPU."""
     assert on("cpu", code).max() > 0

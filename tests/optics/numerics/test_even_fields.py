@@ -1,4 +1,4 @@
-"""Fourier sums of fields that are the same on all four sides, against those of the whole plane."""
+"""Fourier sums of fields with symmetry on all four sides, against sums over the whole plane."""
 
 import drjit as dr
 import numpy as np
@@ -15,7 +15,8 @@ TYPES = precision("float64")
 
 
 def even_field(shape, seed=0):
-    """Of a quarter, and the same number for all places that are alike; dark where there is no place alike."""
+    """A field as its quarter and as the whole plane, equal at mirrored places; samples without a mirrored place are
+    dark."""
     rng, small = np.random.default_rng(seed), [n // 2 + 1 for n in shape]
     u = rng.normal(size=small) + 1j * rng.normal(size=small)
     u[(shape[0] + 1) // 2 :] = u[:, (shape[1] + 1) // 2 :] = 0

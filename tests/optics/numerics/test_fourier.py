@@ -1,4 +1,4 @@
-"""dft2: FFT and matrices give the same sums, for every parity, folding and tiling, and the adjoint is one."""
+"""dft2: FFT and matrices give the same sums, for every parity, folding and tiling, and the adjoint is correct."""
 
 import drjit as dr
 import numpy as np
@@ -10,7 +10,7 @@ from optics.numerics.field import Field
 from optics.numerics.grid import Grid
 from optics.numerics.precision import precision
 
-SINES = 60  # operations, of which sine and cosine take more
+SINES = 60  # operations; a kernel with sine and cosine has more
 WAYS = [fourier._fft, fourier_matrices.by_halves, fourier_matrices.by_whole_matrices]
 CASES = [((5, 6), 8, (4, 3)), ((7, 8), 12, (12, 12)), ((17, 20), 6, (5, 6)), ((9, 4), 5, (13, 11)), ((6, 6), 6, (6, 6))]
 
@@ -56,7 +56,7 @@ def test_float32_carries_six_digits():
 @pytest.mark.parametrize("transposed", [False, True])
 @pytest.mark.parametrize("across", [3, 300])
 def test_complex_products_by_four_and_by_three(across, transposed, monkeypatch):
-    """The larger ones take three real products in the place of four."""
+    """Larger products use three real products instead of four."""
     asked, product = [], matrices.matmul
     monkeypatch.setattr(matrices, "matmul", lambda *args: asked.append(args) or product(*args))
     rng = np.random.default_rng(2)
@@ -71,7 +71,7 @@ def test_complex_products_by_four_and_by_three(across, transposed, monkeypatch):
 
 @pytest.mark.parametrize("way", WAYS)
 def test_parts_of_a_field_are_computed_together(way):
-    """Real part and imaginary part share sines: looked at one after the other, each would compute them."""
+    """Real and imaginary part share sines: evaluated one after the other, each would compute them."""
     types, grid = precision("float32"), Grid.square(256, 1.0)
     x, y = grid.coordinates(types)
     with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
@@ -80,7 +80,7 @@ def test_parts_of_a_field_are_computed_together(way):
         dr.eval(re, im)
         kernels = [kernel for kernel in dr.kernel_history() if kernel["type"] == dr.KernelType.JIT]
     with_sines = [kernel for kernel in kernels if kernel["size"] == 256 * 256 and kernel["operation_count"] > SINES]
-    assert len(with_sines) == 1  # the field's; a matrix of that size goes along in it
+    assert len(with_sines) == 1  # the field's kernel; a matrix of that size is computed in the same one
 
 
 @pytest.mark.parametrize("way", WAYS)
@@ -99,7 +99,7 @@ def test_derivative_is_the_adjoint(way):
 
 @pytest.mark.parametrize("way", [fourier_matrices.by_halves, fourier_matrices.by_whole_matrices])
 def test_derivative_by_the_period(way):
-    """Against differences of fourth order."""
+    """The reference is a difference of fourth order."""
     _, field = random_field((9, 6))
     weight, step = field.types.Float(np.random.default_rng(1).normal(size=56)), 1e-3
 

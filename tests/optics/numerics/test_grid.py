@@ -1,4 +1,4 @@
-"""Samples lie where they should: sample n//2 at the origin, rows are y."""
+"""Samples lie in the right places: sample n//2 at the origin, rows are y."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Memory that is handed to Dr.Jit."""
+"""Memory passed to Dr.Jit."""
 
 import numpy as np
 

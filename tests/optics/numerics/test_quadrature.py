@@ -1,4 +1,4 @@
-"""Node counts are enough, and one fewer is not."""
+"""Node counts are sufficient, and one node fewer is not."""
 
 import numpy as np
 import pytest
@@ -35,14 +35,15 @@ def test_steps_up_are_few_small_and_never_down():
     stepped = np.array([stepped_up(each) for each in cycles])
     assert (stepped >= (1 - 1e-9) * cycles).all()
     assert (stepped < 1.05 * cycles).all()
-    assert len(set(stepped)) < 220  # 13.3 octaves of 16 steps, where 2000 were asked
+    assert len(set(stepped)) < 220  # 13.3 octaves of 16 steps, for 2000 requested values
     assert all(stepped_up(each) == pytest.approx(each, rel=1e-9) for each in set(stepped))
     assert stepped_up(0.0) == 0.0
 
 
 @pytest.mark.parametrize("n", [1, 2, 3, 10, 51, 300, 3000])
 def test_gauss_legendre_is_exact(n):
-    """Nodes are SciPy's; and polynomials of degree 2n - 1 come out right, those of degree 2n do not."""
+    """Nodes agree with SciPy's; polynomials of degree 2n - 1 are integrated exactly, and polynomials of degree 2n are
+    not."""
     x, weight = gauss_legendre(n)
     np.testing.assert_allclose(x, (roots_legendre(n)[0] + 1) / 2, atol=4e-16)
     for degree in {0, 1, min(n, 40), 2 * n - 1}:

@@ -1,4 +1,4 @@
-"""Rotationally symmetric pictures along one radius: enough points, and none where they would not pay."""
+"""Rotationally symmetric PSFs along one radius: enough points, and no radial line if it does not save time."""
 
 import math
 
@@ -19,7 +19,8 @@ from validation.reference import circular_aperture_on_axis, ideal_lens_field, re
 
 @pytest.mark.parametrize("tolerance", [1e-3, 1e-6])
 def test_obliquity_alone_is_resolved(tolerance):
-    """A hole far below the wavelength has no fringes: all that the line must carry is z²/(z² + r²)², here to 66°."""
+    """An aperture far below the wavelength has no fringes: the line must only represent z²/(z² + r²)², here up to
+    66°."""
     asked = {"dx": 2e-4, "shape": (17, 17), "tolerance": tolerance, "dtype": "float64"}
     result = optics.psf(Pupil(1e-12), [550e-9], 1e-3, **asked, method="rayleigh_sommerfeld")
     rho2 = result.x**2 + result.y[:, None] ** 2 + 1e-6
@@ -28,7 +29,7 @@ def test_obliquity_alone_is_resolved(tolerance):
 
 
 def test_a_window_far_off_the_axis_needs_no_line():
-    """From the axis to 5 mm there are 18 000 fringes, of which the window sees two."""
+    """There are 18 000 fringes from the axis to 5 mm, and the window covers two."""
     line = RadialProfile.resolving(5e-3, 5e5, 2e-4, 1e-4)
     assert not line.pays(81)
     asked = {"centre": (5e-3, 0.0), "dx": 2e-6, "shape": (3, 3), "tolerance": 1e-3, "dtype": "float64"}
@@ -41,7 +42,7 @@ def test_a_window_far_off_the_axis_needs_no_line():
 @pytest.mark.fast_cases(1)
 @pytest.mark.parametrize(("radius", "distance"), [(1e-7, 1e-9), (1e-7, 1e-7), (1e-9, 1e-9), (3e-5, 1e-6)])
 def test_planes_nearer_than_the_pupil_is_wide(radius, distance):
-    """There the kernel's poles need more nodes than its phase: the axis against Osterberg and Smith's closed form."""
+    """The kernel's poles need more nodes there than its phase: the axis against Osterberg and Smith's closed form."""
     asked = {"dx": radius / 4, "shape": (9, 9), "tolerance": 1e-8, "dtype": "float64"}
     result = optics.psf(Pupil(radius), [550e-9], distance, **asked, method="rayleigh_sommerfeld")
     exact = circular_aperture_on_axis(radius, distance, 550e-9) / (math.pi * radius**2)
@@ -50,19 +51,19 @@ def test_planes_nearer_than_the_pupil_is_wide(radius, distance):
 
 
 def test_a_profile_costs_no_more_than_its_wave_turns():
-    """Of a wave that turns 2πbR = 63 radians over its radius, and an obliquity that adds a tenth: some fifty points
-    and a table twice as fine. A rim a hundred times as far away adds nothing."""
+    """For a wave that turns 2πbR = 63 radians over its radius, and an obliquity that adds a tenth, some fifty points
+    and a table twice as fine are enough. A rim a hundred times as far away adds nothing."""
     near, far = (RadialProfile.resolving(1e-4, 1e5, distance, 1e-4) for distance in (2e-3, 2e-1))
     assert 30 < far.points <= near.points < 150
     assert 60 < far.table <= near.table < 1.05 * far.table
 
 
-HOLE = {"radius": 1e-3, "distance": 1e-6 / (1000 * 550e-9)}  # of Fresnel number 1,000: rays are as steep as 1/2
+HOLE = {"radius": 1e-3, "distance": 1e-6 / (1000 * 550e-9)}  # Fresnel number 1,000: rays are as steep as 1/2
 
 
 @pytest.mark.slow
 def test_a_hole_of_a_thousand_zones():
-    """Its whole shadow on few samples, against the direct sum at some of them; and on the axis against Osterberg and
+    """The whole shadow on few samples agrees with the direct sum at some of them, and on the axis with Osterberg and
     Smith's closed form."""
     samples = 65
     radius, distance = HOLE["radius"], HOLE["distance"]
@@ -73,7 +74,7 @@ def test_a_hole_of_a_thousand_zones():
     assert result.psf[0, samples // 2, samples // 2] == pytest.approx(middle, rel=1e-3)
     places = np.linspace(0, samples - 1, 7).astype(int)
     beam = Beam(Pupil(radius), PointSource(), 550e-9, distance)
-    problem = Problem.of(beam, Grid(result.psf.shape[1:], asked["dx"]), 1e-4, "float64")
+    problem = Problem.from_beam(beam, Grid(result.psf.shape[1:], asked["dx"]), 1e-4, "float64")
     types, rule = precision("float64"), (beam.pupil.aperture, *node_rule(problem), True)
     x = types.Float64(np.abs(result.x[places]))
     exact = direct_sum(beam, rule, x, 0 * x, types).intensity.numpy() / beam.pupil.area
@@ -81,7 +82,7 @@ def test_a_hole_of_a_thousand_zones():
 
 
 def test_long_lines_are_their_own_table(monkeypatch):
-    """The same picture without the matrix from Chebyshev points."""
+    """The PSF is the same without the matrix from Chebyshev points."""
     asked = {"dx": 1e-6, "shape": (101, 101), "tolerance": 1e-5, "dtype": "float64", "method": "hankel"}
     by_points = optics.psf(Pupil(30e-6), [550e-9], 1e-3, **asked).psf[0]
     monkeypatch.setattr(radial_profile, "LARGEST_MATRIX", 1)

@@ -12,7 +12,8 @@ from tests.optics.device_types import Float64
 @pytest.mark.parametrize("shape", [(31, 34), (64, 20), (1, 5)])
 @pytest.mark.parametrize("span", [0.2, 0.9, 3.0])
 def test_sums_are_those_of_the_points(shape, span):
-    """Within a part of the period, nearly all of it, and wrapped around it; digits as asked, and not by luck more."""
+    """Points span a part of the period, nearly all of it, or wrap around it; the number of digits is as requested, and
+    not higher by chance."""
     rng = np.random.default_rng(0)
     p, q = (rng.random((2, 200)) - 0.4) * span
     u = rng.normal(size=(2, 200)) + 1j * rng.normal(size=(2, 200))
@@ -20,7 +21,7 @@ def test_sums_are_those_of_the_points(shape, span):
     exact = np.einsum("sj,jy,jx->syx", u, np.exp(2j * np.pi * np.outer(q, ky)), np.exp(2j * np.pi * np.outer(p, kx)))
     errors = []
     for digits in (3, 6, 9):
-        found = ScatteredSum(p, q, shape, digits).of(u)
+        found = ScatteredSum(p, q, shape, digits).evaluate(u)
         errors.append(np.abs(found - exact).max() / np.abs(u).sum(axis=1).max())
     assert all(error < 2 * 10.0**-digits for error, digits in zip(errors, (3, 6, 9), strict=True))
     assert errors[0] > 100 * errors[1] > 1e4 * errors[2]
@@ -43,7 +44,7 @@ def test_sums_at_points_are_those_of_the_samples(shape, span):
 
 
 def test_sums_at_points_carry_derivatives_both_ways():
-    """The sum is linear, so that its derivative along samples is itself, and backwards its transpose."""
+    """The sum is linear: its forward derivative is the sum itself, and its backward derivative the transpose."""
     rng = np.random.default_rng(2)
     sums = ScatteredSum(rng.random(7), rng.random(7), (4, 5), 12)
     samples, along, weight = Float64(rng.normal(size=40)), rng.normal(size=40), rng.normal(size=(2, 14))

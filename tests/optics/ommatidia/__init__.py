@@ -1,4 +1,4 @@
-"""Which test fails when a module of optics/ommatidia is broken.
+"""Tests that fail when a module of optics/ommatidia is broken.
 
 coupling: test_ommatidium.py
 radiation: test_radiation.py, test_ommatidium.py

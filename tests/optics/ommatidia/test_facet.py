@@ -18,7 +18,8 @@ def test_the_lens_of_a_fruit_fly():
 
 
 def test_one_surface_and_a_ball():
-    """A surface has n'r/(n' - n₀); a ball in air of index 2 focuses on its back, with both planes in its middle."""
+    """A single surface has f = n'r/(n' - n₀); a ball of index 2 in air focuses on its back, with both planes in its
+    middle."""
     single = FacetLens(20e-6, 10e-6, n=1.4, medium_n=1.4)
     assert single.focal_length() == pytest.approx(1.4 * 10e-6 / 0.4)
     assert single.principal_planes() == pytest.approx((0.0, 0.0))

@@ -1,4 +1,4 @@
-"""Ommatidia side by side: where they look, and what they tell of a grating."""
+"""Mosaics of ommatidia: their viewing directions, and their response to a grating."""
 
 import math
 
@@ -22,7 +22,7 @@ def test_directions_are_a_hexagonal_lattice():
 
 
 def test_a_grating_comes_with_its_contrast():
-    """And dark and bright where it is."""
+    """The bright and dark stripes are in the right places, too."""
     frequency = 0.25
     seen = FLY.see(lambda x, y: 1 + np.cos(2 * np.pi * frequency * np.degrees(x) + 0 * y))
     expected = 1 + FLY.contrast(frequency) * np.cos(2 * np.pi * frequency * np.degrees(FLY.directions[:, 0]))
@@ -31,7 +31,7 @@ def test_a_grating_comes_with_its_contrast():
 
 
 def test_contrast_falls_as_a_gaussian_of_the_acceptance_angle():
-    """exp(-(π Δρ ν)²/(4 ln 2)) (Götz 1964), nearly; nothing beyond D/λ."""
+    """Approximately exp(-(π Δρ ν)²/(4 ln 2)) (Götz 1964), and no contrast beyond D/λ."""
     rho = math.degrees(FLY.ommatidium.acceptance_angle())
     for frequency in (0.1, 0.3):
         gauss = math.exp(-((math.pi * rho * frequency) ** 2) / (4 * math.log(2)))
@@ -44,9 +44,9 @@ def test_contrast_falls_as_a_gaussian_of_the_acceptance_angle():
 @pytest.mark.fast_cases(2)
 @pytest.mark.parametrize("place", [(0.024, 0.0), (-0.024, 0.0), (0.0, 0.02), (0.0, -0.02), (0.02, 0.02)])
 def test_a_lopsided_facet_looks_where_an_eye_of_it_does(place):
-    """A prism and coma before a rhabdom: of a small light it sees as much as the receptor of an `Eye` that has the same
-    pupil and waveguide, whose scene is (right, down), but for tails of white's that the mosaic's window leaves out. On
-    the other side of the axis it is dark."""
+    """A prism and coma in front of a rhabdom: its signal for a small light equals that of the receptor of an `Eye` with
+    the same pupil and waveguide, whose scene is (right, down), up to tails of white outside the mosaic's window. On the
+    other side of the axis the signal is dark."""
     bent = optics.Zernike({(1, 1): 0.12, (3, -1): 0.05})
     lens = Pupil(12.5e-6, thin_lens_focal_length=67e-6, medium_n=1.34, object_n=1.0, wavefront=bent)
     guide, focal, side = Waveguide(1.4e-6), 50e-6, 61
@@ -82,7 +82,7 @@ def test_bad_input_names_itself(make, message):
 
 
 def eye_and_finest_grating():
-    """[cycles per degree]"""
+    """An eye and its finest grating [cycles per degree]."""
     eye = AppositionEye(Ommatidium(FacetLens(25e-6, 14e-6), Waveguide(2e-6)), 1, 1.5)
     return eye, math.radians(2 * eye.ommatidium.pupil.radius / 500e-9)
 
@@ -102,8 +102,9 @@ def test_nothing_is_left_of_gratings_finer_than_a_facet_passes():
 
 @pytest.mark.slow
 def test_in_water_a_facet_passes_finer_gratings():
-    """Waves are shorter before it: contrast ends at 2R n/λ, and is the sensitivity's transform up to there. To what
-    this window cuts off; with the index left out there is no contrast at the second frequency."""
+    """Wavelengths are shorter in front of the facet. Contrast ends at 2R n/λ, and equals the sensitivity's transform up
+    to there, except for the part that this window cuts off. Without the index there would be no contrast at the second
+    frequency."""
     lens = Pupil(12.5e-6, thin_lens_focal_length=67e-6, medium_n=1.34, object_n=1.34)
     eye = AppositionEye(Ommatidium(lens, Waveguide(1e-6)), 1, 1.5)
     in_air = 2 * lens.radius / 500e-9

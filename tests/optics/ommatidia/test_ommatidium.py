@@ -1,4 +1,4 @@
-"""Light of a facet in a rhabdom's modes: against the paraxial formulas, and the field in the focus itself."""
+"""Light from a facet in a rhabdom's modes: against the paraxial formulas, and the field in the focus itself."""
 
 import math
 
@@ -20,8 +20,8 @@ LENS = Pupil(D / 2, thin_lens_focal_length=1.34 * FOCAL, medium_n=1.34, object_n
 
 
 def formulas(mode, angles):
-    """Power in a mode, to a factor, as the published formulas have it: Fraunhofer's field in the focal plane overlaps
-    the mode, ∫ F(ρ) J_l(kρθ) ρ dρ over the facet, F(ρ) = ∫ ψ(r) J_l(krρ/f) r dr."""
+    """Power in a mode, up to a factor, from the published formulas: Fraunhofer's field in the focal plane overlaps the
+    mode, ∫ F(ρ) J_l(kρθ) ρ dρ over the facet, F(ρ) = ∫ ψ(r) J_l(krρ/f) r dr."""
     k = 2 * math.pi / WAVE
     r, rho = np.linspace(0, 12e-6, 3001), np.linspace(0, D / 2, 801)
     psi = mode.field(r, 0.0) * r
@@ -30,30 +30,31 @@ def formulas(mode, angles):
 
 
 def width(angles, seen):
-    """Of half the peak, on one side of the axis, doubled."""
+    """Full width at half the peak, from one side of the axis."""
     last = np.flatnonzero(seen >= seen.max() / 2)[-1]
     share = (seen[last] - seen.max() / 2) / (seen[last] - seen[last + 1])
     return 2 * math.degrees(angles[last] + share * (angles[last + 1] - angles[last]))
 
 
 def test_acceptance_angle_of_a_fly_is_that_of_the_formulas():
-    """A facet of 25 µm at f/2 before a rhabdomere of 1.4 µm, at 500 nm: one mode, Δρ = 1.398°. The formulas are
-    paraxial, which is 2e-3 at f/2."""
+    """A facet of 25 µm at f/2 in front of a rhabdomere of 1.4 µm, at 500 nm: one mode, Δρ = 1.398°. The formulas are
+    paraxial, with an error of 2e-3 at f/2."""
     eye = Ommatidium(LENS, Waveguide(1.4e-6))
     [mode] = eye.modes(WAVE)
     angles = np.radians(np.linspace(0, 1.5, 3001))
     found = math.degrees(eye.acceptance_angle(WAVE))
     assert found == pytest.approx(1.398, rel=1e-3)
     assert width(angles, formulas(mode, angles)) == pytest.approx(found, rel=3e-3)
-    # Neither the Airy disk's nor the rhabdomere's width, nor both as Gaussians.
+    # The result is neither the Airy disk's nor the rhabdomere's width, nor both as Gaussians.
     assert abs(math.degrees(snyder_acceptance(D, FOCAL, 1.4e-6, WAVE)) - 1.398) > 0.5
     assert math.degrees(1.03 * WAVE / D) < 1.2
 
 
 @pytest.mark.slow
 def test_wide_slow_lenses_are_the_formulas_limit():
-    """They leave out that the focal plane is no wave front, e^{iknx²/2f}, and oblique rays. A pupil 16 times as wide at
-    f/8, and a rhabdom of the same V that is 4 times as wide, have the same picture and a sixteenth of the angles."""
+    """The formulas ignore that the focal plane is not a wavefront, e^{iknx²/2f}, and ignore oblique rays. A pupil 16
+    times as wide at f/8, with a rhabdom of the same V that is 4 times as wide, has the same pattern and a sixteenth of
+    the angles."""
     lens = Pupil(16 * D / 2, thin_lens_focal_length=64 * 1.34 * FOCAL, medium_n=1.34, object_n=1.0)
     core = math.sqrt(1.34**2 + (1.363**2 - 1.34**2) / 16)
     eye = Ommatidium(lens, Waveguide(4 * 1.4e-6, core, 1.34))
@@ -77,8 +78,8 @@ def test_every_mode_takes_what_the_formulas_say(diameter):
 @pytest.mark.parametrize("wavefront", [None, optics.Zernike({(1, 1): 0.06, (3, -1): 0.08})], ids=["even", "lopsided"])
 @pytest.mark.parametrize("angle", [(0.0, 0.0), (0.02, -0.01)])
 def test_modes_take_the_overlap_with_the_field_in_the_focus(angle, wavefront):
-    """The other way round: the field that the facet makes, summed with the mode over the sensor's plane. From a point
-    on one side light travels to the other."""
+    """The opposite calculation: the facet's field, summed with the mode over the sensor's plane. Light from a point on
+    one side travels to the other."""
     lens, guide = FacetLens(20e-6, 13e-6, -60e-6, 6e-6), Waveguide(1.8e-6, 1.37, 1.34)
     eye = Ommatidium(lens.pupil(wavefront=wavefront), guide, lens.focal_length() + 3e-6)
     pupil, z, types = eye.pupil, lens.focal_length() + 3e-6, precision("float64")
@@ -95,7 +96,8 @@ def test_modes_take_the_overlap_with_the_field_in_the_focus(angle, wavefront):
 
 @pytest.mark.slow
 def test_a_wide_guide_takes_what_falls_on_it():
-    """Dozens of modes are as good as none: the light within the core, and little of what falls beside it."""
+    """Dozens of modes act like no waveguide: they collect the light within the core, and little of the light around
+    it."""
     eye = Ommatidium(LENS, Waveguide(4e-6, 1.42, 1.34))
     light = optics.psf(LENS, [WAVE], dx=0.1e-6, shape=(81, 81))
     taken = eye.mode_power(np.array([0.0, 4e-6 / FOCAL]), 0.0, WAVE).sum(axis=0)
@@ -108,7 +110,7 @@ def test_defocus_and_absorption_change_what_is_seen():
     guide = Waveguide(2e-6)
     focused, blurred = (Ommatidium(LENS, guide, z) for z in (None, 1.34 * FOCAL + 15e-6))
     assert blurred.sensitivity(0.0, 0.0, WAVE) < 0.8 * focused.sensitivity(0.0, 0.0, WAVE)
-    # A long rhabdom takes all of higher modes, too, which reach further out.
+    # A long rhabdom absorbs all light of higher modes, too, which reach further out.
     short, long = (Ommatidium(LENS, Waveguide(2e-6, length=at)) for at in (5e-6, 2e-3))
     assert short.sensitivity(0.0, 0.0, WAVE) < 0.05
     assert long.sensitivity(0.0, 0.0, WAVE) == pytest.approx(float(focused.sensitivity(0.0, 0.0, WAVE)), rel=1e-3)
@@ -125,8 +127,8 @@ def test_hexagons_see_nearly_alike_all_around():
 
 @pytest.mark.parametrize("wavelength", [400e-9, 450e-9, 550e-9])
 def test_colours_have_foci_of_their_own_behind_glass_that_disperses(wavelength):
-    """A lens of the index at that wavelength alone, whose rhabdom has the same place behind its front: a thick lens'
-    principal plane moves as well. Without dispersion violet would be sharp."""
+    """The reference is a lens with the index at that wavelength, with the rhabdom at the same place behind its front,
+    because a thick lens' principal plane moves as well. Without dispersion violet would be sharp."""
     glass, shape = optics.RefractiveIndex.from_abbe(1.5, abbe_number=15.0), (25e-6, 24e-6, -40e-6, 20e-6)
     guide, lens = Waveguide(1.6e-6), FacetLens(*shape, n=glass)
     behind_front = lens.principal_planes()[1] + lens.focal_length()
@@ -141,7 +143,8 @@ def test_colours_have_foci_of_their_own_behind_glass_that_disperses(wavelength):
 
 
 def test_superposition_narrows_what_one_facet_blurs():
-    """Light of many facets that arrives in phase: the aperture's diffraction instead of a facet's (Stavenga 2006)."""
+    """Light of many facets that arrives in phase has the diffraction of the aperture instead of a facet's (Stavenga
+    2006)."""
     narrow = Waveguide(0.8e-6, 1.38, 1.34)
     whole = Pupil(30e-6, aperture=optics.hexagonal_segments(1), thin_lens_focal_length=0.2e-3, medium_n=1.34)
     facet = Pupil(30e-6 / 2.65, aperture=optics.Polygon.regular(6), thin_lens_focal_length=0.2e-3, medium_n=1.34)
@@ -165,7 +168,7 @@ def test_bad_input_names_itself(make, message):
 
 
 def test_fields_of_thin_rhabdoms_reach_far(monkeypatch):
-    """At V = 1 a mode falls by e over five core radii: twelve are not enough by .3 %, forty are: e^-8."""
+    """A mode at V = 1 falls by e over five core radii: twelve radii miss 0.3 %, forty are enough: e^-8."""
     thin = Ommatidium(FacetLens(25e-6, 30e-6), Waveguide(0.64e-6))
     power = {}
     for radii in (12.0, radiation.FARTHEST, 400.0):
@@ -173,5 +176,6 @@ def test_fields_of_thin_rhabdoms_reach_far(monkeypatch):
         _coupled.cache_clear()
         power[radii] = thin.mode_power(np.zeros(1), np.zeros(1))[0, 0]
     few, chosen, many = power.values()
-    assert chosen == pytest.approx(many, rel=2e-5)  # what it lacks goes with the field where it ends, or its square
+    # the missing part is proportional to the field at the limit, or its square
+    assert chosen == pytest.approx(many, rel=2e-5)
     assert few < 0.998 * many

@@ -1,4 +1,4 @@
-"""What modes radiate: against the integral over their field in the plane, or the tilted plane, where they end."""
+"""Radiation of modes: against the integral over their field in the plane, or the tilted plane, at the rhabdom's end."""
 
 import math
 

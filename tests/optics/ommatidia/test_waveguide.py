@@ -1,4 +1,4 @@
-"""Modes of a cylinder: against the equation they solve on a grid, published cut-offs, and quadrature."""
+"""Modes of a cylinder: against a grid solution of their equation, published cut-offs, and quadrature."""
 
 import math
 
@@ -12,7 +12,7 @@ WAVE = 500e-9
 
 
 def guide(v, diameter=2e-6):
-    """Of this V at 500 nm."""
+    """A waveguide with this V at 500 nm."""
     clad = 1.34
     return Waveguide(diameter, math.hypot(clad, v * WAVE / (math.pi * diameter)), clad)
 
@@ -40,8 +40,8 @@ def test_modes_are_those_of_the_wave_equation(v):
 
 
 def test_cut_offs_are_zeros_of_bessel_functions():
-    """Gloge (1971): LP11 from 2.405, LP21 and LP02 from 3.832, LP31 from 5.136, LP12 from 5.520. (Just above its cut
-    off LP02 is too wide to be told from none.)"""
+    """Gloge (1971): LP11 from 2.405, LP21 and LP02 from 3.832, LP31 from 5.136, LP12 from 5.520. (Just above its
+    cut-off LP02 is too wide to be detected.)"""
     names = {"11": 2.4048, "21": 3.8317, "02": 3.8317, "31": 5.1356, "12": 5.5201}
     for name, v in names.items():
         below, above = ({f"{m.l}{m.m}" for m in guide(at).modes(WAVE)} for at in (v - 0.003, v + 0.1))

@@ -1,4 +1,4 @@
-"""Which test fails when a module of optics/point_spread is broken.
+"""Tests that fail when a module of optics/point_spread is broken.
 
 batch: test_batch.py
 concentration: test_measures.py, test_measure_errors.py

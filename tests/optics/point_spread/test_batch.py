@@ -1,4 +1,4 @@
-"""Many PSFs at once are the PSFs one by one."""
+"""Many PSFs at once equal the PSFs one by one."""
 
 import math
 
@@ -57,7 +57,7 @@ def test_must_not_be_empty(name):
 @pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("tolerance", [1e-2, 1e-5])
 def test_each_has_the_measures_of_one(tolerance):
-    """Whether one plan has made them or each its own."""
+    """Measures agree whether the PSFs come from one common plan or from separate plans."""
     view = {**VIEW, "shape": (65, 65), "tolerance": tolerance}
     batch = optics.psf_batch(pupils(), WAVELENGTHS, 150e-6, DEPTHS, **view)
     for i, pupil in enumerate(pupils()):
@@ -67,6 +67,6 @@ def test_each_has_the_measures_of_one(tolerance):
             np.testing.assert_array_equal(mine.x, batch.x)
             (strehl, error), (other, its) = (optics.strehl_ratio(seen, with_error=True) for seen in (mine, one))
             np.testing.assert_array_less(np.abs(strehl - other), error + its)
-            assert mine.can_be_seen_anew
+            assert mine.can_recompute
     with pytest.raises(ValueError, match=r"eye = 2: must be a whole number in \[0, 1\]"):
         batch.result(2)

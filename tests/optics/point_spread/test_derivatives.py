@@ -1,4 +1,4 @@
-"""Derivatives of PSF and quality against central differences, forwards and backwards, for every method."""
+"""Derivatives of PSF and quality against central differences, forward and backward, for every method."""
 
 import numpy as np
 import pytest
@@ -10,7 +10,7 @@ from optics.numerics.precision import precision
 from tests.slow_part import slow
 
 WAVELENGTH, SHAPE = 550e-9, (17, 15)
-# Whole waves of defocus, an index step and a source nearby: every parameter moves the picture.
+# Whole waves of defocus, an index step and a source nearby: every parameter changes the PSF.
 PARAMETERS = {"radius": 12e-6, "distance": 120e-6, "n": 1.5, "focal_length": 140e-6, "source_distance": 1e-3}
 EXACT = ["low_rank", "far_field", "angular_spectrum", "split_angular_spectrum", "rayleigh_sommerfeld"]
 METHODS = [*EXACT, "fresnel", "fraunhofer", "geometric"]
@@ -23,7 +23,7 @@ def float64(value):
 
 
 def asking(value):
-    """The same number, whose derivatives are asked for."""
+    """The same number with its gradient enabled."""
     import drjit as dr
 
     x = float64(value)
@@ -44,7 +44,7 @@ def total(values, heights=None, method="auto"):
         values["source_distance"],
         dx=0.7e-6,
         shape=SHAPE,
-        tolerance=1e-5 if method == "far_field" else 1e-8,  # its nodes are many, and the same for both differences
+        tolerance=1e-5 if method == "far_field" else 1e-8,  # it has many nodes, the same for both differences
         method=method,
         dtype="float64",
     )
@@ -63,7 +63,7 @@ def number(value):
 
 
 def none_on_a_gpu(method, function):
-    """Whether a method has no derivatives where the tests run, and says so."""
+    """Return whether a method has no derivatives on this device; it must report this."""
     if method != "geometric" or device() == "cpu":
         return False
     with pytest.raises(ValueError, match="no derivatives on a GPU"):
@@ -125,7 +125,7 @@ def test_psf_by_control_points(method):
 
 
 def test_a_derivative_asks_about_every_control_point():
-    """A paraboloid is symmetric, its neighbours are not: the derivative must not be taken within symmetric pupils."""
+    """A paraboloid is symmetric, but its neighbours are not: the derivative must not assume a symmetric pupil."""
     import drjit as dr
 
     points = BSplineRelief.paraboloid(1e-6, 1 / (0.5 * 120e-6), 12e-6).control_points

@@ -1,4 +1,4 @@
-"""The complex amplitude beside its square: against the integral written out, by every method that has a phase."""
+"""The complex amplitude next to its square: against the integral written out, for every method that has a phase."""
 
 import itertools
 import math
@@ -22,7 +22,7 @@ ASKED = {"wavelengths": [WAVE], "sensor_distance": Z, "dx": 0.9e-6, "shape": (15
 
 
 def written_out(pupil, x, y):
-    """Gauss and trapezoid over the ring; first Rayleigh-Sommerfeld integral, carrier and all."""
+    """Gauss and trapezoid over the ring; first Rayleigh-Sommerfeld integral, with its carrier."""
     inner = pupil.aperture.rings[0][0]
     square, weight = np.polynomial.legendre.leggauss(160)
     rho2 = inner**2 + (1 - inner**2) * (square + 1) / 2
@@ -55,12 +55,12 @@ def test_field_is_the_integral(name, method):
     exact = written_out(PUPILS[name], result.x, result.y)
     assert np.linalg.norm(result.field[0] - exact) < 2e-6 * np.linalg.norm(exact)
     np.testing.assert_allclose(np.abs(result.field) ** 2, result.psf, rtol=1e-9, atol=1e-9 * result.psf.max())
-    # No phase of its own would do.
+    # A field without phase would not pass.
     assert np.linalg.norm(np.abs(exact) - exact) > 0.1 * np.linalg.norm(exact)
 
 
 def test_symmetric_fields_along_a_line_are_those_of_the_plane():
-    """A wide window, for which nodes are summed along one radius."""
+    """Nodes are summed along one radius in a wide window."""
     wide = {**ASKED, "dx": 0.5e-6, "shape": (121, 121)}
     line = optics.psf(PUPILS["lens"], **wide, method="rayleigh_sommerfeld", tolerance=1e-6, field=True)
     plane = optics.psf(PUPILS["lens"], **wide, method="split_angular_spectrum", tolerance=1e-6, field=True)
@@ -92,7 +92,7 @@ def test_methods_that_are_none_are_named(method):
 
 
 def test_the_phase_carries_derivatives():
-    """By the distance, carrier included: d arg U / dz is about k."""
+    """The derivative by the distance includes the carrier: d arg U / dz is about k."""
 
     def real_part(z):
         asked = {**ASKED, "sensor_distance": z, "method": "rayleigh_sommerfeld", "tolerance": 1e-8}

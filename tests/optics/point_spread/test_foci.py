@@ -29,7 +29,7 @@ def width(profile, dx):
 
 
 def test_spot_of_an_objective_of_na_09():
-    """365 by 270 nm along and across the polarisation, where scalar theory has 253 (flat) or 277."""
+    """365 by 270 nm along and across the polarisation; scalar theory gives 253 (flat) or 277."""
     found = focus(0.9, aplanatic=True, polarization=(1, 0))
     assert width(found.psf[40], 10e-9) == pytest.approx(365e-9, abs=1.5e-9)
     assert width(found.psf[:, 40], 10e-9) == pytest.approx(270e-9, abs=1.5e-9)
@@ -69,12 +69,12 @@ def test_at_low_na_it_is_rayleigh_sommerfelds():
     exact = optics.psf(pupil, [WAVELENGTH], 1e-3, dtype="float64", tolerance=1e-6, **window).psf[0]
     vector = optics.vector_focus(pupil, WAVELENGTH, **window)
     off = np.linalg.norm(vector.scalar - exact) / np.linalg.norm(exact)
-    assert off < 1e-3  # 1 / (2k z (1 - cos θ)) of the near term, and what is left of the edge
+    assert off < 1e-3  # 1 / (2k z (1 - cos θ)) of the near term, and the remainder of the edge
     assert np.linalg.norm(vector.psf - exact) / np.linalg.norm(exact) == pytest.approx(0.21 * 0.0995**2, rel=0.3)
 
 
 def test_defocus_and_spherical_relief_are_in_it():
-    """W counts: 20 µm behind the focus, against the scalar integral of the same light."""
+    """The wavefront is included: 20 µm behind the focus, against the scalar integral of the same light."""
     pupil = optics.Pupil(0.15e-3, optics.BSplineRelief.paraboloid(0, 40.0, 0.15e-3), thin_lens_focal_length=1e-3)
     window = {"dx": 0.5e-6, "shape": (33, 33)}
     exact = optics.psf(pupil, [WAVELENGTH], 1.02e-3, dtype="float64", tolerance=1e-6, **window).psf[0]
@@ -83,7 +83,7 @@ def test_defocus_and_spherical_relief_are_in_it():
 
 
 def test_all_components_together_hold_the_light_of_scalar_theory():
-    """Each plane wave has |e| = 1: integrals over the plane agree."""
+    """Each plane wave has |e| = 1, so integrals over the plane agree."""
     found = focus(0.7, dx=0.15e-6, shape=(135, 135))
     assert found.psf.sum() == pytest.approx(found.scalar.sum(), rel=2e-3)
     assert found.intensity[2].sum() > 0.1 * found.psf.sum()

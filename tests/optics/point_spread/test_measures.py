@@ -21,7 +21,8 @@ def circular_mtf(f: np.ndarray, cutoff: float) -> np.ndarray:
 
 
 def test_mtf_of_an_ideal_lens_is_the_overlap_of_two_disks():
-    """f/8: the window of 400 µm loses 1 % of the light in far rings, which raises low frequencies by as much."""
+    """f/8: the window of 400 µm loses 1 % of the light in far rings, which raises low frequencies by the same
+    amount."""
     result = ideal(8, 1.6e-6, 257)
     transfer = optics.mtf(result)
     f = np.linspace(0.1, 1, 10) * transfer.cutoff[0]
@@ -42,7 +43,8 @@ def test_mtf_is_one_at_zero_frequency_and_nothing_beyond_the_cutoff():
 
 
 def test_all_that_arrives_is_what_a_small_window_measures_contrast_by():
-    """Two rings hold 0.91 of the light. What is missing is looked at, or else it may be anywhere in the contrasts."""
+    """Two rings hold 0.91 of the light. The missing light is computed; otherwise contrasts would be uncertain by its
+    whole amount."""
     result = ideal(8, 1.6e-6, 13)
     transfer, as_it_is = optics.mtf(result), optics.mtf(result, tolerance=1)
     f = np.array([0.3, 0.5, 0.7]) * transfer.cutoff[0]
@@ -50,7 +52,7 @@ def test_all_that_arrives_is_what_a_small_window_measures_contrast_by():
     assert np.abs(transfer.profile(f)[0] - expected).max() < 6e-3 < transfer.predicted_error[0] <= 0.02
     assert 0.05 < as_it_is.predicted_error[0] < 0.12
     assert as_it_is.fx.size == 13 < transfer.fx.size
-    assert np.abs(as_it_is.profile(f)[0] - expected).max() < 0.02  # by all that arrives
+    assert np.abs(as_it_is.profile(f)[0] - expected).max() < 0.02  # relative to all the light that arrives
     assert optics.mtf(result, 1.0).mtf.max() == 1
     np.testing.assert_allclose(optics.mtf(result, 1.0).predicted_error, transfer.predicted_error, atol=5e-3)
     with pytest.raises(ValueError, match=r"arriving = 0\.5: must be in"):
@@ -75,7 +77,7 @@ def test_mtf_keeps_the_order_of_axes():
 
 @pytest.mark.parametrize("f_number", [2, 4, 16])
 def test_strehl_ratio_of_an_ideal_lens_is_one_at_any_aperture(f_number):
-    """The exact peak, which is [ln(1 + t)/t]² of Airy's πR²/(λf)², t = (R/f)²: .94 at f/2."""
+    """The exact peak, which is [ln(1 + t)/t]² of Airy's πR²/(λf)², t = (R/f)²: 0.94 at f/2."""
     result = ideal(f_number, 0.5e-6, 33)
     assert optics.strehl_ratio(result)[0] == pytest.approx(1, abs=1e-4)
     airy = result.pupil.area / (WAVELENGTH * FOCAL_LENGTH) ** 2
@@ -96,7 +98,7 @@ def test_strehl_ratio_under_defocus():
 
 
 def test_encircled_energy_follows_airy_at_any_pitch():
-    """f/16 departs from Airy by 2e-3. Samples 8.8 µm apart would be the coarsest that can be added up at all."""
+    """f/16 departs from Airy by 2e-3. Samples 8.8 µm apart would be the coarsest that can be summed."""
     f_number = 16
     radius = FOCAL_LENGTH / (2 * f_number)
     radii = np.array([5e-6, 1.07e-5, 2e-5])
@@ -151,8 +153,8 @@ def test_one_sample_has_no_profile():
 
 
 def test_the_cutoff_is_the_mediums():
-    """In water waves are shorter, so the same pupil passes finer gratings: the MTF reaches zero a third further on."""
-    focus = 1.33 * FOCAL_LENGTH  # of a lens with this focal length in air
+    """Waves are shorter in water, so the same pupil passes finer gratings: the MTF reaches zero a third further on."""
+    focus = 1.33 * FOCAL_LENGTH  # for a lens with this focal length in air
     pupil = optics.Pupil(15e-6, thin_lens_focal_length=focus, medium_n=1.33)
     result = optics.psf(pupil, [WAVELENGTH], focus, dx=1.3e-6, shape=(257, 257))
     transfer = optics.mtf(result)
@@ -164,7 +166,8 @@ def test_the_cutoff_is_the_mediums():
 
 
 def test_contrasts_know_how_much_light_a_mask_leaves_at_the_rim():
-    """The derivative by the mask's width, against differences: what is evanescent goes with the light at the rim."""
+    """The derivative by the mask's width agrees with differences: the evanescent part is proportional to the light at
+    the rim."""
     import drjit as dr
 
     from tests.optics.device_types import Float64
@@ -184,7 +187,7 @@ def test_contrasts_know_how_much_light_a_mask_leaves_at_the_rim():
 
 
 def test_white_contrasts_know_it_too():
-    """Contrast is a share of the light that arrives, which a mask's width changes."""
+    """Contrast is relative to the light that arrives, which changes with a mask's width."""
     import drjit as dr
 
     from tests.optics.device_types import Float64
@@ -199,12 +202,12 @@ def test_white_contrasts_know_it_too():
     dr.backward(dr.sum(contrast(waist).array))
     step = 1e-4 * 10e-6
     across = (np.sum(np.asarray(contrast(10e-6 + step))) - np.sum(np.asarray(contrast(10e-6 - step)))) / (2 * step)
-    assert waist.grad[0] == pytest.approx(across, rel=1e-2)  # with the light held, several times as much
+    assert waist.grad[0] == pytest.approx(across, rel=1e-2)  # several times as large for a constant amount of light
 
 
 @pytest.mark.parametrize("steepness", [2.3, 8.0])
 def test_a_perfect_lens_is_perfect_however_wide(steepness):
-    """Radius over distance: near the pupil slants are no polynomials, and want more nodes."""
+    """Radius over distance: near the pupil slants are not polynomials and need more nodes."""
     z = 100e-6
     pupil = optics.Pupil(steepness * z, thin_lens_focal_length=z)
     seen = optics.psf(pupil, [500e-9], sensor_distance=z, dx=0.05e-6, shape=(33, 33), tolerance=1e-4)

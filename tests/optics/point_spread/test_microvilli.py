@@ -1,4 +1,4 @@
-"""Microvilli: Malus' law, and what steep rays leave of it."""
+"""Microvilli: Malus' law, and the effect of steep rays on it."""
 
 import math
 from dataclasses import replace
@@ -25,7 +25,8 @@ def slow(**others):
 @pytest.mark.parametrize("azimuth", [0.0, 30.0, 117.0])
 @pytest.mark.parametrize("ratio", [math.inf, 5.0])
 def test_flat_rays_obey_malus(azimuth, ratio):
-    """cos² of the angle between polarisation and microvilli, and 1/ratio of the rest; to sin²θ of the rays."""
+    """The signal is cos² of the angle between polarisation and microvilli, plus 1/ratio of the rest, up to sin²θ of the
+    rays."""
     cells = Microvilli(azimuth, ratio)
     for plane in np.radians([0.0, 25.0, 60.0, 90.0, 150.0]):
         light = slow(polarization=(math.cos(plane), math.sin(plane)))
@@ -48,7 +49,7 @@ def test_no_preference_absorbs_all():
 
 
 def test_steep_rays_lower_polarisation_sensitivity():
-    """It is the dichroic ratio behind a slow lens, and the ratio of signals in both planes behind any."""
+    """It equals the dichroic ratio behind a slow lens, and the ratio of signals in the two planes behind any lens."""
     cells, window = Microvilli(0.0, 10.0), {"dx": 50e-9, "shape": (61, 61)}
     assert cells.polarization_sensitivity(slow(), 8e-6) == pytest.approx(10, rel=0.02)
     found = cells.polarization_sensitivity(optics.vector_focus(STEEP, WAVE, **window), 1e-6)
@@ -58,7 +59,7 @@ def test_steep_rays_lower_polarisation_sensitivity():
 
 
 def absorbed_at(x, y, lens, z, jones, cells):
-    """At places about the focus of a round lens, by Richards and Wolf's integrals."""
+    """Absorbed light at places about the focus of a round lens, by Richards and Wolf's integrals."""
     radius, focal = lens.radius, lens.thin_lens_focal_length
 
     def light(theta):
@@ -79,7 +80,7 @@ def absorbed_at(x, y, lens, z, jones, cells):
 
 
 def integral(radius, centre, picture):
-    """Over a disk, of what polar Gauss nodes see."""
+    """Integral of an image over a disk, by polar Gauss nodes."""
     nodes, weights = np.polynomial.legendre.leggauss(30)
     r, turns = radius * (nodes + 1) / 2, 2 * np.pi * np.arange(90) / 90
     x, y = centre[0] + np.outer(r, np.cos(turns)), centre[1] + np.outer(r, np.sin(turns))
@@ -91,8 +92,8 @@ def integral(radius, centre, picture):
 @pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("seed", range(30))
 def test_predicted_errors_hold_for_any_receptor_and_samples(seed):
-    """Receptors from a twentieth of λ/NA to four, anywhere about the focus; pitches to .7 λ/NA, windows of three
-    samples and more; a sum under a hard disk errs by some 20 % in the median."""
+    """Receptors from a twentieth of λ/NA to four, anywhere about the focus; pitches up to 0.7 λ/NA, windows of at least
+    three samples. A sum under a hard disk has a median error of some 20 %."""
     rng = np.random.default_rng(seed)
     sine = float(rng.choice([0.05, 0.2, 0.5, 0.8, 0.9]))
     lens = optics.Pupil(8e-3 * math.tan(math.asin(sine)), thin_lens_focal_length=8e-3)
@@ -106,7 +107,7 @@ def test_predicted_errors_hold_for_any_receptor_and_samples(seed):
     assert light.plan.method == "plane_waves"
     found, error = cells.signal(light, radius, centre, with_error=True)
     expected = integral(radius, centre, lambda x, y: absorbed_at(x, y, lens, z, jones, cells))
-    # Out of focus the lens' rays go to its focus, and those of the integrals to the image.
+    # Out of focus the lens' rays go to its focus, and rays of the integrals go to the image.
     turned = 0.0 if z == 8e-3 else 1e-4 * found
     assert abs(found - expected) < min(error, 1.1e-6 + turned)
 
@@ -123,8 +124,8 @@ def test_predicted_errors_hold_for_any_receptor_and_samples(seed):
 @pytest.mark.parametrize("defocus", [0.0, 1.5, -4.0])
 @pytest.mark.parametrize(("tolerance", "worst"), [(0.3, 2.0), (1e-3, 4e-3)])
 def test_what_light_errs_by_is_told(sine, focal, wavefront, aperture, defocus, tolerance, worst):
-    """By plane waves or exactly: the scalar picture against `psf`, which is right to 1e-6. What is said is more than
-    the tolerance where a disk holds less light than the window."""
+    """The scalar image, by plane waves or exactly, is compared with `psf`, which is right to 1e-6. The reported error
+    exceeds the tolerance if a disk holds less light than the window."""
     lens = optics.Pupil(
         focal * math.tan(math.asin(sine)), thin_lens_focal_length=focal, wavefront=wavefront, aperture=aperture
     )
@@ -135,17 +136,17 @@ def test_what_light_errs_by_is_told(sine, focal, wavefront, aperture, defocus, t
     ratios = []
     for radius in (0.5 * unit, 2 * unit):
         disk = DiskSum.over(light, radius)
-        found, error = disk.of(disk.light.scalar)
+        found, error = disk.integrate(disk.light.scalar)
         off = abs(found - float(optics.encircled_energy(exact, radius)[0, 0]))
         assert off < error < worst * found + 2e-6
         ratios.append(error / off)
-    # In focus nearly all that is said is for single components, which a sum does not err by.
+    # In focus nearly all of the reported error belongs to single components, and a sum does not have it.
     assert tolerance == 1e-3 or defocus == 0 or min(ratios) < 100
 
 
 @pytest.mark.slow
 def test_signals_do_not_depend_on_samples():
-    """Of a hexagon aslant: coarse, narrow and even windows, and the polarisation sensitivity in them."""
+    """Signals of a tilted hexagon in coarse, narrow and even windows, and the polarisation sensitivity in them."""
     hexagon = optics.Pupil(1e-3, thin_lens_focal_length=2e-3, aperture=optics.Polygon.regular(6))
     cells, angle, place = Microvilli(20.0, 8.0), (0.1, -0.05), (0.3e-6, -0.2e-6)
     windows = [(0.1e-6, (61, 61)), (0.7e-6, (5, 5)), (1e-6, (4, 6)), (0.4e-6, (9, 12))]

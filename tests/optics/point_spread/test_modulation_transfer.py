@@ -1,4 +1,4 @@
-"""Contrasts at frequencies that lie on no grid, over all orientations, against the sums themselves."""
+"""Contrasts between the grid's frequencies, over all orientations, against the sums themselves."""
 
 import drjit as dr
 import numpy as np
@@ -26,10 +26,11 @@ def radial_means(shares, dx, frequencies, orientations):
 
 
 def test_contrasts_between_the_grids_frequencies_are_the_pictures_own():
-    """Light that fills its window turns contrasts over within a step of the grid: straight lines err by .04 there."""
+    """Contrasts reverse within one step of the grid if light fills its window: straight lines have an error of 0.04
+    there."""
     result = optics.psf(LENS, [WAVELENGTH], FOCUS + 1.6e-4, dx=0.8e-6, shape=(91, 91), tolerance=1e-4)
     transfer = optics.mtf(result, tolerance=1)
-    grid = transfer.fx[46:49]  # the few first
+    grid = transfer.fx[46:49]  # the first few
     f = np.linspace(0.3, 1.7, 8) * grid[0]
     exact = radial_means(transfer.shares.numpy()[0], result.dx, f, 128)
     off = np.abs(transfer.profile(f)[0] - exact).max()
@@ -47,10 +48,10 @@ def test_as_many_orientations_as_the_picture_needs():
     f = np.linspace(0.3, 0.5, 11) / dx
     fine, few = (radial_means(shares[0], dx, f, n) for n in (4096, 64))
     assert np.abs(few - fine).max() > 0.03
-    found = MTF.of(tensor, dx, np.array([1e6]), np.array([2e-3])).profile(f)[0]
+    found = MTF.from_shares(tensor, dx, np.array([1e6]), np.array([2e-3])).profile(f)[0]
     assert np.abs(found - fine).max() < 1e-3
-    with pytest.raises(optics.AccuracyError, match="a mean over 1024 orientations errs by"):
-        MTF.of(tensor, dx, np.array([1e6]), np.array([1e-6])).profile(f)
+    with pytest.raises(optics.AccuracyError, match="a mean over 1024 orientations has"):
+        MTF.from_shares(tensor, dx, np.array([1e6]), np.array([1e-6])).profile(f)
 
 
 def test_many_frequencies_are_summed_some_at_a_time(monkeypatch):

@@ -1,4 +1,4 @@
-"""What becomes of a picture that the spot check finds wrong."""
+"""Handling of a PSF that fails the spot check."""
 
 import subprocess
 import sys
@@ -42,7 +42,8 @@ def test_the_error_that_is_seen_is_the_one_that_is_stated(told):
 
 
 def test_an_exact_method_tries_again_for_a_smaller_tolerance(told):
-    """Ten times too wrong: 0.3 of a tenth of the tolerance, for which the method takes more samples."""
+    """An error ten times too large leads to 0.3 of a tenth of the tolerance, for which the method takes more
+    samples."""
     checked = told(10 * TOLERANCE, 0.5 * TOLERANCE)
     ask = {"sensor_distance": 400e-6, "method": "low_rank", **WINDOW}
     result = optics.psf(LENS, tolerance=TOLERANCE, **ask)
@@ -77,7 +78,7 @@ def test_what_stays_wrong_is_refused(told):
 
 
 def test_no_more_digits_are_asked_than_there_are(told):
-    """float32 carries ten times its noise: a picture that was wrong at that tolerance is not computed again."""
+    """float32 can reach ten times its noise: a PSF that fails at that tolerance is not computed again."""
     least = 10 * FLOAT_NOISE["float32"]
     checked = told(10 * least)
     with pytest.raises(optics.AccuracyError, match="in float32"):
@@ -86,7 +87,8 @@ def test_no_more_digits_are_asked_than_there_are(told):
 
 
 def test_where_no_check_was_made_the_picture_tells_how_dark_it_is(told):
-    """Far off the focus rounding weighs more: there float32 cannot meet what it meets in the middle."""
+    """Rounding has more weight far off the focus, so float32 cannot reach the accuracy there that it has in the
+    middle."""
     ask = {"sensor_distance": 400e-6, "method": "low_rank", "tolerance": 2e-5, "dx": 0.5e-6, "shape": (9, 9)}
     told(None, None)
     assert optics.psf(LENS, **ask).plan.predicted_error < 2e-5
@@ -95,8 +97,8 @@ def test_where_no_check_was_made_the_picture_tells_how_dark_it_is(told):
 
 
 def test_the_first_small_picture_waits_for_no_import_of_what_it_does_not_need():
-    """SciPy alone would take more than `import numpy, scipy`; a pupil that bends light is computed without. What reads
-    packages' metadata, for Dr.Jit's version, takes longer than the picture."""
+    """SciPy alone would take longer than `import numpy, scipy`; a pupil that bends light needs no SciPy. Reading the
+    packages' metadata for Dr.Jit's version takes longer than the PSF."""
     small = """
 import sys
 import optics

@@ -1,4 +1,4 @@
-"""Plans: the cheapest method that fits is named, with its reasons; what cannot be had is said."""
+"""Plans: the cheapest sufficient method is named with its reasons, and impossible requests get a message."""
 
 import dataclasses
 import math
@@ -13,10 +13,10 @@ from optics.point_spread.planner import APPROXIMATE, EXACT, METHODS, WEIGHING, c
 
 
 def problem_of(pupil, distance, window, tolerance, **more):
-    return Problem.of(Beam(pupil, PointSource(), 550e-9, distance), window, tolerance, **more)
+    return Problem.from_beam(Beam(pupil, PointSource(), 550e-9, distance), window, tolerance, **more)
 
 
-# A prism of no slope to speak of: not symmetric, so that all methods can compete.
+# A prism with a negligible slope: not symmetric, so that all methods compete.
 BENT = BSplineRelief(1e-9 * np.eye(4))
 LENS_PUPIL = Pupil(30e-6, BENT, thin_lens_focal_length=240e-6)
 LENS = problem_of(LENS_PUPIL, 240e-6, Grid.square(65, 0.5e-6), 1e-3)
@@ -39,7 +39,7 @@ def test_auto_takes_the_cheapest(problem):
 def test_method_follows_the_problem():
     symmetric = problem_of(Pupil(30e-6, thin_lens_focal_length=240e-6), 240e-6, Grid.square(65, 0.5e-6), 1e-3)
     assert choose(symmetric)[0].method in ("hankel", "rayleigh_sommerfeld")
-    # Near a focus pupil and path turn through few cycles together: a few nodes do, but not for many outputs.
+    # Near a focus pupil and path turn through few cycles together: a few nodes are enough, but not for many outputs.
     coarsely = problem_of(LENS_PUPIL, 240e-6, Grid.square(33, 1e-6), 1e-3)
     assert choose(coarsely)[0].method == "rayleigh_sommerfeld"
     finely = problem_of(LENS_PUPIL, 240e-6, Grid.square(801, 0.04e-6), 1e-3)
@@ -59,8 +59,8 @@ def test_auto_takes_no_approximation_that_errs_by_more_than_the_tolerance(proble
 
 
 def test_a_method_is_not_asked_where_that_costs_more_than_it_can_save():
-    """Those that are left out are slower than what was chosen, or save less than asking takes; and a problem that
-    takes long asks all."""
+    """Omitted methods are slower than the chosen one, or save less than their evaluation costs; for a problem that
+    takes long, all methods are evaluated."""
     small = problem_of(LENS_PUPIL, 240e-6, Grid.square(33, 1e-6), 1e-2)
     plan, _ = choose(small)
     asked = {option.method for option in plan.options}
@@ -88,11 +88,11 @@ def test_more_digits_cost_more_samples(method):
         for tolerance in (1e-2, 1e-5, 1e-9)
     ]
     assert samples == sorted(samples)
-    assert samples[0] < samples[-1] < 3 * samples[0]  # digits cost little: convergence is spectral
+    assert samples[0] < samples[-1] < 3 * samples[0]  # digits are cheap: convergence is spectral
 
 
 def test_sampling_resolves_the_lens():
-    """Phase of an ideal lens needs dx < λ / (2 NA)."""
+    """The phase of an ideal lens needs dx < λ / (2 NA)."""
     _, sampling = choose(LENS, "angular_spectrum")
     assert sampling.pupil.dx < 550e-9 / (2 * 0.124)
 
@@ -107,7 +107,7 @@ def test_refusals_say_what_it_would_take():
     far_too_large = dataclasses.replace(WIDE, radius=3e-3, distance=2e-3, window=Grid.square(1001, 4e-6))
     with pytest.raises(AccuracyError, match=r"needs \d+ samples across .* the limits are"):
         choose(far_too_large)
-    with pytest.raises(AccuracyError, match="dtype='float64' carries"):
+    with pytest.raises(AccuracyError, match="dtype='float64' allows"):
         choose(dataclasses.replace(LENS, tolerance=1e-8))
     with pytest.raises(AccuracyError, match="grazing"):
         choose(dataclasses.replace(LENS, distance=1e-7), "angular_spectrum")

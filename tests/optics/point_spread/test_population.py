@@ -1,4 +1,4 @@
-"""A population's pictures, by one plan, against the exact integral; what it cannot do well goes the ordinary way."""
+"""A population's PSFs with one plan, against the exact integral; unsuitable members take the ordinary way."""
 
 import math
 
@@ -16,7 +16,7 @@ Z, LAMBDA = 240e-6, 550e-9
 
 
 def eyes(count, seed=0, **options):
-    """Of 15 to 40 µm, with reliefs near a lens."""
+    """Pupils of 15 to 40 µm, with reliefs close to a lens."""
     rng = np.random.default_rng(seed)
     for _ in range(count):
         radius = rng.uniform(15e-6, 40e-6)
@@ -56,7 +56,8 @@ def test_in_a_medium_behind_any_lens():
 
 
 def test_the_batch_takes_it_and_leaves_it_the_rest():
-    """A height map, a wide pupil whose rest is not slow, and a derivative go the ordinary way: all in one batch."""
+    """A height map, a wide pupil whose remainder is not slow, and a derivative take the ordinary way, all in one
+    batch."""
     wide = optics.Pupil(200e-6, thin_lens_focal_length=Z)
     pupils = [*eyes(3), optics.Pupil(20e-6, np.zeros((5, 5))), wide, optics.Pupil(Float64(20e-6))]
     options = {"dx": 0.25e-6, "shape": (33, 33), "tolerance": 1e-2}
@@ -72,8 +73,8 @@ def test_the_batch_takes_it_and_leaves_it_the_rest():
 
 
 def test_one_kernel_scale_for_all_rays_would_be_worse():
-    """The rest keeps three times less phase with ξ/c(ξ) than with ξ over the distance."""
-    stack, window = _Stack.of(members(eyes(4))), Grid((65, 65), 0.25e-6)
+    """The remainder has three times less phase with ξ/c(ξ) than with ξ over the distance."""
+    stack, window = _Stack.from_members(members(eyes(4))), Grid((65, 65), 0.25e-6)
     ours = _spread(stack, window)[:, -1]
     xi = stack.radius[:, 0, 0] * 0.7
     plain, bent = xi / stack.distance[:, 0, 0], _sine(stack, window, xi[:, None, None])[:, 0, 0]

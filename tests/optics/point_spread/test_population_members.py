@@ -1,4 +1,5 @@
-"""Wavefronts, masks and two media in a population's plan, against the exact integral; and what it leaves to others."""
+"""Wavefronts, masks and two media in a population's plan, against the exact integral; and the members that it leaves to
+other methods."""
 
 import math
 
@@ -72,7 +73,7 @@ def test_predicted_errors_hold(kind, tolerance, radii, side):
 
 
 def test_powers_are_zernike_s_polynomials():
-    """Every mode up to the highest order, within the circle and its soft edge, less its value in the middle."""
+    """Every mode up to the highest order, within the circle and its soft edge, minus its value in the middle."""
     x, y = 1.1 * np.random.default_rng(0).uniform(-0.7, 0.7, (2, 40))
     known = powers(x, y, HIGHEST_ORDER)
     for n in range(HIGHEST_ORDER + 1):
@@ -96,7 +97,7 @@ def test_what_it_leaves_to_others():
 
 
 def test_a_batch_of_all_kinds():
-    """Each picture is its own, whichever way it goes."""
+    """Each pupil gets its own PSF, with either kind of plan."""
     pupils = [member.pupil for kind in KINDS for member in members(kind, 2, (15e-6, 25e-6))]
     options = {"dx": 0.25e-6, "shape": (33, 33), "tolerance": 1e-2}
     batch = optics.psf_batch(pupils, [LAMBDA], Z, **options)
@@ -107,7 +108,7 @@ def test_a_batch_of_all_kinds():
 
 @pytest.mark.parametrize("waist", [0.03, 0.15])
 def test_a_narrow_mask_is_sampled_finely(waist):
-    """It turns nothing, and changes within a few samples of an open pupil's."""
+    """A narrow mask does not turn the phase, but changes within a few samples of an open pupil's grid."""
     radius = 10e-6
     pupil = optics.Pupil(radius, thin_lens_focal_length=Z, mask=optics.GaussianMask(waist * radius))
     member, window = Member(pupil, LAMBDA, Z, math.inf), Grid.square(33, 0.25e-6)
@@ -118,7 +119,7 @@ def test_a_narrow_mask_is_sampled_finely(waist):
 
 @pytest.mark.parametrize("common", [{"height": 1.0}, {"wavefront": 1e6}])
 def test_what_all_of_a_pupil_has_in_common_changes_nothing(common):
-    """A metre of glass, or of path, is a million waves, of which float32 keeps no tenth."""
+    """A metre of glass, or of path, is a million waves, for which float32 resolves less than a tenth of a wave."""
     lens = {
         "height": optics.BSplineRelief.paraboloid(0, 1 / (0.5 * Z), 15e-6),
         "wavefront": optics.Zernike({(3, 1): 0.1}),
@@ -139,7 +140,8 @@ def test_what_all_of_a_pupil_has_in_common_changes_nothing(common):
     [(0.8, 0.25, 1e-2), (0.7, 0.25, 1e-2), (0.6, 0.2, 5e-2), (0.5, 0.35, 5e-2), (0.3, 0.25, 1e-2)],
 )
 def test_masks_that_are_bright_where_the_aperture_is_shut_are_left_to_others(inner, waist, tolerance):
-    """What passes is less than the soft edge errs by, which is told of a bright pupil: errors were 1.2e-2 to 2.6e-1."""
+    """The transmitted light is less than the soft edge's error, which is predicted for a bright pupil: errors would be
+    1.2e-2 to 2.6e-1."""
     mask = optics.GaussianMask(waist * 12e-6)
     pupil = optics.Pupil(12e-6, aperture=optics.Annulus(inner), mask=mask, thin_lens_focal_length=Z)
     assert not list(population_pictures([Member(pupil, LAMBDA, Z, math.inf)], Grid.square(33, 0.5e-6), tolerance))
@@ -152,7 +154,7 @@ def test_masks_that_are_bright_where_the_aperture_is_shut_are_left_to_others(inn
 
 @pytest.mark.parametrize(("inner", "waist", "tolerance"), [(0.5, 0.45, 1e-2), (0.5, 0.45, 5e-2), (0.4, 0.4, 2e-2)])
 def test_of_somewhat_dimmer_ones_errors_are_told(inner, waist, tolerance):
-    """Just above the light below which they are left to others."""
+    """The light is just above the limit below which other methods take over."""
     pupil = optics.Pupil(
         12e-6, aperture=optics.Annulus(inner), mask=optics.GaussianMask(waist * 12e-6), thin_lens_focal_length=Z
     )
@@ -164,6 +166,6 @@ def test_of_somewhat_dimmer_ones_errors_are_told(inner, waist, tolerance):
 
 
 def test_dim_masks_are_no_reason_to_leave():
-    """Of .001 of the light everywhere no edge takes more than its share."""
+    """No edge has more than its share of a light that is 0.001 everywhere."""
     pupil = optics.Pupil(12e-6, mask=optics.MaskMap(np.full((4, 4), 0.03)), thin_lens_focal_length=Z)
     assert list(population_pictures([Member(pupil, LAMBDA, Z, math.inf)], Grid.square(33, 0.5e-6), 1e-2))

@@ -1,4 +1,4 @@
-"""PSFs against closed forms and the direct sum; signs, axes and centring; what is refused."""
+"""PSFs against closed forms and the direct sum; signs, axes and centring; and refusals."""
 
 import math
 
@@ -56,7 +56,7 @@ class TestOracles:
         assert result.psf[0, 2, 2] * math.pi * self.a**2 == pytest.approx(exact, rel=error)
 
     def test_far_field_of_an_aperture_is_fraunhofers(self):
-        """Fresnel number 5e-4: |U|² = (πa²/λρ)² (z/ρ)² (2 J1(v)/v)², v = ka sin θ, to the Fresnel number squared."""
+        """Fresnel number 5e-4: |U|² = (πa²/λρ)² (z/ρ)² (2 J1(v)/v)², v = ka sin θ, up to the Fresnel number squared."""
         from scipy.special import j1
 
         a, z = 2e-6, 16e-3
@@ -70,7 +70,8 @@ class TestOracles:
 @pytest.mark.parametrize("seed", range(6))
 @pytest.mark.parametrize("method", METHODS[:3])
 def test_methods_agree_with_the_direct_sum_within_their_prediction(method, seed):
-    """Random reliefs, distances, windows off the optics' scale: the error never exceeds what the plan predicts."""
+    """Random reliefs, distances, and windows at other scales than the optics': the error never exceeds the plan's
+    prediction."""
     rng = np.random.default_rng(seed)
     radius, z, n = 10 ** rng.uniform(0.2, 1.1) * 1e-6, 10 ** rng.uniform(-4, -3) * 1, rng.uniform(1, 2)
     pupil = Pupil(radius, BSplineRelief(rng.random((4, 4)) * 2 * radius), n=n)
@@ -85,7 +86,7 @@ def test_methods_agree_with_the_direct_sum_within_their_prediction(method, seed)
 
 @pytest.mark.parametrize("method", METHODS[:2])
 def test_error_follows_the_tolerance(method):
-    """Spectral convergence in float64: each digit asked is a digit given."""
+    """Convergence is spectral in float64: every requested digit is obtained."""
     r = np.hypot(*np.meshgrid(*[np.arange(-15, 16) * 0.5e-6] * 2))
     exact = np.abs(reference.ideal_lens_field(r.ravel(), 550e-9, 30e-6, 240e-6)).reshape(r.shape) ** 2 / LENS.area
     for tolerance in (1e-2, 1e-4, 1e-6, 1e-8):
@@ -156,7 +157,7 @@ class TestConventions:
 
 
 class TestWindow:
-    """A window off the axis shows what a larger one on the axis shows there."""
+    """A window off the axis agrees with a larger one on the axis."""
 
     @pytest.mark.parametrize("method", METHODS)
     def test_off_the_axis(self, method):
@@ -186,7 +187,7 @@ class TestWindow:
 class TestPower:
     @pytest.mark.parametrize("method", ["angular_spectrum", "far_field"])
     def test_a_wide_window_holds_all_power(self, method):
-        """Sampled finer than the intensity's band, the sum is the integral (Parseval)."""
+        """The sum is the integral if samples are finer than the intensity's band (Parseval)."""
         result = optics.psf(
             prism(8e-6, 0.1), [550e-9], 120e-6, dx=1e-6, shape=(281, 281), tolerance=2e-3, method=method
         )
@@ -195,7 +196,7 @@ class TestPower:
         assert result.power[0] < 1.001
 
     def test_evanescent_light_does_not_arrive(self):
-        """A relief so steep that its first order does not propagate keeps nearly all light from the sensor."""
+        """A relief so steep that its first order is evanescent blocks nearly all light."""
         lost = optics.psf(
             prism(8e-6, 1.5), [550e-9], 120e-6, dx=2e-6, shape=(141, 141), tolerance=1e-2, dtype="float64"
         )
@@ -250,17 +251,17 @@ def test_what_is_no_pupil_is_named(pupil):
 
 class TestRefusals:
     def test_float32_has_a_floor(self):
-        with pytest.raises(AccuracyError, match=r"float32 carries 1e-05; dtype='float64'"):
+        with pytest.raises(AccuracyError, match=r"float32 allows at least 1e-05; dtype='float64'"):
             optics.psf(LENS, [550e-9], tolerance=1e-7)
 
     def test_a_pupil_of_millimetres_and_a_wide_window_are_too_much(self):
-        """Lit from aside, where no transform along one radius can carry it."""
+        """The light is oblique, so a transform along one radius cannot represent it."""
         pupil, window = Pupil(2e-3, thin_lens_focal_length=4e-3), {"dx": 20e-6, "shape": (201, 201)}
         with pytest.raises(AccuracyError, match="samples across"):
             optics.psf(pupil, [550e-9], 4e-3, **window, source_angle=(0.1, 0.0))
 
     def test_a_dark_window_is_less_accurate_and_says_so(self):
-        """The focus of a tilted wave lies far outside: what edge light is here drowns sooner in float32's rounding."""
+        """The focus of a tilted wave lies far outside: the remaining edge light is closer to float32's rounding."""
         window = {"wavelengths": [550e-9], "dx": 1e-6, "shape": (17, 17)}
         bright = optics.psf(LENS, **window)
         dark = optics.psf(LENS, **window, source_angle=(0.6, 0.0))

@@ -1,4 +1,4 @@
-"""One wavelength's method is tried for the next, unless it has become dear."""
+"""One wavelength's method is tried for the next one, unless it has become expensive."""
 
 from dataclasses import replace
 
@@ -19,7 +19,7 @@ def test_what_did_for_one_wavelength_does_for_the_next():
     again, _ = second.after(first, plan).planned()
     assert again.method == plan.method
     assert len(again.options) == 1
-    assert "as at the wavelength before" in again.why
+    assert "same method as at the previous wavelength" in again.why
 
 
 def test_what_takes_longer_is_weighed_anew():

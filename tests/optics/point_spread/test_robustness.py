@@ -1,4 +1,5 @@
-"""Whatever an evolution or a user asks: a finite PSF within its predicted error, or a named error. Nothing else."""
+"""PSFs with arbitrary arguments, from an evolution or a user, are finite within their predicted error, or raise a named
+error."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""The spot check sees the errors that a focus or a small window could hide from it."""
+"""The spot check finds errors that a focus or a small window could hide from it."""
 
 from dataclasses import replace
 
@@ -16,9 +16,9 @@ from optics.point_spread.spot_check import CAUTION, spot_check
 
 
 def picture(shape, dx, tolerance=1e-4):
-    """Beam, problem and PSF of a lens at its focus, and of a window of this shape."""
+    """Beam, problem and PSF of a lens at its focus, for a window of this shape."""
     beam = Beam(Pupil(50e-6, thin_lens_focal_length=250e-6), PointSource(), 550e-9, 250e-6)
-    task = Problem.of(beam, Grid(shape, dx), tolerance, "float64")
+    task = Problem.from_beam(beam, Grid(shape, dx), tolerance, "float64")
     image = choose(task, "rayleigh_sommerfeld")[1].intensity(beam, task).numpy() / beam.pupil.area
     return beam, task, image
 
@@ -45,7 +45,7 @@ def test_in_a_small_window_every_sample_is_looked_at(sample):
 
 def test_single_precision_is_never_promised_more_than_it_carries():
     beam, task, image = picture((9, 9), 1e-6, 1e-10)
-    single = Problem.of(beam, task.window, 1e-4, "float32")
+    single = Problem.from_beam(beam, task.window, 1e-4, "float32")
     assert spot_check(beam, single, image, 1.0) >= np.finfo(np.float32).eps
     assert spot_check(beam, task, image, 1.0) < 1e-9
 
@@ -53,7 +53,7 @@ def test_single_precision_is_never_promised_more_than_it_carries():
 @pytest.mark.parametrize("aperture", [optics.Circle(), optics.Annulus(0.4)])
 @pytest.mark.parametrize("cycles", [3.0, 3.7, 11.2])
 def test_half_the_nodes_sum_what_is_even_in_y(aperture, cycles):
-    """Exactly, up to rounding; a rule whose nodes were not mirrored at the x axis would not."""
+    """The sums agree up to rounding; a rule with nodes that are not mirrored at the x axis would not agree."""
     whole, half = (cached_nodes(aperture, cycles, 8.0, halved) for halved in (False, True))
     assert len(half) < 0.6 * len(whole)
     for even in (lambda x, y: 1 + 0 * x, lambda x, y: np.cos(3 * x) * y**2, lambda x, y: np.exp(x) * np.cos(2 * y)):
@@ -63,8 +63,8 @@ def test_half_the_nodes_sum_what_is_even_in_y(aperture, cycles):
 
 @pytest.mark.parametrize("spare", [1.0, 2.0])
 def test_the_check_owns_up_to_what_its_own_sum_is_good_to(spare, monkeypatch):
-    """A picture made of the very sum that it is held against differs from it in nothing. What is left to say is how
-    far the sum itself may be off: in a dark window by more than in a bright one, unless it is given digits for that."""
+    """A PSF made with the reference sum itself differs from it by nothing. The check then reports the accuracy of the
+    sum, which is lower in a dark window than in a bright one unless it gets spare digits."""
     effort = replace(spot_check_module.EFFORT, spare_digits=(spare,))
     monkeypatch.setattr(spot_check_module, "EFFORT", effort)
     beam, task, image = picture((61, 61), 4e-6)
@@ -72,7 +72,7 @@ def test_the_check_owns_up_to_what_its_own_sum_is_good_to(spare, monkeypatch):
     darkness = spot_check_module._darkness(beam, task, mean)
     assert darkness > 0.5
     reference = spot_check_module._affordable(task, darkness, 1.0, image.size)
-    # Few different rules of nodes: up to a step more.
+    # The rules of nodes come in few steps, hence up to one step more.
     wished = spare - np.log10(task.tolerance) + darkness
     assert wished <= reference.digits <= wished + spot_check_module.DIGITS_STEP
     same = spot_check_module._exact(beam, task, reference, np.arange(image.size))

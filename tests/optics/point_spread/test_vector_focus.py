@@ -35,8 +35,8 @@ def by_directions(window, z, sine, jones, light):
 @pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("sine", [0.5, 0.9])
 def test_far_away_a_lens_in_focus_is_richards_and_wolfs(sine):
-    """From place to place the path bends by sin²θ/N less than plane waves have it: with ten times the distance the
-    exact field comes ten times nearer to them, and the sum of plane waves is there at once."""
+    """The path bends by sin²θ/N less from place to place than plane waves predict. At ten times the distance the exact
+    field is ten times nearer to them, and the sum of plane waves agrees at once."""
     jones, window = np.array([1, 0.5j]) / math.sqrt(1.25), {"dx": 0.05e-6, "shape": (41, 35)}
     off = {}
     for z in (0.2e-3, 2e-3):
@@ -63,8 +63,8 @@ def test_an_aplanatic_lens_is_richards_and_wolfs(sine):
 
 
 def by_smythe(pupil, angle, jones, z, places):
-    """½π⁻¹ ∇ × ∫ (ẑ × E) e^{ikR}/R dξ as it stands, by a midpoint sum; behind a Gaussian mask it converges like one.
-    E by Rodrigues' matrices, towards the lens' focus."""
+    """½π⁻¹ ∇ × ∫ (ẑ × E) e^{ikR}/R dξ as it stands, by a midpoint sum, which converges spectrally behind a Gaussian
+    mask. E comes from Rodrigues' matrices, towards the lens' focus."""
     n, k = 161, 2 * math.pi / WAVE
     at = ((np.arange(n) + 0.5) / n * 2 - 1) * pupil.radius
     x, y = (axis.ravel() for axis in np.meshgrid(at, at))
@@ -88,7 +88,7 @@ def by_smythe(pupil, angle, jones, z, places):
 
 @pytest.mark.parametrize(("angle", "z"), [((0.0, 0.0), 40e-6), ((0.0, 0.0), 30e-6), ((0.2, -0.1), 40e-6)])
 def test_a_small_eye_is_smythes_integral(angle, z):
-    """Fresnel number 1 within the mask: where plane waves are wrong, fields still obey Maxwell's equations."""
+    """Fresnel number 1 within the mask: plane waves are wrong there, but fields still obey Maxwell's equations."""
     pupil = optics.Pupil(20e-6, thin_lens_focal_length=40e-6, mask=optics.GaussianMask(4.8e-6))
     window = {"dx": 0.8e-6, "shape": (5, 7), "source_angle": angle}
     jones = np.array([0.6, 0.8j])
@@ -123,7 +123,8 @@ def turn(field, before, after):
 @pytest.mark.parametrize("defocus", [0.0, -2e-6, 15e-6])
 @pytest.mark.parametrize("relief", [0.0, 1e-6])
 def test_predicted_errors_hold_for_each_component(defocus, relief):
-    """Of lenses with reliefs of some waves, in focus and far from it; plane waves are taken where they will do."""
+    """Lenses with reliefs of some waves, in focus and far from it; plane waves are chosen if they are accurate
+    enough."""
     rng, f = np.random.default_rng(5), 100e-6
     height = rng.random((4, 4)) * relief if relief else None
     pupil = optics.Pupil(25e-6, height, thin_lens_focal_length=f, aperture=HEXAGON)
@@ -165,7 +166,7 @@ def test_a_plan_counts_every_field_that_is_propagated(monkeypatch):
 
 
 def test_where_single_precision_will_not_do_double_is_taken():
-    """The relief turns the light away, and a mask leaves it no rings: in the window is a ten thousand millionth."""
+    """The relief turns the light away, and a mask removes its rings: the window holds a ten thousand millionth."""
     ramp = np.broadcast_to(np.linspace(0, 10e-6, 4), (4, 4))
     view = {"dx": 0.2e-6, "shape": (9, 9), "tolerance": 1e-4}
     plans = {}
@@ -178,14 +179,15 @@ def test_where_single_precision_will_not_do_double_is_taken():
 
 
 def test_evanescent_rays_are_refused():
-    """Aslant by half a radian, those of a lens as wide as it is far are to leave under a sine of 1.17."""
+    """The rays of a lens as wide as its distance, oblique by half a radian, would leave at a sine of 1.17."""
     with pytest.raises(optics.AccuracyError, match=r"sine of 1\.17: must be at most 0\.98"):
         optics.vector_focus(optics.Pupil(20e-6, thin_lens_focal_length=20e-6), source_angle=(0.5, 0.0))
 
 
 def test_single_components_behind_thin_rings():
-    """What a plane wave's bent path does to them is of first order, where it is of second to their sum. It is largest
-    in light that circles; what is foretold of it is nearly all that is foretold here, and less than twice too much."""
+    """The bent path of a plane wave has a first-order effect on single components and a second-order effect on their
+    sum. It is largest for circular polarisation. It makes up nearly all of the predicted error here, which is less than
+    twice the actual one."""
     pupil = optics.Pupil(300e-6, thin_lens_focal_length=400e-6, aperture=optics.Annulus(0.98))
     view = {"polarization": (1, 1j), "dx": 0.06e-6, "shape": (9, 9)}
     rough, exact = (optics.vector_focus(pupil, WAVE, tolerance=tolerance, **view) for tolerance in (1e-2, 1e-8))
@@ -195,7 +197,7 @@ def test_single_components_behind_thin_rings():
 
 
 def test_flat_rays_aslant_keep_their_polarisation():
-    """A slow lens 0.3 rad off its axis: the chief ray goes straight on, its field at right angles to it."""
+    """A slow lens 0.3 rad off its axis: the chief ray goes straight on, with its field at right angles to it."""
     narrow = optics.Pupil(0.1e-3, thin_lens_focal_length=F)
     light = optics.vector_focus(narrow, WAVE, polarization=(1, 0), source_angle=(0.3, 0.0), dx=1e-6, shape=(3, 3))
     ex, ey, ez = light.intensity.sum(axis=(1, 2)) / light.psf.sum()
@@ -215,7 +217,7 @@ def test_hexagons_with_coma_are_scalar_theorys_where_rays_are_flat():
 
 
 def test_turning_pupil_and_polarisation_turns_the_picture():
-    """By 90°, in the plane whose rows run along y."""
+    """The rotation is by 90°, in the plane whose rows run along y."""
     one, other = (lens(0.8, aperture=optics.Polygon.regular(6, angle)) for angle in (17.0, 107.0))
     window = {"dx": 0.05e-6, "shape": (41, 41)}
     before = optics.vector_focus(one, WAVE, polarization=(1, 0), **window).psf
@@ -240,8 +242,8 @@ def test_stokes_parameters_say_the_same_as_jones_vectors():
     np.testing.assert_allclose(by_jones.polarization, (1, 0.28, 0, 0.96))
     np.testing.assert_allclose(by_stokes.intensity, by_jones.intensity, atol=1e-9 * by_jones.psf.max())
     overlap = np.vdot(by_stokes.field, by_jones.field) / np.vdot(by_jones.field, by_jones.field).real
-    assert abs(overlap) == pytest.approx(1)  # turned the other way round, circular light is at right angles to it
-    # Half polarised light is half unpolarised.
+    assert abs(overlap) == pytest.approx(1)  # turned the other way round, circular light is orthogonal to it
+    # Half-polarised light is half unpolarised.
     plain = optics.vector_focus(pupil, WAVE, **window)
     half = optics.vector_focus(pupil, WAVE, polarization=(2, *by_jones.polarization[1:]), **window)
     mean = (plain.intensity + by_jones.intensity) / 2
@@ -251,7 +253,7 @@ def test_stokes_parameters_say_the_same_as_jones_vectors():
 
 
 def test_one_ring_ends_where_it_ends():
-    """A disk of .6 R is a circle of that radius."""
+    """A disk of 0.6 R is a circle of that radius."""
     view = {"dx": 0.4e-6, "shape": (9, 9)}
     part = optics.Pupil(200e-6, thin_lens_focal_length=800e-6, aperture=optics.Rings([0, 0.6]))
     disk = optics.Pupil(120e-6, thin_lens_focal_length=800e-6)

@@ -26,7 +26,7 @@ def mean(values, weight):
 
 @pytest.mark.parametrize("lamp", ["D65", "A", "FL11"])
 def test_peak_is_airys_weighed_by_photons(lamp):
-    """π R² / (λ f)² of each wavelength."""
+    """π R² / (λ f)² at each wavelength."""
     white = optics.white_psf(LENS, lamp, (GREEN, 600), waves=61, **SMALL)
     low, high = optics.receptors_of((GREEN, 600)).limits_nm
     nm = np.arange(low, high + 1)
@@ -35,7 +35,7 @@ def test_peak_is_airys_weighed_by_photons(lamp):
         assert found == pytest.approx(mean(peaks, weight), rel=1e-3)
         assert abs(mean(peaks, weight / nm) / found - 1) > 2e-3  # energy in place of photons
         if lamp == "A":
-            assert abs(mean(peaks, kind.at(nm * 1e-9) * nm) / found - 1) > 1e-2  # no lamp
+            assert abs(mean(peaks, kind.at(nm * 1e-9) * nm) / found - 1) > 1e-2  # without the lamp
 
 
 def test_contrast_is_the_mean_of_disks():
@@ -52,7 +52,7 @@ def test_contrast_is_the_mean_of_disks():
 
 
 def test_shifts_between_colours_blur():
-    """A prism of dispersive glass: each colour is as sharp as before, white light is not."""
+    """A prism of dispersive glass leaves each colour sharp, but not white light."""
     x = np.linspace(-1, 1, 4) * 3 / 1 * R
     wedge = optics.BSplineRelief(np.outer(np.ones(4), 0.3 * x))
     glass = optics.RefractiveIndex.from_abbe(1.5, 20)
@@ -75,7 +75,8 @@ def test_predicted_error_holds():
 
 @pytest.mark.slow
 def test_as_few_wavelengths_as_the_tolerance_allows():
-    """Against the mean over every fourth nanometre of PSFs asked for one by one, with weights typed out here."""
+    """The reference is a mean over PSFs at every fourth nanometre, computed one by one, with weights written out
+    here."""
     nm = np.arange(420.0, 681, 4)
     weight = caught(optics.illuminant("D65"), GREEN, nm)
     each = np.stack([optics.psf(COMA, [at * 1e-9], **{**SMALL, "tolerance": 1e-5}).psf[0] for at in nm])
@@ -94,8 +95,8 @@ def test_as_few_wavelengths_as_the_tolerance_allows():
 
 @pytest.mark.slow
 def test_the_spectrums_error_falls_with_the_fourth_power(monkeypatch):
-    """Of splines; linear between wavelengths it would fall with the second."""
-    monkeypatch.setattr("optics.point_spread.white.LEFT", 1e-9)  # take whatever number is asked for
+    """This holds for splines; linear interpolation between wavelengths would give the second power."""
+    monkeypatch.setattr("optics.point_spread.white.LEFT", 1e-9)  # accept any number of wavelengths
     ask = {"dx": 8e-6, "shape": (9, 9), "tolerance": 1e-4}
     *found, exact = (optics.white_psf(COMA, "A", GREEN, waves=waves, **ask).psf[0] for waves in (9, 17, 33, 65))
     errors = [reference.relative_l2(each, exact) for each in found]
@@ -104,12 +105,12 @@ def test_the_spectrums_error_falls_with_the_fourth_power(monkeypatch):
 
 def test_all_wavelengths_are_planned_as_the_first():
     white = optics.white_psf(LENS, "D65", GREEN, waves=9, **{**SMALL, "tolerance": 1e-2})
-    assert white.waves.plans[0].why.endswith("cheapest of those that meet the tolerance")
-    assert all("as at the wavelength before" in plan.why for plan in white.waves.plans[1:])
+    assert white.waves.plans[0].why.endswith("cheapest method that meets the tolerance")
+    assert all("same method as at the previous wavelength" in plan.why for plan in white.waves.plans[1:])
 
 
 def test_measures_take_white_light():
-    """Each against its definition: sums over wavelengths of what monochromatic light has."""
+    """Each measure agrees with its definition: sums over wavelengths of monochromatic values."""
     white = optics.white_psf(LENS, "A", "lms", dx=4e-6, shape=(41, 41), centre=(0.0, 0.0))
     (strehl, error), peaks = optics.strehl_ratio(white, with_error=True), white.psf[:, 20, 20]
     ideal = white.weights @ (np.pi * R**2 / (white.waves.wavelengths * F) ** 2)
@@ -129,7 +130,7 @@ def test_measures_take_white_light():
 
 
 def test_a_strehl_ratio_of_colours_side_by_side():
-    """Of a lens of dispersive glass: the peak of the mean, not the mean of peaks that lie apart."""
+    """For dispersive glass, the result is the peak of the mean, not the mean of separate peaks."""
     x = np.linspace(-1, 1, 4) * 3 * R
     glass = optics.RefractiveIndex.from_abbe(1.5, 20)
     prism = Pupil(R, optics.BSplineRelief(np.outer(np.ones(4), 0.3 * x)), n=glass, thin_lens_focal_length=F)
@@ -179,10 +180,10 @@ def test_derivatives_flow():
         ({"light": "D66"}, "illuminant = 'D66': must be one of"),
         ({"light": 5}, "light = 5: must be an illuminant's name"),
         ({"light": lambda at: -at}, "light: must be finite and not negative"),
-        ({"light": Spectrum((700.0, 701), (0.0, 1.0)), "receptors": (350,)}, "light: receptors of type 0 see nothing"),
+        ({"light": Spectrum((700.0, 701), (0.0, 1.0)), "receptors": (350,)}, "light: receptors of type 0 absorb none"),
         ({"waves": 30}, "waves = 30: must be odd"),
         ({"waves": 3}, r"waves = 3: must be a whole number in \[5, 513\]"),
-        ({"wavelengths": [5e-7]}, "wavelengths: those of white light"),
+        ({"wavelengths": [5e-7]}, "wavelengths: must not be given"),
     ],
 )
 def test_bad_input(arguments, message):
@@ -191,12 +192,12 @@ def test_bad_input(arguments, message):
 
 
 def test_too_few_wavelengths_are_refused():
-    with pytest.raises(AccuracyError, match=r"5 wavelengths carry the spectrum to .*; ask for waves="):
+    with pytest.raises(AccuracyError, match=r"5 wavelengths resolve the spectrum to .*; use waves="):
         optics.white_psf(LENS, waves=5, **SMALL)
 
 
 def test_results_are_printed_in_a_line():
-    """Not with all that they hold, which is megabytes."""
+    """The line does not print all contents, which are megabytes."""
     white = optics.white_psf(optics.Pupil(1e-3, thin_lens_focal_length=17e-3), dx=2e-6, shape=(9, 11))
     focus = optics.vector_focus(optics.Pupil(1e-3, thin_lens_focal_length=17e-3), dx=2e-6, shape=(9, 11))
     waves = f"<PSFResult {len(white.waves.wavelengths)} wavelengths, 9 x 11 samples 2e-06 m apart, predicted error "

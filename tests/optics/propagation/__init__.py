@@ -1,4 +1,4 @@
-"""Which test fails when a module of optics/propagation is broken.
+"""Tests that fail when a module of optics/propagation is broken.
 
 planes: test_system.py
 propagate: test_propagate.py

@@ -1,4 +1,4 @@
-"""Plane-to-plane propagation against closed forms, and where it must refuse."""
+"""Plane-to-plane propagation against closed forms, and cases that it must refuse."""
 
 import numpy as np
 import pytest
@@ -38,7 +38,7 @@ def test_fresnel_is_the_gaussian_beam_in_amplitude_and_phase(dtype, bound, dista
 
 
 def test_angular_spectrum_departs_from_the_paraxial_beam_like_the_fourth_power_of_the_angle():
-    """Leading term of the phase error: kzθ⁴/8, so at a fixed distance halving the waist costs 2⁴."""
+    """Leading term of the phase error: kzθ⁴/8, so at a fixed distance half the waist gives 2⁴ times the error."""
     departures = []
     for waist in (4e-6, 2e-6):
         u = gaussian(128, waist / 8, waist)
@@ -105,7 +105,8 @@ def test_backwards_undoes_forwards():
 
 
 def test_tilted_light_walks_to_the_side_it_is_tilted_to():
-    """exp(+2πi fx x) leaves towards +x by z tan θ, sin θ = λ fx: the sign, the axis and the tangent, not the sine."""
+    """exp(+2πi fx x) leaves towards +x by z tan θ, sin θ = λ fx: the test covers the sign, the axis, and the tangent
+    instead of the sine."""
     n, dx, sine = 128, 0.25e-6, 0.6
     x = (np.arange(n) - n // 2) * dx
     u = gaussian(n, dx, 4e-6) * np.exp(2j * np.pi * sine / WAVELENGTH * x)[None, :]
@@ -135,7 +136,7 @@ def test_evanescent_waves_decay_and_do_not_return():
     assert near.evanescent_power == pytest.approx(1, abs=1e-6)
     expected = np.exp(-2 * np.pi * 0.1e-6 / WAVELENGTH * np.sqrt(3))
     assert np.abs(near.u).max() == pytest.approx(expected, rel=0.02)
-    with pytest.raises(optics.AccuracyError):  # nothing but rounding is left of it
+    with pytest.raises(optics.AccuracyError):  # only rounding is left of it
         optics.propagate(u, distance=-0.1e-6, **settings)
 
 
@@ -195,7 +196,7 @@ def test_a_window_off_the_axis_shows_what_a_larger_one_does():
 
 
 def test_darkness_around_the_light_costs_nothing():
-    """A field in a wide dark frame is the field alone: same picture, same period."""
+    """A field in a wide dark frame gives the same image and the same period as the field alone."""
     u = gaussian(48, 0.5e-6, 4e-6)
     settings = {"dx": 0.5e-6, "wavelength": WAVELENGTH, "distance": 80e-6, "out_shape": (40, 40), "tolerance": 1e-5}
     framed = optics.propagate(np.pad(u[None], ((0, 1), (100, 100), (60, 61))), **settings)
@@ -206,7 +207,7 @@ def test_darkness_around_the_light_costs_nothing():
 
 
 def test_evanescent_power_is_the_given_fields_whatever_becomes_of_it():
-    """It is worked out when asked for; by then the array may hold something else."""
+    """It is computed on request, when the array may already hold other values."""
     waist, dx = 0.2 * WAVELENGTH, WAVELENGTH / 20
     u = gaussian(81, dx, waist)
     result = optics.propagate(u, dx=dx, wavelength=WAVELENGTH, distance=0.5e-6, tolerance=2e-2)
@@ -216,7 +217,7 @@ def test_evanescent_power_is_the_given_fields_whatever_becomes_of_it():
 
 @pytest.mark.parametrize("size", [1e-23, 1e20])
 def test_faint_and_bright_fields_are_carried_alike(size):
-    """Powers of these leave the range of float32; what is asked is linear."""
+    """Powers of these fields exceed the range of float32, but propagation is linear."""
     x = (np.arange(48) - 24) * 1e-6
     u = np.exp(-np.add.outer(x**2, x**2) / 8e-6**2).astype(complex)
     plain, scaled = (optics.propagate(f * u, dx=1e-6, wavelength=5e-7, distance=1e-4) for f in (1.0, size))

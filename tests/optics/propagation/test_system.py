@@ -16,7 +16,7 @@ def spot(x, y, waist):
     return np.exp(-((X - x) ** 2 + (Y - y) ** 2) / waist**2)
 
 
-# Not symmetric, smooth to 1e-11 at the rim of its window.
+# An object that is not symmetric, and smooth to 1e-11 at the rim of its window.
 OBJECT = (spot(2e-6, 0, 2.5e-6) + 0.6j * spot(0, -3e-6, 2.5e-6)).astype(complex)
 SETTINGS = {"wavelength": WAVELENGTH, "dx": DX, "dtype": "float64", "tolerance": 1e-6}
 
@@ -56,7 +56,8 @@ def test_a_pupil_and_free_space_are_psf(name, dtype, tolerance):
 
 
 def test_two_apertures_converge_spectrally_to_two_exact_integrals():
-    """Each digit asked is given, through two hard edges: Rayleigh-Sommerfeld's integral of the reference's field."""
+    """Each requested digit is obtained through two hard edges: Rayleigh-Sommerfeld's integral of the reference's
+    field."""
     (a, z), (b, y) = (10e-6, 60e-6), (8e-6, 50e-6)
     nodes = optics.Circle().nodes(30.0, 9.0)
     at_nodes = reference.ideal_lens_profile(b, WAVELENGTH, a, distance=z)(b * np.hypot(nodes.x, nodes.y))
@@ -74,7 +75,7 @@ def test_two_apertures_converge_spectrally_to_two_exact_integrals():
 
 
 def test_two_halves_are_a_whole():
-    """Free space adds up, so a wide open pupil stands between the halves and makes a plane of its own."""
+    """Free space adds up, so a wide open pupil between the halves makes a plane of its own."""
     whole = propagate_through([FreeSpace(200e-6)], OBJECT, **SETTINGS)
     half = propagate_through([FreeSpace(100e-6), Pupil(40e-6), FreeSpace(100e-6)], OBJECT, **SETTINGS)
     assert len(half.steps) == 2
@@ -102,8 +103,8 @@ def test_a_relief_of_the_mediums_index_changes_nothing():
 
 
 def test_a_relay_of_two_lenses_inverts_its_object():
-    """4-f: -u(-x) e^{4ikf} paraxially, (1/iλf)² = -1/(λf)². Rays from x at angle θ depart from that by
-    a phase of order k x² θ²/f."""
+    """4-f: -u(-x) e^{4ikf} paraxially, (1/iλf)² = -1/(λf)². Rays from x at angle θ depart from that by a phase of order
+    k x² θ²/f."""
     focal_lengths, errors = np.array([75e-6, 150e-6]), []
     for f in focal_lengths:
         lens = Pupil(0.3 * f, thin_lens_focal_length=f)
@@ -120,12 +121,12 @@ def test_backwards_undoes_forwards():
     system = [FreeSpace(120e-6), Pupil(30e-6, thin_lens_focal_length=100e-6), FreeSpace(120e-6)]
     there = propagate_through(system, OBJECT, **SETTINGS, out_shape=(97, 97))
     back = propagate_through(system, there.u, **SETTINGS, out_shape=(N, N), backward=True)
-    assert field_error(back.u, OBJECT) < 1e-5  # the lens spreads 4e-6 of it beyond the wide window
+    assert field_error(back.u, OBJECT) < 1e-5  # the lens spreads 4e-6 of the light beyond the wide window
     assert [step.distance for step in back.steps] == [-120e-6, -120e-6]
 
 
 def test_what_decays_does_not_come_back():
-    """g (1 + cos 2πfx), f = 1.5/λ: two orders of amplitude 1/2 are evanescent, 1/3 of the power; 2 µm lose them."""
+    """g (1 + cos 2πfx), f = 1.5/λ: two orders of amplitude 1/2 are evanescent, 1/3 of the power; 2 µm remove them."""
     n, dx = 128, 0.1e-6
     x = (np.arange(n) - n // 2) * dx
     smooth = np.exp(-(x[None, :] ** 2 + x[:, None] ** 2) / (1.2e-6) ** 2)
@@ -179,8 +180,8 @@ def test_a_shape_may_be_an_array():
 
 @pytest.mark.parametrize("tolerance", [1e-9, 1e-10, 1e-11])
 def test_behind_a_disk_light_on_the_axis_is_two_waves_to_the_last_digits(tolerance):
-    """Rayleigh-Sommerfeld's integral over a disk, e^{ikz} - z/s e^{iks}, s² = z² + R². Edges are no softer than 1e-13,
-    which was once an error about a ripple that nobody had given."""
+    """Rayleigh-Sommerfeld's integral over a disk, e^{ikz} - z/s e^{iks}, s² = z² + R². Edges are at most as soft as
+    1e-13, without an error about a ripple that the user did not set."""
     radius, z, k = 10e-6, 60e-6, 2 * np.pi / WAVELENGTH
     where = {"out_dx": 1e-6, "out_shape": (9, 9), "wavelength": WAVELENGTH}
     seen = propagate_through([Pupil(radius), FreeSpace(z)], **where, tolerance=tolerance, dtype="float64")

@@ -1,4 +1,4 @@
-"""How much room a finite transform leaves: for light at Nyquist's frequency, which ends as if cut, and blurs."""
+"""Padding of a finite transform: light at Nyquist's frequency ends as if cut off, and blurs."""
 
 import math
 
@@ -11,11 +11,11 @@ from optics.propagation.transfer_function import EVERYTHING, Passage
 from optics.propagation.transform_sampling import blurred_back, sampling
 
 WAVELENGTH = 550e-9
-# [m] of room: blur falls to a fifth (disk near the window) ... a thirtieth of what it is with next to none, which moves
-# what an estimate is held against by 10 % at most; twice as much room halves that, and costs seven times as much.
+# [m] of padding. Compared with almost none, the blur falls to a fifth (disk near the window) ... a thirtieth, which
+# changes the reference of an estimate by at most 10 %. Twice the padding halves that and costs seven times more.
 FAR = 0.6e-3
-# How far the estimate may be off. It takes Nyquist's light for incoherent and even over the source; where it is neither
-# (all rows of a square are alike) a factor of three was the largest found.
+# Allowed error of the estimate. It assumes that Nyquist's light is incoherent and even over the source. If it is
+# neither (all rows of a square are alike), the largest error found was a factor of three.
 FACTOR = 5
 
 
@@ -34,13 +34,13 @@ def noise(n, dx, radius):
 
 
 def carried(u, dx, z, window, spare, paraxial):
-    """The field in the window, and the relative error of its intensity that `blurred_back` says."""
+    """The field in the window, and the relative error of its intensity predicted by `blurred_back`."""
     how = sampling(Passage(WAVELENGTH, z, paraxial, EVERYTHING, 3e-6, window.centre), Grid(u.shape, dx), window, spare)
-    assert how.passage.band == EVERYTHING  # or nothing would be cut
+    assert how.passage.band == EVERYTHING  # otherwise nothing would be cut off
     period, n, m = how.period, u.shape[0], window.shape[0]
     wrapped = np.zeros((n, period), complex)
     wrapped[:, :n] = u
-    spectrum = np.fft.fft(np.roll(wrapped, -(n // 2), axis=1), axis=1)  # of the rows that hold light
+    spectrum = np.fft.fft(np.roll(wrapped, -(n // 2), axis=1), axis=1)  # for the rows that hold light
     spectrum = np.fft.fft(np.roll(np.pad(spectrum, ((0, period - n), (0, 0))), -(n // 2), axis=0), axis=0)
     f = np.fft.fftfreq(period, dx)
     f2 = f[:, None] ** 2 + f[None, :] ** 2
@@ -73,14 +73,15 @@ class TestBlur:
 
     @pytest.mark.slow
     def test_falls_with_the_room(self):
-        """Like 1 / room far away; the nearest light of 130 µm source and 120 µm window is nearer."""
+        """The error falls like 1 / padding far away; the nearest light of a 130 µm source and a 120 µm window is
+        closer."""
         u, window = disk(215, 0.47e-6, 50e-6), Grid((129, 129), 0.94e-6)
         said = [carried(u, 0.47e-6, 200e-6, window, room, True)[1] for room in (200e-6, 400e-6, 800e-6)]
         assert 1.4 < said[0] / said[1] < 2
         assert 1.6 < said[1] / said[2] < 2.1
 
     def test_is_nothing_for_what_ends_before_nyquist(self):
-        """A smooth beam: all that its spectrum holds at Nyquist's frequency is next to nothing."""
+        """A smooth beam has almost no light at Nyquist's frequency."""
         n, dx = 215, 0.47e-6
         x = (np.arange(n) - n // 2) * dx
         u = np.exp(-np.add.outer(x**2, x**2) / (15e-6) ** 2).astype(complex)
@@ -96,7 +97,7 @@ class TestBlur:
 
 
 def test_no_room_where_none_would_do():
-    """White noise holds so much light at Nyquist's frequency that its blur is part of what such samples are worth."""
+    """White noise has much light at Nyquist's frequency, so its blur reflects the limited accuracy of such samples."""
     dx, z, window = 0.47e-6, 200e-6, Grid((129, 129), 0.94e-6)
     u = noise(213, dx, 50e-6)
     settings = {"dx": dx, "wavelength": WAVELENGTH, "distance": z, "out_dx": window.dx, "out_shape": window.shape}
@@ -106,4 +107,4 @@ def test_no_room_where_none_would_do():
         assert how.passage.band == EVERYTHING
         plan = optics.propagate(u, **settings, tolerance=tolerance, dtype="float64").plan
         assert plan.samples == (how.period, how.period)
-        assert ("Nyquist" in plan.why) == (tolerance == 1e-4)  # what no room mends is not passed over in silence
+        assert ("Nyquist" in plan.why) == (tolerance == 1e-4)  # an error that padding cannot remove is reported

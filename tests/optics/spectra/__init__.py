@@ -1,4 +1,4 @@
-"""Which test fails when a module of optics/spectra is broken.
+"""Tests that fail when a module of optics/spectra is broken.
 
 bands: test_bands.py
 photon_budget: test_photon_budget.py

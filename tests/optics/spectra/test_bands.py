@@ -43,7 +43,7 @@ def test_white_in_daylight_gives_one(bands):
 
 
 def test_bands_converge_in_second_order():
-    """A smooth reflectance seen through n bands: halving the bands' width quarters the error."""
+    """A smooth reflectance in n bands: half the bands' width gives a quarter of the error."""
 
     def catch(bands):
         spectral = SpectralBands.uniform(bands)
@@ -82,7 +82,8 @@ def scene_signal(bands, reflectance):
 
 @pytest.mark.parametrize("tolerance", [0.1, 0.02, 0.005, 0.002])
 def test_bands_for_a_tolerance_against_64(tolerance):
-    """Reflectances of one cycle over the visible range, all phases: within the tolerance, and half as many are not."""
+    """Reflectances of one cycle over the visible range, with all phases: the bands are within the tolerance, and half
+    the number is not."""
     chosen = choose_bands(tolerance)
     count, fine = len(chosen.wavelengths), SpectralBands.uniform(64)
 
@@ -102,7 +103,7 @@ def test_more_bands_for_a_smaller_tolerance():
 
 
 def test_coloured_blur_needs_more_bands():
-    """A kernel that hops from cell to cell as the wavelength grows: bands must resolve the hops."""
+    """A kernel that moves from cell to cell as the wavelength grows: bands must resolve the movement."""
 
     def hopping(wavelengths):
         kernels = np.zeros((len(wavelengths), 1, 41))
@@ -128,7 +129,7 @@ def test_tolerances_that_no_bands_meet():
 
 
 class TestLightInBands:
-    """Lamps with lines: what receptors catch of them against quadrature to 1 nm, in however few bands."""
+    """Lamps with spectral lines: quantum catches against quadrature at 1 nm, for any number of bands."""
 
     @staticmethod
     def caught(receptors, light):
@@ -150,7 +151,7 @@ class TestLightInBands:
             np.testing.assert_allclose(seen, expected, rtol=1e-5)
 
     def test_samples_at_the_centres_miss_lines(self):
-        """The wrong way, by as much as a factor of two: the test above is not passed by anything."""
+        """The wrong method has an error of up to a factor of two, so the test above is meaningful."""
         eye, light = Eye(resolution=(1, 1), bands=4), illuminant("FL2")
         seen = eye.see(light.at(eye.spectral_bands.wavelengths)[:, None, None], 1)[:, 0, 0]
         assert np.abs(seen / self.caught("rgb", light.at) - 1).max() > 0.5
@@ -159,25 +160,25 @@ class TestLightInBands:
     def test_daylight_stays_what_it_is_and_half_of_it_is_half(self, receptors, bands):
         spectral = SpectralBands.uniform(bands, receptors)
         for share in (1.0, 0.5):
-            found = spectral.of(lambda at, share=share: share * daylight(at), receptors)
+            found = spectral.band_values(lambda at, share=share: share * daylight(at), receptors)
             np.testing.assert_allclose(found, share * daylight(spectral.wavelengths), rtol=1e-9)
 
     def test_no_band_is_below_0_where_none_may_be(self):
         bands, light = SpectralBands.uniform(8, "honeybee"), illuminant("FL11")
-        free, bound = (bands.of(light, "honeybee", nonnegative=only) for only in (False, True))
+        free, bound = (bands.band_values(light, "honeybee", nonnegative=only) for only in (False, True))
         assert free.min() < -0.01
         assert bound.min() >= 0
         np.testing.assert_allclose(bands.weights @ bound, self.caught("honeybee", light.at), rtol=1e-4)
 
     def test_fewer_bands_than_types_meet_them_halfway(self):
         bands, light = SpectralBands.uniform(1), illuminant("FL2")
-        caught, seen = self.caught("rgb", light.at), bands.weights @ bands.of(light, "rgb")
-        assert np.ptp(seen) < 1e-9, "one band: white in FL2 looks grey"
+        caught, seen = self.caught("rgb", light.at), bands.weights @ bands.band_values(light, "rgb")
+        assert np.ptp(seen) < 1e-9, "one band: white in FL2 appears grey"
         assert caught.min() < seen[0] < caught.max()
 
 
 def test_an_error_of_reflectances_is_the_worst_channels():
-    """Two channels, of which one is right: the other's error is told."""
+    """The error of the wrong one of two channels is reported, although the other one is right."""
     wavelengths = np.linspace(410e-9, 690e-9, 8)
     weights = np.vstack([np.full(8, 0.1), np.linspace(0.0, 0.2, 8)])
     exact = SimpleNamespace(wavelengths=wavelengths, weights=weights)
@@ -190,8 +191,8 @@ def test_an_error_of_reflectances_is_the_worst_channels():
 
 def test_light_that_is_no_spectrum_is_refused():
     with pytest.raises(ValueError, match="radiance = 'D65': must be a Spectrum"):
-        SpectralBands.uniform(4).of("D65", "rgb")
+        SpectralBands.uniform(4).band_values("D65", "rgb")
     with pytest.raises(ValueError, match="radiance: must be finite at every wavelength"):
-        SpectralBands.uniform(4).of(lambda wavelengths: wavelengths * np.nan, "rgb")
+        SpectralBands.uniform(4).band_values(lambda wavelengths: wavelengths * np.nan, "rgb")
     with pytest.raises(ValueError, match=r"radiance: must be a number for each of \d+ wavelengths, not \[1, 2\]"):
-        SpectralBands.uniform(4).of(lambda wavelengths: [1, 2], "rgb")
+        SpectralBands.uniform(4).band_values(lambda wavelengths: [1, 2], "rgb")

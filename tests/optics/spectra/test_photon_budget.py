@@ -1,4 +1,4 @@
-"""Photons per receptor: a hand-computed example, published conversions, the statistics of what an eye sees."""
+"""Photons per receptor: a hand-computed example, published conversions, and the noise statistics of an eye."""
 
 import math
 from dataclasses import replace
@@ -50,7 +50,7 @@ def test_photons_are_proportional_to(field):
 
 
 def test_photons_grow_with_the_receptor_and_fall_with_the_focal_length():
-    """Land's (D d / f)²; the number of bands has no say."""
+    """Land's (D d / f)²; the number of bands has no effect."""
     eye = Eye(photon_budget=BRIGHT)
     np.testing.assert_allclose(replace(eye, bands=16).photons, eye.photons)
     np.testing.assert_allclose(replace(eye, resolution=(30, 30)).photons, eye.photons / 4)

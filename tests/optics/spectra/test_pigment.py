@@ -1,4 +1,4 @@
-"""Visual pigment templates against their own paper's numbers and against other published templates."""
+"""Visual pigment templates against the numbers in their paper and against other published templates."""
 
 import numpy as np
 import pytest
@@ -10,7 +10,7 @@ NM = np.arange(300.0, 780.0, 0.1)
 
 
 def alpha_band(sensitivity, peak_nm):
-    """Wavelengths from the long-wave foot to where the β band begins to count."""
+    """Wavelengths from the long-wave foot to the point where the β band becomes significant."""
     return (peak_nm * 0.93 < NM) & (sensitivity > 0.02)
 
 
@@ -37,7 +37,7 @@ def test_the_alpha_band_peaks_at_one_where_it_says(peak_nm, chromophore):
 
 @pytest.mark.parametrize("peak_nm", [500.0, 530.0, 560.0])
 def test_a1_is_lambs_template_where_both_hold(peak_nm):
-    """They differ by the refit alone: 2 % of the peak (A2's parameters are 10 % off)."""
+    """They differ by the refit alone: 2 % of the peak (A2's parameters have an error of 10 %)."""
     ours = pigment_absorptance(NM * 1e-9, peak_nm * 1e-9)
     band = alpha_band(ours, peak_nm)
     assert np.abs(ours - lamb_1995(NM, peak_nm))[band].max() < 0.02
@@ -48,8 +48,8 @@ def test_a1_is_lambs_template_where_both_hold(peak_nm):
 @pytest.mark.parametrize(("chromophore", "a0", "a1", "least"), [("A1", 380, 6.09, 0.02), ("A2", 263, 4.45, 0.07)])
 @pytest.mark.parametrize("peak_nm", [500.0, 523.0, 560.0])
 def test_alpha_bands_are_those_of_stavenga(peak_nm, chromophore, a0, a1, least):
-    """An independent fit to other measurements (their Table 1; A2 is carp's porphyropsin, whose red foot is higher): to
-    2 and 7 % of the peak, where the other chromophore's template is off by twice as much at least."""
+    """An independent fit to other measurements agrees within 2 and 7 % of the peak (their Table 1; A2 is carp's
+    porphyropsin, whose red foot is higher). The other chromophore's template has at least twice the error."""
     theirs = stavenga_1993(NM, peak_nm, a0, a1)
     errors = {}
     for kind in ("A1", "A2"):
@@ -63,7 +63,7 @@ def test_alpha_bands_are_those_of_stavenga(peak_nm, chromophore, a0, a1, least):
     ("chromophore", "height", "centre"), [("A1", 0.26, 189 + 0.315 * 560), ("A2", 0.37, 216.7 + 0.287 * 560)]
 )
 def test_the_beta_band_is_a_gaussian_of_the_published_height_and_place(chromophore, height, centre):
-    """Far below the α band of a pigment of 560 nm there is nothing else: eqs. 5a and 8a by hand."""
+    """Far below the α band of a 560 nm pigment nothing else absorbs: eqs. 5a and 8a by hand."""
     at = pigment_absorptance(np.array([centre]) * 1e-9, 560e-9, chromophore)[0]
     alpha_foot = 0.09  # of the α band there, at most
     assert height <= at <= height + alpha_foot

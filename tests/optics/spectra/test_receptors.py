@@ -1,4 +1,4 @@
-"""Receptor types and mosaics: what each catches, what an eye reports, and that the default is what it was."""
+"""Receptor types and mosaics: quantum catches, an eye's signals, and an unchanged default."""
 
 from dataclasses import replace
 
@@ -12,7 +12,7 @@ BAYER = ((0, 1), (1, 2))
 
 
 def test_the_default_is_three_rgb_like_channels_from_400_to_700_nm():
-    """To the last digit: pigments of 600, 520 and 460 nm, trapezoids of 1 nm, linear between the bands' centres."""
+    """All digits agree: pigments of 600, 520 and 460 nm, trapezoids of 1 nm, linear between the bands' centres."""
     bands = SpectralBands.uniform(4)
     nm = np.arange(400.0, 700.5)
     catch = np.stack(
@@ -41,8 +41,8 @@ def test_the_default_is_three_rgb_like_channels_from_400_to_700_nm():
     ],
 )
 def test_channels_see_most_where_their_types_peak(receptors, peaks):
-    """A reflector of 20 nm moves that channel most, relative to white, at whose peak it is. (Human L and M cones are so
-    near each other that it takes one further to the red.)"""
+    """A reflector of 20 nm changes the channel with that peak most, relative to white. (Human L and M cones are so
+    close to each other that the reflector has to be further to the red.)"""
     bands = SpectralBands.uniform(64, receptors)
     assert bands.weights.shape == (len(peaks), 64)
     np.testing.assert_allclose(bands.weights @ daylight(bands.wavelengths), 1, rtol=1e-12)
@@ -73,7 +73,7 @@ def test_a_measured_sensitivity_is_as_good_as_the_pigment_it_samples():
 
 
 def scene(eye, samples, seed=0):
-    """Random patches of light, a receptor wide, and a margin for the kernel."""
+    """Random patches of light, each a receptor wide, and a margin for the kernel."""
     height, width = (n + 8 for n in eye.resolution)
     patches = np.random.default_rng(seed).uniform(0.1, 1.0, (eye.bands, height, width))
     return patches.repeat(samples, axis=1).repeat(samples, axis=2)
@@ -102,7 +102,7 @@ def test_shot_noise_of_a_mosaic_is_that_of_each_receptors_type():
     noise = eye.see(white, 1, np.random.default_rng(0)) - eye.see(white, 1)
     for kind in (0, 1):
         here = noise[0][eye.mosaic == kind]
-        # 1800 receptors: their variance is known to sqrt(2 / 1800) = 3.3 %.
+        # With 1800 receptors the variance is accurate to sqrt(2 / 1800) = 3.3 %.
         assert here.var() == pytest.approx(1 / eye.photons[kind], rel=0.12)
     assert eye.photons[1] > 2 * eye.photons[0]
 
@@ -126,11 +126,11 @@ def test_bands_are_chosen_for_the_receptors():
     [
         ("rbg", "receptors = 'rbg': must be one of 'rgb', 'lms', .*did you mean 'rgb'"),
         ("honey bee", "did you mean 'honeybee'"),
-        ((), "there is no type"),
+        ((), "no type is given"),
         (None, "receptors = None"),
         ((900,), r"receptors hold 900: must be wavelengths of peaks in \[330, 700\]"),
         (("red",), "receptors hold 'red'"),
-        (Spectrum((400, 500), (0, 0)), "type 0 sees nothing"),
+        (Spectrum((400, 500), (0, 0)), "type 0 has no sensitivity"),
     ],
 )
 def test_bad_receptors_are_named(receptors, named):
@@ -157,7 +157,7 @@ def test_pigments_of_both_chromophores_differ():
 
 
 def test_derivatives_flow_through_a_mosaic():
-    """d signal / d radius of every receptor's own type, backwards, against central differences (error O(step⁴))."""
+    """d signal / d radius of every receptor's own type, backward, against central differences (error O(step⁴))."""
     import drjit as dr
 
     from optics.numerics.precision import precision
@@ -193,5 +193,5 @@ def test_a_sensitivity_in_per_cent_is_the_same_sensitivity():
 
 def test_types_that_see_nothing_of_the_range_are_named():
     violet = Spectrum((300, 350, 351), (0, 1, 0))
-    with pytest.raises(ValueError, match=r"range_nm = .*: type 0 sees nothing within"):
+    with pytest.raises(ValueError, match=r"range_nm = .*: type 0 has no sensitivity within it"):
         Receptors((violet, Pigment(550.0)), range_nm=(500, 700))

@@ -42,7 +42,8 @@ def test_reflectances_are_those_of_colour_science(colour):
 
 @pytest.mark.filterwarnings("ignore")
 def test_cone_fundamentals_are_those_of_colour_science(colour):
-    """Theirs are in units of energy: quantal ones are lower by the factor λ, and peak at 1 again."""
+    """colour-science's tables are in units of energy: quantal ones are lower by the factor λ, and have a peak of 1
+    again."""
     theirs = colour.MSDS_CMFS["Stockman & Sharpe 2 Degree Cone Fundamentals"]
     nm = np.arange(390.0, 781.0, 5.0)
     energy = np.array([theirs[float(x)] for x in nm])
@@ -50,9 +51,9 @@ def test_cone_fundamentals_are_those_of_colour_science(colour):
     for kind, column, peak in zip(cone_fundamentals(), energy.T, (566, 541, 441), strict=True):
         quantal = column / nm
         np.testing.assert_allclose(kind.at(nm * 1e-9), quantal / quantal.max(), rtol=1e-6, atol=1e-12)
-        assert abs(kind.peak_nm - peak) < 4  # published peaks, to the table's 5 nm
+        assert abs(kind.peak_nm - peak) < 4  # published peaks, up to the table's 5 nm
         assert not kind.at(np.array([350e-9]))
-    # Between the entries, linear interpolation is off by h²/8 of the curvature: σ is some 40 nm, so 2e-3.
+    # Linear interpolation between entries has an error of h²/8 of the curvature: σ is some 40 nm, so 2e-3.
     exact = np.array([theirs[float(x)] for x in fine])[:, 0] / fine
     np.testing.assert_allclose(cone_fundamentals()[0].at(fine * 1e-9), exact / (exact.max()), atol=3e-3)
 
@@ -61,12 +62,12 @@ def test_cone_fundamentals_are_those_of_colour_science(colour):
 @pytest.mark.filterwarnings("ignore")
 @pytest.mark.parametrize("name", freeze_spectra.TABLES)
 def test_tables_are_what_the_script_makes(name):
-    """Byte for byte; with the colour-science that they were made with or one that holds the same numbers."""
+    """Files agree byte for byte, with the original version of colour-science or one with the same numbers."""
     assert freeze_spectra.text(freeze_spectra.TABLES[name]()) == (freeze_spectra.DATA / name).read_text()
 
 
 def test_daylight_reaches_into_the_ultraviolet():
-    """CIE 15's table of D65: 0.0341 at 300 nm and 44.9117 at 350 nm, where it is 100 at 560 nm."""
+    """CIE 15's table of D65: 0.0341 at 300 nm and 44.9117 at 350 nm, relative to 100 at 560 nm."""
     np.testing.assert_allclose(daylight(np.array([300e-9, 350e-9, 560e-9])), [3.41e-4, 0.449117, 1.0], rtol=1e-6)
     assert not cie_1931(np.array([300e-9, 340e-9])).any()
 

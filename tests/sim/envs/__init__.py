@@ -1,4 +1,4 @@
-"""What tests hold of environments, module by module.
+"""Tests of environments: which test covers which module.
 
 assembly: test_env.py, test_vec_env.py, test_tasks_page.py
 parallel_env: test_parallel_env.py, test_pictures.py

@@ -1,4 +1,4 @@
-"""Prey and predator on a floor, for tests of several animals: both slide, and each has eyes all round."""
+"""Prey and predator on a floor, for tests of several animals. Both slide, and each has eyes all round."""
 
 import numpy as np
 
@@ -46,7 +46,7 @@ class Animal(sim.Task):
 
 
 class Prey(Animal):
-    """Has three eyes, and wants to be far."""
+    """An animal with three eyes that is rewarded for distance from the predator."""
 
     body, n_eyes, eye = "prey", 3, optics.Eye(resolution=(2, 8), fov_deg=120, bands=4)
 
@@ -56,12 +56,12 @@ class Prey(Animal):
     def rewards(self, data):
         return {"far": distance(data) / 20}
 
-    def feels(self, data):
+    def proprioception(self, data):
         return data.qvel[:2]
 
 
 class Predator(Animal):
-    """Has two eyes of another kind, and wants to be near."""
+    """An animal with two eyes of another kind that is rewarded for proximity to the prey."""
 
     body, n_eyes, eye = "predator", 2, optics.Eye(resolution=(1, 12), fov_deg=140, bands=4)
 
@@ -77,7 +77,7 @@ class Predator(Animal):
 
 
 class Twin(Animal):
-    """One of two that are alike and want to meet."""
+    """One of two identical animals that are rewarded for proximity to each other."""
 
     n_eyes, eye = 3, optics.Eye(resolution=(1, 6), fov_deg=100, bands=4)
 
@@ -102,5 +102,5 @@ def hunt():
 
 
 def still(observation):
-    """A policy that does nothing."""
+    """Return zero actions: a policy that does nothing."""
     return np.zeros((len(observation["previous_action"]), 2))

@@ -1,4 +1,4 @@
-"""A cart on a rail that looks ahead: what the tests of worlds that differ have in common."""
+"""A cart on a rail that looks ahead: shared base of the tests with worlds that differ."""
 
 import optics
 import sim
@@ -7,7 +7,7 @@ EYE = optics.Eye(resolution=(15, 21), fov_deg=80, bands=5, noise_sigma=0.0)
 
 
 class OnRail(sim.Task):
-    """`model` is whatever has a body "cart" and one actuator."""
+    """A task on any `model` that has a body "cart" and one actuator."""
 
     eye = EYE
     mounts = (sim.Mount("cart", offset=(0.2, 0, 0.1)),)

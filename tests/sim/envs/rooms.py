@@ -1,4 +1,4 @@
-"""Rooms with a thing in them whose shape, size and colour may differ, and who looks at it from a rail."""
+"""Rooms with an object whose shape, size and colour may vary, seen by a cart on a rail."""
 
 from tests.sim.envs.rail import OnRail
 

@@ -1,4 +1,4 @@
-"""The example of an ant that goes by sight: it walks by its legs, as it is told."""
+"""Tests of the example of an ant that navigates by sight: its legs follow the commands for speed and turning."""
 
 import importlib.util
 from pathlib import Path
@@ -21,7 +21,9 @@ def example():
 
 
 def gone(task, model, speed, turn, seconds=6):
-    """How far ahead [m] and to the left [rad] an ant gets that does this, and how upright it stays."""
+    """Return the distance ahead [m] and the turn to the left [rad] of an ant under constant commands, and its smallest
+    uprightness.
+    """
     data, heading, upright = mujoco.MjData(model), [], []
     task.reset(data, np.random.default_rng(0))
     for _ in range(round(seconds / (task.substeps * model.opt.timestep))):
@@ -50,7 +52,7 @@ def test_it_walks_turns_and_stands_as_it_is_told(example):
 
 
 def test_it_is_the_legs_that_take_it_there(example):
-    """On ice they do not."""
+    """The ant does not advance on ice, which proves that its legs move it."""
     task = example.AntSeeks()
     model = task.model.compile()
     model.geom_friction[:, 0] = 1e-4
@@ -63,7 +65,7 @@ def test_it_is_rewarded_for_getting_nearer_and_sees_the_ball_unless_blindfolded(
     ball = env.worlds.model.geom("ball").id
     for one, sees in ((env, True), (blind, False)):
         one.reset()
-        assert (one.renderer.ids(sim.Poses.of(one.worlds.datas)) == ball).any() == sees
+        assert (one.renderer.ids(sim.Poses.from_data(one.worlds.datas)) == ball).any() == sees
     before = np.array([example.AntSeeks().apart(data) for data in env.worlds.datas])
     _, _, _, infos = env.step(np.tile([1.0, 0.0], (16, 1)))
     after = np.array([example.AntSeeks().apart(data) for data in env.worlds.datas])

@@ -1,4 +1,4 @@
-"""What observations hold beside signals: against MuJoCo's ray caster and the model renderer, over ends of episodes."""
+"""Tests of auxiliary observations against MuJoCo's ray caster and the model renderer, across ends of episodes."""
 
 import mujoco
 import numpy as np
@@ -28,7 +28,9 @@ class Told(Face):
 
 
 def met(model, data, eye, pupil, frame):
-    """Depth along the axis, 0 for nothing, and geom of what MuJoCo's rays meet through receptors' centres."""
+    """Return the depth along the axis (0 for no hit) and the geom that MuJoCo's rays hit through the receptors'
+    centres.
+    """
     geom, centres = np.zeros(1, np.int32), directions_of(eye, receptor_centres(eye))
     found = []
     for centre in centres:
@@ -41,7 +43,7 @@ def test_own_tasks_are_told_what_mujocos_rays_meet():
     env = sim.make_vec_env(Told(), n_envs=3, seed=1)
     env.reset()
     observation = env.step(np.full((3, 1), 0.5))[0]
-    pupils, frames = env.renderer.eye_frames(sim.Poses.of(env.worlds.datas))
+    pupils, frames = env.renderer.eye_frames(sim.Poses.from_data(env.worlds.datas))
     for world, data in enumerate(env.worlds.datas):
         depth, ids = met(env.worlds.model, data, Told.eye, pupils[world, 0], frames[world, 0])
         np.testing.assert_array_equal(observation["ids"][world, 0], ids)
@@ -51,7 +53,9 @@ def test_own_tasks_are_told_what_mujocos_rays_meet():
 
 
 def test_flow_is_of_what_is_seen_now_since_the_last_observation():
-    """A wall far ahead goes by as the cart moves: what is d ahead by d' of the cart's way to the other side."""
+    """The flow of a distant wall is the cart's displacement since the last observation, divided by the wall's distance,
+    in the opposite direction.
+    """
     env = sim.make_vec_env(Told(), n_envs=2, seed=1)
     assert not env.reset()["flow"].any()
     places = [data.qpos[0] for data in env.worlds.datas]
@@ -63,7 +67,7 @@ def test_flow_is_of_what_is_seen_now_since_the_last_observation():
     for world, data in enumerate(env.worlds.datas):
         way = data.qpos[0] - places[world]
         there, depth = still[world, 0], observation["depth"][world, 0]
-        expected = way / depth[there] / side  # the cart goes to the left, what it sees to the right
+        expected = way / depth[there] / side  # the cart moves to the left, and the scene to the right
         np.testing.assert_allclose(observation["flow"][world, 0, 0][there], expected, rtol=1e-3)
         np.testing.assert_allclose(observation["flow"][world, 0, 1][there], 0, atol=1e-3)
     assert np.abs(observation["flow"]).max() > 0.1
@@ -134,7 +138,7 @@ def test_each_kind_of_eyes_has_its_own():
     task.auxiliary = ("ids",)
     env = sim.make_vec_env(task, n_envs=1)
     observation = env.reset()
-    poses = sim.Poses.of(env.worlds.datas)
+    poses = sim.Poses.from_data(env.worlds.datas)
     for name, sight in env.animals.learners[0].sights.items():
         np.testing.assert_array_equal(observation[f"{name}_ids"], sight.renderer.ids(poses))
     assert {name for name in observation if name.endswith(("depth", "flow"))} == set()
@@ -190,14 +194,16 @@ def test_rhabdoms_own_worlds_are_told_what_mujocos_rays_meet():
 
 
 def test_rhabdoms_own_worlds_flow_by_the_way_of_the_agent():
-    """Turning on the spot: what is far goes by the angle, whatever its distance."""
+    """Distant surfaces flow by the agent's angle of rotation, whatever their distance, when the agent turns on the
+    spot.
+    """
     eyes = sim.Eyes(n_eyes=1, resolution=(1, 41), fov_deg=60)
     env = sim.make_vec_env("detection", eyes, n_envs=2, rays_per_receptor=1, auxiliary=("flow", "depth"))
     assert not env.reset()["flow"].any()
     observation = env.step(np.array([[-1.0, 0.2], [-1.0, 0.2]]))[0]
     turned, eye = 0.2 * np.pi / 4, eyes.eye()
     side = eye.receptor_pitch / eye.sensor_distance
-    # The pupil is BODY_RADIUS ahead of the axis that the agent turns about.
+    # The pupil is BODY_RADIUS ahead of the agent's axis of rotation.
     depth = observation["depth"][0, 0, 0, 20]
     x, z = (depth + BODY_RADIUS) * np.sin(-turned), (depth + BODY_RADIUS) * np.cos(turned) - BODY_RADIUS
     assert observation["flow"][0, 0, 0, 0, 20] == pytest.approx(-x / z / side, rel=1e-3)
@@ -212,7 +218,7 @@ def test_positions_of_states_are_those_of_mujoco():
     for k in range(5):
         datas.append(mujoco.MjData(world.model))
         pose(datas[-1], world, env.state, k)
-    found, expected = env.worlds.poses(), sim.Poses.of(datas)
+    found, expected = env.worlds.poses(), sim.Poses.from_data(datas)
     for name in ("geom_xpos", "geom_xmat", "xpos", "xmat"):
         np.testing.assert_allclose(getattr(found, name), getattr(expected, name), atol=1e-12)
 

@@ -1,4 +1,4 @@
-"""What is refused of several animals in one world, and what is told of one that fails."""
+"""Encounters that are refused, and the report of an animal that fails."""
 
 import numpy as np
 import pytest
@@ -29,7 +29,7 @@ class Untied(Predator):
 
 
 class Greedy(Predator):
-    """Drives all that there is."""
+    """A predator that drives all actuators of the model."""
 
     def __init__(self):
         super().__init__()
@@ -57,20 +57,20 @@ class Unwired(Predator):
         (lambda: sim.Encounter(Prey(), Longer()), "Encounter: episode_steps = 20 of Prey, 30 of Longer: must be equal"),
         (
             lambda: sim.Encounter(lit(Prey(), 1, 2), lit(Predator(), 0.1, 0.2)),
-            "Encounter: vary of Prey and of Predator differ: must be equal, or one's alone",
+            "Encounter: vary of Prey and of Predator differ: must be equal, or set once",
         ),
         (
             lambda: sim.make_vec_env(sim.Encounter(Prey(), Greedy()).alone("Prey", {})),
             "Prey and Greedy: actuators: both drive 'prey_x': must name their own",
         ),
-        (lambda: sim.Encounter(Prey(), Accompanied()), "Encounter: Accompanied has others of its own: must be a task "),
+        (lambda: sim.Encounter(Prey(), Accompanied()), "Encounter: Accompanied has its own `others`: must be a task "),
         (lambda: hunt().alone("Pray", {}), "Encounter: no animal 'Pray'; did you mean 'Prey'"),
         (lambda: hunt().alone("Prey", {"Cat": None}), "Encounter: no animal 'Cat': it has Prey, Predator"),
         (lambda: hunt().alone("Prey", {"Prey": still}), "Encounter: policies: 'Prey' is the one that learns: must be"),
         (lambda: hunt().alone("Prey", {"Predator": 3}), "Frozen: policy = 3: must be a function, have `predict`, or"),
         (lambda: sim.Frozen(3), "Frozen: task = 3: must be a kind of Task"),
         (lambda: sim.make_vec_env(hunt(), n_envs=1), "Encounter: Prey has .*, Predator has .*: must be alike to learn"),
-        (lambda: sim.make_env(hunt()), "task: several animals learn in a sim.Encounter: must be its `alone`"),
+        (lambda: sim.make_env(hunt()), "task: several animals learn in a sim.Encounter: use the result of `alone`"),
         (lambda: sim.make_parallel_env(Prey()), "encounter = .*Prey.*: must be a sim.Encounter"),
         (lambda: sim.make_vec_env(sim.Encounter(Prey(), Untied()).alone("Untied", {})), "Mount: no site or camera or "),
         (
@@ -108,7 +108,7 @@ def test_policies_that_fail_are_named(policy, words):
 
 
 def late(observation):
-    """No number, once it has moved."""
+    """Return actions that are NaN after the first movement."""
     return np.where(observation["previous_action"] > 0, np.nan, 1.0)
 
 

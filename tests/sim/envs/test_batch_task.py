@@ -1,4 +1,4 @@
-"""A batch task does what the same task does world by world; whatever breaks the protocol is named."""
+"""A batch task behaves like the same task written for one world; every violation of the protocol is named."""
 
 import importlib.util
 from pathlib import Path
@@ -25,7 +25,7 @@ FindBall, FindBalls = _example("find_ball").FindBall, _example("find_balls").Fin
 
 
 def test_it_is_the_same_task_bit_for_bit():
-    """Over two episodes and a half, in several worlds."""
+    """The two tasks agree over two and a half episodes, in several worlds."""
     single, batch = (sim.make_vec_env(task, n_envs=5, seed=3, memory=2) for task in (FindBall(), FindBalls()))
     seen, same = single.reset(), batch.reset()
     random = np.random.default_rng(0)
@@ -52,7 +52,7 @@ def test_arrays_are_mujocos():
         np.testing.assert_array_equal(worlds.geom_xpos[world], data.geom_xpos)
     with pytest.raises(ValueError, match="read-only"):
         worlds.geom_xpos[0] = 0
-    with pytest.raises(AttributeError, match="neither has mjData"):
+    with pytest.raises(AttributeError, match="ArrayWorlds and mjData have no attribute"):
         _ = worlds.nothing
 
 
@@ -83,14 +83,14 @@ class WrongEnd(FindBalls):
 
 
 class NotFinite(FindBalls):
-    def feels(self, worlds):
+    def proprioception(self, worlds):
         felt = worlds.qvel.copy()
         felt[2] = np.nan
         return felt
 
 
 class Neighbour(FindBalls):
-    """Puts the ball of the next world elsewhere, too."""
+    """A task that also moves the ball of the next world."""
 
     def reset(self, worlds, chosen, rngs):
         super().reset(worlds, chosen, rngs)
@@ -98,7 +98,7 @@ class Neighbour(FindBalls):
 
 
 class OwnChance(FindBalls):
-    """Draws from a generator of its own."""
+    """A task that draws from its own random generator."""
 
     chance = np.random.default_rng(0)
 
@@ -107,14 +107,14 @@ class OwnChance(FindBalls):
 
 
 class Crowd(FindBalls):
-    """A world's reward depends on the others."""
+    """A task in which a world's reward depends on the other worlds."""
 
     def rewards(self, worlds):
         return {"near": -self.distance(worlds) + self.distance(worlds).mean()}
 
 
 class Mover(FindBalls):
-    """Moves the ball while it judges, and does not say so."""
+    """A task that moves the ball in `judge` without reporting it."""
 
     def judge(self, worlds, failed):
         for data in worlds.datas[:2]:
@@ -135,8 +135,8 @@ class WrongWorld(FindBalls):
         (WrongShape, r"WrongShape: rewards: 'near' has shape \(3,\): must be \(4,\), one entry for each world"),
         (NoMapping, "NoMapping: rewards returned .*: must be arrays by name"),
         (WrongEnd, r"WrongEnd: terminated has shape \(\): must be \(4,\)"),
-        (NotFinite, r"NotFinite: feels: 'feels' is \[nan\] in world 2: must be finite"),
-        (Neighbour, "reset: was given world 3 and changed physics of world 2: must leave it alone"),
+        (NotFinite, r"NotFinite: proprioception: 'feels' is \[nan\] in world 2: must be finite"),
+        (Neighbour, "reset: was given world 3 and changed physics of world 2: must not change it"),
         (OwnChance, "the same seed: .* differs after action 0: must repeat every episode"),
         (Crowd, "world 0: reward differs after action 0: must not depend on other worlds"),
         (Mover, "judge: moved bodies of world 0, which is not in Outcome.changed"),

@@ -1,4 +1,4 @@
-"""Worlds of tasks of one's own that cannot go on: their episodes are over, and the others never know."""
+"""Worlds of user tasks that break down: their episodes end, and the other worlds are not affected."""
 
 import numpy as np
 import pytest
@@ -9,13 +9,13 @@ from tests.sim.envs.test_task_vec_env import CART, Face
 
 
 class Unmended(Face):
-    """MuJoCo does not begin it anew when it breaks down."""
+    """A task in which MuJoCo does not reset the world when it becomes unstable."""
 
     model = CART.replace('<option timestep=".02"/>', '<option timestep=".02"><flag autoreset="disable"/></option>')
 
 
 class Nowhere(Face):
-    """An action of 1 puts the ball nowhere, which MuJoCo does not mind."""
+    """A task in which an action of 1 sets the ball's position to NaN, which MuJoCo accepts."""
 
     def act(self, data, action):
         super().act(data, action)
@@ -24,7 +24,9 @@ class Nowhere(Face):
 
 
 class Lost(Face):
-    """An action of 1 is divided by zero, one of 0.9 is huge; MuJoCo does nothing then, by any motor."""
+    """A task in which an action of 1 gives a NaN control and one of 0.9 a huge control; MuJoCo then ignores all
+    motors.
+    """
 
     def act(self, data, action):
         super().act(data, action)
@@ -40,8 +42,8 @@ def moved_off(env):
     [
         (Face, moved_off, "physics is unstable: positions, speeds"),
         (Unmended, moved_off, "physics is unstable: positions, speeds"),
-        (Lost, lambda env: None, "controls are huge or not finite: what `act` writes must be numbers"),
-        (Nowhere, lambda env: None, "physics is unstable: places of bodies are not finite; what `act` writes must be"),
+        (Lost, lambda env: None, "controls are huge or not finite: `act` must write numbers"),
+        (Nowhere, lambda env: None, "physics is unstable: positions of bodies are not finite; `act` must write"),
     ],
 )
 def test_a_world_that_breaks_down_ends_alone_and_for_good(task, break_down, words):
@@ -78,7 +80,9 @@ def test_the_only_world_ends_so_too(action):
 
 @pytest.mark.parametrize("worth", [0.0, -50.0])
 def test_a_broken_world_is_worth_what_the_task_says(worth):
-    """Of 0 a policy that breaks its world at once earns more than one that steers well, where rewards are costs."""
+    """A failed step earns `failure_reward`. If rewards are negative costs, the default of 0 is better than any normal
+    step.
+    """
     task = Nowhere()
     task.failure_reward = worth
     env = sim.make_vec_env(task, n_envs=2)
@@ -92,7 +96,7 @@ def test_a_broken_world_is_worth_what_the_task_says(worth):
 
 def test_huge_controls_end_an_episode_too():
     task = Lost()
-    task.model = CART.replace(' ctrlrange="-2 2"', "")  # within a range MuJoCo would limit it
+    task.model = CART.replace(' ctrlrange="-2 2"', "")  # MuJoCo would clip the control to a range
     env = sim.make_vec_env(task, n_envs=2)
     env.reset()
     with pytest.warns(UserWarning, match="Lost: controls are huge"):
@@ -102,7 +106,7 @@ def test_huge_controls_end_an_episode_too():
 
 
 def lost(encounter):
-    """What two animals are told when the prey's place is no number."""
+    """Return the results of a step for both animals when the prey's velocity is NaN."""
     env = sim.make_parallel_env(encounter, seed=1)
     env.reset()
     env._animals.simulation.physics.datas[0].qvel[0] = np.nan

@@ -1,4 +1,6 @@
-"""Worlds of one batch whose geoms are of different materials see what a model sees that is built with them."""
+"""Geoms with different materials in the worlds of one batch look as in a model that is compiled with these
+materials.
+"""
 
 import functools
 import gc
@@ -57,7 +59,7 @@ def with_ranges(vary, model=None, light="direct"):
 
 
 def built(data, light="direct", **how):
-    """What is seen in the state of a world, of a model that is built so."""
+    """Return the signals of a model that is compiled with these settings, in the state of a world."""
     renderer = _renderer(light, room(**how))
     same = mujoco.MjData(renderer.model)
     same.qpos[:], same.qvel[:] = data.qpos, data.qvel
@@ -78,9 +80,12 @@ def material_of(data, geom="thing"):
 @pytest.mark.filterwarnings("ignore::sim.MirrorWarning")
 @pytest.mark.parametrize(("kind", "light"), [*((kind, "direct") for kind in SIZES), ("sphere", "bounce")])
 def test_eyes_see_what_a_model_sees_that_is_built_so(kind, light):
-    """Over ends of episodes. Light that bounces falls on the floor, too, and what glows sends some."""
+    """Signals agree also after the end of an episode. The cases include bounced light and glowing materials, which
+    light the floor.
+    """
     task = with_ranges({"thing.material": MATERIALS}, room(kind=kind), light)
-    gc.collect()  # Mitsuba's objects that die meanwhile, of tests before this one, would have the kernel recorded anew
+    # otherwise Mitsuba objects left by earlier tests die during the recording, and the kernel is recorded again
+    gc.collect()
     env = sim.make_vec_env(task, n_envs=8, seed=2)
     seen, infos, met = env.reset()["eyes"], env.reset_infos, set()
     for _ in range(2):
@@ -90,17 +95,19 @@ def test_eyes_see_what_a_model_sees_that_is_built_so(kind, light):
             expected = built(data, light, thing=f'material="{drawn}"', kind=kind)
             np.testing.assert_allclose(seen[world, 0], expected, atol=2e-6, err_msg=drawn)
             met.add(drawn)
-        for _ in range(Room.episode_steps + 1):  # the first of the next episode
+        for _ in range(Room.episode_steps + 1):  # one step into the next episode
             observation, _, dones, infos = env.step(np.ones((8, 1)))
         seen = observation["eyes"]
         assert not dones.any()
     assert met == set(MATERIALS)
-    assert env.renderer.recordings <= 3, "all worlds are one kernel"
+    assert env.renderer.recordings <= 3, "all worlds share one kernel"
 
 
 @pytest.mark.filterwarnings("ignore::sim.MirrorWarning")
 def test_a_floor_that_stands_still_may_differ():
-    """It is met as what moves is: a ray in a thousand, at its rim or at a stripe's, falls on the other side."""
+    """The floor is intersected like a moving geom: one ray in a thousand, at its rim or at the edge of a stripe, falls
+    on the other side.
+    """
     env = sim.make_vec_env(with_ranges({"floor.material": MATERIALS[:4]}, room(floor="")), n_envs=6, seed=1)
     seen = env.reset()["eyes"]
     for world, info in enumerate(env.reset_infos):
@@ -113,9 +120,9 @@ def test_a_floor_that_stands_still_may_differ():
 
 @pytest.mark.filterwarnings("ignore::sim.MirrorWarning")
 def test_depth_ids_and_shadows_are_of_the_one_that_is_drawn():
-    """A material that is not to be seen leaves nothing, and no shadow."""
+    """A geom with an invisible material has no depth, no id and no shadow."""
     env = sim.make_vec_env(with_ranges({"thing.material": ("cubic", "unseen", "plain")}), n_envs=9, seed=0)
-    seen, poses = env.reset()["eyes"], sim.Poses.of(env.worlds.datas)
+    seen, poses = env.reset()["eyes"], sim.Poses.from_data(env.worlds.datas)
     thing, shares = env.worlds.model.geom("thing").id, {}
     for world, (ids, depth) in enumerate(zip(env.renderer.ids(poses), env.renderer.depth(poses), strict=True)):
         drawn = material_of(env.worlds.datas[world])
@@ -135,7 +142,7 @@ def test_all_are_drawn_alike():
     env.simulation.restart(np.arange(600))
     found = np.unique(env.simulation.varied["thing.material"], return_counts=True)
     assert list(found[0]) == ["dark", "plain", "stripes"]
-    assert (np.abs(found[1] - 200) < 4 * np.sqrt(600 * 2 / 9)).all(), "four standard deviations"
+    assert (np.abs(found[1] - 200) < 4 * np.sqrt(600 * 2 / 9)).all(), "more than four standard deviations"
 
 
 def test_sizes_may_differ_with_materials_that_have_no_texture():
@@ -183,7 +190,7 @@ def test_one_world_and_another_number_of_worlds_see_the_same():
 
 
 def test_pictures_for_people_show_them():
-    """In each episode those of its own."""
+    """Renderings for people show the materials of the current episode."""
 
     def worlds(**how):
         one = Room()
@@ -203,20 +210,18 @@ def test_pictures_for_people_show_them():
 
 
 def test_renderers_take_the_materials_of_datas_own_models():
-    """Without a task, too; and refuse what they were not built for."""
+    """Renderers also follow the materials without a task, and refuse materials for which they were not built."""
     model = mujoco.MjModel.from_xml_string(room(thing='material="plain"'))
     models = [mujoco.MjModel.from_xml_string(room(thing=f'material="{m}"')) for m in ("plain", "stripes")]
     datas = [mujoco.MjData(each) for each in models]
     for each, data in zip(models, datas, strict=True):
         mujoco.mj_forward(each, data)
     how = model, EYE, Room.mounts, 2, Room.fidelity
-    with pytest.raises(
-        ValueError, match="geom 'thing' has another material than in the renderer's model: must be in `"
-    ):
+    with pytest.raises(ValueError, match="geom 'thing' differs in material from the renderer's model: must be in `"):
         sim.ModelRenderer(*how).signals(datas)
     seen = sim.ModelRenderer(*how, varied={"thing": ("plain", "stripes")}).signals(datas)
     np.testing.assert_allclose(seen[1], built(datas[1], thing='material="stripes"'), atol=2e-6)
-    with pytest.raises(ValueError, match="geom 'thing' has a material beside"):
+    with pytest.raises(ValueError, match="geom 'thing' has a material other than"):
         sim.ModelRenderer(*how, varied={"thing": ("plain", "dark")}).signals(datas)
     with pytest.raises(ValueError, match="varied: geom 'thing': the model has no material 'drak'; did you mean 'dark'"):
         sim.ModelRenderer(*how, varied={"thing": ("plain", "drak")})

@@ -1,4 +1,6 @@
-"""Worlds of one batch whose bodies differ: physics and sight agree, and are those of a model that is built so."""
+"""Bodies that differ between the worlds of one batch: physics and signals agree with a model that is compiled with
+these bodies.
+"""
 
 import mujoco
 import numpy as np
@@ -24,7 +26,8 @@ def test_what_is_seen_is_as_large_as_physics_has_it(kind):
     sizes = [info["varied"]["thing.size"] for info in env.reset_infos]
     assert np.ptp(sizes) > 0.5
     depth, ids, (pupils, frames) = (
-        ask(sim.Poses.of(env.worlds.datas)) for ask in (env.renderer.depth, env.renderer.ids, env.renderer.eye_frames)
+        ask(sim.Poses.from_data(env.worlds.datas))
+        for ask in (env.renderer.depth, env.renderer.ids, env.renderer.eye_frames)
     )
     geom, centres, right, shares = np.zeros(1, np.int32), directions_of(EYE, receptor_centres(EYE)), [], []
     for world, data in enumerate(env.worlds.datas):
@@ -43,11 +46,11 @@ def test_what_is_seen_is_as_large_as_physics_has_it(kind):
 
 @pytest.mark.parametrize("kind", SHAPES)
 def test_masses_and_all_that_follow_are_the_compilers(kind):
-    """A thing of that size, written down by hand: its volume weighs, and what was given a mass keeps it."""
+    """Mass follows the scaled volume, unless the model specifies a mass: then it stays."""
     text, factor = room(kind, SHAPES[kind]), 1.7
     model = mujoco.MjModel.from_xml_string(text)
     bodies = WorldModels(text, model, 2, Variation({"thing.size": (factor, factor)}))
-    bodies.begin(1, {"thing.size": factor})
+    bodies.start_episode(1, {"thing.size": factor})
     found, g, b = bodies.models[1], model.geom("thing").id, model.body("thing").id
     np.testing.assert_allclose(found.geom_size[g], factor * model.geom_size[g], rtol=1e-12)
     np.testing.assert_allclose(found.geom_pos[g], model.geom_pos[g], atol=1e-12)
@@ -58,7 +61,7 @@ def test_masses_and_all_that_follow_are_the_compilers(kind):
     weighed = text.replace('name="thing" type', 'name="thing" mass="2" type')
     model = mujoco.MjModel.from_xml_string(weighed)
     bodies = WorldModels(weighed, model, 1, Variation({"thing.size": (factor, factor)}))
-    bodies.begin(0, {"thing.size": factor})
+    bodies.start_episode(0, {"thing.size": factor})
     assert bodies.models[0].body_mass[b] == 2
     np.testing.assert_allclose(bodies.models[0].body_inertia[b], factor**2 * model.body_inertia[b], rtol=1e-9)
 
@@ -66,8 +69,8 @@ def test_masses_and_all_that_follow_are_the_compilers(kind):
 def test_a_world_of_factor_one_is_the_world_as_it_was():
     model = mujoco.MjModel.from_xml_string(room())
     bodies = WorldModels(room(), model, 1, Variation({"thing.size": (1, 2)}))
-    bodies.begin(0, {"thing.size": 1.8})
-    bodies.begin(0, {"thing.size": 1.0})
+    bodies.start_episode(0, {"thing.size": 1.8})
+    bodies.start_episode(0, {"thing.size": 1.0})
     for name in dir(model):
         here = None if name.startswith("_") else getattr(model, name)
         if isinstance(here, np.ndarray) and here.dtype != object:
@@ -76,7 +79,7 @@ def test_a_world_of_factor_one_is_the_world_as_it_was():
 
 
 def test_large_things_fall_onto_the_floor_earlier():
-    """Of a ball of radius r, r is what is left of its height when it lies."""
+    """A ball of radius r comes to rest with its centre at height r."""
     env = sim.make_vec_env(with_ranges({"thing.size": (0.5, 1.5)}), n_envs=4, seed=0)
     env.reset()
     for data in env.worlds.datas:
@@ -86,7 +89,7 @@ def test_large_things_fall_onto_the_floor_earlier():
 
 
 def coloured(rgb, **how):
-    """What is seen of a room that is built in this colour."""
+    """Return the signals of a room that is compiled with this colour."""
     model = mujoco.MjModel.from_xml_string(room(rgb=" ".join(map(str, rgb)), **how))
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
@@ -113,17 +116,18 @@ def test_a_floor_that_stands_still_may_differ_and_keeps_its_texture():
     for world, info in enumerate(env.reset_infos):
         color = info["varied"]["floor.color"]
         plain = [coloured((0.9, 0.2, 0.1), floor=f'rgba="{" ".join(map(str, c))} 1"') for c in (color, (1, 1, 1))]
-        where = (env.renderer.ids(sim.Poses.of(env.worlds.datas))[world] == 0)[:, None] & (plain[1] > 0.02)
+        where = (env.renderer.ids(sim.Poses.from_data(env.worlds.datas))[world] == 0)[:, None] & (plain[1] > 0.02)
         inner = np.broadcast_to(where, white.shape).copy()
         inner[..., 1:, :] &= inner[..., :-1, :]
         inner[..., :-1, :] &= inner[..., 1:, :]
         inner[..., :, 1:] &= inner[..., :, :-1]
         inner[..., :, :-1] &= inner[..., :, 1:]
-        # A texture times a colour, band by band: signals of the same receptor are, to the breadth of its bands.
+        # A texture multiplied by a colour, band by band. Signals of one receptor follow this product up to the width of
+        # its bands.
         expected = white * plain[0] / np.maximum(plain[1], 1e-6)
         np.testing.assert_allclose(seen[world][inner], expected[inner], rtol=0.05, atol=2e-3)
         assert inner.sum() > 50
-    assert np.ptp(white[:, -3:]) > 0.1, "there are stripes"
+    assert np.ptp(white[:, -3:]) > 0.1, "the floor has stripes"
 
 
 def test_starts_are_drawn_for_joints_and_bodies():
@@ -200,13 +204,13 @@ def test_pictures_for_people_show_them():
     for _ in range(11):
         env.get_images()
         env.step(np.zeros((1, 1)))
-    assert env.renderer.recordings <= 4, "a camera has kernels recorded anew, and there is one in an episode"
+    assert env.renderer.recordings <= 4, "a new camera records its kernels again, and an episode has one camera"
     green, red = ((p[..., 1] > 1.3 * p[..., 0]).sum() for p in pictures)
     assert green > red + 2000
 
 
 def test_renderers_take_what_datas_own_models_have():
-    """Without a task, too; and refuse what they were not built for."""
+    """Renderers also follow the data's own models without a task, and refuse changes for which they were not built."""
     models = [mujoco.MjModel.from_xml_string(room(shape=f'size="{size}"')) for size in (0.1, 0.5)]
     datas = [mujoco.MjData(model) for model in models]
     for model, data in zip(models, datas, strict=True):
@@ -217,11 +221,11 @@ def test_renderers_take_what_datas_own_models_have():
     single = sim.ModelRenderer(models[0], EYE, Room.mounts, 1, Room.fidelity)
     np.testing.assert_array_equal(single.ids(datas[1:]) == models[0].geom("thing").id, seen[1:])
     models[1].geom("post").size[2] *= 2
-    with pytest.raises(ValueError, match="geom 'post' has another size than in the renderer's model: must be in `vari"):
+    with pytest.raises(ValueError, match="geom 'post' differs in size from the renderer's model: must be in `vari"):
         renderer.signals(datas)
     models[1].geom("post").size[2] /= 2
     models[1].geom("thing").rgba[0] = 0.3
-    with pytest.raises(ValueError, match="geom 'thing' has another colour than in the renderer's model"):
+    with pytest.raises(ValueError, match="geom 'thing' differs in colour from the renderer's model"):
         renderer.signals(datas)
     sim.ModelRenderer(models[0], EYE, Room.mounts, 2, Room.fidelity, varied=["thing"]).signals(datas)
 

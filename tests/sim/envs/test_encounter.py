@@ -1,4 +1,4 @@
-"""Several animals in one world: who sees whom, who learns, and when episodes end."""
+"""Several animals in one world: mutual visibility, learning, and ends of episodes."""
 
 import numpy as np
 import pytest
@@ -9,12 +9,12 @@ from tests.sim.envs.hunt import Predator, Prey, Twin, distance, hunt, still
 
 
 def ahead(observation):
-    """Along +x, at full speed."""
+    """Return actions along +x at full speed."""
     return np.tile([1.0, 0.0], (len(observation["previous_action"]), 1))
 
 
 def seen_last(env, action):
-    """Poses of all worlds, and what the learner saw, after one step."""
+    """Return the poses of all worlds and the learner's observation after one step."""
     observation, *_ = env.step(np.tile(np.asarray(action, np.float32), (env.num_envs, 1)))
     return np.array([data.qpos for data in env.worlds.datas]), observation
 
@@ -22,14 +22,14 @@ def seen_last(env, action):
 def test_one_learns_and_the_other_acts_by_its_policy():
     env = sim.make_vec_env(hunt().alone("Prey", {"Predator": ahead}), n_envs=4)
     assert env.num_envs == 4
-    assert env.observation_space["eyes"].shape == (1, 3, 3, 2, 8)  # the prey's own
+    assert env.observation_space["eyes"].shape == (1, 3, 3, 2, 8)  # the prey's own resolution
     assert env.observation_space["feels"].shape == (2,)
     env.reset()
     before = np.array([data.qpos for data in env.worlds.datas])
     after, _ = seen_last(env, [0, 1])
     moved = after - before
-    assert (moved[:, 2] > 0.04).all()  # predator, along x
-    assert (moved[:, 1] > 0.04).all()  # prey, along y
+    assert (moved[:, 2] > 0.04).all()  # the predator moves along x
+    assert (moved[:, 1] > 0.04).all()  # the prey moves along y
     assert np.abs(moved[:, [0, 3]]).max() < 1e-6
     idle = sim.make_vec_env(hunt().alone("Prey", {}), n_envs=4)
     idle.reset()
@@ -37,7 +37,7 @@ def test_one_learns_and_the_other_acts_by_its_policy():
 
 
 class Invisible(Predator):
-    """Of a group of geoms that nobody sees."""
+    """A predator in a group of geoms that is not rendered."""
 
     name = "Predator"
     model = Predator.model.replace('rgba=".9 .1', 'group="3" rgba=".9 .1')
@@ -48,7 +48,9 @@ class Careful(Prey):
 
 
 def test_each_sees_the_other_through_its_own_eyes():
-    """The frozen animal is told what is before its own eyes, and the learner sees it: without it, red is gone."""
+    """The frozen animal receives the signals of its own eyes. The learner sees the frozen animal: without it, the red
+    disappears.
+    """
     told = []
 
     def looks(observation):
@@ -66,13 +68,13 @@ def test_each_sees_the_other_through_its_own_eyes():
     hidden = sim.make_vec_env(sim.Encounter(Careful(), Invisible()).alone("Careful", {}), n_envs=3, seed=2)
     unseen = hidden.reset()["eyes"][:, 0]
     assert (unseen[:, :, 0] - unseen[:, :, 2]).max() < 0.1
-    # The same moment as the predator's own task has it.
+    # The same state in the predator's own task.
     mirrored = sim.make_vec_env(hunt().alone("Predator", {}), n_envs=3, seed=2)
     mirrored.reset()
     for theirs, ours in zip(mirrored.worlds.datas, env.worlds.datas, strict=True):
         theirs.qpos[:], theirs.qvel[:] = ours.qpos, 0
     twin = mirrored.renderer.signals(_forward(mirrored))
-    assert np.abs(twin - frozen["eyes"][:, 0]).max() < 0.1  # noise of 0.01, and one step of nobody
+    assert np.abs(twin - frozen["eyes"][:, 0]).max() < 0.1  # the noise is 0.01, and there was one step without motion
 
 
 def _forward(env):
@@ -108,7 +110,7 @@ def test_frozen_eyes_remember_what_their_policy_wants():
 
 
 def test_an_episode_ends_for_all_when_it_ends_for_one():
-    """Whose own ending it is, is terminated; for the other it is cut off."""
+    """The episode is terminated for the animal that ended it, and truncated for the other."""
 
     class Brave(Prey):
         name = "Prey"
@@ -135,7 +137,7 @@ def test_worlds_with_frozen_animals_go_back_bit_for_bit():
     directions = rng.normal(size=(12, 2)).astype(np.float32)
 
     def swayed(observation):
-        """By what it sees, noise and memory included."""
+        """Return actions that depend on the signals, including noise and memory."""
         return observation["eyes"].reshape(len(observation["eyes"]), -1)[:, :12] @ directions
 
     def played(env, steps):
@@ -160,7 +162,7 @@ def new_learner(env, **settings):
 
 
 def test_both_learn_in_turn():
-    """A predator learns, then the prey before that predator, which stays as it was."""
+    """A predator learns first. Then the prey learns against that predator, which stays unchanged."""
     hunts = sim.make_vec_env(hunt().alone("Predator", {"Prey": still}), n_envs=2)
     predator = new_learner(hunts, batch_size=64, n_epochs=1).learn(64)
     weights = predator.policy.state_dict()["action_net.weight"].clone()
@@ -172,13 +174,13 @@ def test_both_learn_in_turn():
 
 @pytest.mark.slow
 def test_a_predator_learns_to_approach():
-    """Its prey stands still."""
+    """A predator learns to approach prey that stands still."""
     hunts = sim.make_vec_env(hunt().alone("Predator", {"Prey": still}), n_envs=32)
     predator = new_learner(hunts, batch_size=256, n_epochs=8).learn(12_000)
 
     def ends_at(policy):
         observation = hunts.reset()
-        for _ in range(7):  # nobody is caught so soon
+        for _ in range(7):  # the prey is not caught this early
             observation, *_ = hunts.step(policy(observation))
         return np.mean([distance(data) for data in hunts.worlds.datas])
 
@@ -187,7 +189,7 @@ def test_a_predator_learns_to_approach():
 
 
 def test_animals_that_are_alike_learn_one_policy():
-    """Rows: the first animal of all worlds, then the second. Each row is its own animal's."""
+    """The rows are the first animal of all worlds, then the second. Each row belongs to its own animal."""
     twins = sim.Encounter(Twin("prey"), Twin("predator"))
     env = sim.make_vec_env(twins, n_envs=4, seed=3, render_mode="eyes")
     assert env.num_envs == 8
@@ -195,7 +197,7 @@ def test_animals_that_are_alike_learn_one_policy():
     assert first["eyes"].shape == (8, 1, 3, 3, 1, 6)
     assert len(env.get_images()) == 8
     actions = np.zeros((8, 2), np.float32)
-    actions[5] = 1, 0  # predator of the second world
+    actions[5] = 1, 0  # the predator of the second world
     before = np.array([data.qpos for data in env.worlds.datas])
     observation, reward, _, infos = env.step(actions)
     moved = np.array([data.qpos for data in env.worlds.datas]) - before
@@ -216,7 +218,7 @@ def test_animals_that_are_alike_learn_one_policy():
 
 
 def test_automatic_fidelity_is_chosen_among_the_others():
-    """A predator alone has nothing to tell apart but the floor's edge; prey before it wants rays."""
+    """A predator alone sees only the floor's edge; with prey in view it needs at least the same number of rays."""
     careless = Predator()
     careless.fidelity = "auto"
     env = sim.make_vec_env(sim.Encounter(Prey(), careless).alone("Predator", {}), n_envs=1)

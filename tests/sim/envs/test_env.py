@@ -1,4 +1,4 @@
-"""The single environment: Gymnasium's and stable-baselines3's own checkers, and agreement with the batch."""
+"""The single environment passes the checkers of Gymnasium and stable-baselines3, and agrees with the batch."""
 
 import dataclasses
 import subprocess
@@ -28,8 +28,9 @@ FINE = {"rays_per_receptor": sim.Fidelity(2, bands=3)}
 
 @pytest.mark.parametrize("id_", IDS)
 def test_checkers_are_content(id_):
-    """Gymnasium's has nothing to say. stable-baselines3's recommends a policy of one's own for observations that are
-    neither an image nor a vector; as a vector, it has nothing to say either."""
+    """Gymnasium's checker gives no warning. For observations that are neither an image nor a vector,
+    stable-baselines3's checker recommends a custom policy; for the flattened vector it gives no warning either.
+    """
     env = gymnasium.make(id_, eyes=EYES, rays_per_receptor=1)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
@@ -51,7 +52,9 @@ def test_gymnasium_checks_the_pictures_too():
 
 @pytest.mark.parametrize("eyes", [EYES, dataclasses.replace(EYES, noise_sigma=0.0, receptors="goldfish")])
 def test_observations_stay_within_finite_bounds(eyes):
-    """Close to objects and walls, where signals are brightest; the bounds are not idle either."""
+    """Signals are brightest close to objects and walls. They stay within the bounds, and the bounds are within a factor
+    of 20.
+    """
     env = sim.make_env("detection", eyes, rays_per_receptor=1)
     space = env.observation_space["eyes"]
     assert np.isfinite([space.low, space.high]).all()
@@ -94,7 +97,7 @@ def test_picture_follows_the_agent():
     first = env.render()
     assert first.shape == (360, 480, 3)
     assert first.dtype == np.uint8
-    env.step(np.array([-1.0, 1.0]))  # turns on the spot: the body stays, the world turns
+    env.step(np.array([-1.0, 1.0]))  # the agent turns on the spot: it stays in the image, and the world turns
     second = env.render()
     state, camera = env.state, env._batch._pictures._photographer.camera
     mirror = sim.mirror(camera.world.model, camera._data)
@@ -106,8 +109,9 @@ def test_picture_follows_the_agent():
 
 
 def test_fields_are_drawn_on_the_eyes_level_and_end_where_sight_ends():
-    """One eye that looks straight ahead, at an object 3 m away: the picture changes in a wedge between the two and past
-    the object, and neither behind it nor beside the field."""
+    """One eye looks straight ahead at an object 3 m away. The image changes in a wedge up to the object and past it,
+    but not behind the object or outside the field.
+    """
     eyes = sim.Eyes(n_eyes=1, resolution=(5, 5), fov_deg=40)
     env = sim.make_env("detection", eyes, rays_per_receptor=1, render_mode="rgb_array")
     env.reset(seed=0)
@@ -120,7 +124,7 @@ def test_fields_are_drawn_on_the_eyes_level_and_end_where_sight_ends():
     changed = np.abs(bare - drawn).max(axis=2) > 8
 
     def at(x, y):
-        """Whether a point on the eyes' level lies in the drawn field."""
+        """Return whether a point on the eyes' level lies in the drawn field."""
         view = _follow(state, 0)
         local = view.rotation.T @ (np.array([x, y, EYE_HEIGHT]) - view.position)
         half = np.tan(np.radians(view.fovy_deg) / 2)
@@ -132,16 +136,18 @@ def test_fields_are_drawn_on_the_eyes_level_and_end_where_sight_ends():
 
     assert at(1.5, 0.2)
     assert at(1.5, -0.4)
-    assert not at(1.5, 0.8)  # tan 20° of 1.3 m is 0.47 m
+    assert not at(1.5, 0.8)  # tan 20° times 1.3 m is 0.47 m
     assert not at(1.5, -0.8)
     assert not at(5.5, 0.0)  # behind the object
-    assert at(6.0, 1.6)  # past it
+    assert at(6.0, 1.6)  # past the object
     assert not at(-1.0, 0.0)
     assert 0.005 < changed.mean() < 0.3
 
 
 def test_slow_pictures_are_there_for_the_asking_and_show_the_same_fields():
-    """Both draw the same overlay from depths of their own; what differs is noise on edges, see test_quick_camera.py."""
+    """Both cameras draw the same overlay from their own depths. They differ by noise at edges (see
+    test_quick_camera.py).
+    """
     env = sim.make_env("detection", EYES, rays_per_receptor=1)
     env.reset(seed=0)
     world, state, size = env._batch.worlds.world, env.state, (144, 192)
@@ -158,7 +164,9 @@ def test_slow_pictures_are_there_for_the_asking_and_show_the_same_fields():
 
 @pytest.mark.parametrize("receptors", ["rgb", (500,), "goldfish", "mosaic"])
 def test_pictures_of_eyes_show_their_signals(receptors):
-    """Each receptor is a square of its signal's grey level, or of its type's colour; eyes stand from left to right."""
+    """Each receptor is a square with the grey level of its signal, or the colour of its type. Eyes are in order from
+    left to right.
+    """
     mosaic = receptors == "mosaic"
     kinds = optics.Receptors((600, 520, 460), mosaic=((0, 1), (1, 2))) if mosaic else receptors
     eyes = dataclasses.replace(EYES, noise_sigma=0.0, receptors=kinds)
@@ -188,7 +196,7 @@ def test_pictures_of_eyes_show_their_signals(receptors):
 
 @pytest.mark.parametrize(("mode", "rows", "columns"), [("eyes", 2, 2), ("rgb_array", 2, 1)])
 def test_batches_are_shown_as_tiles_of_the_single_worlds_pictures(mode, rows, columns, monkeypatch):
-    small = partialmethod(FollowCamera.picture, size=(90, 120))  # as good as large ones, and a sixteenth of the work
+    small = partialmethod(FollowCamera.picture, size=(90, 120))  # enough for the comparison, at a sixteenth of the work
     monkeypatch.setattr(FollowCamera, "picture", small)
     venv = sim.make_vec_env("detection", EYES, rows * columns, 3, rays_per_receptor=1, render_mode=mode)
     env = sim.make_env("detection", EYES, rays_per_receptor=1, render_mode=mode)
@@ -217,11 +225,11 @@ def test_renders_nothing_before_the_world_has_begun():
         ({"episode_steps": 0}, "episode_steps = 0: must be a whole number"),
         (
             {**FINE, "fidelity": sim.Fidelity(3, bands=2)},
-            r"rays_per_receptor = Fidelity\(.*: must be left out where a ",
+            r"rays_per_receptor = Fidelity\(.*: must be left out if a ",
         ),
         ({**FINE, "fidelity": "nonsense"}, "fidelity = 'nonsense': must be a sim.Fidelity, 'auto' or None"),
-        ({**FINE, "fidelity": "auto"}, "rays_per_receptor = .*: must be left out where a fidelity is given"),
-        ({"seed": 3}, r"seed = 3: must be left out, it goes to reset\(seed=...\)"),
+        ({**FINE, "fidelity": "auto"}, "rays_per_receptor = .*: must be left out if a fidelity is given"),
+        ({"seed": 3}, r"seed = 3: must be left out, pass it to reset\(seed=...\)"),
         ({"n_envs": 2}, "n_envs = 2: must be left out, this is one world: make_vec_env has several"),
         ({"world_seed": 1.5}, "world_seed = 1.5: must be a whole number"),
     ],
@@ -239,7 +247,7 @@ def test_actions_of_another_shape_are_named():
 
 
 def test_gymnasiums_own_statistics_can_be_wrapped_around():
-    """It wants to put `episode` into info itself."""
+    """Gymnasium's wrapper writes `episode` into the info itself."""
     env = gymnasium.wrappers.RecordEpisodeStatistics(sim.make_env("detection", EYES, rays_per_receptor=1))
     env.reset(seed=0)
     total, done = 0.0, False
@@ -264,7 +272,7 @@ def test_a_perfect_lens_tells_how_many_rays_it_has():
 
 
 def test_a_fidelity_by_either_name_is_the_same():
-    """docs/tasks.md once had it as `rays_per_receptor`; the eyes then have its number of bands."""
+    """`rays_per_receptor` also accepts a fidelity. The eyes then have its number of bands."""
     fidelity = sim.Fidelity(2, bands=3, light="bounce")
     for named in ({"fidelity": fidelity}, {"rays_per_receptor": fidelity}):
         renderer = sim.make_vec_env("detection", EYES, 1, **named).renderer
@@ -276,7 +284,7 @@ def test_a_fidelity_by_either_name_is_the_same():
 
 
 def test_an_eyes_columns_of_receptors_are_drawn_where_they_look():
-    """Receptors are equally wide on the retina: behind 90°, five columns look to the arcs of tan = 0, 0.4 and 0.8."""
+    """Receptors are equally wide on the retina: for a field of 90°, five columns look along arctan 0, ±0.4 and ±0.8."""
     eyes = sim.Eyes(n_eyes=1, resolution=(1, 5), fov_deg=90)
     np.testing.assert_allclose(_receptor_rays(eyes), np.arctan([0.8, 0.4, 0.0, -0.4, -0.8]), atol=1e-12)
     narrow = sim.Eyes(n_eyes=1, resolution=(1, 2), fov_deg=40)
@@ -285,6 +293,6 @@ def test_an_eyes_columns_of_receptors_are_drawn_where_they_look():
 
 
 def test_pictures_of_signals_are_white_where_all_receptors_see_white():
-    """Each primary's shares add up to one; one that no type has gets a bit of all."""
+    """The shares of each primary add up to one. A primary that no type contributes to is shared by all types."""
     shares = _shares(np.array([[1.0, 0.0, 0.0], [1.0, 1.0, 0.0]]))
     np.testing.assert_allclose(shares, [[0.5, 0.0, 0.5], [0.5, 1.0, 0.5]])

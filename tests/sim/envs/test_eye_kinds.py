@@ -1,4 +1,4 @@
-"""Eyes of several kinds on one animal: each sees what it would see alone."""
+"""Several kinds of eyes on one animal: each kind has the signals that it would have alone."""
 
 from dataclasses import replace
 
@@ -22,7 +22,7 @@ AHEAD = (sim.Mount("cart", offset=(0.2, 0, 0.1)),)
 
 
 class Looker(Face):
-    """Two wide coarse eyes, and one that is narrow and sharp."""
+    """A task with two wide, coarse eyes, and a narrow, sharp one."""
 
     eye, mounts = {"wide": WIDE, "sharp": SHARP}, {"wide": SIDES, "sharp": AHEAD}
     episode_steps = 6
@@ -50,7 +50,9 @@ def played(task, n=3, steps=9, **how):
 @pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("memory", [1, 2])
 def test_each_kind_sees_what_it_would_see_alone(memory):
-    """The first even with the noise of a task that has no other kind; past the end of an episode, too."""
+    """The first kind even has the noise of a task without other kinds. The test continues past the end of an
+    episode.
+    """
     both, last = played(Looker(), memory=memory)
     wide, wide_last = played(alone("wide"), memory=memory)
     assert [*both[0]] == ["wide", "sharp", "previous_action"]
@@ -59,7 +61,7 @@ def test_each_kind_sees_what_it_would_see_alone(memory):
     np.testing.assert_array_equal(last["wide"], wide_last["eyes"])
     sharp, sharp_last = played(alone("sharp"), memory=memory)
     for one, other in zip([*both, last], [*sharp, sharp_last], strict=True):
-        np.testing.assert_allclose(one["sharp"], other["eyes"], atol=8 * 0.001 * 2**0.5)  # but for the noise
+        np.testing.assert_allclose(one["sharp"], other["eyes"], atol=8 * 0.001 * 2**0.5)  # both signals have noise
     assert np.abs(both[0]["sharp"] - both[-1]["sharp"]).max() > 0.1
 
 
@@ -137,7 +139,7 @@ def test_automatic_fidelity_is_each_kinds_own():
 
 
 def test_an_animal_of_several_kinds_among_others():
-    """What the others see, noise included, stays as it is."""
+    """The other animals' signals, including their noise, stay unchanged."""
 
     careful = Prey()
     careful.eye = {"back": Prey.eye, "ahead": Prey.eye}

@@ -1,4 +1,4 @@
-"""Frames that are begun early and waited for late are the frames they would have been one after the other."""
+"""Frames that are launched early and awaited late equal frames that are computed one after the other."""
 
 import numpy as np
 import pytest
@@ -14,7 +14,7 @@ KEYS = np.arange(N, dtype=np.uint64)
 
 @pytest.fixture(scope="module")
 def before_and_after():
-    """An environment of N worlds, and two different snapshots of them."""
+    """Return an environment of N worlds and two different snapshots of them."""
     env = sim.make_vec_env("detection", EYES, N, fidelity=sim.Fidelity(4, EYES.bands))
     poses = []
     for seed in (0, 1):
@@ -33,9 +33,9 @@ def test_all_and_some_at_once(before_and_after, worlds):
     env, old, new = before_and_after
     worlds = np.array(worlds)
     patient, hasty = eyes_of(env), eyes_of(env)
-    expected = patient.begin(new).wait(), patient.begin(old, worlds).wait()
-    every = hasty.begin(new)
-    some = hasty.begin(old, worlds)
+    expected = patient.launch(new).wait(), patient.launch(old, worlds).wait()
+    every = hasty.launch(new)
+    some = hasty.launch(old, worlds)
     np.testing.assert_array_equal(every.wait(), expected[0])
     np.testing.assert_array_equal(some.wait(), expected[1])
     assert not np.array_equal(expected[0][worlds], expected[1])
@@ -44,25 +44,25 @@ def test_all_and_some_at_once(before_and_after, worlds):
 def test_some_see_what_they_see_among_all(before_and_after):
     env, state, _ = before_and_after
     worlds = np.array([5, 17])
-    among_all = eyes_of(env).begin(state).wait()[worlds]
-    np.testing.assert_array_equal(eyes_of(env).begin(state, worlds).wait(), among_all)
+    among_all = eyes_of(env).launch(state).wait()[worlds]
+    np.testing.assert_array_equal(eyes_of(env).launch(state, worlds).wait(), among_all)
 
 
 def test_noise_goes_on_and_begins_anew(before_and_after):
     env, state, _ = before_and_after
     eyes = eyes_of(env)
-    first, second = eyes.begin(state).wait(), eyes.begin(state).wait()
+    first, second = eyes.launch(state).wait(), eyes.launch(state).wait()
     spread = (second - first).std()
-    assert spread == pytest.approx(np.sqrt(2) * EYES.noise_sigma, rel=0.1)  # of 720 receptors: 3 % to chance
+    assert spread == pytest.approx(np.sqrt(2) * EYES.noise_sigma, rel=0.1)  # 720 receptors estimate it to 3 %
     eyes.restart(KEYS)
-    np.testing.assert_array_equal(eyes.begin(state).wait(), first)
+    np.testing.assert_array_equal(eyes.launch(state).wait(), first)
 
 
 def test_looks_begun_one_after_the_other_keep_apart(before_and_after):
-    """Both use the renderer's one buffer of poses, and are waited for the other way round."""
+    """Both frames use the renderer's single buffer of poses, and are awaited in reverse order."""
     env, old, new = before_and_after
-    expected = [env.renderer.begin(state).wait() for state in (old, new)]
-    first, second = env.renderer.begin(old), env.renderer.begin(new)
+    expected = [env.renderer.launch(state).wait() for state in (old, new)]
+    first, second = env.renderer.launch(old), env.renderer.launch(new)
     np.testing.assert_array_equal(second.wait(), expected[1])
     np.testing.assert_array_equal(first.wait(), expected[0])
     with pytest.raises(RuntimeError, match="waited for before"):

@@ -1,4 +1,4 @@
-"""Every feature serves every task, or its refusal gives the reason."""
+"""Every feature works in every task, or its refusal gives the reason."""
 
 import numpy as np
 import pytest
@@ -13,7 +13,7 @@ PLAIN = sim.Fidelity(1, bands=4)
 
 
 class BatchFace(sim.BatchTask):
-    """`Face` for arrays of worlds."""
+    """The task `Face` for arrays of worlds."""
 
     model, mounts, eye, episode_steps = Face.model, Face.mounts, Face.eye, Face.episode_steps
 
@@ -23,12 +23,12 @@ class BatchFace(sim.BatchTask):
     def rewards(self, worlds):
         return {"still": -np.abs(worlds.qvel[:, 0])}
 
-    def feels(self, worlds):
+    def proprioception(self, worlds):
         return worlds.qvel
 
 
 def made(task, **options):
-    """An environment of a built-in task, by name, or of a user task, whose settings are attributes."""
+    """Return an environment of a built-in task, by name, or of a user task, whose settings are attributes."""
     if task in sim.TASKS:
         return sim.make_vec_env(task, options.pop("eyes", EYES), 3, seed=1, fidelity=PLAIN, **options)
     user = {"Task": Face, "BatchTask": BatchFace}[task]()
@@ -80,7 +80,7 @@ def test_every_feature_serves_every_task(task, feature):
 @pytest.mark.fast_cases(3)
 @pytest.mark.parametrize("task", TASKS)
 def test_states_are_stored_and_restored(task):
-    """70 actions: more than random numbers for moving objects are drawn ahead."""
+    """The 70 actions exceed the random numbers that are drawn in advance for moving objects."""
     env = made(task)
     env.reset()
     random = np.random.default_rng(0)
@@ -99,7 +99,7 @@ def test_states_are_stored_and_restored(task):
 
 @pytest.mark.parametrize("task", ["detection", "navigation"])
 def test_a_colour_temperature_multiplies_every_band(task):
-    """Through tracers that trace fewer components than there are bands, too."""
+    """The product also holds for tracers that trace fewer components than there are bands."""
     kelvins = 3200.0
     warm, plain = (made(task, vary=vary) for vary in ({"color_temperature": (kelvins, kelvins)}, None))
     seen, white = warm.reset()["eyes"][:, -1], plain.reset()
@@ -117,7 +117,8 @@ def test_colours_of_built_in_worlds_vary(task):
     colors = env.simulation.varied["floor.color"]
     floor = env.worlds.model.geom("floor").id
     assert len(np.unique(colors, axis=0)) == 3
-    np.testing.assert_allclose([model.geom_rgba[floor, :3] for model in env.worlds._looks.models], colors, atol=1e-6)
+    models = env.worlds._appearances.models
+    np.testing.assert_allclose([model.geom_rgba[floor, :3] for model in models], colors, atol=1e-6)
 
 
 def test_encounters_need_a_body_for_each_animal():

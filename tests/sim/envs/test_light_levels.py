@@ -1,4 +1,4 @@
-"""Light that differs between episodes of rhabdom's own tasks: signals are as large a share, and noise is not."""
+"""Light levels that differ between episodes of built-in tasks: signals scale with the level, and noise does not."""
 
 import gymnasium
 import numpy as np
@@ -11,7 +11,7 @@ OPTIONS = {"rays_per_receptor": 4, "n_envs": 12, "seed": 7}
 
 
 def played(steps=6, eyes=EYES, **more):
-    """Episodes of three actions: worlds begin anew on the way, all at once."""
+    """Return signals and light levels over episodes of three actions. All worlds restart at the same time."""
     env = sim.make_vec_env("detection", eyes, episode_steps=3, **{**OPTIONS, **more})
     seen, levels = [env.reset()["eyes"]], [[i.get("varied", {}).get("light") for i in env.reset_infos]]
     last = None
@@ -30,7 +30,8 @@ def test_signals_are_as_large_a_share_in_every_episode():
     assert none.tolist() == [[None] * 12] * 7
     shares = dim.sum(axis=(2, 3, 4, 5, 6)) / plain.sum(axis=(2, 3, 4, 5, 6))
     np.testing.assert_allclose(dim, plain * shares[..., None, None, None, None, None], rtol=1e-4, atol=1e-6)
-    # What is returned with an episode's last action is seen in the next one's light, its info tells the last one's.
+    # The observation after an episode's last action is in the light of the next episode. Its info holds the level of
+    # the last one.
     np.testing.assert_allclose(shares[:3], levels[[0, 1, 2]], rtol=1e-4)
     np.testing.assert_allclose(shares[3:6], levels[[4, 4, 5]], rtol=1e-4)
     assert (levels[0] == levels[3]).all()
@@ -42,7 +43,7 @@ def test_signals_are_as_large_a_share_in_every_episode():
 
 
 def test_a_world_that_begins_anew_is_lit_anew_and_others_stay_as_they_were():
-    """Episodes are given up when their agents have touched too much, and so at different times."""
+    """Episodes end by `least_return`, and so at different times."""
     seen, told = {}, {}
     for vary in (None, {"light": (0.05, 1.0)}):
         env = sim.make_vec_env("detection", EYES, vary=vary, least_return=-1.0, **OPTIONS)
@@ -54,8 +55,9 @@ def test_a_world_that_begins_anew_is_lit_anew_and_others_stay_as_they_were():
             levels.append([info.get("varied", {}).get("light") for info in infos])
             ended.append(done)
         seen[vary is None], told = np.array(looks), np.array(levels)
-    assert any(0 < done.sum() < 6 for done in ended), "few at a time"
-    # An info tells what its action was taken in; what is seen with it belongs to the next.
+    assert any(0 < done.sum() < 6 for done in ended), "only a few worlds restart at once"
+    # The info holds the light level of the action; the observation that comes with it already belongs to the next
+    # episode.
     np.testing.assert_allclose(seen[False][:-1], seen[True][:-1] * told[1:].astype(float), rtol=1e-4)
 
 
@@ -82,7 +84,7 @@ def test_gymnasium_takes_it_too():
 @pytest.mark.parametrize(
     ("vary", "said"),
     [
-        ({"wall_east.size": (0.5, 2)}, "vary: wall_east.size: 'wall_east' is touched, and all worlds share one layout"),
+        ({"wall_east.size": (0.5, 2)}, "vary: wall_east.size: agents touch 'wall_east', which all worlds share"),
         ({"goal.start": ((0, 0, 0), (1, 1, 0))}, "vary: goal.start: must be left out, the task itself places"),
         ({"size": (1, 2)}, "vary: 'size': must be one of"),
     ],

@@ -1,4 +1,6 @@
-"""What a task changes in a world's model is that world's alone, lasts for the episode, and goes back with its state."""
+"""Changes that a task makes to one world's model stay in that world, last for the episode, and are restored with its
+state.
+"""
 
 from typing import ClassVar
 
@@ -18,7 +20,7 @@ FALLING = CART.replace(
 
 
 class Weighed(Face):
-    """Every episode has a gravity of its own, and rails that are slipperier or less than the model's."""
+    """A task in which each episode has its own gravity, and a rail whose damping is scaled by 0.5 to 2."""
 
     model = FALLING
     episode_steps = 6
@@ -34,14 +36,14 @@ def gravities(env):
 
 
 def test_each_world_falls_by_its_own_gravity_also_while_others_begin_anew():
-    """After k steps of Euler's method with speeds first, of length h: g h² k (k + 1) / 2."""
+    """After k steps of length h of the semi-implicit Euler method, a body has fallen g h² k (k + 1) / 2."""
     env = sim.make_vec_env(Weighed(), n_envs=3, seed=1)
     env.reset()
     drawn, steps = gravities(env), np.zeros(3, int)
     assert np.ptp(drawn) > 1
     for step in range(10):
         if step == 2:
-            env.simulation.steps[1] = 5  # this one begins anew at once
+            env.simulation.steps[1] = 5  # this world restarts at once
         *_, done, _ = env.step(np.zeros((3, 1)))
         steps = np.where(done, 0, steps + Weighed.substeps)
         kept = gravities(env) == drawn
@@ -52,7 +54,9 @@ def test_each_world_falls_by_its_own_gravity_also_while_others_begin_anew():
 
 
 def test_a_factor_is_of_the_models_own_value():
-    """And not of the last episode's: after many episodes it is between half of it and twice of it, as at first."""
+    """The factor applies to the compiled value, not to that of the last episode: after many episodes it is still
+    between 0.5 and 2.
+    """
     env = sim.make_vec_env(Weighed(), n_envs=2, seed=0)
     found = []
     for _ in range(40):
@@ -63,7 +67,7 @@ def test_a_factor_is_of_the_models_own_value():
 
 
 def test_episodes_depend_on_seed_and_number_alone():
-    """One world, whose model nobody could share, and the first of three; and again after other episodes."""
+    """A single world and the first of three worlds have the same episodes, also after other episodes."""
     alone, among = (sim.make_vec_env(Weighed(), n_envs=n, seed=5) for n in (1, 3))
 
     def heights(env):
@@ -79,7 +83,7 @@ def test_episodes_depend_on_seed_and_number_alone():
 
 
 def test_a_state_holds_what_was_changed():
-    """Back where it stood, in the same environment and in another one, everything is as it was, gravity, too."""
+    """After a restore, in the same environment or in another one, all values are the same, including gravity."""
     env, other = (sim.make_vec_env(Weighed(), n_envs=3, seed=seed) for seed in (2, 3))
     env.reset()
     other.reset()
@@ -104,7 +108,7 @@ def test_environments_of_one_compiled_model_do_not_share_it():
 
 
 class Late(Face):
-    """Changes the model in an episode of one world, and not when it is tried out."""
+    """A task that changes the model during an episode of one world, but not during the trial."""
 
     def act(self, data, action):
         super().act(data, action)
@@ -122,7 +126,7 @@ def test_what_comes_too_late_for_a_model_of_its_own_is_refused():
     env = sim.make_vec_env(Late(), n_envs=2)
     env.reset()
     env.step(np.zeros((2, 1)))
-    words = "data.model has another {} now, and all worlds share it: must be changed by the first `reset`, too"
+    words = "{} of data.model has changed, and all worlds share it: must be changed by the first `reset`, too"
     with pytest.raises(RuntimeError, match=f"Late: {words.format('geom_friction')}") as refused:
         env.step(np.array([[0.0], [1.0]]))
     assert "\n" not in str(refused.value)
@@ -133,8 +137,9 @@ def test_what_comes_too_late_for_a_model_of_its_own_is_refused():
 
 
 def test_an_only_world_may_be_changed_at_any_time():
-    """Its model is its own from then on: the next episode begins as it was compiled, and states hold what was changed,
-    in this environment and in another one."""
+    """A single world has its own model after the change. The next episode starts from the compiled model, and states
+    contain the change, in this environment and in another one.
+    """
     env, other = (sim.make_vec_env(Late(), n_envs=1) for _ in range(2))
     env.reset()
     other.reset()
@@ -153,7 +158,7 @@ def test_an_only_world_may_be_changed_at_any_time():
 
 
 class Painted(Face):
-    """Paints the ball and turns on the light once for all, and perhaps changes physics, too."""
+    """A task that always paints the ball and turns on the light, and optionally changes physics."""
 
     heavy = False
 
@@ -183,7 +188,9 @@ def test_who_changes_nothing_shares_one_model():
 
 @pytest.mark.parametrize("floor", ['rgba="1 0 0 1"', 'material="green"'])
 def test_the_grey_that_mujoco_takes_for_no_colour_is_a_colour_where_it_is_drawn(floor):
-    """Else a material's geom keeps the material's colour, and one without is as it was in the model."""
+    """MuJoCo treats this grey as "no colour". A drawn grey is still a colour, whether the geom has a material
+    or not.
+    """
     text = room(floor=floor).replace("<asset>", '<asset><material name="green" rgba="0 1 0 1"/>')
     seen = []
     for grey in (0.5, 0.5 + 1e-6):
@@ -193,7 +200,7 @@ def test_the_grey_that_mujoco_takes_for_no_colour_is_a_colour_where_it_is_drawn(
 
 
 def test_who_changes_a_colour_to_that_grey_sees_it():
-    """Of a geom without a material it is MuJoCo's colour, too."""
+    """A task may set this grey. For a geom without a material, MuJoCo shows the same colour."""
 
     class Grey(Room):
         vary: ClassVar = {"floor.color": ((1, 0, 0), (1, 0, 0))}

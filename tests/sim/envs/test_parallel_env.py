@@ -1,4 +1,4 @@
-"""PettingZoo's own tests, and what they do not ask."""
+"""PettingZoo's own tests, and tests of behaviour that they do not cover."""
 
 import sys
 import warnings
@@ -53,7 +53,7 @@ def test_everybody_is_told_how_the_world_differs():
 
 
 def test_it_is_the_world_that_one_of_them_learns_in(env):
-    """The same seed, the same actions: what the learner sees is the same, bit for bit."""
+    """The learner has the same observations, bit for bit, with the same seed and actions."""
     env.reset(seed=5)
     alone = sim.make_vec_env(hunt().alone("Prey", {"Predator": lambda seen: np.array([[0.3, -0.4]])}), n_envs=1, seed=5)
     alone.reset()
@@ -98,7 +98,7 @@ def test_pictures():
 @pytest.mark.parametrize(
     ("actions", "words"),
     [
-        ({"Prey": np.zeros(2)}, "actions: 'Predator' has none: must be one of each, Prey, Predator"),
+        ({"Prey": np.zeros(2)}, "actions: 'Predator' has none: must have one for each of Prey, Predator"),
         ({"Prey": np.zeros(2), "Predater": np.zeros(2)}, "actions: no animal 'Predater'; did you mean 'Predator'"),
         ({"Prey": np.zeros(2), "Predator": np.zeros(3)}, r"actions: 'Predator' has shape \(3,\): must be \(2,\)"),
     ],

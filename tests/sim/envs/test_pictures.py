@@ -1,4 +1,4 @@
-"""What environments show to people, whoever asks: stable-baselines3's `render`, its wrappers, PettingZoo's."""
+"""Renderings for people through stable-baselines3's `render`, its wrappers, and PettingZoo."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Going back to where worlds stood: the same future, bit for bit, for the worlds that go back and for no other."""
+"""Restored worlds have the same future, bit for bit, and the other worlds are not affected."""
 
 import pickle
 
@@ -10,7 +10,7 @@ from tests.sim.envs.test_task_vec_env import Face
 
 
 class Pushed(Face):
-    """Chance, contact and a solver: a second body, pushed about at random, leans at the cart."""
+    """A task with randomness, contacts and a solver: a second body, placed at random, leans on the cart."""
 
     model = Face.model.replace(
         '<body name="ball"',
@@ -22,7 +22,7 @@ class Pushed(Face):
         super().reset(data, rng)
         data.qpos[2] = rng.uniform(0.3, 0.5)
 
-    def feels(self, data):
+    def proprioception(self, data):
         return data.qvel[:2]
 
 
@@ -34,7 +34,7 @@ def env():
 
 
 def played(env, steps, seed):
-    """What is seen, felt and earned under the same actions; some episodes end on the way."""
+    """Return observations, rewards and ends under fixed actions. Some episodes end on the way."""
     random = np.random.default_rng(seed)
     found = []
     for _ in range(steps):
@@ -58,7 +58,7 @@ def test_the_same_future_twice(env):
     seen = env.set_state(state)
     assert np.array_equal(seen["eyes"], state["remembered"])
     assert same(first, played(env, 15, 2))
-    assert not same(first, played(env, 15, 2)), "time goes on, and the future is another one"
+    assert not same(first, played(env, 15, 2)), "time has advanced, so the future differs"
 
 
 def test_from_disk_in_another_environment(env):
@@ -80,10 +80,10 @@ def test_some_go_back_and_the_others_go_on(env):
 
 
 def test_every_entry_counts(env):
-    """A state with one entry of another moment leads elsewhere: nothing in it is for show."""
+    """A state in which one entry comes from an earlier time leads to another future: every entry matters."""
     played(env, 3, 6)
     early = env.get_state()
-    played(env, Pushed.episode_steps + 1, 7)  # every world begins anew, where chance has drawn it
+    played(env, Pushed.episode_steps + 1, 7)  # every world restarts at a random state
     state = env.get_state()
     first = played(env, 15, 8)
     for name in set(state) - {"felt", "action"}:
@@ -141,12 +141,12 @@ def test_who_sleeps_is_in_no_state():
     sleepy = sim.make_vec_env(task, n_envs=1)
     sleepy.reset()
     for ask in (sleepy.get_state, lambda: sleepy.set_state({})):
-        with pytest.raises(RuntimeError, match="get_state: the model has <flag sleep>, and who sleeps"):
+        with pytest.raises(RuntimeError, match="get_state: the model has <flag sleep>, which no state contains"):
             ask()
 
 
 def test_environments_are_not_pickled(env):
-    with pytest.raises(TypeError, match="EyesVecEnv cannot be pickled or copied: it holds compiled kernels"):
+    with pytest.raises(TypeError, match="EyesVecEnv cannot be pickled or copied, since it contains compiled kernels"):
         pickle.dumps(env)
     with pytest.raises(TypeError, match="EyesVecEnv cannot be pickled"):
         pickle.dumps(sim.make_vec_env("detection", sim.Eyes(n_eyes=1, resolution=(1, 1)), n_envs=1))

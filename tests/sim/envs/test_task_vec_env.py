@@ -1,4 +1,4 @@
-"""Tasks of one's own: a cart on a rail that moves to where it sees a ball, and what goes wrong in others' code."""
+"""User tasks: a cart on a rail that moves to the position of a visible ball, and errors in other users' code."""
 
 import mujoco
 import numpy as np
@@ -27,7 +27,7 @@ CART = """
 
 
 class Face(sim.Task):
-    """A cart on a rail moves to where a ball is before it."""
+    """A task in which a cart on a rail moves to the position of a ball ahead of it."""
 
     model = CART
     eye = optics.Eye(resolution=(2, 16), fov_deg=120, bands=4)
@@ -47,7 +47,7 @@ class Face(sim.Task):
 
 @pytest.mark.slow
 def test_ppo_learns_to_go_by_sight():
-    """A cart that stays in the middle is before the ball in 0.15 of the episodes: 0.6 m of 4."""
+    """A cart that stays in the middle faces the ball in 0.15 of the episodes: 0.6 m of 4 m."""
     env = sim.make_vec_env(Face(), n_envs=32)
     learner = PPO(
         "MultiInputPolicy", env, n_steps=64, batch_size=512, learning_rate=1e-3, n_epochs=8, gamma=0.9, seed=0
@@ -94,8 +94,8 @@ def test_episodes_end_and_begin_as_stable_baselines_has_it():
         assert info["episode"]["r"] == pytest.approx(returns[world], rel=1e-5)
         assert info["episode"]["l"] == Face.episode_steps
         last, new = info["terminal_observation"]["eyes"], observation["eyes"][world]
-        assert np.ptp(last[-1] - last[0]) > 0  # noise differs from frame to frame
-        np.testing.assert_array_equal(new[0], new[2])  # a new episode has always seen what it sees first
+        assert np.ptp(last[-1] - last[0]) > 0  # noise differs between frames
+        np.testing.assert_array_equal(new[0], new[2])  # the memory of a new episode is filled with its first frame
         assert np.abs(new[2] - last[2]).max() > 0.05
 
 
@@ -111,7 +111,7 @@ def test_one_world_is_a_gymnasium_environment():
 
 
 class Feeling(Face):
-    def feels(self, data):
+    def proprioception(self, data):
         return data.qvel
 
 
@@ -156,7 +156,8 @@ def test_a_failing_method_ends_its_world_and_the_others_go_on(task, words):
     np.testing.assert_array_equal(done, fails)
     for failed, info, r in zip(fails, infos, reward, strict=True):
         assert ("failure" in info) == failed
-        assert info.get("TimeLimit.truncated") == (False if failed else None)  # else learners count with a fresh start
+        # otherwise learners bootstrap from the first state of the new episode
+        assert info.get("TimeLimit.truncated") == (False if failed else None)
         assert r == (0 if failed else 1)
 
 
@@ -194,7 +195,7 @@ class NoModel(sim.Task):
 class NoRewards(sim.Task):
     model, mounts = Face.model, Face.mounts
 
-    def reward(self, data):  # not the method's name
+    def reward(self, data):  # a misspelt name of the method
         return {"progress": 0.1}
 
 
@@ -227,10 +228,10 @@ class FailingReset(Face):
         (lambda: Face, {}, ValueError, r"task is the class Face: must be an instance, such as Face\(\)"),
         (NoCamera, {}, ValueError, "NoCamera: no camera 'fromt'; the model has"),
         (NoActuators, {}, ValueError, "NoActuators: its model has no actuators"),
-        (NoMounts, {}, ValueError, "mounts = .*must be one sim.Mount at least"),
+        (NoMounts, {}, ValueError, "mounts = .*must contain at least one sim.Mount"),
         (NoSubsteps, {}, ValueError, "NoSubsteps: substeps = 0: must be a whole number"),
         (FailingReset, {}, RuntimeError, "reset, line .* of test_task_vec_env.py: KeyError: 'nothing'"),
-        (Face, {"eyes": sim.Eyes()}, ValueError, "eyes = .*: must be left out, a sim.Task says it itself"),
+        (Face, {"eyes": sim.Eyes()}, ValueError, "eyes = .*: must be left out, a sim.Task defines it itself"),
         (Face, {"n_envs": 0}, ValueError, "n_envs = 0: must be a whole number"),
         (Face, {"render_mode": "ascii"}, ValueError, "render_mode = 'ascii': must be one of"),
     ],
@@ -241,7 +242,7 @@ def test_bad_tasks_are_named(task, options, error, words):
 
 
 class Seen(Face):
-    """With a camera of its own, and names for what a spectrum may take the place of."""
+    """A task with its own camera, and named colours that spectra can replace."""
 
     model = (
         CART.replace("<worldbody>", '<asset><material name="red" rgba=".9 .2 .1 1"/></asset><worldbody>')
@@ -262,7 +263,7 @@ class Seen(Face):
     ],
 )
 def test_every_field_moves_what_is_seen(field, value, where):
-    """Noise is the same in both, so that whatever differs is the field's doing."""
+    """Noise is the same in both environments, so that the field causes all differences."""
     found = []
     for task in (Seen(), Seen()):
         if found:

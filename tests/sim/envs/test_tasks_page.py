@@ -1,4 +1,4 @@
-"""docs/tasks.md says what the environments do."""
+"""The tables in docs/tasks.md agree with the environments."""
 
 import re
 import warnings
@@ -25,7 +25,7 @@ class Dimmed(Face):
 
 
 def table(heading):
-    """Rows of the first table under a heading, as lists of cells without backquotes."""
+    """Return the rows of the first table under a heading, as lists of cells without backquotes."""
     section = PAGE.split(f"# {heading}\n", 1)[1].split("\n#", 1)[0]
     rows = [line.strip("|").split("|") for line in section.splitlines() if line.startswith("|")]
     return [[cell.strip().strip("`") for cell in row] for row in rows[2:]]
@@ -85,7 +85,7 @@ def test_info_keys_are_those_of_the_table():
 
 def test_tasks_of_ones_own_say_no_more_than_the_table_has():
     documented = {row[0] for row in table("Info")}
-    elsewhere = {row[0] for row in table("Info") if row[2].endswith("not of a task of one's own")} | {"given_up"}
+    elsewhere = {row[0] for row in table("Info") if row[2].endswith("not in user tasks")} | {"given_up"}
     env = sim.make_vec_env(Dimmed(), n_envs=2)
     env.reset()
     assert elsewhere == {"position", "heading", "given_up", "adversary_first"}

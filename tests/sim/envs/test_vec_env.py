@@ -1,4 +1,4 @@
-"""The VecEnv's contract: seeds, freshness, endings, memory, noise; and learners that use it."""
+"""The contract of the VecEnv: seeds, up-to-date observations, endings, memory and noise; and learners that use it."""
 
 import dataclasses
 
@@ -21,12 +21,12 @@ def make(n_envs, *, seed=0, eyes=EYES, task="detection", **options):
 
 
 def actions(n, step):
-    """Actions that depend on world and step alone."""
+    """Return actions that depend only on world and step."""
     return np.stack([np.random.default_rng([i, step]).uniform(-1, 1, 2) for i in range(n)])
 
 
 def seeking(venv, step):
-    """Actions that bring every agent to one of its objects sooner or later: episodes end."""
+    """Return actions that bring every agent to one of its objects sooner or later, so that episodes end."""
     random, state = actions(venv.num_envs, step), venv.state
     if not state.objects.shape[1]:
         return random
@@ -37,7 +37,7 @@ def seeking(venv, step):
 
 
 def played(venv, steps):
-    """Everything the worlds say over some steps: list of (observation, reward, done, info)."""
+    """Return the first observation and a list of (observation, reward, done, info) for each step."""
     first = venv.reset()
     return first, [venv.step(seeking(venv, step)) for step in range(steps)]
 
@@ -58,7 +58,7 @@ LENS = dataclasses.replace(EYES, optics=optics.Pupil(aperture_radius=40e-6, thin
     ],
 )
 def test_episodes_do_not_depend_on_the_number_of_worlds(task, eyes):
-    """Bit-identical, over restarts, noise and moving objects."""
+    """Episodes are bit-identical across restarts, noise and moving objects."""
     few, many = (played(make(n, task=task, eyes=eyes, memory=2), 50) for n in (2, 19))
     ends = 0
     for name in few[0]:
@@ -86,7 +86,7 @@ def test_seed_repeats_and_another_seed_differs():
 
 
 def test_observations_are_those_of_the_state_they_come_with():
-    """After reset, after a step and after an ending: never one frame late."""
+    """Observations match the state after a reset, after a step and after an ending, without a delay of one frame."""
     venv = make(6, eyes=QUIET)
     observation = venv.reset()
     ends = 0
@@ -99,9 +99,10 @@ def test_observations_are_those_of_the_state_they_come_with():
 
 
 def test_terminal_observation_shows_the_final_state(monkeypatch):
-    """Few and many endings at once (small and whole renderer) give the same pictures."""
+    """A few endings at once (small renderer) and many (whole renderer) give the same signals."""
     venv = make(FEW + 2, eyes=QUIET, memory=3)
-    whole = venv.renderer.resized(venv.num_envs)  # the environment's own is busy just then
+    # a separate renderer, because the environment's own is busy at this point
+    whole = venv.renderer.resized(venv.num_envs)
     seen = {}
     judge = venv.simulation.judge
 
@@ -126,7 +127,9 @@ def test_terminal_observation_shows_the_final_state(monkeypatch):
 
 @pytest.mark.parametrize("mode", ["training", "evaluation"])
 def test_eyes_see_worlds_as_they_are_after_fresh_starts_and_respawns(mode):
-    """Most of an observation is begun before rewards are worked out; what they change must be in it all the same."""
+    """Most of an observation is launched before rewards are computed. Changes made by the rewards must still be visible
+    in it.
+    """
     venv = make(FEW + 2, eyes=QUIET, mode=mode)
     whole = venv.renderer.resized(venv.num_envs)
     venv.reset()
@@ -158,7 +161,7 @@ def test_memory_holds_newest_last_and_starts_with_the_first_frame():
 def test_noise_has_its_sigma_and_is_white():
     loud, quiet = make(64, eyes=dataclasses.replace(EYES, noise_sigma=0.2)), make(64, eyes=QUIET)
     noise = (loud.reset()["eyes"] - quiet.reset()["eyes"])[:, 0]
-    n = noise.size  # 7680: the sample's sigma is known to 1/sqrt(2 n) = 0.8 %
+    n = noise.size  # 7680: the sample's sigma has a relative error of 1/sqrt(2 n) = 0.8 %
     assert noise.std() == pytest.approx(0.2, rel=4 / np.sqrt(2 * n))
     assert abs(noise.mean()) < 4 * 0.2 / np.sqrt(n)
     assert abs(np.corrcoef(noise[0].ravel(), noise[1].ravel())[0, 1]) < 4 / np.sqrt(noise[0].size)
@@ -208,7 +211,7 @@ def test_a_broken_world_restarts_and_says_why():
 
 @pytest.mark.parametrize("broken", ["heading", "position", "objects"])
 def test_worlds_that_hold_nan_end_and_the_others_go_on_as_if_alone(broken):
-    """Bit for bit: what the neighbours see and get is what they would without the broken world."""
+    """The observations and rewards of the other worlds are the same bit for bit as without the broken world."""
     venvs = [make(3, memory=2) for _ in range(2)]
     for venv in venvs:
         venv.reset()

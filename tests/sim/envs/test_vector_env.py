@@ -1,4 +1,4 @@
-"""Gymnasium's own face of the batched environment."""
+"""Gymnasium's interface to the batched environment."""
 
 import subprocess
 import sys
@@ -52,7 +52,7 @@ def test_worlds_start_anew_in_the_step_that_ends_them():
 
 
 class Leaving(Face):
-    """Ends where the cart has left the middle, and differs from episode to episode."""
+    """A task that ends when the cart has left the middle, and differs from episode to episode."""
 
     episode_steps, vary = 6, {"light": (0.5, 2.0)}
 
@@ -61,7 +61,7 @@ class Leaving(Face):
 
 
 def form(info):
-    """Its keys, its masks, and what kinds of arrays there are."""
+    """Return the keys and masks of an info, and the types and shapes of its arrays."""
     return {
         key: form(value)
         if isinstance(value, dict)
@@ -73,7 +73,7 @@ def form(info):
 
 
 def of_first_world(info):
-    """What it says of it but what is seen, which is there only if its mask says so."""
+    """Return the info of the first world without its observations. A key is included only if its mask is set."""
     return {
         key: of_first_world(value) if isinstance(value, dict) else value[0]
         for key, value in info.items()
@@ -90,7 +90,7 @@ def of_first_world(info):
     ],
 )
 def test_what_is_said_of_ended_episodes_is_where_gymnasium_has_it(task, options, actions):
-    """World 0 is the same in both."""
+    """World 0 is the same in both environments."""
     env = EyesVectorEnv(2, task=task, **options)
     single = SyncVectorEnv([lambda: sim.make_env(task, **options)] * 2, autoreset_mode=AutoresetMode.SAME_STEP)
     assert form(env.reset(seed=3)[1]) == form(single.reset(seed=3)[1])
@@ -108,13 +108,15 @@ def test_what_is_said_of_ended_episodes_is_where_gymnasium_has_it(task, options,
 
 @pytest.mark.parametrize("steps", [3, 300])
 def test_episodes_last_as_long_as_gymnasium_is_told(steps):
-    """Shorter than the task's 256 actions, and longer."""
+    """`max_episode_steps` sets the length of an episode, below and above the task's 256 actions."""
     how = {"max_episode_steps": steps, "mode": "evaluation", **OPTIONS}
     assert lengths("rhabdom/Detection-v0", [-1, 0], 301, **how) == [steps, steps]
 
 
 def lengths(id_, action, most, **how):
-    """Actions in the first episode of one world and of the first of two, up to `most`; None: it lasts longer."""
+    """Return the number of actions in the first episode of a single world and of a batch of two, up to `most`; None if
+    it is longer.
+    """
     one, two = gymnasium.make(id_, **how), gymnasium.make_vec(id_, num_envs=2, **how)
     one.reset(seed=0)
     two.reset(seed=0)
@@ -153,8 +155,8 @@ def test_tasks_of_ones_own_have_ids_too(task, told, steps):
 @pytest.mark.parametrize(
     ("make", "said"),
     [
-        (lambda: gymnasium.make("rhabdom/Maze-v0", episode_steps=9), "episode_steps = 9: must be left out where Gymn"),
-        (lambda: gymnasium.make_vec("rhabdom/Maze-v0", episode_steps=9), "episode_steps = 9: must be left out where"),
+        (lambda: gymnasium.make("rhabdom/Maze-v0", episode_steps=9), "episode_steps = 9: must be left out if Gymn"),
+        (lambda: gymnasium.make_vec("rhabdom/Maze-v0", episode_steps=9), "episode_steps = 9: must be left out if"),
         (lambda: gymnasium.make_vec("rhabdom/Maze-v0", max_episode_steps=0), "max_episode_steps = 0: must be a whole"),
         (lambda: sim.make_vec_env(Face(), episode_steps=0), "episode_steps = 0: must be a whole number"),
         (lambda: sim.register_task("Face-v0", "detection"), "task = 'detection': must be a sim.Task, or its class"),
@@ -166,7 +168,7 @@ def test_bad_lengths_are_refused(make, said):
 
 
 def test_several_animals_of_a_world_are_no_vector_of_worlds():
-    with pytest.raises(ValueError, match=r"several animals learn in a sim\.Encounter: give what its `alone` returns"):
+    with pytest.raises(ValueError, match=r"several animals learn in a sim\.Encounter: pass the result of `alone`"):
         EyesVectorEnv(4, task=hunt())
 
 

@@ -1,4 +1,4 @@
-"""What tests hold of eyes, module by module.
+"""Tests of eyes: which test covers which module.
 
 eyes: test_eyes.py, envs/test_env.py
 sampling: test_sensor.py, test_field_areas.py

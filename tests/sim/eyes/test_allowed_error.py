@@ -11,12 +11,14 @@ def eye(**settings):
 
 
 def test_half_of_the_noise_is_allowed():
-    """Which makes it no more than an eighth larger."""
+    """The default tolerance is half of the noise, which makes the total at most an eighth larger."""
     assert allowed_error(eye(noise_sigma=0.04), None) == pytest.approx(0.02)
 
 
 def test_little_noise_allows_what_is_little_beside_white():
-    """Behind a pupil white is worth its share of the retina's square: a lens a quarter as wide lets 1/16 through."""
+    """The tolerance is a share of white's signal if noise is small. A lens a quarter as wide as the retina transmits
+    1/16 of the light.
+    """
     assert allowed_error(eye(noise_sigma=1e-6), None) == pytest.approx(0.005)
     assert allowed_error(eye(noise_sigma=1e-6, pupil=LENS), None) == pytest.approx(0.005 / 16)
 

@@ -19,8 +19,9 @@ NEAR, FAR = 0.3, 20.0  # [m]
 
 @pytest.fixture(scope="module")
 def close_by():
-    """An object at arm's length, others behind it, and an eye as large as a vertebrate's in focus at infinity: light
-    from NEAR is blurred over 1.7 receptors."""
+    """Return a scene with an object at arm's length and others behind it, and an eye of a vertebrate's size in focus at
+    infinity. Light from NEAR is blurred over 1.7 receptors.
+    """
     eyes = sim.Eyes(2, (5, 21), fov_deg=12, placement_range_deg=40, sensor_width=2e-2, bands=1, noise_sigma=0)
     focus = eyes.eye().sensor_distance
     eyes = dataclasses.replace(eyes, optics=optics.Pupil(2.5e-3, thin_lens_focal_length=focus))
@@ -48,14 +49,16 @@ def test_layers_agree_with_the_convolution_in_depth(close_by):
     infinite, mean, layers = (
         error(depth) for depth in (DepthLayers(), DepthLayers(FAR, NEAR, 1), DepthLayers(FAR, NEAR, 3))
     )
-    # 1.5 %, 0.5 % and what the reference's own noise leaves, 0.1 to 0.2 %.
+    # 1.5 %, 0.5 %, and the noise of the reference, 0.1 to 0.2 %.
     assert infinite > 2 * mean > 4 * layers
     assert layers < 0.0025
 
 
 def test_areas_share_their_light_among_layers_as_rays_do(close_by, monkeypatch):
-    """Means over all samples of a view, of two views that see spheres, walls and floor; and not if distances are taken
-    for their inverses. Samples here are not weighted: as many areas as groups of rays, over the receptors' squares."""
+    """Areas and rays give the layers the same mean light over all samples of a view. Both views contain spheres, walls
+    and floor. The result differs if distances replace their inverses. Samples are unweighted: the number of areas
+    equals that of groups of rays, over the receptors' squares.
+    """
     world, eyes, state = close_by
     heading = state.heading[0] - np.linspace(0, 0.6, 7)
     states = dataclasses.replace(state.take(np.zeros(7, int)), heading=heading)
@@ -63,7 +66,7 @@ def test_areas_share_their_light_among_layers_as_rays_do(close_by, monkeypatch):
     depth = DepthLayers(FAR, NEAR, 3)
 
     def layers(eyes, samples, kind):
-        """(layer, view)"""
+        """Return the mean light, (layer, view)."""
         renderer = sim.BatchedRenderer(world, eyes, 7, sim.Fidelity(samples, 1, depth, samples=kind))
         renderer.sensor = dataclasses.replace(renderer.sensor, depth=depth)
         renderer._set_width(7)
@@ -106,7 +109,7 @@ def test_shares_are_hats_over_the_vergence():
         shares = np.array([np.array(share) for share in depth.shares(dr.rcp(mi.Float(z)))])
     expected = [[1, 0.75, 0, 0, 0, 0], [0, 0.25, 1, 0.5, 0, 0], [0, 0, 0, 0.5, 1, 1]]
     np.testing.assert_allclose(shares, expected, atol=1e-5)
-    assert DepthLayers(2.0, 0.5, 1).distances == (0.8,)  # the mean vergence's
+    assert DepthLayers(2.0, 0.5, 1).distances == (0.8,)  # the distance of the mean inverse distance
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""Where eyes sit and look."""
+"""Positions and directions of eyes."""
 
 import dataclasses
 import math
@@ -21,7 +21,7 @@ def test_eyes_spread_evenly_from_left_to_right():
 
 
 def test_eyes_look_outwards_with_the_left_on_the_left():
-    azimuths = np.radians([90.0, 0.0])  # to the left, ahead (x ahead, y left, z up)
+    azimuths = np.radians([90.0, 0.0])  # to the left, and ahead (x ahead, y left, z up)
     right, up, axis = np.moveaxis(eye_rotations(azimuths), -1, 0)
     np.testing.assert_allclose(axis, [[0, 1, 0], [1, 0, 0]], atol=1e-15)
     np.testing.assert_allclose(right, [[1, 0, 0], [0, -1, 0]], atol=1e-15)
@@ -44,7 +44,7 @@ def test_cameras_of_a_world_are_the_eyes():
         np.testing.assert_allclose(
             data.cam_xpos[camera], data.xpos[model.body("agent").id] + BODY_RADIUS * np.array(outwards), atol=1e-12
         )
-        # Receptors are square: 60° across 5 of them, and 3 of the same pitch high.
+        # Receptors are square: the field is 60° across 5 of them, and 3 of the same pitch high.
         assert math.tan(math.radians(model.cam_fovy[camera]) / 2) == pytest.approx(math.tan(math.radians(30)) * 3 / 5)
 
 
@@ -75,7 +75,7 @@ def test_values_out_of_range_are_named(name, value):
         sim.Eyes(**{name: value})
 
 
-# Every field, a change to it, and the shape of what is seen afterwards.
+# Every field, a changed value, and the shape of the signals after the change.
 CHANGES = {
     "n_eyes": (3, (3, 3, 4, 5)),
     "resolution": ((5, 4), (2, 3, 5, 4)),
@@ -93,8 +93,9 @@ CHANGES = {
 
 @pytest.mark.parametrize("field", [f.name for f in dataclasses.fields(sim.Eyes)])
 def test_every_field_moves_what_is_seen(field):
-    """A field that is not in the table fails: whoever adds one says what it does. (The sensor's width changes what a
-    lens of given focal length makes of the scene.)"""
+    """Every field of `sim.Eyes` changes the signals; a field without an entry in `CHANGES` fails. (The sensor's width
+    matters behind a lens of fixed focal length.)
+    """
     value, shape = CHANGES[field]
     behind_a_lens = field in ("sensor_width", "waveguide")
     before = _settled(behind_a_lens)
@@ -110,7 +111,7 @@ def _given(behind_a_lens):
 
 @cache
 def _settled(behind_a_lens):
-    """What is seen before the change. Looked at twice: what moves by itself could not show anything."""
+    """Return the signals before the change, after checking that they are reproducible."""
     first, again = (_seen(sim.Eyes(**_given(behind_a_lens))) for _ in range(2))
     assert np.array_equal(first, again)
     first.flags.writeable = False
@@ -135,7 +136,7 @@ def test_mosaics_and_pigments_change_the_number_of_channels():
 def test_unknown_receptors_come_with_the_nearest_name():
     with pytest.raises(ValueError, match=r"receptors = 'hunnybee': must be one of .*; did you mean 'honeybee'\?"):
         sim.Eyes(receptors="hunnybee")
-    with pytest.raises(ValueError, match="there is no type; an eye needs at least one"):
+    with pytest.raises(ValueError, match="no type is given; an eye needs at least one"):
         sim.Eyes(receptors=())
 
 

@@ -1,4 +1,4 @@
-"""Areas behind a pupil against the convolution of `Eye.see`, with exact means of a scene that has no closed form."""
+"""Areas behind a pupil against the convolution of `Eye.see`, with numerical means of a scene without a closed form."""
 
 import dataclasses
 
@@ -12,15 +12,15 @@ from sim.eyes.receptive_fields import ReceptiveFields, cells_per_receptor
 from sim.eyes.sampling import FieldSampling
 from tests.sim.eyes.test_sensor import L, convolved, dense, eye, focused, plane_of, prism, scene
 
-FINE = 8  # points along an area's side, on which its mean is found
+FINE = 8  # points along an area's side for its mean
 
 
 def sampling_of(e, tolerance=None):
-    return FieldSampling(e, ReceptiveFields.of(e, cells_per_receptor(e.resolution)), tolerance=tolerance)
+    return FieldSampling(e, ReceptiveFields.from_eye(e, cells_per_receptor(e.resolution)), tolerance=tolerance)
 
 
 def from_means(e, sensor):
-    """Signals (channel, h, w) from the scene's means over the sensor's areas."""
+    """Return the signals (channel, h, w) from the scene's means over the sensor's areas."""
     width, height = (side * e.sensor_distance / e.receptor_pitch for side in sensor.extent)
     x, y = plane_of(e, sensor.directions.astype(float))
     within = (np.arange(FINE) + 0.5) / FINE - 0.5
@@ -38,16 +38,18 @@ def error(e, per_receptor, tolerance=None):
 
 @pytest.mark.parametrize(("pupil", "most"), [(focused(), 0.004), (prism(), 0.02)], ids=["focused", "prism"])
 def test_agrees_with_the_convolution(pupil, most):
-    """One area per receptor, relative to the mean signal; 16 rays are allowed .01. The prism's light comes from 1.5
-    receptors around each direction: within one area, light is not even."""
+    """Error with one area per receptor, relative to the mean signal; 16 rays are allowed 0.01. The prism's light comes
+    from 1.5 receptors around each direction, and so varies within one area.
+    """
     assert error(eye(pupil=pupil), 1) < most
 
 
 @pytest.mark.parametrize("pupil", [focused(), prism()], ids=["focused", "prism"])
 def test_errors_fall_with_smaller_areas(pupil):
-    """As the square of their sides, and better where that makes them fit the fields: by 3 at least for half the side.
-    Then nothing may be left beyond the lattice; the convolution's own cells, a quarter as wide as receptors, err by
-    .0015 at most."""
+    """Errors fall with the square of the areas' sides: half the side reduces them at least threefold, and more if the
+    areas then fit the fields. The tolerance for light beyond the lattice is small here. The convolution's own cells, a
+    quarter as wide as receptors, have errors of at most 0.0015.
+    """
     e = eye(pupil=pupil)
     errors = [error(e, n, 5e-4 * e.throughput) for n in (1, 4, 16)]
     assert errors[1] < errors[0] / 3
@@ -56,9 +58,10 @@ def test_errors_fall_with_smaller_areas(pupil):
 
 @pytest.mark.parametrize("a", [0.9, 0.55, 0.3])
 def test_the_lattice_reaches_as_far_as_the_noise_asks(a):
-    """Behind a hole one area per receptor errs by no more than is allowed, although the rim's receptors get much of
-    their light from beside the retina. A lattice that reaches as far whatever the noise errs by more where holes are
-    wider than half of the retina."""
+    """Behind a pinhole, the error of one area per receptor stays within the tolerance, although receptors at the rim
+    get much of their light from outside the retina. A lattice whose reach ignores the noise has a larger error if the
+    pinhole is wider than half of the retina.
+    """
     e = dataclasses.replace(eye((15, 15), optics.Pupil(aperture_radius=a * L / 2)), noise_sigma=0.003)
     expected, allowed = convolved(e, cells_per_receptor(e.resolution)), allowed_error(e, None)
 
@@ -71,14 +74,16 @@ def test_the_lattice_reaches_as_far_as_the_noise_asks(a):
 
 @pytest.mark.parametrize("a", [0.55, 0.3])
 def test_areas_of_several_receptors_err_as_the_square_of_their_sides(a):
-    """Holes blur them more widely than they are. Areas of four receptors and of one: sides twice as long."""
+    """Pinholes blur more widely than a receptor. Areas of four receptors have sides twice as long as areas of one."""
     e = eye((15, 15), optics.Pupil(aperture_radius=a * L / 2))
     of_four, of_one = (error(e, n, 5e-4 * e.throughput) for n in (1 / 4, 1))
     assert 3 < of_four / of_one < 5
 
 
 def test_areas_are_shared_where_fields_are_twice_as_wide():
-    """A hole's field is about as wide as the hole, of 15 receptors; a lens's in focus as a receptor."""
+    """Behind a pinhole, the field has about the pinhole's width; behind a lens in focus, a receptor's. The retina has
+    15 receptors.
+    """
     for pupil, width in ((optics.Pupil(0.3 * L / 2), 4.5), (optics.Pupil(0.9 * L / 2), 13.5), (focused(), 1.0)):
         sampling = sampling_of(eye((15, 15), pupil))
         assert sampling.fields.widths == pytest.approx((width, width), rel=0.25)
@@ -89,18 +94,19 @@ def test_areas_are_shared_where_fields_are_twice_as_wide():
 
 
 def test_areas_of_several_receptors_cover_all_in_the_middle():
-    """Fifteen receptors take ten columns of 1.5, or eight of two, of which the outer ones reach half a receptor
-    further."""
+    """Fifteen receptors need ten columns of 1.5 receptors or eight of two; the outer columns of the latter extend half
+    a receptor beyond the retina.
+    """
     fields = sampling_of(eye((15, 15), focused())).fields
     for per_receptor, columns in ((4 / 9, 10), (1 / 4, 8)):
-        lattice = FieldAreas.of(fields, (1, per_receptor**0.5))
+        lattice = FieldAreas.from_fields(fields, (1, per_receptor**0.5))
         assert len(lattice.edges[1]) == columns + 1
         assert lattice.size == pytest.approx((per_receptor**-0.5, 1))
         assert sum(lattice.edges[1]) == pytest.approx(0)
 
 
 def test_columns_of_any_height_leave_rows_alone():
-    """Where nothing but columns matters, receptors of one row share an area and those of several do not."""
+    """An area covers all receptors of a column with `in_rows=False`, and only neighbours in a row share an area."""
     e = eye((4, 8), optics.Pupil(aperture_radius=0.1 * L))
     tall, square = (sampling_of(e).areas(1 / 4, in_rows=in_rows) for in_rows in (False, True))
     pitch = e.receptor_pitch / e.sensor_distance
@@ -113,7 +119,7 @@ def turned(self, fields, receptors, right=FieldAreas.weights):
 
 
 def none_at_all(self, fields, receptors, right=FieldAreas.weights):
-    """Every receptor sees the one area that most of its field lies in."""
+    """Give every receptor only the area that contains most of its field."""
     weights = right(self, fields, receptors)
     return (weights == weights.max(axis=2, keepdims=True)) * fields.power[:, None, None]
 
@@ -132,8 +138,12 @@ def test_white_light_gives_the_kernels_power():
 
 
 def test_each_receptor_is_cut_and_light_comes_from_around_it():
-    """A lens in focus needs no rim; a prism looks to one side, and the lattice reaches there alone."""
-    sharp, beside = (FieldAreas.of(sampling_of(eye(pupil=pupil)).fields, (2, 3)) for pupil in (focused(), prism()))
+    """A lens in focus needs no margin around the field. A prism looks to one side, and the lattice extends only
+    there.
+    """
+    sharp, beside = (
+        FieldAreas.from_fields(sampling_of(eye(pupil=pupil)).fields, (2, 3)) for pupil in (focused(), prism())
+    )
     assert sharp.size == pytest.approx((1 / 3, 1 / 2))
     np.testing.assert_allclose(sharp.edges[1], np.arange(28) / 3 - 4.5)
     assert len(sharp.middles) == 18 * 27
@@ -142,7 +152,7 @@ def test_each_receptor_is_cut_and_light_comes_from_around_it():
     assert (rims >= 0).all()
     assert 0 < rims.max() < 3
     assert rims.min() == 0
-    # Of a lattice that reaches everywhere, what lies beyond that one's upper end is less than was allowed.
+    # A lattice that extends everywhere shows that the light beyond this lattice's upper end is within the tolerance.
     fields = sampling_of(eye(pupil=prism())).fields
     everywhere = FieldAreas((np.arange(-20, 21) / 2, np.arange(-60, 61) / 3))
     weights = everywhere.weights(fields, np.arange(81)).reshape(3, 81, 40, 120)
@@ -156,7 +166,7 @@ def test_a_trial_is_part_of_the_sensor():
     trial, sensor = sampling.area_trial(4, some), sampling.areas(4)
     np.testing.assert_array_equal(trial.directions, sensor.directions)
     assert trial.extent == sensor.extent
-    # The sensor leaves out weights that change signals by less than a tenth of the noise.
+    # The sensor omits weights that change signals by less than a tenth of the noise.
     light = np.random.default_rng(0).random(len(sensor.directions))
     np.testing.assert_allclose(
         trial.weights @ light, (dense(sensor) @ light)[:, some], atol=0.1 * e.noise_sigma / e.throughput
@@ -164,7 +174,9 @@ def test_a_trial_is_part_of_the_sensor():
 
 
 def test_rays_can_be_drawn_for_some_receptors_alone():
-    """As many rays then tell more about these: all of them lie in one of their fields, and signals stay the same."""
+    """The same number of rays then gives more information about these receptors: all rays lie in one of their fields,
+    and signals stay the same.
+    """
     e, some = eye(pupil=focused()), np.array([0, 40])
     sampling = sampling_of(e)
     own = dataclasses.replace(sampling, fields=sampling.fields.drawn_for(some))

@@ -1,4 +1,4 @@
-"""Where eyes are, against MuJoCo's own frames."""
+"""Positions of eyes against MuJoCo's own frames."""
 
 import mujoco
 import numpy as np
@@ -22,7 +22,7 @@ EYE = Eye(resolution=(1, 1), bands=1)
 
 def frame_of(mount):
     renderer = sim.ModelRenderer(MODEL, EYE, [mount], 1, sim.Fidelity(1, bands=1))
-    pupils, frames = renderer.eye_frames(sim.Poses.of([DATA]))
+    pupils, frames = renderer.eye_frames(sim.Poses.from_data([DATA]))
     return pupils[0, 0], frames[0, 0]
 
 
@@ -42,7 +42,7 @@ def test_bodies_and_sites_look_along_x(name, thing):
 
 
 def test_angles_turn_left_up_and_over():
-    """As MuJoCo turns a camera that stands where the eye does: about z, then -y, then the axis."""
+    """The angles rotate like MuJoCo's frames: about z, then -y, then the optical axis."""
     left, up, roll = 35.0, 20.0, 50.0
     _, frame = frame_of(sim.Mount("head", azimuth_deg=left, elevation_deg=up, roll_deg=roll, offset=(0.4, 0, 0)))
     turns = []
@@ -116,12 +116,12 @@ def test_depth_inside(shape, point, depth):
 
 
 CORNERS = np.array(list(np.ndindex(2, 2, 2))) - 0.5
-# Each side of a cube as two triangles, outwards; the last is its lid, at z = 0.5.
+# Each side of a cube as two triangles that face outwards; the last side is the lid, at z = 0.5.
 SIDES = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
 
 
 def cube(*sizes, lids=True):
-    """Cubes in each other, as one mesh, with or without lids, that stands askew."""
+    """Return a model of nested cubes as one tilted mesh, with or without lids."""
     vertices = np.concatenate([size * CORNERS for size in sizes])
     sides = SIDES if lids else SIDES[:-1]
     faces = [
@@ -145,15 +145,15 @@ def cube(*sizes, lids=True):
         (cube(1), (0.2, 0.1, -0.51), 0, 0),
         (cube(1), (5, 0, 0), 0, 0),
         (cube(1, lids=False), (0, 0, -0.4), 0, 0),  # an open box
-        (cube(1, 0.5), (0, 0, 0.3), 0.05, 0.05 * 1.1),  # between shells
-        (cube(1, 0.5), (0, 0, 0.2), 0, 0),  # in the hollow
+        (cube(1, 0.5), (0, 0, 0.3), 0.05, 0.05 * 1.1),  # between two shells
+        (cube(1, 0.5), (0, 0, 0.2), 0, 0),  # in the inner cavity
     ],
 )
 def test_depth_inside_of_meshes(text, point, least, most):
     model = mujoco.MjModel.from_xml_string(text)
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
-    centre = data.xpos[1] + data.xmat[1].reshape(3, 3) @ point  # MuJoCo puts a mesh's origin elsewhere in its geom
+    centre = data.xpos[1] + data.xmat[1].reshape(3, 3) @ point  # MuJoCo moves a mesh's origin within its geom
     assert least <= depth_inside(model, data, 0, centre) <= most
 
 

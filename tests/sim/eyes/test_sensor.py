@@ -1,4 +1,4 @@
-"""Receptive-field sampling against the paper's convolution, and the perfect lens's sampling against quadrature."""
+"""Sampling of receptive fields against the paper's convolution, and sampling of the perfect lens against quadrature."""
 
 import math
 
@@ -22,7 +22,7 @@ def box_sensor(eye, rays):
 
 
 def receptive_field_sensor(eye, rays, cells):
-    return FieldSampling(eye, ReceptiveFields.of(eye, cells)).sensor(rays / math.prod(eye.resolution))
+    return FieldSampling(eye, ReceptiveFields.from_eye(eye, cells)).sensor(rays / math.prod(eye.resolution))
 
 
 def focused(a=0.3):
@@ -31,24 +31,28 @@ def focused(a=0.3):
 
 
 def prism(a=0.3):
-    """A wedge of glass: its PSF is off centre, which a sensor with a flipped kernel would put on the other side."""
+    """Return a glass wedge. Its PSF is off centre, so that a sensor with a flipped kernel would shift it to the other
+    side.
+    """
     slope = np.linspace(-1, 1, 65)
     return optics.Pupil(aperture_radius=a * L / 2, height=6e-6 * np.add.outer(0.5 * slope, slope), n=1.5)
 
 
 def scene(x, y, band):
-    """Smooth radiance over the tangent plane in receptor pitches (x right, y down), different in every band."""
+    """Return a smooth radiance over the tangent plane in receptor pitches (x right, y down), different in every
+    band.
+    """
     return 1 + 0.5 * np.sin(0.9 * x + 0.3 * band) * np.cos(0.5 * y) + 0.3 * np.tanh(x + 0.5 * y - band)
 
 
 def plane_of(eye, directions):
-    """Tangent-plane coordinates (x right, y down) in receptor pitches of unit vectors."""
+    """Return tangent-plane coordinates (x right, y down), in receptor pitches, of unit vectors."""
     scale = eye.sensor_distance / eye.receptor_pitch
     return directions[:, 0] / directions[:, 2] * scale, -directions[:, 1] / directions[:, 2] * scale
 
 
 def sampled(eye, sensor):
-    """What the sensor makes of `scene`, as signals (channel, h, w)."""
+    """Return the sensor's signals (channel, h, w) for `scene`."""
     x, y = plane_of(eye, sensor.directions.astype(float))
     radiance = np.stack([scene(x, y, band) for band in range(eye.bands)])[:, None].astype(np.float32)
     if isinstance(sensor, BoxSensor):
@@ -58,7 +62,7 @@ def sampled(eye, sensor):
 
 
 def convolved(eye, cells):
-    """The same by Eye.see, on a picture that extends beyond the kernel's reach."""
+    """Return the signals of Eye.see, for an image that extends beyond the kernel's reach."""
     kernel = eye.kernel(cells)
     size = [cells * n + 2 * (k // 2 + 1) for n, k in zip(eye.resolution, kernel.shape[1:], strict=True)]
     y, x = ((np.arange(n) - (n - 1) / 2) / cells for n in size)
@@ -82,7 +86,7 @@ def test_agrees_with_the_convolution(pupil):
 
 
 def test_error_falls_with_rays():
-    """Faster than 1/sqrt(n): low-discrepancy points."""
+    """Errors fall faster than 1/sqrt(n), because the points have low discrepancy."""
     e = eye(pupil=focused())
     cells = cells_per_receptor(e.resolution)
     expected = convolved(e, cells)
@@ -103,7 +107,7 @@ def test_a_flipped_kernel_is_noticed(monkeypatch):
 
 
 def test_white_light_gives_the_kernels_power():
-    """Rows of weights sum to the power inside the kernel: a uniform scene gives a² power, exactly."""
+    """Rows of weights sum to the power inside the kernel: a uniform scene gives exactly a² power."""
     e = eye(pupil=optics.Pupil(aperture_radius=0.1 * L))
     sensor = build_sensor(e, 4)
     power = e.kernel(cells_per_receptor(e.resolution)).sum(axis=(1, 2))
@@ -112,13 +116,13 @@ def test_white_light_gives_the_kernels_power():
 
 
 def dense(sensor):
-    """Weights as one array, (band, receptor, ray)."""
+    """Return the weights as one array, (band, receptor, ray)."""
     return np.stack([w.toarray() for w in sensor.weights]).astype(float)
 
 
 @pytest.mark.parametrize("components", [1, 2, 3])
 def test_signals_are_the_weighted_sums(components):
-    """Whichever way is taken: bands multiplied into the weights (few components) or one after the other."""
+    """Both implementations agree: bands multiplied into the weights (few components), or one band after the other."""
     e = eye(pupil=focused(), resolution=(4, 5))
     sensor = receptive_field_sensor(e, 400, 4)
     rng = np.random.default_rng(0)
@@ -135,7 +139,9 @@ def test_signals_are_the_weighted_sums(components):
 
 
 def test_what_is_left_out_is_less_than_a_tenth_of_the_noise():
-    """No scene between black and white in full daylight gives a signal that departs by more, and a uniform one none."""
+    """Omitted weights change no signal by more, for any scene between black and white in full daylight, and leave
+    uniform scenes unchanged.
+    """
     sigma = 0.005
     exact, cut = (
         receptive_field_sensor(
@@ -146,7 +152,7 @@ def test_what_is_left_out_is_less_than_a_tenth_of_the_noise():
     assert cut.density < 0.7 * exact.density
     before, after = dense(exact), dense(cut)
     np.testing.assert_allclose(after.sum(axis=2), before.sum(axis=2), rtol=1e-5)
-    worst = np.maximum(after - before, 0).sum(axis=2)  # the scene that is white exactly where weights have grown
+    worst = np.maximum(after - before, 0).sum(axis=2)  # the scene that is white exactly at the weights that have grown
     throughput = 0.3**2
     assert 0.02 * sigma < throughput * worst.max() <= 0.1 * sigma
 
@@ -159,7 +165,8 @@ def test_perfect_lens_averages_over_each_receptor():
     picture = np.stack([scene(x[None, :], y[:, None], b) for b in range(3)])
     means = picture.reshape(3, 5, fine, 7, fine).mean(axis=(2, 4))
     expected = np.einsum("cb,byx->cyx", e.spectral_bands.weights, means)
-    np.testing.assert_allclose(found, expected, atol=4e-3)  # gradient 0.6 per pitch, discrepancy of 64 points
+    # the gradient is 0.6 per pitch, and 64 points have this discrepancy
+    np.testing.assert_allclose(found, expected, atol=4e-3)
 
 
 def test_perfect_lens_is_the_default_of_the_same_contract():
@@ -170,7 +177,7 @@ def test_perfect_lens_is_the_default_of_the_same_contract():
 
 
 def test_rows_go_down_and_columns_right():
-    """docs/architecture.md: receptor (0, 0) looks up and to the left; x is right, y is up."""
+    """The convention of docs/architecture.md: receptor (0, 0) looks up and to the left; x is right, y is up."""
     e = eye(resolution=(3, 3))
     d = box_sensor(e, 16).directions.reshape(3, 3, 16, 3).mean(axis=2)
     assert d[0, 0, 0] < 0 < d[0, 0, 1]
@@ -180,7 +187,7 @@ def test_rows_go_down_and_columns_right():
 
 
 def test_points_fill_the_square_evenly():
-    """Star discrepancy over anchored boxes O(log n / n): far below the random 1/sqrt(n)."""
+    """The star discrepancy over anchored boxes is O(log n / n), far below the random 1/sqrt(n)."""
     for n in (1, 4, 7, 100):
         points = low_discrepancy(n)
         assert points.shape == (n, 2)
@@ -191,7 +198,9 @@ def test_points_fill_the_square_evenly():
 
 
 def test_light_that_spreads_far_is_tabulated_on_coarser_cells():
-    """A pinhole behind which every receptor sees many times the field: 32 cells per receptor cannot hold that."""
+    """Behind this pinhole, every receptor receives light from many times the field, which 32 cells per receptor cannot
+    cover.
+    """
     e = optics.Eye(pupil=optics.Pupil(aperture_radius=10e-6), resolution=(1, 1), fov_deg=1.5, sensor_width=L)
     with pytest.raises(optics.AccuracyError):
         receptive_field_sensor(e, 64, cells_per_receptor((1, 1)))
@@ -200,7 +209,7 @@ def test_light_that_spreads_far_is_tabulated_on_coarser_cells():
 
 
 def test_a_trial_is_part_of_the_sensor():
-    """Directions and weights of some receptors, without the rest."""
+    """A trial has the directions and weights of some receptors only."""
     for e in (eye((4, 5)), eye((4, 5), focused())):
         some = np.array([0, 7, 19])
         sampling = eye_sampling(e)
@@ -214,7 +223,7 @@ def test_a_trial_is_part_of_the_sensor():
             mine = light
             np.testing.assert_array_equal(trial.directions, sensor.directions)
             whole = dense(sensor) @ light
-        # The sensor leaves out weights that change signals by less than a tenth of the noise.
+        # The sensor omits weights that change signals by less than a tenth of the noise.
         np.testing.assert_allclose(trial.weights @ mine, whole[:, some], atol=0.1 * e.noise_sigma / e.throughput)
 
 

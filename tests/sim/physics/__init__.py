@@ -1,4 +1,4 @@
-"""What tests hold of physics, module by module.
+"""Tests of physics: which test covers which module.
 
 free_motion: test_physics.py
 local_contacts: test_local_contacts.py
@@ -8,6 +8,6 @@ agent_motion: test_physics.py
 sliding_agents: tasks/test_task.py, envs/test_features.py
 mujoco_worlds: envs/test_task_state.py, envs/test_broken_worlds.py, envs/test_own_models.py
 array_worlds: envs/test_batch_task.py
-varied_looks: envs/test_features.py, envs/test_light_levels.py
+varied_appearances: envs/test_features.py, envs/test_light_levels.py
 physics: envs/test_features.py
 """

@@ -1,4 +1,4 @@
-"""Actuators of several controls and of none are driven where MuJoCo has their controls."""
+"""Actuators with several controls, one or none drive the entries of MuJoCo's control vector that belong to them."""
 
 import mujoco
 import numpy as np
@@ -23,7 +23,7 @@ MODEL = """
     <pid name="right" joint="right" kp="1" input="pos vel"/>
   </actuator>
 </mujoco>"""
-CONTROLS = {"brake": [], "gaze": [0, 1, 2], "left": [3], "right": [4, 5]}  # in the order that they are written down
+CONTROLS = {"brake": [], "gaze": [0, 1, 2], "left": [3], "right": [4, 5]}  # in the order of the model's text
 
 
 class Driver(sim.Task):
@@ -48,7 +48,7 @@ def test_controls_are_counted_in_the_actuators_order(name):
 
 
 def test_one_motor_turns_its_own_joint():
-    """What turns is `left`, by 4 N m, the end of its range, and nothing else."""
+    """Only the joint `left` turns, driven by 4 N m, the upper end of its range."""
     env = sim.make_vec_env(Driver("left"), n_envs=1)
     assert env.action_space.shape == (1,)
     env.reset()

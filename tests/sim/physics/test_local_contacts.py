@@ -1,4 +1,4 @@
-"""Physics among few geoms, in threads and without MuJoCo's clock: what it may not change."""
+"""Physics with few geoms, in threads, and without MuJoCo's timers gives the same results."""
 
 import dataclasses
 import threading
@@ -27,7 +27,7 @@ def begun(world, n, seed=0):
 
 
 def begun_at_walls(world, n):
-    """Worlds whose agents have walked into walls and corners for a while."""
+    """Return a state and commands of worlds whose agents have moved at walls and in corners for some time."""
     simulation = Simulation(task_of(world), n, 0)
     simulation.reset()
     rng = np.random.default_rng(0)
@@ -43,7 +43,7 @@ def assert_same_bits(ours, theirs):
 
 @pytest.fixture
 def redone(monkeypatch):
-    """How many agents were stepped in the whole world, call by call."""
+    """Return a list of the number of agents that each call stepped in the whole world."""
     counts = []
     simulate = AgentPhysics._simulate
 
@@ -58,7 +58,9 @@ def redone(monkeypatch):
 @pytest.mark.parametrize("threads", [1, 2])
 @pytest.mark.parametrize("task", ["detection", "foraging", "maze", "navigation", "tracking"])
 def test_agents_among_a_few_geoms_do_what_they_do_among_all(task, threads, redone):
-    """Bit for bit, and hardly anyone is done again; so many agents that threads share them."""
+    """The results are the same bit for bit. Only few agents are stepped again, and the number of agents is large enough
+    for threads.
+    """
     world = build_world(task)
     state, command = begun_at_walls(world, 2 * POOLED)
     few, all_of_them = AgentPhysics(world, threads), AgentPhysics(world, 1)
@@ -69,7 +71,7 @@ def test_agents_among_a_few_geoms_do_what_they_do_among_all(task, threads, redon
     assert (few.local_contacts._step._pool is None) == (threads == 1)
     assert_same_bits(ours, all_of_them.step(state, command))
     assert ours.contact.sum() > 100
-    assert len(few.local_contacts._models) > 4  # different walls, and corners
+    assert len(few.local_contacts._models) > 4  # different walls and corners
 
 
 def test_agents_among_too_many_geoms_are_stepped_in_the_whole_world(redone):
@@ -79,13 +81,15 @@ def test_agents_among_too_many_geoms_are_stepped_in_the_whole_world(redone):
     cramped.local_contacts._slots = cramped.local_contacts._slots[:1]
     redone.clear()
     ours = cramped.step(state, command)
-    assert 0 < sum(redone) < 64  # those in corners
+    assert 0 < sum(redone) < 64  # agents in corners
     assert_same_bits(ours, AgentPhysics(world, 1).step(state, command))
 
 
 @pytest.mark.parametrize("noticed", [True, False])
 def test_agents_that_stray_to_what_their_models_lack_are_done_again(monkeypatch, noticed):
-    """With room for no geom at all, every agent at a wall strays into it; unnoticed, they would go through."""
+    """Here the small models contain no geom, so that every agent at a wall must be stepped again. If this is not
+    detected, agents pass through walls.
+    """
     world = build_world("maze")
     state, command = begun_at_walls(world, 64)
     without_room = AgentPhysics(world, 1)
@@ -112,7 +116,7 @@ def test_an_agent_that_breaks_down_at_a_wall_is_what_the_whole_world_makes_of_it
 
 @pytest.mark.parametrize("change", ["opt.iterations", "opt.timestep", "geom_conaffinity", "geom_friction", "body_mass"])
 def test_a_model_that_was_altered_has_no_parts(change):
-    """Another number anywhere, and agents at walls are stepped in the whole of it."""
+    """A change of any number of the model makes agents at walls step in the whole model."""
     world = build_world("maze")
     assert AgentPhysics(world, 1).local_contacts is not None
     if change.startswith("opt."):
@@ -124,11 +128,11 @@ def test_a_model_that_was_altered_has_no_parts(change):
 
 
 def test_a_world_with_nothing_to_touch_is_crossed_in_closed_form():
-    """Boundless, but a world."""
+    """An unbounded world without geoms is valid."""
     field, spec = build_world("detection"), _empty_world()
     _add_agent(spec, np.zeros(2), None)
     model = spec.compile()
-    world = dataclasses.replace(field, model=model, objects=(), alone=AgentModel.of(spec, model))
+    world = dataclasses.replace(field, model=model, objects=(), alone=AgentModel.from_spec(spec, model))
     state = begun(field, 4)
     motion = AgentPhysics(world, 1).step(state, np.full((4, 2), 3.0))
     assert not motion.contact.any()
@@ -150,7 +154,7 @@ def test_fewer_worlds_than_are_worth_it_start_no_threads(world):
 
 
 def test_mujocos_clock_outlives_physics_in_two_threads(world):
-    """Each saves and restores it; a race would leave the process without."""
+    """Each thread saves and restores MuJoCo's clock; with a race, the process would lose it."""
     state, command = begun(world, 64), np.zeros((64, 2))
     stepping = [
         threading.Thread(target=step_often, args=(AgentPhysics(world, 1, closed_form=False), state, command))
@@ -171,7 +175,7 @@ def step_often(physics, state, command):
 
 
 def test_mujocos_clock_runs_on_after_physics(world):
-    """It is stopped during a rollout, whose data count their steps without timing them, and for nobody else."""
+    """The clock is stopped only during a rollout, whose data count their steps without timing them."""
     ours = AgentPhysics(world, 1, closed_form=False)
     ours.step(begun(world, 1), np.ones((1, 2)))
     step = mujoco.mjtTimer.mjTIMER_STEP

@@ -1,4 +1,4 @@
-"""The batched step against the servo's closed form, single MjData stepping, walls and breakdowns."""
+"""The batched step against the servo's closed form and steps of a single MjData, at walls and in unstable worlds."""
 
 import copy
 import dataclasses
@@ -24,7 +24,9 @@ def begun(world, n, seed=0):
 
 
 def test_speed_follows_the_servos_closed_form(world):
-    """dv/dt = (gain ctrl - v)/τ. The explicit-implicit scheme is of first order: error ~ dt/τ/2 = 3 %."""
+    """The servo follows dv/dt = (gain ctrl - v)/τ. The explicit-implicit scheme is of first order, with an error of
+    about dt/τ/2 = 3 %.
+    """
     state = dataclasses.replace(begun(world, 1), position=np.zeros((1, 2)))
     motion = AgentPhysics(world, 1).step(state, np.array([[10.0, 0.0]]))
     t = SUBSTEPS * world.model.opt.timestep
@@ -49,7 +51,9 @@ def test_batch_equals_single_data(world):
 
 @pytest.mark.parametrize("task", ["detection", "navigation"])
 def test_free_motion_is_what_mujoco_does(task):
-    """Everywhere, near walls and away from them, to rounding: 1e-12 m on metres over ten substeps."""
+    """The closed form agrees with MuJoCo near walls and away from them, up to rounding: 1e-12 m on metres over ten
+    substeps.
+    """
     world = build_world(task)
     moving, simulating = AgentPhysics(world, 1), AgentPhysics(world, 1, closed_form=False)
     simulation = Simulation(task_of(world), 32, 0)
@@ -63,14 +67,14 @@ def test_free_motion_is_what_mujoco_does(task):
         np.testing.assert_allclose(ours.velocity, mujocos.velocity, rtol=0, atol=1e-11)
         np.testing.assert_array_equal(ours.contact, mujocos.contact)
         path, _ = moving.free_motion(state.velocity, command)
-        free += (~moving.free_motion.met(state.position, path).any(axis=1)).sum()
+        free += (~moving.free_motion.obstacles_in_reach(state.position, path).any(axis=1)).sum()
         simulation.step(rng.uniform(-1, 1, (32, 2)))
-    assert free > 50  # or nothing was compared
+    assert free > 50  # enough agents to compare
 
 
 @pytest.mark.parametrize("task", ["detection", "navigation"])
 def test_what_physics_leaves_out_changes_no_bit(task, monkeypatch):
-    """Islands and, in small models, boxes of boxes: agents at walls and in corners move as in all of MuJoCo."""
+    """Without islands and, in small models, bounding volumes, agents at walls and in corners move as in full MuJoCo."""
     world = build_world(task)
     lean = AgentPhysics(world, 1, closed_form=False)
     assert lean._model.opt.disableflags != world.model.opt.disableflags
@@ -91,7 +95,7 @@ def test_what_physics_leaves_out_changes_no_bit(task, monkeypatch):
 
 
 def test_an_agent_that_moves_freely_through_a_wall_would_be_noticed(world):
-    """Blind to the walls, the same motion departs from MuJoCo: the test above can fail."""
+    """Without the walls, free motion departs from MuJoCo. This proves that the test above can fail."""
     physics = AgentPhysics(world, 1)
     physics.free_motion = dataclasses.replace(physics.free_motion, lower=np.empty((0, 2)), upper=np.empty((0, 2)))
     state = dataclasses.replace(begun(world, 1), position=np.array([[10.5, 0.0]]), velocity=np.array([[9.0, 0.0]]))
@@ -104,11 +108,12 @@ def test_an_agent_that_moves_freely_through_a_wall_would_be_noticed(world):
     ("field", "linear"), [("dof_damping", True), ("dof_frictionloss", False), ("jnt_stiffness", False)]
 )
 def test_models_move_in_closed_form_as_far_as_they_are_linear(field, linear):
-    """A spring's pull depends on the place, dry friction on the direction: such agents are left to MuJoCo. And models
-    of a part, compiled before this one was altered, do not stand for it."""
+    """The force of a spring depends on position, and dry friction on direction: MuJoCo steps such agents. Small models
+    that were compiled before the change are not used.
+    """
     world = build_world("detection")
     getattr(world.model, field)[0] = 0.3
-    world.model.qpos_spring[:] = world.model.qpos0  # at rest where the agent starts, and nowhere else
+    world.model.qpos_spring[:] = world.model.qpos0  # at rest at the agent's start only
     assert (AgentPhysics(world, 1).free_motion is not None) == linear
     assert AgentPhysics(world, 1).local_contacts is None
     state = dataclasses.replace(begun(world, 4), position=np.array([[3.0, 1.0]] * 4))
@@ -127,7 +132,7 @@ def test_walls_hold_and_are_felt(world):
         state = dataclasses.replace(state, position=motion.path[:, -1], velocity=motion.velocity)
     assert contacts[-1]
     assert not motion.unstable[0]
-    assert state.position[0, 0] < 11.0  # the wall's face: 11 cells of 2 m
+    assert state.position[0, 0] < 11.0  # the wall's face is at 11 m (11 cells of 2 m)
 
 
 def test_one_broken_world_is_named_and_the_others_go_on(world):
@@ -162,13 +167,13 @@ def test_objects_that_collide_are_refused(world):
         <actuator><velocity joint="agent_x"/><velocity joint="agent_y"/></actuator>
         <sensor><touch site="s"/></sensor></mujoco>"""
     )
-    with pytest.raises(ValueError, match="'goal' collides"):
+    with pytest.raises(ValueError, match="'goal' can collide"):
         AgentPhysics(dataclasses.replace(world, model=spec.compile(), objects=("goal",)), 1)
 
 
 @pytest.mark.parametrize(("speed", "broken"), [(50.0, False), (400.0, True)])
 def test_what_no_actuator_can_do_is_a_breakdown(world, speed, broken):
-    """Agents are driven at 10 m/s at most. One that is ten times as fast, and rising, was thrown by something."""
+    """Motors drive agents at up to 10 m/s. A speed ten times as high that still rises cannot come from a motor."""
     state = dataclasses.replace(begun(world, 1), position=np.zeros((1, 2)), velocity=np.array([[0.0, speed]]))
     command = np.array([[0.0, 10.0]])
     motion = AgentPhysics(world, 1, closed_form=False).step(state, command)
@@ -177,7 +182,7 @@ def test_what_no_actuator_can_do_is_a_breakdown(world, speed, broken):
 
 
 def test_a_world_that_broke_down_touches_nothing(world):
-    """Whatever its sensors say: its agent is where it was before, and pays for no contact."""
+    """Whatever the sensors report, the agent stays at its previous position and pays for no contact."""
     physics = AgentPhysics(world, 1, closed_form=False)
     state = dataclasses.replace(begun(world, 2), position=np.zeros((2, 2)))
     states, sensors = physics._step_batch([physics._model] * 2, *physics._start_of(state, np.full((2, 2), 3.0)))

@@ -1,4 +1,4 @@
-"""Quick pictures against slow ones.
+"""Tests of quick renderings against slow ones.
 
 quick_camera: test_quick_camera.py
 camera_rays: test_quick_camera.py

@@ -1,12 +1,13 @@
-"""Where eyes are drawn, against pinhole geometry."""
+"""Eye marks in renderings, against pinhole geometry."""
 
 import numpy as np
 
 from sim.pictures.eye_marks import COLORS, with_eyes
 from sim.scene.cameras import Viewpoint
 
-VIEW = Viewpoint.looking_at(np.array([0.0, -4.0, 0.0]), np.zeros(3), 90.0)  # along +y: +x is to the right
-AHEAD_RIGHT = np.column_stack([[0.0, -1, 0], [0, 0, 1], [1.0, 0, 0]])  # looks along +x
+# the view is along +y, so that +x is to the right
+VIEW = Viewpoint.looking_at(np.array([0.0, -4.0, 0.0]), np.zeros(3), 90.0)
+AHEAD_RIGHT = np.column_stack([[0.0, -1, 0], [0, 0, 1], [1.0, 0, 0]])  # the eye looks along +x
 
 
 def drawn(pupil, frame=AHEAD_RIGHT, fov_deg=60.0):
@@ -15,19 +16,19 @@ def drawn(pupil, frame=AHEAD_RIGHT, fov_deg=60.0):
 
 
 def test_an_eye_is_where_it_is():
-    """90 degrees over 360 pixels, 4 m away: 45 pixels per metre."""
+    """The image has 90 degrees over 360 pixels. At a distance of 4 m this is 45 pixels per metre."""
     picture = drawn([1.0, 0.0, 0.5])
     rows, columns = np.nonzero(picture.sum(axis=2) > 100)
-    assert picture[180 - 23, 180 + 45].sum() < 60  # the pupil, black within its iris
+    assert picture[180 - 23, 180 + 45].sum() < 60  # the black pupil within its iris
     ring = picture[180 - 23 - 3 : 180 - 23 + 4, 180 + 45 - 3 : 180 + 45 + 4].reshape(-1, 3).max(axis=0)
-    assert np.all((0.75 * COLORS[0] <= ring) & (ring <= COLORS[0]))  # rims are painted over the iris, or not
-    assert columns.max() > 180 + 45 + 30  # rims of a field that looks to the right
-    assert columns.min() > 180 + 45 - 6  # and not to the left
-    assert np.abs(rows - 157.5).max() < 6  # seen from the side, both rims lie in the eye's own plane
+    assert np.all((0.75 * COLORS[0] <= ring) & (ring <= COLORS[0]))  # rims may be painted over the iris
+    assert columns.max() > 180 + 45 + 30  # the rims of a field to the right
+    assert columns.min() > 180 + 45 - 6  # no rim to the left
+    assert np.abs(rows - 157.5).max() < 6  # from the side, both rims lie in the plane of the eye
 
 
 def test_rims_open_with_the_field():
-    """Turned on its side, the field opens across the picture: its rims end 2 sin(fov / 2) m apart."""
+    """The eye is rolled, so that the field opens across the image. Its rims end 2 sin(fov / 2) m apart."""
     rolled = AHEAD_RIGHT[:, [1, 0, 2]] * [1, -1, 1]
     for fov_deg in (40.0, 80.0):
         rows, _ = np.nonzero(drawn([0.0, 0.0, 0.0], rolled, fov_deg).sum(axis=2) > 100)

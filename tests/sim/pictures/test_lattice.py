@@ -1,4 +1,4 @@
-"""Pixels that are looked at first: no line one pixel wide passes between them."""
+"""The lattice of pixels that are rendered first: no line one pixel wide fits between them."""
 
 import numpy as np
 import pytest
@@ -8,7 +8,7 @@ from sim.pictures.lattice import PERIOD, Lattice
 
 @pytest.mark.parametrize("size", [(36, 48), (7, 11), (1, 9), (1, 1)])
 def test_every_pixel_is_or_touches_one_of_them(size):
-    lattice = Lattice.of(size)
+    lattice = Lattice.for_size(size)
     y, x = np.indices(size)
     own_y, own_x = np.divmod(lattice.pixels[lattice.nearest].reshape(size), size[1])
     assert (abs(y - own_y) + abs(x - own_x)).max() <= 1
@@ -16,10 +16,11 @@ def test_every_pixel_is_or_touches_one_of_them(size):
 
 
 def test_a_line_of_pixels_is_seen_whole():
-    """Level, upright and diagonal ones, anywhere: all of their pixels are looked at. A grid of every other column and
-    row, which has more pixels, would miss half of the upright lines."""
+    """Every pixel of a horizontal, vertical or diagonal line is rendered, wherever the line is. A grid of every other
+    column and row has more pixels, but would miss half of the vertical lines.
+    """
     size = (40, 40)
-    lattice = Lattice.of(size)
+    lattice = Lattice.for_size(size)
     y, x = np.indices(size)
     for k in range(15, 15 + PERIOD):
         for line in (x == k, y == k, x - y == k - 17, x + y == k + 22):
@@ -32,6 +33,6 @@ def test_a_line_of_pixels_is_seen_whole():
 
 
 def test_nothing_is_looked_at_again_where_all_is_alike():
-    lattice = Lattice.of((20, 30))
+    lattice = Lattice.for_size((20, 30))
     assert len(lattice.between(np.zeros(lattice.pairs.shape[1], bool))) == 0
     assert len(lattice.pixels) < 0.3 * 20 * 30

@@ -1,4 +1,6 @@
-"""Quick pictures against Mitsuba's `direct` of many samples, on our worlds and on a model of many kinds of geom."""
+"""Quick renderings against Mitsuba's `direct` integrator with many samples, for built-in worlds and a model with many
+kinds of geoms.
+"""
 
 import mujoco
 import numpy as np
@@ -14,11 +16,11 @@ from sim.scene.color import encode_srgb, preview
 WAVELENGTHS = np.linspace(430e-9, 660e-9, 8)
 SIZE = (144, 192)
 SPP = 64
-# Levels of 255 by which pixels may differ on average. The five samples of a pixel on an edge tell its share of either
-# side to about .1; where stripes are dense, in the maze, a fifth of the pixels is on edges, of contrasts of some 100.
+# Allowed mean difference of pixels, in levels of 255. The five samples of a pixel at an edge give its coverage to about
+# 0.1. The dense stripes of the maze put a fifth of the pixels at edges, with a contrast of about 100.
 NOISE = 2.5
-# Of the whole picture's mean. The display's curve is hollow from below, so that what is noisy in linear light looks
-# darker: by half its curvature times the variance, here .3 to .5.
+# Allowed difference of the image's mean. The display curve is concave, so that noise in linear light darkens the mean
+# by half the curvature times the variance, here 0.3 to 0.5.
 BIAS = 0.6
 
 MIXTURE = """
@@ -99,8 +101,9 @@ def test_lights_from_elsewhere_do_not_agree(task):
 
 
 def test_other_models_look_as_in_slow_pictures_wherever_their_parts_are(mixture):
-    """Colours are of four bands here and of eight there: 2e-2 of linear light in the mean of all colours, which
-    is 3 levels where it is bright and 20 where it is dark. Poses do not make new recordings."""
+    """The quick camera has four bands and the reference eight. This changes linear light by 2e-2 in the mean of all
+    colours: 3 levels in bright areas and 20 in dark ones. New poses do not cause new recordings.
+    """
     model, quick, mirror = mixture
     pictures = []
     for angle in (0.0, 1.5):
@@ -112,7 +115,7 @@ def test_other_models_look_as_in_slow_pictures_wherever_their_parts_are(mixture)
 
 
 def test_nearness_is_the_mirrors(mixture):
-    """Where nothing is round: on planes, what is filled in between rays is exact. Depth there is float32."""
+    """Interpolation between rays is exact on planes. The reference depth is float32."""
     model, quick, mirror = mixture
     data = _posed(model)
     look = quick.look(data, "side", SIZE[1], SIZE[0])
@@ -122,7 +125,7 @@ def test_nearness_is_the_mirrors(mixture):
     flat = (ids == 0) | (ids == 1)
     wrong = np.abs(nearness[flat] * depth[flat] - 1) > 1e-4
     assert flat.mean() > 0.4
-    assert wrong.mean() < 0.05  # beside shadows as black as the side of the box that no light reaches
+    assert wrong.mean() < 0.05  # near shadows as black as the unlit side of the box
     assert (nearness[ids < 0] == 0).mean() > 0.95
 
 
@@ -134,10 +137,10 @@ def test_a_camera_inside_of_a_body_looks_out_of_it():
         <camera name="within" pos="0 0 1" fovy="40"/></worldbody></mujoco>""")
     picture = QuickCamera(model).picture(_posed(model), "within", SIZE[1], SIZE[0])
     mirror = sim.mirror(model)
-    assert _agree(picture, _slow(mirror, _posed(model), "within"), noise=8, bias=8)  # four bands of a saturated red
+    assert _agree(picture, _slow(mirror, _posed(model), "within"), noise=8, bias=8)  # four bands render a saturated red
 
 
 def test_white_in_daylight_is_white():
-    """1e-3: a quarter of a level."""
+    """White is within 1e-3, a quarter of a level."""
     white = camera_rays.SRGB @ daylight(np.array(camera_rays.WAVELENGTHS_NM) * 1e-9)
     np.testing.assert_allclose(white, 1, atol=1e-3)

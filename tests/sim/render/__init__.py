@@ -1,4 +1,4 @@
-"""What tests hold of rendering, module by module.
+"""Tests of rendering: which test covers which module.
 
 one_ray: test_one_ray.py
 batched_renderer: test_batched_renderer.py, test_one_ray.py, test_reference_renderer.py

@@ -26,12 +26,12 @@ SPP = 96
 RAYS = 1024
 
 
-# Objects as the two agents see them: at arm's length, one in each eye's axis, shading floor, wall and each other.
+# Objects in the frames of the two agents: at arm's length, one on each eye's axis, shading floor, wall and each other.
 CLOSE_BY = np.array([[[1.5, 0.7], [1.5, -0.7], [2.6, 0.0]], [[1.8, -0.8], [1.4, 0.7], [2.9, 0.3]]])
 
 
 def begun(task, n, seed=0):
-    """A world and a state in which the agents look at what there is."""
+    """Return a world and a state in which the agents look at objects or walls."""
     world = build_world(task, seed=seed, eyes=EYES)
     state = Simulation(task_of(world), n, seed).reset()
     if not world.objects:
@@ -44,7 +44,7 @@ def begun(task, n, seed=0):
 
 
 def placed(world, state, index):
-    """MuJoCo's data of one world of a state."""
+    """Return MuJoCo's data of one world of a state."""
     data = mujoco.MjData(world.model)
     pose(data, world, state, index)
     return data
@@ -56,7 +56,7 @@ def scene(task):
 
 
 class References(dict):
-    """Per task: world, state, and Mitsuba's renderings (batch, env, eye, band, y, x), rendered on first use."""
+    """World, state and Mitsuba's renderings (batch, env, eye, band, y, x) of each task, rendered on first use."""
 
     def __missing__(self, task):
         world, state = scene(task)
@@ -81,8 +81,9 @@ def references():
 
 @dataclasses.dataclass(frozen=True)
 class Disagreement:
-    """Largest |z| of an eye's mean over its image; share of receptors beyond 3 standard errors; largest relative
-    error of a band's share in an image's light (here Mitsuba has next to no noise: its bands share their rays)."""
+    """Largest |z| of an eye's mean over its image; share of receptors beyond 3 standard errors; largest relative error
+    of a band's share in an image's light. The last has hardly any noise in Mitsuba, because its bands share their rays.
+    """
 
     mean: float
     beyond: float
@@ -107,15 +108,15 @@ def disagreement(world, state, images, tracer):
 
 def _z(ours, batches):
     error = batches.std(axis=0, ddof=1) / np.sqrt(len(batches))
-    # 1e-5: float32 rounding of a uniformly lit receptor, where the reference has no variance either.
+    # 1e-5: float32 rounding of a uniformly lit receptor, for which the reference has no variance either.
     return (ours - batches.mean(axis=0)) / (error + 1e-5)
 
 
 # Four image means per task, whose bands share their noise: one |t| of 11 degrees of freedom beyond 4.5 has p = 4e-3.
 LARGEST_MEAN_Z = 4.5
-# P(|t_11| > 3) = 1.2 %; receptors that an edge crosses add our own sampling error.
+# P(|t_11| > 3) = 1.2 %; receptors at an edge add our own sampling error.
 SHARE_BEYOND_3 = 0.04
-# float32, and what little the noise leaves where materials are not grey.
+# float32, and the small remaining noise for materials that are not grey.
 SPECTRUM = 1e-4
 
 
@@ -131,7 +132,7 @@ def test_agrees_with_mitsubas_direct_integrator(references, task, tracer):
 
 
 def with_lights(change):
-    """Lights that are changed by a function of one."""
+    """Return a mutant in which a function changes every light."""
 
     def sabotage(original):
         def lights(*arguments):
@@ -150,7 +151,7 @@ def misweighted(light):
 
 
 def with_uv(change):
-    """Texture coordinates of spheres that are changed, (u, v) to (u, v)."""
+    """Return a mutant in which a function changes the texture coordinates (u, v) of spheres."""
 
     def sabotage(original):
         def normal_and_uv(*arguments):
@@ -232,7 +233,9 @@ def test_signals_weight_the_bands():
 @both_tracers
 @pytest.mark.parametrize("task", ["detection", "navigation"])
 def test_kernels_are_recorded_once_and_results_do_not_alias(task, tracer):
-    gc.collect()  # kernels look at the shapes of all scenes: when others' go meanwhile, they are recorded anew
+    # kernels depend on the shapes of all scenes: if scenes of other tests are freed meanwhile, kernels are recorded
+    # again
+    gc.collect()
     world, state = scene(task)
     renderer = sim.BatchedRenderer(world, EYES, state.n, sim.Fidelity(2, EYES.bands, light="bounce"), tracer)
     first = renderer.signals(state)
@@ -262,6 +265,6 @@ def test_bad_arguments_are_named():
     with pytest.raises(ValueError, match=r"fidelity = 4: must be a sim\.Fidelity"):
         sim.BatchedRenderer(world, EYES, 1, 4)
     with pytest.raises(ValueError, match=rf"fidelity\.bands = 3: must be the scene's {EYES.bands}"):
-        sim.BatchedRenderer.of(WorldScene(world, EYES), 1, sim.Fidelity(1, bands=3))
+        sim.BatchedRenderer.from_scene(WorldScene(world, EYES), 1, sim.Fidelity(1, bands=3))
     with pytest.raises(ValueError, match="state has 2 worlds"):
         sim.BatchedRenderer(world, EYES, 1, sim.Fidelity(1, EYES.bands)).signals(state)

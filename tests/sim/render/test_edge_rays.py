@@ -1,4 +1,4 @@
-"""Rays at edges alone: as good as rays everywhere, and a fraction of them."""
+"""Adaptive edge sampling: the accuracy of rays everywhere with a fraction of the rays."""
 
 import gc
 
@@ -16,7 +16,7 @@ SHARP = eye(noise_sigma=0.01, resolution=(12, 15))
 
 
 def around(seed):
-    """The ball somewhere, also half out of view."""
+    """Return states with the ball at random positions, also half out of view."""
     return moments(seed, 16, 1.8)
 
 
@@ -27,7 +27,7 @@ def renderer(n, samples="edges", one=SHARP, tolerance=None, rays=FINE):
 
 @pytest.fixture
 def traced(monkeypatch):
-    """How many rays each launch traced."""
+    """Return a list of the number of rays that each launch traced."""
     found, launch = [], EdgeRays.launch
 
     def counted(self, start):
@@ -42,12 +42,12 @@ def traced(monkeypatch):
 
 
 def test_a_fraction_of_the_rays_sees_the_same(traced):
-    """Where the first four rays are alike and a neighbour is not far off, all rays are alike."""
+    """All rays of a receptor agree if the first four rays of the receptor and its neighbours agree."""
     datas = around(0)
     seen = renderer(len(datas)).signals(datas)
     first, again = traced
     receptors = len(datas) * 12 * 15
-    assert first == FIRST * len(datas) * 14 * 17  # and beyond the rim
+    assert first == FIRST * len(datas) * 14 * 17  # including a rim around the field
     assert 0 < again < 0.25 * FINE * receptors
     everywhere = renderer(len(datas), "rays").signals(datas)
     assert np.ptp(everywhere) > 0.2
@@ -55,7 +55,7 @@ def test_a_fraction_of_the_rays_sees_the_same(traced):
 
 
 def test_without_their_neighbours_receptors_miss_edges(monkeypatch):
-    """The wrong method: four rays do not see that the ball fills a corner."""
+    """A wrong method: four rays miss the ball in a receptor's corner."""
     datas = around(1)
     everywhere = renderer(len(datas), "rays").signals(datas)
     monkeypatch.setattr(EdgeRays, "_beside_edges", lambda self, light: np.zeros(12 * 15 * light.shape[1], bool))
@@ -63,7 +63,7 @@ def test_without_their_neighbours_receptors_miss_edges(monkeypatch):
 
 
 def test_more_tolerance_looks_again_at_fewer(traced):
-    """Of a ball whose brightness changes over its surface."""
+    """A larger tolerance refines fewer receptors. The ball's brightness changes over its surface."""
     datas, again = around(2), []
     for tolerance in (1e-3, 0.02, 0.1):
         renderer(len(datas), tolerance=tolerance).signals(datas)
@@ -73,8 +73,12 @@ def test_more_tolerance_looks_again_at_fewer(traced):
 
 
 def test_kernels_are_recorded_once_however_many_edges_there_are():
-    """Also where there are none, and where a frame is begun before the one before it was waited for."""
-    gc.collect()  # kernels look at the shapes of all scenes: when others' go meanwhile, they are recorded anew
+    """Kernels are recorded once, even without any edges, and if a frame is launched before the previous one was
+    awaited.
+    """
+    # kernels depend on the shapes of all scenes: if scenes of other tests are freed meanwhile, kernels are recorded
+    # again
+    gc.collect()
     one = renderer(16)
     behind = around(3)
     for data in behind:
@@ -83,8 +87,8 @@ def test_kernels_are_recorded_once_however_many_edges_there_are():
     assert np.ptp(one.signals(behind)) == 0
     datas, others = around(4), around(5)
     expected = [one.signals(datas), one.signals(others)]
-    first = one.begin(datas)
-    second = one.begin(others)
+    first = one.launch(datas)
+    second = one.launch(others)
     for frame, seen in zip((second, first), reversed(expected), strict=True):
         np.testing.assert_array_equal(frame.wait(), seen)
     assert one.recordings == 2
@@ -98,7 +102,7 @@ def test_radiance_is_looked_at_as_finely():
 
 
 def test_edges_are_asked_for_where_the_first_rays_are_few():
-    """Of 12 x 15 receptors 14 x 17 squares are looked at, of 1 x 4 as many as 18."""
+    """The first rays cover 14 x 17 squares for 12 x 15 receptors, but 18 squares for 1 x 4 receptors."""
     assert [edges_pay((12, 15), rays) for rays in (8, 10, 11, 16)] == [False, False, True, True]
     assert [edges_pay((1, 4), rays) for rays in (16, 32, 64)] == [False, False, True]
 
@@ -114,7 +118,7 @@ def test_who_cannot_look_at_edges_says_so():
 
 
 def test_built_in_worlds_are_seen_at_edges_in_closed_form(traced):
-    """As rays everywhere see them, with half of the rays: there are stripes on all walls."""
+    """Signals agree with rays everywhere, with half of the rays, although all walls have stripes."""
     world, eyes, worlds = sim.build_world("detection"), sim.Eyes(n_eyes=2, resolution=(12, 15)), 4
     env = sim.make_vec_env("detection", eyes, worlds, seed=1, rays_per_receptor=1)
     env.reset()
@@ -126,6 +130,6 @@ def test_built_in_worlds_are_seen_at_edges_in_closed_form(traced):
     right, found = everywhere.signals(env.state), seen.signals(env.state)
     coarse = sim.BatchedRenderer(world, eyes, worlds, sim.Fidelity(FIRST, 4)).signals(env.state)
     assert sum(traced) < 0.6 * FINE * worlds * 2 * 12 * 15
-    # What is missed lies within the tolerance; the first rays alone err by ten times as much somewhere.
+    # Missed edges stay within the tolerance; the error of the first rays alone is ten times as large in some receptor.
     assert np.abs(found - right).max() < 0.005
     assert np.abs(coarse - right).max() > 0.05

@@ -1,4 +1,6 @@
-"""Light that differs between worlds, looks at some of them, and rays at edges: alike through every tracer."""
+"""Light that differs between worlds, renderings of some worlds, and adaptive edge sampling, the same through every
+tracer.
+"""
 
 import numpy as np
 import pytest
@@ -21,7 +23,7 @@ CASES = {
 
 
 def begun(pupil, case):
-    """A renderer of N worlds, and where everything is in them."""
+    """Return a renderer of N worlds and their poses."""
     tracer, fidelity = CASES[case]
     world = sim.build_world("detection")
     simulation = Simulation(task_of(world), N, 0)
@@ -40,7 +42,7 @@ class TestLight:
         lit = renderer.signals(poses, np.repeat(level[:, None], 4, axis=1))
         expected = renderer.signals(poses) * level[:, None, None, None, None]
         np.testing.assert_allclose(lit, expected, rtol=1e-5, atol=1e-7)
-        if case != "mitsuba":  # whose components are bands
+        if case != "mitsuba":  # Mitsuba's components are bands
             np.testing.assert_array_equal(lit, expected)
 
     def test_a_factor_of_each_band_multiplies_its_radiance(self, pupil, case):
@@ -58,13 +60,13 @@ class TestLight:
         for worlds in ([4], [7, 2, 19], list(range(1, N, 2))):
             for light in (None, factors):
                 every = renderer.signals(poses, light)[worlds]
-                np.testing.assert_array_equal(renderer.begin_some(poses, np.array(worlds), light).wait(), every)
+                np.testing.assert_array_equal(renderer.launch_some(poses, np.array(worlds), light).wait(), every)
 
 
 def test_light_is_what_it_was_when_the_look_began():
     renderer, poses = begun(None, "closed form")
     factors = np.full((N, 4), 0.5)
-    frame = renderer.begin(poses, factors)
+    frame = renderer.launch(poses, factors)
     factors[:] = 7
     np.testing.assert_array_equal(frame.wait(), renderer.signals(poses) * np.float32(0.5))
 
@@ -73,8 +75,8 @@ def test_a_look_at_some_runs_beside_one_at_all():
     renderer, poses = begun(None, "areas")
     others = poses.take(np.arange(N)[::-1])
     expected = renderer.signals(poses), renderer.signals(others)[[3]]
-    every = renderer.begin(poses)
-    some = renderer.begin_some(others, np.array([3]))
+    every = renderer.launch(poses)
+    some = renderer.launch_some(others, np.array([3]))
     np.testing.assert_array_equal(every.wait(), expected[0])
     np.testing.assert_array_equal(some.wait(), expected[1])
 
@@ -91,7 +93,7 @@ def test_rays_at_edges_see_built_in_worlds_too(tracer):
 
 
 def test_what_receptors_look_at_in_built_in_worlds():
-    """Rays of all tracers end where labels say."""
+    """Rays of all tracers end on the geoms that the labels name."""
     renderer, poses = begun(None, "closed form")
     ids, depth = renderer.ids(poses), renderer.depth(poses)
     model = renderer.model

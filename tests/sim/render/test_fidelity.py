@@ -1,4 +1,4 @@
-"""What "auto" picks is enough, is not much more than enough, and says why."""
+"""Automatic fidelity is accurate enough, is not much finer than necessary, and explains its choice."""
 
 import math
 from dataclasses import replace
@@ -26,7 +26,7 @@ def behind_lens(eyes, a):
 
 
 LIGHTS = ("direct", "bounce")
-FINER = 4  # times as many rays as the pick's are the truth: its own error lifts what is measured by 3 to 9 %
+FINER = 4  # the reference has this many times the chosen rays: its own error raises the measured one by 3 to 9 %
 CASES = {
     "detection, a = 1/4": ("detection", behind_lens(DETECTION, 0.25)),
     "detection, a = 0.6": ("detection", behind_lens(DETECTION, 0.6)),
@@ -36,7 +36,7 @@ CASES = {
 
 
 def lived_through(world, n=16):
-    """States that agents get into, which the trials know nothing of."""
+    """Return states that agents reach by acting, which differ from the states of the trials."""
     simulation = Simulation(task_of(world), n, 3)
     simulation.reset()
     rng = np.random.default_rng(5)
@@ -47,21 +47,23 @@ def lived_through(world, n=16):
 
 
 def near_objects(world, eyes):
-    """States in which half of the agents have an object near, and which receptors see one, (env, eye, h, w)."""
+    """Return states in which half of the agents are near an object, and the receptors that see one, (env, eye,
+    h, w).
+    """
     state = views(world, 32, seed=2)
     return state, sees_object(world, eyes, state)
 
 
 @cache
 def picked(name):
-    """The world of a case and the pick of rays, which is all that Mitsuba traces."""
+    """Return the world of a case and the chosen number of rays; Mitsuba's tracer has rays only."""
     task, eyes = CASES[name]
     world = sim.build_world(task, seed=11)
     return world, sim.choose_fidelity(world, eyes, tracer="mitsuba")
 
 
 def signals(world, eyes, state, fidelity, samples):
-    """(env, eye, h, w, channel), of so many samples per receptor."""
+    """Return signals (env, eye, h, w, channel) with this number of samples per receptor."""
     renderer = sim.BatchedRenderer(world, eyes, state.n, replace(fidelity, rays_per_receptor=samples))
     return np.moveaxis(renderer.signals(state), 2, -1)
 
@@ -69,7 +71,9 @@ def signals(world, eyes, state, fidelity, samples):
 @pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("name", CASES)
 def test_the_pick_is_enough_and_not_far_more_than_enough(name):
-    """Over all receptors where agents come, and over those that see an object where one is near."""
+    """The error is below half of the noise over all receptors at places that agents reach, and over receptors that see
+    a near object.
+    """
     eyes = CASES[name][1]
     world, fidelity = picked(name)
     rays = fidelity.rays_per_receptor
@@ -79,13 +83,13 @@ def test_the_pick_is_enough_and_not_far_more_than_enough(name):
     truths = [signals(world, eyes, state, fidelity, FINER * rays) for state, _ in states]
 
     def actual_error(n):
-        """Beside many more rays in the same light."""
+        """Return the error relative to many more rays in the same light."""
         found = [signals(world, eyes, state, fidelity, n) for state, _ in states]
         errors = [(f - t)[seen] for f, t, (_, seen) in zip(found, truths, states, strict=True)]
         return max(np.sqrt(np.mean(error**2)) for error in errors)
 
     assert actual_error(rays) < eyes.noise_sigma / 2
-    # A third as many rays would not do, or there is no lower number: errors fall like n^-0.6 ... n^-1.
+    # A third of the rays is not enough, unless it is below the lowest number: errors fall like n^-0.6 ... n^-1.
     numbers = PERFECT_LENS_RAYS if eyes.optics is None else PUPIL_RAYS
     fewer = max((n for n in numbers if n <= rays / 3), default=None)
     if fewer is not None:
@@ -99,9 +103,9 @@ def test_no_tolerance_is_refused(wrong):
 
 
 def test_what_cannot_be_kept_is_said():
-    """Once, with how much it is missed by, and what misses it."""
+    """One warning states by how much the tolerance is exceeded, and which approximation causes it."""
     world = sim.build_world("detection")
-    with pytest.warns(sim.FidelityWarning, match=r"times what is allowed, 2.0e-04: mostly (areas|rays)") as warned:
+    with pytest.warns(sim.FidelityWarning, match=r"times the allowed 2.0e-04, mostly from (areas|rays)") as warned:
         fidelity = sim.choose_fidelity(world, FEW, tolerance=2e-4, bands="own")
     assert len(warned) == 1
     assert fidelity.predicted_error > 2e-4
@@ -121,7 +125,7 @@ def test_an_asked_for_tracer_has_no_areas():
 
 @pytest.mark.slow
 def test_rays_fall_with_the_pupil_and_rise_as_noise_falls():
-    """With the eyes' own bands: bands are most of the work of choosing all."""
+    """The test uses the eyes' own bands, because choosing bands is most of the work."""
     world = sim.build_world("detection")
 
     def rays(a, noise_sigma=FEW.noise_sigma):
@@ -136,8 +140,9 @@ def test_rays_fall_with_the_pupil_and_rise_as_noise_falls():
 
 @pytest.mark.slow
 def test_light_is_followed_as_far_as_it_matters():
-    """Walls light each other in a maze: behind a narrow pupil that is lost in the noise, behind a wide one not. What
-    the trials expect of it is what agents see, to a factor of 1.5."""
+    """Walls illuminate each other in a maze. Behind a narrow pupil this is below the noise, behind a wide one it is
+    not. The error that the trials predict is within a factor of 1.5 of the error along agents' paths.
+    """
     world, wide = picked("navigation, a = 0.6")
     state = lived_through(world)
     narrow = sim.choose_fidelity(world, behind_lens(NAVIGATION, 0.1))
@@ -149,12 +154,13 @@ def test_light_is_followed_as_far_as_it_matters():
     missing = np.sqrt(np.mean((both.signals(state) - direct.signals(state)) ** 2))
     assert missing / 1.5 < narrow.levels[2].predicted_error < missing * 1.5
     assert wide.levels[2].predicted_error < wide.tolerance / 2
-    assert "light that is reflected twice is worth" in wide.why
+    assert "light that is reflected twice adds" in wide.why
 
 
 def test_light_is_followed_where_objects_alone_need_it():
-    """An object's own light is mostly reflected: what direct light lacks would pass over all receptors, and does not
-    over those that see an object."""
+    """The light of an object is mostly reflected. Direct light alone would be accurate enough over all receptors, but
+    not over receptors that see an object.
+    """
     world, eyes = sim.build_world("tracking"), behind_lens(DETECTION, 0.5)
     chosen = sim.choose_fidelity(world, eyes, bands="own")
     assert chosen.light == "all"
@@ -175,7 +181,7 @@ def test_the_same_pick_every_time_whatever_the_number_of_worlds():
 
 @pytest.mark.slow
 def test_environments_and_renderers_have_what_is_chosen_with_the_eyes_own_bands():
-    """The same value, whoever prepares the scene: the maker of an environment, a renderer or choose_fidelity."""
+    """An environment, a renderer and choose_fidelity choose the same value."""
     world = sim.build_world("detection")
     chosen = sim.choose_fidelity(world, FEW, bands="own")
     assert chosen.bands == FEW.bands
@@ -196,7 +202,7 @@ def test_it_can_be_overruled():
     assert len(renderer.bands.wavelengths) == strict.bands
     asked = sim.BatchedRenderer(world, eyes, 1, sim.Fidelity(2, eyes.bands))
     assert len(asked.sensor.directions) == 2 * math.prod(FEW.resolution)
-    assert "as asked" in str(asked.fidelity)
+    assert "as requested" in str(asked.fidelity)
 
 
 def test_it_says_why():
@@ -204,7 +210,7 @@ def test_it_says_why():
     lines = str(fidelity).splitlines()
     assert [line.split()[0] for line in lines] == ["stage", "bands", "depth", "light", "rays"]
     assert fidelity.predicted_error <= fidelity.tolerance == 0.005
-    assert "nearest that is seen" in fidelity.why
+    assert "nearest visible distance" in fidelity.why
 
 
 @pytest.mark.parametrize(
@@ -223,7 +229,7 @@ def test_it_says_why():
         (lambda world: sim.choose_fidelity(world, DETECTION, tolerance=0), "tolerance = 0"),
         (lambda world: sim.Fidelity(1.0, 0), "bands = 0"),
         (lambda world: sim.Fidelity(1.0, 3, light="path"), "light = 'path': must be one of 'direct', 'bounce', 'all'"),
-        (lambda world: sim.Fidelity(1.0, 3, light="all"), "light = 'all': must go with samples = 'areas'"),
+        (lambda world: sim.Fidelity(1.0, 3, light="all"), "light = 'all': must be used with samples = 'areas'"),
     ],
 )
 def test_bad_arguments_are_named(call, named):

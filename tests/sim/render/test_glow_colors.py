@@ -1,4 +1,6 @@
-"""What glows in a colour of its own in each world looks, and lights others, as in a model that is built so."""
+"""Glowing geoms with a different colour in each world look, and light other geoms, as in a model that is compiled with
+this colour.
+"""
 
 import copy
 
@@ -33,7 +35,7 @@ def built(color, material="plain"):
 
 
 def seen(model, light, worlds, varied=()):
-    """(world, channel, height, width); worlds: their models"""
+    """Return signals (world, channel, height, width). worlds: their models"""
     renderer = sim.ModelRenderer(model, EYE, MOUNTS, len(worlds), sim.Fidelity(8, bands=4, light=light), varied=varied)
     datas = [mujoco.MjData(world) for world in worlds]
     for world, data in zip(worlds, datas, strict=True):
@@ -44,7 +46,9 @@ def seen(model, light, worlds, varied=()):
 @pytest.mark.filterwarnings("ignore:eyes do not see")
 @pytest.mark.parametrize("light", ["direct", "bounce"])
 def test_every_world_has_its_own_glow(light):
-    """In bounced light of the same rays the wall beside is lit by it. To the tables' steps of 5 nm."""
+    """The glow agrees to the tables' steps of 5 nm. In bounced light of the same rays it also illuminates the wall next
+    to it.
+    """
     model = mujoco.MjModel.from_xml_string(built((1, 1, 1)))
     worlds = [copy.copy(model) for _ in COLORS]
     for world, color in zip(worlds, COLORS, strict=True):
@@ -62,7 +66,7 @@ def test_every_world_has_its_own_glow(light):
 def test_who_may_differ_and_does_not_glows_as_ever(material):
     model = mujoco.MjModel.from_xml_string(built((0.9, 0.6, 0.2), material))
     same, plain = (seen(model, "direct", [model], varied) for varied in (["lamp"], []))
-    np.testing.assert_allclose(same, plain, rtol=1e-2, atol=5e-3)  # hues of dark pixels are not products of hues
+    np.testing.assert_allclose(same, plain, rtol=1e-2, atol=5e-3)  # the hues of dark pixels are not products of hues
     assert plain.max() > 0.3
 
 

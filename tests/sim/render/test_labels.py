@@ -1,4 +1,4 @@
-"""What there is to know of each receptor beside its signal: which geom it sees, how it moves, and all of it as tensors.
+"""Labels of each receptor: the geom that it sees, its optic flow, and their export as tensors.
 
 MuJoCo's own rays say which geom it is; closed forms say how what is seen moves on the retina.
 """
@@ -43,7 +43,7 @@ def test_ids_are_those_that_mujocos_rays_meet(model):
     found = renderer.ids(datas)
     assert found.shape == (3, 2, *EYE.resolution)
     assert found.dtype == np.int32
-    pupils, frames = renderer.eye_frames(sim.Poses.of(datas))
+    pupils, frames = renderer.eye_frames(sim.Poses.from_data(datas))
     geom, expected = np.zeros(1, np.int32), np.empty(found.shape, int)
     centres = directions_of(EYE, receptor_centres(EYE))
     for w, e, r in np.ndindex(3, 2, len(centres)):
@@ -84,7 +84,9 @@ def wall():
 
 
 def closed_form(where, there):
-    """x f(X): the places (2, height, width) [receptors] of points (right, down, ahead) before and after."""
+    """Return x f(X): the displacements (2, height, width) [receptors] of points (right, down, ahead) between two
+    states.
+    """
     side = EYE.receptor_pitch / EYE.sensor_distance
     x, y = np.moveaxis(receptor_centres(EYE).reshape(*EYE.resolution, 2) * side, -1, 0)
     moved = np.array(there(where * x, where * y, where * np.ones_like(x)))
@@ -125,7 +127,7 @@ def test_what_moves_by_itself_is_carried_along(wall):
 
 
 def test_what_spins_goes_round(wall):
-    """A ball before the eye turns about the eye's own axis."""
+    """A ball in front of the eye rotates about the eye's own axis."""
     model, renderer = wall
     before, after = at(model), at(model, spin=-0.4)
     found, on_ball = renderer.flow([before], [after])[0, 0], renderer.ids([before])[0, 0] == model.geom("ball").id
@@ -162,7 +164,7 @@ TERRAIN = """
 
 
 def test_height_fields_are_met_where_mujocos_rays_meet_them():
-    """One that stands still and one that moves, in three poses."""
+    """One height field is static and one moves, in three poses."""
     model = mujoco.MjModel.from_xml_string(TERRAIN)
     model.hfield_data[:] = np.random.default_rng(0).uniform(0, 1, model.hfield_data.shape)
     datas = []
@@ -173,7 +175,7 @@ def test_height_fields_are_met_where_mujocos_rays_meet_them():
     eye = optics.Eye(resolution=(40, 60), fov_deg=100, bands=3)
     renderer = sim.ModelRenderer(model, eye, [sim.Mount("eye", azimuth_deg=10, elevation_deg=-12)], 3, ONE_RAY)
     ids, depth = renderer.ids(datas), renderer.depth(datas)
-    pupils, frames = renderer.eye_frames(sim.Poses.of(datas))
+    pupils, frames = renderer.eye_frames(sim.Poses.from_data(datas))
     geom, centres, right = np.zeros(1, np.int32), directions_of(eye, receptor_centres(eye)), []
     for w, r in np.ndindex(3, len(centres)):
         far = mujoco.mj_ray(model, datas[w], pupils[w, 0], (frames[w, 0] @ centres[r]).astype(float), None, 1, -1, geom)
@@ -192,7 +194,7 @@ def test_signals_are_tensors_without_a_copy(model):
     tensor += 1
     assert signals.min() >= 1
     kept = signals.copy()
-    renderer.signals([posed(model, 1.0)])  # later frames do not write into earlier ones
+    renderer.signals([posed(model, 1.0)])  # later frames do not overwrite earlier ones
     np.testing.assert_array_equal(signals, kept)
 
 

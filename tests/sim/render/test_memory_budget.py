@@ -1,4 +1,4 @@
-"""More rays than memory: one clear error, before anything is computed."""
+"""A request for more rays than fit into memory gives one clear error before any computation."""
 
 import dataclasses
 import math
@@ -61,7 +61,7 @@ V1 = {
 
 
 def groups(root, files):
-    """A folder as a container finds it."""
+    """Return a folder of control groups as a container sees it."""
     for name, text in files.items():
         (root / name).parent.mkdir(exist_ok=True)
         (root / name).write_text(text)
@@ -84,7 +84,7 @@ def groups(root, files):
     ],
 )
 def test_a_containers_limit_counts(tmp_path, monkeypatch, files, free):
-    """What files keep in memory makes way, and does not count as taken."""
+    """The cache of files can be freed, and does not count as used memory."""
     monkeypatch.setattr(memory_budget, "CGROUPS", groups(tmp_path, files))
     monkeypatch.setattr(memory_budget, "_of_machine", lambda: math.inf)
     assert memory_budget.available() == free

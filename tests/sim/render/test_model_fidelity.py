@@ -1,4 +1,6 @@
-"""How many rays eyes on a model need, judged where it matters: by a known error, and at moments that were not tried."""
+"""The number of rays for eyes on a model: judged by receptors that see an edge, with a known error, and for states
+outside the trials.
+"""
 
 import warnings
 
@@ -22,7 +24,7 @@ MOUNT = sim.Mount("head", offset=(0.2, 0, 0))
 
 
 def moments(seed, n=6, aside=0.7):
-    """The ball somewhere, so far aside at most."""
+    """Return states with the ball at random positions, at most this far aside."""
     random, datas = np.random.default_rng(seed), []
     for _ in range(n):
         data = mujoco.MjData(BALL)
@@ -42,13 +44,15 @@ def signals(rays, datas, one):
 
 
 def known_error(power, share, receptors=1000):
-    """A thing that `share` of the receptors see, whose error falls as rays^-power from 0.1."""
+    """Return a function for the signals of an object that a `share` of the receptors see, with an error of 0.1
+    rays^-power.
+    """
     saw = np.arange(receptors) < share * receptors
     return lambda rays: (0.0 if rays >= 1e6 else 0.1 * rays**-power) * saw.reshape(1, 1, 1, 1, -1)
 
 
 def test_the_error_is_that_of_who_sees_something():
-    """A mean over all receptors would be a tenth of it, and take 1 ray."""
+    """The mean over all receptors would be a tenth of this error, so that 1 ray would suffice."""
     for share in (1.0, 0.01):
         trials = tried(known_error(0.75, share), (1, 4, 16, 64), 1e6, 0.02)
         assert trials.errors == pytest.approx({1: 0.1, 4: 0.1 * 4**-0.75, 16: 0.0125})
@@ -68,16 +72,16 @@ def test_the_promise_holds_at_moments_that_were_not_tried():
     coarse, off = (np.abs(signals(rays, held_out, one) - right).max(axis=2) for rays in (1, chosen.rays_per_receptor))
     apart = coarse > 0.1 * chosen.tolerance
     error = np.sqrt(np.square(off[apart]).mean())
-    # Six moments of one ball predict those of twelve others: a third more is their scatter.
+    # Six states of one ball predict the error of twelve others; a third more is their scatter.
     assert error < 1.33 * chosen.tolerance
     assert error == pytest.approx(chosen.predicted_error, rel=0.5)
     fewer = np.abs(signals(chosen.rays_per_receptor / 2, held_out, one) - right).max(axis=2)
-    assert np.sqrt(np.square(fewer[apart]).mean()) > chosen.tolerance / 1.33, "half as many would not do"
+    assert np.sqrt(np.square(fewer[apart]).mean()) > chosen.tolerance / 1.33, "half of the rays is not enough"
     assert chosen.tolerance == 0.5 * one.noise_sigma
 
 
 def test_errors_fall_as_stratified_rays_have_it():
-    """An edge through a square of n jittered cells: n^-3/4 (Mitchell 1996, section 3)."""
+    """The error of an edge through a square of n jittered cells falls as n^-3/4 (Mitchell 1996, section 3)."""
     datas, one = moments(2), eye()
     trials = tried(lambda rays: signals(rays, datas, one), (1, 4, 16, 64), 1024, 1e-9)
     slope = np.polyfit(np.log(list(trials.errors)), np.log(list(trials.errors.values())), 1)[0]
@@ -107,7 +111,7 @@ def test_behind_a_pupil_receptors_share_rays():
 
 
 def test_what_cannot_be_promised_is_said():
-    with pytest.warns(FidelityWarning, match="times what is allowed, 1.0e-05: mostly (edges|rays), 256 per receptor"):
+    with pytest.warns(FidelityWarning, match="times the allowed 1.0e-05, mostly from (edges|rays): 256 per receptor"):
         chosen = sim.choose_model_fidelity(BALL, eye(), [MOUNT], moments(0), tolerance=1e-5)
     assert chosen.rays_per_receptor == 256
     for tolerance in (0, -1, np.nan, np.inf):

@@ -1,4 +1,6 @@
-"""White under measured lamps, on models of one's own: few bands have what receptors catch of the whole spectrum."""
+"""White under measured lamps, on user models: with few bands, receptors have the quantum catch of the whole
+spectrum.
+"""
 
 import warnings
 
@@ -32,7 +34,7 @@ def model_of(kind):
 
 
 def seen(kind, bands, lamp="FL11", receptors="rgb"):
-    """(channel,) of a small eye that faces a white wall, which faces the lamp."""
+    """Return the signals (channel,) of a small eye that faces a white wall, which faces the lamp."""
     model = model_of(kind)
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
@@ -45,7 +47,7 @@ def seen(kind, bands, lamp="FL11", receptors="rgb"):
 
 
 def caught(receptors="rgb"):
-    """By quadrature to 1 nm over each type's range, white in daylight being 1."""
+    """Return the quantum catch by quadrature to 1 nm over each type's range, relative to white in daylight."""
     types = optics.receptors_of(receptors)
     low, high = types.limits_nm
     nm = NM[(low <= NM) & (high >= NM)]
@@ -58,9 +60,9 @@ def caught(receptors="rgb"):
 @pytest.mark.parametrize("bands", [4, 8, 16])
 @pytest.mark.parametrize("kind", LAMPS)
 def test_white_is_what_receptors_catch_of_the_lamp(kind, bands):
-    """Samples at the bands' centres would be off by up to twice as much, or half."""
+    """Sampling the lamp at the bands' centres would give up to twice this value, or half of it."""
     found, brightest = seen(kind, bands)
-    np.testing.assert_allclose(found, caught(), rtol=0.02)  # narrow lines, between entries of two tables
+    np.testing.assert_allclose(found, caught(), rtol=0.02)  # the lamp has narrow lines between entries of two tables
     np.testing.assert_allclose(found, seen(kind, 64)[0], rtol=1e-3)
     if kind == "directional":
         assert brightest == pytest.approx(found.max(), rel=1e-3)
@@ -79,7 +81,7 @@ def test_too_few_bands_are_told():
 
 
 def test_pictures_and_worlds_keep_the_lamp_itself():
-    """What people are shown has wavelengths of its own."""
+    """Renderings for people have their own wavelengths, and so keep the lamp's spectrum."""
     eye = optics.Eye(resolution=(1, 1), fov_deg=1, bands=16)
     model = model_of("directional")
     renderer = sim.ModelRenderer(model, eye, [sim.Mount("eye")], 1, sim.Fidelity(1, bands=16), spectra={"lamp": "FL11"})

@@ -1,4 +1,6 @@
-"""Light that bounces, the sky's and that of what glows, on any model: against Mitsuba's `path` of three vertices."""
+"""Bounced light, light of the sky and light of glowing geoms, on any model: against Mitsuba's `path` with three
+vertices.
+"""
 
 import mujoco
 import numpy as np
@@ -39,7 +41,7 @@ def posed(kind):
 
 @pytest.fixture(scope="module")
 def truth(posed):
-    """By the number of a path's vertices, (channel, y, x)."""
+    """Return Mitsuba's signals (channel, y, x) by the number of a path's vertices."""
     model, data = posed
     mirror, bands, found = sim.mirror(model), EYE.spectral_bands, {}
     mirror.sync(data)
@@ -56,10 +58,11 @@ def seen(posed, light="bounce", rays=RAYS):
 
 
 def test_light_that_is_reflected_twice_is_mitsubas(posed, truth):
-    """To 3 standard errors of the scatter over receptors, which are some thousandths; and neither direct light would do
-    nor a truth without the second reflection."""
+    """The means agree within 3 standard errors, from the scatter over receptors, which are some thousandths. Direct
+    light alone is noticed, and so is a reference without the second reflection.
+    """
     found, once = seen(posed), seen(posed, "direct")
-    error = (found - truth[3]).std(axis=(1, 2), ddof=1) / np.sqrt(truth[3][0].size)  # of both sides
+    error = (found - truth[3]).std(axis=(1, 2), ddof=1) / np.sqrt(truth[3][0].size)  # standard error of both sides
     assert (error < 4e-3 * truth[3].mean(axis=(1, 2))).all()
     assert (np.abs((found - truth[3]).mean(axis=(1, 2))) < 3 * error).all()
     for wrong, right in ((once, truth[3]), (found, truth[2])):
@@ -67,7 +70,7 @@ def test_light_that_is_reflected_twice_is_mitsubas(posed, truth):
 
 
 def test_what_glows_is_seen_in_direct_light_too():
-    """A plate of emission 2 before the eye: twice what its colour would have in full daylight."""
+    """A plate of emission 2 ahead of the eye is twice as bright as its colour in full daylight."""
     text = """<mujoco><visual><headlight active="0"/></visual>
         <asset><material name="lamp" emission="2" rgba=".5 .5 .5 1"/></asset><worldbody>
         <geom type="box" size=".1 2 2" pos="2 0 0" material="lamp"/><body name="eye"/></worldbody></mujoco>"""
@@ -82,8 +85,9 @@ def test_what_glows_is_seen_in_direct_light_too():
 
 
 def test_a_furnace_keeps_what_it_has():
-    """Within a room whose walls glow by g, of reflectance r, everything that is reflected twice at most adds up to
-    g (1 + r + r²), whatever its form."""
+    """Light with at most two reflections adds up to g (1 + r + r²) in a closed room whose walls have radiance g and
+    reflectance r, whatever the room's shape.
+    """
     plates = "".join(
         f'<geom type="box" size="{x} {y} {z}" pos="{px} {py} {pz}" material="wall"/>'
         for axis in range(3)
@@ -109,7 +113,7 @@ def test_a_furnace_keeps_what_it_has():
 
 
 def test_worlds_do_not_mix_and_colours_bounce():
-    """A white floor beside a wall that is red in one world and grey in the other."""
+    """A white floor lies next to a wall that is red in one world and grey in the other."""
     text = """<mujoco><visual><headlight active="0"/></visual><worldbody>
         <light type="directional" dir="1 0 -1"/>
         <geom name="floor" type="plane" size="5 5 .1" rgba=".9 .9 .9 1"/>
@@ -124,7 +128,7 @@ def test_worlds_do_not_mix_and_colours_bounce():
     fidelity = sim.Fidelity(64, bands=3, light="bounce")
     both = sim.ModelRenderer(models[0], EYE, down, 2, fidelity, varied=["wall"]).signals(datas)[:, 0]
     grey, red = both.mean(axis=(2, 3))
-    assert (red[1:] < grey[1:] - 0.01).all(), "green and blue do not come back from a red wall"
+    assert (red[1:] < grey[1:] - 0.01).all(), "a red wall reflects no green and blue"
     single = sim.ModelRenderer(models[1], EYE, down, 1, fidelity).signals(datas[1:])[0, 0]
     np.testing.assert_allclose(both[1], single, atol=5e-4)
 
@@ -138,7 +142,9 @@ CORNER = """<mujoco><visual><headlight active="0"/></visual><worldbody>
 
 @pytest.mark.parametrize(("grey", "light"), [(".9 .9 .9", "bounce"), (".05 .05 .05", "direct")])
 def test_light_bounces_where_it_counts(grey, light):
-    """In white corners and not in black ones; what is said of direct light is what a converged picture says."""
+    """Bounced light is chosen in white corners and not in black ones. The predicted error of direct light agrees with a
+    converged rendering.
+    """
     model = mujoco.MjModel.from_xml_string(CORNER.format(grey=grey))
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
@@ -161,7 +167,7 @@ def test_light_bounces_where_it_counts(grey, light):
         assert np.sqrt(np.mean(left_out**2)) <= found.tolerance
     plain = sim.choose_model_fidelity(*arguments)
     assert plain.light == "direct"
-    assert "as asked" in plain.why
+    assert "as requested" in plain.why
 
 
 def test_rays_that_bounce_are_as_many_as_their_noise_wants():

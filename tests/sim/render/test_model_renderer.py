@@ -1,4 +1,6 @@
-"""What eyes on any model see, against Mitsuba's `direct` of many samples in a mirror of the same model."""
+"""Signals of eyes on any model, against Mitsuba's `direct` integrator with many samples in a mirror of the same
+model.
+"""
 
 import gc
 
@@ -59,7 +61,7 @@ def model():
 
 @pytest.fixture(scope="module")
 def truth(model):
-    """(pose, channel, y, x)"""
+    """Return Mitsuba's signals (pose, channel, y, x)."""
     mirror, bands, found = sim.mirror(model), EYE.spectral_bands, []
     for angle in ANGLES:
         mirror.sync(posed(model, angle))
@@ -77,12 +79,12 @@ def signals(model, rays=64, mounts=(SIDE,)):
 
 
 def differ(found, truth):
-    """Root mean square, and in the mean, of white's signal."""
+    """Return the root-mean-square difference and the difference of the means, in units of white's signal."""
     return np.sqrt(np.mean((found - truth) ** 2)), np.abs((found - truth).mean(axis=(2, 3))).max()
 
 
-# 64 jittered rays in a pixel on an edge of contrast 1 err by some .03, and a sixth of the pixels is on edges; three
-# times what is found. In the mean of a picture that is nothing.
+# 64 jittered rays in a pixel at an edge of contrast 1 have an error of about 0.03, and a sixth of the pixels is at
+# edges. NOISE is three times the measured error. In the mean of an image this error vanishes.
 NOISE, BIAS = 0.012, 6e-4
 
 
@@ -111,21 +113,24 @@ def test_wrong_methods_are_noticed(model, truth, mutant, monkeypatch):
 
 
 def test_lights_move_with_bodies(model, truth):
-    """Each pose has its own light: that of another one does not do."""
+    """Each pose has its own light, which the light of another pose cannot replace."""
     assert differ(truth[[1, 2, 0]], truth)[0] > 3 * NOISE
 
 
 def test_worlds_and_eyes_do_not_mix(model):
-    """Each world and each eye alone sees what it does among others."""
+    """Each world and each eye has the same signals alone as among others."""
     mounts = [sim.Mount("side"), sim.Mount("arm", azimuth_deg=-90, offset=(0.2, -0.9, 0.4))]
     together = signals(model, 4, mounts)
     for e, mount in enumerate(mounts):
         np.testing.assert_array_equal(signals(model, 4, [mount])[:, 0], together[:, e])
-    gc.collect()  # kernels look at the shapes of all scenes: when others' go meanwhile, they are recorded anew
+    # kernels depend on the shapes of all scenes: if scenes of other tests are freed meanwhile, kernels are recorded
+    # again
+    gc.collect()
     renderer = sim.ModelRenderer(model, EYE, mounts, 1, sim.Fidelity(4, bands=BANDS))
     for world, angle in enumerate(ANGLES):
         np.testing.assert_array_equal(renderer.signals([posed(model, angle)])[0], together[world])
-    assert renderer.recordings <= 3  # of several scenes in one kernel, Dr.Jit 1.5 records the second or third call anew
+    # with several scenes in one kernel, Dr.Jit 1.5 records the second or third call again
+    assert renderer.recordings <= 3
 
 
 def test_the_sky_is_seen_where_nothing_is():
@@ -148,8 +153,9 @@ def test_the_sky_is_seen_where_nothing_is():
 
 
 def test_eyes_behind_a_pupil_see_it_too(model):
-    """Defocused, at many rays: the mean over the picture stays what the perfect lens sees, but for the pupil's share,
-    and edges are lower."""
+    """A defocused pupil with many rays: the mean over the image equals the perfect lens's times the throughput, and
+    edges are softer.
+    """
     pupil = optics.Pupil(aperture_radius=60e-6, thin_lens_focal_length=180e-6)
     blurred = optics.Eye(pupil, resolution=(15, 15), fov_deg=45, bands=BANDS)
     sharp = optics.Eye(resolution=(15, 15), fov_deg=45, bands=BANDS)
@@ -169,7 +175,7 @@ def test_eyes_behind_a_pupil_see_it_too(model):
     ("change", "words"),
     [
         ({"n_envs": 0}, "n_envs = 0: must be a whole number"),
-        ({"mounts": []}, r"mounts = \[\]: must be one sim.Mount at least"),
+        ({"mounts": []}, r"mounts = \[\]: must contain at least one sim.Mount"),
         ({"eye": sim.Eyes()}, "eye = .*: must be a kind of Eye"),
         (
             {"fidelity": sim.Fidelity(4, bands=3, light="all", samples="areas")},
@@ -177,7 +183,7 @@ def test_eyes_behind_a_pupil_see_it_too(model):
         ),
         (
             {"eye": optics.Eye(resolution=(3, 3), eccentricity_deg=(0, -10))},
-            r"eye: eccentricity_deg = \(0.0, -10.0\): eyes in a world look along their Mount: turn that instead",
+            r"eye: eccentricity_deg = \(0.0, -10.0\): must be \(0, 0\); eyes in a world look along their Mount, turn",
         ),
         ({"fidelity": 16}, "fidelity = 16: must be a kind of Fidelity"),
         ({"groups": (5,)}, "no visible geom"),
@@ -213,8 +219,8 @@ def test_an_only_worlds_data_need_not_be_in_a_list(model):
 
 
 def test_data_before_mj_forward_is_refused(model):
-    """Everything would be at the origin, without size, and dark. The mirror says the same."""
-    words = r"says nothing yet of where things are; call mujoco.mj_forward\(model, data\) first"
+    """Before mj_forward, all geoms would be at the origin, without size, and dark. The mirror refuses such data too."""
+    words = r"contains no poses yet; call mujoco.mj_forward\(model, data\) first"
     renderer = sim.ModelRenderer(model, EYE, [sim.Mount("side")], 2, sim.Fidelity(1, bands=BANDS))
     for look in (renderer.signals, renderer.depth, renderer.ids):
         with pytest.raises(ValueError, match="data of world 1 " + words):

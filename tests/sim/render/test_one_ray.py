@@ -1,6 +1,7 @@
-"""The batched renderer sees what the one-ray renderer sees, in every receptor that sees one colour.
+"""The batched renderer and the one-ray renderer agree in every receptor that sees a single colour.
 
-The two share the mirror's shapes and materials; rays, eyes, lamps, shadows and receptors are found in two ways.
+The two renderers share the mirror's shapes and materials. Each has its own code for rays, eyes, lamps, shadows and
+receptors.
 """
 
 from dataclasses import replace
@@ -16,9 +17,9 @@ from sim.tasks.simulation import Simulation
 
 EYES = sim.Eyes(n_eyes=2, resolution=(24, 36), fov_deg=60, placement_range_deg=50, bands=3, noise_sigma=0)
 RAYS = 64
-FLAT = 0.03  # of a receptor's mean: standard deviation of its rays below which it sees one colour, but for shading
-CLOSE = 5e-3  # what that shading and float32 leave
-# Objects at arm's length of the agent, one in each eye's axis, and one behind.
+FLAT = 0.03  # relative standard deviation of a receptor's rays below which it sees one colour, apart from shading
+CLOSE = 5e-3  # the remaining effect of shading and float32
+# Objects at arm's length of the agent, one on each eye's axis, and one behind it.
 CLOSE_BY = np.array([[1.5, 0.7], [1.5, -0.7], [2.6, 0.0]])
 
 
@@ -35,7 +36,7 @@ def scene(task):
 
 @cache
 def batched(task):
-    """Signals of the batched renderer, and the receptors that see one colour."""
+    """Return the signals of the batched renderer, and the receptors that see one colour."""
     world, state = scene(task)
     renderer = sim.BatchedRenderer(world, EYES, 1, sim.Fidelity(RAYS, EYES.bands))
     rays = renderer.radiance(state).sum(axis=-1).reshape(EYES.n_eyes, *EYES.resolution, RAYS)
@@ -44,10 +45,10 @@ def batched(task):
 
 
 def differing(task, signals):
-    """How many of the receptors that see one colour report another signal."""
+    """Return the number of receptors that see one colour and have different signals."""
     expected, flat = batched(task)
     assert flat.mean() > 0.4
-    assert np.ptp(expected.max(axis=1)[flat]) > 0.1  # not all of them the same dark
+    assert np.ptp(expected.max(axis=1)[flat]) > 0.1  # the receptors are not uniformly dark
     off = np.abs(signals - expected).max(axis=1) > CLOSE * (np.abs(expected).max(axis=1) + 0.02)
     return int((off & flat).sum())
 
@@ -55,7 +56,7 @@ def differing(task, signals):
 @pytest.mark.parametrize("task", ["detection", "foraging", "navigation"])
 def test_both_renderers_see_the_same(task):
     world, state = scene(task)
-    assert differing(task, one_ray.see(world, EYES, state)) <= 2  # an edge that RAYS rays have missed
+    assert differing(task, one_ray.see(world, EYES, state)) <= 2  # RAYS rays may miss an edge
 
 
 def test_signals_that_see_an_edge_are_as_bright_on_average():
@@ -67,19 +68,19 @@ def test_signals_that_see_an_edge_are_as_bright_on_average():
 
 
 def swapped(monkeypatch, world, state):
-    """Goal and adversary in each other's place."""
+    """A mutant that exchanges goal and adversary."""
     return world, replace(state, objects=state.objects[:, [1, 0, 2]])
 
 
 def shifted(monkeypatch, world, state):
-    """Every receptor looks where its right neighbour does."""
+    """A mutant in which every receptor looks along its right neighbour's direction."""
     looks = one_ray.receptor_direction
     monkeypatch.setattr(one_ray, "receptor_direction", lambda eyes, axis, row, at: looks(eyes, axis, row, at + 1))
     return world, state
 
 
 def without_cosine(monkeypatch, world, state):
-    """Slanting light as bright as light from ahead."""
+    """A mutant in which oblique light is as bright as perpendicular light."""
     lambert = one_ray.cosine
     monkeypatch.setattr(one_ray, "cosine", lambda normal, towards: float(lambert(normal, towards) > 0))
     return world, state

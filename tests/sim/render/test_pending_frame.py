@@ -1,4 +1,4 @@
-"""Frames have their own values in whatever order they are waited for, and hand them over once."""
+"""Frames keep their own values in whatever order they are awaited, and return them once."""
 
 import numpy as np
 import pytest
@@ -7,7 +7,7 @@ from sim.render.pending_frame import FrameSlot, PendingFrame
 
 
 class Device:
-    """One buffer, which a kernel reads only when its output is asked for: as late as a device may."""
+    """A device with one buffer, which a kernel reads as late as a device may: when its output is requested."""
 
     def __init__(self):
         self.slot, self.buffer = FrameSlot(), np.zeros(3)
@@ -17,7 +17,7 @@ class Device:
             self.buffer[:] = value
             return self.buffer.copy
 
-        return self.slot.begin(launch)
+        return self.slot.launch(launch)
 
 
 def test_a_frame_keeps_its_values_when_the_next_one_is_begun():
@@ -36,18 +36,18 @@ def test_a_frame_that_nobody_waits_for_is_in_nobodys_way():
 def test_a_launch_that_fails_leaves_the_frame_before_it_alone():
     device = Device()
     first = device.begin(1)
-    with pytest.raises(ValueError, match="as many"):
-        device.slot.begin(_failing)
+    with pytest.raises(ValueError, match="wrong number"):
+        device.slot.launch(_failing)
     np.testing.assert_array_equal(first.wait(), np.ones(3))
     np.testing.assert_array_equal(device.begin(3).wait(), np.full(3, 3))
 
 
 def _failing():
-    raise ValueError("not as many worlds")
+    raise ValueError("wrong number of worlds")
 
 
 def test_values_are_handed_over_once():
-    """A second caller would get what the first one may have written into."""
+    """A second caller might otherwise get values that the first one has overwritten."""
     frame = PendingFrame(lambda: np.zeros(3))
     frame.wait()[:] = 1
     with pytest.raises(RuntimeError, match="was waited for before"):

@@ -1,4 +1,4 @@
-"""The batched renderer against the reference: Mitsuba's integrators on the mirror, and optics' convolution."""
+"""The batched renderer against the reference: Mitsuba's integrators on the mirror, and the convolution of optics."""
 
 import dataclasses
 
@@ -16,10 +16,10 @@ from sim.tasks.simulation import Simulation
 from sim.tracing import lighting, spheres
 
 EYES = sim.Eyes(n_eyes=2, resolution=(5, 7), fov_deg=60, placement_range_deg=70, bands=3, noise_sigma=0)
-BATCHES, SPP = 12, 96  # 1152 samples a receptor by Mitsuba, with their standard error
+BATCHES, SPP = 12, 96  # Mitsuba takes 1152 samples per receptor, with their standard error
 RAYS = 1024
-PSF_TOLERANCE = 0.01  # Eye's own; both sides integrate PSFs over cells, but not over the same
-# Eleven random worlds: fields in which agent and objects are anywhere, and mazes.
+PSF_TOLERANCE = 0.01  # the tolerance of Eye; both sides integrate PSFs over cells, but over different ones
+# Eleven random worlds: fields with agent and objects at random positions, and mazes.
 WORLDS = (
     [("detection", s) for s in (1, 2, 3)]
     + [("tracking", s) for s in (4, 5)]
@@ -27,11 +27,11 @@ WORLDS = (
     + [("navigation", 0)]
     + [("foraging", 6)]
 )
-LIGHTS = {"direct": "direct", "bounce": {"type": "path", "max_depth": 3}}  # ours and Mitsuba's
+LIGHTS = {"direct": "direct", "bounce": {"type": "path", "max_depth": 3}}  # our name and Mitsuba's
 
 
 def random_world(task, seed):
-    """One agent that looks at something near: at an object where there are any."""
+    """Return a world with one agent that looks at something near, at an object if there is one."""
     world = sim.build_world(task, seed=seed)
     rng = np.random.default_rng(seed)
     simulation = Simulation(task_of(world), 1, seed)
@@ -47,7 +47,7 @@ def random_world(task, seed):
 
 
 def seeds(renderer, method, state):
-    """What BATCHES independent renderings of the first world give."""
+    """Return BATCHES independent renderings of the first world."""
     batches = []
     for renderer.seed in range(BATCHES):
         batches.append(getattr(renderer, method)(state)[0])
@@ -55,21 +55,24 @@ def seeds(renderer, method, state):
 
 
 def z_scores(ours, batches, floor=1e-5):
-    """floor: of the standard error; by default what float32 leaves of a uniformly lit receptor, where the reference has
-    no variance either."""
+    """Return the deviations in standard errors.
+
+    floor: a minimum added to the standard error. The default is float32's rounding in a uniformly lit receptor, for
+    which the reference has no variance either.
+    """
     error = batches.std(axis=0, ddof=1) / np.sqrt(len(batches))
     return (ours - batches.mean(axis=0)) / (error + floor)
 
 
 def pictures(world, state, light, tracer="auto"):
-    """The renderer's, (eye, band, y, x)."""
+    """Return the renderer's radiance (eye, band, y, x)."""
     renderer = sim.BatchedRenderer(world, EYES, 1, sim.Fidelity(RAYS, EYES.bands, light=light), tracer)
     return np.moveaxis(renderer.receptor_radiance(state)[:, 0], 0, 1)
 
 
 @pytest.fixture(scope="module", params=LIGHTS)
 def seen(request):
-    """Light, and per world the state, and the reference's pictures (batch, eye, band, y, x)."""
+    """Return the light, and for each world its state and the reference's renderings (batch, eye, band, y, x)."""
     worlds = [random_world(*which) for which in WORLDS]
     return request.param, [
         (world, state, seeds(sim.ReferenceRenderer(world, EYES, LIGHTS[request.param], SPP), "pictures", state))
@@ -79,8 +82,10 @@ def seen(request):
 
 @dataclasses.dataclass(frozen=True)
 class Disagreement:
-    """Share of receptors beyond 3 standard errors in some band; largest and root mean square |z| of images' means. All
-    bands of a receptor share Mitsuba's samples. Where light bounces ours are as random as Mitsuba's, and as many."""
+    """Share of receptors beyond 3 standard errors in any band; largest and root-mean-square |z| of image means. All
+    bands of a receptor share Mitsuba's samples. With bounced light, our samples are as random as Mitsuba's, and equal
+    in number.
+    """
 
     beyond: float
     largest: float
@@ -95,18 +100,19 @@ class Disagreement:
 
     @property
     def significant(self):
-        """P(|t_11| > 3) = 1.2 %, and receptors that an edge crosses add our own sampling error. Of twenty-two images
-        one |t_11| beyond 5 has p = 9e-3; their root mean square is 1.1 ± 0.2."""
+        """True beyond these limits: P(|t_11| > 3) = 1.2 %, and receptors at an edge add our own sampling error. Among
+        twenty-two images, one |t_11| beyond 5 has p = 9e-3. Their root mean square is 1.1 ± 0.2.
+        """
         return self.beyond > 0.04 or self.largest > 5 or self.usual > 1.8
 
 
 def test_random_worlds_look_as_they_do_to_mitsuba(seen):
-    """Image by image and band by band within standard errors, light by light."""
+    """Images agree within standard errors, band by band, for each kind of light."""
     light, worlds = seen
     ours, theirs = [pictures(world, state, light) for world, state, _ in worlds], [t for *_, t in worlds]
     found = Disagreement.of(light, ours, theirs)
     assert not found.significant, found
-    assert min(t.std() for t in theirs) > 0.03  # there was something to see
+    assert min(t.std() for t in theirs) > 0.03  # the images are not uniform
 
 
 def left_out(monkeypatch):
@@ -126,7 +132,7 @@ def lights_without_shadows(monkeypatch):
     monkeypatch.setattr(spheres, "blocks", lambda radii, centres, ray: dr.zeros(mi.Bool))
 
 
-@pytest.mark.parametrize("seen", ["bounce"], indirect=True)  # the direct light's own are in test_render.py
+@pytest.mark.parametrize("seen", ["bounce"], indirect=True)  # test_batched_renderer.py has the mutants of direct light
 @pytest.mark.parametrize("sabotage", [left_out, bodies_in_each_others_place, lights_without_shadows])
 def test_a_wrong_bounce_is_noticed(seen, monkeypatch, sabotage):
     light, worlds = seen
@@ -138,7 +144,7 @@ def test_a_wrong_bounce_is_noticed(seen, monkeypatch, sabotage):
 
 @pytest.mark.parametrize("task", ["detection", "navigation", "foraging"])
 def test_both_tracers_follow_the_same_bounces(task):
-    """Ray by ray, where materials are grey and where they are not, but for rays that graze an edge at either end."""
+    """Single rays agree, for grey materials and others, except for rays that graze an edge at either end."""
     world, state = random_world(task, 3)
     fidelity = sim.Fidelity(16, EYES.bands, light="bounce")
     ours, theirs = (
@@ -148,7 +154,7 @@ def test_both_tracers_follow_the_same_bounces(task):
 
 
 def prism(eyes):
-    """A pupil whose PSF is off centre, to the side and up."""
+    """Return eyes with a pupil whose PSF is off centre, to the side and up."""
     slope = np.linspace(-1, 1, 65)
     relief = 6e-6 * np.add.outer(0.5 * slope, slope)
     return dataclasses.replace(eyes, optics=optics.Pupil(0.15 * eyes.sensor_width, height=relief, n=1.5))
@@ -162,13 +168,14 @@ def through_a_prism():
 
 
 def departs(through_a_prism):
-    """Whether the signals differ from the reference's by more than its standard errors and PSF_TOLERANCE allow."""
+    """Return whether signals deviate from the reference by more than its standard errors and PSF_TOLERANCE."""
     world, state, eyes, batches = through_a_prism
     found = sim.BatchedRenderer(world, eyes, 1, sim.Fidelity(256, eyes.bands)).signals(state)[0]
     floor = PSF_TOLERANCE * batches.mean()
     each = z_scores(found, batches, floor)
     images = z_scores(found.mean(axis=(2, 3)), batches.mean(axis=(3, 4)), floor)
-    # Root mean square of t_11: 1.1; P(|t_11| > 5) = 4e-4 for each of six images, which share their samples in threes.
+    # The root mean square of t_11 is 1.1. P(|t_11| > 5) = 4e-4 for each of six images, which share their samples in
+    # threes.
     return np.sqrt(np.mean(each**2)) > 1.5 or np.abs(images).max() > 5
 
 
@@ -204,7 +211,9 @@ def test_parity_is_lost_when_something_is_wrong(through_a_prism, monkeypatch, sa
 
 @pytest.fixture(scope="module")
 def at_rhabdoms():
-    """The same prism, before rhabdoms a seventh of a receptor's place wide; the kernel is off centre."""
+    """Return signals behind the same prism and rhabdoms whose width is a seventh of a receptor's pitch. The kernel is
+    off centre.
+    """
     world, state = random_world("detection", 1)
     eyes = dataclasses.replace(prism(EYES), waveguide=optics.Waveguide(4e-6))
     return world, state, eyes, seeds(sim.ReferenceRenderer(world, eyes, "direct", 32), "signals", state)
@@ -217,7 +226,7 @@ def test_rhabdoms_see_in_worlds_what_they_do_in_pictures(at_rhabdoms):
 
 @pytest.mark.parametrize("sabotage", ["averaged", "turned"])
 def test_rhabdoms_parity_is_lost_when_something_is_wrong(at_rhabdoms, monkeypatch, sabotage):
-    """Averaged over squares as other receptors are, or turned the wrong way round."""
+    """The mutants average over squares as for other receptors, or flip the kernel."""
     of = receptive_fields._as_wide
     wrong = {
         "averaged": lambda kernels: receptive_fields._averaged(
@@ -230,7 +239,9 @@ def test_rhabdoms_parity_is_lost_when_something_is_wrong(at_rhabdoms, monkeypatc
 
 
 def test_shapes_and_light_levels():
-    """(env, eye, ray, band) as the batched renderer has it; light that is reflected twice makes scenes brighter."""
+    """Shapes agree with the batched renderer's, (env, eye, ray, band). Light that is reflected twice makes scenes
+    brighter.
+    """
     world, state = random_world("maze", 0)
     direct, path = (sim.ReferenceRenderer(world, EYES, kind, 64) for kind in ("direct", "path"))
     dark, light = direct.radiance(state), path.radiance(state)

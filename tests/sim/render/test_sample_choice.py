@@ -1,4 +1,4 @@
-"""What eyes look along: rays, areas, or areas that receptors share."""
+"""The choice of samples: rays, areas, or areas that receptors share."""
 
 from dataclasses import replace
 
@@ -26,8 +26,9 @@ from tests.sim.tracing.area_views import ROW
     ],
 )
 def test_eyes_see_by_areas_where_rays_would_be_many(task, eyes, recwarn):
-    """With all light, and as well as promised, over all receptors and over those that see an object near: in the light
-    that rays can follow, where they are the truth."""
+    """The error with areas, over all receptors and over receptors that see a near object, is within the prediction. It
+    is measured in bounced light, for which many rays are the reference.
+    """
     world = sim.build_world(task)
     fidelity = sim.choose_fidelity(world, eyes, bands="own")
     assert (fidelity.samples, fidelity.light) == ("areas", "all")
@@ -43,7 +44,7 @@ def test_eyes_see_by_areas_where_rays_would_be_many(task, eyes, recwarn):
 
 
 def test_one_wide_area_does_where_it_cuts_spheres_finely_enough(monkeypatch):
-    """With the nine slices of narrow ones it would take two."""
+    """Two areas would be necessary with the nine slices of narrow areas."""
     world, eyes = (
         sim.build_world("detection"),
         sim.Eyes(n_eyes=4, resolution=(12, 12), fov_deg=45, placement_range_deg=120),
@@ -54,14 +55,14 @@ def test_one_wide_area_does_where_it_cuts_spheres_finely_enough(monkeypatch):
 
 
 def test_rays_are_kept_where_few_will_do():
-    """Each costs less than an area."""
+    """A ray costs less than an area."""
     fidelity = sim.choose_fidelity(sim.build_world("detection"), replace(DETECTION, noise_sigma=0.2), bands="own")
     assert fidelity.samples == "rays"
     assert fidelity.rays_per_receptor <= PERFECT_LENS_AREA
 
 
 def test_behind_a_pupil_an_area_costs_less_than_three_rays():
-    """Three would do here, and did, at .74 of an area's speed (D1)."""
+    """Three rays would be accurate enough here, but are slower: they reach 0.74 of an area's speed."""
     eyes = behind_lens(sim.Eyes(n_eyes=2, resolution=(15, 15), noise_sigma=0.01), 0.25)
     fidelity = sim.choose_fidelity(sim.build_world("detection"), eyes, bands="own")
     assert (fidelity.samples, fidelity.light, fidelity.rays_per_receptor) == ("areas", "direct", 1)
@@ -69,8 +70,9 @@ def test_behind_a_pupil_an_area_costs_less_than_three_rays():
 
 @pytest.mark.parametrize(("a", "most"), [(0.9, 1 / 4), (0.3, 4 / 9)])
 def test_receptors_share_areas_behind_a_hole(a, most):
-    """Its blur is wider than they are. They see as well as promised, over all receptors and over those that see an
-    object near, and the renderer says of itself how many areas it has."""
+    """The pinhole's blur is wider than a receptor. The error is within the prediction, over all receptors and over
+    receptors that see a near object, and the renderer reports its number of areas.
+    """
     eyes = sim.Eyes(n_eyes=2, resolution=(15, 15), noise_sigma=0.003, placement_range_deg=45.0)
     eyes = replace(eyes, optics=optics.Pupil(a * eyes.sensor_width / 2))
     world = sim.build_world("detection")
@@ -89,8 +91,9 @@ def test_receptors_share_areas_behind_a_hole(a, most):
 
 @pytest.mark.parametrize(("resolution", "a", "sigma"), [((15, 15), 0.4, 0.003), ((1, 4), 0.25, 0.01)])
 def test_receptors_behind_a_lens_in_focus_keep_their_own(resolution, a, sigma):
-    """One area each does for the first eye, and what fewer err by says nothing of more. Four receptors that shared two
-    would see the same in pairs."""
+    """One area per receptor is enough for the first eye; the error of fewer areas does not predict that of more. If
+    four receptors shared two areas, they would have the same signals in pairs.
+    """
     eyes = sim.Eyes(n_eyes=2, resolution=resolution, noise_sigma=sigma, placement_range_deg=45.0)
     fidelity = sim.choose_fidelity(sim.build_world("detection"), behind_lens(eyes, a), bands="own")
     assert fidelity.rays_per_receptor >= 1
@@ -98,7 +101,7 @@ def test_receptors_behind_a_lens_in_focus_keep_their_own(resolution, a, sigma):
 
 
 def test_memory_is_reckoned_with_the_areas_around_the_receptors(monkeypatch):
-    """Behind a wide hole there are several times as many as receptors."""
+    """A wide pinhole needs several areas per receptor."""
     asked = []
     monkeypatch.setattr(eye_renderer, "check_memory", lambda demand: asked.append(demand.rays_per_receptor))
     world, eyes = sim.build_world("detection"), sim.Eyes(n_eyes=1, resolution=(5, 5), bands=3)
@@ -121,8 +124,9 @@ def test_a_tolerance_reaches_the_areas_around_the_receptors():
 
 
 def test_what_cannot_be_lessened_costs_no_more_than_it_must():
-    """The error of areas ends at a floor: of those that hardly err by more, the fewest are taken; where it falls, the
-    most are."""
+    """The smallest number of areas with almost the same error is chosen if the error reaches a floor. The largest
+    number is chosen if the error keeps falling.
+    """
     floor, falls = {1: 0.6, 2: 0.54, 4: 0.52, 6: 0.505, 9: 0.5}, {1: 0.9, 2: 0.8, 4: 0.7, 6: 0.6, 9: 0.5}
     for errors, number in ((floor, 2), (falls, 9)):
         found, level, enough = _fewest(lambda n, errors=errors: errors[n], tuple(errors), 0.49, "areas")

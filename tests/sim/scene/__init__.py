@@ -1,4 +1,4 @@
-"""What tests hold of mirrors, module by module. Helpers: oracle (MuJoCo's rays), drawn (its renderer), models, lit.
+"""Tests of mirrors: which test covers which module. Helpers: oracle (MuJoCo's rays), drawn (its renderer), models, lit.
 
 mirror: test_mirror.py, test_mirror_light.py
 source: test_mirror_source.py
@@ -6,7 +6,7 @@ bombs: test_bombs.py
 inventory: test_mirror.py
 rays: test_mirror.py
 cameras: test_mirror.py
-whereabouts: test_mirror.py
+pose_snapshot: test_mirror.py
 variant: test_mirror.py
 shapes: test_mirror.py, test_textures.py
 merged_parts: test_mirror.py
@@ -22,7 +22,7 @@ color: test_color.py, test_exr.py
 variation: test_variation.py
 world_models: envs/test_differing_worlds.py, envs/test_own_models.py
 model_settings: envs/test_own_models.py
-as_built: test_as_built.py
+model_snapshot: test_model_snapshot.py
 appearances: envs/test_differing_materials.py
 poses: render/test_model_renderer.py
 solids: evolve/report/test_rerun_bodies.py

@@ -1,8 +1,7 @@
-"""MuJoCo's own renderer, in a child process: a machine's OpenGL may bring an LLVM of its own, which does not always
-live in peace with the one that Dr.Jit loads.
+"""MuJoCo's own renderer in a child process, because the machine's OpenGL may load an LLVM that conflicts with Dr.Jit's.
 
-As a program: drawn.py OUT WIDTH HEIGHT MATERIALS MODEL.mjb ... draws camera 0 of each model, colours and geom ids;
-where MATERIALS is above 1, once with all geoms of each of the model's first materials.
+Usage as a program: drawn.py OUT WIDTH HEIGHT MATERIALS MODEL.mjb ... renders colours and geom ids of camera 0 for each
+model. If MATERIALS is above 1, each model is rendered once for each of its first materials, on all of its geoms.
 """
 
 import os
@@ -16,16 +15,18 @@ import numpy as np
 
 
 def draw(models, width, height, materials=1):
-    """Colours (n, y, x, 3) uint8 and geom ids (n, y, x), -1 for none; None where there is no OpenGL. A renderer takes
-    much longer to make than a picture: for several `materials` each model is drawn in one after the other, which makes
-    n = models x materials."""
+    """Return colours (n, y, x, 3) uint8 and geom ids (n, y, x), -1 for none; None without OpenGL.
+
+    A renderer takes much longer to create than an image. If `materials` is above 1, each model is therefore rendered in
+    one material after the other, so that n = models x materials.
+    """
     with tempfile.TemporaryDirectory() as folder:
         names = [str(Path(folder) / f"{i}.mjb") for i in range(len(models))]
         for model, name in zip(models, names, strict=True):
             mujoco.mj_saveModel(model, name)
         out = str(Path(folder) / "out.npz")
         command = [sys.executable, __file__, out, *map(str, (width, height, materials)), *names]
-        # EGL needs no display; where someone has set another way, that one is taken.
+        # EGL needs no display. An existing setting takes precedence.
         child = subprocess.run(command, env={"MUJOCO_GL": "egl", **os.environ}, capture_output=True, check=False)
         if child.returncode:
             return None
@@ -38,7 +39,8 @@ def main(out, width, height, materials, *names):
     for name in names:
         model = mujoco.MjModel.from_binary_path(name)
         if model.nlight == 0:
-            model.vis.quality.shadowsize = 0  # nothing casts a shadow, and its buffer takes long to make
+            # a scene without lights has no shadows, and the shadow buffer is slow to create
+            model.vis.quality.shadowsize = 0
         data = mujoco.MjData(model)
         mujoco.mj_forward(model, data)
         with mujoco.Renderer(model, int(height), int(width)) as renderer:

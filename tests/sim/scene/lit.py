@@ -1,4 +1,4 @@
-"""Small lit scenes, as MuJoCo's XML, and what a mirror of them radiates."""
+"""Small scenes with lights, as MuJoCo's XML, and the radiance of their mirrors."""
 
 import mujoco
 import numpy as np
@@ -17,7 +17,7 @@ def xml_of(lights, geoms, headlight=False):
 
 
 def radiance(xml, origin=(0, 0, 5.0), target=(0, 0, 0), spp=4):
-    """Radiance at NM of what lies around `target`."""
+    """Return the radiance at NM around `target`."""
     mirror = sim.mirror(mujoco.MjModel.from_xml_string(xml))
     view = Viewpoint.looking_at(np.array(origin), np.array(target), fovy_deg=1.0)
     return mirror.render(view, 2, 2, spp=spp, wavelengths=NM * 1e-9).mean((1, 2))

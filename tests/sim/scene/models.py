@@ -17,7 +17,7 @@ KINDS = (
     (GEOM.mjGEOM_MESH, [0, 0, 0]),
     (GEOM.mjGEOM_HFIELD, [0, 0, 0]),
 )
-# Its rays meet an octree's approximation of the mesh that is drawn.
+# MuJoCo's rays hit an octree's approximation of the rendered mesh.
 SDF = ((GEOM.mjGEOM_SDF, [0, 0, 0]),)
 
 
@@ -44,7 +44,9 @@ def add_gradient(spec, name="gradient"):
 
 
 def every_kind(seed, textured=False, mocap=False, kinds=KINDS):
-    """An infinite floor and two geoms of every kind, each on its own body at a random pose, and a camera."""
+    """Return a model with an infinite floor, two geoms of every kind, each on its own body at a random pose, and a
+    camera.
+    """
     rng = np.random.default_rng(seed)
     spec = mujoco.MjSpec()
     spec.visual.headlight.active = 0
@@ -63,7 +65,7 @@ def every_kind(seed, textured=False, mocap=False, kinds=KINDS):
             name=f"body_{i}",
             mocap=mocap,
             pos=[*rng.uniform(-1.2, 1.2, 2), rng.uniform(0.3, 1.5)],
-            # A plane has no back side for MuJoCo's rays: it keeps facing the camera.
+            # MuJoCo's rays pass through the back of a plane, so it keeps facing the camera.
             quat=[1, 0, 0, 0] if kind == GEOM.mjGEOM_PLANE else random_quat(rng),
         )
         arguments = {"size": size}

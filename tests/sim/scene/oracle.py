@@ -1,4 +1,4 @@
-"""MuJoCo's own ray casting, pixel by pixel: what a mirror's geometry has to agree with. Needs no graphics."""
+"""MuJoCo's own ray casting, pixel by pixel, as the reference for a mirror's geometry. It needs no graphics."""
 
 import mujoco
 import numpy as np
@@ -7,9 +7,9 @@ from optics.numerics.device import device
 
 
 def first_hits(model, data, position, rotation, fovy_deg, width, height, without_body=-1):
-    """Geom ids (y, x), -1 for none, and depth along the camera's axis [m], inf for none.
+    """Return geom ids (y, x), -1 for none, and depth along the camera's axis [m], inf for none.
 
-    without_body: id of a body to look through. rotation: MuJoCo's camera frame (x right, y up, looking along -z).
+    without_body: id of a body that rays ignore. rotation: MuJoCo's camera frame (x right, y up, looking along -z).
     """
     half = np.tan(np.radians(fovy_deg) / 2)
     y, x = np.indices((height, width))
@@ -51,10 +51,11 @@ def camera_hits(model, data, name, width, height, without_body=-1):
 
 
 def assert_agrees(mirror, model, data, camera, width, height, without_body=-1, limb_share=0.0):
-    """The project's bar for a mirror: 99.5 % of pixels show the same geom, and their depths agree to 1e-3. Spheres and
-    cylinders are met in float32 on a GPU, where .15 % of the depths erred by 1.5e-3.
+    """Assert that 99.5 % of pixels show the same geom, and that their depths agree to 1e-3.
 
-    limb_share: share of pixels that may have another depth: a tessellated limb is a polygon's.
+    Spheres and cylinders are intersected in float32 on a GPU, where 0.15 % of the depths had an error of 1.5e-3.
+
+    limb_share: share of pixels that may have another depth, because a tessellated limb is a polygon.
     """
     ids, depth = camera_hits(model, data, camera, width, height, without_body)
     seen, distance = mirror.render_ids(camera, width, height), mirror.render_depth(camera, width, height)
@@ -64,7 +65,7 @@ def assert_agrees(mirror, model, data, camera, width, height, without_body=-1, l
     error = np.abs(distance[both] - depth[both]) / depth[both]
     limb_share = max(limb_share, 3e-3 if device() == "cuda" else 0.0)
     assert np.mean(error > 1e-3) <= limb_share, (
-        f"{np.mean(error > 1e-3):.2%} of depths err by {error.max():.1e} at most"
+        f"{np.mean(error > 1e-3):.2%} of depths have errors of up to {error.max():.1e}"
     )
     assert np.all(np.isinf(distance[seen < 0]))
     return ids

@@ -1,4 +1,4 @@
-"""What a few bands make of measured colours is known before anything is rendered."""
+"""The error of measured colours in a few bands is predicted before rendering."""
 
 import warnings
 
@@ -18,7 +18,7 @@ GREY = optics.Spectrum((300.0, 780.0), (0.4, 0.4))
 
 
 def exact(reflectance, peak_nm, low, high):
-    """By quadrature to 1 nm over the eye's range, white being 1."""
+    """Return the signal by quadrature to 1 nm over the eye's range, relative to white."""
     nm = NM[(low <= NM) & (high >= NM)]
     catch = optics.receptors_of((peak_nm,)).catch(nm)[0]
     return np.trapezoid(catch * reflectance.at(nm * 1e-9), nm) / np.trapezoid(catch, nm)
@@ -27,7 +27,7 @@ def exact(reflectance, peak_nm, low, high):
 @pytest.mark.parametrize("bands", [4, 8, 16])
 @pytest.mark.parametrize("peak_nm", [350.0, 410.0, 560.0])
 def test_it_is_what_an_eye_gets_wrong(bands, peak_nm):
-    """An eye of so many bands that looks at the colour, against quadrature."""
+    """The predicted error equals the difference between an eye with these bands and quadrature."""
     eye = optics.Eye(resolution=(1, 1), bands=bands, receptors=(peak_nm,))
     at = eye.spectral_bands.wavelengths
     daylight = optics.illuminant("D65").at(at)
@@ -38,7 +38,9 @@ def test_it_is_what_an_eye_gets_wrong(bands, peak_nm):
 
 
 def test_it_falls_with_the_square_of_the_bands():
-    """Colours are linear between the centres: second order. Rounding up, since edges fall on centres by luck."""
+    """Colours are linear between the bands' centres, which gives second order. The limits allow for edges that happen
+    to fall on centres.
+    """
     errors = [band_error(PETALS, (600.0, 520.0, 460.0), bands) for bands in (4, 8, 16, 32)]
     orders = -np.diff(np.log2(errors))
     assert orders.mean() > 1.7
@@ -65,13 +67,13 @@ def test_a_renderer_says_what_its_bands_are_worth():
     half = optics.Pupil(50e-6, thin_lens_focal_length=241e-6)
     dim = sim.Eyes(1, (2, 2), receptors="honeybee", optics=half)
     behind = sim.BatchedRenderer(world, dim, 1).fidelity.levels[0].predicted_error
-    assert behind == pytest.approx(few.predicted_error / 4), "a quarter of the light"
+    assert behind == pytest.approx(few.predicted_error / 4), "the pupil transmits a quarter of the light"
     grey = sim.BatchedRenderer(sim.build_world("detection"), sim.Eyes(1, (2, 2)), 1).fidelity.levels[0]
     assert grey.predicted_error is None
 
 
 class TestLampsWithLines:
-    """Grey things under a fluorescent lamp: as receptors see them in 64 bands they see them in few."""
+    """Grey surfaces under a fluorescent lamp have the same signals in few bands as in 64."""
 
     @staticmethod
     def signals(renderer, bands, receptors="rgb", **spectra):
@@ -87,7 +89,7 @@ class TestLampsWithLines:
 
     @pytest.mark.parametrize("renderer", ["batched", "reference"])
     def test_few_bands_catch_what_many_do(self, renderer):
-        """To float32; samples at the bands' centres are off by a factor of two (below)."""
+        """Signals agree to 1e-4. Samples at the bands' centres would be off by a factor of two (see below)."""
         few, many = (self.signals(renderer, bands) for bands in (4, 64))
         np.testing.assert_allclose(few, many, rtol=1e-4)
         assert few.max() > 0.05
@@ -98,7 +100,7 @@ class TestLampsWithLines:
         assert (few > 1.9 * many)[many > 0.1].any()
 
     def test_daylight_by_name_is_daylight(self):
-        """As a lamp with a table, and as light that was given none."""
+        """A lamp with the table of D65 equals the default light."""
         named, own = (self.signals("batched", 4, light_0=light) for light in ("D65", None))
         np.testing.assert_allclose(named, own, rtol=1e-4)
 

@@ -1,7 +1,7 @@
-"""What materials ask for beside their colour: gloss, mirrors, metal and glow, against closed forms.
+"""Gloss, mirrors, metal and glow of materials against closed forms.
 
-Tried and seen to fail, one at a time: gloss for MuJoCo's defaults, specular taken for the reflectance itself, a box's
-mirror on all its sides, a perfect mirror in Mitsuba's blend, glow not decoded.
+The tests detect these errors, each tried separately: gloss for MuJoCo's defaults, specular used as the reflectance, a
+box's mirror on all its sides, a perfect mirror in Mitsuba's blend, glow not decoded.
 """
 
 import numpy as np
@@ -17,7 +17,7 @@ SUN = '<light type="directional" dir="0 0 -1" diffuse="1 1 1"/>'
 
 
 def seen(material, geom='<geom type="plane" size="50 50 1" material="m"/>', lights=SUN, origin=(0, 0, 5.0), **how):
-    """Radiance at 560 nm of what lies at the origin."""
+    """Return the radiance at 560 nm at the origin."""
     xml = f"""<mujoco><visual><headlight active="0"/></visual><asset>{how.pop("assets", "")}
     <material name="m" {material}/></asset><worldbody>{lights}{geom}</worldbody></mujoco>"""
     view = Viewpoint.looking_at(np.array(origin), np.array(how.pop("target", (0, 0, 0.0))), 0.2)
@@ -26,7 +26,7 @@ def seen(material, geom='<geom type="plane" size="50 50 1" material="m"/>', ligh
 
 @pytest.mark.parametrize("material", ["", 'specular="0" shininess="0.9"', 'specular="0.5" shininess="0.5"'])
 def test_materials_that_do_not_ask_for_gloss_are_lambertian(material):
-    """MuJoCo's defaults are 0.5 and 0.5; seen from two sides, no brighter where a highlight would be."""
+    """MuJoCo's defaults are 0.5 and 0.5. From both sides, the surface is not brighter at the angle of a highlight."""
     grey = f'rgba="0.6 0.6 0.6 1" {material}'
     assert seen(grey) == pytest.approx(decode_srgb(0.6), rel=2e-3)
     assert seen(grey, origin=(4.0, 0, 3)) == pytest.approx(decode_srgb(0.6), rel=2e-3)
@@ -34,16 +34,16 @@ def test_materials_that_do_not_ask_for_gloss_are_lambertian(material):
 
 @pytest.mark.parametrize(("specular", "shininess"), [(1.0, 0.8), (0.5, 0.2), (0.25, 1.0)])
 def test_highlight_peaks_where_and_as_high_as_a_beckmann_lobe(specular, shininess):
-    """Light and eye on the normal of a black surface: L / E = F₀ D(0) / 4 with D(0) = 1 / (π α²), and E = π."""
+    """Light and eye are on the normal of a black surface: L / E = F₀ D(0) / 4 with D(0) = 1 / (π α²), and E = π."""
     black = f'rgba="0 0 0 1" specular="{specular}" shininess="{shininess}"'
     peak = 0.08 * specular / (4 * 2 / (128 * shininess + 2))
     assert seen(black) == pytest.approx(peak, rel=5e-3)
-    # Off the peak, the half vector at 26.6° from the normal: the lobe is gone for sharp ones, and lower for all.
+    # Off the peak, the half vector is at 26.6° from the normal: sharp lobes vanish, and others are lower.
     assert seen(black, origin=(4.0, 0, 3)) < 0.35 * peak
 
 
 def test_gloss_reflects_no_more_light_than_arrives():
-    """Under a white sky (radiance 1 from everywhere) nothing may look brighter than it."""
+    """Under a white sky (radiance 1 from everywhere), no surface may be brighter than the sky."""
     sky = '<texture type="skybox" builtin="flat" rgb1="1 1 1" width="8" height="48"/>'
     for origin in ((0, 0, 5.0), (5.0, 0, 1.0)):
         found = seen('rgba="1 1 1 1" specular="1" shininess="0.5"', lights="", origin=origin, assets=sky, spp=4096)
@@ -51,12 +51,12 @@ def test_gloss_reflects_no_more_light_than_arrives():
 
 
 def test_reflectance_is_a_mirrors_share():
-    """A glowing sphere where a mirror of 0.3 on a grey surface shows it to the eye: 0.3 of it, and 0.7 of the grey."""
+    """The eye sees a glowing sphere in a mirror of 0.3 on a grey surface: 0.3 of the sphere and 0.7 of the grey."""
     floor = '<geom type="plane" size="50 50 1" material="m"/><geom size="0.5" pos="-3 0 3" material="lamp"/>'
     lamp = '<material name="lamp" rgba="1 1 1 1" emission="0.7"/>'
     how = {"geom": floor, "origin": (3.0, 0, 3), "assets": lamp, "spp": 4096}
     grey, silver = 'rgba="0.6 0.6 0.6 1"', 'rgba="0.6 0.6 0.6 1" reflectance="0.3"'
-    # 4096 draws of 0.3: standard error 2.4 %.
+    # 4096 draws of 0.3 give a standard error of 2.4 %.
     assert seen(silver, lights="", **how) == pytest.approx(0.3 * 0.7 + 0.7 * seen(grey, lights="", **how), rel=0.08)
     aside = how | {"target": (3.0, 3.0, 0)}
     assert seen(silver, **aside) == pytest.approx(0.7 * seen(grey, **aside), rel=0.02)

@@ -1,4 +1,4 @@
-"""sRGB, against published values of IEC 61966-2-1."""
+"""sRGB against published values of IEC 61966-2-1."""
 
 import numpy as np
 

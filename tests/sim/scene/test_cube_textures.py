@@ -1,10 +1,10 @@
-"""Cube textures on every kind of geom: which face is seen where, and where on it, against MuJoCo's own renderer and
-against OpenGL's definition, written here once more.
+"""Cube textures on every kind of geom: the visible face and the position on it, against MuJoCo's own renderer and an
+independent implementation of OpenGL's definition.
 
-A texture's grey value codes the face in one model, its column in another, its row in a third; a white one tells the
-light, so that a ratio of radiances gives the code. Tried and seen to fail, one at a time: faces U and D swapped,
-columns of ±x mirrored, rows of ±y mirrored, uniform textures taken for others, caps looked
-up by their own sphere, no cut along the seams, no halving.
+A texture's grey value codes the face in one model, the column in another, and the row in a third. A white texture gives
+the light, so that a ratio of radiances gives the code. The tests detect these errors, each tried separately: faces U
+and D swapped, columns of ±x mirrored, rows of ±y mirrored, uniform textures treated as others, caps looked up by their
+own sphere, no cut along the seams, no halving.
 """
 
 import mujoco
@@ -22,7 +22,7 @@ from .models import GEOM
 
 WIDTH, HEIGHT, TEXELS = 96, 72, 64
 TURNED, OVER = [0.8, 0.2, -0.4, 0.3], [0.1, 0.9, 0.6, -0.3]
-# kind, size, the geom's turn (quaternion), uniform, faces in the image
+# kind, size, rotation of the geom (quaternion), uniform, faces in the image
 CASES = {
     "box": (GEOM.mjGEOM_BOX, [0.9, 0.5, 0.6], TURNED, False, 6),
     "box-over": (GEOM.mjGEOM_BOX, [0.9, 0.5, 0.6], OVER, False, 6),
@@ -43,14 +43,14 @@ CODES = ("face", "column", "row", "white")
 
 
 def picture(code, faces):
-    """Display values (faces · TEXELS, TEXELS)."""
+    """Return display values (faces · TEXELS, TEXELS)."""
     face, row, column = np.indices((faces, TEXELS, TEXELS))
     values = {"face": 40 * face + 20, "column": 4 * column + 2, "row": 4 * row + 2, "white": 255 + 0 * face}
     return values[code].reshape(-1, TEXELS).astype(np.uint8)
 
 
 def build(case, *codes, emission=0.0):
-    """The geom, in the first of its materials, one per code."""
+    """Return a model of the geom in the first of its materials, one material per code."""
     kind, size, quat, uniform, faces = CASES[case]
     spec = mujoco.MjSpec()
     spec.visual.headlight.active = 0
@@ -67,7 +67,7 @@ def build(case, *codes, emission=0.0):
         material.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = code
     where = {"size": size}
     if kind == GEOM.mjGEOM_MESH:
-        # Skew, and not centred on its frame: the directions on its faces are not those of a box.
+        # A skewed tetrahedron that is not centred on its frame: its faces have other directions than a box.
         corners = np.array([[-1, -1, -0.4], [1.1, -0.9, -0.5], [0.2, 1.2, -0.3], [0.1, -0.1, 1.1]]) * 0.8
         faces = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]
         spec.add_mesh(name="mesh", uservert=corners.ravel().tolist(), userface=np.ravel(faces).tolist())
@@ -85,9 +85,9 @@ def build(case, *codes, emission=0.0):
 
 
 def mirrored(case):
-    """Face, column and row that the mirror shows at each pixel, NaN where dark, (y, x, 3); columns and rows in [0, 1].
+    """Return face, column and row in the mirror at each pixel, NaN if dark, (y, x, 3); columns and rows in [0, 1].
 
-    The same seed gives all pictures the same rays, so that a ratio has no noise.
+    With the same seed, all images have the same rays, so that a ratio has no noise.
     """
     pictures = {
         code: sim.mirror(build(case, code)).render("camera", WIDTH, HEIGHT, spp=8, wavelengths=[550e-9])[0]
@@ -101,14 +101,14 @@ def mirrored(case):
 
 
 def decoded(levels):
-    """(y, x, 3) of display values 0 ... 255 in the three codes."""
+    """Return face, column and row (y, x, 3) from display values 0 ... 255 in the three codes."""
     face, column, row = levels
     return np.stack([(face - 20) / 40, (column - 2) / 4 / (TEXELS - 1), (row - 2) / 4 / (TEXELS - 1)], axis=-1)
 
 
 @pytest.fixture(scope="module")
 def drawn():
-    """What MuJoCo draws, by case."""
+    """Return the coordinates in MuJoCo's rendering, by case."""
     pictures = draw([build(case, *CODES[:3], emission=1.0) for case in CASES], WIDTH, HEIGHT, 3)
     if pictures is None:
         pytest.skip("no OpenGL context: compared with OpenGL's definition alone")
@@ -119,16 +119,16 @@ def drawn():
 @pytest.mark.parametrize("case", CASES)
 def test_cube_textures_lie_where_mujoco_draws_them(case, drawn):
     seen, expected = mirrored(case), drawn[case]
-    plain = _plain(expected) & ~np.isnan(seen).any(axis=-1)  # what the light does not reach tells nothing
+    plain = _plain(expected) & ~np.isnan(seen).any(axis=-1)  # dark pixels give no coordinates
     assert plain.sum() > 700
-    # Faces change and colours blend only along seams, which `plain` leaves out.
+    # Faces change and colours blend only along seams, which `plain` omits.
     assert np.mean(np.abs(seen[plain][:, 0] - expected[plain][:, 0]) < 0.05) > 0.995
-    # 8 jittered samples have their mean within a third of a pixel, and a pixel spans up to 3 texels.
+    # The mean of 8 jittered samples is within a third of a pixel, and a pixel spans up to 3 texels.
     assert np.mean(np.abs(seen[plain][:, 1:] - expected[plain][:, 1:]).max(axis=1) < 2.5 / TEXELS) > 0.99
 
 
 def _plain(values):
-    """Pixels whose neighbours show the same face, in nearly the same place, of the geom."""
+    """Return the pixels whose neighbours show the same face at nearly the same position."""
     steps = np.zeros(values.shape[:2])
     for axis in (0, 1):
         step = np.abs(np.diff(values, axis=axis)).max(axis=-1)
@@ -140,7 +140,9 @@ def _plain(values):
 
 
 def test_faces_are_those_of_opengl():
-    """Table 3.19 of the OpenGL 2.1 specification: the major axis picks the face; (s, t) = ((sc, tc) / |ma| + 1) / 2."""
+    """Table 3.19 of the OpenGL 2.1 specification: the major axis selects the face; (s, t) = ((sc, tc) / |ma| +
+    1) / 2.
+    """
     table = {
         0: ([1, 0.2, 0.3], (-0.3, -0.2)),
         1: ([-1, 0.2, 0.3], (0.3, -0.2)),
@@ -166,7 +168,7 @@ def test_no_triangle_spans_a_seam_and_none_is_lost():
     inwards = corners + 1e-6 * (middle[:, None] - corners)
     assert (cube.look_up(inwards.reshape(-1, 3))[0].reshape(-1, 3) == face[:, None]).all()
     assert _area(cut) == pytest.approx(_area(round_one), rel=1e-9)
-    # Linear coordinates on each triangle are good to about the tolerance: tried at its centre.
+    # Linear coordinates on each triangle are accurate to about the tolerance, which is checked at its centre.
     at = cube.look_up(middle)[1]
     pitch = 66
     expected = np.column_stack([1 + 64 * at[:, 0], face * pitch + 1 + 64 * at[:, 1]]) / [pitch, 6 * pitch]

@@ -1,4 +1,4 @@
-"""Recording a kernel survives that Python would collect another environment's remains just then."""
+"""Python's garbage collection of another environment does not disturb the recording of a kernel."""
 
 import subprocess
 import sys
@@ -14,7 +14,7 @@ from sim.scene.device_arrays import ALIGNMENT, PACKET, SharedBuffer, aligned, fl
 from sim.scene.frozen_kernels import FrozenKernel
 from sim.scene.variant import variant
 
-# A first environment becomes garbage; collection falls due in the middle of the second one's recording.
+# A first environment becomes garbage, and a collection is due during the recording of the second one.
 PROGRAM = """
 import gc
 import sim
@@ -64,7 +64,7 @@ def test_aligned_arrays_are_whole_and_a_packet_may_be_read_beyond_their_end():
 
 @dataclass(frozen=True)
 class Weights:
-    """Nested as kernels' inputs are: lists of arrays, and parts that may be missing."""
+    """Inputs with the nesting of kernels' inputs: lists of arrays, and optional parts."""
 
     each: list[Any]
     offset: Any = None
@@ -83,12 +83,13 @@ def weighted(scenes, x, inputs):
 
 
 def test_typed_inputs_keep_their_places_when_a_kernel_is_replayed():
-    """With other arrays in the same places, a recording is used again; with other places, there is another one."""
+    """A recording is used again with other arrays in the same positions. Other positions need another recording."""
     with variant():
         kernel = FrozenKernel(weighted)
 
         def of(number):
-            return floats(np.full(100, number))  # of its own: Dr.Jit records anew if one array has two places
+            # a separate array, because Dr.Jit records again if one array has two positions
+            return floats(np.full(100, number))
 
         fixed = Inputs(of(5), Weights([of(2), of(3)]))
         for moving, given, expected in (
@@ -105,11 +106,11 @@ def test_typed_inputs_keep_their_places_when_a_kernel_is_replayed():
 
 @pytest.mark.parametrize("backend", [dr.JitBackend.LLVM, dr.JitBackend.CUDA])
 def test_a_shared_buffer_says_what_was_written_last(backend, monkeypatch):
-    """A GPU does not see NumPy's memory, and gets a copy each time; that is done here on the processor."""
+    """A GPU cannot read NumPy's memory and gets a copy each time. The test simulates this on the processor."""
     with variant():
         buffer = SharedBuffer(64)
         if backend != dr.JitBackend.LLVM:
-            buffer._array = mi.Float(np.full(64, -1.0))  # stale, as on a GPU
+            buffer._array = mi.Float(np.full(64, -1.0))  # outdated, as on a GPU
             monkeypatch.setattr(dr, "backend_v", lambda kind: backend)
         for number in (1.0, 2.0):
             buffer.values[:] = number

@@ -1,4 +1,4 @@
-"""Spots and lamps against MuJoCo's formulas. Tried and seen to fail: no exponent, attenuation ignored."""
+"""Spotlights and lamps against MuJoCo's formulas. The tests detect a missing exponent and ignored attenuation."""
 
 import warnings
 
@@ -12,7 +12,7 @@ from sim.scene.mirror import MirrorWarning
 
 
 def profile(light, places):
-    """Radiance at 560 nm of a white floor at places (x) under a light at height 2 [m]."""
+    """Return the radiance at 560 nm of a white floor at positions x under a light at height 2 [m]."""
     xml = f"""<mujoco><visual><headlight active="0"/></visual><statistic center="0 0 0"/><worldbody>
     <light pos="0 0 2" dir="0 0 -1" diffuse="1 1 1" {light}/><geom type="plane" size="9 9 1" rgba="1 1 1 1"/>
     </worldbody></mujoco>"""
@@ -25,11 +25,11 @@ def profile(light, places):
 
 @pytest.mark.parametrize(("cutoff", "exponent"), [(45, 10), (30, 0), (60, 3), (100, 1)])
 def test_spots_fall_off_as_their_exponent_says(cutoff, exponent):
-    """cosᵉ θ inside the cone, times the floor's cosine and the inverse square of the distance 2 / cos θ."""
+    """Inside the cone, radiance is cosᵉ θ times the floor's cosine and the inverse square of the distance 2 / cos θ."""
     angles = np.radians([0.0, 10, 20, 29, 44, 58])
     cos = np.cos(angles)
     expected = np.where(np.degrees(angles) < cutoff, cos**exponent * cos**3, 0)
-    # The projected image is bilinear between samples 1/513 of the cone apart, coarsest for the widest.
+    # The projected image is bilinear between samples 1/513 of the cone apart, which is coarsest for the widest cone.
     np.testing.assert_allclose(
         profile(f'cutoff="{cutoff}" exponent="{exponent}"', 2 * np.tan(angles)), expected, atol=6e-3
     )
@@ -37,9 +37,9 @@ def test_spots_fall_off_as_their_exponent_says(cutoff, exponent):
 
 @pytest.mark.parametrize(("attenuation", "level"), [("1 0 0", 1.0), ("0 0 1", 0.25), ("1 1 0", 1 / 3)])
 def test_lamps_are_as_bright_at_the_models_centre_as_their_attenuation_says(attenuation, level):
-    """1 / (a + b d + c d²), d = 2 m; then on with the inverse square."""
+    """The level is 1 / (a + b d + c d²) at d = 2 m, and falls from there with the inverse square."""
     found = profile(f'type="point" attenuation="{attenuation}"', [0.0, 2.0])
-    # 2 m aside: twice the square of the distance, and light at 45°.
+    # 2 m aside, the square of the distance doubles, and the light arrives at 45°.
     np.testing.assert_allclose(found, [level, level / 2 * np.cos(np.pi / 4)], rtol=5e-3)
 
 
@@ -52,7 +52,7 @@ def test_quadratic_attenuation_is_mirrored_without_a_word():
 
 
 def test_tracking_lights_and_cameras_follow():
-    """A light that targets a body, and a camera that tracks it, after the body has moved."""
+    """A light that targets a body, and a camera that tracks it, follow the body's movement."""
     xml = """<mujoco><visual><headlight active="0"/></visual><worldbody>
     <light name="spot" pos="0 0 4" mode="targetbody" target="ball" cutoff="5" exponent="0" diffuse="1 1 1"
     attenuation="0 0 1"/>

@@ -1,8 +1,8 @@
-"""The mirror's geometry against MuJoCo's own ray casting and renderer, and what it says of models and input.
+"""The mirror's geometry against MuJoCo's own ray casting and renderer, and its messages about models and input.
 
-Tried and seen to fail, one at a time: camera mirrored (diag(1, 1, -1)), fov taken as horizontal, poses transposed,
-open cylinders, a capsule's caps at one end, ellipsoid's quaternion with its real part first, meshes not turned, sync
-that does nothing.
+The tests detect these errors, each tried separately: camera mirrored (diag(1, 1, -1)), field of view taken as
+horizontal, poses transposed, open cylinders, a capsule's caps at one end, an ellipsoid's quaternion with its real part
+first, meshes not rotated, sync without effect.
 """
 
 import warnings
@@ -28,7 +28,7 @@ def test_every_kind_of_geom_agrees_with_mujoco(seed, textured):
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     ids = assert_agrees(sim.mirror(model, data), model, data, "camera", 200, 150, limb_share=1e-3)
-    assert len(np.unique(ids)) >= 13  # nearly all geoms are in view, or the test shows little
+    assert len(np.unique(ids)) >= 13  # nearly all geoms are in view
 
 
 def test_scalar_variant_sees_the_same():
@@ -40,7 +40,7 @@ def test_scalar_variant_sees_the_same():
     lit = every_kind_in_the_light(3)
     scalar, llvm = sim.mirror(lit, variant="scalar_spectral"), sim.mirror(lit)
     pictures = [m.render("camera", 16, 12, spp=64, wavelengths=NM * 1e-9) for m in (scalar, llvm)]
-    # Two independent sets of 64 jittered samples of a picture with edges.
+    # These are two independent sets of 64 jittered samples of an image with edges.
     assert np.sqrt(np.mean((pictures[0] - pictures[1]) ** 2)) < 0.05 * pictures[1].max()
     np.testing.assert_allclose(pictures[0].mean((1, 2)), pictures[1].mean((1, 2)), rtol=0.02)
 
@@ -58,7 +58,7 @@ def test_task_worlds_agree_from_the_eyes(task):
         task, seed=1, eyes=sim.Eyes(n_eyes=3, resolution=(60, 80), fov_deg=70, placement_range_deg=200)
     )
     model, data = world.model, mujoco.MjData(world.model)
-    # MuJoCo's rays would hit the skin that they start on; Mitsuba's, like the eyes', look outwards from it.
+    # MuJoCo's rays would hit the surface on which they start. Mitsuba's rays, like the eyes', look outwards from it.
     mirror, rng, kinds = sim.mirror(model), np.random.default_rng(0), set()
     for _ in range(3):
         data.qpos[:2] = world.agent_spawn[rng.integers(len(world.agent_spawn))]
@@ -89,7 +89,7 @@ def test_sync_moves_geoms_camera_and_light():
 
 
 def test_between_two_syncs_everything_stays_where_it_was():
-    """A camera that rides on a body that falls, its headlight, and the world."""
+    """A camera on a falling body, its headlight, and the world change only with `sync`."""
     model = mujoco.MjModel.from_xml_string("""
         <mujoco><visual><headlight ambient="0 0 0"/></visual><worldbody>
           <geom type="plane" size="5 5 .1"/><geom size=".3" pos="0 2 1" rgba=".9 .2 .1 1"/>
@@ -178,7 +178,9 @@ def test_bad_input_is_named():
     with pytest.raises(ValueError, match="no camera None; the model has"):
         mirror.render(None, 4, 4)
     for strange in ("pathtracer", "diffuse", {"type": "path", "max_dept": 3}):
-        with pytest.raises(ValueError, match=r"integrator = .*: must be one of Mitsuba's, such as 'path'; it says: "):
+        with pytest.raises(
+            ValueError, match=r"integrator = .*: must be one of Mitsuba's, such as 'path'; its message: "
+        ):
             mirror.render(Viewpoint(np.zeros(3), np.eye(3), 45.0), 4, 4, integrator=strange)
     for strange in (None, {"spp": 3}):
         with pytest.raises(ValueError, match=r"integrator = .*: must be a name, or a description such as"):
@@ -212,11 +214,12 @@ def test_the_callers_variant_stays_in_force():
 
 
 def test_geom_ids_agree_with_mujocos_renderer():
-    """The rays of the oracle, and the mirror, against pixels that MuJoCo draws; signed distance fields are drawn as
-    meshes, which rays do not see."""
+    """The oracle's rays and the mirror agree with pixels that MuJoCo renders. Signed distance fields are rendered as
+    meshes, which rays do not hit.
+    """
     model = models.every_kind(0, kinds=models.KINDS + models.SDF)
     model.vis.quality.numslices = model.vis.quality.numstacks = 100
-    model.vis.map.zfar = 1e4  # the floor reaches to the horizon
+    model.vis.map.zfar = 1e4  # so that the floor reaches to the horizon
     pictures = draw([model], 200, 150)
     if pictures is None:
         pytest.skip("no OpenGL context: compared with MuJoCo's ray casting alone")
@@ -230,11 +233,13 @@ def test_geom_ids_agree_with_mujocos_renderer():
 
 
 def test_a_camera_inside_bodies_looks_out_of_them():
-    """As in MuJoCo, which draws outer sides only: through a head and a helmet, but not through a wall from behind."""
+    """MuJoCo also renders outer sides only: the camera looks through a head and a helmet, but not through the back of a
+    wall.
+    """
     ball = '<geom name="ball" size="0.5" pos="4 0 0" rgba="0.8 0.8 0.8 1"/>'
     around = '<geom name="head" size="0.2"/><geom name="helmet" type="box" size="0.4 0.3 0.3"/>'
     wall = '<geom name="wall" type="plane" size="5 5 1" pos="2 0 0" zaxis="1 0 0"/>'
-    light = LIGHT.replace("0 0 -1", "0.6 0 -0.8")  # past the head
+    light = LIGHT.replace("0 0 -1", "0.6 0 -0.8")  # so that the light passes the head
     view = Viewpoint.looking_at(np.zeros(3), np.array([1.0, 0, 0]), 5.0)
     for variant in ("llvm_ad_spectral", "scalar_spectral"):
         mirror = sim.mirror(xml_of(light, around + ball), variant=variant)

@@ -1,6 +1,6 @@
 """The light of a mirror against closed forms.
 
-Tried and seen to fail, one at a time: light reversed, π forgotten, colours not linearised.
+The tests detect these errors, each tried separately: light reversed, π forgotten, colours not linearised.
 """
 
 import warnings
@@ -26,7 +26,7 @@ def test_white_lambertian_facing_unit_light_has_the_radiance_of_daylight():
 
 def test_radiance_is_the_same_from_everywhere_and_falls_with_the_cosine():
     np.testing.assert_allclose(radiance(xml_of(LIGHT, WHITE), origin=(4.0, 1, 2)), daylight(NM * 1e-9), rtol=1e-4)
-    # Two lights add; Mitsuba draws one of them per sample: 16384 samples, standard error 1 %.
+    # Two lights add up. Mitsuba draws one of them per sample: 16384 samples give a standard error of 1 %.
     other = LIGHT.replace("sun", "moon").replace("0 0 -1", "0 0.6 -0.8").replace("1 1 1", "0.5 0.5 0.5")
     slanted = LIGHT.replace("0 0 -1", "0.6 0 -0.8").replace("1 1 1", "0.5 0.5 0.5")
     np.testing.assert_allclose(radiance(xml_of(slanted, WHITE)), 0.4 * daylight(NM * 1e-9), rtol=1e-4)
@@ -34,7 +34,7 @@ def test_radiance_is_the_same_from_everywhere_and_falls_with_the_cosine():
 
 
 def test_light_shines_along_its_direction():
-    """A wall that faces -x is lit by a light that travels towards +x, and not by one towards -x."""
+    """A wall that faces -x is lit by a light that travels towards +x, but not by one that travels towards -x."""
     wall = '<geom type="box" size="0.1 5 5" rgba="1 1 1 1"/>'
     for sign in (1, -1):
         light = LIGHT.replace("0 0 -1", f"{sign * 0.6} 0 -0.8")
@@ -43,8 +43,9 @@ def test_light_shines_along_its_direction():
 
 
 def test_one_bounce_off_an_infinite_floor():
-    """A white wall under a light from above gets no direct light, and half of its hemisphere is floor of radiance 1:
-    its radiance is 1/2. (`direct` sees nothing, one bounce all of it.)"""
+    """A white wall under a light from above gets no direct light. Half of its hemisphere is floor of radiance 1, so its
+    radiance is 1/2. (`direct` gives 0, and one bounce gives all of it.)
+    """
     floor = '<geom type="plane" size="0 0 1" rgba="1 1 1 1"/>'
     wall = '<geom type="box" size="0.1 50 50" pos="0.1 0 0" rgba="1 1 1 1"/>'
     mirror = sim.mirror(mujoco.MjModel.from_xml_string(xml_of(LIGHT, floor + wall)))
@@ -54,7 +55,7 @@ def test_one_bounce_off_an_infinite_floor():
         return mirror.render(view, 2, 2, integrator, spp=4096, wavelengths=[560e-9]).mean()
 
     assert seen("direct") == 0
-    # 16384 samples of 0 or 1: standard error 0.004.
+    # 16384 samples of 0 or 1 give a standard error of 0.004.
     assert seen({"type": "path", "max_depth": 3}) == pytest.approx(0.5, abs=0.016)
 
 
@@ -71,7 +72,7 @@ def test_display_colors_are_linearised():
 
 
 def test_material_color_counts_where_the_geom_has_none():
-    """MuJoCo's rule: a geom's rgba other than its default overrides its material's."""
+    """A geom's rgba overrides its material's unless it is the default, by MuJoCo's rule."""
     material = '<asset><material name="m" rgba="0.8 0.8 0.8 1"/></asset><worldbody>'
     geom = '<geom type="plane" size="5 5 1" material="m"{}/>'
     for rgba, value in (("", 0.8), (' rgba="0.3 0.3 0.3 1"', 0.3)):
@@ -80,7 +81,7 @@ def test_material_color_counts_where_the_geom_has_none():
 
 
 def test_colored_light():
-    """White under a light of linear RGB (1, 0.3, 0.3) looks like that light."""
+    """White under a light of linear RGB (1, 0.3, 0.3) has the colour of the light."""
     from sim.scene.color import preview
 
     red = LIGHT.replace("1 1 1", "1 0.3 0.3")
@@ -101,7 +102,8 @@ def test_point_light_obeys_the_inverse_square_law():
     xml = xml_of('<light type="point" pos="0 0 {}" diffuse="1 1 1" castshadow="false"/>', WHITE)
     with pytest.warns(MirrorWarning, match="attenuation"):
         near = radiance(xml.format(3), origin=(4.0, 0, 1))
-    # stat.center is the plane's centre, so that right below the light it is as bright as MuJoCo draws it.
+    # stat.center is the centre of the plane, so that the plane right below the light is as bright as in MuJoCo's
+    # rendering.
     np.testing.assert_allclose(near, daylight(NM * 1e-9), rtol=2e-3)
 
 
@@ -118,8 +120,9 @@ GLASS = """<mujoco><visual><headlight active="0"/></visual><worldbody>
 
 
 def test_who_looks_through_glass_is_told_where_it_is_not_seen_through():
-    """A black pane of alpha ½ before a white floor, lit beside it: half of the floor's light by "path", none of it by
-    "direct", and a word of that."""
+    """A black pane of alpha ½ is in front of a white floor that is lit around the pane. "path" shows half of the
+    floor's light; "direct" shows none of it, and warns.
+    """
     view = Viewpoint.looking_at([0, -2, 4], [0, 0, 0.0], 2)
     mirror, floor = sim.mirror(GLASS), 0.9
     with warnings.catch_warnings():
@@ -129,5 +132,5 @@ def test_who_looks_through_glass_is_told_where_it_is_not_seen_through():
     with pytest.warns(sim.MirrorWarning, match="'direct' does not show what is behind the transparent geom 'pane'"):
         assert mirror.render(view, 2, 2, spp=4, wavelengths=[560e-9]).max() < 0.01
     model = mujoco.MjModel.from_xml_string(GLASS)
-    with pytest.warns(sim.MirrorWarning, match="quick pictures do not show what is behind the transparent geom 'pane'"):
+    with pytest.warns(sim.MirrorWarning, match="quick images do not show what is behind the transparent geom 'pane'"):
         QuickCamera(model)

@@ -1,4 +1,4 @@
-"""What a mirror is made of, and the one line that a broken model ends in."""
+"""Sources of a mirror, and the one-line error for a broken model."""
 
 import mujoco
 import numpy as np
@@ -62,7 +62,7 @@ def test_data_of_another_model_and_lost_bodies_are_named():
         BALL.replace("<geom", '<body name="b"><freejoint/><geom').replace("/></world", "/></body></world")
     )
     other = mujoco.MjModel.from_xml_string(BALL.replace("</world", '<geom size="2"/></world'))
-    with pytest.raises(ValueError, match="data of 2 geoms and 1 bodies is not the model's, which has 1 and 2"):
+    with pytest.raises(ValueError, match="data has 2 geoms and 1 bodies, but the model has 1 and 2"):
         mirror.sync(mujoco.MjData(other))
     data = mujoco.MjData(mirror.model)
     with pytest.raises(ValueError, match=r"call mujoco.mj_forward\(model, data\) first"):
@@ -70,5 +70,5 @@ def test_data_of_another_model_and_lost_bodies_are_named():
     mujoco.mj_forward(mirror.model, data)
     mirror.sync(data)
     data.geom_xpos[0, 1] = np.nan
-    with pytest.raises(ValueError, match="geom 'ball' is at no finite place"):
+    with pytest.raises(ValueError, match="geom 'ball' has no finite position"):
         mirror.sync(data)

@@ -1,7 +1,7 @@
-"""The skybox: where MuJoCo draws its faces, and how bright it is.
+"""The skybox: positions of its faces against MuJoCo's renderer, and its brightness.
 
-Every face shows a ramp of its own, in grey; a picture is compared pixel by pixel with MuJoCo's renderer.
-Tried and seen to fail, one at a time: F and B swapped, U and D swapped, R and L swapped.
+Every face shows its own grey ramp, and images are compared pixel by pixel with MuJoCo's renderer. The tests detect
+these errors, each tried separately: F and B swapped, U and D swapped, R and L swapped.
 """
 
 import warnings
@@ -21,7 +21,7 @@ from .models import add_camera
 
 TEXELS, WIDTH, HEIGHT = 64, 64, 48
 NM = np.array([400.0, 470.0, 560.0, 700.0])
-# Two of these see one face each, well inside; the others edges and corners.
+# Two of these views show the inside of one face each; the others show edges and corners.
 TOWARDS = (
     [1, 0.1, 0.2],
     [-1, 0.2, -0.1],
@@ -64,13 +64,13 @@ def test_sky_is_where_mujoco_draws_it():
         assert np.ptp(drawn) > 20
         seen = mirrored(model).render("camera", WIDTH, HEIGHT, spp=16, wavelengths=[560e-9])[0]
         error = np.abs(255 * encode_srgb(np.clip(seen, 0, 1)) - drawn[..., 0])
-        # Neighbouring texels differ by 1 or less; where faces meet, by anything.
+        # Neighbouring texels differ by at most 1; at the edges of faces they differ by any amount.
         assert np.median(error) < 1
         assert np.mean(error < 3) > 0.95
 
 
 def test_white_sky_has_the_radiance_of_daylight_and_lights_as_such():
-    """A white Lambertian that sees nothing else is as bright as the sky."""
+    """A white Lambertian surface that faces only the sky is as bright as the sky."""
     xml = """<mujoco><visual><headlight active="0"/></visual><asset>
     <texture type="skybox" builtin="flat" rgb1="1 1 1" width="8" height="48"/></asset>
     <worldbody><geom type="plane" size="1 1 1" rgba="1 1 1 1"/></worldbody></mujoco>"""

@@ -22,7 +22,7 @@ UNEVEN = Spectrum((300, 340, 380, 420, 700), (0.1, 0.7, 0.2, 0.5, 0.9))
 
 
 def seen(material, spectra, kind="plane", space="auto", variant="llvm_ad_spectral"):
-    """Radiance at NM of the upper side of a plane or box, looked down on."""
+    """Return the radiance at NM of the upper side of a plane or box, seen from above."""
     xml = XML.format(material=material, kind=kind, z=-1 if kind == "box" else 0, space=space)
     mirror = sim.mirror(mujoco.MjModel.from_xml_string(xml), spectra=spectra, variant=variant)
     view = Viewpoint.looking_at(np.array([0.3, 0.2, 5.0]), np.array([0.3, 0.2, 0.0]), 1.0)
@@ -32,7 +32,9 @@ def seen(material, spectra, kind="plane", space="auto", variant="llvm_ad_spectra
 @pytest.mark.parametrize("variant", ["llvm_ad_spectral", "scalar_spectral"])
 @pytest.mark.parametrize("kind", ["plane", "box"])
 def test_a_material_reflects_its_spectrum_and_nothing_of_its_color(kind, variant):
-    """Lit by light of diffuse 0.5 (its largest): 0.5 ρ(λ) D65(λ), where the tables are bent, too."""
+    """Under a light of diffuse 0.5 (its largest component) the radiance is 0.5 ρ(λ) D65(λ), also at the kinks of the
+    tables.
+    """
     spectra = {"leaf": UNEVEN, "sun": "D65"}
     expected = 0.5 * UNEVEN.at(NM * 1e-9) * daylight(NM * 1e-9)
     np.testing.assert_allclose(seen("leaf", spectra, kind, variant=variant), expected, rtol=1e-4)
@@ -47,14 +49,14 @@ def test_a_light_has_its_spectrum_at_its_own_level():
 @pytest.mark.parametrize("kind", ["plane", "box"])
 @pytest.mark.parametrize(("space", "share"), [("linear", 0.6), ("sRGB", 0.3185)])
 def test_a_grey_texture_multiplies_the_spectrum(kind, space, share):
-    """0.6 of the display's white is 0.3185 of its light (IEC 61966-2-1)."""
+    """A level of 0.6 of the display's white is 0.3185 of its light (IEC 61966-2-1)."""
     expected = 0.5 * share * UNEVEN.at(NM * 1e-9) * daylight(NM * 1e-9)
     found = seen("striped", {"striped": UNEVEN, "sun": "D65"}, kind, space)
     np.testing.assert_allclose(found, expected, rtol=5e-3)  # 8-bit texels
 
 
 def test_daylight_is_ultraviolet_too():
-    """By default, without any spectrum given; `rgb` and `d65` emitters of Mitsuba end at 360 nm."""
+    """The default light contains ultraviolet; Mitsuba's `rgb` and `d65` emitters end at 360 nm."""
     white = Spectrum((400, 700), (1, 1))
     xml = XML.format(material="leaf", kind="plane", z=0, space="auto").replace(".5 .25 .5", "1 1 1")
     mirror = sim.mirror(mujoco.MjModel.from_xml_string(xml), spectra={"leaf": white})
@@ -64,8 +66,9 @@ def test_daylight_is_ultraviolet_too():
 
 
 def test_what_glows_glows_in_its_spectrum():
-    """emission · ρ(λ) D65(λ), without any light; between the tables' entries, the product of lines is a
-    parabola: 1e-3."""
+    """Without any light, the radiance is emission · ρ(λ) D65(λ). Between the tables' entries, the product of two lines
+    is a parabola, which gives errors of 1e-3.
+    """
     xml = XML.format(material="leaf", kind="plane", z=0, space="auto").replace('"leaf"/>', '"leaf" emission=".7"/>', 1)
     mirror = sim.mirror(
         mujoco.MjModel.from_xml_string(xml.replace('<light name="sun"', '<light active="false"')),

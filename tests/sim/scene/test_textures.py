@@ -1,8 +1,9 @@
-"""Where a texture lies on every kind of geom: against formulas written here, and against MuJoCo's own renderer.
+"""Positions of a texture on every kind of geom: against independent formulas and MuJoCo's own renderer.
 
-The texture's grey value codes u in one model, v in another; a white one tells the light, so that a ratio of radiances
-gives the coordinate. Tried and seen to fail, one at a time: a box's u and v swapped or u mirrored, u mirrored around an
-axis, a plane's v upwards, image upside down, a capsule's caps swapped, uniform repeats ignored, sRGB not decoded.
+The texture's grey value codes u in one model and v in another. A white texture gives the light, so that a ratio of
+radiances gives the coordinate. The tests detect these errors, each tried separately: a box's u and v swapped or u
+mirrored, u mirrored around an axis, a plane's v upwards, image upside down, a capsule's caps swapped, uniform repeats
+ignored, sRGB not decoded.
 """
 
 from functools import cache
@@ -21,7 +22,7 @@ from .models import GEOM
 WIDTH, HEIGHT = 96, 72
 TEXELS = 256
 
-# kind, size, the geom's turn (quaternion), texture repeat, uniform
+# kind, size, rotation of the geom (quaternion), texture repeat, uniform
 TURNED = [0.8, 0.2, -0.4, 0.3]
 CASES = {
     "plane": (GEOM.mjGEOM_PLANE, [1.0, 0.6, 0.1], [1, 0, 0, 0.2], (1, 1), False),
@@ -58,7 +59,7 @@ CODES = {
 
 
 def build(case, *codes, emission=0.0):
-    """The geom, in the first of its materials, one per code."""
+    """Return a model of the geom in the first of its materials, one material per code."""
     kind, size, quat, repeat, uniform = CASES[case]
     spec = mujoco.MjSpec()
     spec.visual.headlight.active = 0
@@ -77,7 +78,7 @@ def build(case, *codes, emission=0.0):
         )
         material.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = code
     if kind == GEOM.mjGEOM_MESH:
-        back = QUAD - [0, 0, 0.3]  # a mesh must enclose a volume: the same quad again, turned over
+        back = QUAD - [0, 0, 0.3]  # a mesh must enclose a volume, so this is the back of the quad
         spec.add_mesh(
             name="quad",
             uservert=np.concatenate([QUAD, back]).ravel().tolist(),
@@ -99,9 +100,9 @@ def build(case, *codes, emission=0.0):
 
 @cache
 def coordinates(case):
-    """(u, v) that the mirror's radiance tells at each pixel, NaN where dark, and the points seen, in the geom's frame.
+    """Return (u, v) from the mirror's radiance at each pixel, NaN if dark, and the visible points in the geom's frame.
 
-    The same seed gives all three pictures the same rays, so that a ratio has no noise.
+    With the same seed, all three images have the same rays, so that a ratio has no noise.
     """
     pictures = {
         code: sim.mirror(build(case, code)).render("camera", WIDTH, HEIGHT, spp=16, wavelengths=[550e-9])[0]
@@ -143,7 +144,7 @@ def local_points(case):
 
 
 def formula(case, points):
-    """MuJoCo's texture coordinates of points in a geom's frame, before they wrap."""
+    """Return MuJoCo's texture coordinates of points in a geom's frame, before they wrap."""
     kind, size, _, repeat, uniform = CASES[case]
     x, y, z = np.moveaxis(points, -1, 0)
     azimuth = np.arctan2(y, x) / (2 * np.pi) % 1
@@ -157,7 +158,7 @@ def formula(case, points):
         face = np.argmax(np.abs([a, b, c]), axis=0)
         uv = [(np.where(face == 0, b, a) + 1) / 2, (1 - np.where(face == 2, b, c)) / 2]
     elif kind == GEOM.mjGEOM_HFIELD:
-        # Along z on all of it, walls included; the repeats are counted from the middle.
+        # The projection is along z on all sides, and repeats are counted from the middle.
         return np.stack([x / size[0], -y / size[1]], -1) / 2 * scale - 0.5
     elif kind == GEOM.mjGEOM_SPHERE:
         scale = np.array(repeat) * (size[0] if uniform else 1)
@@ -178,8 +179,11 @@ def formula(case, points):
 
 
 def assert_same_place(uv, expected):
-    """Equal up to whole repeats, to 5 texels: the 16 samples' mean position is off by a fraction of a pixel. Pixels
-    next to an edge, a seam or a limb, where a pixel holds more than one place, do not count."""
+    """Assert that coordinates agree up to whole repeats, to 5 texels.
+
+    The mean position of the 16 samples is off by a fraction of a pixel. Pixels next to an edge, a seam or a limb are
+    omitted, because they contain several positions.
+    """
     distance = np.abs((uv - expected + 0.5) % 1 - 0.5).max(axis=-1)
     steps = np.zeros(expected.shape[:2])
     for axis in (0, 1):
@@ -202,7 +206,7 @@ def test_textures_lie_where_the_formulas_say(case):
 def test_mesh_interpolates_its_texture_coordinates():
     uv, points = coordinates("mesh")
     model = build("mesh", "white")
-    # The compiler moves a mesh to its centre of mass and turns it to its axes of inertia.
+    # The compiler moves a mesh to its centre of mass and rotates it to its axes of inertia.
     turn = np.empty(9)
     mujoco.mju_quat2Mat(turn, model.mesh_quat[0])
     corners = points @ turn.reshape(3, 3).T + model.mesh_pos[0]
@@ -224,7 +228,7 @@ def _barycentric(points, triangle, values):
 
 @pytest.fixture(scope="module")
 def drawn():
-    """(u, v) that MuJoCo draws, by case."""
+    """Return (u, v) in MuJoCo's rendering, by case."""
     pictures = draw([build(case, *"uv", emission=1.0) for case in CASES], WIDTH, HEIGHT, 2)
     if pictures is None:
         pytest.skip("no OpenGL context: compared with the formulas alone")

@@ -1,4 +1,4 @@
-"""Light that differs between episodes: against lamps of that spectrum, CIE's chromaticities, and arithmetic."""
+"""Light that differs between episodes: against lamps with the same spectrum, CIE's chromaticities, and arithmetic."""
 
 import contextlib
 from dataclasses import replace
@@ -36,14 +36,15 @@ def first_look(task, n=4, seed=0):
 
 
 def steady(data, rng):
-    """An episode that begins alike, however much chance was drawn before."""
+    """Start the episode in a fixed state that does not depend on the random generator."""
     data.mocap_pos[0, 1] = 0.4
 
 
 @pytest.mark.parametrize("kelvins", [2000.0, 2500.0, 4000.0, 5000.0, 8000.0, 10_000.0])
 def test_filtered_daylight_has_the_temperature_that_is_said(kelvins):
-    """McCamy's approximation from CIE 1931 chromaticities (Color Res. Appl. 17, 1992), which knows no filter. Daylight
-    is no black body, so filters shift it by a little more or less: 7 mired are hardly seen."""
+    """McCamy's approximation from CIE 1931 chromaticities (Color Res. Appl. 17, 1992) is independent of the filters.
+    Daylight is not a black body, so filtered light deviates slightly: 7 mired are hardly visible.
+    """
     light = daylight(NM * 1e-9) * filter_to(kelvins, NM * 1e-9)
     x, y, z = light @ cie_1931(NM * 1e-9)
     n = (x / (x + y + z) - 0.3320) / (0.1858 - y / (x + y + z))
@@ -55,7 +56,7 @@ def test_filtered_daylight_has_the_temperature_that_is_said(kelvins):
 
 @pytest.mark.parametrize("kelvins", [2500.0, 10_000.0])
 def test_eyes_see_what_a_lamp_of_that_spectrum_shows(monkeypatch, kelvins):
-    """The lamp is measured, and goes another way: through the mirror's emitters and the bands' means."""
+    """The lamp's spectrum is measured and takes another path: through the mirror's emitters and the bands' means."""
     monkeypatch.setattr(Lit, "reset", lambda self, data, rng: steady(data, rng))
     warm = first_look(Lit(color_temperature=(kelvins, kelvins)), n=1)[0]
     lamp = Lit()
@@ -65,7 +66,8 @@ def test_eyes_see_what_a_lamp_of_that_spectrum_shows(monkeypatch, kelvins):
     luminance = [level @ cie_1931(NM * 1e-9)[:, 1] for level in (spectrum, daylight(NM * 1e-9))]
     plain = first_look(Lit(), n=1)[0]
     assert luminance[0] == pytest.approx(luminance[1])
-    # A measured lamp is as bright as its colour in the model says, whatever its table's unit: compare colours.
+    # The model's colour sets the brightness of a measured lamp, whatever the unit of its table, so only colours are
+    # compared.
     bright = plain[0, 0, 0].sum(axis=0) > 0.1
     ratios = [seen[0, 0, 0][[0, 2]][:, bright] / seen[0, 0, 0, 1][bright] for seen in (warm, measured, plain)]
     np.testing.assert_allclose(ratios[0], ratios[1], rtol=0.02)

@@ -1,4 +1,4 @@
-"""What tests hold of tasks, module by module.
+"""Tests of tasks: which test covers which module.
 
 reward: test_reward.py, test_task.py, envs/test_tasks_page.py
 placement: test_task.py

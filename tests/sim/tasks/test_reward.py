@@ -8,7 +8,7 @@ from sim.tasks.reward import MODES, TERMS, check_mode, reward_terms
 
 
 def table():
-    """Mode -> weights, as the module's docstring has them."""
+    """Return the weights of each mode from the module's docstring."""
     rows = [line.split() for line in reward.__doc__.splitlines()]
     return {row[0]: [float(number) for number in row[1:5]] for row in rows if row and row[0] in MODES and len(row) > 5}
 
@@ -19,12 +19,12 @@ def test_the_formulas_weights_are_those_in_use():
 
 @pytest.mark.parametrize("mode", MODES)
 def test_terms_add_up_to_the_formula(mode):
-    """Metres count by their number, events by having happened; all four at once, and none."""
+    """Metres count in proportion, and events count once; the cases have all four terms at once, and none."""
     price, goal, adversary, contact = table()[mode]
     terms = reward_terms(MODES[mode], np.array([0.5, 0.0]), *np.array([[True, False]] * 3))
     assert terms.shape == (len(TERMS), 2)
     assert terms.sum(axis=0).tolist() == pytest.approx([0.5 * price + goal + adversary + contact, 0.0])
-    assert not np.signbit(terms[:, 1]).any()  # -0.0 would print as a penalty
+    assert not np.signbit(terms[:, 1]).any()  # -0.0 would be printed as a penalty
 
 
 def test_an_unknown_mode_is_named():

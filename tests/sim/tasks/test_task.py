@@ -1,4 +1,4 @@
-"""Rewards, events, endings, placement and motion, against their definitions."""
+"""Rewards, events, endings, placement and motion against their definitions."""
 
 import dataclasses
 
@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from sim.physics.sliding_agents import MAX_TURN
-from sim.tasks.placement import Places
+from sim.tasks.placement import SpawnPoints
 from sim.tasks.reach import first_reached
 from sim.tasks.registry import task_of
 from sim.tasks.reward import EVALUATION, TRAINING
@@ -27,7 +27,7 @@ def maze():
 
 
 def facing(simulation, targets, distance):
-    """Every agent `distance` in front of the object with that index, looking at it, at full speed."""
+    """Return a state with every agent `distance` in front of the object with that index, facing it at full speed."""
     state = simulation.reset()
     rows = np.arange(simulation.n)
     spots = state.objects[rows, targets, :2]
@@ -59,7 +59,7 @@ def test_training_ends_at_goal_and_adversary(field):
 
 
 def test_a_world_of_goals_alone(field):
-    """No adversary: the nearest goal counts, and reaching one ends the episode as usual."""
+    """Without adversaries, the nearest goal counts, and reaching a goal ends the episode."""
     goals = dataclasses.replace(field, objects=("goal",))
     simulation = Simulation(task_of(goals), 2, 0)
     state = facing(simulation, np.array([0, 0]), 2.5)
@@ -73,7 +73,7 @@ def test_a_world_of_goals_alone(field):
 
 
 def test_passing_by_within_reach_counts_though_the_action_ends_beyond(field):
-    """2 m per action: at its end the agent is 1.05 m behind the goal, in between it went through it."""
+    """An action moves the agent 2 m. At its end the agent is 1.05 m past the goal, but it passed through the goal."""
     simulation = Simulation(task_of(field), 1, 0)
     state = facing(simulation, np.array([0]), 0.93)
     simulation.state = dataclasses.replace(state, position=state.position + np.array([0.0, 0.6]))
@@ -147,11 +147,11 @@ def test_actions_steer(field):
     step = simulation.step(np.array([[-1.0, 0.5], [-1.0, -1.0]]))
     turned = (step.state.heading - before.heading + np.pi) % (2 * np.pi) - np.pi
     np.testing.assert_allclose(turned, [0.5 * MAX_TURN, -MAX_TURN])
-    np.testing.assert_allclose(step.state.position, before.position, atol=1e-9)  # -1: stop
+    np.testing.assert_allclose(step.state.position, before.position, atol=1e-9)  # -1 means stop
 
 
 def _first_reached(path: np.ndarray, before: float, after: np.ndarray) -> list[list[int]]:
-    """In worlds of one object each, on the x-axis."""
+    """Return the substep at which agents reach the object in worlds of one object each, on the x-axis."""
     objects = [np.stack([x, np.zeros_like(x), np.zeros_like(x)], axis=-1)[:, None] for x in (before + 0 * after, after)]
     return first_reached(path, *objects).tolist()
 
@@ -165,13 +165,13 @@ def test_first_reached_follows_moving_objects():
 def test_a_broken_world_hides_no_event_of_its_neighbours():
     path = np.zeros((2, 10, 2))
     path[0] = np.nan
-    path[1, :, 0] = np.linspace(0, 2, 10)  # by the object's place, and a metre on
+    path[1, :, 0] = np.linspace(0, 2, 10)  # the agent passes the object and goes on for a metre
     assert _first_reached(path, 0.5, np.array([np.nan, 0.5]))[1] == [0]
 
 
 def test_starts_are_apart_and_varied(field):
     rng = np.random.default_rng(0)
-    places = Places(field.agent_spawn, field.object_spawn)
+    places = SpawnPoints(field.agent_spawn, field.object_spawn)
     starts = [places.draw(rng, 3) for _ in range(200)]
     for agent, objects in starts:
         gaps = np.linalg.norm(objects[:, None] - objects[None], axis=-1)[np.triu_indices(3, 1)]
@@ -184,7 +184,7 @@ def test_starts_are_apart_and_varied(field):
 
 def test_too_small_a_field_is_refused(field):
     with pytest.raises(ValueError, match="object_spawn"):
-        Places(field.agent_spawn, field.object_spawn[:1]).draw(np.random.default_rng(0), 3)
+        SpawnPoints(field.agent_spawn, field.object_spawn[:1]).draw(np.random.default_rng(0), 3)
 
 
 def test_tracked_objects_wander_inside_and_apart():
@@ -196,7 +196,8 @@ def test_tracked_objects_wander_inside_and_apart():
         before = states[-1]
         states.append(simulation.step(stay).state)
         walked = np.linalg.norm(states[-1].objects - before.objects, axis=-1)
-        assert walked[walked < 0.5].max() <= 0.5 * 0.2 + 1e-9  # 0.5 m/s; farther only when respawned
+        # the speed is 0.5 m/s; only respawned objects move farther
+        assert walked[walked < 0.5].max() <= 0.5 * 0.2 + 1e-9
     paths = np.stack([s.objects[:, :, :2] for s in states])
     low, high = world.object_spawn.min(axis=0), world.object_spawn.max(axis=0)
     assert (paths >= low - 1e-9).all()
@@ -215,7 +216,7 @@ def test_unknown_mode_and_task_are_refused(field):
 
 @pytest.mark.parametrize("n", [1, 3])
 def test_a_step_in_which_everybody_arrives_is_a_step_like_others(field, n):
-    """With goals alone: nothing is left that nobody has reached."""
+    """The step works although all objects are goals and are reached in all worlds."""
     goals = dataclasses.replace(field, objects=("goal",))
     simulation = Simulation(task_of(goals), n, 0)
     simulation.state = facing(simulation, np.zeros(n, int), 2.5)
@@ -226,7 +227,7 @@ def test_a_step_in_which_everybody_arrives_is_a_step_like_others(field, n):
 
 @pytest.mark.parametrize("adversary_first", [False, True])
 def test_one_action_may_reach_both_and_says_which_was_first(field, adversary_first):
-    """An action takes an agent up to 2 m; in evaluation both are paid for."""
+    """An action moves an agent up to 2 m. In evaluation, the reward includes both events."""
     simulation = Simulation(task_of(field, "evaluation"), 1, 0)
     state = simulation.reset()
     objects = state.objects.copy()

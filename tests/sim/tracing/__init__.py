@@ -1,4 +1,4 @@
-"""What tests hold of ray tracing, module by module.
+"""Tests of ray tracing: which test covers which module.
 
 tracer: test_closed_form_tracer.py
 closed_form_tracer: test_closed_form_tracer.py, worlds/test_foraging.py
@@ -19,7 +19,7 @@ areas.branches: test_areas.py
 areas.columns: test_areas.py
 areas.half_planes: test_area_integrals.py, test_areas.py
 areas.illumination: test_illumination.py, test_areas.py
-areas.lit_bodies: test_lit_bodies.py, test_light_table.py
+areas.illuminated_bodies: test_illuminated_bodies.py, test_light_table.py
 areas.body_light: test_body_light.py, test_areas.py
 areas.borders: render/test_area_kernel.py
 areas.patch: test_areas.py

@@ -1,4 +1,4 @@
-"""Worlds and views that areas are tried in: near objects, and in corridors that go down in steps."""
+"""Worlds and views for tests of areas: near objects, and corridors whose walls form steps."""
 
 import dataclasses
 
@@ -15,7 +15,7 @@ from sim.worlds.state import WorldState
 from sim.worlds.world import build_world
 
 VIEWS = 32
-SIGMA = 0.01  # the default eye's noise, in which errors are told
+SIGMA = 0.01  # the noise of the default eye, as the unit of errors
 EYES = sim.Eyes()
 COARSE = sim.Eyes(n_eyes=7, resolution=(3, 3), placement_range_deg=180.0)
 BEE = sim.Eyes(receptors="honeybee", bands=6)
@@ -23,9 +23,11 @@ ROW = sim.Eyes(n_eyes=10, resolution=(1, 4))
 
 
 def stairs(change=None) -> sim.World:
-    """A corridor, two cells wide, between walls of 2 m that go down a diagonal in steps, with stripes of two widths.
+    """Return a world with a corridor, two cells wide, between walls of 2 m that follow a diagonal in steps, with
+    stripes of two widths.
 
-    change: what is done to one of the walls"""
+    change: a function applied to one of the walls
+    """
     spec = mujoco.MjSpec.from_string(
         '<mujoco><visual><headlight active="0"/></visual><worldbody>'
         '<body name="agent" pos="0 0 .2"><joint name="agent_x" type="slide" axis="1 0 0"/>'
@@ -33,7 +35,7 @@ def stairs(change=None) -> sim.World:
         '<geom size=".2"/></body></worldbody></mujoco>'
     )
     materials.add_daylight(spec)
-    materials.add_plain(spec, "floor", 0.3)  # far brighter than the tasks', so that its shadows count
+    materials.add_plain(spec, "floor", 0.3)  # far brighter than in the tasks, so that shadows on the floor matter
     materials.add_texture(spec, "stripes", materials.stripes((8, 256), 2, axis=1))
     for i, period in enumerate((1.0, 1.6)):
         materials.add_textured(spec, f"stripes_{i}", "stripes", repeat=(2 / period, 1), uniform=True)
@@ -51,8 +53,9 @@ def stairs(change=None) -> sim.World:
 
 
 def views(world, n=VIEWS, seed=0) -> WorldState:
-    """Agents anywhere, looking anywhere: a body's width off the walls at least, half of them at an object 0.8 to 4 m
-    away, where there are objects."""
+    """Return agents at random positions and headings, at least a body's width from the walls. If there are objects,
+    half of the agents look at one 0.8 to 4 m away.
+    """
     rng = np.random.default_rng(seed)
     state = Simulation(task_of(build_world("detection")), n, seed).reset()
     objects = state.objects[:, : len(world.objects)]
@@ -75,7 +78,7 @@ def views(world, n=VIEWS, seed=0) -> WorldState:
 
 @dataclasses.dataclass(frozen=True)
 class Case:
-    """A world's views, what rays see there, and which receptors see an object."""
+    """Views of a world, the reference by rays, and the receptors that see an object."""
 
     world: sim.World
     eyes: sim.Eyes
@@ -85,14 +88,15 @@ class Case:
 
     @classmethod
     def of(cls, world, eyes, rays):
-        """rays: per receptor, of the truth"""
+        """Return the case. rays: number per receptor for the reference"""
         state = views(world)
         truth = sim.BatchedRenderer(world, eyes, state.n, sim.Fidelity(rays, eyes.bands)).signals(state)
         return cls(world, eyes, state, truth, sees_object(world, eyes, state))
 
     def errors(self, samples, kind="areas"):
-        """Root mean square, of the noise that a perfect lens has beside its signals: over all receptors, and over those
-        that see an object."""
+        """Return the root-mean-square error, relative to the noise of a perfect lens: over all receptors, and over
+        receptors that see an object.
+        """
         fidelity = sim.Fidelity(samples, self.eyes.bands, samples=kind)
         signals = sim.BatchedRenderer(self.world, self.eyes, self.state.n, fidelity).signals(self.state)
         error = (signals - self.truth).transpose(0, 1, 3, 4, 2) / SIGMA / self.eyes.eye().throughput
@@ -101,7 +105,7 @@ class Case:
 
 
 def sees_object(world, eyes, state) -> np.ndarray:
-    """Which receptors have a part of an object in their square, or nearly, (env, eye, h, w)."""
+    """Return the receptors with a part of an object in or near their square, (env, eye, h, w)."""
     height, width = eyes.resolution
     pitch = 2 * np.tan(np.radians(eyes.fov_deg) / 2) / width
     y, x = np.indices(eyes.resolution)

@@ -1,14 +1,15 @@
-"""Bodies in detection's room that stand in each other's light."""
+"""Bodies in the room of the detection task that shade each other."""
 
 import numpy as np
 
 WORLDS = 24
-HALF_ROOM = np.array([11.0, 9.0])  # detection's, between its walls [m]
+HALF_ROOM = np.array([11.0, 9.0])  # half of the detection room, between its walls [m]
 
 
 def bodies_of(scene):
-    """Centres (world, body, 3), the agent's last: beside walls, and some way apart, so that lights are often shut off
-    by both."""
+    """Return centres (world, body, 3), the agent's last. Bodies are near walls and apart from each other, so that
+    lights are often blocked by both.
+    """
     radii, rng, found = scene.upright.bodies.radii, np.random.default_rng(4), []
     heights = [*[0.5] * (len(radii) - 1), 0.2]
     room = HALF_ROOM - 0.55

@@ -1,4 +1,4 @@
-"""The integrals that areas are made of, against sums over very many points."""
+"""The integrals over areas against sums over very many points."""
 
 import drjit as dr
 import mitsuba as mi
@@ -10,8 +10,10 @@ from sim.tracing.areas.patch import Area
 
 
 def test_shares_of_spheres():
-    """Against a count of 200 x 200 points, of spheres from right before the eye to 6 m away, of which some fill the
-    area and others lie within it. Exact but for what the area cuts off, where a chord stands for a strip's."""
+    """The reference counts 200 x 200 points. Spheres are between directly in front of the eye and 6 m away; some fill
+    the area, and others lie within it. The result is exact unless the area's border cuts the sphere: there, a chord
+    approximates each strip's edge.
+    """
     rng = np.random.default_rng(3)
     n, radius = 300, 0.5
     azimuth, (width, height), (x, up) = (
@@ -50,7 +52,7 @@ def test_shares_of_spheres():
     assert np.abs(error[within]).max() < 1e-3
     assert np.abs(error).max() < 0.03
     assert np.sqrt(np.mean(error**2)) < 0.003
-    # The whole that light is found for is as large, and lies in the middle; any one of its strips does not.
+    # The light is computed for a whole that has the same size and is centred. No single strip is centred.
     assert np.abs(whole.share.numpy()[within] - found[within]).max() < 1e-3
     places = np.einsum("nhw,ahw->an", expected, ab)[:, within] / expected.sum(axis=(1, 2))[within]
     for strip, in_the_middle in ((whole, True), (strips[0], False), (strips[2], False)):
@@ -59,7 +61,9 @@ def test_shares_of_spheres():
 
 
 def test_shares_above_lines():
-    """Against a count of 400 x 400 points: a line crosses 800 of their cells at most, so that is known to 1/200."""
+    """The reference counts 400 x 400 points. A line crosses at most 800 of their cells, so that the reference is
+    accurate to 1/200.
+    """
     rng = np.random.default_rng(0)
     s, p, q = rng.uniform(-1, 1, (3, 300))
     p[:50], q[50:100] = 0, 0
@@ -82,7 +86,7 @@ def test_means_of_clamped_lines():
 
 
 def test_textures_are_averaged():
-    """Over stretches and parallelograms of any size, against the mean of many texels looked up."""
+    """Averages over segments and parallelograms of any size agree with the mean of many texel lookups."""
     rng = np.random.default_rng(2)
     texels = np.concatenate([rng.random((512, 2)), np.repeat(rng.random((8, 2)), 32, axis=0)])
     places = np.array([[0, 512], [512, 256]])

@@ -1,4 +1,4 @@
-"""Areas in closed form against what very many rays see of the same worlds."""
+"""Area sampling in closed form against very many rays in the same worlds."""
 
 import dataclasses
 
@@ -15,7 +15,7 @@ from sim.tracing.areas.patch import Rectangle
 from sim.worlds.world import build_world
 from tests.sim.tracing.area_views import BEE, COARSE, EYES, ROW, Case, stairs, views
 
-RAYS = 1024  # their own error: 0.03 of the noise
+RAYS = 1024  # their own error is 0.03 of the noise
 
 
 @pytest.fixture(scope="module")
@@ -35,9 +35,9 @@ def cases():
     return found
 
 
-# Largest errors over all receptors and over those that see an object, in noise: a quarter more than measured with these
-# views. For comparison: 32 and 64 rays err by .29 and .16 in detection, by .73 and .39 on objects; by .81 and .42 in
-# the maze.
+# Largest errors over all receptors and over receptors that see an object, relative to the noise: a quarter more than
+# measured with these views. For comparison, 32 and 64 rays have errors of 0.29 and 0.16 in detection, of 0.73 and 0.39
+# on objects, and of 0.81 and 0.42 in the maze.
 TOLERANCE = {
     ("detection", 1): (0.11, 0.29),
     ("detection", 4): (0.062, 0.172),
@@ -61,7 +61,7 @@ def test_an_area_sees_what_a_thousand_rays_see(cases, name, areas):
 
 
 def test_errors_vanish_with_smaller_areas(cases):
-    """What is left of them is the rays' own error: nothing but smallness is neglected."""
+    """Only the error of the reference rays remains: all approximations vanish with the size of areas."""
     for name in ("detection", "foraging"):
         errors = [cases[name].errors(areas)[0] for areas in (1, 4, 16)]
         assert errors[1] < 0.7 * errors[0]
@@ -70,7 +70,7 @@ def test_errors_vanish_with_smaller_areas(cases):
 
 
 def no_edges(monkeypatch):
-    """Where one wall gives way to the next is not found: in the middle."""
+    """A mutant that places the edge between two walls in the middle of an area."""
     monkeypatch.setattr(columns.Columns, "_edge", lambda self, area, left, right: mi.Float(0))
 
 
@@ -87,7 +87,7 @@ def no_body_shadows(monkeypatch):
 
 
 def sums_off_by_a_stripe(monkeypatch):
-    """A prefix sum that begins a twelfth of the texture too late."""
+    """A mutant whose prefix sum starts a twelfth of the texture too late."""
     right = stripes.Stripes._rows
     monkeypatch.setattr(
         stripes.Stripes,
@@ -97,7 +97,7 @@ def sums_off_by_a_stripe(monkeypatch):
 
 
 def no_filter(monkeypatch):
-    """Textures are looked up in the middle of a patch, as by a ray."""
+    """A mutant that looks up textures in the middle of a patch, like a ray."""
     right = stripes.Stripes.mean_over
     monkeypatch.setattr(
         stripes.Stripes,
@@ -107,7 +107,7 @@ def no_filter(monkeypatch):
 
 
 def all_or_nothing(monkeypatch):
-    """A sphere fills the area or does not, as its middle says."""
+    """A mutant in which a sphere fills the whole area or none of it, depending on the middle."""
     right = sphere_areas.SphereView.strip
 
     def strip(self, number):
@@ -119,23 +119,23 @@ def all_or_nothing(monkeypatch):
 
 
 def objects_are_transparent(monkeypatch):
-    """What is farther away is seen through what is nearer."""
+    """A mutant in which objects do not hide the background."""
     monkeypatch.setattr(sphere_areas, "hidden_by", lambda way, radius, slice_: mi.Float(0))
 
 
 def hidden_evenly(monkeypatch):
-    """Objects hide as much of the wall as of the floor, wherever in the area they are."""
+    """A mutant in which objects hide the same share of wall and floor, wherever they are in the area."""
     right = columns.Columns.behind
 
     def behind(self, area, piece, part):
         whole, share = right(self, area, piece, Rectangle(0, 0, 1, 1)), part.width * part.height
-        return dataclasses.replace(whole, below=whole.below * share, beside=whole.beside * share)
+        return dataclasses.replace(whole, below=whole.floor_share * share, beside=whole.wall_share * share)
 
     monkeypatch.setattr(columns.Columns, "behind", behind)
 
 
 def lines_everywhere(monkeypatch):
-    """Strips lie across the whole area, whatever part of it a sphere fills."""
+    """A mutant in which strips extend across the whole area, whatever part of it a sphere fills."""
     right = sphere_areas.SphereView.__init__
 
     def init(self, *args):
@@ -200,7 +200,7 @@ def test_unknown_samples_are_refused():
     ],
 )
 def test_other_worlds_are_refused(change, reason):
-    """In one line that says why; never traced in another way in silence."""
+    """A one-line error gives the reason; such worlds are never traced in another way without notice."""
     with pytest.raises(ValueError, match="samples = 'areas': this world has no closed form: .*" + reason):
         sim.BatchedRenderer(stairs(change), EYES, 1, AREAS)
 

@@ -1,4 +1,4 @@
-"""What eyes behind a pupil see by areas, against what very many rays through the same pupil see of the same worlds."""
+"""Area sampling behind a pupil against very many rays through the same pupil in the same worlds."""
 
 import dataclasses
 
@@ -21,7 +21,7 @@ def behind_lens(eyes, a):
     )
 
 
-# An open hole: light of one direction falls on several receptors, and red light on more of them than blue.
+# An open pinhole: light of one direction falls on several receptors, and red light on more of them than blue light.
 HOLE = dataclasses.replace(EYES, optics=optics.Pupil(6e-6))
 
 
@@ -39,7 +39,7 @@ def cases():
     return found
 
 
-# Largest errors over all receptors and over those that see an object, about a quarter more than measured with these
+# Largest errors over all receptors and over receptors that see an object, about a quarter more than measured with these
 # views.
 TOLERANCE = {
     ("detection, a = 1/4", 1): (0.224, 0.51),
@@ -61,13 +61,13 @@ def test_areas_see_what_very_many_rays_see(cases, name, areas):
 
 @pytest.mark.parametrize(("name", "rays"), [("detection, a = 1/4", 8), ("detection, a = 1/2", 8), ("maze, a = 0.8", 8)])
 def test_one_area_errs_less_than_many_rays(cases, name, rays):
-    """Over all receptors, and over those that see an object."""
+    """The limits are for all receptors and for receptors that see an object."""
     pairs = zip(cases[name].errors(1), cases[name].errors(rays, "rays"), strict=True)
     assert all(by_areas < by_rays / 2 for by_areas, by_rays in pairs if by_rays)
 
 
 def sharp(self, fields, receptors, right=field_areas.FieldAreas.weights):
-    """As if the pupil did not blur."""
+    """A mutant without the blur of the pupil."""
     weights = right(self, fields, receptors)
     return (weights == weights.max(axis=2, keepdims=True)) * fields.power[:, None, None]
 

@@ -1,4 +1,4 @@
-"""Light on what is seen of a body, against light that is found for every slope by itself."""
+"""Light on the visible part of a body, against light that is computed separately for every slope."""
 
 import dataclasses
 
@@ -10,7 +10,7 @@ import pytest
 from sim.render.world_scene import WorldScene
 from sim.scene.variant import variant
 from sim.tracing.areas.body_light import BodyLight
-from sim.tracing.areas.illumination import Illumination, Moment
+from sim.tracing.areas.illumination import FrameState, Illumination
 from sim.tracing.areas.light_table import sum_of
 from sim.tracing.areas.patch import Patch
 from sim.worlds.world import build_world
@@ -31,18 +31,18 @@ def moment(tracer, centres):
     place = dr.arange(mi.UInt32, tracer.places * WORLDS) % tracer.places
     spread = [mi.Point3f(np.repeat(c, tracer.places, axis=0).T.astype(np.float32)) for c in np.moveaxis(centres, 1, 0)]
     lit = tracer.lit(place, spread, tracer.inputs)
-    return Moment(bodies, tracer.inputs, dr.arange(mi.UInt32, WORLDS), lit)
+    return FrameState(bodies, tracer.inputs, dr.arange(mi.UInt32, WORLDS), lit)
 
 
 def patch_of(tracer, now, side):
-    """Of the first body, where it slopes like this."""
+    """Return a patch of the first body at this surface normal."""
     normal = mi.Normal3f(*map(float, side))
     along = dr.normalize(dr.cross(normal, mi.Vector3f(0.1, 0.2, 1)))
     return Patch(now.bodies[0] + normal * tracer._radii[0], normal, along * SIZE, dr.cross(normal, along) * SIZE)
 
 
 def by_itself(tracer, patch, now):
-    """Per component and world: straight from the lights, and what walls, floor and other bodies send on."""
+    """Return the light per component and world: direct light, and light reflected by walls, floor and other bodies."""
     straight = tracer._illumination.arriving(patch.normal, tracer._illumination.lit(patch, now, 0))
     free = [sum_of(fours, patch.normal) for fours in tracer._reflected.on_body(0, now.bodies[0], now.inputs.reflected)]
     reflected = tracer._illumination.past_bodies(patch, free, now, 0)
@@ -55,7 +55,7 @@ def on(light, patch):
 
 def light_at(tracer, now, side):
     patch = patch_of(tracer, now, side)
-    return BodyLight.of(tracer._illumination, tracer._reflected, 0, patch, now), patch
+    return BodyLight.on_patch(tracer._illumination, tracer._reflected, 0, patch, now), patch
 
 
 @pytest.mark.parametrize("side", SIDES)
@@ -66,14 +66,16 @@ def test_on_its_own_slope_it_is_what_is_found_by_itself(scene, side):
         light, patch = light_at(tracer, now, side)
         expected = by_itself(tracer, patch, now)
         np.testing.assert_allclose(on(light, patch), expected, rtol=1e-5, atol=1e-6)
-        # What other bodies shade and send on is in it, and is worth noticing.
+        # Other bodies' shadows and reflections are included, and are not negligible.
         unchanged = dataclasses.replace(light, change=[mi.Float(0)] * len(light.change))
         assert np.abs(on(unchanged, patch) - expected).max() > 0.01 * expected.max()
 
 
 def test_slopes_nearby_have_their_own_light(scene):
-    """Twelve degrees off, as at the rim of what an eye of 15 x 15 sees of a body in one receptor: to 1 % of the
-    brightest in the mean (root of squares), where light of the middle's slope errs by five times as much."""
+    """An eye of 15 x 15 receptors may see a body in one receptor, whose rim is then twelve degrees off. The
+    root-mean-square error is 1 % of the brightest light; with the light of the middle's slope it would be five times as
+    large.
+    """
     turned = np.array([np.cos(np.radians(12)), np.sin(np.radians(12)), 0.0])
     with variant():
         tracer = scene.areas("all")
@@ -101,7 +103,7 @@ def test_shadows_of_other_bodies_are_noticed(scene, monkeypatch):
         now = moment(tracer, bodies_of(scene))
         light, patch = light_at(tracer, now, SIDES[0])
         expected = by_itself(tracer, patch, now)
-        monkeypatch.setattr(Illumination, "lit", lambda self, *_: [mi.Float(1)] * len(self._directions))
+        monkeypatch.setattr(Illumination, "visibility", lambda self, *_: [mi.Float(1)] * len(self._directions))
         unshaded, _ = light_at(tracer, now, SIDES[0])
         assert np.abs(on(unshaded, patch) - expected).max() > 0.2 * expected.max()
         np.testing.assert_allclose(on(light, patch), expected, rtol=1e-5, atol=1e-6)

@@ -1,4 +1,4 @@
-"""Walls in closed form against Mitsuba's ray tracing of the same stage, ray by ray."""
+"""Walls in closed form against Mitsuba's ray tracing of the same scene, ray by ray."""
 
 import dataclasses
 from types import SimpleNamespace
@@ -25,7 +25,7 @@ FOUR_RAYS = sim.Fidelity(4, EYES.bands)
 
 
 def scattered(world, n, seed=0):
-    """A state with agents in random directions and places, objects about them."""
+    """Return a state with agents at random positions and headings, and objects around them."""
     rng = np.random.default_rng(seed)
     state = Simulation(task_of(world), n, seed).reset()
     places = world.agent_spawn if not world.objects else np.concatenate([world.agent_spawn, world.object_spawn])
@@ -35,7 +35,7 @@ def scattered(world, n, seed=0):
 
 
 def radiances(world, state):
-    """Along every ray, by both tracers, (ray, band)."""
+    """Return the radiance along every ray by both tracers, (ray, band)."""
     return [
         sim.BatchedRenderer(world, EYES, state.n, FOUR_RAYS, name).radiance(state).reshape(-1, EYES.bands)
         for name in ("closed_form", "mitsuba")
@@ -53,7 +53,7 @@ def radiances(world, state):
     ],
 )
 def test_every_ray_sees_what_mitsuba_sees(task, seed, mazes):
-    """All rays agree to float32, but for the few that graze an edge (of a stripe, a wall, a shadow)."""
+    """All rays agree to float32, except for the few that graze an edge of a stripe, a wall or a shadow."""
     world = build_world(task, seed=seed, mazes=mazes)
     ours, theirs = radiances(world, scattered(world, 24, seed))
     different = np.abs(ours - theirs).max(axis=1) > 2e-3
@@ -77,13 +77,15 @@ BOXES = """<mujoco><asset>
 
 
 def furnished(n_boxes, *, grid, floor="t", extra="", seed=0):
-    """Coloured walls of random sizes and heights, textured along both axes, turned by quarter turns."""
+    """Return a world with coloured walls of random sizes and heights, textured along both axes, rotated by multiples of
+    90°.
+    """
     rng = np.random.default_rng(seed)
     boxes = []
     for i in range(n_boxes):
         angle = 2 * np.pi * (i + 0.5) / n_boxes
         x, y = 5.5 * np.cos(angle), 5.5 * np.sin(angle)
-        # On the grid of half metres, alternate cells apart; else anywhere.
+        # Walls are on a grid of half metres, in alternate cells, or at random positions.
         half = np.array([0.25, 0.25]) if grid else rng.uniform(0.1, 0.9, 2)
         if grid:
             x, y = np.floor(2 * x) / 2 + 0.25, np.floor(2 * y) / 2 + 0.25
@@ -101,7 +103,7 @@ def furnished(n_boxes, *, grid, floor="t", extra="", seed=0):
 
 
 def around(world, n, seed):
-    """Agents on the world's spots, the goal anywhere near."""
+    """Return a state with agents at the world's spawn points, and the goal near them at random."""
     rng = np.random.default_rng(seed)
     template = Simulation(task_of(build_world("detection")), n, 0).reset()
     goal = np.concatenate([rng.uniform(-3, 3, (n, 1, 2)), np.full((n, 1, 1), 0.5)], axis=-1)
@@ -128,7 +130,7 @@ def test_coloured_walls_of_any_height_under_coloured_lights(n_boxes, grid, seed)
         ('<geom type="box" pos="2 0 .9" size=".2 .5 .5"/>', "does not stand on the floor"),
         ('<geom type="box" pos="2 0 .05" size=".2 .5 .05"/>', "ends below the eyes"),
         ('<geom type="plane" pos="0 0 .01" size="1 1 1"/>', "2 floors"),
-        ('<geom type="box" pos="8.9 0 .5" size=".5 .5 .5"/>', "beside the floor"),
+        ('<geom type="box" pos="8.9 0 .5" size=".5 .5 .5"/>', "beyond the floor"),
         ('<light type="directional" dir="0 .1 1" ambient="0 0 0"/>', "from below"),
     ],
 )
@@ -147,7 +149,7 @@ def test_unknown_tracers_are_refused():
 
 
 def test_the_atlas_holds_mitsubas_reflectances():
-    """At the texels' centres and between them, for a texture with colours along both axes."""
+    """Reflectances agree at the texels' centres and between them, for a texture with colours along both axes."""
     world = furnished(2, grid=False)
     stage = WorldScene(world, EYES)
     wavelengths = EYES.eye().spectral_bands.wavelengths
@@ -185,7 +187,7 @@ def test_as_many_components_as_independent_spectra():
 
 
 def test_a_cell_beyond_any_side_of_the_grid_is_outside():
-    """Else a ray that leaves the field would read the height of a wall that is none."""
+    """Otherwise a ray that leaves the field would read a wall height outside the grid."""
     grid = SimpleNamespace(_columns=3, _rows=2)
     with variant():
         column, row = mi.Int32([0, 2, -1, 3, 0, 0]), mi.Int32([0, 1, 0, 0, -1, 2])
@@ -194,7 +196,7 @@ def test_a_cell_beyond_any_side_of_the_grid_is_outside():
 
 
 def test_components_of_greys_are_their_reflectances():
-    """What a grey texel sends on is its own reflectance times what arrives: radiance / irradiance = reflectance / π."""
+    """A grey texel's reflectance satisfies radiance / irradiance = reflectance / π."""
     texels, light = np.repeat([[0.2], [0.5], [0.9]], 4, axis=1), np.array([[1.0, 2.0, 3.0, 1.5]])
     few = reflected_components_of(texels, light)
     assert few.basis.shape == (1, 4)

@@ -1,4 +1,4 @@
-"""How brightly a body shines on what is near it, against closed forms and the cap of it that is seen."""
+"""Light that a body reflects onto near surfaces, against closed forms and the visible cap of the body."""
 
 from types import SimpleNamespace
 
@@ -11,9 +11,10 @@ from sim.tracing.areas.illumination import Illumination
 
 
 def test_a_body_shines_as_lamberts_sphere():
-    """Its disk seen from where the light comes from is 2/3 as bright as a matt disk, from behind it is dark, and from
-    the side 2/(3π) (its phase function is sin α + (π - α) cos α, over π). From close by only the nearest point is
-    seen, which is as bright as the light falls on it."""
+    """The body's disk is 2/3 as bright as a matt disk from the direction of the light, 0 from behind, and 2/(3π) from
+    the side. (The phase function is sin α + (π - α) cos α, over π.) Only the nearest point is visible from a short
+    distance, and has the brightness of the incident light.
+    """
     straight = SimpleNamespace(_levels=np.array([[0.8]]), _directions=[[0.0, 0.0, 1.0]], _colours=[[0.5]], _radii=[0.2])
     with variant():
         straight.bodies = SimpleNamespace(on_side=lambda *_: [mi.Float(1.0)])
@@ -28,13 +29,14 @@ def test_a_body_shines_as_lamberts_sphere():
 
 @pytest.mark.parametrize("nearness", [0.2, 0.5, 0.8])
 def test_between_near_and_far_a_body_shines_as_its_visible_cap(nearness):
-    """Against the mean over the cap that is seen, weighted by its projected solid angle: to .05 of the light, which is
-    what the fit leaves. Either end alone errs by more."""
+    """The reference is the mean over the visible cap, weighted by projected solid angle. The fit's error is up to 0.05
+    of the light. The formula for either end has a larger error.
+    """
     rng = np.random.default_rng(0)
     sine, around = np.sqrt(rng.random(20_000)) * nearness, rng.uniform(0, 2 * np.pi, 20_000)
     ray = np.stack([sine * np.cos(around), sine * np.sin(around), np.sqrt(1 - sine**2)], axis=-1)
     t = ray[:, 2] - np.sqrt(ray[:, 2] ** 2 - 1 + nearness**2)
-    normals = (ray * t[:, None] - [0, 0, 1]) / nearness  # of a ball at distance 1; it is seen from -z
+    normals = (ray * t[:, None] - [0, 0, 1]) / nearness  # a ball at distance 1, seen from -z
     straight = SimpleNamespace(_levels=np.array([[1.0]]), _directions=[[0.0, 0.0, 1.0]], _colours=[[1.0]], _radii=[0.2])
     errors = {nearness: [], 0.0: [], 1.0: []}
     with variant():

@@ -1,4 +1,4 @@
-"""Light that is reflected twice, looked up in tables, against what very many rays bring of it."""
+"""Light that is reflected twice, looked up in tables, against very many rays."""
 
 import dataclasses
 import os
@@ -13,19 +13,19 @@ import sim
 from sim.render.world_scene import WorldScene
 from sim.scene.variant import variant
 from sim.tracing import lighting
-from sim.tracing.areas import illumination, light_baking, light_store, light_table, lit_bodies
+from sim.tracing.areas import illuminated_bodies, illumination, light_baking, light_store, light_table
 from sim.worlds.layout import Starts
 from sim.worlds.state import WorldState
 from sim.worlds.world import build_world
 from tests.sim.tracing.area_views import BEE, EYES, ROW, SIGMA, sees_object, stairs, views
 
 VIEWS = 12
-RAYS = {EYES: 1024, BEE: 1024, ROW: 8192}  # their own error: 0.04 of the noise
+RAYS = {EYES: 1024, BEE: 1024, ROW: 8192}  # their own error is 0.04 of the noise
 
 
 @pytest.fixture(autouse=True)
 def own_store(monkeypatch, tmp_path_factory):
-    """Not the user's."""
+    """Use a temporary store instead of the user's cache."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("light")))
 
 
@@ -42,7 +42,7 @@ class Case:
     truth: np.ndarray
 
     def error(self):
-        """Of the second reflection alone, root mean square, in noise."""
+        """Return the root-mean-square error of the second reflection alone, relative to the noise."""
         both, direct = (
             signals(self.world, self.eyes, self.state, "areas", light=light)
             for light in (lighting.BOUNCE, lighting.DIRECT)
@@ -64,9 +64,9 @@ def cases():
     return found
 
 
-# Largest errors, in noise: a quarter more than measured with these views. In all, what is reflected twice is 0.98,
-# 0.77, 3.4 and 7.1 of it. What is left is what bodies do to the light, most of all close to walls and
-# before a bright floor.
+# Largest errors, relative to the noise: a quarter more than measured with these views. All light that is reflected
+# twice is 0.98, 0.77, 3.4 and 7.1 times the noise. The remaining error is the bodies' effect on this light, most of all
+# close to walls and in front of a bright floor.
 TOLERANCE = {"detection": 0.081, "foraging": 0.055, "navigation": 0.40, "stairs": 0.34}
 
 
@@ -76,14 +76,14 @@ def test_tables_say_what_rays_bring(cases, name):
 
 
 def no_bodies(monkeypatch):
-    """Bodies neither hide what is reflected nor reflect."""
+    """A mutant in which bodies neither hide reflected light nor reflect it."""
     monkeypatch.setattr(
         illumination.Illumination, "past_bodies", lambda self, patch, arriving, now, itself=-1: arriving
     )
 
 
 def no_floor_shadows(monkeypatch):
-    """The floor sends on as much light where bodies shade it."""
+    """A mutant in which the floor reflects the same light in the shade of bodies."""
     monkeypatch.setattr(
         illumination.Illumination, "_shadow", lambda self, k, patch, now: [mi.Float(0) for _ in self._floor_colour]
     )
@@ -98,7 +98,7 @@ def nothing_on_spheres(monkeypatch):
 
 
 def table_of_another_world(monkeypatch):
-    """Of one whose floor is as bright as its walls."""
+    """A mutant with the table of a world whose floor is as bright as its walls."""
     right = light_table.LightTable.__init__
 
     def other(self, tracer, radii, heights):
@@ -114,7 +114,7 @@ def table_of_another_world(monkeypatch):
 
 
 def other_side_of_the_cell(monkeypatch):
-    """Light of the wall across the corridor."""
+    """A mutant with the light of the wall across the corridor."""
     right = light_table.LightTable.on_wall
 
     def turned(self, patch, inputs):
@@ -142,7 +142,7 @@ def test_wrong_tables_are_noticed(cases, monkeypatch, mutant, name):
 
 
 def test_a_body_in_anothers_shade_reflects_little(monkeypatch):
-    """An agent close to an object, on the side that the object keeps the light from."""
+    """An agent is close to an object, in the object's shadow."""
     world = build_world("detection")
     state = views(world, 1)
     objects = state.objects.copy()
@@ -158,13 +158,15 @@ def test_a_body_in_anothers_shade_reflects_little(monkeypatch):
         return np.sqrt(np.mean((found[0] - found[1] - both + direct).transpose(0, 1, 3, 4, 2)[seen] ** 2))
 
     shaded = error()
-    monkeypatch.setattr(lit_bodies, "lit_past_sphere", lambda patch, directions, *_: [mi.Float(1) for _ in directions])
+    monkeypatch.setattr(
+        illuminated_bodies, "lit_past_sphere", lambda patch, directions, *_: [mi.Float(1) for _ in directions]
+    )
     assert shaded < 0.5
     assert error() > 2 * shaded
 
 
 def more_often(world, eyes, state):
-    """What light that is reflected more than twice adds, in noise: by areas, and by Mitsuba's paths."""
+    """Return the contribution of more than two reflections, relative to the noise: by areas, and by Mitsuba's paths."""
     everything, twice = (signals(world, eyes, state, "areas", light=light) for light in (lighting.ALL, lighting.BOUNCE))
     paths = [
         sim.ReferenceRenderer(
@@ -177,13 +179,16 @@ def more_often(world, eyes, state):
 
 
 def share_of(found, truth):
-    """By which factor it is too strong or weak, in the least squares of all receptors; noise averages out."""
+    """Return the factor by which the light is too strong or weak, by least squares over all receptors; noise averages
+    out.
+    """
     return np.sum(found * truth) / np.sum(truth**2)
 
 
 def test_light_that_is_reflected_more_often(monkeypatch):
-    """It is worth 3.9 of the noise here, of which Mitsuba's samples leave .55; a table that ends one reflection early
-    lacks a third."""
+    """These reflections are 3.9 times the noise here, and Mitsuba's samples have an error of 0.55. A table that ends
+    one reflection early lacks a third.
+    """
     world, eyes = stairs(), sim.Eyes(n_eyes=4, resolution=(1, 4))
     state = views(world, 6)
     found, truth = more_often(world, eyes, state)
@@ -197,12 +202,12 @@ def test_light_that_is_reflected_more_often(monkeypatch):
 
 
 def tables(world):
-    """As they are stored, of a world in bounced light."""
+    """Return the stored tables of a world in bounced light."""
     return WorldScene(world, EYES).areas(lighting.BOUNCE).inputs.reflected
 
 
 def test_tables_are_baked_once_per_world(monkeypatch):
-    """The same world finds them on disk, bit by bit; another one does not take them."""
+    """The same world loads its tables from disk, bit for bit. Another world does not use them."""
     world, other = build_world("detection"), build_world("detection", spectra={"wall": flat(0.3)})
     first = tables(world)
     baked = []
@@ -259,11 +264,11 @@ def test_worlds_without_walls_reflect_nothing_twice():
     state = views(world, 4)
     by_areas, by_rays = signals(world, EYES, state, "areas"), signals(world, EYES, state, "rays", rays=256)
     assert by_rays.max() > 5
-    assert np.sqrt(np.mean((by_areas - by_rays) ** 2)) < 0.1  # the floor's rim in four areas, with 256 rays' own error
+    assert np.sqrt(np.mean((by_areas - by_rays) ** 2)) < 0.1  # the floor's rim in four areas, and the error of 256 rays
 
 
 def test_harmonics_hold_any_smooth_light():
-    """Those of degree 3 and below are fitted exactly, from the normals that are baked."""
+    """Polynomials of degree 3 and below are fitted exactly, from the baked normals."""
     normals = light_baking._evenly(light_baking.NORMALS)
     fit = np.linalg.pinv(np.stack(light_baking.spherical_harmonics(*normals.T), axis=-1))
     x, y, z = np.random.default_rng(0).normal(size=(3, 50))

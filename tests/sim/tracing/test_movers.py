@@ -1,4 +1,4 @@
-"""Rays that meet movers, against MuJoCo's own ray caster."""
+"""Intersections of rays with moving geoms, against MuJoCo's own ray caster."""
 
 import drjit as dr
 import mujoco
@@ -46,7 +46,7 @@ def posed(model, seed, spread=0.4):
 
 
 def cast(model, data, pupil, directions):
-    """Depth along the axis of what MuJoCo's rays meet."""
+    """Return the depth along the axis of the points that MuJoCo's rays hit."""
     found, geom = np.empty(len(directions)), np.zeros(1, np.int32)
     for i, direction in enumerate(directions):
         found[i] = mujoco.mj_ray(model, data, pupil, direction, None, 1, -1, geom, None)
@@ -55,7 +55,7 @@ def cast(model, data, pupil, directions):
 
 def depths(model, datas):
     renderer = sim.ModelRenderer(model, EYE, [sim.Mount("eye")], max(len(datas), 1), sim.Fidelity(1, bands=1))
-    pupils, frames = renderer.eye_frames(sim.Poses.of(datas))
+    pupils, frames = renderer.eye_frames(sim.Poses.from_data(datas))
     side = 2 * np.tan(np.radians(EYE.fov_deg) / 2) / EYE.resolution[1]
     row, column = np.indices(EYE.resolution)
     plane = np.stack([(column - 11.5) * side, (11.5 - row) * side, np.ones(row.shape)], axis=-1).reshape(-1, 3)
@@ -67,13 +67,13 @@ def depths(model, datas):
 
 
 def agreement(found, expected):
-    """Share of rays that meet the same thing: to 1e-4, ten times float32's rounding of what is 3 m away."""
+    """Return the share of rays that hit the same geom, to 1e-4: ten times float32's rounding at a distance of 3 m."""
     return np.mean(np.isclose(found, expected, rtol=1e-4, atol=0))
 
 
 @pytest.mark.parametrize("name", list(SHAPES))
 def test_each_kind_is_met_where_mujoco_meets_it(name):
-    """But for single rays at a limb, where rounding decides."""
+    """Hit points agree, except for single rays at a limb, where rounding decides."""
     model = model_of(SHAPES[name])
     datas = [posed(model, seed) for seed in range(WORLDS)]
     found, expected = depths(model, datas)
@@ -89,7 +89,7 @@ def test_all_kinds_together():
 
 
 def kernels_of(look, datas):
-    """How many are launched by the first look, and what it sees."""
+    """Return the number of kernels in the first call, and its result."""
     with dr.scoped_set_flag(dr.JitFlag.KernelHistory):
         dr.kernel_history_clear()
         found = look(datas)
@@ -98,8 +98,9 @@ def kernels_of(look, datas):
 
 @pytest.mark.parametrize(("what", "more"), [("depth", 1), ("signals", 2)])
 def test_on_a_gpu_each_mesh_has_kernels_of_its_own(monkeypatch, what, more):
-    """OptiX meets one scene per kernel. As if this were a GPU: the same is seen, and every mesh has a kernel more for
-    what is looked at, and one for the shadow of the lamp."""
+    """OptiX, on a GPU, intersects one scene per kernel. The test simulates a GPU: results stay the same, and every mesh
+    needs one more kernel for its rays, and one for the lamp's shadow.
+    """
     launched, expected = {}, {}
     for gpu in (False, True):
         for place in (movers, variant):
@@ -111,12 +112,14 @@ def test_on_a_gpu_each_mesh_has_kernels_of_its_own(monkeypatch, what, more):
             np.testing.assert_array_equal(found, expected.setdefault(meshes, found))
     assert launched[False, 1] == launched[False, 2] == launched[False, 3]
     assert launched[True, 2] - launched[True, 1] == launched[True, 3] - launched[True, 2] == more
-    assert launched[True, 1] >= launched[False, 1] + 2 * more  # before the mesh, it, and what is made of it
+    assert launched[True, 1] >= launched[False, 1] + 2 * more  # kernels before the mesh, of the mesh, and after it
 
 
 @pytest.mark.parametrize("name", ["ellipsoid", "capsule", "cylinder", "box"])
 def test_other_shapes_do_not_agree(name, monkeypatch):
-    """A capsule without its ends, a cylinder without its lids, an ellipsoid and a box of other sizes."""
+    """The mutants are a capsule without its ends, a cylinder without its lids, and an ellipsoid and a box of other
+    sizes.
+    """
     right = primitives.PRIMITIVES[name]
 
     def wrong(o, d, size):
@@ -142,12 +145,12 @@ def test_what_stands_still_hides_what_moves():
 
 def test_too_many_meshes_for_one_kernel_are_named(monkeypatch):
     monkeypatch.setattr(movers, "MESHES", 1)
-    with pytest.raises(ValueError, match="2 moving meshes: must be 1 at most; hide some by group"):
+    with pytest.raises(ValueError, match="2 moving meshes: must be at most 1; hide some by group"):
         depths(model_of(SHAPES["mesh"], SHAPES["mesh"]), [])
 
 
 def still_and_moving(geom, assets=""):
-    """What an eye at the origin sees of a geom 2 m ahead, along x, that stands still, and of one that could move."""
+    """Return models with a static and a movable geom 2 m ahead, along x, of an eye at the origin, and their data."""
     models = [
         mujoco.MjModel.from_xml_string(f"""<mujoco><visual><headlight active="0"/></visual>{assets}<worldbody>
             <light type="directional" dir="1 .5 -.5"/><body name="eye"/>
@@ -165,7 +168,7 @@ def posed_as_is(model):
 
 
 def coarse_ball():
-    """With normals that MuJoCo makes smooth: neighbouring faces differ by less than a right angle."""
+    """Return a mesh with normals that MuJoCo smooths: neighbouring faces differ by less than a right angle."""
     polar, around = np.linspace(0, np.pi, 9)[1:-1], np.arange(14) * 2 * np.pi / 14
     rings = [[np.sin(p) * np.cos(a), np.sin(p) * np.sin(a), np.cos(p)] for p in polar for a in around]
     vertices = " ".join(map(str, np.ravel([*rings, [0, 0, 1], [0, 0, -1]])))
@@ -179,12 +182,14 @@ def test_a_smooth_mesh_is_shaded_alike_whether_it_moves_or_not():
         sim.ModelRenderer(model, eye, [sim.Mount("eye")], 1, sim.Fidelity(4, bands=1)).signals([data])
         for model, data in zip(models, datas, strict=True)
     )
-    assert len(np.unique(still.round(3))) > 40  # shades
+    assert len(np.unique(still.round(3))) > 40  # the mesh has many shades
     np.testing.assert_allclose(moving, still, atol=2e-4)
 
 
 def test_what_is_small_and_far_is_met_by_all_its_rays():
-    """A ball of 5 cm 100 m away, whose squared distances float32 tells apart by steps of a third of its square."""
+    """The ball of 5 cm is 100 m away. There, float32 resolves squared distances in steps of a third of the squared
+    radius.
+    """
     models, datas = still_and_moving('<geom name="far" size=".05" pos="100 3 2"/>')
     azimuth, elevation = np.degrees([np.arctan2(3, 100), np.arctan2(2, np.hypot(3, 100))])
     mount = sim.Mount("eye", azimuth_deg=float(azimuth), elevation_deg=float(elevation))
@@ -193,4 +198,4 @@ def test_what_is_small_and_far_is_met_by_all_its_rays():
         renderer = sim.ModelRenderer(model, Eye(resolution=(40, 40), fov_deg=0.07, bands=1), [mount], 1)
         seen.append(renderer.ids([data])[0, 0] == model.geom("far").id)
     assert 600 < seen[0].sum() < 1100
-    assert (seen[0] != seen[1]).sum() < 20  # at the limb
+    assert (seen[0] != seen[1]).sum() < 20  # rays at the limb

@@ -1,4 +1,4 @@
-"""User models in closed form and by areas: they agree with rays by Mitsuba, or say why not."""
+"""User models in closed form and by area sampling: they agree with rays by Mitsuba, or the error gives the reason."""
 
 import mujoco
 import numpy as np
@@ -7,7 +7,7 @@ import pytest
 import optics
 import sim
 
-# A rover that slides and turns, a ball that rolls along a rail, and one that is moved by hand.
+# A rover that slides and turns, a ball that rolls along a rail, and a ball whose pose is set from outside.
 ROOM = """<mujoco><visual><headlight active="0"/></visual>
 <asset>
   <texture name="bars" type="2d" builtin="gradient" rgb1=".9 .8 .2" rgb2=".1 .2 .6" width="64" height="1"/>
@@ -56,7 +56,7 @@ def rendered(model, datas, tracer="mitsuba", mounts=MOUNTS, eye=EYE, **how):
 
 
 def test_the_same_rays_see_the_same_by_either_tracer():
-    """But for the few that graze an edge: both follow the same rays, in direct light."""
+    """Both tracers follow the same rays in direct light. Only the few rays that graze an edge differ."""
     room, tilted = model(), sim.Mount("rover", azimuth_deg=20, elevation_deg=10, roll_deg=30, offset=(0, 0, 0.3))
     for mounts, rover in ((MOUNTS, ROVER), ([tilted], "")):
         room = model(rover or '<geom type="sphere" size=".1" group="4" mass="1"/>')
@@ -171,7 +171,7 @@ def test_other_reasons_are_named_too():
 
 
 def test_a_textured_ball_that_turns_is_refused():
-    """Closed forms have one orientation for all time; a mocap body may be turned by anybody."""
+    """Closed forms have a fixed orientation, but a user may rotate a mocap body."""
     geom = '<geom name="globe" type="sphere" size=".3" material="bars"/>'
     ball = f'<body name="globe" mocap="true" pos="1 1 .3">{geom}</body>'
     room = model(extra=ball)

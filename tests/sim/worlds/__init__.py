@@ -1,4 +1,4 @@
-"""What tests hold of worlds, module by module.
+"""Tests of worlds: which test covers which module.
 
 catalog: test_catalog.py
 world: test_world.py

@@ -1,4 +1,4 @@
-"""Goal and adversary are equally bright: one receptor that sees all of an object does not know which it is."""
+"""Goal and adversary are equally bright: a single receptor that covers a whole object cannot distinguish them."""
 
 import numpy as np
 import pytest
@@ -7,14 +7,17 @@ import sim
 from sim.worlds import detection
 from sim.worlds.state import WorldState
 
-DISTANCES = (2.0, 2.4, 3.0, 4.0, 6.0)  # [m] from the agent's centre; nearer, an eye of 45° sees less and less of it
+# [m] from the agent's centre; at shorter distances, an eye of 45° covers less and less of the object
+DISTANCES = (2.0, 2.4, 3.0, 4.0, 6.0)
 DIRECTIONS = np.arange(24) * 2 * np.pi / 24
 EYE = sim.Eyes(n_eyes=1, resolution=(1, 1), fov_deg=45, noise_sigma=0.0)
 NOISE = sim.Eyes().noise_sigma
 
 
 def facing(kind):
-    """An object of this kind straight ahead, in all directions and distances; the others behind, outside the field."""
+    """Return states with an object of this kind straight ahead, in all directions and distances. The other objects are
+    behind the agent.
+    """
     distance, heading = (a.ravel() for a in np.meshgrid(DISTANCES, DIRECTIONS, indexing="ij"))
     n, ahead = len(heading), np.stack([np.cos(heading), np.sin(heading)], axis=1)
     objects = np.full((n, 3, 3), detection.OBJECT_RADIUS)
@@ -25,7 +28,7 @@ def facing(kind):
 
 
 def differences():
-    """Signal of an adversary less that of a goal, (distance, direction)."""
+    """Return the signal of an adversary minus that of a goal, (distance, direction)."""
     world = sim.build_world("detection")
     renderer = sim.BatchedRenderer(world, EYE, len(DISTANCES) * len(DIRECTIONS), sim.Fidelity(1024, EYE.bands))
     goal, adversary = (renderer.signals(facing(kind))[:, 0, 0, 0, 0] for kind in (0, 1))
@@ -33,9 +36,10 @@ def differences():
 
 
 def test_one_receptor_sees_goal_and_adversary_alike():
-    """On the average over directions by less than a fifth of the receptors' noise, measured .13 at most. From any one
-    direction by less than a third (measured .23) as long as all of it is seen; at 2 m, where an eye misses its top,
-    by .6, now brighter, now darker, as sectors come to lie."""
+    """The difference is below a fifth of the receptors' noise in the mean over directions (measured: 0.13 at most).
+    From any single direction it is below a third (measured: 0.23) if the whole object is visible. At 2 m, where the eye
+    misses the top, it is 0.6, with a sign that depends on the sectors.
+    """
     found = differences() / NOISE
     assert np.abs(found.mean(axis=1)).max() < 1 / 5
     assert np.abs(found[1:]).max() < 1 / 3
@@ -43,6 +47,6 @@ def test_one_receptor_sees_goal_and_adversary_alike():
 
 @pytest.mark.parametrize("bands", [4, 6])
 def test_equally_wide_bands_would_give_adversaries_away(bands, monkeypatch):
-    """Light from above falls on the upper bands, whatever their colour (measured 1.6 and 1.1 times the noise)."""
+    """Light from above falls on the upper bands, whatever their colour (measured: 1.6 and 1.1 times the noise)."""
     monkeypatch.setattr(detection, "BAND_EDGES_DEG", tuple(np.arange(1, bands) * 180 / bands))
     assert np.abs(differences()[0].mean()) > NOISE

@@ -1,4 +1,4 @@
-"""One list of tasks, which everything that knows tasks by name agrees with."""
+"""The single list of tasks agrees with all places that use tasks by name."""
 
 import subprocess
 import sys

@@ -1,4 +1,4 @@
-"""A course can be run: whoever keeps getting farther from its start arrives."""
+"""A course can be solved by always increasing the distance from its start."""
 
 import ast
 import math
@@ -25,7 +25,7 @@ STRAIGHT = """
 #S.......#
 ##########
 """
-# Back towards the start for three cells: the only way on.
+# The only path leads back towards the start for three cells.
 HOOK = """
 #############
 #S......#####
@@ -38,7 +38,7 @@ HOOK = """
 
 
 def falls_on_shortest_way(course, start):
-    """The most by which the distance from the start falls while one follows the shortest way from it [m]."""
+    """Return the largest decrease of the distance from the start along the shortest path [m]."""
     cell, far, worst = start, 0.0, 0.0
     while not course.goal[cell]:
         cell = min(course._next_to(cell), key=lambda other: course.way[other])
@@ -57,21 +57,23 @@ def test_the_distance_from_the_start_hardly_falls_on_any_way(name):
 
 
 def test_lengths_of_the_ways():
-    """From the west the short course takes some 50 actions at top speed, and the long one is twice as long."""
+    """The short course takes about 50 actions at top speed from the west. The long course is twice as long."""
     short, long = (DRAWN[name].way[DRAWN[name].starts[0]] for name in COURSES)
     assert 82 < short < 104
     assert 1.8 < long / short < 2.2
     per_action = 0.2 * MAX_SPEED
-    assert long < 128 * per_action < 2 * long, "to be finished in 128 actions, but not by who is slow"
+    assert long < 128 * per_action < 2 * long, "128 actions must suffice at top speed, but not at half of it"
 
 
 @pytest.mark.parametrize("name", COURSES)
 def test_ways_part_and_join_again(name):
-    """Free cells without a hole would be a tree of corridors: every island of walls is a choice of two ways."""
+    """Free cells without islands would form a tree of corridors. Every island of walls is a choice between two
+    paths.
+    """
     import scipy.ndimage
 
     walls = DRAWN[name].walls
-    islands = scipy.ndimage.label(walls, np.ones((3, 3)))[1] - 1  # the outer wall is one piece
+    islands = scipy.ndimage.label(walls, np.ones((3, 3)))[1] - 1  # the outer wall is one component
     assert islands == {"short": 2, "long": 4}[name]
 
 
@@ -96,7 +98,7 @@ def test_agents_start_along_the_way_in_training_and_in_the_west_in_evaluation(na
 
 
 def test_free_cells_are_free_and_walls_are_walls():
-    """Also where walls that nobody sees have been left out."""
+    """The check includes places where invisible walls have been omitted."""
     world, course = sim.build_world("navigation"), DRAWN["short"]
     physics = AgentPhysics(world, 1)
     centers = course.places([tuple(cell) for cell in np.argwhere(~course.walls)])
@@ -120,7 +122,7 @@ def test_walls_have_stripes_of_differing_frequency():
 
 
 def test_most_mazes_are_no_courses():
-    """The invariant tells what it is for: on the easiest way through a random maze the distance falls by metres."""
+    """The distance falls by metres even along the easiest path of a random maze. Such mazes are not valid courses."""
     refused = 0
     for seed in range(8):
         walls = maze.draw_maze(maze.MAZE, np.random.default_rng(seed))
@@ -148,18 +150,18 @@ def test_a_course_of_ones_own():
 @pytest.mark.parametrize(
     ("drawing", "message"),
     [
-        ("####\n#S.#\n###", "all lines must be as long"),
+        ("####\n#S.#\n###", "lines differ in length"),
         (STRAIGHT.replace("S", "Q"), r"signs \['Q'\]; must be lines of '#', '.', 'S' and 's'"),
         (STRAIGHT.replace("S", "."), "no start: must have an 'S'"),
         (STRAIGHT.replace("#S", ".S"), r"cell \(1, 0\) of its border is free: must be a wall"),
-        (STRAIGHT.replace("S.", "S#"), r"start in cell \(1, 1\) has no way to the goal"),
+        (STRAIGHT.replace("S.", "S#"), r"start in cell \(1, 1\) has no path to the goal"),
         (
             STRAIGHT.replace("...#", "S..#"),
             r"start in cell \(1, 6\) is in the goal, .* last 3 columns .*: must be west",
         ),
         (STRAIGHT.replace("...#", "..s#"), r"start in cell \(1, 8\) is in the goal"),
         ("#####\n#S..#\n#####", r"start in cell \(1, 1\) is in the goal"),
-        (HOOK, r"from cell \(\d, \d\) on, the distance from the start in cell \(5, 1\) has to fall by"),
+        (HOOK, r"after cell \(\d, \d\), the distance from the start in cell \(5, 1\) has to fall by"),
     ],
 )
 def test_what_is_no_course_is_refused_by_name(drawing, message):
@@ -188,11 +190,13 @@ def test_what_is_no_drawing_is_shown_one():
         Course(3)
     example = str(caught.value).split("such as ")[1]
     course = Course(ast.literal_eval(example))
-    assert course.way[course.starts[0]] > 0, "there is a way to go"
+    assert course.way[course.starts[0]] > 0, "the start is at the goal"
 
 
 def test_a_training_episode_ends_at_the_least_return():
-    """An agent that runs against a wall gets -1 per action, and -3 after three of them; info says why it ended."""
+    """An agent that drives against a wall gets -1 per action, and so -3 after three actions. The info gives the reason
+    for the end.
+    """
     venv = sim.make_vec_env("navigation", n_envs=2, least_return=-3.0, rays_per_receptor=1)
     venv.reset()
     total, ends = np.zeros(2), 0

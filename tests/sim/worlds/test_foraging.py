@@ -1,4 +1,4 @@
-"""Foraging: objects that differ in spectrum alone, an eye that tells them apart and eyes that cannot."""
+"""Foraging: objects that differ only in their spectra, an eye that distinguishes them, and eyes that cannot."""
 
 import dataclasses
 
@@ -26,7 +26,7 @@ def world():
 
 
 def before_the_eyes(world, n=1, swapped=False):
-    """Agents that face the goal, an adversary beside it; `swapped`: each where the other was."""
+    """Return a state with agents that face the goal and an adversary next to it; `swapped` exchanges the two."""
     state = Simulation(task_of(world), n, 0).reset()
     objects = state.objects.copy()
     objects[:, :, :2] = np.array([[1.6, 0.9], [1.6, -0.9], [4.0, 0.0]])
@@ -36,8 +36,9 @@ def before_the_eyes(world, n=1, swapped=False):
 
 
 def difference(world, eyes):
-    """Largest difference that swapping goal and adversary makes to any noise-free signal, in standard deviations of the
-    receptors' noise."""
+    """Return the largest change of any noise-free signal when goal and adversary are exchanged, in standard deviations
+    of the receptors' noise.
+    """
     renderer = sim.BatchedRenderer(world, eyes, 1, sim.Fidelity(4, eyes.bands))
     one, other = (renderer.signals(before_the_eyes(world, swapped=s)) for s in (False, True))
     assert one.max() > 0.05
@@ -49,14 +50,16 @@ def test_spectra_are_smooth_reflectances():
         values = petal(share).at(NM * 1e-9)
         assert values.min() >= 0
         assert values.max() <= 1
-        # A cosine over 50 nm and a logistic of 15 nm: slopes of 0.017 and 0.0125 per nm at most, and no steps.
+        # The curve is a cosine over 50 nm and a logistic of 15 nm, with slopes of at most 0.017 and 0.0125 per nm, and
+        # no steps.
         assert np.abs(np.diff(values)).max() < 0.02
 
 
 @pytest.mark.parametrize("light", ILLUMINANTS)
 def test_they_are_metamers_for_rgb_like_receptors(light):
-    """Under every light, and by every number of bands: within 1e-3 of white's signal (0, in fact), while a pigment of
-    350 nm sees a difference wherever the light has any ultraviolet."""
+    """Under every light and with any number of bands, the difference is within 1e-3 of white's signal (in fact 0). A
+    pigment of 350 nm shows a difference under every light that contains ultraviolet.
+    """
     difference = petal(ULTRAVIOLET["goal"]).at(NM * 1e-9) - petal(ULTRAVIOLET["adversary"]).at(NM * 1e-9)
     assert np.abs(difference).max() > 0.5
     for bands in (1, 2, 3, 4, 5, 8, 16, 64):
@@ -79,13 +82,13 @@ def test_objects_differ_in_nothing_but_their_spectra(world):
         a, b = model.geom_matid[goal], model.geom_matid[other]
         assert np.array_equal(model.mat_texid[a], model.mat_texid[b])
         assert np.array_equal(model.mat_texrepeat[a], model.mat_texrepeat[b])
-        np.testing.assert_allclose(model.mat_rgba[a], model.mat_rgba[b], atol=2e-3)  # what MuJoCo's viewer shows
+        np.testing.assert_allclose(model.mat_rgba[a], model.mat_rgba[b], atol=2e-3)  # MuJoCo's viewer shows this colour
     assert world.spectra["goal"] != world.spectra["adversary"]
 
 
 @pytest.mark.parametrize("pupil", [None, optics.Pupil(60e-6, thin_lens_focal_length=173e-6)], ids=["perfect", "lens"])
 def test_an_eye_without_ultraviolet_cannot_tell_them_apart_and_one_with_it_can(world, pupil):
-    """Receptor noise is 0.01. (Human cones begin at 390 nm, where they still see next to nothing.)"""
+    """Receptor noise is 0.01. (Human cones begin at 390 nm, where their sensitivity is almost zero.)"""
     blind, human, bee = (dataclasses.replace(e, optics=pupil) for e in (EYES, _human(), BEES))
     assert difference(world, blind) < 0.1
     assert difference(world, human) < 0.1
@@ -131,13 +134,13 @@ def test_both_tracers_agree_ray_by_ray(world, eyes):
 
 
 def test_as_many_components_as_the_eye_can_tell_spectra_apart(world):
-    """Grey and yellow; and, from 300 nm on, yellow with ultraviolet."""
+    """The components are grey and yellow; for a range from 300 nm, yellow with ultraviolet is a third."""
     assert len(sim.BatchedRenderer(world, EYES, 1, sim.Fidelity(4, bands=8)).tracer.basis) == 2
     assert len(sim.BatchedRenderer(world, BEES, 1, sim.Fidelity(4, BEES.bands)).tracer.basis) == 3
 
 
 def test_the_mirror_shows_what_the_renderer_shows(world):
-    """Mitsuba's `direct` integrator on the mirror of the whole world, per band, an eye's mean."""
+    """The eyes' mean in every band agrees with Mitsuba's `direct` integrator on the mirror of the whole world."""
     import mujoco
 
     seen = build_world("foraging", eyes=BEES)
@@ -154,12 +157,14 @@ def test_the_mirror_shows_what_the_renderer_shows(world):
     theirs = np.stack(
         [mirror.render(f"eye_{i}", 13, 9, "direct", 1024, wavelengths).mean(axis=(1, 2)) for i in range(2)], axis=1
     )
-    # 120,000 samples of one of three lights each: standard error 0.3 % of the mean.
+    # 120,000 samples of one of three lights each give a standard error of 0.3 % of the mean.
     np.testing.assert_allclose(ours, theirs, rtol=0.012)
 
 
 def test_lights_and_walls_take_spectra_in_any_task():
-    """Under incandescent light red receptors see more and blue ones less of the same grey walls."""
+    """Under incandescent light, red receptors have larger signals and blue ones smaller signals of the same
+    grey walls.
+    """
     day, evening = (
         sim.BatchedRenderer(build_world("detection", spectra=s), EYES, 1)
         for s in (None, {f"light_{i}": "A" for i in range(3)})

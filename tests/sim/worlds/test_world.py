@@ -1,4 +1,4 @@
-"""Worlds: what stands where, how the agent moves, and what it can touch."""
+"""Worlds: positions of objects, the agent's motion, and its contacts."""
 
 import hashlib
 
@@ -18,7 +18,7 @@ from sim.worlds.layout import CELL
 from sim.worlds.striped_walls import merge_walls
 from sim.worlds.world import MAX_SPEED
 
-ACTION = 10  # substeps
+ACTION = 10  # substeps per action
 
 
 @pytest.fixture(scope="module")
@@ -34,9 +34,10 @@ def started(world, x, y):
 
 
 def test_speed_rises_as_in_the_published_environment(field):
-    """.44, 1.12, 1.50, 1.71 m per action from rest, limit 1.98 m (read off the published code, to 1 cm).
+    """The agent moves 0.44, 1.12, 1.50 and 1.71 m per action from rest, with a limit of 1.98 m (from the published
+    code, to 1 cm).
 
-    That code reads `xpos` after mj_step, which is one substep old; the same is read here.
+    That code reads `xpos` after mj_step, which is one substep old. The test reads the same value.
     """
     data = started(field, -10, 0)
     data.ctrl[:] = MAX_SPEED, 0
@@ -48,13 +49,16 @@ def test_speed_rises_as_in_the_published_environment(field):
     steps = np.diff(x)
     np.testing.assert_allclose(steps[:4], [0.44, 1.12, 1.50, 1.71], atol=0.01)
     assert 1.95 < steps[-1] < 1.98
-    # The continuous lag, v = 9.9 (1 - exp(-t/0.35)), integrated over the first action: a first-order method's error.
+    # The continuous lag, v = 9.9 (1 - exp(-t/0.35)), integrated over the first action; the difference is a first-order
+    # method's error.
     assert data.qvel[0] == pytest.approx(9.9 * (1 - np.exp(-1.8 / 0.35)), rel=2e-3)
 
 
 @pytest.mark.parametrize("direction", [(1, 0), (0.6, 0.8), (0.98, 0.199)])
 def test_no_eye_ever_passes_through_a_wall(field, direction):
-    """At full speed against the walls, from many distances, so that the substeps fall differently."""
+    """The agent drives at full speed against the walls from many distances, so that contact occurs at different
+    substeps.
+    """
     azimuths = np.linspace(0, 2 * np.pi, 36)
     for start in np.linspace(-3, -2, 7):
         data = started(field, start, start)
@@ -65,11 +69,11 @@ def test_no_eye_ever_passes_through_a_wall(field, direction):
             eyes = data.qpos[:2] + eye_positions(azimuths)[:, :2]
             assert np.all(np.abs(eyes) < [11.0, 9.0])
             touched |= data.sensordata[0] > 0
-            # No bounce: it is pushed back by a fifth of the whiskers' length per substep at most.
+            # The agent does not bounce: each substep pushes it back by at most a fifth of the whiskers' length.
             assert np.all(data.qvel[:2] > -0.2 * 0.2 / 0.02 - 0.01)
         assert touched
-        assert data.sensordata[0] > 0  # still leaning against the wall
-        # ... and at rest along the wall's normal.
+        assert data.sensordata[0] > 0  # the agent still leans against the wall
+        # ... and is at rest along the wall's normal.
         assert np.abs(data.qvel[0]) < 0.02
 
 
@@ -79,7 +83,7 @@ def test_objects_are_no_obstacles(field):
     for _ in range(3 * ACTION):
         mujoco.mj_step(field.model, data)
         assert data.ncon == 0
-    assert data.qpos[0] > 0.5  # right through the goal, which is at the origin
+    assert data.qpos[0] > 0.5  # the agent has passed through the goal at the origin
     assert data.sensordata[0] == 0
 
 
@@ -117,14 +121,14 @@ def test_objects_differ_only_in_the_orientation_of_their_stripes(field):
         assert np.array_equal(model.mat_rgba[model.geom_matid[geom]], model.mat_rgba[model.geom_matid[goal]])
     upright = image(model, model.texture("upright_stripes").id)[..., 0]
     level = image(model, model.texture("level_stripes").id)[..., 0]
-    # A viewer sees half the sectors, and as many bands: the lowest of seven is hidden below.
+    # A viewer sees half of the sectors and the same number of bands: the lowest of the seven bands is hidden below.
     assert len(stripe_bounds(upright[0])) == 2 * detection.STRIPES - 1
     assert len(stripe_bounds(level[:, 0])) == detection.STRIPES
     assert {level.max(), level.min()} == {upright.max(), upright.min()}
 
 
 def stripe_bounds(values):
-    """Where dark meets light; texels of a grey between the two count as neither."""
+    """Return the boundaries between dark and light texels; a threshold halfway decides about grey ones."""
     dark = values < (values.min() + values.max()) / 2
     return np.flatnonzero(np.diff(dark))
 
@@ -170,7 +174,9 @@ def test_a_maze_is_its_seeds():
 
 
 def test_several_mazes_are_different_and_apart():
-    """Episodes begin in each of them; the first is what it is alone; a wall as long as the world parts neighbours."""
+    """Episodes start in each of the mazes. The first maze is the same as in a world with one maze, and a wall as long
+    as the world separates neighbours.
+    """
     one, three = (sim.build_world("maze", seed=4, mazes=mazes) for mazes in (1, 3))
     height = 13 * 2.0
     centers = np.array([-height, 0.0, height])
@@ -219,7 +225,9 @@ def test_tracking_is_the_field_of_detection():
 
 
 def test_a_seeds_maze_stays_the_same():
-    """Another version's maze of the same seed would be another task. One row of walls and passages per line."""
+    """The maze of a seed must not change between versions, because it would be another task. Each line is a row of
+    walls and passages.
+    """
     drawn = maze.draw_maze((7, 9), np.random.default_rng(0))
     assert ["".join(".#"[int(wall)] for wall in row) for row in drawn] == [
         "#########",

@@ -1,4 +1,5 @@
-"""The comparison of devices, as far as a machine without a GPU can go: what a child writes, and what rows say."""
+"""The comparison of devices, tested without a GPU: the results that a child process writes, and the rows of the
+table."""
 
 import json
 

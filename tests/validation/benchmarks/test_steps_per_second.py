@@ -1,4 +1,4 @@
-"""The page's measurement, small; its bounds fail what they are to fail."""
+"""The page's measurement at a small size; its bounds fail for results that violate them."""
 
 import contextlib
 import time
@@ -34,13 +34,13 @@ def test_every_part_is_measured(name, tmp_path, capsys):
 
 
 def test_parts_do_what_they_are_called():
-    """Physics moves the worlds and does not look, sight looks and does not move, a step does both."""
+    """Physics moves the worlds without rendering, sight renders without moving, and a step does both."""
     with contextlib.closing(steps_per_second.environments()["ant"](2)) as env:
         env.reset()
         (sight,) = env.animals.learners[0].sights.values()
         worlds, looks = env.simulation, []
-        begin = sight.renderer.begin
-        sight.renderer.begin = lambda *seen: looks.append(1) or begin(*seen)
+        begin = sight.renderer.launch
+        sight.renderer.launch = lambda *seen: looks.append(1) or begin(*seen)
         found = {}
         for name, part in steps_per_second.parts_of(env).items():
             steps, seen = worlds.steps[0], len(looks)
@@ -59,8 +59,8 @@ def test_share_and_overhead_are_of_times():
     ("found", "broken"),
     [
         (rows(), []),
-        (rows(sight=150.0, both=60), ["ant, 64 worlds: sight is 1.5 times as fast as of one world"]),
-        (rows(both=50.0), ["ant, 64 worlds: a step takes 1.50 times its parts"]),
+        (rows(sight=150.0, both=60), ["ant, 64 worlds: rendering is 1.5 times as fast as for one world"]),
+        (rows(both=50.0), ["ant, 64 worlds: a step takes 1.50x the sum of its parts"]),
         (rows(both=50.0, worlds=16), []),
     ],
 )

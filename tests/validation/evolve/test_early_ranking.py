@@ -1,4 +1,4 @@
-"""What the page says of ladders is what the store holds, and the numbers are what they are called."""
+"""The page on successive halving agrees with its store, and its numbers follow their definitions."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -35,14 +35,14 @@ def rows(order, seconds=(1.0, 1.0, 2.0, 4.0)):
 
 
 def test_rank_correlation():
-    """Spearman: 1 - 6 Σd² / (n (n² - 1)), here d = (1, 1, 0, 0) of 4."""
+    """Spearman: 1 - 6 Σd² / (n (n² - 1)), here d = (1, 1, 0, 0) for n = 4."""
     assert correlation(np.array([1.0, 2, 3, 4]), np.array([2.0, 1, 3, 4]))[0] == pytest.approx(1 - 6 * 2 / 60)
 
 
 def test_halving_keeps_the_best_and_costs_half_where_ranks_hold():
     same = rows([range(8)] * RUNGS)
     four = halving(same, 4, 0.5)
-    # 8 animals x 1 s, 4 x 1 s, 2 x 2 s, 1 x 4 s, of 8 x 8 s
+    # 8 animals x 1 s, 4 x 1 s, 2 x 2 s, 1 x 4 s, out of 8 x 8 s
     assert (four.cost, four.place) == (pytest.approx((8 + 4 + 4 + 4) / 64), 1)
     two = halving(same, 2, 0.25)
     # A quarter of the budget is the second of four rungs: 8 x 2 s, then 2 x 6 s.
@@ -51,7 +51,7 @@ def test_halving_keeps_the_best_and_costs_half_where_ranks_hold():
 
 def test_halving_loses_the_best_where_ranks_turn_round():
     late = rows([range(8), range(8), range(8), [7 - i for i in range(8)]])
-    assert halving(late, 2, 0.5).place == 5, "the upper half goes on, the best of which ends in the fifth place"
+    assert halving(late, 2, 0.5).place == 5, "the upper half is promoted, and its best animal ends in fifth place"
 
 
 def test_rows_survive_the_file(tmp_path):

@@ -1,4 +1,4 @@
-"""What the page says is what the store holds."""
+"""The page agrees with its store."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -25,7 +25,7 @@ LIFE = Life("detection", 0, THROUGHOUT, 200.0, 90.0, 0.75, (10.0, 50.0, 90.0))
 
 
 def lives(gains, saved=50.0, tasks=fewer_epochs.EYES):
-    """A pair per task and gain: fewer passes earn that much more, in so many seconds less."""
+    """A pair of training runs per task and gain: fewer epochs earn `gain` more and take `saved` seconds less."""
     found = []
     for task in tasks:
         for seed, gain in enumerate(gains):
@@ -49,17 +49,17 @@ def test_only_lives_that_were_trained_in_both_ways_are_compared():
 
 
 def test_bounds():
-    """Gains of -3 to -1 are -2 with a standard error of .35; of -4 to 2, -1 and 1.14."""
+    """Gains of -3 to -1 have a mean of -2 with a standard error of 0.35; gains of -4 to 2 have -1 and 1.14."""
     assert verdicts(lives([1, 2, 3, 4, 5])) == verdicts(lives([-4, -3, -1, 1, 2])) == []
     assert verdicts(lives([-3, -2.5, -2, -1.5, -1], tasks=["detection"]))[0] == (
-        "detection: fewer passes teach less, by 2.0 ± 0.4"
+        "detection: fewer epochs reduce the return, by 2.0 ± 0.4"
     )
     assert len(verdicts(lives([0, 0, 0, 0, 0], saved=9.0))) == 3
-    assert "five are wanted" in verdicts(lives([0, 0, 0, 0]))[0]
+    assert "five are required" in verdicts(lives([0, 0, 0, 0]))[0]
 
 
 def test_time_is_spread_as_passes_are():
-    """The sum is the whole time; a pass costs the same early and late."""
+    """The sum is the whole time; an epoch costs the same early and late."""
     times = seconds("detection", (200.0, 140.0), 10)
     assert times[:, -1] == pytest.approx([200, 140])
     assert np.diff(times[0]) == pytest.approx([20.0] * 9)
@@ -73,7 +73,7 @@ def test_time_is_spread_as_passes_are():
 
 @pytest.mark.slow
 def test_a_life_is_trained_with_the_passes_asked_for(monkeypatch):
-    """One rollout, then another after learning has slowed down."""
+    """Training has one rollout, then another one after the learning rate has dropped."""
     small = ("learning.total_steps=64", "learning.n_envs=4", "learning.n_steps=8", "learning.batch_size=16")
     monkeypatch.setattr(
         fewer_epochs, "SETTINGS", (*fewer_epochs.SETTINGS, *small, "learning.decay_after=16", "evaluation.episodes=2")

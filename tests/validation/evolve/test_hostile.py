@@ -1,4 +1,4 @@
-"""Strangers' runs: a short version of validation/evolve/hostile.py, which must notice when a promise is broken."""
+"""Untrusted run directories: a short version of validation/evolve/hostile.py, which must detect a broken guarantee."""
 
 import pytest
 

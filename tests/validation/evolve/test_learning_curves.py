@@ -1,4 +1,4 @@
-"""What the page says is what the store holds."""
+"""The page agrees with its store."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -20,7 +20,8 @@ ROW = Row("detection, 2 x (15 x 15)", 0, 50_000, 10.0, 4.0, 30, 60, 100, 1.5, 0.
 
 
 class Walkers(VecEnv):
-    """Two that walk along x; every second action touches something; the first one's episodes take two actions."""
+    """Two walkers that move along x. Every second action causes a contact, and the first walker's episodes take two
+    actions."""
 
     def __init__(self):
         super().__init__(2, PolicyConfig((1, 1, 1, 1, 1), 1).observation_space(), spaces.Box(-1, 1, (2,)))
@@ -56,7 +57,7 @@ def learning(case, *goals, seed=0):
 
 
 def test_wilson_interval():
-    """Newcombe (1998), table I: 81 of 263 gives .2553 to .3662."""
+    """Newcombe (1998), table I: 81 of 263 gives 0.2553 to 0.3662."""
     assert wilson(81, 263) == pytest.approx((0.2553, 0.3662), abs=5e-5)
     assert wilson(0, 20)[0] == pytest.approx(0, abs=1e-12)
 
@@ -85,8 +86,9 @@ def test_verdicts_name_what_is_not_learnt():
 
 
 def test_ten_eyes_must_beat_one_by_more_than_chance():
-    """10 m and 2 contacts: fitness 1.5 x 10 - 2 x 2 = 11. Standard errors .3 m and .1 of the return make at most
-    1.5 x .3 + 2 x (.25 x .3 + .1) = .8, so that of a difference is 1.13 and its 95 % limit 2.22, of distances .83 m."""
+    """10 m and 2 contacts: fitness 1.5 x 10 - 2 x 2 = 11. Standard errors of 0.3 m and 0.1 of the return give at most
+    1.5 x 0.3 + 2 x (0.25 x 0.3 + 0.1) = 0.8. The standard error of a difference is then 1.13 and its 95 % limit 2.22;
+    for distances the limit is 0.83 m."""
     many = replace(ROW, case="maze, 10 x (1 x 4)", goals=0, contacts=2.0, distance=10.0)
     one = replace(many, case="maze, 1 x (1 x 4)", contacts=2.4, distance=9.0)
     assert learning_curves.verdicts([many, one]) == []  # 8.7 and 9 m
@@ -100,7 +102,7 @@ def test_ten_eyes_must_beat_one_by_more_than_chance():
 
 
 def test_a_journey_ends_where_its_first_episode_ends():
-    """Two worlds walk 1 m per action from (3, 4); the first one's episode ends after two actions, and starts anew."""
+    """Two worlds walk 1 m per action from (3, 4). The first one's episode ends after two actions and starts again."""
     worlds = Journey(Walkers())
     worlds.reset()
     for _ in range(4):
@@ -110,7 +112,7 @@ def test_a_journey_ends_where_its_first_episode_ends():
 
 
 def test_a_training_is_watched():
-    """Two rollouts and two evaluations, of an eye so small that it takes seconds."""
+    """Two rollouts and two evaluations, with an eye so small that the test takes seconds."""
     learning = LearningConfig(total_steps=512, n_envs=16, n_steps=16, batch_size=64, eval_interval=256)
     case = Case("x", sim.Eyes(n_eyes=1, resolution=(1, 2)), learning=learning, memory=2, neurons=8, episodes=8)
     rows = list(watched(case, seed=3))

@@ -1,4 +1,4 @@
-"""The table of promises: enough trials, no failure, and what is broken is told."""
+"""The table of guarantees: enough trials, no failure, and a message for every broken guarantee."""
 
 from dataclasses import replace
 from pathlib import Path

@@ -1,4 +1,5 @@
-"""A worker after many candidates: the stored measurement holds, growth is told, and a short one is made anew."""
+"""A worker after many candidates: the stored measurement satisfies the bounds, growth is reported, and a short
+measurement is repeated."""
 
 from dataclasses import replace
 from pathlib import Path

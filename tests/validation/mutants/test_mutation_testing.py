@@ -1,4 +1,5 @@
-"""Mutants: places are found, mistakes are made and mended, killed and surviving are told apart, and the page holds."""
+"""Mutation testing: sites are found, mutants are applied and reverted, killed and surviving mutants are distinguished,
+and the page agrees."""
 
 import subprocess
 import textwrap
@@ -79,7 +80,7 @@ def test_named_mutants_can_still_be_made():
 
 @pytest.fixture
 def copy(tmp_path):
-    """A tree of its own, with a module, and tests that see one of its two lines."""
+    """A separate tree with a module, and tests that check one of its two lines."""
     root = tmp_path / "root"
     (root / "optics" / "odd").mkdir(parents=True)
     (root / "tests" / "optics" / "odd").mkdir(parents=True)
@@ -94,11 +95,11 @@ def copy(tmp_path):
     plugin = "validation/mutants/mutant_plugin.py"
     (root / plugin).write_text((ROOT / plugin).read_text())
     subprocess.run(["git", "init", "-q"], cwd=root, check=True)
-    return root, Copy.of(root, tmp_path / "work")
+    return root, Copy.from_root(root, tmp_path / "work")
 
 
 def test_killed_and_surviving_are_told_apart_and_the_tree_is_mended(copy):
-    """A test that is red without any mistake kills nothing."""
+    """A test that fails without any mutation kills nothing."""
     root, tree = copy
     source = (root / "optics/odd/a.py").read_bytes()
     plus, _, unseen, _ = sites("optics/odd/a.py", source)

@@ -1,4 +1,5 @@
-"""Backwards nothing explodes, and what is lost is the evanescent share; the bounds see the naive inverse."""
+"""Backward propagation does not amplify noise and loses only the evanescent share; the bounds detect the naive
+inverse."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -24,7 +25,7 @@ def test_all_bounds_hold(measured):
 def test_the_naive_inverse_is_caught(measured):
     rows, spots = measured
     broken = backward_propagation.broken_bounds([replace(row, ours=row.float64) for row in rows], spots)
-    assert sum("brings back" in words for words in broken) >= 6
+    assert sum("recovers the field" in words for words in broken) >= 6
 
 
 def test_evanescent_waves_that_are_kept_or_left_unreported_are_caught(measured):
@@ -34,7 +35,8 @@ def test_evanescent_waves_that_are_kept_or_left_unreported_are_caught(measured):
 
 
 def test_growth_is_that_of_the_finest_wave(measured):
-    """exp(2πz √(f²λ² - 1)) of f = √2 / (2 dx) = 2.8/λ: slope of the logarithm within 10 % beyond 3 wavelengths."""
+    """exp(2πz √(f²λ² - 1)) with f = √2 / (2 dx) = 2.8/λ: the slope of the logarithm agrees within 10 % beyond 3
+    wavelengths."""
     rows = [row for row in measured[0] if 3 <= row.distance <= 20]
     slope = np.polyfit([row.distance for row in rows], np.log([row.float64 for row in rows]), 1)[0]
     assert slope == pytest.approx(2 * np.pi * np.sqrt(7), rel=0.1)

@@ -1,4 +1,4 @@
-"""The chart's bounds hold, and they fail for a PSF that is Airy's or a departure of another order."""
+"""The chart's bounds hold, and they fail for a PSF equal to Airy's or a departure of another order."""
 
 from dataclasses import replace
 
@@ -17,7 +17,7 @@ def test_all_bounds_hold(rows):
 
 
 def test_known_departure_at_f2(rows):
-    """4.5e-2 at NA 0.24, where f/2 is NA 0.2425: the figure `ideal_lens_psf` has at Fresnel number 27."""
+    """4.5e-2 at NA 0.24, where f/2 is NA 0.2425: the same value as in `ideal_lens_psf` at Fresnel number 27."""
     row = next(row for row in rows if row.aperture == 0.24)
     assert row.tangent_misfit == pytest.approx(4.52e-2, rel=0.03)
     assert row.peak_ratio == pytest.approx(1 - 0.24**2, abs=2e-3)

@@ -1,4 +1,4 @@
-"""float32 phases lose their digits with distance, optics.psf in float32 does not, and darkness is refused."""
+"""float32 phases lose digits with distance, optics.psf in float32 does not, and dark windows are refused."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -37,7 +37,7 @@ def test_darkness_that_float32_claims_to_see_is_caught(measured):
 def test_breaking_distances_grow_with_the_tolerance(measured):
     distances = float32_precision.breaking_distances(measured[0])
     assert distances == sorted(distances)
-    # kz 2^-24 reaches the tolerance at least that near.
+    # The breaking distance is at least the distance at which kz 2^-24 reaches the tolerance.
     assert all(
         z >= b * 2**24 * float32_precision.WAVELENGTH / (2 * np.pi)
         for z, b in zip(distances, float32_precision.BREAKS, strict=True)

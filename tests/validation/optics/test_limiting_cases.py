@@ -1,4 +1,5 @@
-"""Every edge of the domain ends in its value or its one line; the page sees a wrong value and a wrong error."""
+"""Every limiting case of the domain gives its known value or a one-line error; the page detects a wrong value and a
+wrong error."""
 
 from pathlib import Path
 
@@ -36,7 +37,7 @@ def test_wrong_values_and_wrong_errors_are_caught():
 
 
 def test_a_lobe_without_obliquity_is_caught():
-    """cos²θ is what tells Rayleigh-Sommerfeld's lobe from a spherical wave: far more than the page allows."""
+    """cos²θ distinguishes Rayleigh-Sommerfeld's lobe from a spherical wave by far more than the page's bound."""
     x = (np.arange(17) - 8) * 2e-4
     rho2 = x[None, :] ** 2 + x[:, None] ** 2 + 1e-6
     assert limiting_cases.relative_l2(1 / rho2, 1e-6 / rho2**2) > 0.1

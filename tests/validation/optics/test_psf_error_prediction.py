@@ -1,4 +1,4 @@
-"""The predicted error holds on random cases, and the bounds see where it does not."""
+"""The predicted error holds on random cases, and the bounds detect cases in which it does not."""
 
 from dataclasses import replace
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Rays through a real surface: Snell's law, and which rays meet it twice."""
+"""Rays through a real surface: Snell's law, and the rays that hit the surface twice."""
 
 import numpy as np
 import pytest
@@ -8,7 +8,8 @@ from validation.optics import refraction
 
 @pytest.mark.parametrize("slope", [0.0, 0.1, -0.4, 0.85])
 def test_snells_law_and_unit_length(slope):
-    """n sin i = sin t to the surface's normal, in the plane of incidence, and bent towards the thicker glass."""
+    """n sin i = sin t to the surface's normal, in the plane of incidence, with the ray bent towards the thicker
+    glass."""
     tx, tz = refraction.refract(np.array(slope), 1.5)
     normal = np.array([-slope, 1]) / np.hypot(slope, 1)
     assert np.hypot(tx, tz) == pytest.approx(1)
@@ -34,7 +35,7 @@ def test_all_three_prisms_agree_for_small_angles():
 
 
 def test_transmission_has_its_known_values():
-    """4 % are reflected at normal incidence on n = 1.5; p-light passes at Brewster's angle arctan(1/n)."""
+    """4 % are reflected at normal incidence on n = 1.5; p-polarised light passes at Brewster's angle arctan(1/n)."""
     assert refraction.transmission(0.0, 1.5) == pytest.approx(0.96)
     brewster = np.arctan(1 / 1.5)
     s = np.sin(2 * brewster - np.pi / 2) ** 2
@@ -45,7 +46,7 @@ def test_no_ray_leaves_a_gentle_surface_twice_and_some_leave_a_steep_one():
     assert refraction.corrugation(0.1, 1.5).caught == 0
     steep = refraction.corrugation(1.0, 1.5)
     assert steep.caught > 0
-    # Totally reflected where |cos 2πx| > tan(critical) / (π depth).
+    # Light is totally reflected if |cos 2πx| > tan(critical) / (π depth).
     critical = np.tan(np.arcsin(1 / 1.5)) / np.pi
     assert steep.reflected == pytest.approx(2 / np.pi * np.arccos(critical), abs=1e-3)
 

@@ -1,4 +1,5 @@
-"""The mask is right to first order in the slope; optics.psf is that mask; the page's limits are the computed ones."""
+"""The mask is right to first order in the slope, optics.psf agrees with that mask, and the page shows the computed
+limits."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -20,7 +21,7 @@ def test_all_bounds_hold(measured):
 
 
 def test_a_psf_that_refracts_is_caught(measured):
-    """At 10 deg the real prism already deviates 7e-4 rad more than the mask."""
+    """The real prism already deviates 7e-4 rad more than the mask at 10 deg."""
     prisms, lenses, limits = measured
     broken = thin_element.broken_bounds([replace(p, psf=p.real) for p in prisms], lenses, limits)
     assert len(broken) >= 6

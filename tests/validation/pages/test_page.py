@@ -7,7 +7,7 @@ PAGE = Page("nothing_at_all", "A title (B9)\n\nProse.\n\n    python -m x\n", "a 
 
 def test_page_is_docstring_figure_and_table():
     assert PAGE.markdown == (
-        "# A title (B9)\n\nProse.\n\n    python -m x\n\nIt draws `validation/figures/nothing_at_all.png`.\n\n"
+        "# A title (B9)\n\nProse.\n\n    python -m x\n\nThe command draws `validation/figures/nothing_at_all.png`.\n\n"
         "```\na 1.0e-03\nb 7\n```\n"
     )
 

@@ -1,4 +1,4 @@
-"""The work-precision chart shows what it is given, and refuses what it cannot show."""
+"""The work-precision chart shows all given points, and refuses points that it cannot show."""
 
 from itertools import pairwise
 
@@ -45,7 +45,7 @@ def test_ours_is_drawn_over_the_others_and_stronger(axes):
 
 
 def test_names_are_beside_the_axes_and_do_not_touch(axes):
-    """Eight curves that end within 1 % of one another."""
+    """Labels of eight curves that end within 1 % of one another do not overlap."""
     draw_work_precision(axes, CURVES)
     names = [text for text in axes.texts if text.get_text()]
     assert sorted(text.get_text() for text in names) == sorted(curve.label for curve in CURVES if curve.label)
@@ -60,7 +60,7 @@ def test_names_are_beside_the_axes_and_do_not_touch(axes):
 
 @pytest.mark.parametrize(
     ("seconds", "errors", "word"),
-    [([], [], "0 seconds"), ([1], [1, 2], "as many"), ([0], [1], "above 0"), ([1], [np.nan], "finite")],
+    [([], [], "0 seconds"), ([1], [1, 2], "must be equal"), ([0], [1], "above 0"), ([1], [np.nan], "finite")],
 )
 def test_points_that_no_logarithm_takes_are_refused(axes, seconds, errors, word):
     with pytest.raises(ValueError, match=rf"mine: .*{word}"):

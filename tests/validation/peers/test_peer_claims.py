@@ -1,4 +1,4 @@
-"""Claims of others are asked and held to their bounds; a wrong answer is named."""
+"""Published claims are checked against their bounds, and a wrong answer is named."""
 
 import sys
 from dataclasses import replace
@@ -15,7 +15,7 @@ def test_page_is_written_and_every_claim_holds(tmp_path, monkeypatch):
     monkeypatch.setattr(sys, "argv", ["peer_claims", "--out", str(tmp_path), "--docs", str(tmp_path)])
     assert peer_claims.main() == 0
     page = (tmp_path / "peer_claims.md").read_text()
-    assert "not expressed here" in page
+    assert "claims without a counterpart here" in page
     assert (tmp_path / "peer_claims.png").stat().st_size > 10_000
 
 
@@ -27,7 +27,7 @@ def test_there_are_enough_claims_of_several_sources():
 
 
 def test_a_wrong_wavelength_is_noticed(monkeypatch):
-    """A unit 1 % too long: every dark ring is then elsewhere."""
+    """A unit that is 1 % too long moves every dark ring."""
     monkeypatch.setattr(systems, "UNIT", 1.01 * systems.UNIT)
     asked = [each for each in of_circles() if each.says.startswith("dark ring")]
     assert len(peer_claims.answered(asked)[2]) == len(asked) == 3

@@ -1,4 +1,4 @@
-"""The chart of populations: its rows are what they say, and its phase and scale those of Fresnel's integral."""
+"""The chart of populations: rows follow their definitions; phase and scale agree with Fresnel's integral."""
 
 import sys
 
@@ -40,7 +40,7 @@ def test_errors_that_exceed_what_was_predicted_are_broken(monkeypatch):
 
 @pytest.mark.parametrize("parts", [1, 4])
 def test_what_peers_are_given_is_the_field(parts):
-    """Its Fourier sum to the focal plane is Fresnel's picture, but for the edge."""
+    """Its Fourier sum to the focal plane is Fresnel's image, except for the error of the edge."""
     [pupil] = population_speed.eyes(1)
     field, pitch = population_speed.pupil_field(pupil, 256, parts)
     at = (np.arange(population_speed.N) - population_speed.N // 2) * population_speed.DX

@@ -1,4 +1,4 @@
-"""The harness beside the peers: its oracle, its grids, its goals and its file can each fail, and say so."""
+"""The benchmark against other packages: its oracle, its grids, its goals and its file can each fail with a message."""
 
 from dataclasses import replace
 from importlib import metadata
@@ -34,7 +34,7 @@ def test_exact_is_what_is_known_in_closed_form_on_the_axis():
 
 
 def test_exact_refuses_to_be_the_airy_pattern():
-    """A paraxial answer is 5e-4 wrong at f/16 even after its scale is fitted: the oracle sees it."""
+    """A paraxial answer has an error of 5e-4 at f/16 even after its scale is fitted, and the oracle detects it."""
     case = NAMED["f/16"]
     r = np.hypot(case.window.x[None, :], case.window.x[:, None])
     airy = reference.airy_psf(r, WAVELENGTH, case.radius, case.focal_length)
@@ -101,7 +101,7 @@ def test_a_spoilt_file_is_named_with_its_line(tmp_path, old, new, said):
 
 
 def test_stored_points_are_of_known_cases_and_peers_that_came_close():
-    """More than 10 % wrong at the best of its settings would be our mistake in setting a peer up."""
+    """An error above 10 % at the best setting of a package would mean that we set it up wrongly."""
     points = read_points()
     assert {p.case for p in points} == set(NAMED)
     for case in NAMED:
@@ -139,9 +139,9 @@ def test_goals_hold_on_points_that_meet_them():
 @pytest.mark.parametrize(
     ("index", "change", "goal"),
     [
-        (0, {"seconds": 6e-4}, 1),  # the quickest at its own best is "spectral", 5 ms: not ten times faster
+        (0, {"seconds": 6e-4}, 1),  # "spectral", the quickest at its own best, takes 5 ms: less than ten times as long
         (0, {"error": 2.1e-7}, 1),
-        (1, {"seconds": 6e-3}, 2),  # later than 1e-3 from "spectral"
+        (1, {"seconds": 6e-3}, 2),  # later than "spectral", which reaches 1e-3 in 5 ms
         (1, {"error": 1.1e-5}, 2),
         (1, {"dtype": "float64"}, 2),
         (2, {"error": 2.1e-3}, 3),
@@ -207,7 +207,7 @@ def test_every_peer_has_an_adapter_and_only_installed_ones_run():
     assert len(MODULES) == 10
 
 
-# All of it
+# The whole benchmark
 
 
 @pytest.fixture
@@ -224,7 +224,7 @@ def test_end_to_end_over_stored_points(few, tmp_path, capsys):
     said = capsys.readouterr().out
     assert "stored (2026-11-21 on 2 cores)" in said
     assert "indicative only" in said
-    assert said.count("goal ") == 2  # no stored angular spectrum has as many samples as ours
+    assert said.count("goal ") == 2  # no stored angular spectrum has our number of samples
     assert code == (1 if "FAIL" in said else 0)
     assert (tmp_path / "work_precision.png").stat().st_size > 10_000
 

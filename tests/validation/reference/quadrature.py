@@ -1,4 +1,4 @@
-"""Gauss-Legendre nodes for tests of the oracles, written apart from the oracles' own."""
+"""Gauss-Legendre nodes for tests of the oracles, implemented independently of the oracles."""
 
 import numpy as np
 

@@ -78,7 +78,7 @@ class TestCircular:
         assert abs(reference.converging_wave_at_focus(radius, z, WAVELENGTH) - complex(focus)) < 1e-12 * abs(focus)
 
     def test_fraunhofer_at_any_angle_is_the_exact_integral_at_small_fresnel_number(self):
-        """Misses the phase kρ²/2D, so the intensity errs by the Fresnel number squared."""
+        """The pattern lacks the phase kρ²/2D, so the intensity's error is the Fresnel number squared."""
         radius, errors = 2e-6, []
         for z in (1e-3, 4e-3, 16e-3):
             r = np.linspace(0, z, 21)
@@ -115,7 +115,7 @@ class TestRayleighSommerfeld:
 
     @pytest.mark.parametrize("f_number", [1.4, 2, 2.8, 4, 5.6, 8, 11, 16])
     def test_nodes_suffice_for_every_lens_of_the_chart(self, f_number):
-        """Windows of ±10 λ f#, to the corner. Twice the nodes change nothing above 1e-12 of the peak."""
+        """Windows of ±10 λ f#, to the corner. Twice the number of nodes changes nothing above 1e-12 of the peak."""
         radius, f = 300e-6 / (2 * f_number), 300e-6
         r = np.linspace(0, 14.2 * WAVELENGTH * f_number, 24)
         self.check(r, radius, f, f)
@@ -168,7 +168,8 @@ class TestDefocus:
         assert reference.lommel_intensity(u, v) == pytest.approx(float(abs(value) ** 2), rel=1e-9, abs=1e-13)
 
     def test_the_edges_of_the_formula(self):
-        """On the axis sinc², in the focal plane Airy, at the shadow's edge (1 - 2 J0 cos u + J0²)/u² (§8.8.1)."""
+        """The limits are sinc² on the axis, Airy in the focal plane, and (1 - 2 J0 cos u + J0²)/u² at the shadow's edge
+        (§8.8.1)."""
         u = np.linspace(0.01, 50, 200)
         np.testing.assert_allclose(reference.lommel_intensity(u, 0), np.sinc(u / (4 * np.pi)) ** 2, atol=1e-12)
         edge = [float((1 - 2 * mpmath.besselj(0, x) * mpmath.cos(x) + mpmath.besselj(0, x) ** 2) / x**2) for x in u]
@@ -182,13 +183,13 @@ class TestDefocus:
         )
 
     def test_it_carries_all_the_power(self):
-        """To what Airy's tail leaves out beyond v = 200: 2/(πv)."""
+        """All power is there, up to the part of Airy's tail beyond v = 200: 2/(πv)."""
         r, weight = gauss_legendre(600, 0, 200 / (K * 0.03e-3 / 2e-3))
         psf = reference.defocused_psf(r, WAVELENGTH, 30e-6, 3e-3, 2e-3)
         assert np.sum(weight * 2 * np.pi * r * psf) == pytest.approx(1 - 2 / (200 * np.pi), abs=2e-4)
 
     def test_the_exact_defocused_lens_departs_from_it_like_the_angle_squared(self):
-        """Fresnel number and defocus in waves held fixed: the same pattern in (u, v), paraxially."""
+        """The paraxial pattern in (u, v) is the same at a fixed Fresnel number and a fixed defocus in waves."""
         fresnel_number, apertures, errors = 20.0, (0.02, 0.04, 0.08), []
         for aperture in apertures:
             f = fresnel_number * WAVELENGTH / aperture**2

@@ -93,7 +93,7 @@ class TestAberrations:
             assert reference.RMS_PER_WAVE[name] == pytest.approx(sigma, rel=1e-12)
 
     def test_marechals_rule_errs_by_the_fourth_power_of_the_rms(self):
-        """In full: defocus and astigmatism alone; the third moment that would give σ³ vanishes for them and coma."""
+        """The third moment, which would give an error of σ³, vanishes for defocus, balanced astigmatism and coma."""
         for law, name, balance in (
             (reference.strehl_defocus, "defocus", None),
             (reference.strehl_coma, "balanced coma", -2 / 3),
@@ -112,7 +112,7 @@ class TestLenses:
         assert reference.thin_lens_image_distance(120e-6, 360e-6) == pytest.approx(180e-6)
         assert reference.thin_lens_image_distance(120e-6, math.inf) == pytest.approx(120e-6, rel=1e-15)
         assert reference.thin_lens_image_distance(120e-6, 60e-6) == pytest.approx(-120e-6)
-        # rays through a sphere of curvature 1/R_c, from glass: f from the exact refraction of a ray near the axis
+        # rays from glass through a sphere of curvature 1/R_c: f from the exact refraction of a ray near the axis
         n, curvature_radius, height = 1.52, 1e-3, 1e-7
         inside = math.asin(height / curvature_radius)
         bend = math.asin(n * math.sin(inside)) - inside

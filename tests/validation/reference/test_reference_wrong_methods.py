@@ -1,4 +1,4 @@
-"""An oracle must fail the wrong method, by far more than the bound that the package is held to."""
+"""An oracle must reject the wrong method by far more than the bound that the package must satisfy."""
 
 import math
 
@@ -16,7 +16,8 @@ def intensity(field):
 
 
 def fresnel_on_axis():
-    """Radius 20 µm at 40 µm: Fresnel number 20, dark on the axis; it is 3.474."""
+    """Radius 20 µm at 40 µm: Fresnel's approximation gives darkness on the axis at Fresnel number 20; the exact value
+    is 3.474."""
     exact = reference.circular_aperture_on_axis(20e-6, 40e-6, WAVELENGTH)
     return exact, 4 * math.sin(math.pi * 20e-6**2 / (2 * WAVELENGTH * 40e-6)) ** 2
 
@@ -33,14 +34,16 @@ def airy_peak_at_f1():
 
 
 def parabolic_lens_at_f2():
-    """exp(-ikr²/2f) in place of the sphere: Fresnel's focus of a lens that is none."""
+    """exp(-ikr²/2f) in place of the sphere: Fresnel's method gives it an ideal focus, which the exact lens does not
+    have."""
     radius, f = 75e-6, 300e-6
     edge_waves = (radius**2 / (2 * f) - (math.hypot(radius, f) - f)) / WAVELENGTH
     return 1.0, reference.strehl_spherical(edge_waves)
 
 
 def debye_at_low_fresnel_number():
-    """Debye's pattern is symmetric about the focus; at Fresnel number 2 the light is brightest before it."""
+    """Debye's pattern is symmetric about the focus; at Fresnel number 2 the exact pattern is brightest in front of
+    it."""
     radius, f = 100e-6, 10e-3
     z = 0.8 * f
     u = 2 * np.pi / WAVELENGTH * radius**2 * (1 / z - 1 / f)
@@ -54,7 +57,7 @@ def fraunhofer_in_the_near_field():
 
 
 def tangent_in_the_far_field():
-    """At 45°: sin θ, not tan θ, and the slant factor."""
+    """The pattern at 45° needs sin θ instead of tan θ, and the slant factor."""
     r, z = np.linspace(0, 16e-3, 200), 16e-3
     exact = reference.circular_aperture_fraunhofer(r, WAVELENGTH, 0.7e-6, z)
     return exact, reference.airy_psf(r, WAVELENGTH, 0.7e-6, z) * np.pi * 0.7e-6**2
@@ -133,7 +136,7 @@ def four_levels_as_a_sawtooth():
 
 
 def amplitude_grating_in_place_of_a_phase_grating():
-    """Chrome in place of glass: (1/π)² = 10 %, not (2/π)² = 40.5 %."""
+    """A chrome grating in place of glass has (1/π)² = 10 % instead of (2/π)² = 40.5 %."""
     return reference.binary_grating_efficiency(1, 0.5), (1 / math.pi) ** 2
 
 
@@ -165,19 +168,19 @@ def image_in_the_focal_plane():
 
 
 def glass_that_disperses_like_a_grating():
-    """Blue (440 nm) of a lens made for 550 nm."""
+    """Blue light (440 nm) through a lens made for 550 nm."""
     return reference.refractive_focal_length(1e-3, 1.53), reference.diffractive_focal_length(
         1e-3 / 0.52, 550e-9, 440e-9
     )
 
 
 def pinhole_as_its_shadow():
-    """Geometric PSF, one over the hole's area."""
+    """A geometric PSF, one over the aperture's area."""
     radius = reference.pinhole_radius(WAVELENGTH, 1e-3)
     return reference.defocused_psf(0.0, WAVELENGTH, radius, math.inf, 1e-3), 1 / (np.pi * radius**2)
 
 
-# What the tests of optics allow, times ten.
+# Ten times the bounds in the tests of optics.
 CASES = {
     fresnel_on_axis: 1e-4,
     airy_at_f2: 1e-6,

@@ -1,4 +1,4 @@
-"""The bands that are shipped, and what the page says of them."""
+"""The brightness bands of the worlds, and the page about them."""
 
 from pathlib import Path
 
@@ -13,13 +13,13 @@ PAGE = Path(__file__).parents[3] / "docs/validation/equal_brightness.md"
 
 
 def test_shipped_bands_are_balanced_and_even_ones_are_not():
-    """Where an eye just misses the top of an object, even bands differ by as much as the noise."""
+    """Even bands differ by the noise level if an eye just misses the top of an object."""
     assert abs(difference(BAND_EDGES_DEG, 2.0).mean()) < 0.2
     assert abs(difference(np.arange(1, 6) * 30.0, 2.0).mean()) > 0.8
 
 
 def test_light_is_lamberts_seen_through_a_square_field():
-    """From afar, a sphere lit by one light from behind the viewer: mean over the disc of cos is 2/3."""
+    """A distant sphere lit by one light from behind the viewer has a mean of cos over the disc of 2/3."""
     (towards, level) = np.array([1.0, 0, 0]), 1.0
     lights, equal_brightness._lights = equal_brightness._lights, lambda: [(towards, level)]
     light_seen.cache_clear()
@@ -28,12 +28,12 @@ def test_light_is_lamberts_seen_through_a_square_field():
     finally:
         equal_brightness._lights = lights
         light_seen.cache_clear()
-    # heading pi: the viewer stands where the light comes from
+    # heading pi: the viewer stands on the side of the light
     facing = len(by_latitude) // 2
     disc = np.pi * (0.5 / 19.8) ** 2 / (2 * np.tan(np.radians(22.5))) ** 2
     np.testing.assert_allclose(by_latitude[facing].sum(), 2 / 3 * disc, rtol=0.05)  # 11 rays across the disc
     np.testing.assert_allclose(by_longitude.sum(axis=1), by_latitude.sum(axis=1))
-    assert by_latitude[0].sum() < 0.02 * disc  # from the other side it is dark
+    assert by_latitude[0].sum() < 0.02 * disc  # the other side is dark
 
 
 def test_contrast_of_even_light_depends_on_the_stripes_share():

@@ -1,4 +1,5 @@
-"""The page's comparison on models that gymnasium brings; it sees movers that stand still, and eyes turned aside."""
+"""The page's comparison on models shipped with gymnasium; it detects moving geoms that stand still, and eyes turned
+aside."""
 
 import importlib.util
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""The stored page shows what is stored beside it, within the bounds; each bound complains where it is broken."""
+"""The stored page agrees with its stored data, within the bounds; each bound reports its violation."""
 
 import csv
 from dataclasses import replace
@@ -47,7 +47,7 @@ def test_the_stored_page_holds_the_bounds():
 @pytest.mark.parametrize(
     ("changes", "complaint"),
     [
-        ({"auto_error": 0.6}, "auto errs by 0.60 σ"),
+        ({"auto_error": 0.6}, "auto has an error of 0.60 σ"),
         ({"errors": (0.4, 0.3, 0.25)}, "errors fall like n^-0.17"),
     ],
 )
@@ -64,7 +64,7 @@ def test_the_slope_leaves_out_what_tables_differ_by():
 
 
 def test_a_small_eye_is_measured_as_the_page_says(tmp_path, monkeypatch):
-    """Sampling agrees with the convolution, and a field that is put on the other side is noticed."""
+    """Sampling agrees with the convolution, and a mirrored receptive field is detected."""
     monkeypatch.setitem(receptive_field_sampling.RETINAS, (2, 3), 40.0)
     world = sim.build_world("detection", seed=3)
     state = lived_through(world, 2)
@@ -89,7 +89,8 @@ def test_a_small_eye_is_measured_as_the_page_says(tmp_path, monkeypatch):
 
 
 def test_areas_are_held_against_finer_ones_in_their_own_light(monkeypatch):
-    """What is chosen for a perfect lens follows all light, which rays do not: direct light is not its reference."""
+    """The fidelity chosen for a perfect lens includes all light, which rays do not, so direct light is not its
+    reference."""
     monkeypatch.setitem(receptive_field_sampling.RETINAS, (2, 3), 40.0)
     world = sim.build_world("detection", seed=3)
     state = lived_through(world, 2)

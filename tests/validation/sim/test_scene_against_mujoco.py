@@ -1,4 +1,5 @@
-"""The page's comparison on two models that gymnasium brings; it sees a mirror that does not follow, and one turned."""
+"""The page's comparison on two models shipped with gymnasium; it detects a mirror that does not follow, and a turned
+one."""
 
 import importlib.util
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""The chart's bounds hold for a chart as it should be, and each complains where its own is broken."""
+"""The chart's bounds hold for a correct chart, and each bound reports its violation."""
 
 import csv
 from dataclasses import replace
@@ -26,7 +26,7 @@ AUTO = Point(
 
 
 def series(light):
-    """Errors fall like n^-0.7 to what is left of the light, and are higher on objects; speed falls like 1/n."""
+    """Errors fall like n^-0.7 to the error of the missing light, and are higher on objects; speed falls like 1/n."""
     left = {"direct": 0.3, "bounce": 0.05}[light]
     return [
         Point(
@@ -77,7 +77,7 @@ def test_the_front_is_what_no_point_beats(chart):
 
 
 def test_what_is_good_over_all_receptors_alone_is_not_on_the_front(chart):
-    """It is no rival to auto, either, unless the errors over all receptors are what counts."""
+    """It does not compete with auto either, unless the errors over all receptors are the criterion."""
     blind = Point(Setting("mitsuba", 1), Errors(0.01, 0.9), sampling=0.1, speed=850)
     charted = replace(chart, points=(*chart.points, blind))
     assert blind not in charted.front
@@ -89,10 +89,13 @@ def test_what_is_good_over_all_receptors_alone_is_not_on_the_front(chart):
     ("spoil", "complaint"),
     [
         (lambda c: with_auto(c, speed=100), "auto makes 100 steps/s"),
-        (lambda c: with_auto(c, error=Errors(0.6, 0.4)), "auto errs by 0.600 σ over all receptors"),
-        (lambda c: with_auto(c, error=Errors(0.4, 0.6)), "auto errs by 0.600 σ over those that see an object"),
-        (lambda c: replace(c, reference_error=Errors(0.3)), "good to 0.30 σ only"),
-        (lambda c: replace(c, reference_error=Errors(0.1, 0.3)), "good to 0.10 (0.30) σ only"),
+        (lambda c: with_auto(c, error=Errors(0.6, 0.4)), "auto has an error of 0.600 σ over all receptors"),
+        (
+            lambda c: with_auto(c, error=Errors(0.4, 0.6)),
+            "auto has an error of 0.600 σ over receptors that see an object",
+        ),
+        (lambda c: replace(c, reference_error=Errors(0.3)), "standard error of the reference is 0.30 σ"),
+        (lambda c: replace(c, reference_error=Errors(0.1, 0.3)), "standard error of the reference is 0.10 (0.30) σ"),
         (lambda c: flat(c, "direct"), "direct light do not fall"),
         (lambda c: flat(c, "bounce"), "bounce light do not fall"),
     ],
@@ -105,22 +108,22 @@ def test_what_is_wrong_is_named(chart, spoil, complaint):
 
 def test_a_promise_that_was_taken_back_by_a_warning_is_shown_and_no_broken_bound(chart):
     broken = with_auto(chart, error=Errors(0.4, 0.6))
-    warned = with_auto(chart, error=Errors(0.4, 0.6), warning="1.3 times what is allowed")
+    warned = with_auto(chart, error=Errors(0.4, 0.6), warning="1.3 times the allowed error")
     assert speed_accuracy.broken_bounds([broken])
     assert not speed_accuracy.broken_bounds([warned])
     for shown in (broken, warned):
-        assert "it errs by 0.600 σ over those that see an object" in table([shown])
-        assert "misses its promise of σ/2 in 1 of 2 charts: its worst error is 0.600 σ" in message([chart, shown])
-    assert "auto warned: 1.3 times what is allowed" in table([warned])
-    assert "kept" in table([chart])
-    assert "keeps its promise" in message([chart])
+        assert "exceeded: 0.600 σ over receptors that see an object" in table([shown])
+        assert "exceeds σ/2 in 1 of 2 charts: up to 0.600 σ" in message([chart, shown])
+    assert "auto: warning: 1.3 times the allowed error" in table([warned])
+    assert "satisfied" in table([chart])
+    assert "is below σ/2" in message([chart])
 
 
 def test_table_figure_and_stored_rows_show_all_points(chart, tmp_path):
     lines = table([chart]).splitlines()
     assert sum(line.endswith("  front") for line in lines) == len(chart.front)
     assert sum(line.startswith("auto areas ") for line in lines) == 1
-    assert "there are no receptors that see one" in table([without_objects(chart)])
+    assert "no objects in this world" in table([without_objects(chart)])
     draw([chart, chart, chart, without_objects(chart)], tmp_path / "chart.png")
     assert (tmp_path / "chart.png").stat().st_size > 10_000
     write_table(tmp_path / "data" / "speed_accuracy.csv", rows_of([chart]))
@@ -139,7 +142,7 @@ def test_the_stored_data_have_every_setting_of_every_scene():
         rows = [row for row in stored if row["scene"] == scene.name]
         assert len(rows) == len(speed_accuracy.PERFECT_LENS if scene.aperture is None else speed_accuracy.BEHIND_LENS)
         assert all(bool(row["error_on_objects_sigma"]) == (scene.task != "maze") for row in rows)
-        assert f"\n{scene.name}; reference" in page
+        assert f"\n{scene.name}; standard error of the reference" in page
 
 
 def test_agents_face_objects_that_some_of_their_receptors_see():
@@ -150,7 +153,7 @@ def test_agents_face_objects_that_some_of_their_receptors_see():
     assert ((nearest >= NEAR[0] - 1e-9) & (nearest <= NEAR[1])).all()
     seen = sees_object(world, scene.eyes, facing)
     assert seen.any(axis=(1, 2, 3)).mean() > 0.9
-    # By angles from the object's centre instead of rays, with a margin of half a receptor's diagonal.
+    # This check uses angles from the object's centre instead of rays, with a margin of half a receptor's diagonal.
     about = area_views.sees_object(world, scene.eyes, facing)
     assert not (seen & ~about).any()
     assert seen.sum() > 0.8 * about.sum()
@@ -158,7 +161,7 @@ def test_agents_face_objects_that_some_of_their_receptors_see():
 
 @pytest.mark.parametrize("aperture", [None, 0.25])
 def test_a_measured_chart_has_every_setting(aperture):
-    """Of a small scene, with few samples: all that the full run does."""
+    """A small scene with few samples covers every part of the full run."""
     scene = replace(SCENES[0], eyes=sim.Eyes(n_eyes=1, resolution=(2, 3), fov_deg=60), aperture=aperture)
     kinds = [Setting("areas", 1, 4, "bounce")] if aperture is None else [Setting("closed_form", 4, 8, "bounce", 3)]
     settings = [speed_accuracy.AUTO, Setting("closed_form", 4), *kinds, speed_accuracy.BEHIND_LENS[-1]]

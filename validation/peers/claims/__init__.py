@@ -1,8 +1,8 @@
-"""What other codes' test suites and textbooks assert of physics, asked of this package.
+"""Physical claims of other codes' test suites and of textbooks, evaluated with this package.
 
-claim                 Case: a source, what it says, what we find, how far that may be off; the systems that are asked
+claim                 Case: source, claim, our value and bound; the systems that claims use
 suite_claims          prysm, poppy and hcipy
 textbook_apertures    textbooks: circles, rings and slits
 textbook_aberrations  textbooks: Strehl ratios, defocus, light on the axis, Zernike's polynomials
-unexpressed           what cannot be asked here, and why
+unexpressed           claims without a counterpart here, with the reasons
 """

@@ -1,4 +1,4 @@
-"""One claim of somebody else's, and the slow systems that most claims are about."""
+"""A claim of another source, and the slow systems to which most claims refer."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import optics
 
 __all__ = ["FOCAL", "RADIUS", "UNIT", "WAVE", "Case", "across", "amplitude_across", "lens", "strehl_at_centre"]
 
-# f/100: closed forms here are paraxial, and the exact integral departs from them by the square of NA 0.005.
+# f/100: closed forms here are paraxial, and the exact integral differs from them by the square of NA 0.005.
 RADIUS, FOCAL, WAVE = 0.5e-3, 0.1, 0.55e-6
 UNIT = WAVE * FOCAL / (2 * RADIUS)  # λ f/D [m]
 ASKED: dict[str, Any] = {"tolerance": 1e-7, "dtype": "float64"}
@@ -20,8 +20,13 @@ ASKED: dict[str, Any] = {"tolerance": 1e-7, "dtype": "float64"}
 
 @dataclass(frozen=True)
 class Case:
-    """source: repository and test, or book and equation; says: in our words; theirs, ours: the number; bound: by how
-    much the two may differ, the source's own where it has one."""
+    """A claim.
+
+    source: repository and test, or book and equation.
+    says: the claim in our words.
+    theirs, ours: the number in the source, and a function that computes ours.
+    bound: largest allowed difference, the source's own if it states one.
+    """
 
     source: str
     says: str
@@ -35,7 +40,7 @@ def lens(**more: Any) -> optics.Pupil:
 
 
 def across(pupil: optics.Pupil, at: np.ndarray) -> np.ndarray:
-    """PSF in the focus at evenly spaced places [λ f/D] along x, over the peak of a perfect opening."""
+    """PSF in the focus at evenly spaced positions [λ f/D] along x, relative to the peak of a perfect aperture."""
     dx = float(at[1] - at[0]) * UNIT
     n = 2 * round(float(at[-1]) * UNIT / dx) + 1
     found = optics.psf(pupil, [WAVE], FOCAL, dx=dx, shape=(1, n), **ASKED).psf[0, 0]
@@ -45,17 +50,17 @@ def across(pupil: optics.Pupil, at: np.ndarray) -> np.ndarray:
 
 
 def amplitude_across(pupil: optics.Pupil, at: np.ndarray) -> np.ndarray:
-    """|U| likewise, over the middle's."""
+    """|U| at the same positions, relative to the centre."""
     n = 2 * (len(at) - 1) + 1
     dx = float(at[1] - at[0]) * UNIT
     result = optics.psf(pupil, [WAVE], FOCAL, dx=dx, shape=(1, n), field=True, **ASKED)
     assert result.field is not None
     u = result.field[0, 0]
-    # Less the sphere e^{ikx²/2f} on which a flat screen is touched by the wave.
+    # Without the phase e^{ikx²/2f} of the converging wave on a flat screen.
     sphere = np.exp(1j * np.pi * result.x**2 / (WAVE * FOCAL))
     return np.asarray((u / u[n // 2] / sphere)[n // 2 :].real)
 
 
 def strehl_at_centre(pupil: optics.Pupil) -> float:
-    """Of the light on the axis, over a perfect wave's through the same opening."""
+    """Light on the axis relative to that of a perfect wave through the same aperture."""
     return float(across(pupil, np.array([0.0, 0.1]))[0])

@@ -1,4 +1,4 @@
-"""What the test suites of prysm, poppy and hcipy assert. Facts and bounds are theirs, code and words are ours."""
+"""Claims of the test suites of prysm, poppy and hcipy. Facts and bounds are theirs, code and words are ours."""
 
 from __future__ import annotations
 
@@ -34,10 +34,11 @@ def of_prysm() -> Iterator[Case]:
             found = optics.psf(
                 pupil, [wave * 1e-6], efl * 1e-3, dx=unit / 8, shape=(1, 65), tolerance=1e-6, dtype="float64"
             )
-            line = found.psf[0, 0] / found.psf[0, 0].max()  # as theirs is
+            line = found.psf[0, 0] / found.psf[0, 0].max()  # normalised as in their test
             return float(np.abs(line - jinc(found.x / unit) ** 2).max())
 
-        # At f/2.7 the exact integral is no paraxial pattern any more (`departure_from_airy`): twenty times their bound.
+        # At f/2.7 the exact integral differs from the paraxial pattern (`departure_from_airy`): twenty times their
+        # bound.
         bound = 1e-3 if efl > 5 else 2e-2
         yield Case(f"{where}: test_diffprop_matches_airydisk", f"PSF less Airy's, {name}", 0.0, airy, bound)
 
@@ -120,7 +121,7 @@ def of_poppy() -> Iterator[Case]:
         at = np.arange(0, 5, 0.05)
         cell = (
             (0.010 / 0.206265) ** 2 * np.pi / 4
-        )  # of theirs, 0.01", in units of (λ/D)² at 1 m and 1 µm; times the peak
+        )  # their cell of 0.01", in units of (λ/D)² at 1 m and 1 µm; times the peak
         return float(np.abs(across(lens(), at) - jinc(at) ** 2).max() * cell)
 
     yield Case(

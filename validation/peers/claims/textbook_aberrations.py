@@ -1,4 +1,4 @@
-"""What textbooks say of aberrated light."""
+"""Claims of textbooks on aberrations."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from validation.peers.claims.claim import UNIT, WAVE, Case, lens, strehl_at_cent
 
 __all__ = ["of_strehl_ratios", "of_wavefronts"]
 
-# Peak terms ρ², ρ⁴, ρ³ cos θ, ρ² cos² θ, ρ cos θ in modes of root mean square 1, but for piston.
+# Peak terms ρ², ρ⁴, ρ³ cos θ, ρ² cos² θ, ρ cos θ in modes of root mean square 1, without piston.
 PEAK = {
     "defocus": {(2, 0): 1 / (2 * sqrt(3))},
     "spherical": {(4, 0): 1 / (6 * sqrt(5)), (2, 0): 1 / (2 * sqrt(3))},
@@ -24,7 +24,7 @@ PEAK = {
 
 
 def wave(**peaks: float) -> optics.Zernike:
-    """Of peak terms in waves."""
+    """Zernike wavefront with these peak terms in waves."""
     modes: dict[tuple[int, int], float] = {}
     for name, waves in peaks.items():
         for key, share in PEAK[name].items():

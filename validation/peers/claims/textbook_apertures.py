@@ -1,4 +1,4 @@
-"""What textbooks say of circles, rings and slits in focus, and of the light behind them on the axis."""
+"""Claims of textbooks on circles, rings and slits in focus, and on the light behind them on the axis."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ FINE = 0.001  # λ f/D
 
 
 def dark(pupil: optics.Pupil, near: float) -> float:
-    """Where the light has a minimum."""
+    """Position of a minimum of the light."""
     at = np.arange(near - 0.05, near + 0.05, FINE)
     return float(at[across(pupil, np.round(at / FINE) * FINE).argmin()])
 
 
 def ring(near: float) -> tuple[float, float]:
-    """Where the light has a maximum beside the middle, and how much."""
+    """Position of a maximum of the light off the centre, and its height."""
     at = np.round(np.arange(near - 0.05, near + 0.05, FINE) / FINE) * FINE
     found = across(lens(), at)
     return float(at[found.argmax()]), float(found.max())
@@ -56,7 +56,7 @@ def of_circles() -> Iterator[Case]:
         one = across(lens(), at)
         return float(2 * one[1] / (one[0] + one[2]))
 
-    yield Case("Born & Wolf, §8.6.2", "light between two points at Rayleigh's distance", 0.735, dip, 2e-3)
+    yield Case("Born & Wolf, §8.6.2", "light midway between two points at Rayleigh's distance", 0.735, dip, 2e-3)
 
 
 def of_openings() -> Iterator[Case]:
@@ -98,7 +98,7 @@ def of_openings() -> Iterator[Case]:
 
 
 def on_the_axis() -> Iterator[Case]:
-    """Of light behind openings, where textbooks have it exactly."""
+    """Light behind apertures, with exact closed forms."""
     for z in (15e-6, 40e-6, 100e-6):
 
         def light(z: float = z) -> float:
@@ -106,7 +106,7 @@ def on_the_axis() -> Iterator[Case]:
 
         exact = reference.circular_aperture_on_axis(20e-6, z, WAVE)
         yield Case(
-            "Osterberg & Smith, JOSA 51, 1050 (1961)", f"behind a hole of 20 µm, {z * 1e6:g} µm on", exact, light, 1e-4
+            "Osterberg & Smith, JOSA 51, 1050 (1961)", f"aperture of 20 µm, at {z * 1e6:g} µm", exact, light, 1e-4
         )
     inner, outer = (np.hypot(100e-6, r) for r in (10e-6, 20e-6))
     exact = (

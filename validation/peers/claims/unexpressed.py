@@ -1,4 +1,4 @@
-"""Claims that cannot be asked here, and why."""
+"""Claims without a counterpart here, with the reasons."""
 
 from __future__ import annotations
 
@@ -7,15 +7,15 @@ __all__ = ["UNEXPRESSED"]
 UNEXPRESSED = (
     (
         "spacetelescope/poppy, test_core: test_basic_functionality",
-        "its 0.201 is a sample half a cell off the peak, normalised by a window of its own",
+        "its 0.201 is a sample half a cell off the peak, normalised by the test's own window",
     ),
     (
         "spacetelescope/poppy, test_fresnel: test_fresnel_optical_system_Hubble",
-        "two mirrors: systems of planes here have pupils, and no lenses that follow one another in a converging beam",
+        "two mirrors: systems of planes here have pupils, but no sequence of lenses in a converging beam",
     ),
     (
         "spacetelescope/poppy, test_fresnel: test_GaussianBeamParams",
-        "asks for a bookkeeping of beam radius and waist that no field here carries",
+        "requires beam radius and waist, which fields here do not store",
     ),
     (
         "spacetelescope/poppy, test_matrixFTcoronagraph",
@@ -24,14 +24,14 @@ UNEXPRESSED = (
     ("spacetelescope/poppy, test_zernike: test_cross_hexikes", "there are no modes of a hexagon"),
     (
         "ehpor/hcipy, test_propagation: backward propagators",
-        "a PSF is computed forwards; `optics.propagate` goes back, and `backward_propagation` holds it",
+        "PSFs are computed forwards; `optics.propagate` goes backwards, which `backward_propagation` tests",
     ),
     (
         "brandondube/prysm, test_thinfilm and ray tracing",
-        "thin films and ray tracing are no part of this package",
+        "thin films and ray tracing are not part of this package",
     ),
     (
         "opticspy/lightpipes, examples of diffraction",
-        "draw pictures and assert nothing; their spot of Poisson is the ring's light on the axis",
+        "plot images without assertions; their spot of Poisson is the ring's light on the axis",
     ),
 )

@@ -1,0 +1,40 @@
+"""Failures that ended training episodes, mostly of methods of a user task."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+from evolve.store.candidate import Candidate
+
+__all__ = ["EpisodeFailure", "episode_failure_lines", "episode_failures_of"]
+
+
+@dataclass(frozen=True)
+class EpisodeFailure:
+    """A failure's message, with the number of episodes that it ended and of candidates that it affected."""
+
+    said: str
+    episodes: int
+    candidates: int
+
+
+def episode_failures_of(candidates: Iterable[Candidate]) -> list[EpisodeFailure]:
+    """Return the failures of the candidates' training episodes, the most frequent first."""
+    episodes, lives = Counter[str](), Counter[str]()
+    for candidate in candidates:
+        for said, number in candidate.episode_failures:
+            episodes[said] += number
+            lives[said] += 1
+    ranked = sorted(episodes, key=lambda said: (-episodes[said], said))
+    return [EpisodeFailure(said, episodes[said], lives[said]) for said in ranked]
+
+
+def episode_failure_lines(found: Sequence[EpisodeFailure]) -> list[str]:
+    """Return one line that summarises the failures, or no line if there were none."""
+    if not found:
+        return []
+    number, most = sum(one.episodes for one in found), found[0]
+    whose = f"{most.episodes:,}, of {most.candidates} candidate{'s' * (most.candidates > 1)}"
+    return [f"episodes that failed: {number:,}; most often ({whose}): {most.said}"]

@@ -1,0 +1,38 @@
+"""Deprecated names that keep working for one version."""
+
+from __future__ import annotations
+
+import warnings
+from typing import Any
+
+__all__ = ["renamed", "warn_renamed"]
+
+_warned: set[str] = set()
+
+
+def warn_renamed(old: str, new: str, stacklevel: int = 3) -> None:
+    """Warn once per process that a name has changed."""
+    if old not in _warned:
+        _warned.add(old)
+        warnings.warn(
+            f"{old} is now called {new}; the old name will be removed in version 0.3", FutureWarning, stacklevel
+        )
+
+
+def renamed(new: str) -> Any:
+    """Return a class attribute under an old name: it warns once and returns the attribute `new`."""
+    return _Renamed(new)
+
+
+class _Renamed:
+    """Descriptor of an attribute's old name."""
+
+    def __init__(self, new: str) -> None:
+        self._new, self._old = new, ""
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self._old = f"{owner.__name__}.{name}"
+
+    def __get__(self, instance: object, owner: type) -> Any:
+        warn_renamed(self._old, self._new)
+        return getattr(owner if instance is None else instance, self._new)

@@ -1,0 +1,82 @@
+"""The share of each light that reaches the moving bodies, as a whole and on each side of them.
+
+It does not depend on the eye, so it is computed once per world, in a table that all areas of the world read.
+"""
+
+from __future__ import annotations
+
+import math
+
+import drjit as dr
+import mitsuba as mi
+
+from optics.numerics.autodiff import Array
+from sim.tracing.areas.light_nodes import corners
+from sim.tracing.areas.patch import Patch
+from sim.tracing.areas.shadows import WallShadows, lit_past_sphere
+
+MIDDLE = 2 / 3  # distance from a body's centre to the middle of its visible side, weighted by projected area [radii]
+SIDES = 3  # places along x and along y, the outer ones on the sides' middles: an error of 0.05 between them
+WHOLE = SIDES * SIDES  # number of the whole body among a body's places
+PLACES = WHOLE + 1
+
+
+class IlluminatedBodies:
+    """shadows: of walls · directions: of the lights · radii: of the bodies [m]"""
+
+    def __init__(self, shadows: WallShadows, directions: list[list[float]], radii: list[float]) -> None:
+        self._shadows, self._directions, self._radii = shadows, directions, radii
+
+    @property
+    def nodes_per_body_set(self) -> int:
+        """Number of rows of a world's table."""
+        return PLACES * len(self._radii)
+
+    def table(self, place: Array, bodies: list[Array], walls_around: Array | None) -> list[Array]:
+        """Return the share of each light, in fours, at places 0 ... places - 1 of a world: past walls and, for places
+        on a side, past other bodies."""
+        k, side = place // PLACES, place % PLACES
+        radius, whole = select(k, self._radii), side == WHOLE
+        x, y = (mi.Float(i) * (2 / (SIDES - 1)) - 1 for i in (side % SIDES, side // SIDES))
+        offset = dr.select(whole, 0, MIDDLE * radius) * mi.Vector2f(x, y)
+        centre = select(k, bodies) + mi.Vector3f(offset.x, offset.y, 0)
+        disk = _disk(centre, dr.select(whole, radius, radius / 2))
+        lit = self._shadows.visibility(disk, self._directions, walls_around)
+        for other, (body, its_radius) in enumerate(zip(bodies, self._radii, strict=True)):
+            past = lit_past_sphere(disk, self._directions, body, mi.Float(its_radius))
+            free = whole | (k == other)
+            lit = [share * dr.select(free, 1, more) for share, more in zip(lit, past, strict=True)]
+        nothing = [mi.Float(0)] * (-len(lit) % 4)
+        lights = [*lit, *nothing]
+        return [dr.ravel(mi.Vector4f(*lights[i : i + 4])) for i in range(0, len(lights), 4)]
+
+    def on_whole(self, k: Array, world: Array, table: list[Array]) -> list[Array]:
+        """Return the share of each light that reaches the k-th body of a world."""
+        return self._row((world * len(self._radii) + k) * PLACES + WHOLE, table)
+
+    def on_side(self, k: Array, towards: Array, world: Array, table: list[Array]) -> list[Array]:
+        """Return the share of each light that reaches the k-th body on its side in a direction (unit vector)."""
+        first = (world * len(self._radii) + k) * PLACES  # whole numbers: too large for float32 in very many worlds
+        found = [mi.Float(0) for _ in self._directions]
+        for side, weight in corners(mi.Float(0), ((towards.x + 1) / 2, SIDES), ((towards.y + 1) / 2, SIDES)):
+            shares = self._row(first + side, table)
+            found = [dr.fma(weight, share, sum_) for share, sum_ in zip(shares, found, strict=True)]
+        return found
+
+    def _row(self, row: Array, table: list[Array]) -> list[Array]:
+        fours = [dr.gather(mi.Vector4f, shares, row) for shares in table]
+        return [fours[i // 4][i % 4] for i in range(len(self._directions))]
+
+
+def select(k: Array, values: list[Array] | list[float]) -> Array:
+    """Return the k-th value."""
+    found = values[-1]
+    for i, value in reversed(list(enumerate(values[:-1]))):
+        found = value if value is found else dr.select(k == i, value, found)
+    return found
+
+
+def _disk(centre: Array, radius: Array) -> Patch:
+    """Return a level square with the area of a disk."""
+    side = math.sqrt(math.pi) * radius
+    return Patch(centre, mi.Normal3f(0, 0, 1), mi.Vector3f(side, 0, 0), mi.Vector3f(0, side, 0))
