@@ -10,15 +10,20 @@ from dataclasses import dataclass
 from math import pi
 
 import numpy as np
+from scipy.spatial import KDTree
 
 from optics.apertures.outline import TURN, Outline
 
 __all__ = ["Boundary", "boundary"]
 
 SHORTEST = 1e-9  # choice, radii: pieces that are shorter are left out
-ASIDE = 1e-7  # choice, radii: distance from an edge at which its sides are tested
+COINCIDENT = 1e-11  # choice, radii: edges that are closer together are one edge; rounding moves them by 1e-15
+NEIGHBOURS = 1e-10  # choice, radii: middles of coincident pieces are closer together
+ASIDE = 1e-7  # choice, radii: largest distance from an edge at which its sides are tested
 PARALLEL = 1e-12
-TOUCHING = 1e-9  # choice, squared shares: tangents count as intersections
+ALONG, MOST_LINES = 0.3819660, 200  # choice: where lines of the final check cross pieces, and their number
+NARROW = 1e-6  # choice, radii: narrower gaps are not compared with `contains`
+TOUCHING = 1e-9  # choice, squared shares: tangents count as intersections, which only adds a cut
 
 Contains = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
@@ -63,89 +68,144 @@ class Boundary:
 
 def boundary(pieces: Outline, contains: Contains) -> Boundary:
     """Return the boundary of the region that `contains` describes; its edges are these pieces or parts of them."""
-    segments, arcs = _cut_segments(pieces), _cut_arcs(pieces)
+    points = _meeting_points(pieces)
+    segments, arcs = _cut_segments(pieces, points), _cut_arcs(pieces, points)
     along = segments[:, 1] - segments[:, 0]
     left = np.column_stack([-along[:, 1], along[:, 0]]) / np.hypot(*along.T)[:, None]
-    kept, flipped = _edges(segments.mean(axis=1), left, contains)
+    kept, flipped = _edges(segments.mean(axis=1), left, pieces, contains)
     segments[flipped] = segments[flipped][:, ::-1]
     cx, cy, radius, begin, end = arcs.T
     outward = np.column_stack([np.cos((begin + end) / 2), np.sin((begin + end) / 2)])
     middle = np.column_stack([cx, cy]) + radius[:, None] * outward
-    bent, outside = _edges(middle, -outward, contains)
+    bent, outside = _edges(middle, -outward, pieces, contains)
     signed = np.column_stack([arcs, np.where(outside, -1.0, 1.0)])
-    return Boundary(segments[kept], signed[bent])
+    found = Boundary(segments[kept], signed[bent])
+    _check(found.outline, pieces, contains)
+    return found
 
 
-def _edges(middle: np.ndarray, left: np.ndarray, contains: Contains) -> tuple[np.ndarray, np.ndarray]:
+def _check(outline: Outline, pieces: Outline, contains: Contains) -> None:
+    """Compare the outline with `contains` along lines through all pieces.
+
+    Area and quadrature follow the outline alone, so that neither reveals a lost shape.
+
+    Raises:
+        ValueError: they differ somewhere.
+    """
+    heights = np.concatenate(
+        [pieces.segments[:, 0, 1] * ALONG + pieces.segments[:, 1, 1] * (1 - ALONG)]
+        + [pieces.arcs[:, 1] + side * ALONG * pieces.arcs[:, 2] for side in (-1, 1)]
+    )
+    corners = np.unique(np.concatenate([pieces.turning, outline.turning, [-1.0, 1.0]]))
+    nearest = np.abs(
+        corners[np.clip(np.searchsorted(corners, heights) + np.array([[-1], [0]]), 0, len(corners) - 1)] - heights
+    )
+    heights = heights[(np.abs(heights) < 1) & (nearest.min(axis=0) > NARROW)]
+    for y in heights[:: max(1, len(heights) // MOST_LINES)]:
+        ends = np.concatenate([[-1.0], outline.crossings(np.array([y]))[0], [1.0]])
+        middle, inside = ends[:-1] + ALONG * np.diff(ends), np.arange(len(ends) - 1) % 2 == 1
+        wrong = (contains(middle, np.full(len(middle), y)) != inside) & (np.diff(ends) > NARROW)
+        if wrong.any():
+            raise ValueError(
+                f"shapes: their common outline cannot be computed near ({middle[wrong][0]:.6g}, {y:.6g}), where edges "
+                "almost coincide: move one of them by 1e-6 or more"
+            )
+
+
+def _edges(middle: np.ndarray, left: np.ndarray, pieces: Outline, contains: Contains) -> tuple[np.ndarray, np.ndarray]:
     """Return masks of the pieces between open and closed areas (one of each coinciding pair), and of those with the
     opening on their right.
+
+    The sides are tested closer to the piece than the next edge is, however narrow the gap between the two.
     """
-    here, there = (contains(*(middle + sign * ASIDE * left).T) for sign in (1, -1))
-    kept = here != there
-    _, first = np.unique(np.round(middle / ASIDE).astype(np.int64), axis=0, return_index=True)
-    single = np.zeros(len(middle), dtype=bool)
-    single[first] = True
-    return kept & single, there & ~here
+    aside = np.minimum(ASIDE, pieces.clearance(middle, COINCIDENT) / 2)[:, None]
+    here, there = (contains(*(middle + sign * aside * left).T) for sign in (1, -1))
+    return (here != there) & _first_of_coincident(middle, left), there & ~here
 
 
-def _cut_segments(pieces: Outline) -> np.ndarray:
+def _first_of_coincident(middle: np.ndarray, left: np.ndarray) -> np.ndarray:
+    """Return a mask (n,) that omits all but the first of several pieces on one edge."""
+    first = np.ones(len(middle), dtype=bool)
+    if len(middle):
+        pairs = KDTree(middle).query_pairs(NEIGHBOURS, output_type="ndarray")
+        apart = np.sum((middle[pairs[:, 0]] - middle[pairs[:, 1]]) * left[pairs[:, 0]], axis=1)
+        first[pairs[np.abs(apart) <= COINCIDENT, 1]] = False
+    return first
+
+
+def _cut_segments(pieces: Outline, points: np.ndarray) -> np.ndarray:
+    """Return the segments (n, 2, 2), cut at those of the points that lie on them."""
     found = []
     for start, end in pieces.segments:
         along = end - start
         size = float(np.hypot(*along))
-        others = pieces.segments[:, 0], pieces.segments[:, 1] - pieces.segments[:, 0]
-        places = [_on_lines(start, along, *others)]
-        for cx, cy, radius, *_ in pieces.arcs:
-            offset = start - (cx, cy)
-            middle = -(offset @ along) / size**2
-            rest = (radius**2 - np.sum((offset + middle * along) ** 2)) / size**2
-            met = middle + np.sqrt(max(rest, 0.0)) * np.array([-1, 1])
-            places.append(met if rest > -TOUCHING else np.zeros(0))
-        at = _between(np.concatenate(places), 0.0, 1.0, SHORTEST / size)
+        on_line = np.abs((points - start) @ (-along[1], along[0])) / size < COINCIDENT
+        at = _between((points[on_line] - start) @ along / size**2, 0.0, 1.0, SHORTEST / size)
         found += [(start + first * along, start + last * along) for first, last in itertools.pairwise(at)]
     return np.array(found, dtype=np.float64).reshape(-1, 2, 2)
 
 
-def _on_lines(start: np.ndarray, along: np.ndarray, starts: np.ndarray, alongs: np.ndarray) -> np.ndarray:
-    """Return the positions along one segment at which other segments intersect it, in shares of its length.
-
-    Collinear segments contribute their ends.
-    """
-    gap = starts - start
-    determinant = along[0] * alongs[:, 1] - along[1] * alongs[:, 0]
-    size = float(along @ along)
-    parallel = np.abs(determinant) <= PARALLEL * np.sqrt(size) * np.hypot(*alongs.T)
-    safe = np.where(parallel, 1.0, determinant)
-    met = (gap[:, 0] * alongs[:, 1] - gap[:, 1] * alongs[:, 0]) / safe
-    off = np.abs(gap[:, 0] * along[1] - gap[:, 1] * along[0]) / np.sqrt(size)
-    same = parallel & (off < ASIDE)
-    return np.concatenate([met[~parallel], (gap[same] @ along) / size, ((gap + alongs)[same] @ along) / size])
-
-
-def _cut_arcs(pieces: Outline) -> np.ndarray:
+def _cut_arcs(pieces: Outline, points: np.ndarray) -> np.ndarray:
+    """Return the arcs (n, 5), cut at those of the points that lie on them."""
     found = []
     for cx, cy, radius, begin, end in pieces.arcs:
-        angles = [np.zeros(0)]
-        for start, last in pieces.segments:
-            along, offset = last - start, start - (cx, cy)
-            size = float(along @ along)
-            middle = -(offset @ along) / size
-            rest = (radius**2 - np.sum((offset + middle * along) ** 2)) / size
-            if rest > -TOUCHING:
-                points = offset + (middle + np.sqrt(max(rest, 0.0)) * np.array([[-1], [1]])) * along
-                angles.append(np.arctan2(points[:, 1], points[:, 0]))
-        for other_x, other_y, other, *ends in pieces.arcs:
-            apart, towards = np.hypot(other_x - cx, other_y - cy), np.arctan2(other_y - cy, other_x - cx)
-            if apart > PARALLEL:
-                cosine = (radius**2 + apart**2 - other**2) / (2 * radius * apart)
-                turns = np.array([-1, 1]) * np.arccos(np.clip(cosine, -1, 1))
-                angles.append(towards + turns if abs(cosine) < 1 + TOUCHING else np.zeros(0))
-            elif abs(other - radius) < ASIDE:
-                angles.append(np.array(ends))
-        at = begin + (np.concatenate(angles) - begin) % TURN
+        x, y = (points - (cx, cy)).T
+        on_circle = np.abs(np.hypot(x, y) - radius) < COINCIDENT
+        at = begin + (np.arctan2(y[on_circle], x[on_circle]) - begin) % TURN
         at = _between(at, begin, end, SHORTEST / radius)
         found += [(cx, cy, radius, first, last) for first, last in itertools.pairwise(at)]
     return np.array(found, dtype=np.float64).reshape(-1, 5)
+
+
+def _meeting_points(pieces: Outline) -> np.ndarray:
+    """Return all points (n, 2) at which the lines and circles of the pieces intersect, and the ends of the pieces.
+
+    Each point is computed once and cuts both pieces. Where two edges are almost the same, the place of their
+    intersection is ill-conditioned, and two computations of it would leave a gap in the outline.
+    """
+    found = [pieces.ends]
+    for number, (start, end) in enumerate(pieces.segments):
+        later = pieces.segments[number + 1 :]
+        found.append(_of_lines(start, end - start, later[:, 0], later[:, 1] - later[:, 0]))
+        found += [_of_line_and_circle(start, end - start, arc) for arc in pieces.arcs]
+    for arc, other in itertools.combinations(pieces.arcs, 2):
+        found.append(_of_circles(arc, other))
+    return np.concatenate(found)
+
+
+def _of_lines(start: np.ndarray, along: np.ndarray, starts: np.ndarray, alongs: np.ndarray) -> np.ndarray:
+    gap = starts - start
+    determinant = along[0] * alongs[:, 1] - along[1] * alongs[:, 0]
+    crossing = np.abs(determinant) > PARALLEL * np.hypot(*along) * np.hypot(*alongs.T)
+    share, other = (
+        (gap[:, 0] * by[:, 1] - gap[:, 1] * by[:, 0])[crossing] / determinant[crossing]
+        for by in (alongs, np.broadcast_to(along, alongs.shape))
+    )
+    within = (np.abs(share - 0.5) < 0.5 + SHORTEST) & (np.abs(other - 0.5) < 0.5 + SHORTEST)
+    return np.asarray(start + share[within, None] * along)
+
+
+def _of_line_and_circle(start: np.ndarray, along: np.ndarray, arc: np.ndarray) -> np.ndarray:
+    offset, size = start - arc[:2], float(along @ along)
+    middle = -(offset @ along) / size
+    rest = (arc[2] ** 2 - np.sum((offset + middle * along) ** 2)) / size
+    if rest <= -TOUCHING:
+        return np.zeros((0, 2))
+    return np.asarray(start + (middle + np.sqrt(max(rest, 0.0)) * np.array([[-1], [1]])) * along)
+
+
+def _of_circles(arc: np.ndarray, other: np.ndarray) -> np.ndarray:
+    towards = other[:2] - arc[:2]
+    apart = float(np.hypot(*towards))
+    if apart <= PARALLEL:
+        return np.zeros((0, 2))
+    cosine = (arc[2] ** 2 + apart**2 - other[2] ** 2) / (2 * arc[2] * apart)
+    if abs(cosine) >= 1 + TOUCHING:
+        return np.zeros((0, 2))
+    cosine = min(max(cosine, -1.0), 1.0)
+    ahead, across = towards / apart, np.array([-towards[1], towards[0]]) / apart
+    sine = np.sqrt(1 - cosine**2) * np.array([[-1], [1]])
+    return np.asarray(arc[:2] + arc[2] * (cosine * ahead + sine * across))
 
 
 def _between(places: np.ndarray, low: float, high: float, shortest: float) -> np.ndarray:

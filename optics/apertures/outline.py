@@ -48,6 +48,34 @@ class Outline:
         _, _, radius, begin, end = self.arcs.T
         return float(np.hypot(*(self.segments[:, 1] - self.segments[:, 0]).T).sum() + (radius * (end - begin)).sum())
 
+    @property
+    def ends(self) -> np.ndarray:
+        """Ends of all pieces, (n, 2)."""
+        cx, cy, radius, *angles = self.arcs.T
+        return np.concatenate(
+            [self.segments.reshape(-1, 2)]
+            + [np.column_stack([cx + radius * np.cos(at), cy + radius * np.sin(at)]) for at in angles]
+        )
+
+    def clearance(self, points: np.ndarray, least: float) -> np.ndarray:
+        """Return the distance (n,) of points (n, 2) from the nearest piece that is farther away than `least`."""
+        x, y = points.T
+        found = np.full(len(points), np.inf)
+        ends = self.ends
+        for start, end in self.segments:
+            along = end - start
+            share = np.clip(((x - start[0]) * along[0] + (y - start[1]) * along[1]) / (along @ along), 0, 1)
+            off = np.hypot(x - start[0] - share * along[0], y - start[1] - share * along[1])
+            found = np.where(off > least, np.minimum(found, off), found)
+        for cx, cy, radius, begin, end in self.arcs:
+            within = (np.arctan2(y - cy, x - cx) - begin) % TURN < end - begin
+            off = np.abs(np.hypot(x - cx, y - cy) - radius)
+            found = np.where(within & (off > least), np.minimum(found, off), found)
+        for end_x, end_y in ends[2 * len(self.segments) :]:
+            off = np.hypot(x - end_x, y - end_y)
+            found = np.where(off > least, np.minimum(found, off), found)
+        return found
+
     def points(self, apart: float = 0.01) -> np.ndarray:
         """Return points (n, 2) along the outline, evenly spaced by about `apart`."""
         found = []
