@@ -11,5 +11,5 @@ class ClosedForm:
     def run(self, jobs, progress) -> Iterator:
         while jobs:
             job = jobs.popleft()
-            steps = job.stage.ends[-1] if job.stage else job.config.learning.total_steps
+            steps = job.rung.ends[-1] if job.rung else job.config.learning.total_steps
             yield job, Evaluation(fitness=-abs(job.phenotype.fov_deg - 70), steps=steps)

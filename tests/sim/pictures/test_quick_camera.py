@@ -118,10 +118,10 @@ def test_nearness_is_the_mirrors(mixture):
     """Interpolation between rays is exact on planes. The reference depth is float32."""
     model, quick, mirror = mixture
     data = _posed(model)
-    look = quick.look(data, "side", SIZE[1], SIZE[0])
+    look = quick.render(data, "side", SIZE[1], SIZE[0])
     depth = mirror.render_depth("side", SIZE[1], SIZE[0])
     ids = mirror.render_ids("side", SIZE[1], SIZE[0])
-    nearness = look.nearness(np.arange(depth.size)).reshape(SIZE)
+    nearness = look.inverse_distance(np.arange(depth.size)).reshape(SIZE)
     flat = (ids == 0) | (ids == 1)
     wrong = np.abs(nearness[flat] * depth[flat] - 1) > 1e-4
     assert flat.mean() > 0.4

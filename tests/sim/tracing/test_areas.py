@@ -76,7 +76,7 @@ def no_edges(monkeypatch):
 
 def no_wall_shadows(monkeypatch):
     monkeypatch.setattr(
-        shadows.WallShadows, "lit", lambda self, patch, directions, inputs: [mi.Float(1) for _ in directions]
+        shadows.WallShadows, "visibility", lambda self, patch, directions, inputs: [mi.Float(1) for _ in directions]
     )
 
 
@@ -129,7 +129,7 @@ def hidden_evenly(monkeypatch):
 
     def behind(self, area, piece, part):
         whole, share = right(self, area, piece, Rectangle(0, 0, 1, 1)), part.width * part.height
-        return dataclasses.replace(whole, below=whole.floor_share * share, beside=whole.wall_share * share)
+        return dataclasses.replace(whole, floor_share=whole.floor_share * share, wall_share=whole.wall_share * share)
 
     monkeypatch.setattr(columns.Columns, "behind", behind)
 

@@ -30,7 +30,7 @@ def moment(tracer, centres):
     bodies = [mi.Point3f(c.T.astype(np.float32)) for c in np.moveaxis(centres, 1, 0)]
     place = dr.arange(mi.UInt32, tracer.places * WORLDS) % tracer.places
     spread = [mi.Point3f(np.repeat(c, tracer.places, axis=0).T.astype(np.float32)) for c in np.moveaxis(centres, 1, 0)]
-    lit = tracer.lit(place, spread, tracer.inputs)
+    lit = tracer.body_light(place, spread, tracer.inputs)
     return FrameState(bodies, tracer.inputs, dr.arange(mi.UInt32, WORLDS), lit)
 
 
@@ -43,7 +43,7 @@ def patch_of(tracer, now, side):
 
 def by_itself(tracer, patch, now):
     """Return the light per component and world: direct light, and light reflected by walls, floor and other bodies."""
-    straight = tracer._illumination.arriving(patch.normal, tracer._illumination.lit(patch, now, 0))
+    straight = tracer._illumination.arriving(patch.normal, tracer._illumination.visibility(patch, now, 0))
     free = [sum_of(fours, patch.normal) for fours in tracer._reflected.on_body(0, now.bodies[0], now.inputs.reflected)]
     reflected = tracer._illumination.past_bodies(patch, free, now, 0)
     return np.array([np.array(a + b) for a, b in zip(straight, reflected, strict=True)])
@@ -93,7 +93,7 @@ def test_light_that_is_not_followed_is_not_there(scene):
         tracer, all_ = scene.areas("direct"), scene.areas("all")
         now = moment(all_, bodies_of(scene))
         light, patch = light_at(tracer, now, SIDES[1])
-        straight = tracer._illumination.arriving(patch.normal, tracer._illumination.lit(patch, now, 0))
+        straight = tracer._illumination.arriving(patch.normal, tracer._illumination.visibility(patch, now, 0))
         np.testing.assert_array_equal(on(light, patch), [np.array(component) for component in straight])
 
 

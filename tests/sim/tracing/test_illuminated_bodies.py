@@ -24,14 +24,14 @@ def table(scene, centres):
     tracer = scene.areas("all")
     place = dr.arange(mi.UInt32, tracer.places * WORLDS) % tracer.places
     bodies = [mi.Point3f(np.repeat(c, tracer.places, axis=0).T.astype(np.float32)) for c in np.moveaxis(centres, 1, 0)]
-    return tracer, tracer.lit(place, bodies, tracer.inputs)
+    return tracer, tracer.body_light(place, bodies, tracer.inputs)
 
 
 def lit_by_rays(scene, disk, radius, centres, others):
     """Return the share, per light and world, of a horizontal disk's points that are lit, past walls and past `others`
     among the bodies.
     """
-    rays, rng = scene.tracers.of("direct"), np.random.default_rng(1)
+    rays, rng = scene.tracers.tracer_for("direct"), np.random.default_rng(1)
     r, turn = np.sqrt(rng.random(POINTS)) * radius, rng.uniform(0, 2 * np.pi, POINTS)
     points = disk[:, None] + np.stack([r * np.cos(turn), r * np.sin(turn), np.zeros(POINTS)], axis=-1)
     found = []

@@ -18,7 +18,7 @@ def test_a_body_shines_as_lamberts_sphere():
     straight = SimpleNamespace(_levels=np.array([[0.8]]), _directions=[[0.0, 0.0, 1.0]], _colours=[[0.5]], _radii=[0.2])
     with variant():
         straight.bodies = SimpleNamespace(on_side=lambda *_: [mi.Float(1.0)])
-        now = SimpleNamespace(bodies=[mi.Point3f(0, 0, 1)], world=None, lit=None)
+        now = SimpleNamespace(bodies=[mi.Point3f(0, 0, 1)], world=None, body_light=None)
         ways = ((0, 0, 1), (1, 0, 0), (0, 0, -1), (0.6, 0, 0.8))
         for nearness, expected in ((0.0, (2 / 3, 2 / (3 * np.pi), 0.0, None)), (1.0, (1.0, 0.0, 0.0, 0.8))):
             for towards, share in zip(ways, expected, strict=True):
@@ -41,7 +41,7 @@ def test_between_near_and_far_a_body_shines_as_its_visible_cap(nearness):
     errors = {nearness: [], 0.0: [], 1.0: []}
     with variant():
         straight.bodies = SimpleNamespace(on_side=lambda *_: [mi.Float(1.0)])
-        now = SimpleNamespace(bodies=[mi.Point3f(0, 0, 1)], world=None, lit=None)
+        now = SimpleNamespace(bodies=[mi.Point3f(0, 0, 1)], world=None, body_light=None)
         for angle in np.linspace(0, np.pi, 19):
             exact = np.maximum(normals @ [np.sin(angle), 0, -np.cos(angle)], 0).mean()
             towards = mi.Vector3f(float(np.sin(angle)), 0, float(np.cos(angle)))
