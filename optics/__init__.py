@@ -1,7 +1,7 @@
-"""Light to photoreceptor signal by wave optics. SI units; arrays are (wavelength, y, x).
+"""Wave optics from a light source to the signals of photoreceptors. SI units; arrays are (wavelength, y, x).
 
-Start with `optics.psf`, the image of a point behind a `Pupil`, and `optics.Eye`, a pupil before receptors. Each folder
-imports only from the folders listed above it:
+Start with `optics.psf`, the image of a point behind a `Pupil`, and `optics.Eye`, a pupil in front of receptors. Each
+folder imports only from the folders listed above it:
 
 numerics      arrays, transforms and interpolation, independent of optics
 apertures     shapes of the pupil's opening

@@ -1,4 +1,4 @@
-"""PSFs inside a PyTorch graph: gradients flow from an image loss back to the relief.
+"""PSFs inside a PyTorch graph. Gradients flow from a loss on the PSF back to the relief.
 
 lens = optics.torch.PointSpread(radius=30e-6, sensor_distance=240e-6, wavelengths=[550e-9], dx=1e-6, shape=(33, 33))
 psf = lens()                    # torch tensor (wavelength, y, x)
@@ -29,11 +29,14 @@ def psf(
 ) -> torch.Tensor:
     """Differentiable `optics.psf` of a relief, as a function of its heights.
 
-    heights: [m]. A (4, 4) tensor holds the control points of a BSplineRelief, any other square the samples of a
-        HeightMap.
-    radius, n: radius [m] and refractive index. One-element tensors carry gradients.
-    pupil: further arguments of `optics.Pupil`.
-    view: arguments of `optics.psf` except the pupil. Returns (wavelength, y, x) [1/m²], float32 unless dtype="float64".
+    heights: heights [m]. A (4, 4) tensor holds the control points of a BSplineRelief. A square tensor of any other size
+        holds the samples of a HeightMap.
+    radius, n: radius [m] of the pupil and refractive index of the relief. If they are one-element tensors, gradients
+        flow back to them, too.
+    pupil: further arguments of `optics.Pupil`, as a dictionary.
+    view: arguments of `optics.psf` except the pupil.
+
+    Returns a tensor (wavelength, y, x) [1/m²]. It is float32 unless dtype="float64".
 
     Raises:
         ValueError: see `optics.psf`.
@@ -58,10 +61,10 @@ def psf(
 
 
 def _place() -> str:
-    """Return the device on which optics computes, by its torch name.
+    """Return the torch name of the device on which optics computes.
 
     Raises:
-        BackendError: Dr.Jit cannot compute there, or this torch build cannot.
+        BackendError: Dr.Jit or this build of torch cannot compute on this device.
     """
     place = make_ready()
     if place == "cuda" and not torch.cuda.is_available():
@@ -76,12 +79,13 @@ def _moved(value: Any, place: str) -> Any:
 class PointSpread(torch.nn.Module):
     """Module with a learnable relief: forward() returns the pupil's PSF, (wavelength, y, x).
 
-    radius: [m]. wavelengths, sensor_distance, dx, shape, ...: see `optics.psf`.
+    radius: radius [m] of the pupil.
+    wavelengths, sensor_distance, dx, shape, ...: arguments of `optics.psf`.
     heights: initial heights [m], (4, 4) control points (default: flat) or (n, n) samples.
-    unit: length [m] of one unit of the learnt parameter. It brings the parameter near 1, as optimisers expect.
+    unit: length [m] of one unit of the learnt parameter. Choose it such that the parameter is near 1, as optimisers
+        expect.
 
-    Parameter:
-        relief: heights / unit.
+    The only learnt parameter is `relief`, which equals heights / unit.
     """
 
     def __init__(
@@ -104,7 +108,7 @@ class PointSpread(torch.nn.Module):
 
     @property
     def heights(self) -> torch.Tensor:
-        """Heights [m]."""
+        """Heights [m] of the relief: the learnt parameter times its unit."""
         return self.relief * self.unit
 
     def forward(self) -> torch.Tensor:

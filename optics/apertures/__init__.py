@@ -1,4 +1,4 @@
-"""Shapes of the pupil's opening, prepared for sums: with a soft edge for samples on a grid, or as quadrature nodes.
+"""Shapes of the pupil's opening, in two forms for sums: softened edges for samples on a grid, and quadrature nodes.
 
 aperture       Aperture: interface of all shapes
 circular       Circle, Annulus
@@ -12,6 +12,6 @@ outline        edges and their crossings with lines
 strips         quadrature over the area inside an outline
 soft_edge      kernel that softens an edge
 soft_polygon   polygons convolved with this kernel
-soft_outline   straight pieces and arcs convolved with this kernel
+soft_outline   straight segments and arcs convolved with this kernel
 triangulation  polygons as triangles
 """

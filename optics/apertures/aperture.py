@@ -1,9 +1,9 @@
 """Interface of all apertures: shape, soft edge for samples on a grid, and quadrature nodes fitted to the edge.
 
-A hard edge has no band limit: sampled on a Cartesian grid, its error falls only like N⁻¹ to N⁻¹·⁵. Here the aperture is
-convolved with a low-pass kernel of compact support (optics.apertures.soft_edge), so that sums over samples (the
-trapezoid rule) converge as fast as the kernel's side lobes fall. The function is 1 or 0 except within `reach` of the
-edge.
+The spectrum of a hard edge has no band limit. If a hard edge is sampled on a Cartesian grid with N samples along an
+axis, the error of sums over the samples falls only like N⁻¹ to N⁻¹·⁵. The aperture is therefore convolved with a
+low-pass kernel of compact support (optics.apertures.soft_edge). Sums over samples (the trapezoid rule) then converge as
+fast as the kernel's side lobes fall. The softened transmittance is 1 or 0 except within `reach` of the edge.
 """
 
 from __future__ import annotations
@@ -24,14 +24,16 @@ __all__ = ["EDGE_REACH", "LEAST_RIPPLE", "Aperture", "Nodes", "SoftAperture"]
 
 # Choice: the largest reach of the soft edge beyond the aperture, in radii.
 EDGE_REACH = 0.25
-LEAST_RIPPLE = 1e-13  # choice: of a soft edge's spectrum, above float64's rounding
+LEAST_RIPPLE = 1e-13  # choice: smallest ripple of a soft edge's spectrum; it is above the rounding errors of float64
 
 
 class SoftAperture(ABC):
-    """An aperture with a soft edge, for samples on a grid. Lengths in pupil radii R, frequencies in cycles per R.
+    """An aperture with a soft edge, for samples on a grid.
 
-    Its spectrum equals the hard aperture's up to `passband` and vanishes beyond `stopband`, both to within `ripple`.
-    Further than `reach` from the edge the transmittance is 1 or 0.
+    Lengths are in units of the pupil's radius R, and frequencies in cycles per R.
+
+    The spectrum equals that of the hard aperture up to the frequency `passband` and is 0 beyond `stopband`, in both
+    cases to within `ripple`. At distances above `reach` from the edge, the transmittance is 1 or 0.
     """
 
     edge: SoftEdge
@@ -59,7 +61,7 @@ class SoftAperture(ABC):
 
     @abstractmethod
     def transmittance(self, x: Array, y: Array, types: Precision) -> Array:
-        """Transmittance at points (x, y), flat Dr.Jit Float64 arrays; differentiable in both."""
+        """Transmittance at points (x, y), which are flat Dr.Jit Float64 arrays. It is differentiable in x and y."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,7 +81,7 @@ class Nodes:
 
 
 class Aperture(ABC):
-    """An opening in an opaque screen, within the unit circle: lengths are in units of the pupil's radius R."""
+    """An opening in an opaque screen, within the unit circle. Lengths are in units of the pupil's radius R."""
 
     @property
     @abstractmethod
@@ -104,7 +106,7 @@ class Aperture(ABC):
     @property
     @abstractmethod
     def half_widths(self) -> tuple[float, float]:
-        """Half the width and height of the smallest centred rectangle that holds the aperture."""
+        """Half the width and half the height of the smallest centred rectangle that contains the aperture."""
 
     @property
     @abstractmethod
@@ -116,10 +118,12 @@ class Aperture(ABC):
         """Return a mask of the points that lie within the aperture."""
 
     def nodes(self, cycles: float, digits: float) -> Nodes:
-        """Return nodes whose sum is accurate to 10^-digits of the area, for integrands up to `cycles` cycles per R.
+        """Return quadrature nodes for integrands with spatial frequencies up to `cycles` cycles per R.
 
-        This limit applies to the local frequency at every point and in every direction. A varying amplitude uses part
-        of it.
+        Sums over the nodes have an error of at most 10^-digits times the area.
+
+        The limit `cycles` applies to the local frequency of the integrand at every point and in every direction.
+        Frequencies of a varying amplitude count as well.
 
         Raises:
             ValueError: cycles outside [0, 1e5] or digits outside [0, 16].
@@ -127,11 +131,14 @@ class Aperture(ABC):
         return self._nodes(in_range("cycles", cycles, 0.0, 1e5), in_range("digits", digits, 0.0, 16.0))
 
     def node_count(self, cycles: float, digits: float) -> int | None:
-        """Return the number of `nodes`, or None if it is known only after they have been computed."""
+        """Return the number of `nodes`, or None if it is unknown until they are computed."""
         return None
 
     def soften(self, passband: float, ripple: float, widest_reach: float = EDGE_REACH) -> SoftAperture:
-        """Return the aperture low-passed from `passband` [cycles per R], with the transition that needs fewest samples.
+        """Return the aperture after a low-pass filter.
+
+        The filter leaves frequencies up to `passband` [cycles per R] unchanged. It has the transition width that needs
+        the fewest samples.
 
         Raises:
             ValueError: passband negative, ripple outside [1e-13, 0.5], or widest_reach not positive.
@@ -143,7 +150,7 @@ class Aperture(ABC):
 
     @abstractmethod
     def _nodes(self, cycles: float, digits: float) -> Nodes:
-        """Return edge-fitted nodes."""
+        """Return quadrature nodes that are fitted to the edge."""
 
     @abstractmethod
     def _softened(self, edge: SoftEdge) -> SoftAperture:

@@ -1,5 +1,7 @@
-"""Edge of a combination of shapes: the edges of all shapes, cut at their intersections, without the pieces that do not
-separate open from closed areas.
+"""Edge of a combination of shapes.
+
+The edges of all shapes are cut into pieces at their intersections. A piece belongs to the edge of the combination if it
+separates an open area from a closed one.
 """
 
 from __future__ import annotations
@@ -17,13 +19,14 @@ from optics.apertures.outline import TURN, Outline
 __all__ = ["Boundary", "boundary"]
 
 SHORTEST = 1e-9  # choice, radii: pieces that are shorter are left out
-COINCIDENT = 1e-11  # choice, radii: edges that are closer together are one edge; rounding moves them by 1e-15
-NEIGHBOURS = 1e-10  # choice, radii: middles of coincident pieces are closer together
-ASIDE = 1e-7  # choice, radii: largest distance from an edge at which its sides are tested
+COINCIDENT = 1e-11  # choice, radii: edges that are closer together count as one; rounding moves edges by 1e-15
+NEIGHBOURS = 1e-10  # choice, radii: pieces coincide only if their middles are closer together than this
+ASIDE = 1e-7  # choice, radii: largest distance from an edge of the two points that test what is open on either side
 PARALLEL = 1e-12
-ALONG, MOST_LINES = 0.3819660, 200  # choice: where lines of the final check cross pieces, and their number
+# Choice: position on a piece at which a line of the final check crosses it, and most lines.
+ALONG, MOST_LINES = 0.3819660, 200
 NARROW = 1e-6  # choice, radii: narrower gaps are not compared with `contains`
-TOUCHING = 1e-9  # choice, squared shares: tangents count as intersections, which only adds a cut
+TOUCHING = 1e-9  # choice, squared shares: a near miss counts as an intersection; the only effect is one more cut
 
 Contains = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
@@ -32,8 +35,9 @@ Contains = Callable[[np.ndarray, np.ndarray], np.ndarray]
 class Boundary:
     """Pieces of an edge that separate open from closed areas.
 
-    segments: (n, 2, 2), with the opening on their left.
-    arcs: (m, 6), as in `Outline`, and 1 if the opening is on the side of their centre, else -1.
+    segments: (n, 2, 2), straight pieces, with the opening on their left.
+    arcs: (m, 6), the five numbers of `Outline.arcs`, then 1 if the opening lies on the side of the arc's centre, else
+        -1.
     """
 
     segments: np.ndarray
@@ -67,7 +71,10 @@ class Boundary:
 
 
 def boundary(pieces: Outline, contains: Contains) -> Boundary:
-    """Return the boundary of the region that `contains` describes; its edges are these pieces or parts of them."""
+    """Return the boundary of the region that `contains` describes.
+
+    pieces: edges of all shapes. The boundary consists of parts of them.
+    """
     points = _meeting_points(pieces)
     segments, arcs = _cut_segments(pieces, points), _cut_arcs(pieces, points)
     along = segments[:, 1] - segments[:, 0]
@@ -87,10 +94,10 @@ def boundary(pieces: Outline, contains: Contains) -> Boundary:
 def _check(outline: Outline, pieces: Outline, contains: Contains) -> None:
     """Compare the outline with `contains` along lines through all pieces.
 
-    Area and quadrature follow the outline alone, so that neither reveals a lost shape.
+    Area and quadrature use the outline alone. They would not reveal that a shape was lost.
 
     Raises:
-        ValueError: they differ somewhere.
+        ValueError: outline and `contains` differ at some point.
     """
     heights = np.concatenate(
         [pieces.segments[:, 0, 1] * ALONG + pieces.segments[:, 1, 1] * (1 - ALONG)]
@@ -113,10 +120,12 @@ def _check(outline: Outline, pieces: Outline, contains: Contains) -> None:
 
 
 def _edges(middle: np.ndarray, left: np.ndarray, pieces: Outline, contains: Contains) -> tuple[np.ndarray, np.ndarray]:
-    """Return masks of the pieces between open and closed areas (one of each coinciding pair), and of those with the
-    opening on their right.
+    """Return two masks of pieces: those that belong to the boundary, and those with the opening on their right.
 
-    The sides are tested closer to the piece than the next edge is, however narrow the gap between the two.
+    Pieces of the boundary lie between open and closed areas. Of coinciding pieces, only the first belongs to it.
+
+    Both sides of a piece are tested at points that are closer to the piece than any other edge, however narrow the gap
+    between the two edges.
     """
     aside = np.minimum(ASIDE, pieces.clearance(middle, COINCIDENT) / 2)[:, None]
     here, there = (contains(*(middle + sign * aside * left).T) for sign in (1, -1))
@@ -124,7 +133,7 @@ def _edges(middle: np.ndarray, left: np.ndarray, pieces: Outline, contains: Cont
 
 
 def _first_of_coincident(middle: np.ndarray, left: np.ndarray) -> np.ndarray:
-    """Return a mask (n,) that omits all but the first of several pieces on one edge."""
+    """Return a mask (n,) of the pieces that do not coincide with an earlier piece."""
     first = np.ones(len(middle), dtype=bool)
     if len(middle):
         pairs = KDTree(middle).query_pairs(NEIGHBOURS, output_type="ndarray")
@@ -134,7 +143,7 @@ def _first_of_coincident(middle: np.ndarray, left: np.ndarray) -> np.ndarray:
 
 
 def _cut_segments(pieces: Outline, points: np.ndarray) -> np.ndarray:
-    """Return the segments (n, 2, 2), cut at those of the points that lie on them."""
+    """Return the segments (n, 2, 2), cut at the points that lie on them."""
     found = []
     for start, end in pieces.segments:
         along = end - start
@@ -146,7 +155,7 @@ def _cut_segments(pieces: Outline, points: np.ndarray) -> np.ndarray:
 
 
 def _cut_arcs(pieces: Outline, points: np.ndarray) -> np.ndarray:
-    """Return the arcs (n, 5), cut at those of the points that lie on them."""
+    """Return the arcs (n, 5), cut at the points that lie on them."""
     found = []
     for cx, cy, radius, begin, end in pieces.arcs:
         x, y = (points - (cx, cy)).T
@@ -160,8 +169,9 @@ def _cut_arcs(pieces: Outline, points: np.ndarray) -> np.ndarray:
 def _meeting_points(pieces: Outline) -> np.ndarray:
     """Return all points (n, 2) at which the lines and circles of the pieces intersect, and the ends of the pieces.
 
-    Each point is computed once and cuts both pieces. Where two edges are almost the same, the place of their
-    intersection is ill-conditioned, and two computations of it would leave a gap in the outline.
+    Each point is computed once and cuts both pieces. If two edges almost coincide, the position of their intersection
+    is ill-conditioned. If it were computed once for each piece, the results could differ and leave a gap in the
+    outline.
     """
     found = [pieces.ends]
     for number, (start, end) in enumerate(pieces.segments):
@@ -209,7 +219,7 @@ def _of_circles(arc: np.ndarray, other: np.ndarray) -> np.ndarray:
 
 
 def _between(places: np.ndarray, low: float, high: float, shortest: float) -> np.ndarray:
-    """Return both ends and the places between them, ascending and at least `shortest` apart."""
+    """Return both ends and the places between them, in ascending order and at least `shortest` apart."""
     inside = np.sort(places[(places > low + shortest) & (places < high - shortest)])
     kept = inside[np.diff(inside, prepend=low) > shortest]
     return np.concatenate([[low], kept, [high]])

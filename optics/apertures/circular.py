@@ -128,10 +128,11 @@ def disk_table(edge: SoftEdge, radius: float) -> Interpolant:
 
 
 def disk_profile(edge: SoftEdge, radius: float, distance: np.ndarray) -> np.ndarray:
-    """Transmittance of a soft disk at distances ρ from its axis, by quadrature; even in ρ.
+    """Transmittance of a soft disk at distances ρ from its axis, by quadrature. It is an even function of ρ.
 
-    A(ρ) = ∫ g(r) r θ(ρ, r) dr, with θ = 2 arccos((ρ² + r² - R²)/(2ρr)) the angle over which a circle of radius r about
-    the point lies inside the disk. r = lower + span sin²(πu/2) smooths the arccos at both ends.
+    A(ρ) = ∫ g(r) r θ(ρ, r) dr, where g is the kernel. θ = 2 arccos((ρ² + r² - R²)/(2ρr)) is the angle over which a
+    circle of radius r about the point lies inside the disk. The substitution r = lower + span sin²(πu/2) makes the
+    arccos a smooth function at both ends.
     """
     rho = np.maximum(np.abs(np.asarray(distance, dtype=np.float64)), 1e-9 * radius)[:, None]
     lower = np.abs(rho - radius)
@@ -147,10 +148,10 @@ def disk_profile(edge: SoftEdge, radius: float, distance: np.ndarray) -> np.ndar
 
 
 def ring_nodes(inner: float, outer: float, cycles: float, digits: float) -> Nodes:
-    """Gauss-Legendre nodes in radius, trapezoidal rule in angle with fewer nodes on smaller rings.
+    """Gauss-Legendre nodes along the radius, and equidistant nodes around each ring, with fewer on smaller rings.
 
-    The edge is exact and convergence is spectral. Over a full disk the mean around a ring is a smooth function of r²,
-    so for few cycles a rule in r² needs fewer nodes.
+    The rule represents the edge exactly and converges spectrally. Over a full disk, the mean around a ring is a smooth
+    function of r². For few cycles, a rule in r² therefore needs fewer nodes.
     """
     r, weight, count = _ring_rule(inner, outer, cycles, digits)
     place = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
@@ -161,13 +162,13 @@ def ring_nodes(inner: float, outer: float, cycles: float, digits: float) -> Node
 
 @lru_cache(maxsize=256)
 def _ring_rule(inner: float, outer: float, cycles: float, digits: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Radii, their weights, and the number of nodes on each ring."""
-    digits += 0.3  # log10 2: each of the two rules may contribute half the error
+    """Radii of the rings, their weights, and the number of nodes on each ring."""
+    digits += 0.3  # log10 2: each of the two rules, in radius and in angle, may contribute half the error
     span = outer - inner
     u, weight = gauss_legendre(gauss_legendre_count(cycles * span, digits))
     rings = [(inner + span * u, span * weight)]
     if inner == 0:
-        # The rule covers a diameter; in r² half of its nodes are enough.
+        # The count is for a whole diameter. In r², half of the nodes are enough.
         u, weight = gauss_legendre(ceil(gauss_legendre_count(2 * cycles * outer, digits) / 2))
         rings.append((outer * np.sqrt(u), outer * weight / (2 * np.sqrt(u))))
     counts = [harmonics(2 * pi * cycles * r, digits) for r, _ in rings]

@@ -94,7 +94,7 @@ class Combined(Aperture):
 
 
 def union(*shapes: Shape) -> Combined:
-    """Return an aperture that is open where at least one of the shapes is, within the pupil.
+    """Return an aperture that is open wherever at least one of the shapes is open, within the pupil.
 
     Raises:
         ValueError: see `Combined`.
@@ -103,7 +103,7 @@ def union(*shapes: Shape) -> Combined:
 
 
 def difference(shape: Shape, *closed: Shape) -> Combined:
-    """Return an aperture that is open where the first shape is and none of the others, within the pupil.
+    """Return an aperture that is open wherever the first shape, but none of the others, is open, within the pupil.
 
     `difference(Annulus(0.3), Spider(4, 0.02))` is the aperture of a telescope.
 
@@ -114,7 +114,7 @@ def difference(shape: Shape, *closed: Shape) -> Combined:
 
 
 def intersection(*shapes: Shape) -> Combined:
-    """Return an aperture that is open where all of the shapes are, within the pupil.
+    """Return an aperture that is open wherever all shapes are open, within the pupil.
 
     Raises:
         ValueError: see `Combined`.
@@ -125,15 +125,18 @@ def intersection(*shapes: Shape) -> Combined:
 def hexagonal_segments(
     rings: int, gap: float = 0.0, rotation_deg: float = 0.0, without: tuple[int, ...] = ()
 ) -> Combined:
-    """Return a mirror of hexagons in rings around a central one; the outermost corners lie on the pupil's rim.
+    """Return a segmented mirror: rings of hexagons around a central hexagon.
 
-    gap: gap between neighbours, in units of the distance of their centres.
-    rotation_deg: rotation; 0 puts corners of the hexagons towards x.
-    without: numbers of omitted segments. Segment 0 is the central one; numbers continue ring by ring, counterclockwise
-        from `rotation_deg` + 30 degrees. James Webb's mirror has 2 rings without segment 0.
+    The outermost corners lie on the pupil's rim.
+
+    gap: gap between neighbours, in units of the distance between their centres.
+    rotation_deg: rotation of the mirror. At 0 the hexagons have corners in the direction of x.
+    without: numbers of omitted segments. Segment 0 is the central one. Numbers continue ring by ring, counterclockwise
+        from `rotation_deg` + 30 degrees. The mirror of the James Webb telescope has 2 rings without segment 0.
 
     Raises:
-        ValueError: rings outside 0 to 12, gap outside [0, 1), a number without a segment, or no segment left.
+        ValueError: rings outside 0 to 12, gap outside [0, 1), the number of a segment that does not exist, or no
+            segment left.
     """
     rings = whole("rings", rings, 0, MOST_RINGS)
     in_range("gap", gap, 0, 0.999)

@@ -1,4 +1,4 @@
-"""Edge of an opening and its crossings with lines, at which quadrature ends exactly."""
+"""Edge of an opening, and its crossings with lines. Quadrature rules end exactly at these crossings."""
 
 from __future__ import annotations
 
@@ -18,11 +18,13 @@ def _none(*shape: int) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class Outline:
-    """Straight pieces and arcs, by the even-odd rule: a point is inside if a ray from it crosses an odd number of them.
+    """Outline made of straight segments and arcs, with the even-odd rule.
 
-    segments: (n, 2, 2), the ends (x, y) of each.
-    arcs: (n, 5), circular arcs: x and y of the centre, radius, and the first and last angle [rad], with from < to <=
-        from + 2π.
+    A point is inside if a ray from it crosses an odd number of segments and arcs.
+
+    segments: (n, 2, 2), the two ends (x, y) of each segment.
+    arcs: (n, 5), circular arcs. Each has x and y of the centre, the radius, and the first and the last angle [rad],
+        with first < last <= first + 2π.
     """
 
     segments: np.ndarray = field(default_factory=lambda: _none(2, 2))
@@ -39,7 +41,7 @@ class Outline:
 
     @classmethod
     def joined(cls, outlines: list[Outline]) -> Outline:
-        """Return one outline with the pieces of several."""
+        """Return one outline that contains the pieces of several outlines."""
         segments, arcs = ([getattr(each, name) for each in outlines] for name in ("segments", "arcs"))
         return cls(np.concatenate([_none(2, 2), *segments]), np.concatenate([_none(5), *arcs]))
 
@@ -58,7 +60,7 @@ class Outline:
         )
 
     def clearance(self, points: np.ndarray, least: float) -> np.ndarray:
-        """Return the distance (n,) of points (n, 2) from the nearest piece that is farther away than `least`."""
+        """Return the distance (n,) of each point (n, 2) from the nearest piece, ignoring pieces closer than `least`."""
         x, y = points.T
         found = np.full(len(points), np.inf)
         ends = self.ends
@@ -77,7 +79,7 @@ class Outline:
         return found
 
     def points(self, apart: float = 0.01) -> np.ndarray:
-        """Return points (n, 2) along the outline, evenly spaced by about `apart`."""
+        """Return points (n, 2) along the outline at distances of about `apart`."""
         found = []
         for start, end in self.segments:
             n = max(1, round(float(np.hypot(*(end - start))) / apart))
@@ -89,7 +91,7 @@ class Outline:
         return np.concatenate(found)
 
     def crossings(self, y: np.ndarray) -> np.ndarray:
-        """Return x of the crossings of the edge with the horizontal lines at `y`, ascending: (line, crossing).
+        """Return the x at which the edge crosses the horizontal lines at `y`, in ascending order, (line, crossing).
 
         All lines must have the same number of crossings, so no `turning` height may lie between them.
         """
@@ -108,7 +110,7 @@ class Outline:
         return np.sort(np.array(found).reshape(-1, len(y)).T, axis=1)
 
     def heights(self, x: float) -> np.ndarray:
-        """Return y of the crossings of the edge with the vertical line at x."""
+        """Return the y at which the edge crosses the vertical line at x."""
         found = []
         for cx, cy, radius, begin, end in self.arcs:
             if abs(x - cx) < radius:
@@ -122,7 +124,7 @@ class Outline:
 
     @cached_property
     def turning(self) -> np.ndarray:
-        """Heights at which crossings begin, end or pass a corner."""
+        """Heights y at which the crossings of a horizontal line with the edge begin, end or pass a corner."""
         _, cy, radius, begin, end = self.arcs.T
         corners = [cy + radius * np.sin(begin), cy + radius * np.sin(end)]
         tops = [
@@ -134,14 +136,17 @@ class Outline:
 
     @cached_property
     def tangent(self) -> np.ndarray:
-        """Heights of the tops and bottoms of circles, on or near the arcs. Crossings start there like a square root."""
+        """Heights of the tops and bottoms of circles, if they lie on or near the arcs.
+
+        Near such a height the position of a crossing changes like a square root.
+        """
         _, cy, radius, _, _ = self.arcs.T
         return np.unique(np.concatenate([cy - radius, cy + radius]))
 
     def near(self, x: np.ndarray, y: np.ndarray, half: float) -> np.ndarray:
-        """Return a mask of the squares of half side `half` about points (x, y) that the edge may cut.
+        """Return a mask of the squares that the edge may cut. They have the half side `half` and the centres (x, y).
 
-        It contains all squares that are cut and few others.
+        The mask contains all squares that the edge cuts, and few others.
         """
         cut = np.zeros(np.broadcast(x, y).shape, dtype=bool)
         for cx, cy, radius, _, _ in self.arcs:

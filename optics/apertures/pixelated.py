@@ -1,9 +1,10 @@
-"""Quadrature over an opening tiled by square pixels, for integrands that jump between pixels.
+"""Quadrature over an opening that is tiled by square pixels, for integrands that jump between pixels.
 
-Whole pixels have Gauss-Legendre nodes. Pixels cut by the opening's edge are divided into panels with smooth ends at the
-points where the edge enters and leaves them (`strips`; `PixelatedAperture.nodes`). If nodes must lie on a grid of rows
-and columns, cut pixels use the nodes of whole ones. Their weights integrate the interpolating polynomial over the open
-part of the pixel (`PixelatedAperture.weights`).
+Pixels that lie wholly inside have Gauss-Legendre nodes. Pixels that the opening's edge cuts can be treated in two ways.
+`PixelatedAperture.nodes` divides them into panels at the points where the edge enters and leaves them (see `strips`).
+If the nodes must lie on rows and columns, cut pixels have the same nodes as whole pixels, and
+`PixelatedAperture.weights` returns weights that integrate the interpolating polynomial over the open part of each
+pixel.
 """
 
 from __future__ import annotations
@@ -24,8 +25,8 @@ from optics.numerics.quadrature import gauss_legendre, gauss_legendre_count, har
 
 __all__ = ["PixelatedAperture"]
 
-MOMENT_DIGITS = 8.0  # choice: accuracy of the moments of a cut pixel
-# Choice, nodes along a pixel: with more, cut pixels would need too many moments.
+MOMENT_DIGITS = 8.0  # choice: digits of the integrals of polynomials over the open part of a cut pixel
+# Choice: largest number of nodes along a pixel. With more, cut pixels would need too many integrals of polynomials.
 MOST_NODES = 32
 
 
@@ -56,8 +57,9 @@ class PixelatedAperture(Aperture):
         return self.opening.contains(x, y)
 
     def nodes_across(self, cycles: float, digits: float) -> int | None:
-        """Nodes along each pixel that make rows and columns as accurate as `nodes`; None if too many are needed."""
-        share = min(1.0, len(self._cut) * self._pitch**2 / self.area)  # share that interpolation affects
+        """Nodes along a pixel that make rows and columns as accurate as `nodes`; None if there would be too many."""
+        # Upper bound of the share of the area that lies in cut pixels.
+        share = min(1.0, len(self._cut) * self._pitch**2 / self.area)
         turns = np.array(pi * cycles * self._pitch)
         across = max(
             gauss_legendre_count(cycles * self._pitch, digits + 0.3),
@@ -66,7 +68,7 @@ class PixelatedAperture(Aperture):
         return across if across <= MOST_NODES else None
 
     def rows(self, across: int) -> np.ndarray:
-        """Positions of rows and columns of nodes, ascending, in units of R, (count x across,)."""
+        """Positions of the rows (and of the columns) of nodes in units of R, in ascending order, (count x across,)."""
         u, _ = gauss_legendre(across)
         return (self._centres[:, None] + (u - 0.5) * self._pitch).ravel()
 
@@ -118,7 +120,7 @@ class PixelatedAperture(Aperture):
     def _pieces(
         self, at: np.ndarray, cycles: float, digits: float, degree: int = 0
     ) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
-        """Yield x, y and weights over each panel of the open part of a cut pixel: see `strips`."""
+        """Yield x, y and weights of the nodes in each panel of a cut pixel's open part: see `strips`."""
         bottom, left = self._centres[at] - self._pitch / 2
         box = float(left), float(left + self._pitch), float(bottom), float(bottom + self._pitch)
         return strips(self.outline, box, cycles, digits, degree)
@@ -135,7 +137,7 @@ def _weights(aperture: PixelatedAperture, across: int) -> np.ndarray:
     rows, columns = np.nonzero(aperture._whole)
     weights[rows, :, columns, :] = np.outer(weight, weight) * pitch**2
     for row, column in aperture._cut:
-        # Exact for the Lagrange polynomials of the nodes, which have degree across - 1 in x and in y.
+        # The integrals are exact for the Lagrange polynomials of the nodes, which have degree across - 1 in x and in y.
         total = np.zeros((across, across))
         for x, y, size in aperture._pieces(np.array([row, column]), 0.0, MOMENT_DIGITS, across - 1):
             in_x, in_y = (

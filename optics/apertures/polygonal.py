@@ -17,19 +17,20 @@ from optics.numerics.quadrature import gauss_legendre, gauss_legendre_count
 
 __all__ = ["Polygon", "Slit"]
 
-# Rounding allowed to a vertex on the unit circle.
+# Largest distance of a vertex from the centre: 1, and a margin for rounding.
 RIM = 1 + 1e-9
-MOST_SIDES = 10_000  # choice: the search for crossing edges takes seconds (quadratic); more sides are a circle
+MOST_SIDES = 10_000  # choice: the search for crossing edges then takes seconds; its time grows with the square
 
 
 @dataclass(frozen=True, eq=False)
 class Polygon(Aperture):
     """A simple polygon (its edges meet only at its vertices), convex or not.
 
-    vertices: (n, 2), x and y in units of R, in either sense; stored counterclockwise.
+    vertices: (n, 2), x and y in units of R, clockwise or counterclockwise. They are stored counterclockwise.
 
     Raises:
-        ValueError: fewer than 3 vertices, NaN, one outside the unit circle, two that coincide, edges that cross.
+        ValueError: fewer than 3 vertices, NaN, a vertex outside the unit circle, two vertices that coincide, or edges
+            that cross.
     """
 
     vertices: np.ndarray
@@ -43,7 +44,9 @@ class Polygon(Aperture):
 
     @classmethod
     def regular(cls, n: int, rotation_deg: float = 0.0) -> Polygon:
-        """Return a regular polygon with n sides in the unit circle, the first vertex `rotation_deg` from the x axis.
+        """Return a regular polygon with n sides whose vertices lie on the unit circle.
+
+        rotation_deg: angle of the first vertex from the x axis.
 
         Raises:
             ValueError: n not a whole number from 3 to 10,000, or rotation_deg not finite.
@@ -66,7 +69,7 @@ class Polygon(Aperture):
         return float(x), float(y)
 
     def contains(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """Count the edges that cross the ray from each point towards +x."""
+        """Return a mask of the points inside: those from which a ray towards +x crosses an odd number of edges."""
         x, y = np.broadcast_arrays(np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64))
         inside = np.zeros(x.shape, dtype=bool)
         for (x0, y0), (x1, y1) in zip(self.vertices, np.roll(self.vertices, -1, axis=0), strict=True):
@@ -159,7 +162,7 @@ def _twice_area(vertices: np.ndarray) -> float:
 
 
 def _checked(value: Any) -> np.ndarray:
-    """The vertices as an (n, 2) array; ValueError unless they make a simple polygon within the unit circle."""
+    """Return the vertices as an (n, 2) array; ValueError unless they form a simple polygon within the unit circle."""
     without_derivative("vertices", value)
     try:
         vertices = np.array(value, dtype=np.float64)

@@ -19,17 +19,18 @@ from optics.numerics.precision import Precision
 
 __all__ = ["Rings"]
 
-MOST = 500  # choice: radii
+MOST = 500  # choice: largest number of radii
 
 
 @dataclass(frozen=True, eq=False)
 class Rings(Aperture):
     """Concentric open rings: from the first radius to the second, from the third to the fourth, and so on.
 
-    radii: ascending from 0 (an open centre) or more to at most 1, an even number of them, in units of R.
+    radii: an even number of radii in ascending order, in units of R. They lie in [0, 1]; a first radius of 0 means an
+        open centre.
 
     Raises:
-        ValueError: radii that do not ascend, an odd number of them or more than 500, or some outside [0, 1].
+        ValueError: radii that do not ascend, an odd number of radii, more than 500 radii, or a radius outside [0, 1].
     """
 
     radii: Any
@@ -47,10 +48,10 @@ class Rings(Aperture):
     def zone_plate(
         cls, aperture_radius: float, focal_length: float, wavelength: float = 550e-9, open_centre: bool = True
     ) -> Rings:
-        """Return every second Fresnel zone of a pupil of this radius [m], for a focal length [m] and a wavelength [m].
+        """Return a zone plate: every second Fresnel zone for a focal length and a wavelength. All lengths are in m.
 
-        Light from these zones arrives in phase at the focal length behind the pupil. Zones end at √(nλf + n²λ²/4)
-        (Fresnel). A tenth of the light, 1/π², goes into this focus.
+        Light from these zones arrives in phase at a distance of one focal length behind the pupil. Zone n ends at the
+        radius √(nλf + n²λ²/4) (Fresnel). A tenth of the light, 1/π², reaches this focus.
 
         Raises:
             ValueError: a length that is not positive, fewer than two zones, or more than 500.

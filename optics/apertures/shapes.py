@@ -1,4 +1,4 @@
-"""Shapes from which openings are combined. They may lie anywhere and extend beyond the pupil."""
+"""Shapes for combined openings. They may lie anywhere and extend beyond the pupil."""
 
 from __future__ import annotations
 
@@ -12,20 +12,20 @@ from optics.numerics.arguments import finite, in_range, point_2d, positive, whol
 
 __all__ = ["Disk", "Oblong", "Shape", "Spider"]
 
-BEYOND = 1.5  # choice, radii: length of a spider's vanes, beyond any opening
+BEYOND = 1.5  # choice, radii: length of a spider's vanes, which exceeds any opening
 MOST_VANES = 64
-FARTHEST = 10.0  # choice, radii
+FARTHEST = 10.0  # choice, radii: largest distance of a centre from the axis along x and y
 
 
 class Shape(Protocol):
     """Interface of shapes that can be joined, subtracted or intersected.
 
-    Every aperture has it. Lengths in pupil radii R.
+    Every aperture has this interface. Lengths are in units of the pupil's radius R.
     """
 
     @property
     def outline(self) -> Outline:
-        """Edge of the shape; it may contain further pieces."""
+        """Edge of the shape. It may contain further pieces that do not belong to the edge."""
 
     def contains(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         """Return a mask of the points that lie within the shape."""
@@ -33,10 +33,10 @@ class Shape(Protocol):
 
 @dataclass(frozen=True)
 class Disk:
-    """A disk of this radius about a centre (x, y), in units of R.
+    """A disk of the given radius about a centre (x, y), in units of R.
 
     Raises:
-        ValueError: radius not positive, or either above 10.
+        ValueError: a radius that is not positive or above 10, or a coordinate of the centre beyond 10.
     """
 
     radius: float
@@ -57,10 +57,11 @@ class Disk:
 
 @dataclass(frozen=True)
 class Oblong:
-    """A rectangle of full `width` and `height` about a centre (x, y), turned by an angle, in units of R.
+    """A rectangle about a centre (x, y), rotated by an angle. `width` and `height` are full lengths in units of R.
 
     Raises:
-        ValueError: a side not positive or above 20, a centre beyond 10, or an angle that is not finite.
+        ValueError: a side that is not positive or above 20, a coordinate of the centre beyond 10, or an angle that is
+            not finite.
     """
 
     width: float
@@ -90,9 +91,10 @@ class Oblong:
 
 @dataclass(frozen=True)
 class Spider:
-    """Vanes that hold a telescope's secondary mirror, evenly spaced around the centre.
+    """The vanes that support a telescope's secondary mirror, evenly spaced around the centre.
 
-    width: full width of each vane.
+    vanes: number of vanes, 1 to 64.
+    width: full width of each vane in units of R.
     rotation_deg: angle of the first vane from the x axis.
 
     Raises:

@@ -1,9 +1,9 @@
 """Low-pass kernel that softens an aperture's edge.
 
-The kernel is a jinc under a Kaiser window in radius. An aperture convolved with it has an unchanged spectrum up to
-`passband` and a zero spectrum beyond `stopband`, both to within `ripple`. The kernel ends at `reach`, so the
-transmittance stays 1 or 0 further than that from the edge. Lengths are in units of the pupil's radius R, frequencies in
-cycles per R.
+The kernel is a jinc function multiplied by a Kaiser window along the radius. Convolution with the kernel leaves an
+aperture's spectrum unchanged up to the frequency `passband` and makes it 0 beyond `stopband`, in both cases to within
+`ripple`. The kernel is 0 beyond the radius `reach`. The transmittance therefore stays 1 or 0 at larger distances from
+the edge. Lengths are in units of the pupil's radius R, frequencies in cycles per R.
 """
 
 from __future__ import annotations
@@ -34,10 +34,11 @@ class SoftEdge:
     def cheapest(
         cls, passband: float, ripple: float, widest_reach: float, half_widths: tuple[float, float] = (1.0, 1.0)
     ) -> SoftEdge:
-        """Return the transition that needs the fewest samples over an aperture of these half widths.
+        """Return the kernel whose transition needs the fewest samples over an aperture of these half widths.
 
-        With b = β/π = reach x transition t, the number of samples (h_x + b/t) (h_y + b/t) (2 passband + t)² is smallest
-        at the only positive root of 2 h_x h_y t³ + b s t² - 2 b s passband t - 4 b² passband, where s = h_x + h_y.
+        Let t be the width of the transition, h_x and h_y the half widths, s = h_x + h_y, and b = β/π = reach · t. The
+        number of samples is proportional to (h_x + b/t) (h_y + b/t) (2 passband + t)². It is smallest at the only
+        positive root of 2 h_x h_y t³ + b s t² - 2 b s passband t - 4 b² passband.
         """
         b = _beta(ripple) / pi
         (h_x, h_y), s = half_widths, sum(half_widths)
@@ -52,7 +53,7 @@ class SoftEdge:
 
     @property
     def reach(self) -> float:
-        """Half width of the soft edge: the window's spectrum ends at half the transition."""
+        """Half width of the soft edge. It follows from a window whose spectrum ends at half the transition."""
         return self.beta / (pi * (self.stopband - self.passband))
 
     @property
@@ -61,15 +62,18 @@ class SoftEdge:
         return self.reach * self.stopband
 
     def ring(self, r: np.ndarray) -> np.ndarray:
-        """2π r g(r), the kernel's share on the circle of radius r <= reach. Its integral from 0 to `reach` is 1."""
+        """Return 2π r g(r), the kernel's weight on the circle of radius r <= reach.
+
+        The integral from 0 to `reach` is 1.
+        """
         return np.asarray(self._odd_series(np.minimum(r, self.reach)))
 
     @cached_property
     def _odd_series(self) -> Chebyshev:
-        """Chebyshev series of `ring` from -reach to reach, an odd function.
+        """Chebyshev series of `ring` from -reach to reach, where `ring` is an odd function.
 
-        Tables evaluate `ring` at thousands of radii, and one Bessel function takes a hundred cosines. Only odd terms
-        are retained, so the series is exactly 0 on the axis and has the correct slope.
+        The series is used because tables evaluate `ring` at thousands of radii, and each Bessel function would take a
+        hundred cosines. Only odd terms are retained, so the series is exactly 0 on the axis and has the correct slope.
         """
         degree, domain = 2 * int(24 + 4 * self.cycles + self.beta / 2) + 1, [-self.reach, self.reach]
         series = Chebyshev.interpolate(lambda r: np.sign(r) * self._bare(np.abs(r)), degree, domain)
@@ -84,11 +88,12 @@ class SoftEdge:
 
 
 def _positive_root(a: float, b: float, c: float, d: float) -> float:
-    """Positive root of at³ + bt² + ct + d with a, b > 0 >= c, d.
+    """Return the positive root of at³ + bt² + ct + d with a, b > 0 >= c, d.
 
-    Newton's iteration starts above it and descends monotonically.
+    Newton's iteration starts above the root and descends monotonically.
     """
-    t = max(-2 * c / b, (-4 * c / a) ** 0.5, (-4 * d / a) ** (1 / 3))  # outweighs each of the two negative terms
+    # At this t the positive terms outweigh the negative ones.
+    t = max(-2 * c / b, (-4 * c / a) ** 0.5, (-4 * d / a) ** (1 / 3))
     if t == 0:
         return 0.0
     for _ in range(MOST_STEPS):
@@ -100,17 +105,21 @@ def _positive_root(a: float, b: float, c: float, d: float) -> float:
 
 
 def _beta(ripple: float) -> float:
-    """Kaiser parameter β for a ripple in two dimensions.
+    """Return Kaiser's parameter β for a ripple in two dimensions.
 
-    Kaiser's rule applies to one dimension. In the plane, side lobes from all directions add up at frequency 0, to 7
-    ripples at 0.5, 20 at 1e-6 and 50 at 1e-12 (largest over the passband's width). Choice: design ripples that are 10,
-    27 and 82 times smaller. tests/optics/apertures/test_aperture.py checks that the spectrum stays below the ripple.
+    Kaiser's rule applies to one dimension. In the plane, side lobes from all directions add up at frequency 0. The sum
+    is up to 7 times a ripple of 0.5, 20 times a ripple of 1e-6, and 50 times a ripple of 1e-12, for the worst width of
+    the passband. The kernel is therefore designed for ripples that are 10, 27 and 82 times smaller (a choice).
+    tests/optics/apertures/test_aperture.py checks that the spectrum stays below the ripple.
     """
     return kaiser_beta(ripple**1.08 / 9)
 
 
 def kaiser_beta(ripple: float) -> float:
-    """Kaiser's rule for an attenuation (Oppenheim & Schafer, Discrete-Time Signal Processing, §7.5)."""
+    """Return β for a ripple in one dimension, by Kaiser's rule.
+
+    Source: Oppenheim & Schafer, Discrete-Time Signal Processing, §7.5.
+    """
     attenuation = -20 * log10(ripple)
     if attenuation > 50:
         return 0.1102 * (attenuation - 8.7)

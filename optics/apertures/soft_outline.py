@@ -1,9 +1,12 @@
 """Transmittance at any point of an opening with straight and circular edges, convolved with the soft edge's kernel.
 
-The method extends `soft_polygon` by arcs. The share of the kernel that a piece of the edge adds is ∫ G(r) dθ over the
-angle θ that it subtends at the point. Along a circle of radius R the integrand is H(r) (R - d cos t) R dt where the
-arc lies within the kernel's reach, with d the distance between its centre and the point. Beyond the reach the share
-is the angle over 2π.
+The method extends `soft_polygon` to arcs; G and H are defined there. Each piece of the edge contributes ∫ G(r) dθ to
+the transmittance, where θ is the angle that the piece subtends at the point. For an arc of radius R, let d be the
+distance of its centre from the point and t the angle along the arc. Within the kernel's reach, the integrand is
+
+    H(r) (R - d cos t) R dt.
+
+Beyond the reach, the contribution is the subtended angle divided by 2π.
 """
 
 from __future__ import annotations
@@ -24,16 +27,17 @@ from optics.numerics.quadrature import gauss_legendre, gauss_legendre_count
 
 __all__ = ["SoftOutline"]
 
-EMPTY = 1e-9  # [rad]: arcs below this length are empty
-MOST_OF_A_TURN = pi / 2  # choice: longest arc that is handled in one piece
+EMPTY = 1e-9  # [rad]: shorter arcs are treated as empty
+MOST_OF_A_TURN = pi / 2  # choice: longest arc that one quadrature rule covers
 
 
 @dataclass(frozen=True, eq=False)
 class SoftOutline(SoftAperture):
-    """Edges of an opening convolved with a soft edge's kernel.
+    """An opening with straight and circular edges, convolved with a soft edge's kernel.
 
-    segments: (n, 2, 2), with the opening on their left.
-    arcs: (m, 6): cx, cy, radius, from, to [rad], and 1 if the opening is on the side of the centre, else -1.
+    segments: (n, 2, 2), straight pieces, with the opening on their left.
+    arcs: (m, 6). Each has x and y of the centre, the radius, the first and the last angle [rad], and 1 if the opening
+        lies on the side of the centre, else -1.
     """
 
     edge: SoftEdge
@@ -83,7 +87,10 @@ def _arcs_share(edge: SoftEdge, arcs: np.ndarray, x: Array, y: Array, types: Pre
 
 
 class _Arc:
-    """Contribution of an arc, counterclockwise around its centre, at a point (x, y) relative to that centre."""
+    """Contribution of arcs to the transmittance.
+
+    Arcs run counterclockwise around their centre. Points (x, y) are relative to it.
+    """
 
     def __init__(self, edge: SoftEdge, types: Precision) -> None:
         import drjit as dr
@@ -97,10 +104,12 @@ class _Arc:
         self.count = dr.opaque(types.Index, len(nodes))
 
     def share(self, x: Array, y: Array, radius: Array, begin: Array, end: Array) -> Array:
-        """The part within reach is centred on the point's direction φ and has the half angle τ.
+        """Return the contribution of an arc between two angles.
 
-        Relative to the arc's middle that direction lies at most one turn back or forward, and the part may overlap both
-        ends.
+        The part of the arc within the kernel's reach is centred on the point's direction φ and has the half angle τ.
+
+        φ is shifted by whole turns until it lies less than one turn before the arc's middle. The part around φ or
+        around φ + 2π may overlap either end of the arc.
         """
         import drjit as dr
 
@@ -123,18 +132,21 @@ class _Arc:
         return total
 
     def _angle(self, x: Array, y: Array, radius: Array, first: Array, last: Array) -> Array:
-        """Angle that an arc subtends: the angle of its chord, plus a full turn for points between chord and arc."""
+        """Return the angle that an arc subtends.
+
+        It is the angle of the chord, plus a full turn for points between chord and arc.
+        """
         import drjit as dr
 
         (sin_a, cos_a), (sin_b, cos_b) = dr.sincos(first), dr.sincos(last)
         ax, ay, bx, by = radius * cos_a - x, radius * sin_a - y, radius * cos_b - x, radius * sin_b - y
         cross, dot = ax * by - ay * bx, ax * bx + ay * by
-        # For an empty arc, cross is rounding error, and no full turn is added.
+        # For an empty arc, `cross` is a rounding error, so no full turn may be added.
         between = (cross < 0) & (x * x + y * y < radius * radius) & (last - first > EMPTY)
         return dr.atan2(cross, dot + TINY) + dr.select(between, 2 * pi, 0)
 
     def _integral(self, x: Array, y: Array, radius: Array, first: Array, last: Array, zero: Array) -> Array:
-        """Integral ∫ H(r) (R - p·e(t)) R dt."""
+        """Return ∫ H(r) (R - p·e(t)) R dt, with p the point and e(t) the unit vector at the angle t."""
         import drjit as dr
 
         types = self.types

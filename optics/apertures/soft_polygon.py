@@ -1,10 +1,16 @@
 """Transmittance at any point of a polygon convolved with the soft edge's kernel.
 
-The kernel's share within the triangle of a point and an edge is ∫ G(r) dθ over the angle θ that the edge subtends, with
-G(r) = ∫₀^r g(r') r' dr' and r the distance to the edge. The polygon's transmittance is the sum over its edges. Angles,
-and hence shares, are negative if the point lies outside an edge. With t along an edge at signed distance d, G dθ = d
-H(r) dt, r² = d² + t², where H = G/r² is smooth. Beyond the kernel's reach G = 1/2π, so the share depends only on the
-angle.
+Consider the triangle of a point and an edge. The integral of the kernel g over this triangle is
+
+    ∫ G(r) dθ,   G(r) = ∫₀^r g(r') r' dr',
+
+where θ runs over the angle that the edge subtends, and r is the distance from the point to the edge in the direction θ.
+The polygon's transmittance is the sum over its edges. Angles, and hence these contributions, are negative if the point
+lies on the outer side of an edge. Let t be the position along an edge at the signed distance d. Then
+
+    G dθ = d H(r) dt,   r² = d² + t²,
+
+where H = G/r² is smooth. Beyond the kernel's reach G = 1/2π, so the contribution depends only on the angle.
 """
 
 from __future__ import annotations
@@ -25,7 +31,7 @@ from optics.numerics.quadrature import gauss_legendre, gauss_legendre_count
 
 __all__ = ["TINY", "SoftPolygon", "radial_table", "sides_share"]
 
-# A squared length far below all relevant ones keeps roots and angles differentiable on an edge or a corner.
+# Squared length, far below all relevant ones. Adding it keeps roots and angles differentiable on an edge or a corner.
 TINY = 1e-40
 
 
@@ -45,7 +51,10 @@ class SoftPolygon(SoftAperture):
 
 
 def sides_share(edge: SoftEdge, starts: np.ndarray, ends: np.ndarray, x: Array, y: Array, types: Precision) -> Array:
-    """Contribution of the straight pieces of an edge, (n, 2) each, with the opening on their left."""
+    """Return the contribution of straight segments to the transmittance.
+
+    starts, ends: (n, 2), ends of the segments, with the opening on their left.
+    """
     import drjit as dr
 
     along = ends - starts
@@ -67,7 +76,9 @@ def sides_share(edge: SoftEdge, starts: np.ndarray, ends: np.ndarray, x: Array, 
 
 
 class _Line:
-    """Contribution W(d, s) of the piece of a line from the foot of the perpendicular d to a distance s along the line.
+    """Contribution W(d, s) of a piece of a line, from the foot of the perpendicular to a distance s along the line.
+
+    d is the signed length of the perpendicular from the point.
 
     Beyond the reach it is an angle. The whole chord within the reach comes from the profile of a half-plane, whose edge
     is infinite. A piece that ends within the reach contributes ∫ d H(r) dt.

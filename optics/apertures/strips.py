@@ -1,7 +1,7 @@
 """Quadrature over the part of a rectangle that an outline encloses.
 
-Panels lie between the heights at which the edge enters, leaves or turns, and chords cross them. The edge is exact and
-convergence is spectral.
+The rectangle is divided into panels at the heights at which the edge enters, leaves or turns. Within a panel, nodes lie
+on horizontal chords that end exactly at the edge, so the quadrature converges spectrally.
 """
 
 from __future__ import annotations
@@ -17,10 +17,10 @@ from optics.numerics.quadrature import gauss_legendre, gauss_legendre_count
 
 __all__ = ["strips"]
 
-EDGE_DEGREE = 4  # choice: degree beyond the digits, of polynomials that approximate a curved edge
+EDGE_DEGREE = 4  # choice: extra polynomial degree, in addition to the digits, for a curved edge
 ROUNDING = 1e-12
-TANGENT = 1e-7  # choice: tolerance for coinciding positions of touching shapes
-STEEPNESS = 3.0  # choice: ratio of panel lengths near a square root
+TANGENT = 1e-7  # choice: tolerance within which positions of touching shapes coincide
+STEEPNESS = 3.0  # choice: ratio of the lengths of successive panels near the top or bottom of a circle
 
 Box = tuple[float, float, float, float]
 
@@ -28,9 +28,10 @@ Box = tuple[float, float, float, float]
 def strips(
     outline: Outline, box: Box, cycles: float, digits: float, degree: int = 0
 ) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
-    """Yield x, y and weights over each panel of the part inside the box (left, right, bottom, top).
+    """Yield x, y and weights of the nodes in each panel of the enclosed part of a box (left, right, bottom, top).
 
-    The integrand is a wave of `cycles` cycles per unit of length times a polynomial of this degree in either direction.
+    The nodes suit integrands that are a wave of `cycles` cycles per unit of length, times a polynomial of this degree
+    in x and in y.
     """
     left, right, bottom, top = box
     within = np.concatenate([outline.turning, outline.heights(left), outline.heights(right)])
@@ -38,14 +39,14 @@ def strips(
     for low, high in pairwise(_graded(ends, outline.tangent)):
         if high - low < ROUNDING:
             continue
-        # Along a slanted edge nodes shift from row to row, which adds to the wave's phase.
+        # Along a slanted edge, nodes shift from row to row. This shift adds cycles to the wave.
         inner = low + (high - low) * np.array([1e-6, 1 - 1e-6])
         slide = np.abs(np.diff(np.clip(outline.crossings(inner), left, right), axis=0)).max(initial=0.0)
         turns = cycles * float(np.hypot(slide, high - low))
         y, weight = _panel(low, high, outline.tangent, turns, digits, 2 * degree + EDGE_DEGREE + ceil(digits))
         sides = np.clip(outline.crossings(y), left, right)
         if sides.shape[1] % 2 and high - low < TANGENT:
-            continue  # rounding between shapes that touch: the panel is empty
+            continue  # the panel is empty, due to rounding at shapes that touch
         for start, end in zip(sides.T[::2], sides.T[1::2], strict=True):
             if not (end > start).any():
                 continue
@@ -56,9 +57,9 @@ def strips(
 
 
 def _graded(ends: np.ndarray, tangent: np.ndarray) -> np.ndarray:
-    """Ends of panels, with more of them close to a circle's top or bottom than the length of a panel.
+    """Return the ends of panels, which become shorter towards the top or bottom of a circle.
 
-    Polynomials do not approximate the square root there.
+    The length of a chord changes there like a square root, which polynomials do not approximate.
     """
     more = []
     for at in tangent:
@@ -76,9 +77,10 @@ def _graded(ends: np.ndarray, tangent: np.ndarray) -> np.ndarray:
 def _panel(
     low: float, high: float, tangent: np.ndarray, cycles: float, digits: float, degree: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Heights and weights between two ends, for a wave of `cycles` cycles between them.
+    """Return heights and weights of the nodes between two ends, for a wave of `cycles` cycles between them.
 
-    At a circle's top or bottom the chord starts like a square root; y approaches such an end like sin².
+    At a circle's top or bottom, the length of the chord changes like a square root. The substitution of sin² for y
+    makes it smooth.
     """
     span = high - low
     touching = any(abs(end - at) < ROUNDING for at in tangent for end in (low, high))

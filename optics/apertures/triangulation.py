@@ -8,7 +8,7 @@ from optics.numerics.quadrature import gauss_legendre, gauss_legendre_count, har
 
 __all__ = ["crossing", "kernel_point", "triangle_nodes", "triangles"]
 
-# Tolerance for touching or parallel, relative to the lengths involved.
+# Tolerance within which edges touch or are parallel, relative to their lengths.
 ROUNDING = 1e-12
 
 
@@ -17,7 +17,7 @@ def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def crossing(vertices: np.ndarray) -> tuple[int, int] | None:
-    """Return the first two edges that meet other than at a shared end, or None for a simple polygon."""
+    """Return the first two edges that intersect elsewhere than at a shared end, or None for a simple polygon."""
     n = len(vertices)
     along = np.roll(vertices, -1, axis=0) - vertices
     following = np.roll(along, -1, axis=0)
@@ -35,7 +35,10 @@ def crossing(vertices: np.ndarray) -> tuple[int, int] | None:
 
 
 def _meet(a: np.ndarray, along: np.ndarray, others: np.ndarray, along_others: np.ndarray) -> np.ndarray:
-    """Return a mask of the other segments that share a point with the one from a."""
+    """Return a mask of the segments that share a point with the segment from `a` to `a + along`.
+
+    others, along_others: starts of the other segments, and the vectors to their ends.
+    """
     gap = others - a
     determinant = _cross(along, along_others)
     parallel = np.abs(determinant) <= ROUNDING * np.hypot(*along) * np.hypot(*along_others.T)
@@ -49,7 +52,10 @@ def _meet(a: np.ndarray, along: np.ndarray, others: np.ndarray, along_others: np
 
 
 def kernel_point(vertices: np.ndarray) -> np.ndarray | None:
-    """Return the centroid if it sees the whole counterclockwise polygon, else None."""
+    """Return the centroid of a counterclockwise polygon if it is a kernel point, else None.
+
+    Straight lines from a kernel point to all points of the polygon stay inside it.
+    """
     following = np.roll(vertices, -1, axis=0)
     twice = _cross(vertices, following)
     centroid = ((vertices + following) * twice[:, None]).sum(axis=0) / (3 * twice.sum())
@@ -78,7 +84,7 @@ def triangles(vertices: np.ndarray) -> np.ndarray:
 
 
 def _is_ear(vertices: np.ndarray, a: int, b: int, c: int, left: list[int]) -> bool:
-    """Return whether the triangle a, b, c turns left and contains no other corner."""
+    """Return whether the corner a, b, c turns left and its triangle contains no other corner of those left."""
     corner = vertices[[a, b, c]]
     if _cross(corner[1] - corner[0], corner[2] - corner[1]) < 0:
         return False
@@ -90,8 +96,7 @@ def _is_ear(vertices: np.ndarray, a: int, b: int, c: int, left: list[int]) -> bo
 def triangle_nodes(corners: np.ndarray, cycles: float, digits: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return x, y and weights of Gauss-Legendre nodes over a triangle (Duffy 1982).
 
-    Nodes run from the first corner to the opposite side and along the lines parallel to it, with fewer nodes on shorter
-    lines.
+    The nodes lie on lines parallel to the side opposite the first corner. Shorter lines have fewer nodes.
     """
     apex, side = corners[0], corners[2] - corners[1]
     far = max(np.hypot(*(corners[1] - apex)), np.hypot(*(corners[2] - apex)))

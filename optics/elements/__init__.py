@@ -4,7 +4,7 @@ source            PointSource
 pupil             Pupil: aperture, relief, ideal lens
 relief            Relief, HeightMap, BSplineRelief
 pixel_relief      PixelRelief: stepped reliefs
-fine_detail       spatial frequencies in samples
+fine_detail       spatial frequencies that samples contain
 square_samples    checks of the samples of reliefs, masks and wavefronts
 wavefront         Zernike, WavefrontMap
 transmittance     GaussianMask, MaskMap

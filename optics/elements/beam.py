@@ -20,7 +20,7 @@ __all__ = ["Beam"]
 class Beam:
     """Light of one vacuum wavelength [m] from a source through a pupil to a plane at `distance` [m].
 
-    Radius, relief, index and distances may be Dr.Jit arrays that carry derivatives.
+    The pupil's radius, relief and index, and all distances, may be Dr.Jit arrays that carry derivatives.
     """
 
     pupil: Pupil
@@ -42,15 +42,15 @@ class Beam:
         return self.pupil.index_behind(self.wavelength)
 
     def waves(self, x: Array, y: Array, types: Precision) -> Array:
-        """Optical path in wavelengths at the pupil's points, float64."""
+        """Return the optical path at points of the pupil, in wavelengths, as float64."""
         return self.pupil.path(x, y, self.wavelength, self.source, types) * opaque(types, 1 / self.wavelength)
 
     def behind(self, soft: SoftAperture, grid: Grid, types: Precision) -> Field:
-        """Field just behind the pupil on a grid [m], with a softened aperture."""
+        """Return the field just behind the pupil on a grid [m]. The aperture's edge is softened."""
         return self.at(soft, *grid.coordinates(types), grid, types)
 
     def at(self, soft: SoftAperture, x: Array, y: Array, grid: Grid, types: Precision) -> Field:
-        """Field just behind the pupil at arbitrary points (x, y) [m] that belong to the grid's cells."""
+        """Return the field just behind the pupil at arbitrary points (x, y) [m], one for each sample of the grid."""
         scale = 1 / opaque(types, self.radius)
         size = soft.transmittance(x * scale, y * scale, types)
         if self.pupil.mask is not None:

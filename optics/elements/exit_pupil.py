@@ -1,4 +1,4 @@
-"""Lenses from other programs: exit pupil and wavefront, read from the attributes of their objects."""
+"""Lenses from other programs: exit pupil and wavefront, read from the attributes of the programs' objects."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from optics.numerics.arguments import complexes, is_sized, positive, shown, vacu
 __all__ = ["ExitPupil", "read_exit_pupil"]
 
 MM, UM = 1e-3, 1e-6
-SECTORS, ROUND = 8, 0.9  # choice: sectors, each with light out to this share of the pupil's radius
+SECTORS, ROUND = 8, 0.9  # choice: each of 8 sectors must contain light out to 0.9 of the pupil's radius
 RAYS_PER_MODE = 3  # choice
-LIT = 1e-3  # choice: lowest intensity, relative to the brightest sample
+LIT = 1e-3  # choice: intensity from which on a sample counts as illuminated, relative to the brightest sample
 EVEN = 0.1  # choice: tolerance on amplitudes within ROUND of the radius, relative to their median
-# Choice: a disk of CENTRE of the radius must hold FILLED of the rays that an even distribution would have there. #
-# Distributions in rings pass this test with any number of rings.
+# Choice: a central disk of 0.4 of the radius must contain at least 0.25 of the rays that an even distribution would
+# have there. Rays in concentric rings pass this test with any number of rings.
 CENTRE, FILLED = 0.4, 0.25
 
 
@@ -30,7 +30,7 @@ class ExitPupil:
     pupil: an ideal lens focused on the centre of the reference sphere, with the wavefront as Zernike modes.
     distance: distance [m] to that centre, the image position of the other program.
     rms: root mean square of the wavefront [m] without piston and tilt.
-    residual: root mean square of the fit's residual [m].
+    residual: root mean square [m] of the difference between wavefront and fit.
     """
 
     pupil: Pupil
@@ -42,19 +42,19 @@ class ExitPupil:
 def read_exit_pupil(
     system: Any, wavelength: float, medium_n: float = 1.0, focal_length: float | None = None, order: int = 8
 ) -> ExitPupil:
-    """Convert another program's description of a lens into a pupil with a wavefront.
+    """Convert a lens from another program to a pupil with a wavefront.
 
-    system: an object with pupil_x, pupil_y, pupil_z, radius [mm] and opd [waves], like optiland's WavefrontData with
-        any distribution of rays; or with data (complex), dx [mm] and wavelength [µm], like prysm's Wavefront in a
-        pupil, whose phase must change by less than half a wave between samples.
+    system: an object of one of two kinds. The first has pupil_x, pupil_y, pupil_z, radius [mm] and opd [waves], like
+        optiland's WavefrontData with any distribution of rays. The second has data (complex), dx [mm] and wavelength
+        [µm], like prysm's Wavefront in a pupil. Its phase must change by less than half a wave between samples.
     wavelength: vacuum wavelength [m].
     medium_n: refractive index of the image space.
-    focal_length: distance from pupil to image [m], required if the object does not contain it (prysm).
+    focal_length: distance from pupil to image [m]. It is required if the object does not contain this distance (prysm).
     order: highest radial order of the fitted Zernike modes.
 
     Raises:
-        ValueError: an object with neither set of attributes, too few samples, a pupil that is obscured, not round or
-            unevenly illuminated, or a bad argument.
+        ValueError: an object with neither set of attributes; too few samples; a pupil that is obscured, not round or
+            unevenly illuminated; or an invalid argument.
     """
     vacuum_wavelength(wavelength)
     count = whole("order", order, 1, 30)
@@ -74,14 +74,14 @@ def read_exit_pupil(
 
 
 def _of_rays(system: Any, wavelength: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
-    """Return positions x and y on the tangent plane, the wave's lead there, and the radius of the reference sphere.
+    """Return x and y on the tangent plane, the wave's lead there, and the radius of the reference sphere, all in m.
 
-    The plane touches the reference sphere at the chief ray. A point of the sphere in direction θ is mapped to R tan θ
-    on the plane.
+    The plane touches the reference sphere where the chief ray intersects it. A point of the sphere in direction θ is
+    mapped to R tan θ on the plane, with R the sphere's radius.
     """
     x, y, z, opd, intensity = _alike(system)
     places = np.stack([x, y, z]) * MM
-    ahead = opd * wavelength  # opd: the chief ray's path minus the ray's, so positive values are ahead
+    ahead = opd * wavelength  # opd is the chief ray's path minus the ray's path, so positive values are ahead
     light = np.nan_to_num(intensity)
     lit = np.isfinite(places).all(axis=0) & np.isfinite(ahead) & (light > LIT * light.max(initial=0.0))
     if not lit.any():
@@ -100,7 +100,7 @@ def _of_rays(system: Any, wavelength: float) -> tuple[np.ndarray, np.ndarray, np
 
 
 def _alike(system: Any) -> list[np.ndarray]:
-    """pupil_x, pupil_y, pupil_z, opd and intensity (1 if missing) of every ray."""
+    """Return pupil_x, pupil_y, pupil_z, opd and intensity (1 if missing) of all rays, one flat array each."""
     found = {name: _flat(name, getattr(system, name)) for name in ("pupil_x", "pupil_y", "pupil_z", "opd")}
     rays = len(found["pupil_x"])
     found["intensity"] = _flat("intensity", getattr(system, "intensity", np.ones(rays)))
@@ -111,7 +111,7 @@ def _alike(system: Any) -> list[np.ndarray]:
 
 
 def _centre(places: np.ndarray, radius: float) -> np.ndarray:
-    """Centre of the sphere through the points, behind them."""
+    """Return the centre of the sphere through the points. The centre lies behind them."""
     matrix = np.concatenate([2 * places, np.ones((1, places.shape[1]))]).T
     found = np.linalg.lstsq(matrix, np.sum(places**2, axis=0), rcond=None)[0][:3]
     if not np.isclose(np.linalg.norm(places - found[:, None], axis=0).mean(), radius, rtol=0.05):
@@ -120,7 +120,7 @@ def _centre(places: np.ndarray, radius: float) -> np.ndarray:
 
 
 def _of_samples(system: Any, wavelength: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Positions [m] on the pupil's plane and the wave's lead there, the negative of its phase."""
+    """Return positions x and y on the pupil's plane and the wave's lead there, the negative of its phase. All in m."""
     data, own = complexes("data", system.data), _one("wavelength", system.wavelength)
     pitch = positive("dx", _one("dx", system.dx), "mm") * MM
     if data.ndim != 2 or data.size == 0 or not np.isfinite(data).all():
@@ -137,7 +137,7 @@ def _of_samples(system: Any, wavelength: float) -> tuple[np.ndarray, np.ndarray,
 
 
 def _check_even(amplitude: np.ndarray, x: np.ndarray, y: np.ndarray, lit: tuple[np.ndarray, np.ndarray]) -> None:
-    """Refuse a circle around the illuminated samples that is not open everywhere and evenly illuminated."""
+    """Raise a ValueError unless the circle around the illuminated samples is open and evenly illuminated everywhere."""
     (top, bottom), (left, right) = ((at[n].min(), at[n].max()) for at, n in zip((y, x), lit, strict=True))
     off = np.hypot(y[:, None] - (top + bottom) / 2, x[None, :] - (left + right) / 2)
     within = amplitude[off < ROUND * max(bottom - top, right - left) / 2]
@@ -147,7 +147,7 @@ def _check_even(amplitude: np.ndarray, x: np.ndarray, y: np.ndarray, lit: tuple[
 
 
 def _unwrapped(data: np.ndarray, lit: np.ndarray) -> np.ndarray:
-    """Unwrapped phase: first along the brightest column, then along every row."""
+    """Return the phase [rad], unwrapped first along the brightest column and then along every row."""
     phase, middle = np.where(lit, np.angle(data), 0.0), int(lit.sum(axis=0).argmax())
     phase[:, middle] = np.unwrap(phase[:, middle])
     right, left = np.unwrap(phase[:, middle:], axis=1), np.unwrap(phase[:, middle::-1], axis=1)[:, ::-1]
@@ -186,7 +186,7 @@ def _flat(name: str, values: Any) -> np.ndarray:
 
 
 def _one(name: str, value: Any) -> float:
-    """Return a number, or the first of several, in the other program's unit."""
+    """Return a number, or the first number of an array, in the other program's unit."""
     found = _flat(name, value)
     if value is None or found.size == 0 or not abs(found[0]) > 0 or not np.isfinite(found[0]):
         raise ValueError(f"{name} = {shown(value)}: must be a finite number that is not 0")

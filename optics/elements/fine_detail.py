@@ -1,4 +1,7 @@
-"""Spatial frequencies in samples over a square, for the resolution of grids and the extent of scattered light."""
+"""Spatial frequencies that samples over a square contain.
+
+They determine the resolution of grids and the extent of scattered light.
+"""
 
 from __future__ import annotations
 
@@ -6,14 +9,14 @@ import numpy as np
 
 __all__ = ["band_of", "power_beyond", "reach_of"]
 
-CUBIC = 4  # coefficients along an axis of a single B-spline patch, which slopes describe well
+CUBIC = 4  # coefficients of one B-spline patch along an axis; slopes alone describe such a patch well
 
 
 def band_of(samples: np.ndarray, level: float) -> float:
-    """Frequency [cycles per half a side] above which the samples' spectrum stays below `level`.
+    """Return the frequency [cycles per half a side] above which the content of the samples is below `level` (rms).
 
-    A cubic spline repeats content of frequency f around multiples of the sampling rate, weaker by the fourth power of
-    the ratio of the two frequencies.
+    Interpolation by cubic splines repeats content of frequency f at frequencies around multiples of the sampling rate.
+    These copies are weaker by the fourth power of the ratio of f to their frequency.
     """
     n = len(samples)
     if n < 4:
@@ -31,10 +34,13 @@ def band_of(samples: np.ndarray, level: float) -> float:
 
 
 def power_beyond(samples: np.ndarray) -> np.ndarray:
-    """Mean squares (n,) of the content at frequencies from k/4 cycles per half a side, along x or y, for k from 0.
+    """Return mean squares (n,) of the samples' content beyond increasing frequencies.
 
-    The nearest bicubic polynomial is subtracted first: it bends light according to its slopes and scatters none. The
-    transform is a cosine transform, whose even continuation has no jumps, so the ends add no detail.
+    Entry k is for frequencies along x or y of at least k/4 cycles per half a side.
+
+    The best-fitting bicubic polynomial is subtracted first, because it bends light according to its slopes and scatters
+    no light. The transform is a cosine transform. Its even continuation has no jumps, so the ends of the samples add no
+    detail.
     """
     from scipy.fft import dctn
 
@@ -50,13 +56,16 @@ def power_beyond(samples: np.ndarray) -> np.ndarray:
 
 
 def reach_of(beyond: np.ndarray, level: float) -> float:
-    """Frequency [cycles per half a side] beyond which the root mean square is below `level`; see `power_beyond`."""
+    """Return the frequency [cycles per half a side] beyond which the content is below `level` (rms).
+
+    beyond: see `power_beyond`.
+    """
     more = np.flatnonzero(beyond > level**2)
     return float(more[-1]) / 4 if more.size else 0.0
 
 
 def _plane(samples: np.ndarray) -> np.ndarray:
-    """Least-squares plane through the samples."""
+    """Return the least-squares plane through the samples."""
     position = np.linspace(-1, 1, len(samples))
     slope = position / np.sum(position**2) / len(samples)
     return samples.mean() + (slope @ samples.sum(axis=1)) * position[:, None] + (samples.sum(axis=0) @ slope) * position

@@ -1,4 +1,4 @@
-"""Published models of the human eye: wavefronts with human chromatic aberration, and a mean MTF."""
+"""Published models of the human eye: an eye with chromatic aberration and a measured wavefront, and a mean MTF."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ from optics.numerics.arguments import in_range, of_kind, one_of, positive, reals
 
 __all__ = ["HUMAN_WAVEFRONTS", "HumanEye", "mean_human_mtf"]
 
-# Autrusseau, Thibos & Shevell, Vision Research 51, 2282 (2011), table 1, µm for a pupil of 6 mm at 570 nm, in the order
-# of OSA and ANSI. Unit, order and sign reproduce their figure 11: contrast of L and M cones in
-# tests/optics/elements/test_human_eye.py, of S cones in docs/concepts/eye.md. Piston and tilts are left out, since they
-# only shift an image.
+# Source: Autrusseau, Thibos & Shevell, Vision Research 51, 2282 (2011), table 1: Zernike coefficients [µm] for a pupil
+# of 6 mm at 570 nm, in the order of OSA and ANSI. With this unit, order and sign, their figure 11 is reproduced: the
+# contrast of L and M cones in tests/optics/elements/test_human_eye.py, and that of S cones in docs/concepts/eye.md.
+# Piston and tilts are omitted, since they only shift an image.
 HUMAN_WAVEFRONTS = {
     "standard_observer": Zernike(
         {
@@ -40,21 +40,23 @@ HUMAN_WAVEFRONTS = {
         radius=3e-3,
     ),
 }
-IN_FOCUS = 570e-9  # [m], of Autrusseau et al.
-SURFACE = 5.55e-3  # [m], of Thibos, Ye, Zhang & Bradley, Appl. Opt. 31, 3594 (1992): the reduced eye's one surface
-ASPHERIC = (2, 4, 6)  # orders that describe its aspheric form; order 8 is below 1 nm
-NODES = 24  # of their integrals over polynomials up to order 12
-PERFECT_NM = 555.0  # of the perfect lens in `mean_human_mtf`
+IN_FOCUS = 570e-9  # [m]: wavelength at which the eye is in focus, after Autrusseau et al.
+# [m]: radius of the reduced eye's single surface (Thibos, Ye, Zhang & Bradley, Appl. Opt. 31, 3594, 1992).
+SURFACE = 5.55e-3
+ASPHERIC = (2, 4, 6)  # Zernike orders of the surface's aspheric form; order 8 is below 1 nm
+NODES = 24  # quadrature nodes for integrals of these orders over polynomials up to order 12
+PERFECT_NM = 555.0  # wavelength for the perfect lens in `mean_human_mtf`
 
 
 @dataclass(frozen=True, eq=False)
 class HumanEye:
     """A reduced eye: one refracting surface between air and Thibos' medium, with an additional wavefront.
 
-    It has a human eye's chromatic aberration and no other aberration at 570 nm.
+    The surface has the chromatic aberration of a human eye and no other aberration at 570 nm.
 
-    aperture_radius: radius of its pupil [m], at most that of the circle over which the wavefront is known.
-    wavefront: "standard_observer" (Autrusseau, Thibos & Shevell 2011, known to 3 mm); a Zernike; or None.
+    aperture_radius: radius [m] of the pupil, at most the radius of the circle over which the wavefront is known.
+    wavefront: additional wavefront. "standard_observer" (Autrusseau, Thibos & Shevell 2011, known up to a radius of 3
+        mm), a Zernike, or None.
 
     Raises:
         ValueError: names argument, value and valid range.
@@ -85,7 +87,7 @@ class HumanEye:
 
     @cached_property
     def pupil(self) -> Pupil:
-        """Pupil of the eye for `optics.psf` and other functions, with `focal_length` as their distance."""
+        """Pupil of the eye, for `optics.psf` and other functions. Their sensor distance is then `focal_length`."""
         humour = medium("chromatic_eye")
         paraboloid = BSplineRelief.paraboloid(0.0, 1 / SURFACE, self.aperture_radius)
         reported = self._reported
@@ -103,7 +105,9 @@ class HumanEye:
         )
 
     def frequency(self, cycles_per_degree: Any) -> np.ndarray:
-        """Convert to cycles per metre on the retina, as `optics.MTF.profile` expects: an array of any shape.
+        """Convert frequencies [cycles/degree], an array of any shape, to cycles per metre on the retina.
+
+        `optics.MTF.profile` expects the result.
 
         Raises:
             ValueError: a negative or invalid number.
@@ -111,12 +115,12 @@ class HumanEye:
         return _not_negative(cycles_per_degree) * (180 / math.pi) / self._nodal_distance
 
     def sensor_width(self, fov_deg: float) -> float:
-        """Side [m] of the retinal patch that sees a square field this wide, 2 (f/n) tan(fov/2).
+        """Return the side [m] of the retinal patch that sees a square field of this width, 2 (f/n) tan(fov/2).
 
-        An `optics.Eye` with this eye's pupil has this sensor.
+        Use it as `sensor_width` of an `optics.Eye` with this eye's pupil.
 
         Raises:
-            ValueError: not in [1e-3, 170].
+            ValueError: fov_deg outside [1e-3, 170].
         """
         return 2 * self._nodal_distance * math.tan(math.radians(in_range("fov_deg", fov_deg, 1e-3, 170)) / 2)
 
@@ -131,7 +135,7 @@ class HumanEye:
         return HUMAN_WAVEFRONTS[self.wavefront] if isinstance(self.wavefront, str) else self.wavefront
 
     def _aspheric(self, order: int, radius: float) -> float:
-        """Zernike coefficient [µm] of the path to the retina, n (√(r² + f²) - f), minus n r²/2f."""
+        """Return the Zernike coefficient [µm] of the path n (√(r² + f²) - f) to the retina, minus n r²/2f."""
         at, weights = np.polynomial.legendre.leggauss(NODES)
         rho = (at + 1) / 2
         r, f = radius * rho, self.focal_length
@@ -147,14 +151,14 @@ def _not_negative(cycles_per_degree: Any) -> np.ndarray:
 
 
 def mean_human_mtf(cycles_per_degree: Any, pupil_diameter: float) -> np.ndarray:
-    """Mean contrast of 200 healthy eyes at their best focus, over all orientations, in white light:
+    """Return the mean contrast of 200 healthy human eyes, at their best focus, over all orientations, in white light:
 
         M(u, d) = √D(u, d) (1 + (u/u₁)²)^(-0.62),   u₁ = 21.95 - 5.512 d + 0.3922 d²  [cycles per degree], d in mm
 
-    with D the contrast of a perfect lens at 555 nm (Watson, J. Vision 13(6):18, 2013, eq. 4 and 5; without stray
-    light).
+    where D is the contrast of a perfect lens at 555 nm. Source: Watson, J. Vision 13(6):18, 2013, eq. 4 and 5, without
+    stray light.
 
-    cycles_per_degree: 0 or more, an array of any shape; the result has the same shape.
+    cycles_per_degree: frequencies of 0 or more, an array of any shape. The result has the same shape.
     pupil_diameter: d [m], 2 to 6 mm.
 
     Raises:

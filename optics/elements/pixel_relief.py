@@ -1,4 +1,4 @@
-"""Reliefs of square pixels with individual heights, as made by lithography and spatial light modulators."""
+"""Reliefs of square pixels with one height each, as produced by lithography and spatial light modulators."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from optics.numerics.precision import Precision
 
 __all__ = ["PixelRelief"]
 
-REPETITIONS = 32  # choice: repetitions of the pixels' spectrum; at most 1/(π² 32) of the light lies beyond
+REPETITIONS = 32  # choice: repetitions of the pixels' spectrum that count; at most 1/(π² 32) of the light lies beyond
 
 
 @dataclass(frozen=True, eq=False)
 class PixelRelief(Relief):
     """Heights [m] of n x n square pixels that fill the square [-a, a]²: a stepped diffractive optical element.
 
-    samples: (n, n), (y, x). For a smooth height h, wrapped to one wave in glass of index n and quantised to N levels
-        with step = wavelength / (n - 1) / N, use `np.round(h / step) % N * step`.
+    samples: heights [m], (n, n), (y, x). To wrap a smooth height h to one wave and quantise it to N levels, in glass of
+        index n, use `np.round(h / step) % N * step` with step = wavelength / (n - 1) / N.
 
     A Dr.Jit tensor of samples carries derivatives. For smooth surfaces use `HeightMap`, which interpolates its samples.
 
@@ -53,20 +53,22 @@ class PixelRelief(Relief):
         return float(np.ptp(self._heights))
 
     def bandwidth(self, level: float) -> float:
-        """Return infinity unless the relief is level, since jumps have no band limit."""
+        """Return infinity unless all heights are equal, since jumps have no band limit."""
         return 0.0 if self._level else math.inf
 
     def detail(self, level: float) -> float:
-        """Return 0: `scatter` covers all detail."""
+        """Return 0, because `scatter` accounts for all detail."""
         return 0.0
 
     def scatter(self, turns: float, opening: Aperture, share: float) -> float:
-        """Spatial frequency [cycles per aperture radius] along x and y beyond which at most this share of light goes.
+        """Return the frequency [cycles per aperture radius] beyond which at most a share of the light is scattered.
 
-        The light is a discrete transform over the pixels, weighted with sinc² of a pixel's width at each repetition.
+        The frequency is along x and y. The distribution of the light is the discrete transform over the pixels. It is
+        repeated, and weighted with sinc² of a pixel's width.
 
         turns: waves per metre of height [1/m].
-        opening: aperture; `share` is relative to the light that fills it.
+        opening: aperture of the pupil.
+        share: share of the light that passes the opening.
         """
         n = len(self._heights)
         centres = (np.arange(n) + 0.5) * 2 / n - 1
@@ -98,7 +100,7 @@ class PixelRelief(Relief):
 
 
 def _reach(power: np.ndarray, share: float) -> float:
-    """Frequency [cycles per aperture radius] beyond which the remaining power is at most this share."""
+    """Return the frequency [cycles per aperture radius] beyond which at most this share of the power lies."""
     n = len(power)
     order = np.arange(-(n // 2) - n * REPETITIONS, n - n // 2 + n * REPETITIONS)
     sent = power[order % n] * np.sinc(order / n) ** 2

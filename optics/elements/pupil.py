@@ -25,31 +25,32 @@ from optics.numerics.precision import Precision, opaque, precision
 
 __all__ = ["MIDDLE", "Pupil"]
 
-TALLEST = 100.0  # choice, radii: the thin-element model does not apply to higher reliefs
-ANY_HEIGHT = 1e-3  # choice [m]: allowed for every pupil
-LEVEL, TRANSMISSION_DIGITS = 1e-6, 9.0  # choice: level of a mask's spectrum, and digits of its transmission
+TALLEST = 100.0  # choice, radii: highest relief to which the thin-element model applies
+ANY_HEIGHT = 1e-3  # choice [m]: reliefs up to this height are allowed on every pupil
+LEVEL, TRANSMISSION_DIGITS = 1e-6, 9.0  # choice: neglected level of a mask's spectrum; digits of its transmission
 MIDDLE = 550e-9  # choice [m]: wavelength that defines the image distance
-SENSOR_DISTANCE = 240e-6  # choice [m]: default for a pupil without a lens
+SENSOR_DISTANCE = 240e-6  # choice [m]: default distance of the sensor behind a pupil without a lens
 
 
 @dataclass(frozen=True, eq=False)
 class Pupil:
-    """Transmittance A(x, y) M(x, y) exp(ik [(n - object_n) h(x, y) - W(x, y)]), thin-element model.
+    """A thin element with the amplitude transmittance A(x, y) M(x, y) exp(ik [(n - object_n) h(x, y) - W(x, y)]).
 
     aperture_radius: R [m].
-    height: None; a square array [m] (y, x) of samples at cell centres over [-R, R]² (HeightMap); or any Relief.
+    height: h. None; a square array [m] (y, x) of samples at cell centres over [-R, R]² (HeightMap); or any Relief.
     n: refractive index of the relief, constant or dispersive.
-    medium_n: refractive index behind the pupil, a number, or dispersive (`optics.medium`).
-    object_n: refractive index in front of the pupil, around the relief; None: equal to medium_n.
-    thin_lens_focal_length: adds an ideal lens exp(-ik medium_n (√(r² + f²) - f)), f in metres. It focuses parallel
-        light of every wavelength at the distance f behind it; a negative f diverges.
-    aperture: Circle (default), Annulus, Rings, Polygon, Slit, or a `union`, `difference` or `intersection` of shapes.
-    wavefront: W [m], in vacuum at every wavelength: Zernike or WavefrontMap, over at least the pupil's circle.
+    medium_n: refractive index behind the pupil, constant or dispersive (`optics.medium`).
+    object_n: refractive index in front of the pupil and around the relief. None: equal to medium_n.
+    thin_lens_focal_length: focal length f [m] of an additional ideal lens, exp(-ik medium_n (√(r² + f²) - f)). It
+        focuses parallel light of every wavelength at the distance f behind it. If f is negative, the lens diverges.
+    aperture: A, which is 1 in the opening and 0 elsewhere. Circle (default), Annulus, Rings, Polygon, Slit, or a
+        `union`, `difference` or `intersection` of shapes.
+    wavefront: W [m in vacuum], the same at every wavelength. Zernike or WavefrontMap, over at least the pupil's circle.
     mask: M, the transmitted amplitude: GaussianMask or MaskMap. A PSF is relative to the light that falls on the open
         aperture, so light absorbed by a mask reduces its sum.
 
-    Radius, height, n, focal length and the numbers of W and M may be Dr.Jit arrays (maps: tensors): derivatives flow
-    through them.
+    Radius, height, n, focal length and the numbers of W and M may be Dr.Jit arrays (tensors for maps) that carry
+    derivatives.
 
     Raises:
         ValueError: names argument, value and valid range.
@@ -117,9 +118,8 @@ class Pupil:
 
     @property
     def transmission(self) -> Scalar:
-        """Share of the light on the open aperture that the mask transmits, with derivatives; 1 without a mask."""
-        # A graph serves a single backward pass, and gradients of Dr.Jit numbers may be enabled later: nothing is
-        # cached.
+        """Share of the light on the open aperture that the mask transmits. It carries derivatives; 1 without a mask."""
+        # Nothing is cached: a graph allows one backward pass, and gradients of Dr.Jit numbers may be enabled later.
         if is_differentiable(self.aperture_radius) or not (self.mask is None or self.mask.plain):
             import drjit as dr
 
@@ -142,7 +142,7 @@ class Pupil:
         return dr.sum(types.Float64(nodes.weight) * dr.square(amplitude)) / self.aperture.area
 
     def amplitude(self, x: Array, y: Array, types: Precision) -> Array:
-        """Amplitude that the mask transmits at points in units of R."""
+        """Return the amplitude that the mask transmits at points in units of R."""
         if self.mask is None:
             return types.Float64(1)
         radius = opaque(types, self.aperture_radius)
@@ -150,16 +150,17 @@ class Pupil:
 
     @property
     def pixels(self) -> int:
-        """Number of square pixels across the pupil between which its relief jumps; 0 for a smooth relief."""
+        """Number of the relief's square pixels across the pupil; 0 for a smooth relief."""
         return 0 if self.height is None else int(self.height.pixels)
 
     def image_distance(self, source_distance: float) -> float:
-        """Default distance [m] of the sensor behind the pupil, without derivatives.
+        """Return the default distance [m] of the sensor behind the pupil, without derivatives.
 
-        It is 240 µm without a lens, else the image distance of this source [m], 1/z = 1/f - n₀/(n s) at 550 nm.
+        Without a lens it is 240 µm. With a lens it is the image distance z for a source at a distance s, 1/z = 1/f -
+        n₀/(n s) at 550 nm.
 
         Raises:
-            ValueError: the lens makes no real image, or the distance is invalid.
+            ValueError: the lens forms no real image, or the distance is invalid.
         """
         positive("source_distance", source_distance, infinite=True)
         if self.thin_lens_focal_length is None:
@@ -174,17 +175,17 @@ class Pupil:
         return 1 / power
 
     def index_behind(self, wavelength: float) -> float:
-        """Refractive index between pupil and sensor at a vacuum wavelength [m]."""
+        """Return the refractive index between pupil and sensor at a vacuum wavelength [m]."""
         return self._index("medium_n", wavelength)
 
     def index_before(self, wavelength: float) -> float:
-        """Refractive index between source and pupil at a vacuum wavelength [m]."""
+        """Return the refractive index between source and pupil at a vacuum wavelength [m]."""
         if self.object_n is None:
             return self.index_behind(wavelength)
         return self._index("object_n", wavelength)
 
     def _index(self, name: str, wavelength: float) -> float:
-        """Refractive index of a medium, cached because every PSF evaluates it many times."""
+        """Return the refractive index of a medium. It is cached, because every PSF evaluates it many times."""
         known = self._indices
         if (name, wavelength) not in known:
             known[name, wavelength] = number(index_of(name, getattr(self, name)).at(wavelength))
@@ -199,7 +200,7 @@ class Pupil:
         return replace(self, height=None)
 
     def index_step(self, wavelength: float) -> Scalar:
-        """n(λ) minus the index in front of the pupil, which surrounds the relief."""
+        """Return the relief's index n(λ) minus the index in front of the pupil, which surrounds the relief."""
         return self.n.at(wavelength) - self.index_before(wavelength)
 
     def bends(self, wavelength: float) -> bool:
@@ -221,7 +222,7 @@ class Pupil:
         return self.aperture.mirror_symmetric and relief_is and wavefront_is and mask_is
 
     def path(self, x: Array, y: Array, wavelength: float, source: PointSource, types: Precision) -> Array:
-        """Optical path [m] through source and pupil at points (x, y) [m], flat float64 arrays."""
+        """Return the optical path [m] from the source through the pupil at points (x, y) [m], flat float64 arrays."""
         import drjit as dr
 
         total = source.path(x, y, types) * opaque(types, self.index_before(wavelength))
@@ -240,27 +241,27 @@ class Pupil:
         return total
 
     def slopes(self, wavelength: float, source: PointSource) -> Slopes:
-        """Gradient of the optical path over the disk and its soft edge, by differences; pixels of reliefs are level."""
-        # A path depends on the wavelength only through these indices: equal indices give equal slopes.
+        """Return the gradient of the path over the disk and its soft edge. Pixels of a relief count as level."""
+        # The path depends on the wavelength only through these indices. Equal indices therefore give equal slopes.
         indices = number(self.index_step(wavelength)), self.index_before(wavelength), self.index_behind(wavelength)
         same = self._first_with.setdefault(indices, wavelength)
         return _slopes(self._level if self.pixels else self, same, number(source.distance), source.angle)
 
     @cached_property
     def _first_with(self) -> dict[tuple[float, float, float], float]:
-        """First wavelength that was requested with these indices."""
+        """First wavelength that was requested, for each set of indices."""
         return {}
 
     def scatter(self, wavelength: float, share: float) -> float:
-        """Spatial frequency [1/m] along x and y beyond which at most this share of the light is scattered off its rays.
+        """Return the frequency [1/m] along x and y beyond which at most a share of the light is scattered off its rays.
 
-        A relief's jumps, a mask, and ripples scatter light. Ripples send it at most as far as the sum of their slopes
-        and their own frequency (Carson's rule).
+        Light is scattered by a relief's jumps, by masks, and by ripples. The frequency of light from ripples is at most
+        the sum of their own frequency and the frequency that corresponds to their slopes (Carson's rule).
         """
         bends, found = self.bends(wavelength), 0.0
         rough = sum(p is not None and p.scatters for p in (self.height if bends else None, self.wavefront))
         each = share / max(1, rough + (self.mask is not None))
-        of_disk = each * self.aperture.area / math.pi  # samples cover the whole disk, light only the opening
+        of_disk = each * self.aperture.area / math.pi  # samples cover the whole disk, but light only the opening
         turns, level = number(self.index_step(wavelength)) / wavelength, math.sqrt(of_disk) / (2 * math.pi)  # waves
         if bends and isinstance(self.height, PixelRelief):
             found += self.height.scatter(turns, self.aperture, each) / self.radius
@@ -273,7 +274,7 @@ class Pupil:
         return found if self.mask is None else found + self.mask.detail(light, self.radius)
 
     def bandwidth(self, wavelength: float, tolerance: float) -> float:
-        """Spatial frequency [1/m] above which phase [rad] and mask amplitude change by less than `tolerance`.
+        """Return the frequency [1/m] above which the content of phase [rad] and mask amplitude is below `tolerance`.
 
         Jumps between pixels are excluded, because they are sampled separately.
         """

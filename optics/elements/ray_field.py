@@ -1,8 +1,8 @@
 """Field of polarised light along rays, just behind a pupil, expressed by masks.
 
-A ray is perpendicular to the wavefront, so its direction is s = ∇L/n with L the path through source and pupil. The
-field is rotated with it along the shortest arc: a lens that neither reflects nor absorbs does that (Richards & Wolf,
-Proc. R. Soc. A 253, 358, 1959, §2).
+A ray is perpendicular to the wavefront, so its direction is s = ∇L/n, where L is the path from the source through the
+pupil. The electric field is rotated together with the ray, along the shortest arc. This is the effect of a lens that
+neither reflects nor absorbs (Richards & Wolf, Proc. R. Soc. A 253, 358, 1959, §2).
 """
 
 from __future__ import annotations
@@ -20,17 +20,17 @@ from optics.numerics.precision import Precision, opaque
 
 __all__ = ["SCALAR", "RayField", "Vector", "Weights", "before_pupil", "rays_behind", "turned"]
 
-STEP = 1e-4  # choice, radii: step of differences; errors of a lens' slopes are 1e-8, of rounding 1e-11
-SPREAD = 2.0  # choice: bandwidth of fields relative to the path's, since they depend on products of slopes
+STEP = 1e-4  # choice, radii: step of differences; slopes of a lens then have errors of 1e-8, and 1e-11 from rounding
+SPREAD = 2.0  # choice: bandwidth of fields relative to that of the path; fields depend on products of slopes
 
-SCALAR = (1.0, 0.0, 0.0, 0.0, 0.0)  # weights of a `RayField` that contains only the pupil's own mask
+SCALAR = (1.0, 0.0, 0.0, 0.0, 0.0)  # weights of a `RayField` that equals the pupil's own mask
 
 Weights = tuple[float, float, float, float, float]
 Vector = tuple[Any, Any, Any]  # x, y, z: floats, or arrays of NumPy or Dr.Jit
 
 
 def turned(field: Vector, before: Vector, after: Vector) -> Vector:
-    """Rotate a field as the shortest rotation turns `before` into `after`, two unit vectors.
+    """Return a field after the shortest rotation that turns the unit vector `before` into the unit vector `after`.
 
     The field is perpendicular to `before`.
     """
@@ -40,7 +40,7 @@ def turned(field: Vector, before: Vector, after: Vector) -> Vector:
 
 
 def before_pupil(source: PointSource, axis: int) -> tuple[Vector, Vector]:
-    """Direction of light from a distant source, and its field if polarised along x (0) or y (1)."""
+    """Return the direction of light from a distant source, and its field if it is polarised along x (0) or y (1)."""
     x, y = (math.tan(angle) for angle in source.angle)
     length = math.hypot(x, y, 1)
     along = (x / length, y / length, 1 / length)
@@ -48,9 +48,9 @@ def before_pupil(source: PointSource, axis: int) -> tuple[Vector, Vector]:
 
 
 def rays_behind(beam: Beam, x: Array, y: Array, types: Precision) -> Vector:
-    """Directions of rays that leave points (x, y) [m]: unit vectors of float64 arrays.
+    """Return the directions of rays that leave the pupil at points (x, y) [m]: unit vectors of float64 arrays.
 
-    For evanescent light z is 0.
+    The z component is 0 for evanescent light.
     """
     import drjit as dr
 
@@ -67,11 +67,13 @@ def rays_behind(beam: Beam, x: Array, y: Array, types: Precision) -> Vector:
 
 @dataclass(frozen=True, eq=False)
 class RayField(Mask):
-    """Amplitude behind a pupil, w₀ + w₁ Ex + w₂ ξEx/R + w₃ Ey + w₄ ηEy/R, times that of the pupil's own mask.
+    """Mask with the amplitude w₀ + w₁ Ex + w₂ ξEx/R + w₃ Ey + w₄ ηEy/R, times that of the pupil's own mask.
+
+    Ex and Ey are the field of the ray at the point (ξ, η) of the pupil, which has the radius R.
 
     beam: the light without this mask.
     axis: polarisation before the pupil, 0 (x) or 1 (y).
-    weights: w. All such masks share one kernel, since only the weights differ.
+    weights: w₀ to w₄. All such masks share one compiled kernel, since only the weights differ.
     """
 
     beam: Beam
@@ -99,7 +101,7 @@ class RayField(Mask):
         return found if own is None else found * own.amplitude(x, y, radius, types)
 
     def bandwidth(self, level: float, radius: float) -> float:
-        """Bandwidth of the path, plus that of a lens' ray directions, which have poles at its focal distance."""
+        """Return the bandwidth of the path plus that of ray directions, which have poles at a lens' focal distance."""
         pupil, own = self.beam.pupil, self.beam.pupil.mask
         found = SPREAD * self._bare.bandwidth(self.beam.wavelength, level)
         found += 0.0 if own is None else own.bandwidth(level, radius)

@@ -22,10 +22,10 @@ class Dispersion(ABC):
     """A material's refractive index over wavelength, between 1 (vacuum) and 10."""
 
     def at(self, wavelength: float) -> Scalar:
-        """n at a vacuum wavelength [m]; a Dr.Jit array if the coefficients are.
+        """Return n at a vacuum wavelength [m]. It is a Dr.Jit array if the coefficients are Dr.Jit arrays.
 
         Raises:
-            ValueError: the curve leaves [1, 10] there.
+            ValueError: n is outside [1, 10] at this wavelength.
         """
         n = self._n(vacuum_wavelength(wavelength))
         value = number(n)
@@ -43,7 +43,7 @@ class Dispersion(ABC):
 
     @abstractmethod
     def _n(self, wavelength: float) -> Scalar:
-        """Index at a vacuum wavelength [m], unchecked."""
+        """Return the index at a vacuum wavelength [m], without checking its range."""
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ class RefractiveIndex(Dispersion):
     """n(λ) = A + B/λ² + C/λ⁴ + D/λ⁶ (Cauchy's equation; Born & Wolf, Principles of Optics, §2.3.3), λ in vacuum.
 
     a: A, at least 1 (vacuum).
-    b, c, d: [m²], [m⁴], [m⁶]; 0 for a material without dispersion.
+    b, c, d: B [m²], C [m⁴] and D [m⁶]; 0 for a material without dispersion.
     """
 
     a: Scalar
@@ -89,7 +89,7 @@ class Sellmeier(Dispersion):
     """n²(λ) = 1 + Σ B λ²/(λ² - C), λ in vacuum.
 
     strengths: B.
-    poles_um2: C [µm²]; the same number as strengths.
+    poles_um2: C [µm²], one for each of the strengths.
 
     Raises:
         ValueError: no terms, different numbers of strengths and poles, or numbers that are not finite.
@@ -133,7 +133,7 @@ class Cornu(Dispersion):
 
 
 def _cauchy(a: float, b: float, c: float, d: float) -> RefractiveIndex:
-    """Cauchy curve from coefficients for wavelengths in nm."""
+    """Return the Cauchy curve for coefficients that refer to wavelengths in nm."""
     return RefractiveIndex(a, b * 1e-18, c * 1e-36, d * 1e-54)
 
 

@@ -1,7 +1,7 @@
 """Reliefs: height maps of the pupil's glass, over the square that holds the pupil.
 
-A relief is a function of (x, y) in units of the aperture radius; inside the pupil both lie in [-1, 1]. Row index and y
-increase together, as do column index and x. `Pupil.path` converts it to a path, and `Beam.waves` to a phase.
+A relief is a function of (x, y) in units of the aperture radius. Inside the pupil, x and y lie in [-1, 1]. Rows ascend
+with y, columns with x. `Pupil.path` converts heights to paths, and `Beam.waves` paths to phases.
 """
 
 from __future__ import annotations
@@ -23,24 +23,24 @@ from optics.numerics.precision import Precision
 
 __all__ = ["BSplineRelief", "HeightMap", "Relief"]
 
-FEWEST_FOR_JUMPS = 16  # choice: samples along a side
+FEWEST_FOR_JUMPS = 16  # choice: fewest samples along a side of a relief with jumps
 
 
 class Relief(ABC):
-    """A height map [m]."""
+    """A height map [m] over the pupil."""
 
-    scatters = True  # it may send light in directions other than those of its slopes
+    scatters = True  # the relief may send light into directions that do not follow from its slopes
 
     @abstractmethod
     def height(self, x: Array, y: Array, types: Precision) -> Array:
-        """Height [m] at normalised positions: flat Dr.Jit float64 arrays in and out."""
+        """Return heights [m] at positions in units of the aperture radius; flat Dr.Jit Float64 arrays."""
 
     @abstractmethod
     def bandwidth(self, level: float) -> float:
-        """Spatial frequency [cycles per aperture radius] above which the relief's content is below `level` [m]."""
+        """Return the frequency [cycles per aperture radius] above which the relief's content is below `level` [m]."""
 
     def detail(self, level: float) -> float:
-        """Frequency [cycles per aperture radius] beyond which content missed by the slopes is below `level` [m] rms."""
+        """Return the frequency [cycles per radius] above which content that slopes do not describe is below `level`."""
         return self.bandwidth(level)
 
     @property
@@ -76,11 +76,11 @@ class Relief(ABC):
 
 @dataclass(frozen=True, eq=False)
 class BSplineRelief(Relief):
-    """One uniform bicubic B-spline patch: heights h(x, y) = Σ_ij c[i, j] B_i(v) B_j(u), u = (x/a + 1)/2.
+    """One uniform bicubic B-spline patch, h(x, y) = Σ_ij c[i, j] B_i(v) B_j(u), u = (x/a + 1)/2, v = (y/a + 1)/2.
 
-    control_points: (4, 4) heights [m], (y, x), knots -3 ... 4. The patch represents every bicubic polynomial, so it
-    contains every paraboloid exactly (`paraboloid`). Outside the square the polynomial continues. Piegl & Tiller, The
-    NURBS Book, ch. 2.
+    control_points: c, (4, 4) heights [m], (y, x); the knots are -3 ... 4. The patch can represent every bicubic
+    polynomial, so paraboloids are exact (`paraboloid`). Outside the square the polynomial continues. Source: Piegl &
+    Tiller, The NURBS Book, ch. 2.
 
     A Dr.Jit tensor of control points carries derivatives.
 
@@ -88,7 +88,7 @@ class BSplineRelief(Relief):
         ValueError: not 4 x 4 finite numbers.
     """
 
-    scatters = False  # a polynomial
+    scatters = False  # the slopes of a polynomial describe all its content
     control_points: np.ndarray | Array
 
     def __post_init__(self) -> None:
@@ -104,9 +104,9 @@ class BSplineRelief(Relief):
 
     @classmethod
     def paraboloid(cls, height: float, curvature: float, radius: float) -> BSplineRelief:
-        """h = height - curvature (x² + y²)/2 [m], curvature in 1/m, over a pupil of the given radius [m].
+        """Return h = height - curvature (x² + y²)/2 [m], curvature in 1/m, over a pupil of the given radius [m].
 
-        With curvature medium_n / ((n - medium_n) f) it is the paraxial lens exp(-ikr²/2f) times the phase of `height`.
+        With curvature = medium_n / ((n - medium_n) f), it is the paraxial lens exp(-ikr²/2f), times a constant phase.
 
         On uniform knots the polar form of x² has the control values X_i² - δ²/3, with the Greville abscissae X_i = (2i
         - 3) a and the knot spacing δ = 2a.
@@ -139,7 +139,7 @@ class BSplineRelief(Relief):
         return float(np.ptp(plain(self.control_points)))
 
     def bandwidth(self, level: float) -> float:
-        return 1.0  # a cubic polynomial: half a cycle per half width, doubled
+        return 1.0  # twice the half cycle per half width of a cubic polynomial
 
     def detail(self, level: float) -> float:
         return 0.0
@@ -150,7 +150,7 @@ class BSplineRelief(Relief):
 
     @property
     def rotationally_symmetric(self) -> bool:
-        """True for a constant, or a paraboloid on the axis, whose control values lie on c₀ + c₁ (i² + j²)."""
+        """True for a constant height or a paraboloid on the axis: the control points are then c₀ + c₁ (i² + j²)."""
         if is_differentiable(self.control_points):
             return False  # a derivative depends on every control point
         points = self.control_points
@@ -191,7 +191,7 @@ class HeightMap(Relief):
 
     @property
     def jump(self) -> float:
-        """Largest step between neighbours if at least half the span, as in a wrapped lens (many samples); else 0."""
+        """Largest step between neighbours if at least half the span, as in a wrapped lens with many samples; else 0."""
         many = len(self._heights) >= FEWEST_FOR_JUMPS
         steepest = max(np.abs(np.diff(self._heights, axis=axis)).max() for axis in (0, 1)) if many else 0.0
         return float(steepest) if steepest > self.span / 2 else 0.0
@@ -206,7 +206,7 @@ class HeightMap(Relief):
         return np.ascontiguousarray(_spline_coefficients(along_y.T, self._margin).T)
 
     def _values(self, types: Precision) -> Array:
-        """Spline coefficients as a flat array; they are linear in the samples, M h Mᵀ."""
+        """Return the spline coefficients as a flat array. They are linear in the samples, M h Mᵀ."""
         import drjit as dr
 
         if not is_differentiable(self.samples):
@@ -234,7 +234,7 @@ class HeightMap(Relief):
         return total
 
     def on_grid(self, at: np.ndarray) -> np.ndarray:
-        """Heights, (y, x), at normalised positions along either axis; NumPy arrays without derivatives."""
+        """Return heights (y, x) at positions in units of the radius; NumPy arrays without derivatives."""
         n, width = len(self._heights), len(self._coefficients)
         place = (at + 1) * (n / 2) + self._margin - 0.5
         cell = np.clip(np.floor(place), 1, width - 3)
@@ -245,7 +245,7 @@ class HeightMap(Relief):
         return found
 
     def _cell(self, position: Array, n: int, width: int, types: Precision) -> tuple[Array, list[Array]]:
-        """Index of the first of the four coefficients that act at a position, and the four weights."""
+        """Return the index of the first of the four coefficients that matter at a position, and their four weights."""
         import drjit as dr
 
         half, shift = dr.opaque(types.Float64, n / 2), dr.opaque(types.Float64, self._margin - 0.5)
@@ -257,7 +257,7 @@ class HeightMap(Relief):
         return band_of(self._heights, level)
 
     def detail(self, level: float, part: float = 1.0) -> float:
-        """part: half side of the central square that is analysed; it is also the unit of length of the frequency."""
+        """Return `Relief.detail` of a central square. part: its half side, also the unit of length of the frequency."""
         return reach_of(_power_beyond(self, min(part, 1.0)), level)
 
     @property
@@ -274,7 +274,7 @@ class HeightMap(Relief):
 
 
 def _spline_coefficients(samples: np.ndarray, margin: int) -> np.ndarray:
-    """Uniform B-spline coefficients along axis 0, `margin` extra at either end: c = s - s''/6 of a cubic spline s."""
+    """Return B-spline coefficients c = s - s''/6 of a cubic spline s along axis 0, `margin` more at either end."""
     from scipy.interpolate import make_interp_spline
 
     n = len(samples)
@@ -295,6 +295,6 @@ def _spline_coefficients(samples: np.ndarray, margin: int) -> np.ndarray:
 
 @lru_cache(maxsize=16)
 def _power_beyond(relief: HeightMap, part: float) -> np.ndarray:
-    """Mean squares in a central square; see `fine_detail.power_beyond`."""
+    """Return `fine_detail.power_beyond` of a central square with the half side `part`."""
     at = ((np.arange(n := math.ceil(part * relief.knots)) + 0.5) * 2 / n - 1) * part
     return power_beyond(relief._heights if part == 1 else relief.on_grid(at))

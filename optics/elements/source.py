@@ -14,10 +14,10 @@ __all__ = ["PointSource"]
 
 @dataclass(frozen=True)
 class PointSource:
-    """A point source of unit amplitude on the pupil: exp(ik(ρ(x, y) - ρ(0, 0))), ρ the distance from the source.
+    """A point source. Its wave on the pupil is exp(ik(ρ(x, y) - ρ(0, 0))), with ρ the distance from the source.
 
-    distance: axial distance in front of the pupil [m]; infinite for a plane wave.
-    angle: (θx, θy) [rad], the direction in which its light travels. A thin lens focuses it near f (tan θx, tan θy),
+    distance: distance [m] in front of the pupil, along the axis. An infinite distance gives a plane wave.
+    angle: (θx, θy) [rad], the direction in which the light travels. A thin lens focuses it near f (tan θx, tan θy),
     with the off-axis aberrations of a single stigmatic lens.
     """
 
@@ -31,7 +31,7 @@ class PointSource:
         object.__setattr__(self, "angle", angle)
 
     def path(self, x: Array, y: Array, types: Precision) -> Array:
-        """Optical path [m] in vacuum at the pupil's points, relative to the centre (flat float64 arrays)."""
+        """Return the optical path [m] in vacuum at points of the pupil, relative to the centre; flat float64 arrays."""
         import drjit as dr
 
         tx, ty = (math.tan(theta) for theta in self.angle)
@@ -40,7 +40,7 @@ class PointSource:
         if math.isinf(number(self.distance)):
             return along
         centre = opaque(types, self.distance) * norm
-        # ρ - ρ₀ = (r² + 2 ρ₀ (x, y)·t) / (ρ + ρ₀) avoids a difference of nearly equal numbers
+        # The form ρ - ρ₀ = (r² + 2 ρ₀ (x, y)·t) / (ρ + ρ₀) avoids a difference of nearly equal numbers.
         excess = x * x + y * y + 2 * centre * along
         rho = dr.sqrt(excess + centre * centre)
         return excess / (rho + centre)

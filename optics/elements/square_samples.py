@@ -1,4 +1,4 @@
-"""Checks of samples over a square: heights of a relief, amplitudes of a mask, values of a wavefront."""
+"""Checks of samples over a square, such as heights of a relief, amplitudes of a mask or values of a wavefront."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ __all__ = ["on_both_sides", "square_samples"]
 
 
 def on_both_sides(heights: np.ndarray) -> bool:
-    """Return whether samples are invariant under mirroring in both directions."""
+    """Return whether the samples are invariant under mirroring of x and under mirroring of y."""
     return np.array_equal(heights, heights[::-1]) and np.array_equal(heights, heights[:, ::-1])
 
 

@@ -16,8 +16,8 @@ from optics.numerics.precision import Precision, opaque, padded_for_packets, pre
 
 __all__ = ["GaussianMask", "Mask", "MaskMap"]
 
-OVERSHOOT = 0.02  # choice: largest excess of the spline over [-1, 1]
-FINER = 4  # choice: steps per sample of this check
+OVERSHOOT = 0.02  # choice: the spline through the samples may exceed [-1, 1] by this amount
+FINER = 4  # choice: points per sample at which this is checked
 
 
 class Mask(ABC):
@@ -25,16 +25,16 @@ class Mask(ABC):
 
     @abstractmethod
     def amplitude(self, x: Array, y: Array, radius: Scalar, types: Precision) -> Array:
-        """Amplitude at points (x, y) [m] of a pupil of this radius [m], flat Dr.Jit float64 arrays."""
+        """Return the amplitude at points (x, y) [m] of a pupil of this radius [m], flat Dr.Jit Float64 arrays."""
 
     @abstractmethod
     def bandwidth(self, level: float, radius: float) -> float:
-        """Spatial frequency [1/m] above which the mask's content is below `level`."""
+        """Return the spatial frequency [1/m] above which the mask's content is below `level`."""
 
     def detail(self, light: float, radius: float) -> float:
-        """Spatial frequency [1/m] along x and y beyond which the mask sends at most this light.
+        """Return the frequency [1/m] along x and y beyond which the mask scatters at most a given amount of light.
 
-        light: mean over the disk of a pupil of this radius [m]; 1 is all incident light.
+        light: this amount, as a mean over the disk of a pupil of this radius [m]. All incident light is 1.
         """
         return self.bandwidth(math.sqrt(light), radius)
 
@@ -45,18 +45,20 @@ class Mask(ABC):
 
     @property
     def radius(self) -> float | None:
-        """Radius [m] over which the mask is known; None: the pupil's, or unlimited."""
+        """Radius [m] over which the mask is known. None: it equals the pupil's radius, or is unlimited."""
         return None
 
     @property
     def plain(self) -> bool:
-        """True if all its numbers are plain ones, which cannot carry derivatives."""
+        """True if all numbers of the mask are plain Python or NumPy numbers, which cannot carry derivatives."""
         return False
 
 
 @dataclass(frozen=True, eq=False)
 class GaussianMask(Mask):
-    """exp(-r²/w²), as for a laser beam or the guided mode of a photoreceptor: intensity falls to 1/e² at r = w.
+    """The amplitude exp(-r²/w²), as of a laser beam or the guided mode of a photoreceptor.
+
+    At r = w the intensity is 1/e².
 
     waist: w [m]; a Dr.Jit number may carry a derivative.
 
@@ -75,11 +77,11 @@ class GaussianMask(Mask):
         return dr.exp(-(x * x + y * y) / dr.square(opaque(types, self.waist)))
 
     def bandwidth(self, level: float, radius: float) -> float:
-        """Frequency from the mask's spectrum, exp(-π²w²f²)."""
+        """Return the frequency at which the mask's spectrum exp(-π²w²f²) has fallen to `level`."""
         return math.sqrt(max(-math.log(level), 1.0)) / (math.pi * number(self.waist))
 
     def detail(self, light: float, radius: float) -> float:
-        """A share exp(-2π²w²f²) of the light lies beyond f."""
+        """Return the frequency f beyond which a share exp(-2π²w²f²) of the light lies."""
         waist = number(self.waist)
         beam = (waist / radius) ** 2 / 2 * -math.expm1(-2 * (radius / waist) ** 2)
         return math.sqrt(max(-math.log(light / beam), 0.0) / 2) / (math.pi * waist)
@@ -95,17 +97,18 @@ class GaussianMask(Mask):
 
 @dataclass(frozen=True, eq=False)
 class MaskMap(Mask):
-    """Amplitudes in [-1, 1] sampled at cell centres over the square [-radius, radius]², joined by cubic splines.
+    """Amplitudes in [-1, 1], sampled at cell centres over the square [-reach, reach]², joined by cubic splines.
 
     The interpolation is that of HeightMap. For hard edges use apertures instead.
 
     samples: (n, n), (y, x).
-    reach: half side [m] of the square, at least the pupil's radius; None: the pupil's.
+    reach: half side [m] of the square, at least the pupil's radius. None: equal to the pupil's radius.
 
     A Dr.Jit tensor of samples carries derivatives.
 
     Raises:
-        ValueError: not square, empty, not finite, or beyond [-1, 1], which also happens to the spline at jumps.
+        ValueError: samples that are not square, empty or not finite; or an amplitude beyond [-1, 1]. The spline can
+            exceed this range at jumps of the samples.
     """
 
     samples: np.ndarray | Array
@@ -128,7 +131,7 @@ class MaskMap(Mask):
             )
 
     def _most(self) -> float:
-        """Largest amplitude within the circle."""
+        """Largest amplitude of the mask within the circle."""
         n = FINER * len(self._map._heights)
         at = (np.arange(n) + 0.5) * 2 / n - 1
         x, y = (padded_for_packets(axis[np.hypot(*np.meshgrid(at, at)) <= 1]) for axis in np.meshgrid(at, at))
@@ -141,7 +144,11 @@ class MaskMap(Mask):
         return self._map.height(x * scale, y * scale, types)
 
     def on_grid(self, at: np.ndarray, radius: float) -> np.ndarray:
-        """Amplitudes, (y, x), at positions along either axis in units of the pupil's radius [m]; no derivatives."""
+        """Return amplitudes (y, x) at positions along either axis, without derivatives.
+
+        at: positions in units of the pupil's radius.
+        radius: radius of the pupil [m].
+        """
         return self._map.on_grid(at if self.reach is None else at * (radius / self.reach))
 
     def bandwidth(self, level: float, radius: float) -> float:

@@ -1,7 +1,7 @@
 """Wavefront aberrations of an eye or other optics, added to an ideal lens, in the convention of aberrometers.
 
-The sign is that of reports on human eyes: positive where the wavefront that leaves the eye is ahead, so a positive
-defocus belongs to a myope. For light that enters the eye, the optical path is shorter by the same amount.
+The sign is that of reports on human eyes: a value is positive if the wavefront that leaves the eye is ahead. A myope
+therefore has a positive defocus. For light that enters the eye, the optical path is shorter by the same amount.
 """
 
 from __future__ import annotations
@@ -28,9 +28,11 @@ UM = 1e-6
 
 
 class Aberration(ABC):
-    """Lead [m] of a wavefront that leaves the pupil, over a circle or square of `radius` [m] (None: the pupil's).
+    """Lead [m] of a wavefront that leaves the pupil, over a circle or a square.
 
-    scatters: True if it may send light in directions other than those of its slopes.
+    radius: radius of the circle or half side of the square [m]. None: equal to the pupil's radius.
+
+    scatters: True if the wavefront may send light into directions that do not follow from its slopes.
     """
 
     scatters: ClassVar[bool] = True
@@ -38,16 +40,16 @@ class Aberration(ABC):
 
     @abstractmethod
     def ahead(self, x: Array, y: Array, types: Precision) -> Array:
-        """Lead [m] at positions in units of the radius: flat Dr.Jit float64 arrays in and out."""
+        """Return the lead [m] at positions in units of the radius; flat Dr.Jit Float64 arrays."""
 
     @abstractmethod
     def bandwidth(self, level: float) -> float:
-        """Spatial frequency [cycles per radius] above which the wavefront's content is below `level` [m]."""
+        """Return the frequency [cycles per radius] above which the wavefront's content is below `level` [m]."""
 
     def detail(self, level: float, part: float = 1.0) -> float:
-        """Spatial frequency [cycles per radius] beyond which content missed by the slopes is below `level` [m] rms.
+        """Return the frequency [cycles per radius] along x and y above which content is below `level` [m] rms.
 
-        The frequency is along x and y.
+        Content that the slopes already describe does not count.
 
         part: the pupil's radius relative to the wavefront's.
         """
@@ -56,12 +58,12 @@ class Aberration(ABC):
     @property
     @abstractmethod
     def knots(self) -> int:
-        """Number of polynomial pieces across the wavefront that its slopes must resolve."""
+        """Number of polynomial pieces across the wavefront. Samples of the slopes must resolve them."""
 
     @property
     @abstractmethod
     def span(self) -> float:
-        """Largest minus smallest value [m], or an upper bound."""
+        """Largest minus smallest value [m], or an upper bound of this difference."""
 
     @property
     def rotationally_symmetric(self) -> bool:
@@ -75,14 +77,15 @@ class Aberration(ABC):
 
 @dataclass(frozen=True, eq=False)
 class Zernike(Aberration):
-    """W = Σ c_n^m Z_n^m(x, y) in Zernike polynomials, with the order, sign and normalisation of OSA and ANSI:
+    """Zernike polynomials, W = Σ c_n^m Z_n^m(x, y), with the order, sign and normalisation of OSA and ANSI:
 
         Z_n^m = √((2 - δ_m0)(n + 1)) R_n^|m|(ρ) {cos mθ, m >= 0; sin |m|θ, m < 0},   x = ρ cos θ, y = ρ sin θ
 
-    (Thibos, Applegate, Schwiegerling & Webb, J. Refract. Surg. 18, S652, 2002), with a variance of 1 over the circle.
+    Each polynomial except the piston has a variance of 1 over the circle. Source: Thibos, Applegate, Schwiegerling &
+    Webb, J. Refract. Surg. 18, S652, 2002.
 
     coefficients_um: {(n, m): [µm]}, or a vector [µm] by the index j = (n(n + 2) + m)/2, piston first.
-    radius: radius [m] of the circle to which the coefficients refer, at least the pupil's; None: the pupil's.
+    radius: radius [m] of the circle to which the coefficients refer, at least the pupil's radius. None: equal to it.
 
     A Dr.Jit vector, or Dr.Jit numbers in a dictionary, carry derivatives.
 
@@ -117,7 +120,7 @@ class Zernike(Aberration):
         return total
 
     def at(self, x: Any, y: Any) -> np.ndarray:
-        """W [m] at positions in units of the radius, NumPy arrays; the polynomials continue beyond 1."""
+        """Return W [m] at positions in units of the radius, as a NumPy array. The polynomials continue beyond 1."""
         x, y = np.broadcast_arrays(reals("x", x), reals("y", y))
         total = np.zeros(x.shape)
         for (n, m), value in self.modes.items():
@@ -126,7 +129,7 @@ class Zernike(Aberration):
 
     @property
     def rms(self) -> float:
-        """Root mean square of W [m] over its whole circle without piston: √Σc²."""
+        """Root mean square of W [m] over the whole circle, without piston: √Σc²."""
         return UM * math.sqrt(sum(value**2 for key, value in self.modes.items() if key != (0, 0)))
 
     def bandwidth(self, level: float) -> float:
@@ -160,7 +163,7 @@ class Zernike(Aberration):
         return max((n for (n, _), value in self.modes.items() if value != 0 or self.asks), default=0)
 
     def _coefficient(self, n: int, m: int, value: float, types: Precision) -> Array:
-        """Coefficient [m] of a mode."""
+        """Return the coefficient [m] of a mode."""
         import drjit as dr
 
         given = self.coefficients_um
@@ -173,11 +176,11 @@ class Zernike(Aberration):
 
 @dataclass(frozen=True, eq=False)
 class WavefrontMap(Aberration):
-    """W [m] sampled at cell centres over the square [-radius, radius]², joined by cubic splines (see HeightMap).
+    """A wavefront W [m], sampled at cell centres over the square [-radius, radius]² and interpolated by cubic splines.
 
-    samples: (n, n), (y, x), positive if ahead, as in Zernike: the negative of an optical path difference. They must be
-        unwrapped, and finite and smooth outside the pupil, too.
-    radius: [m], at least the pupil's; None: the pupil's.
+    samples: W, (n, n), (y, x). Values are positive if the wavefront is ahead, as in Zernike: they are the negative of
+        an optical path difference. They must be unwrapped. Outside the pupil they must also be finite and smooth.
+    radius: half side [m] of the square, at least the pupil's radius. None: equal to it.
 
     A Dr.Jit tensor of samples carries derivatives.
 
@@ -219,7 +222,7 @@ class WavefrontMap(Aberration):
 
 
 def mode(n: int, m: int, x: Any, y: Any) -> Any:
-    """Z_n^m at (x, y), NumPy or Dr.Jit: ρ^|m| P_k^(0, |m|)(2ρ² - 1) {cos, sin} with k = (n - |m|)/2.
+    """Return Z_n^m at (x, y), NumPy or Dr.Jit: ρ^|m| P_k^(0, |m|)(2ρ² - 1) {cos, sin} with k = (n - |m|)/2.
 
     The recurrence of Jacobi's polynomials loses no digits at high orders (Abramowitz & Stegun 22.7.1).
     """
@@ -255,7 +258,7 @@ def _check_mode(key: Any) -> None:
 
 
 def _of_vector(given: Any) -> dict[tuple[int, int], float]:
-    """Convert a vector with OSA's index to modes."""
+    """Convert a vector, ordered by the index of OSA, to a dictionary of modes."""
     vector = plain(given) if is_differentiable(given) else reals("coefficients_um", given)
     most = (HIGHEST + 1) * (HIGHEST + 2) // 2
     if vector.ndim != 1 or not 0 < vector.size <= most:

@@ -1,4 +1,7 @@
-"""Local slopes of a wavefront behind a pupil: directions of its rays, and the combined gradient of pupil and path."""
+"""Local slopes of the wavefront behind a pupil.
+
+They give the directions of rays, and the combined gradient of the pupil's phase and of the path to the window.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +17,7 @@ from optics.numerics.grid import Grid
 __all__ = ["Slopes"]
 
 
-AROUND = 16  # choice: points around the window to which paths are evaluated
+AROUND = 16  # choice: number of points around the window to which paths are evaluated
 # Differences of fourth order at the first two points of a row (Fornberg, Mathematics of Computation 51 (1988) 699,
 # table 3).
 AT_END = np.array([-25, 48, -36, 16, -3]) / 12
@@ -22,7 +25,7 @@ BESIDE_END = np.array([-3, -10, 18, -6, 1]) / 12
 
 
 def _derivative(values: np.ndarray, step: float) -> np.ndarray:
-    """Derivative along axis 0 by differences of fourth order, also at the ends, on the rim of the soft edge."""
+    """Return the derivative along axis 0 by differences of fourth order, also at both ends."""
     slope = np.empty_like(values)
     for place, weights in ((0, AT_END), (1, BESIDE_END)):
         slope[place] = weights @ values[:5] / step
@@ -32,7 +35,12 @@ def _derivative(values: np.ndarray, step: float) -> np.ndarray:
 
 
 def _total(points: np.ndarray, to: list[np.ndarray], bend: tuple[float, float]) -> np.ndarray:
-    """|∇L + n (ξ - x) / D| at points (x, y, ∂L/∂x, ∂L/∂y), towards target points (x, y), (place, point); bend: n, z."""
+    """Return |∇L + n (ξ - x) / D| between points of the pupil and target points, (target, point).
+
+    points: x, y, ∂L/∂x and ∂L/∂y of points of the pupil.
+    to: x and y of the target points.
+    bend: refractive index n and distance z [m] of the targets' plane.
+    """
     x, y, px, py = points
     dx, dy = x - to[0], y - to[1]
     scale = np.float32(bend[0]) / np.sqrt(dx * dx + dy * dy + np.float32(bend[1] ** 2))
@@ -69,16 +77,16 @@ class Slopes:
         return math.sqrt(self._squared[self.distance_from_axis <= self.radius].max())
 
     def turning(self, distance: float, window: Grid, medium_n: float) -> tuple[float, float]:
-        """Largest slope |∇L + n (ξ - x) / D| of the path through the pupil and on to any point of the window.
+        """Return the largest slope |∇L + n (ξ - x) / D| of paths through the pupil and on to any point of the window.
 
-        The window lies in a plane at `distance` [m]. The first value covers the disk and its soft edge, the second only
-        the disk.
+        The window lies in a plane at `distance` [m]. The first of the two values is for the disk and its soft edge, the
+        second for the disk alone.
         """
         soft = self.distance_from_axis <= (1 + EDGE_REACH) * self.radius
         x, y = np.broadcast_arrays(self.grid.x[None, :], self.grid.y[:, None])
-        # Seven digits are enough: SLOPE_MARGIN is much larger.
+        # Seven digits are enough, because SLOPE_MARGIN is much larger than their error.
         points = np.stack([part[soft].astype(np.float32) for part in (x, y, self.along_x, self.along_y)])
-        # One cell more than the disk, to include its rim.
+        # The disk is extended by one cell, to include its rim.
         inside = self.distance_from_axis[soft] <= self.radius + self.grid.dx
         (cx, cy), outermost = window.centre, window.own_half_diagonal
         angle = np.linspace(0, 2 * np.pi, AROUND, endpoint=False)
@@ -99,7 +107,7 @@ class Slopes:
         return float(found[0]), float(found[1])
 
     def rays(self, distance: float, medium_n: float) -> tuple[np.ndarray, np.ndarray]:
-        """Intersections of rays from the disk's points with a plane at `distance` [m]; infinite for evanescent rays."""
+        """Return the points where rays from the disk hit a plane at `distance` [m]; infinite for evanescent rays."""
         inside = self.distance_from_axis <= self.radius
         px, py = self.along_x[inside] / medium_n, self.along_y[inside] / medium_n
         axial = np.sqrt(np.maximum(1 - px**2 - py**2, 0))

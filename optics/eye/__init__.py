@@ -2,7 +2,7 @@
 
 eye                   Eye
 eye_spec              EyeSpec: parameters of an eye
-geometry              lengths, directions, and limits on the pupil's width
+geometry              lengths and directions, and checks of the pupil's width
 cell_integrals        integrals of sampled functions over cells
 receptive_field       kernels: receptive fields of receptors
 guided_field          kernels of receptors that are waveguides

@@ -17,7 +17,7 @@ from optics.spectra.spectrum import daylight
 
 __all__ = ["choose_bands"]
 
-# Choice: numbers of bands to try, up to half of `FINEST`, the reference.
+# Choice: numbers of bands to try, up to half of `FINEST`, the number of bands in the reference.
 CANDIDATES = (1, 2, 4, 8, 16, 32)
 
 
@@ -30,19 +30,20 @@ def choose_bands(
 ) -> SpectralBands:
     """Return the fewest bands that keep the predicted error of a receptor's signal within the tolerance.
 
-    The number is a power of two. The error is in units of white's signal and is the sum of two terms:
+    The number is a power of two. The error is relative to the signal of white and is the sum of two terms:
 
-    - For reflectances (1 + cos(2π λ/Λ + φ))/2 of any phase φ, with Λ the whole range: the difference between the bands
-      and quadrature to 1 nm.
-    - For kernels: the largest difference, over all scenes, between white light's kernels from n and from 2n bands.
+    - The error for coloured surfaces: the largest difference from a quadrature to 1 nm, for reflectances (1 + cos(2π
+      λ/Λ + φ))/2 of any phase φ. Λ is the width of the receptors' range of wavelengths.
+    - The error of the kernels: the largest difference, over all scenes, between the kernels of white light that result
+      from n and from 2n bands.
 
-    kernels: function of wavelengths that returns (wave, k, k) with cells of 1/samples_per_receptor. None: the kernel is
-        the same for all wavelengths.
-    white: share of white's signal that remains behind kernels of the width of all this light's. None: the share that
-    remains behind these kernels.
+    kernels: function of wavelengths that returns kernels (wave, k, k), with cells that are 1/samples_per_receptor of a
+        receptor wide. None: the kernel is the same for all wavelengths.
+    white: share of the signal of white that is transmitted by kernels wide enough to contain all light. None: the share
+    that the given kernels transmit.
 
     Raises:
-        AccuracyError: 32 bands exceed the tolerance.
+        AccuracyError: the error with 32 bands exceeds the tolerance.
     """
     in_range("tolerance", tolerance, 1e-6, 0.5)
     total, coarse = math.inf, None
@@ -67,7 +68,10 @@ def choose_bands(
 
 
 def _reflectance_error(chosen: SpectralBands, exact: SpectralBands, range_nm: tuple[float, float]) -> float:
-    """Largest error over phases and channels: half of the error of |Σ w d e^{2πiλ/Λ}|."""
+    """Return the largest error over all phases and channels: half the error of Σ w d e^{2πiλ/Λ}, as a modulus.
+
+    w are the bands' weights and d is daylight.
+    """
     period = (range_nm[1] - range_nm[0]) * 1e-9
 
     def catch(bands: SpectralBands) -> np.ndarray:

@@ -1,4 +1,7 @@
-"""Integrals of sampled functions over a retina's cells: a matrix that integrates the spline through the samples."""
+"""Integrals of sampled functions over the cells of a retina.
+
+A matrix maps samples to the integrals of the spline through them.
+"""
 
 from __future__ import annotations
 
@@ -14,21 +17,24 @@ from optics.numerics.grid import Grid
 __all__ = ["Tiles", "cell_integrals", "samples_per_cycle"]
 
 DEGREE = 7
-SHORT = 8 * DEGREE  # samples: enough for the middle ones to lie far from both ends
-# With 3.1 samples per cycle of the highest frequency, the spline's error over tiles of any size is 3e-5 of the
-# integrals' root mean square. # It falls with the eighth power of the samples' distance. With fewer samples it grows
-# tenfold for every 0.425 per cycle; see # test_cell_integrals.py.
+SHORT = 8 * DEGREE  # number of samples above which the middle ones lie far from both ends
+# With 3.1 samples per cycle of the highest frequency, the error of integrals over cells of any size is 3e-5 of their
+# root mean square. With more samples, it falls with the eighth power of the samples' distance. With fewer, it grows
+# tenfold for every 0.425 samples per cycle; see test_cell_integrals.py.
 FINE, FINE_TOLERANCE, ORDER = 3.1, 1e-4, 8
 FEWEST, PER_DECADE = 2.25, 0.425
-# Cells of whole cycles average out most of the aliasing of coarser samples. Each row (cycles, tolerance, fewer) applies
-# from these cycles # and this tolerance upwards. validation/optics/cell_samples.py prints the errors.
+# Over cells that are at least a cycle wide, most of the aliasing of coarser samples averages out. Each row (cycles,
+# tolerance, fewer) states how many fewer samples per cycle are sufficient. It applies to cells of at least this number
+# of cycles and to tolerances of at least this size. validation/optics/cell_samples.py prints the errors.
 FEWER = ((2.0, 1e-2, 0.5), (1.0, 1e-3, 0.25))
 
 
 def samples_per_cycle(tolerance: float, cycles: float = 0.0) -> float:
-    """Samples per cycle of the highest frequency that keep the error of cell integrals within a third of the tolerance.
+    """Return the samples per cycle of the highest frequency that cell integrals need.
 
-    cycles: cycles of the highest frequency per cell.
+    Their error is then within a third of the tolerance.
+
+    cycles: number of cycles of the highest frequency per cell.
     """
     if tolerance <= FINE_TOLERANCE:
         return FINE * (FINE_TOLERANCE / tolerance) ** (1 / ORDER)
@@ -38,7 +44,12 @@ def samples_per_cycle(tolerance: float, cycles: float = 0.0) -> float:
 
 @dataclass(frozen=True)
 class Tiles:
-    """Cells in a row: number, size [m], and whether light comes from a whole scene cell of that size or a point."""
+    """Cells in a row.
+
+    count: number of cells.
+    size: side of a cell [m].
+    from_cell: True if light comes from a whole cell of the scene, which has the same size; False if from a point.
+    """
 
     count: int
     size: float
@@ -47,22 +58,24 @@ class Tiles:
 
 @lru_cache(maxsize=16)
 def cell_integrals(samples: int, pitch: float, tiles: Tiles) -> np.ndarray:
-    """Matrix (cell, sample) of integrals of the spline through samples over central tiles, along one axis.
+    """Return a matrix (cell, sample) that maps samples to integrals over cells, along one axis.
 
-    With from_cell the integrals are also averaged over sources all over a scene cell: PSF ⊗ cell ⊗ cell. The spline's
-    coefficients c solve C c = s, with C its B-splines at the samples. If the tiles' integrals are Q c, the matrix is Q
-    C⁻¹.
+    The integrand is the spline through the samples. The cells lie around the middle sample.
+
+    If tiles.from_cell is True, the integrals are also averaged over all source positions in a scene cell: PSF ⊗ cell ⊗
+    cell. The spline's coefficients c solve C c = s, where C contains the B-splines at the samples. The integrals are Q
+    c, so the matrix is Q C⁻¹.
     """
     grid = Grid((1, samples), pitch)
     degree = min(DEGREE, (samples - 2) // 2 * 2 + 1)
     knots = _knots(grid.x, degree)
-    # With an odd number of samples the setup is symmetric, and half of the tiles determine the others.
+    # With an odd number of samples, cells and samples are symmetric. One half of the rows then determines the other.
     own = (tiles.count + 1) // 2 if samples % 2 else tiles.count
     edges = (np.arange(own + 1 + tiles.from_cell) - (tiles.count + tiles.from_cell) / 2) * tiles.size
     inside = np.clip(edges, grid.x[0], grid.x[-1])
     primitive = _primitive(knots, degree, inside, 1)
     if tiles.from_cell:
-        # Beyond the samples the light is zero: the primitive is constant there, and its own primitive is linear.
+        # Beyond the samples there is no light. The first integral is constant there, and the second one is linear.
         second = _primitive(knots, degree, inside, 2) + primitive * (edges - inside)[:, None]
         held = np.diff(second, 2, axis=0) / tiles.size
     else:
@@ -72,18 +85,18 @@ def cell_integrals(samples: int, pitch: float, tiles: Tiles) -> np.ndarray:
 
 
 def _knots(x: np.ndarray, degree: int) -> np.ndarray:
-    """Knots of the spline through samples at x: one per sample except near the ends, where the polynomials join."""
+    """Return the knots of the spline through samples at x: one per sample, except near the ends (not-a-knot)."""
     skipped = (degree + 1) // 2
     return np.concatenate([np.repeat(x[0], degree + 1), x[skipped:-skipped], np.repeat(x[-1], degree + 1)])
 
 
 def _over_samples(held: np.ndarray, degree: int) -> np.ndarray:
-    """Q C⁻¹ with Q = held."""
+    """Return Q C⁻¹ for Q = held."""
     from scipy.linalg import solve_banded
 
     samples = held.shape[1]
     lower, upper, band = _collocation(min(samples, SHORT), degree)
-    if samples > SHORT:  # far from both ends the rows of C are equal
+    if samples > SHORT:  # far from both ends, all rows of C have the same entries
         inside = np.repeat(band[:, SHORT // 2 : SHORT // 2 + 1], samples - SHORT, axis=1)
         band = np.concatenate([band[:, : SHORT // 2], inside, band[:, SHORT // 2 :]], axis=1)
     found: np.ndarray = solve_banded((lower, upper), band, held.T, check_finite=False).T
@@ -92,7 +105,7 @@ def _over_samples(held: np.ndarray, degree: int) -> np.ndarray:
 
 @lru_cache(maxsize=64)
 def _collocation(samples: int, degree: int) -> tuple[int, int, np.ndarray]:
-    """C in band form, with its numbers of lower and upper diagonals, for samples at any pitch.
+    """Return the numbers of lower and upper diagonals of C, and C in band form. They are the same for every pitch.
 
     Every sample lies within the support of degree + 1 B-splines.
     """
@@ -106,10 +119,10 @@ def _collocation(samples: int, degree: int) -> tuple[int, int, np.ndarray]:
 
 
 def _primitive(knots: np.ndarray, degree: int, at: np.ndarray, times: int) -> np.ndarray:
-    """Integrals (place, B-spline) of B-splines from the first knot, once or twice.
+    """Return integrals (place, B-spline) of B-splines from the first knot, integrated once or twice.
 
-    The integral of B_j is the sum of all later B-splines of the next degree, times a share of its width (de Boor, A
-    Practical Guide to Splines, ch. X).
+    The integral of B_j is a sum of B-splines of the next degree, from j on, times a share of the width of B_j (de Boor,
+    A Practical Guide to Splines, ch. X).
     """
     knots = np.concatenate([knots[:1]] * times + [knots] + [knots[-1:]] * times)
     found: np.ndarray = _bsplines(knots, degree + times, at).toarray()
@@ -121,7 +134,7 @@ def _primitive(knots: np.ndarray, degree: int, at: np.ndarray, times: int) -> np
 
 
 def _bsplines(knots: np.ndarray, degree: int, at: np.ndarray) -> Any:
-    """Sparse matrix (place, B-spline) of B-spline values."""
+    """Return a sparse matrix (place, B-spline) of B-spline values."""
     from scipy.interpolate import BSpline
 
     return BSpline.design_matrix(at, knots, degree)

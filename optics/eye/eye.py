@@ -25,39 +25,41 @@ from optics.spectra.bands import SpectralBands
 
 __all__ = ["Eye"]
 
-LIGHT_FROM = ("cells", "centres")  # origin of the light within scene cells
+LIGHT_FROM = ("cells", "centres")  # positions within scene cells from which light comes
 
 
 @dataclass(frozen=True)
 class Eye(EyeSpec):
-    """Pupil, retina and noise. Arrays are in visual-field orientation, row 0 at the top, column 0 on the left.
+    """An eye: a pupil, a retina of receptors, and noise.
 
-    pupil: a Pupil. None is the perfect lens: no blur, full throughput.
-    resolution: receptors (height, width); square, pitch = sensor_width / width.
-    fov_deg: horizontal field of view in front of the eye, in [1e-3, 170]. The retina lies at f = L / (2 tan(fov/2)), or
-        n/n₀ times as far behind a pupil between two media.
-    sensor_width: L [m], width of the retina or of a patch of it.
-    full_aperture: diameter [m] of the pupil with a throughput of 1; None: L.
+    Arrays are in the orientation of the visual field: row 0 is at the top, column 0 on the left.
+
+    pupil: a Pupil. None is a perfect lens without blur and with a throughput of 1.
+    resolution: number of receptors (height, width). Receptors are square; their pitch is sensor_width / width.
+    fov_deg: horizontal field of view in front of the eye, in [1e-3, 170]. The retina lies at f = L / (2 tan(fov/2))
+        behind the pupil. If the indices n behind and n₀ in front of the pupil differ, it lies at f n/n₀.
+    sensor_width: L, width [m] of the retina or of the modelled patch of it.
+    full_aperture: diameter [m] of a pupil with a throughput of 1 (None: L).
     eccentricity_deg: (right, up), viewing direction of the middle of the patch in the visual field.
-    bands: spectral bands, 1 to 64, or "auto": the fewest that keep a receptor's predicted error within the tolerance.
-        "auto" computes PSFs of many bands, which pays off for an eye that is used often. The field then contains the
-        choice.
-    noise_sigma: standard deviation of a receptor's Gaussian noise, in signal units.
-    photon_budget: illumination. Its shot noise precedes the Gaussian noise (None: no shot noise).
-    receptors: types of receptor: "rgb" (three channels, red, green, blue), "lms" (human cones), "honeybee", "goldfish",
-        wavelengths of the pigments' peaks [nm], or `Receptors`, which can be a mosaic. The field then contains
-        `Receptors`.
-    waveguide: rhabdom of each receptor, in the middle of its square and pointing at the pupil's centre. It accepts
-        light in modes (None: receptors absorb all light on their square).
-    microvilli: directions and dichroic ratios of the receptors' microvilli: one `Microvilli` for all, or rows of them,
-        repeated over the retina from its top left corner. Azimuths are in the visual field, from right upwards,
-        perpendicular to the ray through the pupil's centre. Microvilli affect only polarised scenes (None: receptors
-        are insensitive to polarisation).
-    tolerance: relative L2 error of the PSF, and signal error, relative to white's, of all other automatic choices.
-    dtype: "float32" or "float64", of PSF, kernel and signals.
+    bands: number of spectral bands, 1 to 64, or "auto": the fewest that keep the predicted error of a receptor's signal
+        within the tolerance. "auto" computes PSFs at many wavelengths, which is worthwhile for an eye that is used
+        often. This field then contains the chosen number.
+    noise_sigma: standard deviation of a receptor's Gaussian noise, in units of the signal.
+    photon_budget: light level. Shot noise is added before the Gaussian noise (None: no shot noise).
+    receptors: types of receptor: "rgb" (three channels: red, green, blue), "lms" (human cones), "honeybee", "goldfish",
+        peak wavelengths of pigments [nm], or `Receptors`, which can be a mosaic. This field then contains `Receptors`.
+    waveguide: rhabdom of each receptor. It stands in the middle of the receptor's square, points at the pupil's centre,
+        and accepts light in its guided modes (None: receptors absorb all light on their square).
+    microvilli: directions and dichroic ratios of the receptors' microvilli: one `Microvilli` for all receptors, or rows
+        of `Microvilli`, repeated over the retina from its top left corner. Azimuths are measured in the visual field,
+        from right towards up, in the plane perpendicular to the ray through the pupil's centre. Microvilli affect only
+        polarised scenes (None: receptors are insensitive to polarisation).
+    tolerance: relative L2 error of the PSF. It is also the error, relative to the signal of white, that each automatic
+        choice may cause in a receptor's signal.
+    dtype: "float32" or "float64", the type of PSF, kernel and signals.
 
     All parameters of the pupil, fov_deg and distances z may be Dr.Jit arrays that carry derivatives. Results that
-    depend on them are Dr.Jit tensors; all others are NumPy arrays.
+    depend on such arrays are Dr.Jit tensors. All other results are NumPy arrays.
 
     Raises:
         ValueError: names argument, value and valid range.
@@ -66,7 +68,10 @@ class Eye(EyeSpec):
 
     @property
     def white_signal(self) -> Scalar:
-        """Signal of a receptor that sees white everywhere, mean over types: the throughput or the waveguides' share."""
+        """Signal of a receptor that sees white everywhere, averaged over receptor types.
+
+        It is the throughput or, with waveguides, the share of the light that they absorb.
+        """
         if self.waveguide is None:
             return self.throughput
         return number(self.aperture_throughput) * self._guided_share
@@ -76,10 +81,10 @@ class Eye(EyeSpec):
         return white_share(plain(self.kernel(1)), self.spectral_bands)
 
     def psf(self, z: Scalar = math.inf) -> PSFResult:
-        """Return the PSF on the retina (sensor orientation) of a point at distance z [m] along the axis.
+        """Return the PSF on the retina for a point at the distance z [m] along the axis, in the sensor's orientation.
 
-        The point lies in the viewing direction of the patch, and the PSF covers the kernel's window. The perfect lens
-        has one sample with all power.
+        The point lies in the viewing direction of the patch, and the PSF covers the window of `kernel`. The PSF of the
+        perfect lens is one sample with all power.
 
         Raises:
             AccuracyError: see `optics.psf`.
@@ -92,22 +97,26 @@ class Eye(EyeSpec):
     def kernel(
         self, samples_per_receptor: int, z: Scalar = math.inf, direction_deg: tuple[float, float] | None = None
     ) -> np.ndarray | Array:
-        """Return the receptive kernel (band, ky, kx), in visual-field orientation, ky and kx odd.
+        """Return the receptive kernel (band, ky, kx) in the orientation of the visual field, with odd ky and kx.
 
-        It is the PSF integrated over square cells of pitch / samples_per_receptor and turned by 180°.
+        It is the PSF, integrated over square cells of side pitch / samples_per_receptor, and rotated by 180°.
 
         z: distance of the scene along the axis [m].
         direction_deg: direction (right, up) of the light from the axis (None: the patch's eccentricity). The centre
             cell is its geometric image.
 
-        The sum is the fraction of the pupil's power that lands inside. The window is wide enough to lose less than the
-        tolerance (limits: see `receptive_field`). The perfect lens has the 1 x 1 kernel 1. If light comes from the
-        cells' centres, signals are a² Σ_b weights[c, b] (kernel_b ⊗ radiance_b), averaged over receptors. `see` takes
-        it from all over the cells (see `sight`).
+        The sum of the kernel is the fraction of the pupil's power that lands inside its window. The window is wide
+        enough to lose less than the tolerance (limits: see `receptive_field`). The kernel of the perfect lens is 1 x 1
+        with the value 1.
 
-        With waveguides the kernel is the share that a receptor accepts from all over each cell around its direction. It
-        is not averaged over the receptor; ky and kx are even if samples_per_receptor is. The sum is relative to a
-        square that absorbs all light.
+        The kernel is for light from the centre of each scene cell. Signals are then a² Σ_b weights[c, b] (kernel_b ⊗
+        radiance_b), averaged over each receptor's cells. `see` assumes light from all over each cell instead (see
+        `sight`).
+
+        With waveguides, the kernel is the share of the light from each cell, averaged over the cell, that a receptor
+        accepts. The cells lie around the receptor's direction. Signals are then not averaged over the receptor. ky and
+        kx are even if samples_per_receptor is even. The sum of the kernel is relative to a square that absorbs all
+        light.
 
         Raises:
             AccuracyError: see `optics.psf`.
@@ -136,24 +145,24 @@ class Eye(EyeSpec):
         tolerance: float | None = None,
         light_from: str = "cells",
     ) -> KernelBank:
-        """Compute the kernels for a scene in depth and over the field of view.
+        """Return the kernels for a scene with a range of distances and directions.
 
-        Printing them shows the choices with reasons.
+        Printed, the result shows the chosen numbers of kernels with reasons.
 
-        z: distances [m] that occur: one, or an array, whose nearest and farthest count.
-        depth_layers: number of kernels between nearest and farthest, evenly spaced in 1/z, or "auto": the fewest within
-            the tolerance.
-        field_zones: number of kernels across the field's width, or "auto". With 1 the kernel on the axis serves the
-            whole retina.
-        tolerance: error of a receptor's signal, in units of white's, for any scene at most as bright as white (None:
-            the eye's).
-        light_from: "cells" is exact for images whose radiance is constant within each cell. "centres" suits cells that
-            contain means of finer detail, such as rendered ones: all light of a cell comes from its centre. Its error
-            is then less than half as large, O(samples_per_receptor^-2).
+        z: distances [m] in the scene, a number or an array. Only the nearest and the farthest distance matter.
+        depth_layers: number of kernels between the nearest and the farthest distance, evenly spaced in 1/z; or "auto",
+            the fewest within the tolerance.
+        field_zones: number of kernels across the width of the field; or "auto". With 1, the kernel on the axis is used
+            for the whole retina.
+        tolerance: largest error of a receptor's signal, relative to the signal of white, for any scene at most as
+            bright as white (None: the eye's tolerance).
+        light_from: "cells" is exact for images whose radiance is constant within each cell. "centres" treats all light
+            of a cell as coming from its centre. It suits cells that contain means of finer detail, such as rendered
+            images. For these, its error is less than half that of "cells", O(samples_per_receptor^-2).
 
         Raises:
             ValueError: names argument, value and valid range.
-            AccuracyError: see `optics.psf`, or the tolerance needs more kernels than the limit.
+            AccuracyError: see `optics.psf`, or the tolerance requires more kernels than the limit.
         """
         within = self.tolerance if tolerance is None else in_range("tolerance", tolerance, 1e-6, 0.5)
         s = whole("samples_per_receptor", samples_per_receptor, 1, 64)
@@ -179,20 +188,26 @@ class Eye(EyeSpec):
         sight: KernelBank | None = None,
         polarization: Any = None,
     ) -> np.ndarray | Array:
-        """Return the signals (channel, h, w) of a scene in the tangent plane, by convolution (the reference).
+        """Return the signals (channel, h, w) for a scene in the tangent plane, by convolution.
 
-        radiance: (band, Y, X), constant within each cell of pitch / samples_per_receptor (alternative: `sight`'s
-            light_from), centred on the axis, at least h s x w s cells and larger by even numbers; dark outside.
-        rng: None for signals without noise. Noise carries no derivative.
-        z: distance of the scene along the axis [m], a number or one per cell (Y, X).
-        sight: kernels from `Eye.sight` with the same samples_per_receptor; None computes them. Objects outside the
-            range of distances are rendered with the kernels of the nearest or farthest distance.
-        polarization: for an eye with microvilli, (degree, angle_deg) of the light: its degree of linear polarisation in
-            [0, 1], and the angle of its field, from right upwards. Each is a number, (band,), (Y, X) or (band, Y, X).
-            None: unpolarised or circularly polarised, which microvilli do not distinguish.
+        This is the reference for renderers.
+
+        radiance: radiance (band, Y, X) of the scene's cells, whose side is pitch / samples_per_receptor. It is constant
+            within each cell (for the alternative, see `light_from` of `Eye.sight`). The scene is centred on the axis
+            and dark outside. With s = samples_per_receptor, it has at least h s x w s cells, or an even number of cells
+            more.
+        rng: random generator of the noise; None for signals without noise. Noise carries no derivative.
+        z: distance [m] of the scene along the axis, a number or one per cell (Y, X).
+        sight: kernels from `Eye.sight` with the same samples_per_receptor; None computes them. Objects outside its
+            range of distances are rendered with the kernel of the nearest or the farthest distance.
+        polarization: (degree, angle_deg) of the light, for an eye with microvilli: the degree of linear polarisation in
+            [0, 1], and the angle of the electric field, from right towards up. Each is a number or an array (band,),
+            (Y, X) or (band, Y, X). None: unpolarised or circularly polarised light, which microvilli do not
+            distinguish.
 
         Raises:
-            ValueError: radiance of another shape, or not finite; polarised light for receptors without microvilli.
+            ValueError: radiance has another shape or is not finite; or the light is polarised and receptors have no
+                microvilli.
         """
         s = whole("samples_per_receptor", samples_per_receptor, 1, 64)
         if rng is not None:
@@ -207,13 +222,13 @@ class Eye(EyeSpec):
         return to_user(found if rng is None else with_noise(self, found, rng))
 
     def in_bands(self, radiance: Any) -> np.ndarray:
-        """Convert a spectral radiance to this eye's bands (band,), for `see`.
+        """Convert a spectral radiance to values for this eye's bands (band,), for `see`.
 
-        Each receptor type then has the correct quantum catch if there are at least as many bands as types. A band may
-        be negative; see `SpectralBands.band_values`.
+        Every receptor type then has the correct quantum catch, if there are at least as many bands as types. The value
+        of a band may be negative; see `SpectralBands.band_values`.
         """
         return self.spectral_bands.band_values(radiance, self.receptors)
 
     def describe(self, z: Scalar = math.inf) -> Description:
-        """Table of the eye's limits: see `summary.Description`."""
+        """Return a table of the eye's limits: see `summary.Description`."""
         return describe(self, number(self.white_signal), self.psf(z), partial(self.kernel, z=z))

@@ -25,7 +25,7 @@ __all__ = ["EyeSpec"]
 
 @dataclass(frozen=True)
 class EyeSpec:
-    """Pupil, retina and noise, with the lengths and throughputs that follow from them without a PSF.
+    """Parameters of an eye, with the lengths and throughputs that follow from them without a PSF.
 
     `optics.Eye` documents the fields and adds PSFs, kernels and signals.
 
@@ -76,13 +76,13 @@ class EyeSpec:
     def sensor_distance(self) -> Scalar:
         """Focal length f [m] that relates a distance x on the retina to the angle x/f.
 
-        It is the distance from pupil to retina if the media in front of and behind the pupil are the same.
+        It equals the distance from pupil to retina if the same medium is in front of and behind the pupil.
         """
         return focal_length(self.sensor_width, self.fov_deg)
 
     @property
     def retina_distance(self) -> Scalar:
-        """Distance [m] from pupil to retina: f n/n₀, at 550 nm."""
+        """Distance [m] from pupil to retina: f n/n₀ at 550 nm, with the indices n behind the pupil and n₀ in front."""
         return behind_pupil(self.pupil, self.sensor_distance)
 
     @property
@@ -92,27 +92,27 @@ class EyeSpec:
 
     @property
     def receptor_pitch(self) -> float:
-        """Distance [m] of neighbouring receptors."""
+        """Distance [m] between the centres of neighbouring receptors."""
         return self.sensor_width / self.resolution[1]
 
     @property
     def relative_aperture(self) -> Scalar:
-        """a = 2 R / L, or 2 R over `full_aperture`; 1 for the perfect lens."""
+        """Relative aperture a = 2 R / L, or 2 R / `full_aperture`; 1 for the perfect lens."""
         return 1.0 if self.pupil is None else 2 * self.pupil.aperture_radius / self.widest_pupil
 
     @property
     def throughput(self) -> Scalar:
-        """a², times the open share of the aperture's disk, times the mask's transmission."""
+        """Throughput: a², times the open share of the aperture's disk, times the mask's transmission."""
         return self.aperture_throughput * (1.0 if self.pupil is None else self.pupil.transmission)
 
     @property
     def aperture_throughput(self) -> Scalar:
-        """Throughput without the mask, whose transmission is part of the kernels that are multiplied by this."""
+        """Throughput without the mask. Signals are kernels times this; the kernels contain the mask's transmission."""
         return throughput(self.relative_aperture, 1.0 if self.pupil is None else self.pupil.aperture.area / math.pi)
 
     @property
     def channels(self) -> int:
-        """Number of signals at each place of the retina: one per receptor type, or a single one in a mosaic."""
+        """Number of signals at each position of the retina: one per receptor type, or one in a mosaic."""
         return self.receptors.channels
 
     @property
@@ -122,7 +122,7 @@ class EyeSpec:
 
     @property
     def photons(self) -> np.ndarray | None:
-        """Photons that correspond to a signal of 1, per receptor type (type,); None without a photon budget."""
+        """Absorbed photons for a signal of 1, per receptor type (type,); None without a photon budget."""
         if self.photon_budget is None:
             return None
         light = etendue(self.widest_pupil, self.receptor_pitch, number(self.sensor_distance))

@@ -1,4 +1,4 @@
-"""Lengths and directions of an eye, and limits on the width of its pupil."""
+"""Lengths and directions of an eye, and checks of its pupil's width."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ WIDEST_DEG = 80
 
 
 def focal_length(width: float, fov_deg: Scalar) -> Scalar:
-    """Focal length f [m] at which a retina of this width has this field of view, L / (2 tan(fov/2))."""
+    """Return the focal length f [m] at which a retina of width L has this field of view, L / (2 tan(fov/2))."""
     if is_differentiable(fov_deg):
         import drjit as dr
 
@@ -25,14 +25,14 @@ def focal_length(width: float, fov_deg: Scalar) -> Scalar:
 
 
 def behind_pupil(pupil: Pupil | None, focal: Scalar) -> Scalar:
-    """Distance [m] from pupil to retina, f n/n₀ at 550 nm between two media."""
+    """Return the distance [m] from pupil to retina: f, or f n/n₀ at 550 nm if the media differ."""
     if pupil is None or pupil.object_n is None:
         return focal
     return focal * (pupil.index_behind(MIDDLE) / pupil.index_before(MIDDLE))
 
 
 def check_pupil(pupil: Pupil | None, width: float, full_aperture: float | None) -> None:
-    """Refuse anything but a pupil that is at most as wide as one with a throughput of 1."""
+    """Raise a ValueError unless `pupil` is None, or a Pupil that is no wider than one with a throughput of 1."""
     if full_aperture is not None:
         positive("full_aperture", full_aperture)
     if pupil is None:
@@ -48,16 +48,16 @@ def check_pupil(pupil: Pupil | None, width: float, full_aperture: float | None) 
 
 
 def etendue(widest_pupil: float, receptor_pitch: float, focal: float) -> float:
-    """Etendue [m² sr] of a receptor behind a pupil with a throughput of 1."""
+    """Return the etendue [m² sr] of a receptor behind a pupil with a throughput of 1."""
     return math.pi / 4 * (widest_pupil * receptor_pitch / focal) ** 2
 
 
 def direction(name: str, value: Any) -> tuple[float, float]:
-    """Return (right, up) [degrees] off the axis, checked."""
+    """Return the angles (right, up) [degrees] of a direction off the axis, or raise a ValueError."""
     right, up = point_2d(name, value, "angles (right, up) [degrees]")
     return in_range(name, right, -WIDEST_DEG, WIDEST_DEG), in_range(name, up, -WIDEST_DEG, WIDEST_DEG)
 
 
 def tangents(direction_deg: tuple[float, float]) -> tuple[float, float]:
-    """Return tangents (right, down) of a direction (right, up) [degrees]."""
+    """Return the tangents (right, down) of a direction that is given as angles (right, up) [degrees]."""
     return math.tan(math.radians(direction_deg[0])), -math.tan(math.radians(direction_deg[1]))

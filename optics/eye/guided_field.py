@@ -1,8 +1,9 @@
 """Receptive fields of receptors that are waveguides: the share of the light on the pupil that their modes accept.
 
-Let E(v) be the share of a point's light that is accepted and absorbed, with v [m] on the retina. A receptor of a retina
-with pitch p then sees E(v)/p² of a scene's radiance. A square that absorbs all light would see the mean over its own
-area. The waveguide stands at the image point of the ray through the pupil's centre, and points at that centre.
+Let E(v) be the share of a point source's light on the pupil that a waveguide accepts and absorbs, if the source is
+imaged at the position v [m] relative to the waveguide. If the pitch of the retina is p, the receptor's kernel is
+E(v)/p², integrated over cells. For comparison, the signal of a square that absorbs all light is the mean over its area.
+The waveguide stands where the ray through the pupil's centre hits the retina, and points at that centre.
 """
 
 from __future__ import annotations
@@ -27,12 +28,12 @@ from optics.ommatidia.waveguide import Waveguide
 
 __all__ = ["Guide", "check_guide", "guided_kernel"]
 
-FINER = 10.0  # choice: E is sampled for a tenth of the tolerance, since it is interpolated by splines twice
-DEGREE, MARGIN = 5, 8  # degree of the spline, and its samples beyond the window
+FINER = 10.0  # choice: E is sampled for a tenth of the tolerance, since splines interpolate it twice
+DEGREE, MARGIN = 5, 8  # degree of the spline, and number of samples beyond the window
 MOST_SAMPLES = 4096  # choice: samples of E along an axis
-DEPTHS = 3.0  # choice: decay lengths of the first mode's evanescent field within the window
+DEPTHS = 3.0  # choice: decay lengths of the first mode's evanescent field that the window includes
 MORE_DIGITS = 1.5  # choice: extra digits of amplitudes, relative to the tolerance
-WIDER = 1.5  # choice: growth of successive windows
+WIDER = 1.5  # choice: ratio of the widths of successive windows
 CELL_DIGITS = 4.0  # choice: digits of integrals over cells
 
 
@@ -40,9 +41,9 @@ CELL_DIGITS = 4.0  # choice: digits of integrals over cells
 class Guide:
     """A waveguide on a retina.
 
-    focal: f [m]; receptors see angles x/f.
-    cells: cells along a receptor's side.
-    from_cell: True if light comes from all over a cell of the scene, False if from its centre.
+    focal: f [m]. A receptor at the distance x from the axis sees the angle x/f.
+    cells: number of cells along a receptor's side.
+    from_cell: True if light comes from all over a cell of the scene, False if it comes from the cell's centre.
     """
 
     waveguide: Waveguide
@@ -52,7 +53,7 @@ class Guide:
 
 
 def check_guide(waveguide: Waveguide | None, pupil: Pupil | None, pitch: float) -> None:
-    """Refuse a waveguide that does not fit between its neighbours, or that has no pupil in front of it."""
+    """Raise a ValueError for a waveguide that overlaps its neighbours or has no pupil in front of it."""
     if waveguide is None:
         return
     of_kind("waveguide", waveguide, Waveguide, "Waveguide(2e-6), or None for receptors that are squares")
@@ -66,14 +67,14 @@ def check_guide(waveguide: Waveguide | None, pupil: Pupil | None, pitch: float) 
 
 
 def guided_kernel(pupil: Pupil, retina: Retina, z: Scalar, direction: tuple[float, float], guide: Guide) -> Array:
-    """Return the light that a receptor accepts from every cell around its direction: Dr.Jit (band, k, k).
+    """Return the share of light that a receptor accepts from every cell around its direction: Dr.Jit (band, k, k).
 
-    k is even if `guide.cells` is. The orientation is that of `receptive_field.visual_kernel`, which also documents the
-    other arguments.
+    k is even if `guide.cells` is even. The orientation is that of `receptive_field.visual_kernel`, which also documents
+    the other arguments.
 
     Raises:
-        ValueError: the waveguide has no guided mode at one of the wavelengths, or something carries a derivative.
-        AccuracyError: too many samples of E.
+        ValueError: the waveguide has no guided mode at one of the wavelengths, or an argument carries a derivative.
+        AccuracyError: E needs too many samples.
     """
     beams = beams_to(pupil, retina, z, (-direction[0], -direction[1]))
     spot = spot_of(beams, retina)
@@ -85,7 +86,10 @@ def guided_kernel(pupil: Pupil, retina: Retina, z: Scalar, direction: tuple[floa
 
 
 def _within(beam: Beam, spot: Spot, pitch: float, retina: Retina, guide: Guide) -> np.ndarray:
-    """E over the cells of a window that loses at most the tolerance of E and is at most as wide as `spot` requires."""
+    """Return E over the cells of a window that contains all of E, except for a share of at most the tolerance.
+
+    The window grows until it does. It is never wider than the light of `spot` and the waveguide together.
+    """
     most = spot.half + _radius(guide.waveguide, beam)
     diffracted = guide.focal * beam.wavelength / (beam.pupil.radius * beam.pupil.index_before(beam.wavelength))
     half = spot.half_of_rays + most - spot.half + diffracted
@@ -101,7 +105,7 @@ def _within(beam: Beam, spot: Spot, pitch: float, retina: Retina, guide: Guide) 
 
 @dataclass(frozen=True)
 class _Cells:
-    """Number of cells in a row, their side, and the sampling distance that resolves E, as tangents."""
+    """Number of cells in a row, their side, and the sampling distance that resolves E. Lengths are tangents."""
 
     count: int
     side: float
@@ -109,7 +113,7 @@ class _Cells:
     tolerance: float
 
     def places(self, from_cell: bool) -> tuple[np.ndarray, np.ndarray]:
-        """Tangents from the middle along an axis, (cell, node), and weights that sum to a cell's side."""
+        """Return tangents (cell, node) along an axis from its middle, and weights that sum to a cell's side."""
         middle = (np.arange(self.count) - (self.count - 1) / 2) * self.side
         if not from_cell:
             return middle[:, None], np.array([self.side])
@@ -124,7 +128,7 @@ class _Cells:
 
 
 def _radius(waveguide: Waveguide, beam: Beam) -> float:
-    """Radius [m] within which the field of the best guided mode lies."""
+    """Return the radius [m] that contains the field of the best confined mode."""
     modes = waveguide.modes(beam.wavelength)
     if not modes:
         raise ValueError(f"waveguide: has no guided mode at {beam.wavelength:g} m; must be wider, or of a higher index")
@@ -132,7 +136,7 @@ def _radius(waveguide: Waveguide, beam: Beam) -> float:
 
 
 def _seen(beam: Beam, spot: Spot, guide: Guide, cells: _Cells) -> tuple[np.ndarray, float]:
-    """E over a band's cells, as integrals over tangents, and the share of the total that lies among them."""
+    """Return E integrated over each cell, in terms of tangents, and the share of the total that the cells contain."""
     from scipy.ndimage import map_coordinates
 
     middle = [math.tan(angle) for angle in beam.source.angle]
@@ -140,7 +144,7 @@ def _seen(beam: Beam, spot: Spot, guide: Guide, cells: _Cells) -> tuple[np.ndarr
     along_x, along_y = (tangent + at.ravel() for tangent in middle)
     own = 1 / math.hypot(1, *middle)
     cosine = 1 / np.sqrt(1 + along_x**2 + along_y[:, None] ** 2)
-    # Sines are relative to the source's own sine, which the modes' phase already contains.
+    # Sines are relative to the sine of the source's direction, which the phase of the modes already contains.
     sine_x, sine_y = along_x * cosine - middle[0] * own, along_y[:, None] * cosine - middle[1] * own
     sines = _grid_around(sine_x, sine_y, cells.step)
     modes = guide.waveguide.modes(beam.wavelength)
@@ -158,7 +162,7 @@ def _seen(beam: Beam, spot: Spot, guide: Guide, cells: _Cells) -> tuple[np.ndarr
 
 
 def _grid_around(x: np.ndarray, y: np.ndarray, step: float) -> Grid:
-    """Grid of sines that covers all of these, with the margin that a spline needs."""
+    """Return a grid of sines that covers the sines x and y, with the margin that a spline needs."""
     centre = tuple(float(axis.min() + axis.max()) / 2 for axis in (x, y))
     sides = [math.ceil(float(np.ptp(axis)) / (2 * step)) for axis in (y, x)]
     shape = tuple(2 * (side + MARGIN) + 1 for side in sides)

@@ -1,8 +1,8 @@
-"""Kernels of an eye for a scene in depth and over its field of view: the fewest within the tolerance.
+"""Kernels of an eye for a scene with a range of distances and directions: the fewest within the tolerance.
 
-A kernel depends on the position of the light source. It is computed at nodes that are evenly spaced in inverse distance
-1/z (defocus is linear in it) and over the tangent plane, and interpolated linearly between them (see
-`kernel_interpolation`):
+A kernel depends on the position of the light source. Kernels are computed at nodes, and interpolated linearly between
+them (see `kernel_interpolation`). The nodes are evenly spaced over the tangent plane and in inverse distance 1/z,
+because defocus is linear in 1/z:
 
     signal = Σ_l kernel_l ⊗ (share_l · radiance),   Σ_l share_l = 1 at every cell of the scene.
 """
@@ -25,20 +25,20 @@ from optics.numerics.interpolation import linear_weights
 
 __all__ = ["KernelBank", "prepare"]
 
-MOST_NODES = 64  # choice: largest number that can be requested for a stage
-# Choice: node counts to try; each contains the nodes of the previous ones.
+MOST_NODES = 64  # choice: largest number of layers or zones that can be requested
+# Choice: numbers of nodes to try. The nodes of each number include the nodes of all smaller numbers.
 DEPTH_COUNTS, FIELD_COUNTS = (1, 3, 5, 9, 17), (1, 3, 5, 9)
 
 
 @dataclass(frozen=True)
 class KernelBank:
-    """The kernels of an eye at all nodes, and the shares of the nodes in each cell of a scene.
+    """The kernels of an eye at all nodes, and the weights with which a cell of the scene uses them.
 
-    inverse_distance: (nearest, farthest) 1/z [1/m].
+    inverse_distance: 1/z [1/m] of the (nearest, farthest) distance.
     field: (half height, half width) of the retina in cells.
-    kernels: Dr.Jit (band, k, k) per node (layer, row, column).
-    choices: one per stage.
-    averaged: True if a receptor's signal is the mean over its cells, which is not the case with waveguides.
+    kernels: a Dr.Jit tensor (band, k, k) for each node (layer, row, column).
+    choices: the chosen numbers of nodes, for depth and for the field.
+    averaged: True if a receptor's signal is the mean over its cells. It is False with waveguides.
     """
 
     inverse_distance: tuple[float, float]
@@ -48,7 +48,7 @@ class KernelBank:
     averaged: bool = True
 
     def shares(self, shape: tuple[int, int], z: Any) -> list[Any]:
-        """Share of every node in each cell of a scene, (Y, X) per node.
+        """Return the share (Y, X) of each node in every cell of a scene, one array per node.
 
         z: distances [m], a number or (Y, X).
 
@@ -73,7 +73,7 @@ class KernelBank:
         return [by_depth[i] * by_row[j][:, None] * by_column[k] for i, j, k in self.kernels]
 
     def check(self, shape: tuple[int, int], bands: int, *, averaged: bool) -> None:
-        """Check that the bank fits a retina of `shape` cells, these bands and receptors, or raise a ValueError."""
+        """Raise a ValueError unless the bank fits a retina of `shape` cells, these bands and these receptors."""
         if (shape[0] / 2, shape[1] / 2) != self.field:
             made = " x ".join(f"{2 * half:g}" for half in self.field)
             raise ValueError(f"sight is for a retina of {made} cells: must be for {shape[0]} x {shape[1]}")
@@ -90,7 +90,7 @@ class KernelBank:
 
 @dataclass(frozen=True)
 class _Range:
-    """Distances from nearest to farthest, by their inverse; a single Dr.Jit distance is used unchanged."""
+    """Inverse distances of the nearest and the farthest object. A single Dr.Jit distance is used unchanged."""
 
     inverse_distance: tuple[float, float]
     only: Scalar
@@ -105,7 +105,7 @@ class _Range:
         return cls((1 / near, 1 / far), near if near == far else None)
 
     def distance(self, place: float) -> Scalar:
-        """Distance [m] at a place from -1 (farthest) to 1 (nearest)."""
+        """Return the distance [m] at a place between -1 (farthest) and 1 (nearest)."""
         if self.only is not None:
             return self.only
         near, far = self.inverse_distance
@@ -126,10 +126,11 @@ def prepare(
 ) -> KernelBank:
     """Choose the number of kernels and compute them.
 
-    kernel_at: function of (z, right, down), with positions in the field from -1 to 1 at the retina's edges.
-    counts: depth layers and zones across the longer side, or "auto".
+    kernel_at: function of (z, right, down) that returns a kernel. Positions in the field run from -1 to 1, the edges of
+        the retina.
+    counts: number of depth layers, and of zones across the longer side of the retina; or "auto".
     averaged: True if a receptor's signal is the mean over its cells.
-    white: returns the share of white's signal that the kernels transmit.
+    white: function that returns the share of the signal of white that the kernels transmit.
     """
     s, depths = samples_per_receptor, _Range.from_distances(z)
     layers, zones = (
@@ -158,10 +159,10 @@ def prepare(
 def _choices(
     stages: tuple[NodeChoice, NodeChoice], asked: tuple[Choice | None, Choice | None], tolerance: float
 ) -> tuple[Choice, Choice]:
-    """Choices for depth and for the field.
+    """Return the numbers of nodes for depth and for the field.
 
-    If both are automatic, depth may use half of the tolerance, and the field the remainder: at a corner, between two
-    depths, errors add up. If half is too little for depth, the field is chosen first.
+    If both are automatic, depth may use half of the tolerance, and the field the remainder, because the two errors add
+    up. If depth needs more than half of the tolerance, the number for the field is chosen first.
     """
     along, across = stages
     if asked[0] is not None or asked[1] is not None:
@@ -176,14 +177,14 @@ def _choices(
 
 
 def _rest(tolerance: float, spent: float | None) -> float | None:
-    """Remainder of a tolerance; None for all of it."""
+    """Return the remainder of a tolerance; None if nothing was used."""
     return tolerance - spent if spent else None
 
 
 def _grid(across: int, resolution: tuple[int, int]) -> tuple[int, int]:
-    """Numbers (rows, columns) of nodes over the field, with similar spacing in both directions.
+    """Return the numbers (rows, columns) of nodes over the field, with similar spacing in both directions.
 
-    Higher counts contain the nodes of lower ones.
+    The nodes of higher counts include the nodes of lower counts.
     """
     height, width = resolution
     finest = max(across - 1, 0)

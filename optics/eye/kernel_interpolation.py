@@ -1,8 +1,8 @@
-"""Number of kernels for a whole range of distances or directions: the fewest with a negligible interpolation error.
+"""Number of kernels for a range of distances or directions: the fewest with an acceptable interpolation error.
 
-Kernels are computed at nodes, evenly spaced over [-1, 1] along every axis, and interpolated linearly between them. The
-error falls with the square of the nodes' distance. It is measured with kernels between the nodes. Most of these are
-nodes of the next higher count.
+Kernels are computed at nodes that are evenly spaced over [-1, 1] along every axis, and interpolated linearly between
+them. The interpolation error falls with the square of the nodes' distance. It is measured by computing kernels between
+the nodes. Most of these kernels are reused, because their places are nodes of the next higher count.
 """
 
 from __future__ import annotations
@@ -20,17 +20,17 @@ from optics.numerics.interpolation import linear_weights
 
 __all__ = ["Choice", "NodeChoice", "nodes", "worst_difference"]
 
-MOST_CHECKS = 8  # choice: kernels that measure the error of a node count
-CAUTION = 1.3  # choice, safety factor on that error: the worst place may lie between
+MOST_CHECKS = 8  # choice: number of kernels with which the error of a node count is measured
+CAUTION = 1.3  # choice: safety factor on this error, because the worst place may lie between the measured ones
 Place = tuple[float, ...]
 
 
 @dataclass(frozen=True)
 class Choice:
-    """The choice for one stage, with its reason.
+    """The chosen number of nodes for one stage ("depth" or "field"), with the reason.
 
-    predicted_error: error of a receptor's signal, for any scene at most as bright as white, in units of white's signal;
-        None if the number was requested.
+    predicted_error: error of a receptor's signal, relative to the signal of white, for any scene at most as bright as
+        white. None if the user requested the number.
     """
 
     stage: str
@@ -44,15 +44,15 @@ class Choice:
 
 
 def nodes(count: int) -> np.ndarray:
-    """Positions of nodes in [-1, 1]."""
+    """Return the positions of nodes in [-1, 1]."""
     return np.linspace(-1, 1, count) if count > 1 else np.zeros(1)
 
 
 def checks(counts: tuple[int, ...]) -> list[Place]:
-    """Places with the largest error for these numbers of nodes along each axis.
+    """Return the places with the largest error for these numbers of nodes along each axis.
 
-    With a single node these are the far ends, else the points halfway between nodes along every axis. Of many places
-    only a few are used, corners among them.
+    With a single node, these are the ends of the range. With more, they are the points halfway between nodes along
+    every axis. If there are many such points, only a few are used, including the corners.
     """
     if max(counts) == 1:
         return [place for place in _places([nodes(3)] * len(counts)) if any(place)]
@@ -68,12 +68,12 @@ def _places(axes: Iterable[np.ndarray]) -> list[Place]:
 
 @dataclass(frozen=True)
 class NodeChoice:
-    """One stage: the number of nodes along each of its axes.
+    """Choice of the numbers of nodes for one stage: along depth, or along the two axes of the field.
 
-    kernel_at: the kernel at a place in [-1, 1]^axes.
-    candidates: node counts to try, in ascending order.
-    white: returns the share of white's signal that the kernels transmit; errors are relative to it. It is less than 1
-        behind masks, and with waveguides, which need a kernel to compute it.
+    kernel_at: function that returns the kernel at a place in [-1, 1]^axes.
+    candidates: numbers of nodes to try, in ascending order.
+    white: function that returns the share of the signal of white that the kernels transmit. Errors are relative to this
+        share. It is less than 1 behind masks and with waveguides. With waveguides, a kernel has to be computed for it.
     """
 
     stage: str
@@ -84,10 +84,12 @@ class NodeChoice:
     known: dict[Place, np.ndarray] = field(default_factory=dict)
 
     def choose(self, tolerance: float, most: float | None = None) -> Choice:
-        """Return the first candidate whose predicted error is within the tolerance, or within its available part.
+        """Return the first candidate whose predicted error is within the tolerance.
+
+        most: part of the tolerance that is available for this stage (None: all).
 
         Raises:
-            AccuracyError: the last candidate exceeds it.
+            AccuracyError: the error of the last candidate exceeds the tolerance.
         """
         error = math.inf
         for counts in self.candidates:
@@ -103,7 +105,7 @@ class NodeChoice:
         )
 
     def error(self, counts: tuple[int, ...]) -> float:
-        """Largest signal error at `checks` of interpolation between these nodes, in units of white's."""
+        """Return the largest interpolation error of a signal with these nodes, relative to the signal of white."""
         coarse = _places(nodes(n) for n in counts)
         worst = 0.0
         for place in checks(counts):
@@ -120,10 +122,12 @@ class NodeChoice:
 
 
 def worst_difference(terms: Sequence[tuple[float, np.ndarray]], samples_per_receptor: int) -> float:
-    """Largest |signal| of Σ share · kernel, kernels (band, k, k), over all scenes with radiance in [0, 1].
+    """Return the largest |signal| of the kernel Σ share · kernel over all scenes with radiance in [0, 1].
 
-    It is the sum over the positive, or over the negative, part of the receptor's receptive field (kernel ⊗ receptor
-    aperture).
+    It is the sum over the positive part, or over the negative part, of the receptor's receptive field (kernel ⊗
+    receptor aperture).
+
+    terms: pairs of share and kernel (band, k, k).
     """
     side = max(kernel.shape[-1] for _, kernel in terms)
     total = np.zeros((terms[0][1].shape[0], side, side))
@@ -132,7 +136,7 @@ def worst_difference(terms: Sequence[tuple[float, np.ndarray]], samples_per_rece
         inner = slice(margin, side - margin)
         total[:, inner, inner] += share * kernel
     s = samples_per_receptor
-    for _ in range(2):  # box along one axis, then the other
+    for _ in range(2):  # convolution with the receptor's aperture along one axis, then along the other
         summed = np.cumsum(np.pad(total, ((0, 0), (0, 0), (s, s - 1))), axis=2)
         total = np.swapaxes(summed[..., s:] - summed[..., :-s], 1, 2) / s
     return float(max(np.maximum(sign * total, 0).sum(axis=(1, 2)).max() for sign in (1, -1)))

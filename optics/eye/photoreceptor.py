@@ -11,23 +11,26 @@ from optics.numerics.precision import Precision, opaque
 
 __all__ = ["gaussian_noise", "noise_on", "own_type", "photon_noise", "quantum_catch", "throughput"]
 
-MOST_PHOTONS = 1e18  # a count must fit a 64-bit integer
+MOST_PHOTONS = 1e18  # counts of photons must fit into 64-bit integers
 
 
 def throughput(relative_aperture: Scalar, open_share: float = 1.0) -> Scalar:
-    """Relative amount of light gathered: a² times the open share of the disk.
+    """Return the throughput: a² times the open share of the aperture's disk.
 
-    It is the pupil's open area divided by the area of the widest disk (diameter = sensor width). It is a Dr.Jit array
-    if relative_aperture is one.
+    This is the pupil's open area divided by the area of the widest pupil. The result is a Dr.Jit array if
+    relative_aperture is a Dr.Jit array.
     """
     a = in_range("relative_aperture", relative_aperture, 0.0, 1.0 + 1e-9, carried=True)
-    if a > 1:  # from rounding
+    if a > 1:  # due to rounding
         relative_aperture = relative_aperture * (1 / a)
     return relative_aperture * relative_aperture * open_share
 
 
 def quantum_catch(irradiance: Array, weights: np.ndarray, gathered: Scalar, types: Precision) -> Array:
-    """a² Σ_b weights[c, b] irradiance[b]: Dr.Jit (band, y, x) -> (channel, y, x); gathered: a²."""
+    """Return a² Σ_b weights[c, b] irradiance[b]: Dr.Jit (band, y, x) -> (channel, y, x).
+
+    gathered: the throughput a².
+    """
 
     bands, height, width = irradiance.shape
     flat = matmul(types.Tensor(weights), types.Tensor(irradiance.array, (bands, height * width)))
@@ -35,7 +38,7 @@ def quantum_catch(irradiance: Array, weights: np.ndarray, gathered: Scalar, type
 
 
 def own_type(signals: Array, mosaic: np.ndarray, types: Precision) -> Array:
-    """Signal of each receptor's own type in a mosaic (y, x), out of the signals of all types at that place.
+    """Return the signal of each receptor in a mosaic (y, x), selected by its type from the signals of all types there.
 
     Dr.Jit (type, y, x) -> (1, y, x).
     """
@@ -46,16 +49,16 @@ def own_type(signals: Array, mosaic: np.ndarray, types: Precision) -> Array:
 
 
 def gaussian_noise(signal: np.ndarray, sigma: float, rng: np.random.Generator) -> np.ndarray:
-    """Add noise of a fixed standard deviation `sigma` [signal units], which limits dim eyes most."""
+    """Return a signal with Gaussian noise of the standard deviation `sigma` [units of the signal]."""
     sigma = in_range("sigma", sigma, 0.0, 1e6)
     return signal + sigma * rng.standard_normal(signal.shape)
 
 
 def photon_noise(signal: np.ndarray, photons: float | np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """Add Poisson noise if a signal of 1 is `photons` absorbed photons: standard deviation √(signal/photons).
+    """Return a signal with Poisson noise, whose standard deviation is √(signal/photons).
 
     signal: (channel, y, x).
-    photons: one number, one per channel, or one per receptor (channel, y, x).
+    photons: absorbed photons for a signal of 1: a number, one per channel, or one per receptor (channel, y, x).
     """
     budget = np.atleast_1d(np.asarray(photons, dtype=np.float64))
     positive("photons", float(budget.min()), "1")
@@ -71,9 +74,9 @@ def photon_noise(signal: np.ndarray, photons: float | np.ndarray, rng: np.random
 def noise_on(
     clean: np.ndarray, photons: np.ndarray | None, mosaic: np.ndarray | None, sigma: float, rng: np.random.Generator
 ) -> np.ndarray:
-    """Sum of both kinds of noise on signals (channel, y, x).
+    """Return the sum of Poisson and Gaussian noise for signals (channel, y, x).
 
-    photons: per type, or None.
+    photons: absorbed photons for a signal of 1, per type; None for no Poisson noise.
     mosaic: see `own_type`.
     """
     if photons is not None and mosaic is not None:

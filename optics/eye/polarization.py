@@ -1,13 +1,13 @@
 """Polarisation-sensitive receptors: microvilli over a retina, and polarised scenes.
 
-If rays are nearly parallel to the axis, light has the same polarisation on the retina as at the pupil. For a radiance I
-polarised to a degree p at an angle ψ, microvilli at an azimuth φ with a dichroic ratio d absorb, relative to
-unpolarised light of this radiance,
+If rays are nearly parallel to the axis, light has the same polarisation on the retina as at the pupil. Consider light
+of radiance I with a degree of polarisation p and an angle ψ. Microvilli with the azimuth φ and the dichroic ratio d
+then absorb the amount of unpolarised light of the same radiance, times
 
     1 + p (d - 1)/(d + 1) cos 2(ψ - φ),
 
-which is 2(d cos² + sin²)/(d + 1) for p = 1. It is linear in Stokes' parameters I, Q = I p cos 2ψ, U = I p sin 2ψ, which
-are blurred like the radiance.
+which is 2(d cos² + sin²)/(d + 1) for p = 1. The absorbed light is linear in the Stokes parameters I, Q = I p cos 2ψ and
+U = I p sin 2ψ. The optics blur Q and U in the same way as the radiance I.
 """
 
 from __future__ import annotations
@@ -27,8 +27,9 @@ __all__ = ["check_rays", "microvilli_of", "polarised_error", "taken_by"]
 
 Tile = tuple[tuple[Microvilli, ...], ...]
 
-# Choice: integrated difference between the vector focus and this model, relative to white's and to the squared sine of
-# the steepest ray. # A round pupil in focus has 0.54 to 0.59 up to NA 0.5; see tests/optics/eye/test_polarization.py.
+# Choice: upper bound of the integrated difference between the vector focus and this model, relative to the signal of
+# white and to the squared sine of the steepest ray. The difference of a round pupil in focus is 0.54 to 0.59 up to NA
+# 0.5; see tests/optics/eye/test_polarization.py.
 STEEP = 0.62
 
 
@@ -36,7 +37,7 @@ def microvilli_of(given: Any) -> Tile | None:
     """Convert one Microvilli for all receptors, or rows of them, to rows of microvilli.
 
     Raises:
-        ValueError: neither of these, or rows of different lengths.
+        ValueError: `given` is neither of these, or rows have different lengths.
     """
     if given is None:
         return None
@@ -53,13 +54,16 @@ def microvilli_of(given: Any) -> Tile | None:
 
 
 def polarised_error(pupil: Pupil, distance: float) -> float:
-    """Largest error of polarised signals, in units of white's, due to oblique rays to a retina at this distance [m]."""
+    """Return an upper bound of the error of polarised signals due to oblique rays, relative to the signal of white.
+
+    distance: distance [m] of the retina from the pupil.
+    """
     squared_sine = pupil.radius**2 / (pupil.radius**2 + distance**2)
     return STEEP * light_spread(pupil) / ROUND * squared_sine
 
 
 def check_rays(pupil: Pupil | None, distance: float, tolerance: float) -> None:
-    """Refuse polarised signals whose error exceeds the tolerance, in units of white's."""
+    """Raise an AccuracyError if the error of polarised signals, relative to that of white, exceeds the tolerance."""
     error = 0.0 if pupil is None else polarised_error(pupil, distance)
     if pupil is not None and error > tolerance:
         sine = pupil.radius / math.hypot(pupil.radius, distance)
@@ -73,7 +77,9 @@ def check_rays(pupil: Pupil | None, distance: float, tolerance: float) -> None:
 def taken_by(
     tile: Tile | None, resolution: tuple[int, int], radiance: np.ndarray, polarization: Any
 ) -> list[tuple[np.ndarray, Any]]:
-    """Return I, Q and U of a radiance (band, Y, X), each with the receptors' weights, a number or (h, w).
+    """Return the Stokes parameters I, Q and U of a radiance (band, Y, X), each with its weight in receptors.
+
+    A weight is a number, or an array (h, w) with one entry per receptor.
 
     polarization: degree in [0, 1] and angle [degrees], each a number, (band,), (Y, X) or (band, Y, X); or None.
 
@@ -96,7 +102,7 @@ def taken_by(
 
 
 def _preferences(tile: Tile, resolution: tuple[int, int]) -> np.ndarray:
-    """(d - 1)/(d + 1) times cos 2φ and sin 2φ of each receptor, (2, h, w)."""
+    """Return (d - 1)/(d + 1) times cos 2φ and sin 2φ of each receptor, (2, h, w)."""
     contrast = np.array([[_contrast(cell.dichroic_ratio) for cell in row] for row in tile])
     twice = np.radians([[2 * cell.azimuth_deg for cell in row] for row in tile])
     everywhere = np.ix_(*(np.arange(n) % m for n, m in zip(resolution, contrast.shape, strict=True)))

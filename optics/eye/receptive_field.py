@@ -1,4 +1,4 @@
-"""Receptive fields behind a pupil: the window that the light needs, and the PSF integrated over cells."""
+"""Receptive fields behind a pupil: the window that contains the light, and the PSF integrated over cells."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ from optics.point_spread.request import Request
 
 __all__ = ["Retina", "perfect_psf", "retinal_psf", "visual_kernel"]
 
-# Choice: light at larger angles from a receptor's direction counts as blocked by the rim of the eye.
+# Choice: light at more than 50° from a receptor's direction counts as blocked by the rim of the eye.
 WIDEST_TANGENT = math.tan(math.radians(50))
-BESIDE = 4  # choice: samples beyond either end of the light, where a spline is least accurate
-MOST_CELLS = 2049  # choice: cells of a kernel along an axis
-MOST_SECONDS = 3.0  # choice: per band
+BESIDE = 4  # choice: samples beyond either end of the light, because a spline is least accurate at its ends
+MOST_CELLS = 2049  # choice: largest number of cells of a kernel along an axis
+MOST_SECONDS = 3.0  # choice: time limit for the PSF of a band [s]
 
 
 @dataclass(frozen=True)
@@ -45,12 +45,12 @@ class Retina:
 
 @dataclass(frozen=True)
 class _WindowNeeds:
-    """Requirements of one wavelength.
+    """Window and samples that the light of one wavelength requires.
 
-    half_window: half the window [m] around the geometric image.
+    half_window: half side [m] of the window around the geometric image.
     pitch: pitch [m] that resolves the PSF.
-    band: frequency [1/m] beyond which there is less light than the tolerance.
-    half_of_rays: half the window [m] of the rays without diffraction.
+    band: frequency [1/m] above which the spectrum contains less light than the tolerance.
+    half_of_rays: half side [m] of a window that contains the end points of rays, without diffraction.
     """
 
     half_window: float
@@ -65,7 +65,7 @@ class Spot:
 
     centre: geometric image (x, y) [m].
     half: half the side [m] of the square around it that contains the light.
-    pitch: pitch [m] that resolves it.
+    pitch: pitch [m] that resolves the light.
     needs: requirements of each wavelength.
     """
 
@@ -76,11 +76,11 @@ class Spot:
 
     @property
     def half_of_rays(self) -> float:
-        """Half the side [m] of the square that contains the rays without diffraction."""
+        """Half the side [m] of the square that contains the end points of rays, without diffraction."""
         return min(self.half, max(need.half_of_rays for need in self.needs))
 
     def window(self, pitch: float, beside: int = 0) -> Grid:
-        """Samples around the geometric image that cover the square, with a margin of `beside` samples."""
+        """Return samples around the geometric image that cover the square, with a margin of `beside` samples."""
         side = 2 * (math.ceil(self.half / pitch) + beside) + 1
         return Grid((side, side), pitch, self.centre)
 
@@ -91,10 +91,13 @@ class Spot:
 def visual_kernel(
     pupil: Pupil, retina: Retina, z: Scalar, direction: tuple[float, float] = (0.0, 0.0), from_cell: bool = False
 ) -> Array:
-    """PSF integrated over the retina's cells around the geometric image and turned by 180°: Dr.Jit (band, k, k), k odd.
+    """Return the PSF, integrated over the retina's cells and rotated by 180°: Dr.Jit (band, k, k), k odd.
 
-    direction: tangents (right, down) from the axis in the visual field; the image lies on the opposite side.
-    from_cell: True if light comes from all over a cell of the scene, False if from its centre.
+    The cells lie around the geometric image.
+
+    direction: tangents (right, down) of the source's direction in the visual field. The image lies on the opposite side
+        of the axis.
+    from_cell: True if light comes from all over a cell of the scene, False if it comes from the cell's centre.
     """
     import drjit as dr
 
@@ -102,7 +105,7 @@ def visual_kernel(
         raise ValueError("fov_deg is a Dr.Jit array: must be a number off the axis, as it also turns the light")
     beams = beams_to(pupil, retina, z, (-direction[0], -direction[1]))
     spot = spot_of(beams, retina)
-    # Each wavelength has its own samples, since longer ones need fewer.
+    # Each wavelength has its own samples, since longer wavelengths need fewer.
     requests = [
         _request(beam, spot, need, spot.window(_pitch_for_cells(need.pitch, retina), BESIDE), retina)
         for beam, need in zip(beams, spot.needs, strict=True)
@@ -119,7 +122,7 @@ def visual_kernel(
 
 
 def retinal_psf(pupil: Pupil, retina: Retina, z: Scalar, direction: tuple[float, float] = (0.0, 0.0)) -> PSFResult:
-    """PSF of a point at distance z on the window that loses less than the tolerance at every wavelength.
+    """Return the PSF of a point at distance z, on a window that loses less than the tolerance at every wavelength.
 
     See `visual_kernel` for the arguments.
 
@@ -151,7 +154,7 @@ def spot_of(beams: list[Beam], retina: Retina) -> Spot:
 
 
 def _image(beam: Beam, distance: float) -> tuple[float, float]:
-    """Point (x, y) [m] that the ray through the pupil's centre reaches, refracted between two media (Snell's law)."""
+    """Return the point (x, y) [m] where the ray through the pupil's centre, refracted there, hits the retina."""
     x, y = (math.tan(angle) for angle in beam.source.angle)
     if beam.pupil.object_n is None:
         return distance * x, distance * y
@@ -161,7 +164,7 @@ def _image(beam: Beam, distance: float) -> tuple[float, float]:
 
 
 def _pitch_for_cells(pitch: float, retina: Retina) -> float:
-    """Largest pitch [m] that integrals over cells allow, given the `pitch` that the PSF itself allows."""
+    """Return the largest pitch [m] for integrals over cells, given the `pitch` that the PSF itself requires."""
     each = samples_per_cycle(retina.tolerance)
     return pitch * each / samples_per_cycle(retina.tolerance, retina.cell / (pitch * each))
 
@@ -178,7 +181,7 @@ def _request(beam: Beam, spot: Spot, need: _WindowNeeds, window: Grid, retina: R
 
 
 def perfect_psf(retina: Retina, radius: float) -> PSFResult:
-    """All power in one cell: a perfect lens of the given aperture radius [m], without diffraction."""
+    """Return a PSF with all power in one cell: a perfect lens of this aperture radius [m], without diffraction."""
     types = precision(retina.dtype)
     image = types.Tensor(np.full((len(retina.wavelengths), 1, 1), 1 / retina.cell**2))
     pupil = Pupil(radius, thin_lens_focal_length=retina.distance)
@@ -187,12 +190,14 @@ def perfect_psf(retina: Retina, radius: float) -> PSFResult:
 
 
 def _needs(beam: Beam, retina: Retina, centre: tuple[float, float]) -> _WindowNeeds:
-    """Requirements of the light of one wavelength; centre: its geometric image (x, y) [m].
+    """Return the window and samples that the light of one wavelength requires.
 
-    The window may lose a share of the light equal to the tolerance. Half of it is for rays that end outside the window,
-    half for diffraction at the pupil's edge. Diffraction by masks, pixels and fine detail uses half of the rays' share.
-    Diffraction adds frequencies, which are sines over λ. The sine at the end of a ray therefore increases by λ times
-    these frequencies, and z tan θ is the new end.
+    The window may lose a share of the light equal to the tolerance. One half of it is for rays that end outside the
+    window, the other half for diffraction at the pupil's edge. If masks, pixels or fine detail scatter light, they use
+    half of the rays' half. Diffraction adds spatial frequencies, which are sines divided by λ. It therefore increases
+    the sine of a ray's angle θ by λ times these frequencies. The ray then ends at z tan θ.
+
+    centre: geometric image (x, y) [m].
     """
     pupil, z, radius = beam.pupil, number(retina.distance), beam.pupil.radius
     wavelength = beam.wavelength / beam.index
@@ -208,19 +213,19 @@ def _needs(beam: Beam, retina: Retina, centre: tuple[float, float]) -> _WindowNe
         sine = outermost / math.hypot(outermost, z) + diffracted * wavelength
         half = min(half, z * sine / math.sqrt(1 - sine * sine) - off_axis if sine < 1 else math.inf)
     band = pupil.slopes(beam.wavelength, beam.source).steepest_inside / beam.wavelength + diffracted
-    # |U|² contains the differences of the field's frequencies. At a point of the sensor that the whole pupil
-    # illuminates, these span 2R/(λz). # Two frequencies within the band differ by at most twice the band.
+    # The spectrum of |U|² contains the differences between the field's frequencies. They are at most 2R/(λz) at a point
+    # that the whole pupil illuminates, and at most twice the band.
     detail = min(2 * radius / (wavelength * z), 2 * band)
     return _WindowNeeds(half, 1 / (samples_per_cycle(retina.tolerance) * detail), band, shadow)
 
 
 @lru_cache(maxsize=64)
 def _half_side(slopes: Slopes, behind: tuple[float, float], centre: tuple[float, float], share: float) -> float:
-    """Half side [m] of the square about `centre` that contains this share of the rays' ends.
+    """Return the half side [m] of the square about `centre` that contains this share of the rays' end points.
 
     Results are cached, because all wavelengths have the same slopes if the glass has no dispersion.
 
-    behind: distance [m] and refractive index.
+    behind: distance [m] and refractive index behind the pupil.
     """
     x, y = slopes.rays(*behind)
     farthest = np.fmax(np.abs(x - centre[0]), np.abs(y - centre[1]))
@@ -228,11 +233,14 @@ def _half_side(slopes: Slopes, behind: tuple[float, float], centre: tuple[float,
 
 
 def _beyond_edge(pupil: Pupil, share: float) -> float:
-    """Frequency δ [1/m] off its geometric direction beyond which an aperture's hard edge sends a share of the light.
+    """Return the frequency δ [1/m] beyond which an aperture's hard edge diffracts a given share of the light.
 
-    Beyond the frequency f, a straight edge has 1/(2π²f) of |its spectrum|² per length. An aperture of perimeter P and
-    area A thus sends P/(2π²Aδ) of its light there, a disk 1/(π²Rδ), as in the Airy pattern (Born & Wolf, §8.5.2). A
-    mask that is brighter at the edge than on average increases it.
+    δ is measured from the geometric direction of the light.
+
+    The squared spectrum of a straight edge, integrated over frequencies above f, is 1/(2π²f) per length of the edge. An
+    aperture of perimeter P and area A thus diffracts the share P/(2π²Aδ) of its light beyond δ. For a disk this is
+    1/(π²Rδ), as in the Airy pattern (Born & Wolf, §8.5.2). The share is larger behind a mask that is brighter along the
+    edge than on average.
     """
     opening = pupil.aperture
     return _rim(pupil) * opening.outline.length / (2 * math.pi**2 * opening.area * pupil.radius * share)
@@ -240,9 +248,10 @@ def _beyond_edge(pupil: Pupil, share: float) -> float:
 
 @lru_cache(maxsize=64)
 def _rim(pupil: Pupil) -> float:
-    """Ratio of the intensity along the edge to its mean; 1 without a mask.
+    """Return the mean intensity behind the mask along the aperture's edge, divided by its mean over the aperture.
 
-    It is also 1 if the edge is darker, since the intensity may rise steeply from it.
+    The result is 1 without a mask. It is also 1 if the edge is darker than the mean, because the intensity may rise
+    steeply next to the edge.
     """
     import drjit as dr
 
@@ -255,5 +264,5 @@ def _rim(pupil: Pupil) -> float:
 
 
 def _cells_within(half: float, cell: float) -> int:
-    """Odd number of cells, one centred on the axis, that covers ± half."""
+    """Return the odd number of cells, with one centred on the image, that cover ± half."""
     return 2 * math.ceil(max(half / cell - 0.5, 0) - 1e-6) + 1

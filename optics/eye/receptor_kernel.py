@@ -18,14 +18,14 @@ from optics.spectra.spectrum import daylight
 
 __all__ = ["bands_for", "receptor_kernel", "white_share"]
 
-CELLS_FOR_BANDS = 2  # per receptor, along an axis
+CELLS_FOR_BANDS = 2  # cells per receptor along an axis, for the choice of bands
 
 
 def receptor_kernel(eye: EyeSpec, retina: Retina, z: Scalar, direction: tuple[float, float], from_cell: bool) -> Array:
-    """Return the kernel of `Eye.kernel`.
+    """Return a kernel, see `Eye.kernel`.
 
-    direction: tangents (right, down).
-    from_cell: True if light comes from all over a cell of the scene.
+    direction: tangents (right, down) of the source's direction.
+    from_cell: True if light comes from all over a cell of the scene, False if it comes from the cell's centre.
     """
     if eye.pupil is None:
         return precision(retina.dtype).Tensor(np.ones((len(retina.wavelengths), 1, 1)))
@@ -38,7 +38,7 @@ def receptor_kernel(eye: EyeSpec, retina: Retina, z: Scalar, direction: tuple[fl
 
 
 def white_share(kernels: np.ndarray, bands: SpectralBands) -> float:
-    """Share of white's signal in daylight that kernels (band, k, k) transmit, averaged over channels."""
+    """Return the share of white's signal in daylight that kernels (band, k, k) transmit, averaged over channels."""
     seen = kernels.sum(axis=(1, 2)) * daylight(bands.wavelengths)
     return float((bands.weights @ seen).mean())
 
@@ -46,7 +46,7 @@ def white_share(kernels: np.ndarray, bands: SpectralBands) -> float:
 def bands_for(eye: EyeSpec, retina: Retina, direction: tuple[float, float]) -> SpectralBands:
     """Return the fewest bands within the eye's tolerance, see `choose_bands`.
 
-    retina: one without wavelengths, with large cells.
+    retina: a retina without wavelengths and with large cells.
     """
     if eye.pupil is None:
         return choose_bands(eye.tolerance, eye.receptors)

@@ -1,4 +1,4 @@
-"""Images on the retina: convolution of the padded scene with the kernel, the reference for other renderers."""
+"""Images on the retina, by convolution of the padded scene with kernels. They are the reference for renderers."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ __all__ = ["at_receptors", "blur", "centred", "receptor_average", "with_centre"]
 def blur(
     scenes: Sequence[np.ndarray], kernels: Sequence[np.ndarray | Array], shape: tuple[int, int], types: Precision
 ) -> Array:
-    """Σ_l Σ_u kernels[l][b, u] scenes[l][b, v - u], dark outside: its middle `shape`, Dr.Jit (band, *shape).
+    """Return the middle `shape` of Σ_l Σ_u kernels[l][b, u] scenes[l][b, v - u], Dr.Jit (band, *shape).
 
-    scenes: (band, Y, X) each.
-    kernels: (band, ky, kx) tensors or arrays, odd, one per scene.
+    scenes: arrays (band, Y, X). Scenes are dark outside.
+    kernels: one tensor or array (band, ky, kx) per scene, with odd ky and kx.
 
-    It is a convolution, not a correlation: a point of light at v produces the kernel around v. All arrays are in
-    visual-field orientation; the kernel's centre cell (ky//2, kx//2) is its origin.
+    This is a convolution, not a correlation: a point of light at v produces the kernel around v. All arrays are in the
+    orientation of the visual field. The origin of a kernel is its centre cell (ky//2, kx//2).
     """
     import drjit as dr
 
@@ -36,10 +36,10 @@ def blur(
 
 
 def _blurred(pairs: list[tuple[np.ndarray, Array]], shape: tuple[int, int], types: Precision) -> Array:
-    """One band, flat. The sums use one period, long enough that wrapped parts land outside `shape`."""
+    """Return one band as a flat array. The period of the sums is so long that wrapped parts land outside `shape`."""
     if all(kernel.shape == (1, 1) for _, kernel in pairs):
         return sum(_flat(centred(scene, shape), types) * kernel.array for scene, kernel in pairs)
-    # Parts of the scene beyond the kernel's reach have no effect, nor have parts of the kernel beyond the scene.
+    # Parts of the scene beyond the kernel's reach have no effect. Neither have parts of the kernel beyond the scene.
     lit = [
         (centred(scene, _within(scene.shape, shape, kernel.shape)), kernel[_middle(kernel.shape, shape, scene.shape)])
         for scene, kernel in pairs
@@ -73,13 +73,16 @@ def _flat(array: np.ndarray, types: Precision) -> Array:
 
 
 def _within(scene: tuple[int, ...], shape: tuple[int, int], kernel: tuple[int, ...]) -> tuple[int, int]:
-    """Size of the scene's middle that the kernel connects to `shape`: at most the scene's size, with its parity."""
+    """Return the size of the part of the scene that affects the middle `shape`.
+
+    It is at most the scene's size and has the same parity.
+    """
     height, width = (n - 2 * max(0, (n - m - k + 1) // 2) for n, m, k in zip(scene, shape, kernel, strict=True))
     return height, width
 
 
 def _middle(kernel: tuple[int, ...], shape: tuple[int, int], scene: tuple[int, ...]) -> tuple[slice, slice]:
-    """Slices of the kernel's middle that connects some point of the scene to `shape`."""
+    """Return slices of the part of the kernel through which some point of the scene affects the middle `shape`."""
     cuts = [max(0, k // 2 - (m + n) // 2) for k, m, n in zip(kernel, shape, scene, strict=True)]
     rows, columns = (slice(cut, k - cut) for cut, k in zip(cuts, kernel, strict=True))
     return rows, columns
@@ -89,7 +92,7 @@ def centred(image: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
     """Return the middle `shape` of (…, Y, X).
 
     Raises:
-        ValueError: the margins around it are not equal on both sides.
+        ValueError: the margins on both sides are not equal.
     """
     margins = [size - n for size, n in zip(image.shape[-2:], shape, strict=True)]
     if any(margin < 0 or margin % 2 for margin in margins):
@@ -102,22 +105,25 @@ def centred(image: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
 
 
 def receptor_average(image: Array, samples_per_receptor: int, types: Precision) -> Array:
-    """Mean over each receptor's square aperture, Dr.Jit tensors: (band, h s, w s) -> (band, h, w)."""
+    """Return the mean over each receptor's square aperture, Dr.Jit tensors: (band, h s, w s) -> (band, h, w)."""
     return _of_receptors(image, np.full(samples_per_receptor, 1 / samples_per_receptor), types)
 
 
 def at_receptors(image: Array, samples_per_receptor: int, types: Precision) -> Array:
-    """Values at each receptor's middle, or in the next cell if the middle lies between cells: see `with_centre`."""
+    """Return the value at each receptor's middle, or in the next cell if the middle lies between two cells.
+
+    See `with_centre`.
+    """
     return _of_receptors(image, np.arange(samples_per_receptor) == samples_per_receptor // 2, types)
 
 
 def with_centre(kernel: Array) -> Array:
-    """Return a kernel (band, k, k) with odd k; for even k the middle moves by half a cell, into a cell."""
+    """Return a kernel (band, k, k) with odd k. An even kernel is shifted by half a cell."""
     side = kernel.shape[-1]
     return kernel if side % 2 else type(kernel)(np.pad(kernel.numpy(), ((0, 0), (1, 0), (1, 0))))
 
 
 def _of_receptors(image: Array, shares: np.ndarray, types: Precision) -> Array:
-    """Weighted sums over each receptor's own cells; shares are the weights along an axis."""
+    """Return weighted sums over the cells of each receptor. shares: weights along an axis."""
     down, across = (types.Tensor(np.kron(np.eye(n // len(shares)), shares)) for n in image.shape[1:])
     return matmul(down, matmul(image, across, transposed=True))

@@ -1,4 +1,4 @@
-"""Signals of a scene: blurred by an eye's kernels and sampled by its receptors, with or without noise."""
+"""Signals of an eye's receptors for a scene, which the eye's kernels blur, with or without noise."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ __all__ = ["signals", "with_noise"]
 
 
 def signals(eye: EyeSpec, parts: Sequence[tuple[np.ndarray, Any]], bank: KernelBank, s: int, z: Any) -> Array:
-    """Signals (channel, h, w) without noise.
+    """Return the signals (channel, h, w) without noise.
 
-    parts: components of the light, (band, Y, X), each with the receptors' weights, a number or (h, w).
+    parts: components of the light, (band, Y, X), each with its weight in receptors, a number or (h, w).
     s: samples_per_receptor.
     z: see `Eye.see`.
     """
@@ -42,6 +42,6 @@ def _quantum_catch(eye: EyeSpec, scenes: list[np.ndarray], bank: KernelBank, s: 
 
 
 def with_noise(eye: EyeSpec, signal: Array, rng: np.random.Generator) -> Array:
-    """Add shot noise, if there is a photon budget, and Gaussian noise; neither carries a derivative."""
+    """Return a signal with Gaussian noise and, given a photon budget, shot noise. Noise carries no derivative."""
     noise = noise_on(plain(signal), eye.photons, eye.mosaic, eye.noise_sigma, rng)
     return signal + precision(eye.dtype).Tensor(noise)

@@ -1,4 +1,4 @@
-"""Limits of an eye, in one table."""
+"""Table of an eye's limits."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ from optics.spectra.spectrum import daylight
 __all__ = ["Description", "describe", "noise_of"]
 
 LIMITS = ("diffraction", "sampling", "noise")  # limits of acuity
-FREQUENCIES = 513  # choice: samples between 0 and the cut-off at which the MTF is compared with the noise
-CELLS_ACROSS, MOST_CELLS = 8, 64  # choice: cells of a kernel across a waveguide; along a receptor's side
-FINER = 16  # choice: steps per sample of the PSF, where a receptor's angular sensitivity is measured
+FREQUENCIES = 513  # choice: number of frequencies up to the cut-off at which the MTF is compared with the noise
+CELLS_ACROSS, MOST_CELLS = 8, 64  # choice: cells of a kernel across a waveguide, and most cells along a receptor's side
+FINER = 16  # choice: points per sample of the PSF at which a receptor's angular sensitivity is evaluated
 
 
 Kernels = Callable[[int], Array | np.ndarray]  # cells per receptor -> kernel (band, y, x)
@@ -29,28 +29,28 @@ Kernels = Callable[[int], Array | np.ndarray]  # cells per receptor -> kernel (b
 
 @dataclass(frozen=True)
 class Description:
-    """An eye's limits in white daylight, near its axis. Frequencies [cycles/degree] are in the visual field.
+    """Limits of an eye in white daylight, near its axis. Frequencies [cycles/degree] are in the visual field.
 
-    relative_aperture: a.
-    throughput: a².
-    f_number: f/2R, with the f of the angles x/f, n₀/n of the distance to the retina. The brightness of the image is
-        proportional to its inverse square.
-    wavelength: mean wavelength of daylight with the receptors' weights [m].
-    diffraction_cpd: cut-off of an aperture of this width, 2 sin θ/λ on the retina.
+    relative_aperture: a, the pupil's diameter relative to that of a pupil with a throughput of 1.
+    throughput: a², times the open share of the aperture's disk, times the mask's transmission.
+    f_number: f/2R. f is the focal length that relates a distance x on the retina to the angle x/f; it is n₀/n times the
+        distance to the retina. The brightness of the image is proportional to 1/f_number².
+    wavelength: mean wavelength [m] of daylight, weighted by the receptors.
+    diffraction_cpd: cut-off frequency of an aperture of this width, 2 sin θ/λ on the retina.
     sampling_cpd: Nyquist frequency of the receptors, 1/(2 Δφ).
     noise_cpd: lowest frequency at which the contrast of the optics falls below the noise.
-    acuity_cpd: smallest of the three; NaN if one is unknown.
-    binding: name of the smallest among the known limits.
+    acuity_cpd: smallest of these three frequencies; NaN if one is unknown.
+    binding: name of the smallest known limit: "diffraction", "sampling" or "noise".
     strehl_ratio: Strehl ratio of the band nearest `wavelength`.
     image_quality: see `optics.image_quality`.
-    noise: standard deviation of a receptor that sees white, from all sources, in units of the signal.
-    photons: photons that it absorbs per integration time, mean of the channels (None: no photon budget).
+    noise: standard deviation of the signal of a receptor that sees white, from all sources of noise.
+    photons: photons that such a receptor absorbs per integration time, averaged over channels (None: no photon budget).
     acceptance_angle_deg: full width at half maximum of a receptor's angular sensitivity, horizontally.
-    interommatidial_angle_deg: Δφ between neighbours.
-    plan: plan of the least accurate band's PSF.
-    white_signal: signal of a receptor that sees white: the throughput, minus the losses of waveguides.
-    unknown: one line for each measure that the light does not determine accurately enough, with the reason; its value
-        is NaN.
+    interommatidial_angle_deg: angle Δφ between neighbouring receptors.
+    plan: plan of the PSF of the least accurate band.
+    white_signal: signal of a receptor that sees white: the throughput, reduced by the losses of waveguides.
+    unknown: one line, with the reason, for each measure that cannot be computed accurately enough from the PSF. The
+        value of such a measure is NaN.
     """
 
     relative_aperture: float
@@ -109,7 +109,7 @@ class Description:
 
 
 def noise_of(eye: EyeSpec, white_signal: Scalar) -> float:
-    """Standard deviation of a receptor's signal for white in daylight, from its own noise and from photon noise."""
+    """Return the standard deviation of a receptor's signal for white in daylight: receptor noise and photon noise."""
     if eye.photons is None:
         return float(eye.noise_sigma)
     light = number(white_signal)
@@ -119,11 +119,11 @@ def noise_of(eye: EyeSpec, white_signal: Scalar) -> float:
 def describe(eye: EyeSpec, light: float, result: PSFResult, kernel: Kernels) -> Description:
     """Return the eye's limits for a scene at one distance.
 
-    A measure that the light does not determine accurately enough is NaN and has a line in `Description.unknown`.
+    A measure that cannot be computed accurately enough is NaN and has a line in `Description.unknown`.
 
-    light: signal of white.
+    light: signal of a receptor that sees white.
     result: PSF for this distance.
-    kernel: returns the kernel for a number of cells per receptor, for the same distance.
+    kernel: function that returns the kernel for a number of cells per receptor, for the same distance.
     """
     distance = number(eye.sensor_distance)
     white, wavelength = _white(eye, result)
@@ -163,11 +163,11 @@ def describe(eye: EyeSpec, light: float, result: PSFResult, kernel: Kernels) -> 
 
 
 def _known(name: str, measure: Callable[[], float], unknown: list[str]) -> float:
-    """Return the measured value, or NaN after adding a line about it."""
+    """Return the value of a measure. If it is not accurate enough, add a line to `unknown` and return NaN."""
     try:
         return measure()
     except AccuracyError as error:
-        # An eye has a fixed window; a PSF of its pupil can have another.
+        # The window of an eye is fixed, but the user can compute a PSF of its pupil over another window.
         remedy = "" if error.remedy is None else f"; of optics.psf(eye.pupil), {error.remedy}"
         unknown.append(f"{name}: {error.what}{remedy}")
         return math.nan
@@ -181,7 +181,7 @@ def _white(eye: EyeSpec, result: PSFResult) -> tuple[PSFResult, float]:
 
 
 def _noise_limit(white: PSFResult, cutoff: float, floor: float) -> float:
-    """Lowest frequency [1/m] at which the MTF falls to the floor; the cut-off if it never does."""
+    """Return the lowest frequency [1/m] at which the MTF falls to the floor; the cut-off if it never does."""
     frequency = np.linspace(0, cutoff, FREQUENCIES)
     above = mtf(white).profile(frequency)[0] - floor
     drowned = np.flatnonzero(above <= 0)
@@ -195,7 +195,7 @@ def _noise_limit(white: PSFResult, cutoff: float, floor: float) -> float:
 
 
 def _acceptance(eye: EyeSpec, white: PSFResult, kernel: Kernels) -> float:
-    """Full width [m] at half maximum, along x through the peak, of a receptor's sensitivity in white daylight.
+    """Return the full width [m] at half maximum of a receptor's sensitivity to white daylight, along x.
 
     The sensitivity is PSF ⊗ receptor aperture, or that of a waveguide.
     """
@@ -215,7 +215,7 @@ def _acceptance(eye: EyeSpec, white: PSFResult, kernel: Kernels) -> float:
 
 
 def _guided_acceptance(eye: EyeSpec, diameter: float, kernel: Kernels) -> float:
-    """Full width [m] at half maximum for a waveguide of this diameter [m], from its kernel, by splines."""
+    """Return the full width [m] at half maximum for a waveguide of this diameter [m], from a spline of its kernel."""
     from scipy.interpolate import CubicSpline
 
     cells = min(max(4, math.ceil(CELLS_ACROSS * eye.receptor_pitch / diameter)), MOST_CELLS)
@@ -228,7 +228,7 @@ def _guided_acceptance(eye: EyeSpec, diameter: float, kernel: Kernels) -> float:
 
 
 def _within(x: np.ndarray, image: np.ndarray, at: np.ndarray, half: float) -> np.ndarray:
-    """Integrals over at ± half, along the first axis, of the spline through an image's samples at x."""
+    """Return integrals from `at - half` to `at + half`, along the first axis, of the spline through samples at x."""
     from scipy.interpolate import CubicSpline
 
     primitive = CubicSpline(x, image).antiderivative()

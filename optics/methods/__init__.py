@@ -4,15 +4,15 @@ Every method except the textbook's takes a `Problem` and returns `Sampling`s. A 
 computes the PSF on request. `optics.point_spread.planner` chooses between them.
 
 textbook             the angular spectrum in plain NumPy: start here
-carrier              the phase of a sphere, removed from fields and restored
+carrier              the phase of a spherical wave, which methods remove from fields and restore
 problem              Problem: the parameters of a computation
 method_sampling      Sampling: the interface of all methods
 rayleigh_sommerfeld  the direct sum: the reference
 angular_spectrum     transforms on grids, whole or with the paraxial part split off
 pixelated_spectrum   the angular spectrum of pupils made of pixels
-hankel               the angular spectrum of symmetric pupils, along one radius
-low_rank             one matrix product
-far_field            one transform onto directions for each of a few nodes of the window
+hankel               the angular spectrum of rotationally symmetric pupils, along one radius
+low_rank             one matrix product, with a Fourier kernel times a slow factor
+far_field            one Fourier transform onto directions for each of a few nodes of the window
 far_field_nodes      the choice of these nodes, and their weights in every direction
 fresnel              approximate: Fresnel and Fraunhofer, with their predicted errors
 geometric            approximate: density of rays; the pinhole
@@ -21,6 +21,6 @@ vector_sum           vector fields about a focus, as a sum of plane waves
 scalar_theory        upper bound of the error of scalar theory
 rays                 end points of rays in geometrical optics
 pupil_sampling       samples of the pupil for matrix products
-sine_samples         samples that are evenly spaced as seen from the window
+sine_samples         samples of the pupil that are evenly spaced in the sines of rays to the window
 spectral_taper       the taper of a spectrum before grazing incidence
 """

@@ -1,4 +1,8 @@
-"""The angular spectrum of a pupil's field on grids, whole or with its paraxial part split off."""
+"""The angular spectrum of a pupil's field on grids, propagated as a whole or with the paraxial part split off.
+
+The split method propagates the spectrum without the paraxial part of its phase to a relay plane, and from there to the
+window with Fresnel's integral.
+"""
 
 from __future__ import annotations
 
@@ -30,12 +34,13 @@ __all__ = [
 
 
 class SpectrumSampling:
-    """Samples of a spectrum and of the planes that it is transformed to.
+    """Samples of a spectrum and of the planes onto which it is transformed.
 
-    method: "angular_spectrum" or "split_angular_spectrum". taper: fades the spectrum out.
-    period: width [m] after which the pupil plane repeats: the spectrum's samples are 1/period apart.
-    output_period: samples over the period of the plane that the last transform starts from or ends on.
-    even: whether the field is even in x and y. A quarter of each plane then represents the plane.
+    method: "angular_spectrum" or "split_angular_spectrum".
+    taper: taper that fades the spectrum out.
+    period: width [m] after which the field in the pupil's plane repeats. The spectrum's samples are 1/period apart.
+    output_period: number of samples per period in the plane where the last transform starts (split) or ends (whole).
+    even: whether the field is even in x and y. A quarter of each plane is then sufficient.
     """
 
     method: str
@@ -71,11 +76,12 @@ class SpectrumSampling:
         return even_seconds(start.shape, end.shape) if self.even else predicted_seconds(start.shape, period, end.shape)
 
     def seconds_from_spectrum(self, window: Grid) -> float:
-        """Return the time of the transforms from the spectrum to the window."""
+        """Return the predicted time of the transforms from the spectrum to the window."""
         if self.is_whole:
             return self.sum_seconds(self.spectrum, self.output_period, window)
         to_relay = self.sum_seconds(self.spectrum, self.output_period, self.relay)
-        return to_relay + self.sum_seconds(self.relay, 0.5, window)  # not a whole period, so a matrix is used
+        # This period is not a whole number, so `dft2` uses a matrix.
+        return to_relay + self.sum_seconds(self.relay, 0.5, window)
 
     def whole_phase(self, field: Field, beam: Beam, problem: Problem) -> Field:
         """Return the field with the phase that `arrived` omits for a split spectrum: e^{iπr²/λz}/i."""
@@ -87,13 +93,13 @@ class SpectrumSampling:
         return field * Field.from_waves(1.0, waves, problem.window, types)
 
     def plane(self, problem: Problem) -> float:
-        """Return the width [m] over which rounding errors spread the pupil's light."""
+        """Return the width [m] of the plane over which rounding errors spread light."""
         return self.period if self.is_whole else problem.wavelength * problem.distance / self.relay.dx
 
 
 @dataclass(frozen=True)
 class GridSampling(SpectrumSampling):
-    """Spectrum of a pupil whose soft edge is represented on a grid, with pupil_period samples per period."""
+    """Spectrum of a pupil with a soft edge on a grid. pupil_period: number of its samples per period."""
 
     method: str
     edge: PupilEdge
@@ -147,9 +153,10 @@ def split_spectrum(problem: Problem) -> list[GridSampling]:
 
 
 def _samplings(problem: Problem, method: str) -> list[GridSampling]:
-    """Return samplings for wider and wider tapers, until one costs more than the one before.
+    """Return samplings for tapers with increasing blur, up to the first that costs more than the one before.
 
-    Narrow tapers need more frequencies and wide ones a longer period, so the cost has a single minimum.
+    Tapers with little blur need more frequencies, and tapers with much blur a longer period. The cost therefore has a
+    single minimum.
     """
     found: list[GridSampling] = []
     for taper in tapers(problem):
@@ -174,7 +181,7 @@ def whole_period(problem: Problem, taper: Taper, outermost: float) -> tuple[floa
     from the axis.
     """
     beam = outermost + taper.blur + problem.distance * taper.tangent
-    if problem.reach is not None:  # light beyond the reach is negligible and may wrap around to the rim of the window
+    if problem.reach is not None:  # light beyond `reach` is negligible, so it may wrap around to the rim of the window
         beam = min(beam, problem.reach + outermost)
     pitch = problem.window.dx
     samples = fast_length(max(problem.window.half_width + beam, 2 * outermost) / pitch)
@@ -184,8 +191,8 @@ def whole_period(problem: Problem, taper: Taper, outermost: float) -> tuple[floa
 def split_period(problem: Problem, taper: Taper, outermost: float) -> tuple[float, int]:
     """Return the period [m] and the number of its samples.
 
-    The period covers the pupil and the non-paraxial displacement z (tan θ - sin θ). Fresnel's integral repeats every λz
-    divided by the pitch of the samples. The samples are so dense that these copies stay off the window.
+    The period covers the pupil and the non-paraxial displacement z (tan θ - sin θ). Fresnel's integral repeats the
+    field at distances of λz divided by the pitch. The samples are so dense that these copies do not reach the window.
     """
     relay = outermost + taper.blur + problem.distance * (taper.tangent - taper.sine)
     period = 2 * relay
@@ -204,7 +211,7 @@ def _timed(sampling: GridSampling, problem: Problem) -> GridSampling:
 
 
 def _angular_spectrum(beam: Beam, problem: Problem, how: GridSampling, types: Precision) -> Field:
-    """Return U(x) = F⁻¹{F{U₀} H} (Goodman, Introduction to Fourier Optics, §3.10).
+    """Return the field over the window, U(x) = F⁻¹{F{U₀} H} (Goodman, Introduction to Fourier Optics, §3.10).
 
     A split spectrum omits a phase that does not affect the intensity.
     """
@@ -215,7 +222,7 @@ def _angular_spectrum(beam: Beam, problem: Problem, how: GridSampling, types: Pr
 
 
 def arrived(spectrum: Field, beam: Beam, problem: Problem, how: SpectrumSampling) -> Field:
-    """Return the field over the window of light with this spectrum at the pupil.
+    """Return the field over the window that results from this spectrum in the pupil's plane.
 
     A phase that does not affect the intensity is omitted.
     """
@@ -228,7 +235,7 @@ def arrived(spectrum: Field, beam: Beam, problem: Problem, how: SpectrumSampling
 def _transfer(beam: Beam, problem: Problem, how: SpectrumSampling, types: Precision) -> Field:
     """Return exp(ikz (cos θ - 1)) under the spectral taper. The split method omits the paraxial part -ikz sin²θ/2.
 
-    Goodman, eq. 3-74. cos θ - 1 = -q, and without the paraxial part it is -q²/2.
+    See Goodman, eq. 3-74. With q = 1 - cos θ, the exponent is -ikz q, and without the paraxial part -ikz q²/2.
     """
     import drjit as dr
 
@@ -245,8 +252,8 @@ def _transfer(beam: Beam, problem: Problem, how: SpectrumSampling, types: Precis
 def versine(s2: Array) -> Array:
     """Return q = 1 - cos θ from sin²θ, in float64.
 
-    The difference loses digits, and multiplication by the distance turns these into waves. One correction step towards
-    q (2 - q) = sin²θ restores the digits without a division.
+    The difference loses digits, and multiplication by kz makes the error large. One correction step towards q (2 - q) =
+    sin²θ restores the digits without a division.
     """
     import drjit as dr
 
@@ -255,7 +262,7 @@ def versine(s2: Array) -> Array:
 
 
 def _paraxial_rest(spectrum: Field, beam: Beam, problem: Problem, how: SpectrumSampling) -> Field:
-    """Return Fresnel's integral of the relay field."""
+    """Return Fresnel's integral of the field in the relay plane: the split-off paraxial part."""
     u = how.sum(spectrum, how.spectrum, how.output_period, how.relay, +1)
 
     def onto_window(u: Field, period: Scalar) -> Field:

@@ -26,13 +26,13 @@ def with_sphere(field: Field, x: Array, y: Array, beam: Beam, problem: Problem, 
 
 
 def on_window(field: Field, beam: Beam, problem: Problem) -> Field:
-    """Return a field over the window with the spherical phase that its method left out."""
+    """Return a field over the window, multiplied by the spherical phase that its method omitted."""
     x, y = problem.window.coordinates(precision(problem.dtype))
     return with_sphere(field, x, y, beam, problem, +1)
 
 
 def on_line(profile: Field, line: RadialProfile | DistinctRadii, beam: Beam, problem: Problem) -> Field:
-    """Return a symmetric field over the window, given on the radii of a line.
+    """Return a rotationally symmetric field over the window, interpolated from the radii of a line.
 
     Without its spherical phase the field is as smooth as the intensity.
     """

@@ -21,21 +21,22 @@ from optics.numerics.precision import Precision, opaque, padded_for_packets, pre
 
 __all__ = ["FarFieldSampling", "far_field"]
 
-MOST_DIRECTIONS = 4096  # choice: number along an axis, limited by memory
+MOST_DIRECTIONS = 4096  # choice, limited by memory: largest number of directions along an axis
 STEEPEST_CORNER = 0.95  # choice: largest sine towards a corner of the window
-GRAZING = 0.98  # choice: largest sine of interpolation beyond the rim of the window
+GRAZING = 0.98  # choice: largest sine of directions that interpolation at the rim of the window reads
 TRIED = 41  # choice: test positions between nodes, for each of 8 points on the rim
-# Choice: numbers of nodes to try.
+# Choice: numbers of nodes along an axis to try.
 CHEBYSHEV_NODES = (1, 2, 3, 4, 5, 6, 8, 10, 12, 16)
-FEW = 2  # choice: with this number of nodes along an axis, omitting some saves nothing
-POINTS = 150  # choice: points of the pupil at which nodes are compared
+FEW = 2  # choice: up to this number of nodes along an axis, omitting nodes saves no time
+POINTS = 150  # choice: points of the pupil at which the slow factors of nodes are compared
 
 
 @dataclass(frozen=True)
 class FarFieldSampling:
-    """Pupil samples, direction cosines (pitch 1/period of their transform), and nodes over the window.
+    """Samples of the pupil and of direction cosines, and nodes over the window.
 
-    The nodes are Chebyshev points in the angle atan(x/z), because the kernel has a pole in x at ±iz.
+    The pitch of the direction cosines is λ / (period x pitch of the pupil). The nodes are Chebyshev points in the angle
+    atan(x/z), because the kernel as a function of x has poles at ±iz.
     """
 
     edge: PupilEdge
@@ -52,7 +53,7 @@ class FarFieldSampling:
         return _far_field(beam, problem, self, precision(problem.dtype))
 
     def plane(self, problem: Problem) -> float:
-        """Return the width [m] over which rounding errors spread the pupil's light."""
+        """Return the width [m] of the plane over which rounding errors spread light."""
         return problem.wavelength * problem.distance / self.pupil.dx
 
     @property
@@ -69,9 +70,9 @@ class FarFieldSampling:
 
 
 def far_field(problem: Problem) -> list[FarFieldSampling]:
-    """Return samplings with directions beyond the Nyquist rate of the field, and the nodes that the slow factor needs.
+    """Return a sampling with directions that oversample the field and the nodes that the slow factor needs.
 
-    Empty if the method is not suitable for the window.
+    The list is empty if the method is not suitable for the window.
     """
     half = problem.window.half_width
     sine = half / math.hypot(half, problem.distance)
@@ -83,11 +84,11 @@ def far_field(problem: Problem) -> list[FarFieldSampling]:
     pitch = 1 / (problem.turning + edge.stopband)
     pupil = Grid.square(2 * math.ceil(edge.outermost / pitch) + 1, pitch)
     oversampling = math.pi / _step(problem.ripple / 2)  # relative to the Nyquist rate of the field
-    # Interpolation extends beyond the rim of the window, but must not include grazing incidence.
+    # Interpolation reads directions beyond the rim of the window, but they must not reach grazing incidence.
     finest = problem.wavelength * max(TAPS / (GRAZING - sine), TAPS / (GRAZING - corner))
     if finest / pitch >= MOST_DIRECTIONS:
         return []
-    # A whole number, so that the FFT can be used.
+    # The period is a whole number, so that the FFT can be used.
     period = fast_length(max(2 * oversampling * edge.outermost, finest) / pitch)
     step = problem.wavelength / (period * pitch)
     directions = Grid.square(2 * (math.ceil(sine / step) + TAPS) + 1, step)
@@ -107,8 +108,8 @@ def _seconds(how: FarFieldSampling, problem: Problem) -> float:
 
 
 def _nodes(problem: Problem, count: int) -> WindowNodes:
-    """Return the necessary nodes out of `count` along each axis."""
-    # A single sample has zero width, but directions are measured in half angles.
+    """Return the nodes at which the slow factor must be evaluated, selected from `count` nodes along each axis."""
+    # The width of a single sample is 0, but the half angle must be positive.
     half_angle = math.atan2(max(problem.window.half_width, problem.window.dx), problem.distance)
     if count <= FEW:
         return all_nodes(count, half_angle)
@@ -129,9 +130,9 @@ def _step(error: float) -> float:
 
 
 def _nodes_needed(problem: Problem, error: float) -> int | None:
-    """Return the number of Chebyshev nodes along an axis that interpolate the slow factor of the kernel.
+    """Return the number of Chebyshev nodes along an axis that interpolate the kernel's slow factor; None if too many.
 
-    It is tested on the rim of the aperture.
+    Interpolation is tested for points on the rim of the aperture.
     """
     angle = np.linspace(0, 2 * np.pi, 8, endpoint=False)[:, None]
     rim_x, rim_y = problem.radius * np.cos(angle), problem.radius * np.sin(angle)
@@ -150,16 +151,17 @@ def _nodes_needed(problem: Problem, error: float) -> int | None:
 
 @lru_cache(maxsize=len(CHEBYSHEV_NODES))
 def _between(n: int) -> np.ndarray:
-    """Return the weights of n Chebyshev points at the test positions, (point, position)."""
+    """Return interpolation weights of n Chebyshev points at the test positions, (point, position)."""
     return lagrange_basis(np.linspace(-1, 1, TRIED), chebyshev_points(n))
 
 
 def _slow_part(
     problem: Problem, points: tuple[np.ndarray, np.ndarray], angle: np.ndarray, y: np.ndarray | float
 ) -> np.ndarray:
-    """Return (ρ/D)² (1 + i/(kD)) exp(ik(D - ρ + s·ξ)).
+    """Return the slow factor (ρ/D)² (1 + i/(kD)) exp(ik(D - ρ + s·ξ)).
 
-    D is the distance from ξ to (z tan(angle), y, z), ρ the distance from the axis to that point, and s the direction.
+    D is the distance from the pupil's point ξ to the point (z tan(angle), y, z), ρ the distance from the pupil's centre
+    to that point, and s the direction from the centre to it.
     """
     x = problem.distance * np.tan(angle)
     rho = np.sqrt(x * x + y * y + problem.distance**2)
@@ -177,8 +179,9 @@ def _far_field(beam: Beam, problem: Problem, how: FarFieldSampling, types: Preci
 
     U(x) = z/(λρ²) ∫ P(ξ) G(ξ; x) e^{-ik s·ξ} dξ,  G = (ρ/D)² (1/(kD) - i) e^{ik(D - ρ + s·ξ)},
 
-    ρ = |(x, z)|, D = |(x - ξ, z)|, s = x/ρ. G varies slowly with x, because it contains Fresnel's quadratic phase and
-    smaller terms. It is evaluated at nodes x_ab. The integrals, one Fourier transform each, are interpolated.
+    where ρ = |(x, z)|, D = |(x - ξ, z)|, s = x/ρ. G varies slowly with x, because it contains only Fresnel's quadratic
+    phase and smaller terms. G is evaluated at nodes x_ab. The integral for each node is one Fourier transform. Between
+    nodes, the integrals are interpolated.
     """
     import drjit as dr
 
@@ -186,7 +189,7 @@ def _far_field(beam: Beam, problem: Problem, how: FarFieldSampling, types: Preci
     dr.eval(u.re, u.im)
     s = how.directions.x
     cosine = np.sqrt(np.maximum(1 - s[:, None] ** 2 - s[None, :] ** 2, 1e-6))
-    edge = math.asin(min(float(s[-1]), 0.999))  # margin beyond the window for the interpolation below
+    edge = math.asin(min(float(s[-1]), 0.999))  # the directions extend beyond the window, for the interpolation below
     weights = how.nodes.weights(np.clip(np.arctan2(s[None, :], cosine), -edge, edge), types.dtype)
     total_re, total_im = dr.zeros(types.Float, s.size**2), dr.zeros(types.Float, s.size**2)
     for (across, along), weight in zip(how.nodes.tangents, weights, strict=True):
@@ -199,7 +202,7 @@ def _far_field(beam: Beam, problem: Problem, how: FarFieldSampling, types: Preci
 
 
 def _slow_kernel(tan_x: float, tan_y: float, beam: Beam, grid: Grid, types: Precision) -> Field:
-    """Return G(ξ; x) on the pupil's grid for x in the direction of the two tangents.
+    """Return G(ξ; x) on the pupil's grid. The two tangents define the direction of x.
 
     A constant phase is omitted.
     """
@@ -225,7 +228,7 @@ def _onto_window(
 ) -> Array:
     """Return the intensity over the window.
 
-    The field is interpolated from direction cosines with eight-point Lagrange polynomials.
+    Eight-point Lagrange polynomials interpolate the field between samples of the direction cosines.
     """
     import drjit as dr
 

@@ -1,8 +1,8 @@
-"""Nodes of the window at which the slow factor of the far field is evaluated: the fewest that represent all others.
+"""Nodes of the window at which the slow factor of the far field is evaluated: the fewest that represent all nodes.
 
-The slow factor is interpolated between Chebyshev nodes in angle. At most of these nodes it is, within the tolerance, a
-linear combination of its values at a few (an interpolative decomposition: Cheng et al., SIAM J. Sci. Comput. 26 (2005)
-1389).
+The slow factor is interpolated between nodes, which are Chebyshev points in angle. Its values at most of these nodes
+are, within the tolerance, linear combinations of its values at a few of them. This is an interpolative decomposition
+(Cheng et al., SIAM J. Sci. Comput. 26 (2005) 1389).
 """
 
 from __future__ import annotations
@@ -15,16 +15,16 @@ from optics.numerics.interpolation import chebyshev_points
 
 __all__ = ["WindowNodes", "all_nodes", "few_nodes"]
 
-AT_A_TIME = 4_000_000  # choice, limited by memory: entries of a product of polynomials
+AT_A_TIME = 4_000_000  # choice, limited by memory: entries of a product of polynomials that is computed at once
 
 
 @dataclass(frozen=True, eq=False)
 class WindowNodes:
     """Nodes of the window and their weights.
 
-    count: Chebyshev points in angle along each axis, up to half_angle [rad].
-    kept: positions (row, column) among them where the slow factor is evaluated, (kept, 2).
-    mix: weights of the kept nodes at every node, (kept, row, column), complex.
+    count: number of nodes along each axis: Chebyshev points in angle, between ±half_angle [rad].
+    kept: rows and columns of the nodes at which the slow factor is evaluated, (kept, 2).
+    mix: complex weights, (kept, row, column), with which the kept nodes represent each node.
     """
 
     count: int
@@ -34,15 +34,16 @@ class WindowNodes:
 
     @property
     def tangents(self) -> list[tuple[float, float]]:
-        """Tangents (x, y) of the kept nodes."""
+        """Tangents (x/z, y/z) of the kept nodes."""
         at = np.tan(self.half_angle * chebyshev_points(self.count))
         return [(float(at[column]), float(at[row])) for row, column in self.kept]
 
     def weights(self, angle: np.ndarray, dtype: str) -> np.ndarray:
-        """Return the weights of the kept nodes in the directions of a square grid of cosines, (kept, 2, place).
+        """Return the weights of the kept nodes for the directions of a square grid of cosines, (kept, 2, place).
 
-        The second axis holds real and imaginary part. angle: atan(x/z) in these directions, (y, x); its transpose is
-        atan(y/z).
+        The second axis contains real and imaginary parts.
+
+        angle: atan(x/z) of these directions, (y, x). Its transpose is atan(y/z).
         """
         across = _chebyshev(angle / self.half_angle, self.count).astype(dtype).reshape(self.count, -1)
         down = _chebyshev(angle.T / self.half_angle, self.count).astype(dtype).reshape(self.count, -1)
@@ -58,17 +59,17 @@ class WindowNodes:
 
 
 def all_nodes(count: int, half_angle: float) -> WindowNodes:
-    """Return all nodes, each with weight 1 at itself."""
+    """Return nodes that are all kept, so that each represents itself."""
     kept = np.stack(np.meshgrid(np.arange(count), np.arange(count), indexing="ij"), axis=-1).reshape(-1, 2)
     return WindowNodes(count, half_angle, kept, np.eye(count**2).reshape(-1, count, count).astype(complex))
 
 
 def few_nodes(count: int, half_angle: float, slow: np.ndarray, error: float) -> WindowNodes:
-    """Return nodes whose linear combinations give the values at all nodes.
+    """Return a few nodes from which the values at all nodes follow as linear combinations.
 
     The root mean square error over the pupil is at most `error`.
 
-    slow: the slow factor at points of the pupil for every node, (row, column, point), of modulus 1.
+    slow: slow factor for every node at points of the pupil, (row, column, point), with a modulus of about 1.
     """
     rest = slow.reshape(count**2, -1)
     kept: list[int] = []
@@ -79,12 +80,13 @@ def few_nodes(count: int, half_angle: float, slow: np.ndarray, error: float) -> 
         if size[worst] < error**2 or len(kept) == len(rest):
             break
         along = rest[worst] / np.linalg.norm(rest[worst])
-        # Sums instead of matrix products: these are too small for the threads of BLAS, which busy-wait.
+        # A sum is used instead of a matrix product: the product is so small that the busy waiting of BLAS threads
+        # dominates.
         share = (rest * along.conj()).sum(axis=1)
         rest = rest - share[:, None] * along
         kept.append(worst)
         shares.append(share)
-    found = np.array(shares)  # all values = foundᵀ · all of `along`; this includes the values of the kept nodes
+    found = np.array(shares)  # values at all nodes = foundᵀ · `along`; this includes the kept nodes themselves
     mix = np.linalg.solve(found[:, kept], found)
     return WindowNodes(
         count, half_angle, np.stack(np.divmod(np.array(kept), count), axis=-1), mix.reshape(-1, count, count)
@@ -102,7 +104,7 @@ def _chebyshev(x: np.ndarray, n: int) -> np.ndarray:
 
 
 def _to_series(n: int) -> np.ndarray:
-    """Return the weights of values at Chebyshev points in the coefficients of their polynomial, (degree, node)."""
+    """Return a matrix (degree, node) from values at n Chebyshev points to coefficients of Chebyshev polynomials."""
     found: np.ndarray = 2 / n * np.cos(np.outer(np.arange(n), np.arccos(chebyshev_points(n))))
     found[0] /= 2
     return found

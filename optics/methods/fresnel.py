@@ -1,4 +1,4 @@
-"""The paraxial methods, Fresnel's and Fraunhofer's integral, and their predicted errors."""
+"""The paraxial methods: the integrals of Fresnel and Fraunhofer, with their predicted errors."""
 
 from __future__ import annotations
 
@@ -22,16 +22,20 @@ from optics.numerics.precision import opaque, precision
 
 __all__ = ["ParaxialSampling", "fraunhofer", "fresnel", "paraxial_integral"]
 
-RAYS, ENDS = 48, 24  # choice: rays at whose origins, and at whose ends, the neglected phase is evaluated
-# Choice, in first Fresnel zones of a ray: distance from its origin within which light adds up coherently at its end.
+RAYS, ENDS = 48, 24  # choice: number of rays at whose origins (RAYS) and ends (ENDS) the neglected phase is evaluated
+# Choice, in radii of a ray's first Fresnel zone: light from within this distance of the ray's origin adds up coherently
+# at its end.
 ZONES = 3.0
 ROUNDING = 1e-15  # rounding error of sums of numbers near 1
-MUCH = 0.7  # choice: above this error the field has nothing in common with the exact one
+MUCH = 0.7  # choice: above this error, the field is unrelated to the exact field
 
 
 @dataclass(frozen=True)
 class ParaxialSampling:
-    """Pupil samples. model_error is computed on first access, because it takes longer than the rest of a plan."""
+    """Samples of a pupil for a paraxial method.
+
+    `model_error` is computed on first access, because it takes longer than the rest of a plan.
+    """
 
     method: str
     edge: PupilEdge
@@ -51,7 +55,7 @@ class ParaxialSampling:
         return paraxial_integral(u, beam.distance, problem.wavelength, problem.window, curved).intensity
 
     def plane(self, problem: Problem) -> float:
-        """Return the width [m] over which rounding errors spread the pupil's light."""
+        """Return the width [m] of the plane over which rounding errors spread light."""
         return problem.wavelength * problem.distance / self.pupil.dx
 
     @property
@@ -64,7 +68,7 @@ class ParaxialSampling:
 
 
 def fresnel(problem: Problem) -> list[ParaxialSampling]:
-    """Return samplings of Fresnel's integral (Goodman, Introduction to Fourier Optics, eq. 4-17)."""
+    """Return a sampling of Fresnel's integral (Goodman, Introduction to Fourier Optics, eq. 4-17); empty for pixels."""
     reach = (1 + EDGE_REACH) * problem.radius + problem.outermost
     excess = reach / problem.distance - reach / math.hypot(reach, problem.distance)
     turning = min(
@@ -75,7 +79,7 @@ def fresnel(problem: Problem) -> list[ParaxialSampling]:
 
 
 def fraunhofer(problem: Problem) -> list[ParaxialSampling]:
-    """Return samplings of Fraunhofer's integral (Goodman, eq. 4-25), which omits the quadratic phase."""
+    """Return a sampling of Fraunhofer's integral (Goodman, eq. 4-25), which omits the quadratic phase."""
     return _sampling(
         "fraunhofer", problem, problem.phase_band + problem.outermost / (problem.wavelength * problem.distance)
     )
@@ -98,12 +102,13 @@ def _sampling(method: str, problem: Problem, turning: float) -> list[ParaxialSam
 def model_error(problem: Problem, curved: bool) -> float:
     """Return the relative L2 error of the intensity that results from the paraxial kernel.
 
-    It follows from the ratio q of this kernel to the exact one,
+    It follows from the ratio q of the paraxial kernel to the exact kernel,
 
         q = (D/z)² e^{-ik(D - z - d²/2z)},   d = |x - ξ|, D = √(d² + z²)   (d² without ξ² in Fraunhofer's),
 
-    at the ends of rays. Light that adds up coherently there comes from around the origin of the ray: from its Fresnel
-    zone, or from the whole aperture if several rays meet. A phase common to all this light causes no error.
+    for light that arrives at the ends of rays. Light that adds up coherently at the end of a ray comes from a few
+    Fresnel zones around the ray's origin, or from the whole aperture if several rays may end in the same point. A phase
+    that is common to all this light causes no error.
     """
     rays = problem.rays
     if rays is None or len(rays) == 0 or problem.masked:
@@ -123,17 +128,17 @@ def model_error(problem: Problem, curved: bool) -> float:
     near = np.tile((apart2 <= np.square(zone)) | nearest, (len(x) // len(ends), 1))
     count, size = near.sum(axis=1), size * near
     re, im = ((size * part).sum(axis=1) for part in (np.cos(angle), np.sin(angle)))
-    # Mean of |q - q₀|², where q₀ is the nearest number of modulus 1: 1 - 2|Σ q| / n + Σ |q|² / n. Rounding is on the
-    # safe side.
+    # Mean of |q - q₀|², where q₀ is the nearest number of modulus 1: 1 - 2|Σ q| / n + Σ |q|² / n. Adding ROUNDING keeps
+    # it above rounding errors.
     squared = 1 + (np.square(size).sum(axis=1) - 2 * np.hypot(re, im)) / count
     error = 2 * math.sqrt(np.maximum(squared, 0).mean() + ROUNDING)
     return MARGIN * error if error < MUCH or curved else _misplaced(problem)
 
 
 def _misplaced(problem: Problem) -> float:
-    """Return the error if a wide shadow shrinks to a spot without the quadratic phase.
+    """Return the error of Fraunhofer's integral if it shrinks a wide shadow to a spot.
 
-    It follows from the brightness of the spot relative to the exact light.
+    The error follows from the brightness of the spot relative to that of the exact light.
     """
     rays, cell = problem.rays, problem.window.dx**2
     assert rays is not None
@@ -143,9 +148,10 @@ def _misplaced(problem: Problem) -> float:
 
 
 def _places(problem: Problem, ends: Rays) -> tuple[np.ndarray, np.ndarray]:
-    """Return the points at which the error is evaluated.
+    """Return the points of the window at which the error is evaluated.
 
-    They are the ends of rays and points one diffraction width away, clipped to the window.
+    They are the ends of rays, and points at a distance of one diffraction width from the ends. Points outside the
+    window are moved to its rim.
     """
     width = 0.6 * problem.wavelength * problem.distance / problem.radius  # close to Airy's first dark ring at 0.61
     window = problem.window
@@ -166,8 +172,11 @@ def paraxial_integral(
 
     U(x) = 1/(iλz) ∫ u(ξ) e^{iπξ²/λz} e^{-2πi x·ξ/λz} dξ   (Goodman, Introduction to Fourier Optics, eq. 4-17);
 
-    with curved=False the quadratic phase is 1 (eq. 4-25). wavelength [m] in the medium. The integral is one Fourier sum
-    of arbitrary output pitch. onto_window: function that computes it from a field and a period (None: `fourier.dft2`).
+    The integral is one Fourier sum with an arbitrary output pitch.
+
+    wavelength: wavelength [m] in the medium.
+    curved: False replaces the quadratic phase factor by 1 (eq. 4-25).
+    onto_window: function that computes the Fourier sum from a field and a period (None: `fourier.dft2`).
     """
     types, grid = u.types, u.grid
     scale = opaque(types, distance) * opaque(types, wavelength)

@@ -1,4 +1,4 @@
-"""Ray methods: the density of rays behind a pupil, and the ideal pinhole. No diffraction, no interference."""
+"""Ray methods without diffraction and interference: the density of rays behind a pupil, and the ideal pinhole."""
 
 from __future__ import annotations
 
@@ -19,23 +19,23 @@ from optics.numerics.precision import Precision, opaque, padded_for_packets, pre
 
 __all__ = ["PinholeSampling", "RaySampling", "geometric", "pinhole"]
 
-# Choice: step, in pupil radii, of the central differences that give the local slope. Their error is the square of the
-# step times a cubic term.
+# Choice: step, in pupil radii, of the central differences for the local slope. Their error is the square of the step
+# times a third derivative.
 STEP = 1e-4
-DIGITS = 1.0  # choice: digits of the quadrature rule at the highest frequency of the splats' spectra
-# Relative L2 size of Fresnel's fringes behind an edge, over a disk of Fresnel number 1. It falls with the fourth root
+DIGITS = 1.0  # choice: digits of the quadrature rule, at the highest frequency of the spectrum of a splat
+# Relative L2 size of the Fresnel fringes behind an edge, for a disk of Fresnel number 1. It falls with the fourth root
 # of the Fresnel number.
 FRINGES = 0.75
 SPLAT_CELLS = 3.3  # area of a splat: (∫β²)⁻², with the quadratic B-spline β
 
 
 class NoDerivativesError(ValueError):
-    """A method has no derivatives on this device."""
+    """A method cannot compute derivatives on the selected device."""
 
 
 @dataclass(frozen=True)
 class RaySampling:
-    """Edge-fitted rays, and the error of the intensity that results from rays instead of waves."""
+    """Rays at nodes that are fitted to the edge. model_error: error of the intensity due to rays instead of waves."""
 
     rule: tuple[Aperture, float, float]
     count: int
@@ -48,8 +48,9 @@ class RaySampling:
         """Return the power per area over the window for unit intensity at the pupil, a flat Dr.Jit array.
 
         Raises:
-            NoDerivativesError: derivatives are required on a GPU. Derivatives in Dr.Jit that use the reciprocal of a
-                float64 have errors of 1e-6 there. In directions, which are differences of paths, the errors are 1e-2.
+            NoDerivativesError: derivatives are required on a GPU. There, derivatives in Dr.Jit that use the reciprocal
+                of a float64 have errors of 1e-6. The directions of rays are differences of paths, so the errors of
+                their derivatives are 1e-2.
         """
         import drjit as dr
 
@@ -67,7 +68,7 @@ class RaySampling:
         return _splat(x, y, dr.select(propagates, weight, 0), problem, types)
 
     def plane(self, problem: Problem) -> float:
-        """Return infinity: rounding errors do not spread rays."""
+        """Return infinity, because rounding errors do not spread rays."""
         return math.inf
 
     @property
@@ -76,7 +77,7 @@ class RaySampling:
 
     @property
     def largest(self) -> int:
-        """Side of the square array with the same memory: each ray has four numbers."""
+        """Side of a square array that takes the same memory as the rays, which have four numbers each."""
         return 2 * math.ceil(math.sqrt(self.count))
 
 
@@ -120,8 +121,9 @@ class PinholeSampling:
 def geometric(problem: Problem) -> list[RaySampling]:
     """Return a sampling with enough rays for a smooth image.
 
-    The distance between the ends of neighbouring rays is below the window's pitch. The spectrum of a quadratic B-spline
-    falls like (πf dx)⁻³. Beyond f = error^(-1/3)/(π dx) it is negligible.
+    Every ray is spread by a quadratic B-spline over the window's cells. The spectrum of the spline falls like (πf
+    dx)⁻³, so it is negligible beyond f = error^(-1/3)/(π dx). The rays are dense enough for this frequency: their ends
+    are closer together than the window's pitch.
     """
     rays = problem.rays
     if rays is None:
@@ -130,7 +132,8 @@ def geometric(problem: Problem) -> list[RaySampling]:
     error = max(problem.tolerance, model / 10) / 10
     stretch = float(rays.most.max()) if len(rays) else 1.0
     cycles = problem.radius * stretch / (math.pi * problem.window.dx) * error ** (-1 / 3)
-    cycles = 2 ** (math.ceil(4 * math.log2(max(cycles, 1.0))) / 4)  # few different rules, so that caches are used
+    # Rounded up to one of a few values, so that cached rules are used.
+    cycles = 2 ** (math.ceil(4 * math.log2(max(cycles, 1.0))) / 4)
     count = node_count(problem.aperture, cycles, DIGITS)
     seconds = CALL["geometric"] + count * RAY
     return [RaySampling((problem.aperture, cycles, DIGITS), count, model, seconds)]
@@ -139,8 +142,8 @@ def geometric(problem: Problem) -> list[RaySampling]:
 def pinhole(problem: Problem) -> list[PinholeSampling]:
     """Return the sampling that puts all light into one sample.
 
-    Its error relative to samples of the exact PSF is total, however small the PSF is, because those are intensities at
-    points and not means over cells. "auto" therefore never chooses it.
+    However small the exact PSF is, the error relative to it is total, because its samples are intensities at points and
+    not means over cells. "auto" therefore never chooses this method.
     """
     if problem.pixelated is not None:
         return []
@@ -149,9 +152,9 @@ def pinhole(problem: Problem) -> list[PinholeSampling]:
 
 
 def _landings(beam: Beam, x: Array, y: Array, types: Precision) -> tuple[Array, Array, Array]:
-    """Return the hit points on the sensor of rays from points (x, y) of the pupil, and which rays propagate.
+    """Return the points (x, y) where rays from points of the pupil hit the sensor, and a mask of rays that propagate.
 
-    The hit points are x + z p/√(1 - p²), with p the gradient of the path.
+    The hit points are x + z p/√(1 - p²), where p is the gradient of the path.
     """
     import drjit as dr
 
@@ -167,10 +170,10 @@ def _landings(beam: Beam, x: Array, y: Array, types: Precision) -> tuple[Array, 
 
 
 def _splat(x: Array, y: Array, weight: Array, problem: Problem, types: Precision) -> Array:
-    """Return the sum of weights per area over the window's cells.
+    """Return the weights that land in each cell of the window, divided by the area of a cell.
 
-    Each weight is spread by a quadratic B-spline that is three cells wide. Its nine shares add up to 1, so power is
-    lost only beyond the rim of the window.
+    Each weight is spread over 3 x 3 cells by a quadratic B-spline. The nine shares add up to 1, so power is lost only
+    beyond the rim of the window.
     """
     import drjit as dr
 
@@ -201,11 +204,12 @@ def _quadratic_basis(t: Array) -> tuple[Array, Array, Array]:
 def _ray_error(problem: Problem) -> float:
     """Return the relative L2 error of the ray density.
 
-    It stems from fringes along the rim of the shadow, which are as wide as a Fresnel zone or a cell. The error is total
-    if rays cross, or if they end in an area smaller than diffraction or cells allow.
+    The error is due to the fringes along the rim of the shadow, which are as wide as a Fresnel zone or a cell. The
+    error is total if rays cross, or if their ends are concentrated in an area that is smaller than diffraction or cells
+    allow.
 
-    Behind an edge stretched by m, light has the pattern of an open edge at z/m, magnified by m: a quadratic phase only
-    scales Fresnel's integral (Goodman, eq. 4-17).
+    If the rays magnify the pupil by m, an edge produces the pattern of an edge without a lens at the distance z/m,
+    magnified by m. The reason is that a quadratic phase only scales Fresnel's integral (Goodman, eq. 4-17).
     """
     rays, cell = problem.rays, problem.window.dx**2
     assert rays is not None
@@ -214,14 +218,14 @@ def _ray_error(problem: Problem) -> float:
         return blurred
     stretch = float(np.mean(1 / np.maximum(rays.least, 1e-12)))
     zone = math.sqrt(problem.wavelength * problem.distance * stretch) + problem.window.dx * stretch
-    # For a disk this size is R. For narrow or cut apertures it is twice the area per length of edge.
+    # Size of the aperture: twice the area per length of edge. It is R for a disk.
     narrow = 2 * problem.aperture.area / problem.aperture.outline.length
     size = problem.radius * min(math.sqrt(problem.aperture.area / math.pi), narrow)
     return FRINGES * math.sqrt(zone / size) if zone < size else blurred
 
 
 def _brightness(problem: Problem) -> float:
-    """Return the brightness of the light after rays and diffraction have spread it."""
+    """Return the brightness of the light, see `rays.brightness`, after rays and diffraction have spread it."""
     assert problem.rays is not None
     diffracted = math.pi * (problem.wavelength * problem.distance / (2 * problem.radius)) ** 2
     return brightness(problem.rays.image_area + diffracted, problem.window.dx**2)

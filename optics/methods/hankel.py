@@ -1,9 +1,10 @@
-"""The angular spectrum of a rotationally symmetric pupil by two Hankel transforms, the cheapest exact method.
+"""The angular spectrum of a rotationally symmetric pupil by two Hankel transforms. This is the cheapest exact method.
 
     S(f) = 2π ∫ P(r) J₀(2πfr) r dr,   U(x) = 2π ∫ S(f) e^{ikz (cos θ - 1)} J₀(2πfx) f df,   f = sin θ / λ
 
 (Goodman, Introduction to Fourier Optics, §2.1.5 and §3.10). The quadrature in r ends at the edge of the aperture, so no
-soft edge is necessary. As a function of θ the transfer function is smooth up to grazing incidence.
+soft edge is necessary. The quadrature over f uses the variable θ, because the transfer function is a smooth function of
+θ up to grazing incidence.
 """
 
 from __future__ import annotations
@@ -28,13 +29,13 @@ from optics.numerics.radial_profile import DistinctRadii, RadialProfile
 
 __all__ = ["HankelSampling", "hankel"]
 
-# Choice: from this tolerance on, J₀ is computed to fewer digits.
+# Choice: for tolerances of this size or larger, J₀ is computed to fewer digits.
 LOOSE = 1e-8
 
 
 @dataclass(frozen=True)
 class HankelSampling:
-    """Gauss-Legendre nodes in r for each open ring, nodes in θ, and the radii of the image."""
+    """Gauss-Legendre nodes in r for each open ring, nodes in θ, and the radii at which the image is computed."""
 
     taper: Taper
     radii: tuple[int, ...]
@@ -56,7 +57,7 @@ class HankelSampling:
         return on_line(_hankel(beam, problem, self, precision(problem.dtype)), self.line, beam, problem)
 
     def plane(self, problem: Problem) -> float:
-        """Return the width [m] over which rounding errors spread the pupil's light."""
+        """Return the width [m] of the plane over which rounding errors spread light."""
         return 2 * (self.line.radius + problem.radius)
 
     @property
@@ -65,14 +66,14 @@ class HankelSampling:
 
     @property
     def largest(self) -> int:
-        """Side of a square array of the same size. Only the matrix that refines the line is two-dimensional."""
+        """Side of a square array of the same size as the largest array, the matrix that refines the line of radii."""
         return math.isqrt(max(self.line.entries, sum(self.radii), self.angles, self.line.points))
 
 
 def hankel(problem: Problem) -> list[HankelSampling]:
-    """Return samplings with enough nodes for the cycles of each phase.
+    """Return a sampling whose nodes resolve the phases of both integrals.
 
-    Empty unless the problem is rotationally symmetric.
+    The list is empty unless the problem is rotationally symmetric.
     """
     if not problem.symmetric:
         return []
@@ -80,7 +81,7 @@ def hankel(problem: Problem) -> list[HankelSampling]:
 
 
 def _sampling(problem: Problem, taper: Taper) -> HankelSampling:
-    digits = 0.5 - math.log10(problem.tolerance)  # choice: a third of the tolerance for each of the two rules
+    digits = 0.5 - math.log10(problem.tolerance)  # choice: about a third of the tolerance for each of the two rules
     cycles = problem.radius * (problem.phase_band_inside + taper.end)
     rings = problem.aperture.rings
     radii = tuple(_round_up(gauss_legendre_count(cycles * (outer - inner), digits)) for inner, outer in rings)
@@ -97,7 +98,7 @@ def _sampling(problem: Problem, taper: Taper) -> HankelSampling:
 
 
 def _round_up(n: int) -> int:
-    """Return n rounded up to one of a few numbers, so that cached tables are used."""
+    """Return n, rounded up to one of a few numbers, so that cached tables are used."""
     step = max(1, 2 ** (n.bit_length() - 4))
     return -(-n // step) * step
 
@@ -129,7 +130,7 @@ def _hankel(beam: Beam, problem: Problem, how: HankelSampling, types: Precision)
 
 
 def _on_rings(rings: tuple[tuple[float, float], ...], counts: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray]:
-    """Return nodes and weights over the open radii, in units of R."""
+    """Return quadrature nodes and weights over the open rings, in units of R."""
     parts = [
         (inner + (outer - inner) * nodes, (outer - inner) * weights)
         for (inner, outer), (nodes, weights) in zip(rings, map(gauss_legendre, counts), strict=True)

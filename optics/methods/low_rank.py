@@ -25,19 +25,19 @@ __all__ = ["LowRankSampling", "low_rank"]
 
 # Choice: ranks to try.
 RANKS = (1, 2, 3, 4, 5, 6, 7, 8, 10, 12, 14, 16, 20, 24)
-# Choice: allowed error of the slow factor at the pupil's rim, relative to the tolerance; test_low_rank.py.
+# Choice: allowed error of the slow factor at the pupil's rim, relative to the tolerance; see test_low_rank.py.
 RANK_RIPPLE = 0.4
-STEEPEST = 8.0  # choice, radius over distance: nearer to the pupil, a test of ranks on the rim is not sufficient
-TRIED = 41  # choice: positions along a line through the window
-MOST_BYTES = 288_000_000  # choice, limited by memory: size of the matrix between pupil and window; twice that is in use
+STEEPEST = 8.0  # choice, radius over distance: at larger ratios, a test on the rim is not sufficient
+TRIED = 41  # choice: number of test positions along a line through the window
+MOST_BYTES = 288_000_000  # choice, limited by memory: largest matrix between pupil and window, of which two exist
 
 
 @dataclass(frozen=True)
 class LowRankSampling:
-    """Pupil samples, and the rank of the slow factor over the window.
+    """Samples of the pupil, and the rank of the slow factor over the window.
 
-    rank: Chebyshev points per axis of the window. half_width: range of these points about the window's centre [m].
-    scale: distance c [m] of the Fourier kernel e^{-ik ξ·u/c}, with u the position in the window; 1 if samples are
+    rank: number of Chebyshev points per axis of the window. half_width: their range about the window's centre [m].
+    scale: distance c [m] in the Fourier kernel e^{-ik ξ·u/c}, with u the position in the window. It is 1 if samples are
         sines.
     """
 
@@ -59,12 +59,12 @@ class LowRankSampling:
         return on_window(_low_rank(beam, problem, self, precision(problem.dtype)), beam, problem)
 
     def plane(self, problem: Problem) -> float:
-        """Return the width [m] over which rounding errors spread the pupil's light."""
+        """Return the width [m] of the plane over which rounding errors spread light."""
         return problem.wavelength * self.scale / float(np.diff(self.pupil.at).mean())
 
     @property
     def directions(self) -> np.ndarray:
-        """s of the samples along either axis."""
+        """Direction s = ξ/c of the samples along either axis."""
         found: np.ndarray = self.pupil.at / self.scale
         return found
 
@@ -74,14 +74,14 @@ class LowRankSampling:
 
     @property
     def largest(self) -> int:
-        return len(self.pupil.at)  # independent of the rank, because the matrix has its own limit
+        return len(self.pupil.at)  # without the matrix, for which MOST_BYTES is the limit
 
 
 def low_rank(problem: Problem) -> list[LowRankSampling]:
-    """Return a sampling with the fewest pupil samples for the combined phase of pupil and path, and the necessary rank.
+    """Return a sampling with the fewest samples of the pupil and the necessary rank.
 
-    The samples are evenly spaced in sines or, if sines are too dense, on a grid of positions. Pixels have their own
-    nodes.
+    The samples resolve the combined phase of pupil and path. They are evenly spaced in sines, or in positions if even
+    spacing in sines needs too many samples. A pupil of pixels has nodes within the pixels.
     """
     if problem.radius > STEEPEST * problem.distance:
         return []
@@ -92,8 +92,7 @@ def low_rank(problem: Problem) -> list[LowRankSampling]:
         if found is not None:
             return [found]
     pupil = samples_of(problem)
-    # The distance of the Fourier kernel lies between the distances to the window's centre and to its sides. Its
-    # position between them is a choice.
+    # The distance c lies between the distances to the window's centre and to its sides. The factor 0.6 is a choice.
     scale = math.hypot(problem.distance, 0.6 * half, *problem.window.centre)
     found = None if pupil is None else _sampling(problem, pupil, half, scale)
     return [] if found is None else [found]
@@ -121,18 +120,18 @@ def _sampling(problem: Problem, pupil: PupilSamples, half: float, scale: float) 
 def _rank(problem: Problem, pupil: PupilSamples, half: float, scale: float, most: int) -> int | None:
     """Return the number of Chebyshev points along an axis that interpolate the slow factor, or None.
 
-    It is tested on the rim of the soft aperture.
+    Interpolation is tested for points on the rim of the soft aperture. None: no rank up to `most` is sufficient.
     """
     angle = np.linspace(0, 2 * np.pi, 8, endpoint=False)[:, None]
     rim = pupil.outermost * np.cos(angle), pupil.outermost * np.sin(angle)
     directions = pupil.directions(*rim) if isinstance(pupil, SineSamples) else (rim[0] / scale, rim[1] / scale)
     test = half * np.linspace(-1, 1, TRIED)
-    # On the axis both directions are equivalent, and so are both sides.
+    # If the window lies on the axis, x and y are equivalent, and so are both sides of the window.
     on_axis = problem.window.centre == (0.0, 0.0)
     lines = [(0, 0.0), (0, half)] if on_axis else [(k, side) for k in (0, 1) for side in (-half, 0, half)]
 
     def rest(at: np.ndarray) -> np.ndarray:
-        """Return the slow factor, (line, position on the rim, position on the line)."""
+        """Return the slow factor, (line, point of the rim, position on the line)."""
         u, v = np.stack([_line(axis, at, across) for axis, across in lines], axis=1)[:, :, None, :]
         return _rest(problem, rim, directions, (u, v))
 
@@ -148,12 +147,12 @@ def _rank(problem: Problem, pupil: PupilSamples, half: float, scale: float, most
 
 @lru_cache(maxsize=len(RANKS))
 def _between(rank: int) -> np.ndarray:
-    """Return the weights of `rank` Chebyshev points at the test positions, (point, position)."""
+    """Return interpolation weights of `rank` Chebyshev points at the test positions, (point, position)."""
     return lagrange_basis(np.linspace(-1, 1, TRIED), chebyshev_points(rank))
 
 
 def _line(along: int, at: np.ndarray, across: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return points (x, y) of a line through the window, along x (0) or y (1), relative to its centre."""
+    """Return points (x, y) of a line along x (0) or y (1), relative to the window's centre."""
     beside = np.full_like(at, across)
     return (at, beside) if along == 0 else (beside, at)
 
@@ -164,9 +163,9 @@ def _rest(
     directions: tuple[np.ndarray, np.ndarray],
     window: tuple[np.ndarray, np.ndarray],
 ) -> np.ndarray:
-    """Return (z/D)² e^{ik(D - ρ + u·s)} between points ξ of the pupil and u of the window.
+    """Return the slow factor (z/D)² e^{ik(D - ρ + u·s)} between points ξ of the pupil and points u of the window.
 
-    s is the direction in the Fourier kernel.
+    s is the direction of ξ in the Fourier kernel e^{-ik s·u}.
     """
     (xi, eta), (u, v), (s, t) = pupil, window, directions
     x, y = u + problem.window.centre[0], v + problem.window.centre[1]
@@ -183,10 +182,11 @@ def _low_rank(beam: Beam, problem: Problem, how: LowRankSampling, types: Precisi
 
         G(ξ; x) = z/(λD²) (1/(kD) - i) e^{ik(D - ρ + s·u)},   D = |(x - ξ, z)|, ρ = |(x, z)|.
 
-    A phase that cancels in the intensity is omitted. G varies slowly with x. u is the position in the window relative
-    to its centre, and s = ξ/c or the sines of the samples. The sums over a and ξ along one axis are combined: A_y W
-    A_xᵀ, two matrix products. Along x both matrices are split into parts that are even and odd about the middle, which
-    halves the products of the first one. A_x does not change if window and samples are both mirrored.
+    A phase that cancels in the intensity is omitted. G varies slowly with x, so L_a interpolates it. u is the position
+    in the window relative to its centre, and s is ξ/c or the sines of the samples. For each axis, the sums over the
+    points of interpolation and over ξ are combined: the field is A_y W A_xᵀ, two matrix products. A_x does not change
+    if window and samples are both mirrored. Along x, the matrices are therefore split into even and odd parts, which
+    halves the first product.
     """
     window = problem.window
     across_y = _fourier(sample_positions(window.shape[0], window.dx), problem, how)
@@ -199,7 +199,7 @@ def _low_rank(beam: Beam, problem: Problem, how: LowRankSampling, types: Precisi
 
 
 def _halves(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return (A[x, j] ± A[x, -j]) / 2 for samples j from the middle on.
+    """Return (A[x, j] ± A[x, -j]) / 2, with samples j counted from the middle.
 
     The middle sample is its own mirror image.
     """
@@ -224,7 +224,7 @@ def _unfolded(parts: list[tuple[Array, Array]], window: Grid, types: Precision) 
 
 
 def _kernel(beam: Beam, problem: Problem, how: LowRankSampling, types: Precision) -> list[tuple[Array, Array]]:
-    """Return W[(b, η), (a, ξ)] ± W[(b, η), -(a, ξ)] for (a, ξ) from the middle on, each as two tensors.
+    """Return W[(b, η), (a, ξ)] ± W[(b, η), -(a, ξ)], with (a, ξ) counted from the middle, each as two tensors.
 
     W = P(ξ, η) G(ξ, η; x_a, y_b).
     """
@@ -232,7 +232,7 @@ def _kernel(beam: Beam, problem: Problem, how: LowRankSampling, types: Precision
 
     u, size = how.pupil.field(beam, types).evaluated(), len(how.pupil.at) * how.rank
     shape = size, size - size // 2
-    column, row = Grid(shape, 1.0).coordinates(types)  # counted from the centre
+    column, row = Grid(shape, 1.0).coordinates(types)  # counted from the middle
     column, row = column + opaque(types, shape[1] // 2), row + opaque(types, size // 2)
     right = column + opaque(types, size // 2)
     ahead = _entries(u, (right, row), beam, problem, how)
@@ -244,7 +244,7 @@ def _kernel(beam: Beam, problem: Problem, how: LowRankSampling, types: Precision
 
 
 def _entries(u: Field, at: tuple[Array, Array], beam: Beam, problem: Problem, how: LowRankSampling) -> Field:
-    """Return W at columns and rows, which are float64 indices. The number of columns is half the number of rows."""
+    """Return W at the columns and rows `at`, which are float64 indices."""
     import drjit as dr
 
     types, n = u.types, len(how.pupil.at)
@@ -259,7 +259,7 @@ def _entries(u: Field, at: tuple[Array, Array], beam: Beam, problem: Problem, ho
     rho2 = x * x + y * y + z * z
     excess = xi * xi + eta * eta - 2 * (x * xi + y * eta)
     distance = dr.sqrt(rho2 + excess)
-    # The Fourier kernel is fixed while nodes move with the radius. The slow factor accounts for the movement.
+    # The Fourier kernel stays fixed if the radius, and with it the nodes, change. The slow factor contains the change.
     directions = types.Float64(padded_for_packets(how.directions))
     s, t = (dr.gather(types.Float64, directions, types.Index(index)) for index in (i, j))
     fixed = from_centre[0] * s + from_centre[1] * t
@@ -281,7 +281,7 @@ def _split(index: Array, n: int, types: Precision) -> tuple[Array, Array]:
 
 
 def _fourier(at: np.ndarray, problem: Problem, how: LowRankSampling) -> np.ndarray:
-    """Return A[x, (a, ξ)] = L_a(u) e^{-ik s u} at positions u along an axis [m] from the window's centre."""
+    """Return A[x, (a, ξ)] = L_a(u) e^{-ik s u} for positions u [m] along an axis, relative to the window's centre."""
     waves = np.outer(at, how.directions) / -problem.wavelength
     angle = (2 * np.pi * (waves - np.rint(waves))).astype(problem.dtype)
     weight = lagrange_basis(at, how.half_width * chebyshev_points(how.rank)).T.astype(problem.dtype)

@@ -1,4 +1,4 @@
-"""The interface of all methods: the samples with which a method meets a tolerance, and the PSF from these samples."""
+"""The interface of all methods: samples with which a method meets a tolerance, and the PSF from these samples."""
 
 from __future__ import annotations
 
@@ -13,14 +13,17 @@ __all__ = ["Sampling", "WithField"]
 
 
 class WithField(Protocol):
-    """The additional interface of exact methods except "far_field": the complex field."""
+    """The additional interface of all exact methods except "far_field": the complex field."""
 
     def field(self, beam: Beam, problem: Problem) -> Field:
         """Return U over the window for unit amplitude at the pupil, without the carrier e^{ikz}."""
 
 
 class Sampling(Protocol):
-    """Samples with which one method solves a problem. The predicted time is for a warm kernel on two cores."""
+    """Samples with which one method solves a problem.
+
+    The predicted time is for a compiled kernel on two cores.
+    """
 
     @property
     def method(self) -> str: ...
@@ -30,7 +33,7 @@ class Sampling(Protocol):
 
     @property
     def samples(self) -> tuple[int, int]:
-        """(y, x) samples of the pupil, or (radial, angular) nodes, or (nodes, 1)."""
+        """Numbers of samples of the pupil (y, x), or numbers of nodes: (radial, angular), or (nodes, 1)."""
 
     @property
     def padding(self) -> float:
@@ -38,7 +41,7 @@ class Sampling(Protocol):
 
     @property
     def largest(self) -> int:
-        """Side of the largest square array."""
+        """Side of the largest square array that is computed."""
 
     @property
     def model_error(self) -> float:
@@ -48,4 +51,8 @@ class Sampling(Protocol):
         """Return |U|² over the window for unit amplitude at the pupil, a flat Dr.Jit array."""
 
     def plane(self, problem: Problem) -> float:
-        """Return the width [m] over which rounding errors spread the pupil's light."""
+        """Return the width [m] of the plane over which rounding errors spread light.
+
+        An error with the power of the pupil's light, spread evenly over this width, has the intensity 1/width². The
+        wider the plane, the smaller are the rounding errors within the window.
+        """

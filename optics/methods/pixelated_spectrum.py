@@ -1,8 +1,8 @@
-"""The angular spectrum of a pupil of pixels: exact sums over nodes within pixels instead of a transform.
+"""The angular spectrum of a pupil of pixels. Sums over nodes within pixels replace the transform of a grid.
 
-To compute the spectrum up to a given frequency, the nodes must resolve that frequency within each pixel. Light beyond
-it, which jumps send in all directions, needs no samples. All further steps are the same as for other pupils
-(`angular_spectrum`).
+To compute the spectrum up to a given frequency, the nodes must resolve this frequency within each pixel. Jumps between
+pixels also diffract light to higher frequencies, but this light needs no samples. All further steps are the same as for
+other pupils (`angular_spectrum`).
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ __all__ = ["PixelSpectrum", "split_pixel_spectrum", "whole_pixel_spectrum"]
 
 @dataclass(frozen=True)
 class PixelSpectrum(SpectrumSampling):
-    """Spectrum of a pupil of pixels with nodes fitted to them."""
+    """Spectrum of a pupil of pixels, with nodes that are fitted to the pixels."""
 
     method: str
     pupil: PixelSamples
@@ -83,7 +83,7 @@ def _samplings(problem: Problem, method: str) -> list[PixelSpectrum]:
 
 
 def _nodes(problem: Problem, taper: Taper) -> PixelSamples | None:
-    """Return enough nodes in all pixels for the phase and every frequency that is kept."""
+    """Return nodes within pixels that resolve the phase and every frequency below the end of the taper."""
     assert problem.pixelated is not None
     cycles = problem.radius * (problem.phase_band_inside + taper.end)
     return pixel_samples(problem.pixelated, cycles, node_rule(problem)[1], problem.radius)
@@ -99,7 +99,7 @@ def _timed(sampling: PixelSpectrum, problem: Problem) -> PixelSpectrum:
 
 
 def _spectrum(u: Field, beam: Beam, how: PixelSpectrum, types: Precision) -> Field:
-    """Return Σ u(ξ) e^{-2πi f·ξ} at all frequencies of the grid: two matrix products W u Wᵀ, W = e^{-2πi f ξ}."""
+    """Return Σ u(ξ) e^{-2πi f·ξ} at all frequencies of the grid, by two matrix products W u Wᵀ, W = e^{-2πi f ξ}."""
     import drjit as dr
 
     nodes, grid = len(how.pupil.at), how.spectrum

@@ -1,4 +1,4 @@
-"""The parameters of a propagation that determine where a method must sample."""
+"""The parameters of a propagation from which a method derives its samples."""
 
 from __future__ import annotations
 
@@ -21,32 +21,36 @@ from optics.numerics.quadrature import stepped_up
 
 __all__ = ["SLOPE_MARGIN", "Problem", "PupilEdge"]
 
-# Choice, relative to the steepest slope of a wavefront: the grid of slopes may miss the steepest point.
+# Choice: factor on the steepest slope of a wavefront, because the grid of slopes may miss the steepest point.
 SLOPE_MARGIN = 1.02
-# Choice: amplitude ripple of the soft aperture and of the spectral taper, relative to the tolerance on intensity.
-# Edge-diffracted light has an amplitude error of several ripples, and its intensity has twice that. If a window
-# contains no other light, this error is half the tolerance.
+# Choice: amplitude ripple of the soft aperture and of the spectral taper, relative to the tolerance on intensity. The
+# relative error of the amplitude of edge-diffracted light is several ripples, and that of its intensity is twice as
+# large. In a window that contains no other light, the latter is half the tolerance.
 EDGE_RIPPLE_PER_TOLERANCE = 0.1
 BRIGHT_EDGE_RIPPLE_PER_TOLERANCE = 0.3
 
 
 @dataclass(frozen=True)
 class Problem:
-    """One monochromatic propagation from a pupil to a window, as numbers.
+    """One monochromatic propagation from a pupil to a window, described by numbers.
 
-    aperture: shape of the pupil. radius, distance [m]; wavelength [m] in the medium; window: output grid.
+    aperture: shape of the pupil.
+    radius, distance: radius of the pupil and distance of the window's plane [m].
+    wavelength: wavelength [m] in the medium.
+    window: grid of the output.
     phase_band: highest spatial frequency [1/m] in the pupil's phase, over the disk and its soft edge.
     phase_band_inside: the same over the disk alone, because a relief may be steep in the soft edge.
     detail: bandwidth [1/m] of the phase that the slopes of the wavefront do not include.
-    symmetric: whether nothing depends on the azimuth. even: whether nothing changes if x or y is mirrored.
-    widest_band: frequencies beyond it may be dropped (infinite: everything that reaches the window counts).
-    reach: distance from the axis [m] that contains all light except a fraction of the tolerance. Samples beyond it may
-        be wrong, and edge-diffracted light may be less accurate (None: the window counts to its corners).
+    symmetric: whether the light behind the pupil is rotationally symmetric. even: whether it is even in x and in y.
+    widest_band: frequency [1/m] beyond which light may be omitted (infinite: all light that reaches the window counts).
+    reach: distance [m] from the axis within which all light lies, except for a fraction of the tolerance. Samples
+        beyond it may be wrong, and edge-diffracted light may be less accurate (None: the whole window must be
+        accurate).
     slopes: slopes of the wavefront.
-    medium_n: index behind the pupil.
-    masked: whether a mask sends light to places that rays do not predict. Approximations then cannot predict their
+    medium_n: refractive index behind the pupil.
+    masked: whether a mask scatters light to places that rays do not predict. Approximations then cannot predict their
         error.
-    spread: of the light over the pupil, see `light_spread`.
+    spread: spread of the light over the pupil, see `light_spread`.
     """
 
     aperture: Aperture
@@ -70,7 +74,7 @@ class Problem:
 
     @classmethod
     def from_beam(cls, beam: Beam, window: Grid, tolerance: float, dtype: str = "float32") -> Problem:
-        """Return the problem of light that passes a pupil and arrives at a window.
+        """Return the problem for a beam that passes a pupil and arrives at a window.
 
         Raises:
             ValueError: the distance is not positive, the tolerance is not in [1e-12, 0.5], or the dtype is invalid.
@@ -83,15 +87,15 @@ class Problem:
 
     @cached_property
     def turning(self) -> float:
-        """Highest spatial frequency [1/m] in the combined phase of the pupil and the path to any point of the window.
+        """Highest frequency [1/m] in the combined phase of the pupil and of the path to any point of the window.
 
-        For a lens in focus it is far below the sum of the two.
+        For a lens in focus, it is far below the sum of the two separate frequencies.
         """
         return self._turning[0]
 
     @cached_property
     def turning_inside(self) -> float:
-        """Highest frequency [1/m] of the combined phase over the disk without its soft edge."""
+        """Highest frequency [1/m] of this combined phase over the disk without its soft edge."""
         return self._turning[1]
 
     @cached_property
@@ -109,7 +113,7 @@ class Problem:
 
     @property
     def pixelated(self) -> PixelatedAperture | None:
-        """The aperture if the phase behind it jumps from pixel to pixel, else None."""
+        """Aperture divided into pixels, if the phase jumps from pixel to pixel; else None."""
         return self.aperture if isinstance(self.aperture, PixelatedAperture) else None
 
     @property
@@ -119,7 +123,7 @@ class Problem:
 
     @property
     def fade_ripple(self) -> float:
-        """Allowed amplitude error of light from beyond the band."""
+        """Allowed amplitude error of light beyond the band."""
         return self.ripple if self.reach is None else 0.1  # choice: beyond the band there is hardly any light
 
     @property
@@ -132,7 +136,7 @@ class Problem:
 
     @property
     def steepest_sine(self) -> float:
-        """Largest sine of rays that meet in a point of the window."""
+        """Largest sine of the rays that meet in a point of the window; see `scalar_theory.steepest_sine`."""
         leaving = self.phase_band_inside * self.wavelength + self.wavelength / self.radius
         return steepest_sine(self.radius, self.distance, leaving)
 
@@ -146,14 +150,14 @@ class Problem:
         return PupilEdge(self.aperture.soften(stepped_up(band * self.radius), self.ripple, EDGE_REACH), self.radius)
 
     def band(self, margin: float = 0.0) -> float:
-        """Return the highest frequency [1/m] of light from the disk that can come within `margin` of the window."""
+        """Return the highest frequency [1/m] of light from the disk that can land within `margin` [m] of the window."""
         reach = (1 + EDGE_REACH) * self.radius + self.outermost + margin
         return min(self.widest_band, reach / math.hypot(reach, self.distance) / self.wavelength)
 
 
 @dataclass(frozen=True)
 class PupilEdge:
-    """A soft aperture on a pupil of the given radius, in metres."""
+    """A soft aperture, scaled to a pupil of the given radius [m]."""
 
     aperture: SoftAperture
     radius: float
@@ -179,7 +183,8 @@ def _problem(beam: Beam, window: Grid, tolerance: float, dtype: str) -> Problem:
     slopes = pupil.slopes(wavelength, beam.source)
     pixels = pupil.pixels if pupil.bends(wavelength) else 0
     on_axis = beam.source.angle == (0.0, 0.0)
-    detail = pupil.bandwidth(wavelength, tolerance / 10)  # choice: a tenth of the tolerance, for the phase [rad]
+    # Choice: a tenth of the tolerance, as an error of the phase [rad].
+    detail = pupil.bandwidth(wavelength, tolerance / 10)
     return Problem(
         aperture=PixelatedAperture(pupil.aperture, pixels) if pixels else pupil.aperture,
         radius=pupil.radius,

@@ -1,6 +1,6 @@
 """Samples of the pupil for matrix products: a grid with a softened edge, or nodes within pixels.
 
-Both are rows and columns of positions, the same along x and y.
+In both cases, the samples form rows and columns, with the same positions along x and along y.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from optics.numerics.precision import Precision, opaque, padded_for_packets
 
 __all__ = ["GridSamples", "PixelSamples", "PupilSamples", "pixel_samples", "samples_of"]
 
-MOST_ACROSS = 1e6  # choice, limited by memory
+MOST_ACROSS = 1e6  # choice, limited by memory: largest number of samples across the pupil
 
 
 class PupilSamples(Protocol):
@@ -31,7 +31,7 @@ class PupilSamples(Protocol):
 
     @property
     def at(self) -> np.ndarray:
-        """Positions along either axis: in metres or as sines."""
+        """Positions along either axis, in metres or as sines."""
 
     @property
     def outermost(self) -> float:
@@ -42,7 +42,7 @@ class PupilSamples(Protocol):
         """Approximate time of `field`."""
 
     def places(self, i: Array, j: Array, beam: Beam, types: Precision) -> tuple[Array, Array]:
-        """Return the points (x, y) [m] of samples i along x and j along y, which are float64 indices.
+        """Return the points (x, y) [m] of samples. i and j are their float64 indices along x and along y.
 
         The points carry the derivatives of the beam's radius.
         """
@@ -82,9 +82,9 @@ class GridSamples:
 
 @dataclass(frozen=True)
 class PixelSamples:
-    """Nodes within the pixels of an aperture, `across` per pixel along each axis.
+    """Nodes within the pixels of an aperture. Each pixel has `across` nodes along each axis.
 
-    They are computed when needed, because plans are cached for a long time.
+    The nodes are computed on request and not stored, because plans are cached for a long time.
     """
 
     aperture: PixelatedAperture
@@ -99,7 +99,8 @@ class PixelSamples:
     def outermost(self) -> float:
         """Distance from the axis [m] beyond which the pupil is dark.
 
-        Pixels that the edge cuts have nodes beyond it. The edge itself lies within the radius.
+        Pixels that the edge cuts also have nodes outside the aperture, but with the weight of the open part alone. The
+        edge itself lies within the radius.
         """
         return self.radius * (1 + math.sqrt(2) * 2 / self.aperture.count)
 
@@ -129,18 +130,18 @@ class PixelSamples:
 
 
 def pixel_samples(aperture: PixelatedAperture, cycles: float, digits: float, radius: float) -> PixelSamples | None:
-    """Return the fewest nodes that give `digits` digits for `cycles` cycles per radius.
+    """Return the fewest nodes with an accuracy of `digits` digits for `cycles` cycles per radius.
 
-    None if the pixels are too coarse.
+    The result is None if the pixels are too coarse.
     """
     across = aperture.nodes_across(cycles, digits)
     return None if across is None else PixelSamples(aperture, across, radius)
 
 
 def samples_of(problem: Problem) -> PupilSamples | None:
-    """Return the fewest samples for the combined phase of pupil and path.
+    """Return the fewest samples that resolve the combined phase of pupil and path.
 
-    None if pixels are too coarse for it, or if a grid would be too large.
+    The result is None if pixels are too coarse for this phase, or if a grid would be too large.
     """
     if problem.pixelated is not None:
         return pixel_samples(problem.pixelated, *node_rule(problem), problem.radius)

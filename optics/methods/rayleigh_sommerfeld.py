@@ -1,4 +1,4 @@
-"""The first Rayleigh-Sommerfeld integral as a direct sum over edge-fitted nodes: the reference."""
+"""The first Rayleigh-Sommerfeld integral as a direct sum over nodes fitted to the edge. This is the reference."""
 
 from __future__ import annotations
 
@@ -31,12 +31,12 @@ __all__ = [
     "turns",
 ]
 
-MOST_DIGITS = 14.0  # choice: digits of float64 sums, which have 16
-# Choice: the quadrature rule is for the highest frequency anywhere and is therefore more accurate than requested.
+MOST_DIGITS = 14.0  # choice: most digits that can be requested of float64 sums, whose numbers have 16
+# Choice: digits beyond the tolerance. They are few, because the rule resolves the highest frequency everywhere.
 SPARE_DIGITS = 0.5
-ON_AXIS = 1e-9  # rounding, relative to the radius
-SMALL_RULE = 5000  # choice, limited by memory: rules with at most this number of nodes have a larger cache
-FAR = 0.25  # choice: radius over distance below which nodes for the phase are sufficient for the kernel
+ON_AXIS = 1e-9  # rounding: points closer to the x axis than this share of the radius lie on it
+SMALL_RULE = 5000  # choice, limited by memory: more rules are cached if they have at most this number of nodes
+FAR = 0.25  # choice: ratio of radius to distance below which nodes for the phase also resolve the kernel
 
 
 Rule = tuple[Aperture, float, float, bool]
@@ -46,7 +46,7 @@ Rule = tuple[Aperture, float, float, bool]
 class NodeSampling:
     """Quadrature nodes fitted to the aperture's edge, accurate to `digits` for `cycles` cycles per radius.
 
-    line: the radii on which a rotationally symmetric image is computed, else None.
+    line: radii at which a rotationally symmetric image is computed; None if it is computed at every sample.
     """
 
     aperture: Aperture
@@ -79,9 +79,10 @@ class NodeSampling:
         return on_line(direct_sum(beam, self.rule, r, 0 * r, types), self.line, beam, problem)
 
     def plane(self, problem: Problem) -> float:
-        """Return the width [m] over which rounding errors spread the pupil's light.
+        """Return the width [m] of the plane over which rounding errors spread light.
 
-        It is the width of the focus times the square root of the number of summands.
+        It is the width of the focus times the square root of the number of nodes, because the rounding errors of the
+        summands are independent.
         """
         return problem.wavelength * problem.distance / problem.radius * math.sqrt(self.count / math.pi)
 
@@ -99,7 +100,7 @@ class NodeSampling:
 
 
 def nodes(problem: Problem) -> list[NodeSampling]:
-    """Return a sampling with enough nodes for the cycles of pupil and path together."""
+    """Return a sampling whose nodes resolve the combined phase of pupil and path."""
     cycles, digits = node_rule(problem)
     count = node_count(problem.aperture, cycles, digits)
     line, outputs = None, math.prod(problem.window.shape)
@@ -117,16 +118,17 @@ def node_rule(problem: Problem) -> tuple[float, float]:
     """Return the cycles per radius and the digits that a quadrature rule must provide."""
     digits = min(SPARE_DIGITS - math.log10(problem.tolerance), MOST_DIGITS)
     cycles = turns(problem, digits)
-    # For pixels there are already few different rules.
+    # Rounding up limits the number of different rules. For pixels, there are few different rules anyway.
     return cycles if problem.pixelated else stepped_up(cycles), digits
 
 
 def turns(problem: Problem, digits: float) -> float:
     """Return the cycles per radius that the nodes must resolve.
 
-    These are the cycles of the phase. Near the pupil, cycles are added that represent the poles of the kernel at height
-    z above the plane. Gauss-Legendre over [0, R] and the trapezoid rule around a ring of radius R converge like
-    e^{-4nz/R} and e^{-nz/R}. In a focus, where the phase is constant, only these poles count.
+    These are the cycles of the phase. In addition, the kernel has poles at the height z above the pupil's plane. If z
+    is short, the poles slow convergence: Gauss-Legendre rules over [0, R] converge like e^{-4nz/R}, and the trapezoid
+    rule around a ring of radius R like e^{-nz/R}. Additional cycles then represent the poles. In a focus, where the
+    phase is constant, only the poles matter.
     """
     phase, poles = problem.radius * problem.turning_inside, digits * math.log(10) / (2 * math.pi)
     nearness = problem.radius / problem.distance
@@ -134,9 +136,9 @@ def turns(problem: Problem, digits: float) -> float:
 
 
 def node_count(aperture: Aperture, cycles: float, digits: float) -> int:
-    """Return the number of nodes.
+    """Return the number of nodes of a quadrature rule.
 
-    Beyond a hundred cycles it grows like their square and is extrapolated.
+    Beyond a hundred cycles, it is extrapolated in proportion to the square of the cycles.
     """
     most = 100.0
     counted = aperture.node_count(min(cycles, most), digits)
@@ -146,9 +148,10 @@ def node_count(aperture: Aperture, cycles: float, digits: float) -> int:
 
 
 def cached_nodes(aperture: Aperture, cycles: float, digits: float, halved: bool = False) -> Nodes:
-    """Return the nodes of an aperture.
+    """Return the nodes of an aperture, from a cache if possible.
 
-    halved: only nodes on one side of the x axis, for sums that are the same on both sides, at points on that axis.
+    halved: whether to return only nodes on one side of the x axis. This is for mirror-symmetric pupils and points on
+        the x axis, for which both sides contribute the same.
     """
     small = (aperture.node_count(cycles, digits) or math.inf) <= SMALL_RULE
     return (_small_rules if small else _large_rules)(aperture, cycles, digits, halved)
@@ -168,9 +171,9 @@ _large_rules = lru_cache(maxsize=16)(_made)
 
 
 def _intensity_band(problem: Problem) -> float:
-    """Return the highest frequency [1/m] of the intensity over the window.
+    """Return the highest spatial frequency [1/m] of the intensity over the window.
 
-    It results from interference of rays from opposite rims of the disk.
+    It results from interference between rays from opposite sides of the rim.
     """
     reach = problem.radius + problem.outermost
     steepest = reach / math.hypot(reach, problem.distance) / problem.wavelength
@@ -181,7 +184,9 @@ def direct_sum(beam: Beam, rule: Rule, x: Array, y: Array, types: Precision) -> 
     """Return the first Rayleigh-Sommerfeld integral at points (x, y) [m].
 
     U(x) = ∫ P(ξ) z/(2πD²) (1/D - ik) e^{ikD} dξ (Goodman, §3.5). Whole waves of D - z = d²/(D + z) are subtracted in
-    float64. rule: (aperture, cycles, digits, halved) of the nodes.
+    float64.
+
+    rule: aperture, cycles, digits and `halved` of the nodes, see `cached_nodes`.
     """
     import drjit as dr
 
@@ -195,7 +200,7 @@ def direct_sum(beam: Beam, rule: Rule, x: Array, y: Array, types: Precision) -> 
     waves = beam.waves(nodes_x, nodes_y, types)
     dr.eval(nodes_x, nodes_y, weight, waves, x, y)
     count = dr.opaque(types.Index, len(found.weight))
-    cycles = 1 / wavelength  # per metre: divisions take most of the time per node
+    cycles = 1 / wavelength  # multiplication by this number is faster than division by the wavelength
     k = 2 * math.pi * cycles
 
     def add(i: Array, re: Array, im: Array) -> tuple[Array, Array, Array]:

@@ -1,4 +1,4 @@
-"""End points of a pupil's rays in geometrical optics, from which approximate methods predict their error."""
+"""Rays of a pupil in geometrical optics. Approximate methods predict their errors from the rays' end points."""
 
 from __future__ import annotations
 
@@ -13,18 +13,19 @@ from optics.elements.wavefront_slopes import Slopes
 
 __all__ = ["MARGIN", "Rays", "brightness", "disk_area", "mismatch"]
 
-CELLS = 32  # choice: cells along each side of the area that rays hit
+CELLS = 32  # choice: number of cells along each side of the area that rays hit
 ACROSS = 65  # choice: largest number of rays along a diameter
-# Choice: factor on predicted model errors, which are estimated from a few rays. test_fresnel.py and test_geometric.py
-# check on random pupils that the predictions with it exceed the true errors.
+# Choice: safety factor on predicted model errors, which are estimated from a few rays. test_fresnel.py and
+# test_geometric.py check for random pupils that predictions with this factor exceed the true errors.
 MARGIN = 1.4
 
 
 @dataclass(frozen=True, eq=False)
 class Rays:
-    """Rays from points (x, y) of the aperture to points (to_x, to_y) of the plane behind it [m].
+    """Rays from points (x, y) of the aperture to points (to_x, to_y) of a plane behind it. Lengths in m.
 
-    norm: half the squared norm of the gradient of this map. determinant: of the gradient.
+    norm, determinant: half the squared Frobenius norm, and the determinant, of the gradient of the map from (x, y) to
+        (to_x, to_y).
     """
 
     x: np.ndarray
@@ -36,21 +37,21 @@ class Rays:
 
     @cached_property
     def most(self) -> np.ndarray:
-        """Largest stretch of the map at each ray: the larger singular value of its gradient."""
+        """Largest magnification at each ray: the larger singular value of the map's gradient."""
         root = np.sqrt(np.maximum(np.square(self.norm) - np.square(self.determinant), 0))
         found: np.ndarray = np.sqrt(self.norm + root)
         return found
 
     @cached_property
     def least(self) -> np.ndarray:
-        """Smallest stretch of the map at each ray: the smaller singular value of its gradient."""
+        """Smallest magnification at each ray: the smaller singular value of the map's gradient."""
         return np.abs(self.determinant) / np.maximum(self.most, 1e-30)
 
     @classmethod
     def from_slopes(cls, slopes: Slopes, aperture: Aperture, distance: float, medium_n: float) -> Rays:
         """Return the rays that propagate (sine of the angle below 1).
 
-        The angle follows from the local slope p: tan θ = p/√(1 - p²).
+        The angle θ follows from the local slope p of the wavefront: tan θ = p/√(1 - p²).
         """
         step = max(1, (slopes.grid.shape[0] - 1) // (ACROSS - 1))
         centred = slice(slopes.grid.shape[0] // 2 % step, None, step)
@@ -75,11 +76,11 @@ class Rays:
 
     @property
     def image_area(self) -> float:
-        """Area [m²] of the disk whose points have the same mean square distance from the centre as the rays' ends."""
+        """Area [m²] that the rays' ends cover, see `disk_area`."""
         return disk_area(self.to_x, self.to_y)
 
     def densest(self) -> list[tuple[float, float]]:
-        """Return the median (x, y) of the rays' ends, and their mean in the fullest of CELLS² cells."""
+        """Return two points (x, y): the median of the rays' ends, and their mean in the cell with the most rays."""
         counts, x, y = np.histogram2d(self.to_x, self.to_y, CELLS)
         i, j = np.unravel_index(counts.argmax(), counts.shape)
         within = (self.to_x >= x[i]) & (self.to_x <= x[i + 1]) & (self.to_y >= y[j]) & (self.to_y <= y[j + 1])
@@ -87,9 +88,10 @@ class Rays:
         return [(float(np.median(self.to_x)), float(np.median(self.to_y))), middle]
 
     def some(self, most: int) -> Rays:
-        """Return `most` rays, evenly spread, or all if there are fewer.
+        """Return `most` evenly spread rays, or all rays if there are fewer.
 
-        Steps of the golden section do not align with the rows of the grid.
+        The index advances in steps of the golden section, so that the selected rays do not align with the rows of the
+        grid.
         """
         turns = (np.arange(min(most, len(self))) + 0.5) * (math.sqrt(5) - 1) / 2
         chosen = ((turns % 1) * len(self)).astype(int) if most < len(self) else slice(None)
@@ -98,23 +100,25 @@ class Rays:
 
 
 def disk_area(x: np.ndarray, y: np.ndarray) -> float:
-    """Return the area of the disk whose points have the same mean square distance from the centre as these."""
+    """Return the area of a uniform disk with the same mean square distance from its centre as the given points."""
     return 2 * math.pi * float(np.var(x) + np.var(y)) if len(x) else 0.0
 
 
 def brightness(area: float, cell: float) -> float:
-    """Return the sum of squared samples, times `cell` [m²], of unit power diffracted into `area` [m²].
+    """Return the sum of squared samples of a PSF, times the area `cell` [m²] of a sample.
 
-    This is 1/area. If samples may hit the peak without resolving it, it is the value at the peak (Airy's peak is π²/4
-    times the mean over its area).
+    The PSF is a unit power that diffraction has spread over `area` [m²].
+
+    The result is 1/area. If samples are so coarse that one may hit the peak of the PSF without resolving it, the result
+    is that for the peak alone (the peak of the Airy pattern is π²/4 times the mean over its area).
     """
     area = max(area, 1e-30)
     return max(1.0, (math.pi**2 / 4) ** 2 * cell / area) / area
 
 
 def mismatch(wrong: float, exact: float) -> float:
-    """Return the relative L2 error, with a margin, if other light replaces the exact light and hardly overlaps it.
+    """Return the relative L2 error, with a margin, if wrong light replaces the exact light and hardly overlaps it.
 
-    wrong, exact: brightness of both, see `brightness`.
+    wrong, exact: brightness of the wrong and of the exact light, see `brightness`.
     """
     return MARGIN * math.sqrt(1 + wrong / exact)

@@ -1,11 +1,12 @@
-"""Samples of a pupil that are evenly spaced as seen from the window: in the sines of the rays to its centre.
+"""Samples of a pupil that are evenly spaced in the sines of the rays to the window's centre.
 
 The distance from a point ξ of the pupil to points x = c + u of a window about c is
 
     |x - ξ| = √(D² - 2 u·(ξ - c) + u²) = D - u·s + (u² - (u·s)²)/2D + ...,   s = (ξ - c)/D,   D = |(ξ - c, z)|.
 
-In terms of s, the part that is linear in u is the Fourier kernel to all orders of the aperture. The remainder falls
-with the distance. It is the curvature of about u²NA²/λD cycles that the obliquity of the rays adds over the window.
+With s as the variable, the term that is linear in u is exactly the Fourier kernel, however wide the aperture is. The
+remaining terms fall with the distance. They are a curvature of about u²NA²/λD cycles over the window, due to the
+obliquity of the rays.
 """
 
 from __future__ import annotations
@@ -27,17 +28,19 @@ from optics.numerics.precision import Precision, opaque, padded_for_packets
 
 __all__ = ["SineSamples", "sine_samples"]
 
-# Choice: largest stretch of the pupil relative to an even spacing; beyond it too many samples are necessary.
+# Choice: largest ratio between the distances of samples in the pupil; above it, too many samples are necessary.
 MOST_STRETCH = 3.0
-RIM = 64  # points on the rim that determine the range of the sines
+RIM = 64  # number of points on the rim from which the range of the sines is determined
 
 
 @dataclass(frozen=True)
 class SineSamples:
-    """A grid of sines about the sines of the pupil's centre. It represents a soft aperture.
+    """A soft aperture on a grid of sines. The grid lies around the sines of the pupil's centre.
 
-    grid: of s - s₀, where s₀ are the sines of the pupil's centre. centre: of the window (x, y) [m]. distance: to its
-        plane [m]. steepest: |s| of the outermost sample with light.
+    grid: grid of s - s₀, where s₀ are the sines of the pupil's centre.
+    centre: centre (x, y) [m] of the window.
+    distance: distance [m] to the window's plane.
+    steepest: |s| of the outermost sample with light.
     """
 
     edge: PupilEdge
@@ -83,9 +86,9 @@ class SineSamples:
         return sx * slant + opaque(types, self.centre[0]), sy * slant + opaque(types, self.centre[1])
 
     def _cosine(self, sx: Array, sy: Array, types: Precision) -> Array:
-        """Return the cosine of the ray's angle to the axis.
+        """Return the cosine of the angle between ray and axis.
 
-        Beyond the outermost sample with light it stays constant.
+        Beyond the outermost sample with light, the cosine stays constant.
         """
         import drjit as dr
 
@@ -113,18 +116,18 @@ def _sines(x: np.ndarray, y: np.ndarray, centre: tuple[float, float], distance: 
 
 
 def _middle(centre: tuple[float, float], distance: float) -> tuple[float, float]:
-    """Return s₀, the sines of the ray from the centre of the pupil."""
+    """Return s₀, the sines of the ray from the pupil's centre to the window's centre."""
     slant = math.hypot(*centre, distance)
     return -centre[0] / slant, -centre[1] / slant
 
 
 def sine_samples(problem: Problem) -> SineSamples | None:
-    """Return the fewest samples for the combined phase of pupil and path.
+    """Return the fewest samples that resolve the combined phase of pupil and path.
 
-    None if the sines are too dense towards the rim, or if the grid would be too large.
+    The result is None if even spacing in sines is too uneven in the pupil, or if the grid would be too large.
 
-    The map from sines to the pupil stretches by z/cos³θ at most. The number of cycles per unit of sine is the number of
-    cycles per metre times this factor.
+    The distance of two points in the pupil is at most z/cos³θ times the distance of their sines. The number of cycles
+    per unit of sine is therefore the number of cycles per metre times this factor.
     """
     edge = problem.soft_edge(problem.turning)
     angle = np.linspace(0, 2 * np.pi, RIM, endpoint=False)

@@ -1,12 +1,12 @@
-"""The exact vector field behind a plane pupil: Smythe's integral of fields that scalar methods propagate.
+"""The exact vector field behind a plane pupil: Smythe's integral, computed with scalar methods.
 
-W. R. Smythe, Phys. Rev. 72, 1066 (1947) derives the field behind the pupil from the field E in its plane:
+W. R. Smythe, Phys. Rev. 72, 1066 (1947), derived the field behind the pupil from the field E in its plane:
 
     E(r) = 1/2π ∇ × ∫ (ẑ × E) e^{ikR}/R dξ.
 
-The x and y components are the first Rayleigh-Sommerfeld integrals of Ex and Ey. The z component is the integral of
--(E·(r - ξ))/z, in which r and ξ can be separated. This gives three fields, each behind a mask, for each of two planes
-of polarisation.
+The x and y components are the first Rayleigh-Sommerfeld integrals of Ex and Ey. The z component is the same integral of
+-(E·(r - ξ))/z, in which terms with r and with ξ can be separated. For each of the two planes of polarisation, scalar
+methods therefore propagate three fields, each of them behind a mask.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ MOMENT = (0.0, 0.0, 1.0, 0.0, 1.0)
 
 
 def smythe(beam: Beam, window: Grid, propagated: Callable[[Beam], np.ndarray]) -> np.ndarray:
-    """Return Ex, Ey, Ez of light that is polarised along x before the pupil, and the same for y, (6, y, x).
+    """Return Ex, Ey, Ez for light that is polarised along x in front of the pupil, and the same for y, (6, y, x).
 
     propagated: function that returns the scalar field of a beam over the window, (y, x).
     """

@@ -11,17 +11,22 @@ from optics.numerics.precision import Precision, opaque
 
 __all__ = ["FADES", "TAPER_END_SINE", "Taper", "tapers"]
 
-# Choice: the taper must end below this sine, because z tan θ has no bound at grazing incidence.
+# Choice: sine at which the taper must end at the latest, because z tan θ has no bound at grazing incidence.
 TAPER_END_SINE = 0.9995
-FADES = (0.03, 0.06, 0.12, 0.25, 0.5, 1.0, 2.0, 4.0)  # choice: blurs to try, in units of the problem's size
+# Choice: blurs to try, relative to the sum of the sizes of pupil and window.
+FADES = (0.03, 0.06, 0.12, 0.25, 0.5, 1.0, 2.0, 4.0)
 
 
 @dataclass(frozen=True)
 class Taper:
-    """A spectrum that fades out from `band` over `width` [1/m], which blurs the field by `blur` [m].
+    """A taper that fades a spectrum out between the frequencies `band` and `band` + `width` [1/m].
 
-    The taper is an error function. The transform of its derivative falls to the ripple within the blur. Light that the
-    taper removes must therefore land at least that far outside the window.
+    It blurs the field by `blur` [m].
+
+    The taper is an error function. The transform of its derivative falls to the ripple within the distance `blur`.
+    Light that the taper removes must therefore land at least this far outside the window.
+
+    sine, tangent: sine and tangent of the angle at which the taper ends.
     """
 
     band: float
@@ -41,15 +46,17 @@ class Taper:
         return self.band + self.width
 
     def fade(self, f2: Array, types: Precision) -> Array:
-        """Return 1 below the band and 0 beyond its end. The error function falls to the ripple in √ln(1/ripple).
+        """Return the taper: 1 below the band, and 0 beyond its end.
 
-        f2: f², float64.
+        The error function falls to the ripple at the argument √ln(1/ripple).
+
+        f2: squared frequencies f², float64.
         """
         import drjit as dr
 
         steepness = 2 / self.width * math.sqrt(math.pi * self.width * self.blur / 2)
         middle = self.band + self.width / 2
-        # f - m = (f² - m²) / (f + m), so a low-precision root is sufficient.
+        # f - m = (f² - m²) / (f + m), so a root of low precision is sufficient.
         beyond = types.Float((f2 - opaque(types, middle**2)) * opaque(types, steepness / middle))
         return (1 - dr.erf(beyond / (1 + dr.sqrt(types.Float(f2 * opaque(types, middle**-2)))))) / 2
 

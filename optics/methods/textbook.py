@@ -1,7 +1,8 @@
 """The textbook angular spectrum of a pupil's field in plain NumPy: the integral that all other methods compute.
 
-Read this first. It is slow, coarse at the pupil's edge, and correct only if its single grid is fine and wide enough.
-Tests compare the other methods with it. Goodman is Introduction to Fourier Optics, third edition.
+Read this module first. Its method is slow, coarse at the pupil's edge, and correct only if the single grid is fine and
+wide enough. Tests compare the other methods with it. References are to Goodman, Introduction to Fourier Optics, third
+edition.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ __all__ = ["angular_spectrum_psf", "lens_path", "positions", "relief_path"]
 
 
 def positions(samples: int, dx: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return x as a row and y as a column [m], with the origin at sample samples//2."""
+    """Return the positions x as a row and y as a column [m]. The origin is at sample samples//2."""
     x = (np.arange(samples) - samples // 2) * dx
     return x[None, :], x[:, None]
 
@@ -20,8 +21,8 @@ def positions(samples: int, dx: float) -> tuple[np.ndarray, np.ndarray]:
 def lens_path(x: np.ndarray, y: np.ndarray, focal_length: float) -> np.ndarray:
     """Return the optical path [m] through an ideal lens.
 
-    It is shorter by the amount by which the distance from (x, y) to the focus is longer. For a small pupil it is -r²/2f
-    (Goodman, eq. 5-10).
+    The path through (x, y) is shorter than the path through the centre by the same amount by which the distance from
+    (x, y) to the focus is longer. For a small pupil, it is -r²/2f relative to the centre (Goodman, eq. 5-10).
     """
     return focal_length - np.sqrt(x**2 + y**2 + focal_length**2)
 
@@ -34,13 +35,16 @@ def relief_path(height: np.ndarray, n: float) -> np.ndarray:
 def angular_spectrum_psf(path: np.ndarray, dx: float, radius: float, wavelength: float, distance: float) -> np.ndarray:
     """Return |U|² / (pupil area) [1/m²] in a plane behind a circular pupil, on the pupil's own grid.
 
-    path: (n, n), optical path [m] through the pupil at `positions(n, dx)`. A plane wave of amplitude 1 arrives.
-    dx: pitch [m], less than half the distance over which the phase changes by one wave. n dx: several times the width
-        of the pupil, because the transform repeats the field beyond it.
-    radius, wavelength (in air), distance: [m].
+    A plane wave of amplitude 1 illuminates the pupil.
+
+    path: (n, n), optical path [m] through the pupil at `positions(n, dx)`.
+    dx: pitch [m]. It must be less than half the distance over which the phase changes by one wave. The width n dx must
+        be several times the width of the pupil, because the transform repeats the field beyond this width. radius,
+        wavelength, distance: radius of the pupil, wavelength in air and distance of the plane [m].
     """
     x, y = positions(len(path), dx)
-    inside = np.clip((radius - np.hypot(x, y)) / dx + 0.5, 0, 1)  # 1 or 0; on the edge, the covered fraction of a cell
+    # 1 inside, 0 outside; on the edge, about the covered fraction of a cell.
+    inside = np.clip((radius - np.hypot(x, y)) / dx + 0.5, 0, 1)
     field = inside * np.exp(2j * np.pi / wavelength * path)  # field just behind the pupil (§5.1, a thin element)
 
     spectrum = np.fft.fft2(np.fft.ifftshift(field))  # plane waves of frequencies (fx, fy) [1/m] (§3.10.1)

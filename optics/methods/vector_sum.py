@@ -1,12 +1,14 @@
-"""The approximate vector field in a focus: Debye's sum of plane waves, one from each point of a pupil.
+"""The approximate vector field in a focus: Debye's sum of plane waves, one for each point of a pupil.
 
-Light from ξ reaches the image position c after a distance D. There it is approximated by a plane wave:
+Light from the point ξ of the pupil arrives at the image position c after a distance D. Near c it is approximated by a
+plane wave:
 
     E(c + x) = -ik/2π ∫ P(ξ) e^{ik(L + D)} g(ξ) e(ξ) e^{ik s·x} dξ,   s = (c - ξ)/D,   g = z/D².
 
-L is the path through the pupil, and e the field of rays behind it (`ray_field`). With e = 1 this is
-Rayleigh-Sommerfeld's integral about c, with one approximation: the term ik(|x|² - (s·x)²)/2D of the exponent has its
-value at the pupil's centre for all points. With rotational symmetry the sum equals Richards and Wolf's integral (1959).
+L is the path through the pupil, and e is the field of rays behind it (`ray_field`). With e = 1, this is the
+Rayleigh-Sommerfeld integral about c with one approximation: for all points of the pupil, the term ik(|x|² - (s·x)²)/2D
+of the exponent is replaced by its value at the pupil's centre. With rotational symmetry, the sum equals the integral of
+Richards and Wolf (1959).
 """
 
 from __future__ import annotations
@@ -31,9 +33,9 @@ DIGITS = 8.0  # choice: digits of the quadrature and of the sum
 
 @dataclass(frozen=True)
 class VectorSum:
-    """Light through a pupil to samples about an image position, window.centre.
+    """Light that passes a pupil and arrives at samples around an image position c, window.centre.
 
-    aplanatic: whether the pupil is seen from c under the sine ξ/z, with all rays in phase.
+    aplanatic: whether the ray from ξ arrives at c with the sine ξ/z, and all rays arrive in phase.
     """
 
     beam: Beam
@@ -41,10 +43,10 @@ class VectorSum:
     aplanatic: bool = False
 
     def components(self) -> np.ndarray:
-        """Return Ex, Ey, Ez for light polarised along x, the same for y, and the scalar field, (7, y, x), complex.
+        """Return Ex, Ey, Ez for light polarised along x, the same for y, and the scalar field: (7, y, x), complex.
 
-        The polarisation is that before the pupil. The fields are divided by the square root of the pupil's area and
-        omit the carrier e^{ikz}.
+        The polarisation is that of the light in front of the pupil. Fields are divided by the square root of the
+        pupil's area and do not contain the carrier e^{ikz}.
         """
         x, y, amplitude = self._pupil()
         (cx, cy), z = self.window.centre, number(self.beam.distance)
@@ -56,7 +58,7 @@ class VectorSum:
         for axis in (0, 1):
             along, before = before_pupil(self.beam.source, axis)
             ex, ey, ez = turned(before, along, rays)
-            # Maxwell's equations give Ez from the other two. Along its own ray it equals Ez of the turned field.
+            # Ez follows from Ex and Ey by Maxwell's equations. Along the ray to c, it equals Ez of the rotated field.
             parts += [ex, ey, ez if self.aplanatic else -(ex * (cx - x) + ey * (cy - y)) / z]
         found = sums.evaluate(np.array([*parts, np.ones(len(x))]) * amplitude) / math.sqrt(self.beam.pupil.area)
         return found if self.aplanatic else found * self._bend()
@@ -91,7 +93,7 @@ class VectorSum:
         if self.aplanatic:
             turning = beam.index * self.window.own_half_diagonal / z
         detail = RayField(beam, 0, SCALAR).bandwidth(1e-6, pupil.radius) * pupil.radius
-        # Directions and obliquity add no phase, but they are not polynomials: their poles lie at height z.
+        # Directions and obliquity add no phase, but they are not polynomials: they have poles at the height z.
         poles = DIGITS * math.log(10) / (2 * math.pi) * pupil.radius / z
         return pupil.radius * turning / beam.wavelength + detail + poles
 

@@ -2,7 +2,7 @@
 
 accuracy        Plan and AccuracyError: predicted errors of results
 arguments       checks of user input
-autodiff        Array, Scalar: values that may carry derivatives
+autodiff        Array and Scalar: values that may carry derivatives
 backend         the LLVM library that Dr.Jit compiles with
 device          processor or GPU
 bessel          J0 on Dr.Jit arrays

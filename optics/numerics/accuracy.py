@@ -7,8 +7,8 @@ from dataclasses import dataclass
 __all__ = ["FLOAT_NOISE", "MOST_SAMPLES", "AccuracyError", "Option", "Plan"]
 
 
-# Choice: side of the largest square array. 4096² complex64 numbers take 134 MB, and a handful of such arrays exist at
-# once.
+# Choice: side of the largest square array. 4096² complex64 numbers take 134 MB, and several such arrays exist at the
+# same time.
 MOST_SAMPLES = 4096
 
 
@@ -16,13 +16,13 @@ MOST_SAMPLES = 4096
 FLOAT_NOISE = {"float32": 1e-6, "float64": 3e-13}
 
 
-STEEP = 1e-2  # choice: a plan shows errors of scalar theory from this value on, which is reached at NA 0.16
+STEEP = 1e-2  # choice: a printed plan shows the error of scalar theory if it is above this value, reached at NA 0.16
 
 
 class AccuracyError(ValueError):
     """No method can meet the requested accuracy. The message states what is possible.
 
-    what: the problem. remedy: settings that would work, if only the caller can change them.
+    what: description of the problem. remedy: settings that would work, given only if the caller alone can change them.
     """
 
     def __init__(self, what: str, remedy: str | None = None):
@@ -32,9 +32,9 @@ class AccuracyError(ValueError):
 
 @dataclass(frozen=True)
 class Option:
-    """A method that was compared: its samples, predicted error and time, and the verdict on it.
+    """One of the compared methods, with its samples, predicted error, predicted time and verdict.
 
-    The verdict is "chosen" or the reason for the rejection.
+    The verdict is "chosen" or the reason why the method was rejected.
     """
 
     method: str
@@ -48,13 +48,14 @@ class Option:
 class Plan:
     """The chosen method with its samples and predicted error, and the reason for the choice.
 
-    samples: (y, x) samples of the pupil; for nodes (radial, angular) or (count, 1).
+    samples: numbers of samples of the pupil (y, x), or numbers of nodes: (radial, angular), or (count, 1).
     padding: period of the pupil's transform divided by the number of its samples; 1 without a period.
     predicted_error: relative L2 error of the intensity over the window.
-    scalar_error: upper bound of the error of scalar theory for rays as steep as these, in light of any polarisation. No
-        method here reduces it: see `optics.vector_focus`. It applies to windows that contain the brightest point of the
-        light. It does not bound the error in windows that are dark everywhere.
-    seconds: predicted time of a warm call on two cores; 0 without a prediction.
+    scalar_error: upper bound of the error of scalar theory, which depends on the steepest ray, for light of any
+        polarisation. It is an additional error that all methods share; only `optics.vector_focus` avoids it. The bound
+        is valid for windows that contain the brightest point of the light, but not for windows that are dark
+        everywhere.
+    seconds: predicted time of a call with compiled kernels on two cores; 0 if there is no prediction.
     options: all methods that were compared.
     """
 

@@ -1,4 +1,4 @@
-"""Checks of arguments. Invalid input raises an error that names the argument, its value and the range in one line."""
+"""Checks of arguments. Each error names the argument, its value and the valid range in one line."""
 
 import math
 from collections.abc import Iterable
@@ -32,17 +32,17 @@ __all__ = [
 ]
 
 
-# Squares of lengths, and ratios of these squares, must stay within double precision.
+# Limits of positive numbers. Their squares, and ratios of the squares, stay within the range of double precision.
 SMALLEST, LARGEST = 1e-15, 1e15
-LONGEST_WAVE = 1.0  # longer values are most likely meant in nanometres
+LONGEST_WAVE = 1.0  # larger values are probably wavelengths in nanometres
 UNIT = " (550 nm is 550e-9)"
-LINE = 200  # characters that a value may take in a message
+LINE = 200  # most characters of a value in a message
 
 
 def shown(value: Any) -> str:
-    """Return `value` as a user would type it, independent of NumPy's print options (colour-science changes them).
+    """Return `value` as a user would type it. NumPy's print options, which colour-science changes, have no effect.
 
-    A value that takes more than one line is described by its type and shape.
+    A value that does not fit on one line is described by its type and shape.
     """
     if isinstance(value, np.generic):
         return repr(value.item())
@@ -57,7 +57,10 @@ def shown(value: Any) -> str:
 
 
 def finite(name: str, value: float, *, carried: bool = False) -> float:
-    """Return `value` as a float; ValueError unless it is a finite number. carried: see `without_derivative`."""
+    """Return `value` as a float; ValueError unless it is a finite number.
+
+    carried: True if `value` may carry a derivative; see `without_derivative`.
+    """
     number = _number(name, value, carried)
     if not math.isfinite(number):
         raise ValueError(f"{name} = {shown(value)}: must be finite")
@@ -87,9 +90,9 @@ def positive(name: str, value: float, unit: str = "m", *, infinite: bool = False
 
 
 def without_derivative(name: str, value: Any) -> Any:
-    """Return `value`; ValueError if it, or an entry of a list, requires a derivative, which would be lost.
+    """Return `value`; ValueError if `value`, or an entry of it, carries a derivative, which would be lost.
 
-    The other checks here include this one unless they are called with carried=True.
+    The other checks of this module include this check, unless they are called with carried=True.
     """
     if type(value) is float:
         return value  # fast path: planning calls this thousands of times
@@ -151,7 +154,7 @@ def shape_2d(name: str, value: Any) -> tuple[int, int]:
 
 
 def one_of(name: str, value: Any, options: Iterable[str]) -> str:
-    """Return `value`; ValueError, with the most similar option, unless it is one of the options."""
+    """Return `value`; ValueError, which suggests the most similar option, unless it is one of the options."""
     known = tuple(options)
     if not isinstance(value, str) or value not in known:
         raise ValueError(
@@ -171,7 +174,7 @@ def close_match(word: str, known: Iterable[str], cutoff: float = 0.5) -> str | N
 
     None if difflib's ratio is below `cutoff` for all of them.
     """
-    import difflib  # imported here because only messages need it
+    import difflib  # imported here, because only error messages need it
 
     plain = {option.lower(): option for option in known}
     near = difflib.get_close_matches(word.lower(), plain, n=1, cutoff=cutoff)
@@ -247,7 +250,7 @@ def is_sized(value: Any) -> bool:
 
 
 def items(name: str, values: Any, kind: type, example: str) -> tuple[Any, ...]:
-    """Return `values` as a tuple; ValueError, with an example, unless they are iterable and all of the given kind."""
+    """Return `values` as a tuple; ValueError, which shows `example`, unless all are instances of `kind`."""
     try:
         found = tuple(values)
     except TypeError:
@@ -270,14 +273,14 @@ def whole(name: str, value: Any, low: int, high: int) -> int:
 
 
 def of_kind(name: str, value: Any, kind: type, example: str) -> Any:
-    """Return `value`; ValueError, with an example of valid input, unless it is an instance of `kind`."""
+    """Return `value`; ValueError, which shows `example`, unless it is an instance of `kind`."""
     if not isinstance(value, kind):
         raise ValueError(f"{name} = {shown(value)}: must be a kind of {kind.__name__}, such as {example}")
     return value
 
 
 def _number(name: str, value: Any, carried: bool = False) -> float:
-    # A PyTorch derivative would be lost even where Dr.Jit's are propagated.
+    # Derivatives of PyTorch would be lost even if those of Dr.Jit are propagated.
     if not carried or getattr(value, "requires_grad", False):
         without_derivative(name, value)
     try:

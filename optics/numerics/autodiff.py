@@ -1,4 +1,4 @@
-"""Parameters that may carry derivatives: plain numbers for the planner, Dr.Jit arrays for the physics."""
+"""Parameters that may carry derivatives. The planner uses them as plain numbers, the physics as Dr.Jit arrays."""
 
 from __future__ import annotations
 
@@ -11,24 +11,24 @@ from optics.numerics.device import VARIABLE, device
 
 __all__ = ["Array", "Scalar", "is_differentiable", "number", "plain", "to_user"]
 
-# Dr.Jit creates its types when a backend is first loaded, so type checkers cannot see them. These names document what
-# an `Any` stands for.
+# Dr.Jit creates its types when a backend is first loaded, so type checkers cannot see them. These names are aliases of
+# `Any` that document the intended type.
 Array = Any  # a Dr.Jit array or tensor
 Scalar = Any  # a number, or a Dr.Jit array of one element that carries a derivative
 
 
 def is_differentiable(value: Any) -> bool:
-    """Return whether `value` is a Dr.Jit array or tensor, and not a Python or NumPy number."""
+    """Return whether `value` is a Dr.Jit array or tensor, as opposed to a Python or NumPy number."""
     return type(value) is not float and type(value).__module__.startswith("drjit")
 
 
 def number(value: Any) -> float:
-    """Return `value` as a float without derivative; a Dr.Jit array must have one element.
+    """Return `value` as a float without derivative. A Dr.Jit array must have one element.
 
     Raises:
         TypeError: the type of `value` is not numeric.
         ValueError: an array has more than one element.
-        BackendError: an array is on another device than the selected one.
+        BackendError: the array is on a device other than the selected one.
     """
     if type(value) is float:
         return value  # fast path: planning calls this thousands of times
@@ -41,7 +41,7 @@ def plain(value: Any) -> np.ndarray:
     """Return `value` as a NumPy array without derivative.
 
     Raises:
-        BackendError: a Dr.Jit array is on another device than the selected one.
+        BackendError: a Dr.Jit array is on a device other than the selected one.
     """
     if is_differentiable(value):
         import drjit as dr
@@ -62,7 +62,7 @@ def _on_the_device(value: Array) -> None:
 
 
 def to_user(tensor: Array) -> np.ndarray | Array:
-    """Return the tensor itself if it carries derivatives, else a NumPy array."""
+    """Return the tensor unchanged if it carries derivatives, else as a NumPy array."""
     import drjit as dr
 
     return tensor if dr.grad_enabled(tensor) else np.asarray(tensor.numpy())

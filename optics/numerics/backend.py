@@ -1,8 +1,8 @@
-"""The LLVM library that Dr.Jit compiles with: search, test in a child process, and selection.
+"""The LLVM library with which Dr.Jit compiles: search, test in a child process, and selection.
 
 Dr.Jit loads LLVM as a shared library. If the library is too old, Dr.Jit raises an exception. Some versions (15 and 16
-with Dr.Jit 1.5) abort the whole process at the first ``maximum``. No exception handler survives that, so a child
-process tests the library. The verdict is cached by path, size and modification time.
+with Dr.Jit 1.5) abort the whole process at the first ``maximum``, which exception handlers cannot prevent. A child
+process therefore tests the library. The verdict is cached by path, size and modification time.
 """
 
 from __future__ import annotations
@@ -28,7 +28,8 @@ REMEDY = (
     "install LLVM 17 or newer (Debian and Ubuntu: apt-get install libllvm19 libatomic1; "
     f"Fedora: dnf install llvm-libs libatomic; macOS: brew install llvm), or point {VARIABLE} at libLLVM.so"
 )
-# LLVM 15 and 16 fail at float maximum and minimum. The version is printed last, as proof that the whole probe ran.
+# LLVM 15 and 16 fail at the maximum and minimum of floats. The version is printed last, to show that the whole probe
+# ran.
 PROBE = """
 import drjit as dr
 from drjit.llvm import Float
@@ -50,7 +51,7 @@ LIBRARY_PATTERNS = (
 
 
 class BackendError(RuntimeError):
-    """Dr.Jit cannot compute as requested: it finds no usable LLVM library or no GPU, or an array is on another device.
+    """Dr.Jit cannot compute: it finds no usable LLVM library, no GPU, or an array on a device that is not selected.
 
     The message is one line with the remedy.
     """
@@ -58,7 +59,7 @@ class BackendError(RuntimeError):
 
 @dataclass(frozen=True)
 class Llvm:
-    """The verdict of a child process on one LLVM library."""
+    """Result of the test of one LLVM library in a child process."""
 
     path: str
     verdict: Verdict
@@ -71,7 +72,7 @@ class Llvm:
 
 
 def candidates() -> Iterator[str]:
-    """Yield the LLVM libraries to try, in order: only the one that the user named, or all, newest first."""
+    """Yield the LLVM libraries to try: the one that the user named, or else all that are found, newest first."""
     named = os.environ.get(VARIABLE)
     if named:
         yield named
@@ -86,17 +87,17 @@ def candidates() -> Iterator[str]:
 
 
 def _version_in_name(path: str) -> tuple[int, ...]:
-    """Return (19, 1) for libLLVM.so.19.1 and (15,) for libLLVM-15.so.1, whose last digit belongs to the soname."""
+    """Return the version: (19, 1) for libLLVM.so.19.1, and (15,) for libLLVM-15.so.1, which ends with an ABI number."""
     match = re.search(r"libLLVM(?:-(\d+(?:\.\d+)*))?\.(?:so|dylib)(?:\.(\d+(?:\.\d+)*))?", os.path.basename(path))
     digits = (match.group(1) or match.group(2) or "0") if match else "0"
     return tuple(int(part) for part in digits.split("."))
 
 
 def prove(path: str) -> Llvm:
-    """Run Dr.Jit with this LLVM library in a child process (0.1-0.2 s)."""
+    """Test Dr.Jit with this LLVM library in a child process, which takes 0.1 to 0.2 s."""
     if os.sep in path and not os.path.exists(path):
         return Llvm(path, "missing", detail="no such file")
-    import subprocess  # imported here because it runs once per library
+    import subprocess  # imported here, because it is needed only if the verdict is not cached
 
     environment = {**os.environ, VARIABLE: path}
     try:
@@ -117,7 +118,7 @@ def prove(path: str) -> Llvm:
     if "backend is inactive" in child.stderr:
         return Llvm(path, "too old", detail="Dr.Jit refuses it")
     lines = child.stderr.strip().splitlines() or ["no message"]
-    # A dependency of Dr.Jit itself is missing, such as libatomic.
+    # A library on which Dr.Jit itself depends is missing, such as libatomic.
     missing = [line for line in lines if "cannot open shared object file" in line]
     return Llvm(path, "broken", detail=(missing or lines)[-1])
 
@@ -128,7 +129,7 @@ def _cache_file() -> Path:
 
 
 def _cache_key(path: str) -> str:
-    """Return a key for this file and this version of Dr.Jit; a verdict is valid only for both."""
+    """Return a cache key for this file and this version of Dr.Jit. A verdict is valid for this combination only."""
     stat = os.stat(path) if os.path.exists(path) else None
     size, modified = (stat.st_size, stat.st_mtime_ns) if stat else (0, 0)
     return f"{path}|{size}|{modified}|drjit {_drjit_version()}|python {sys.version_info[:2]}"
@@ -137,8 +138,7 @@ def _cache_key(path: str) -> str:
 def _drjit_version() -> str:
     """Return Dr.Jit's version from the name of its dist-info folder.
 
-    Importing importlib.metadata takes as long as computing a PSF. It is therefore imported only if the folder is
-    missing.
+    importlib.metadata is imported only if the folder is missing, because the import takes as long as a PSF.
     """
     found = find_spec("drjit")
     if found is not None and found.origin is not None:
@@ -158,7 +158,8 @@ def _prove_cached(path: str) -> Llvm:
         return Llvm(**known[key])
     except (KeyError, TypeError):
         result = prove(path)
-    if result.verdict in ("good", "aborts"):  # other faults may be repaired under the same path
+    # Other verdicts are not cached, because the user may repair the cause without changing the file.
+    if result.verdict in ("good", "aborts"):
         _write_cache({**known, key: asdict(result)})
     return result
 
@@ -172,7 +173,7 @@ def _read_cache() -> dict[str, Any]:
 
 
 def _write_cache(content: dict[str, Any]) -> None:
-    """Write the cache. A failure is ignored, because it only costs 0.2 s per start."""
+    """Write the cache. A failure is ignored, because it only makes every start 0.2 s slower."""
     cache = _cache_file()
     try:
         cache.parent.mkdir(parents=True, exist_ok=True)
@@ -184,7 +185,7 @@ def _write_cache(content: dict[str, Any]) -> None:
 
 
 def find(paths: Iterable[str] | None = None, cached: bool = True) -> tuple[Llvm | None, list[Llvm]]:
-    """Return the first good LLVM library among `paths` (default: `candidates()`), and all verdicts up to it."""
+    """Return the first usable LLVM library among `paths` (default: `candidates()`), and all test results up to it."""
     tried: list[Llvm] = []
     for path in candidates() if paths is None else paths:
         tried.append(_prove_cached(path) if cached else prove(path))
@@ -195,12 +196,12 @@ def find(paths: Iterable[str] | None = None, cached: bool = True) -> tuple[Llvm 
 
 @lru_cache(maxsize=1)
 def require() -> Llvm:
-    """Make sure that Dr.Jit can use LLVM in this process. Call this before anything uses Dr.Jit.
+    """Make sure that Dr.Jit can use LLVM in this process. Call this function before any use of Dr.Jit.
 
-    Returns the library and points ``DRJIT_LIBLLVM_PATH`` at it.
+    Sets ``DRJIT_LIBLLVM_PATH`` to the library and returns the library.
 
     Raises:
-        BackendError: no library is usable. The message lists the libraries that were tried and the remedy.
+        BackendError: no library is usable. The message lists the tested libraries and states the remedy.
     """
     chosen, tried = find()
     if chosen is None:

@@ -2,8 +2,8 @@
 
 Dr.Jit has no Bessel functions. Chebyshev series are fitted once to SciPy's values.
 
-Up to x = 8 the series is in x². Beyond, J₀(x) = √(2/(πx)) Re[(P + iQ) e^{i(x - π/4)}] (Watson, Theory of Bessel
-Functions, §7.3), where P + iQ = √(πx/2) H₀⁽¹⁾(x) e^{-i(x - π/4)} is smooth in 8/x.
+Up to x = 8, the series is in x². Beyond x = 8, J₀(x) = √(2/(πx)) Re[(P + iQ) e^{i(x - π/4)}] (Watson, Theory of Bessel
+Functions, §7.3). The series are for P and Q, because P + iQ = √(πx/2) H₀⁽¹⁾(x) e^{-i(x - π/4)} is smooth in 8/x.
 """
 
 from __future__ import annotations
@@ -20,16 +20,17 @@ from optics.numerics.precision import Precision
 __all__ = ["bessel_j", "bessel_j0"]
 
 SPLIT = 8.0
-FEW = 2_000_000  # choice: cosines that take less time than the import of scipy.special (0.1 s)
-# Numbers of terms at which the series fall below rounding. The last entry ends them below 1e-12.
+FEW = 2_000_000  # choice: number of cosines that takes less time than the import of scipy.special (0.1 s)
+# Numbers of terms of the series up to x = 8 and beyond. The neglected terms are below the rounding errors, or below
+# 1e-12 in the last entry.
 TERMS = {"float32": (12, 5), "float64": (16, 11), "float64 to 1e-12": (14, 7)}
 
 
 def bessel_j(order: np.ndarray | float, x: np.ndarray) -> np.ndarray:
     """Return J_m(x) for whole m >= 0 and x >= 0, to about 1e-15.
 
-    The value is the mean of cos(mθ - x sin θ) around a circle (Watson, §2.2). With n equidistant points, J_(n-m) is
-    neglected. It falls faster than any power beyond n - m = x.
+    J_m is the mean of cos(mθ - x sin θ) around a circle (Watson, §2.2). With n equidistant points, the error is of the
+    size of J_(n-m)(x), which falls faster than any power for n - m > x.
     """
     most, farthest = float(np.max(order)), float(np.max(x, initial=0.0))
     count = int(most + farthest + 14 * farthest ** (1 / 3) + 40)
@@ -38,7 +39,7 @@ def bessel_j(order: np.ndarray | float, x: np.ndarray) -> np.ndarray:
 
         found: np.ndarray = jv(order, x)
         return found
-    # θ and -θ give the same value, so all points lie between 0 and π.
+    # By symmetry, points between 0 and π are sufficient.
     angle = (np.arange(count) + 0.5) * (pi / count)
     waves = np.asarray(order)[..., None] * angle - np.asarray(x)[..., None] * np.sin(angle)
     return np.asarray(np.cos(waves).mean(axis=-1))
@@ -47,7 +48,7 @@ def bessel_j(order: np.ndarray | float, x: np.ndarray) -> np.ndarray:
 def bessel_j0(waves: Array, types: Precision, exactly: bool = True) -> Array:
     """Return J₀(2π waves) for waves >= 0 in float64.
 
-    The error is about 1e-7 in float32. In float64 it is 1e-15, or 1e-12 if not `exactly`.
+    The error is about 1e-7 in float32. In float64, it is 1e-15 if `exactly` is True, else 1e-12.
     """
     import drjit as dr
 
@@ -65,7 +66,7 @@ def bessel_j0(waves: Array, types: Precision, exactly: bool = True) -> Array:
 
 @lru_cache(maxsize=3)
 def _series(rounding: str) -> tuple[list[float], list[float], list[float]]:
-    """Return Chebyshev coefficients of J₀ over [0, 8], and of P and Q x/8 beyond, in the square of the variable."""
+    """Return Chebyshev coefficients of J₀ in x² over [0, 8], and of P and Q x/8 in (8/x)² beyond."""
     from scipy.special import hankel1e, j0
 
     inner, outer = TERMS[rounding]

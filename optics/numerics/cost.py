@@ -1,7 +1,7 @@
-"""Time per operation, from which methods predict their time and the planner chooses a method.
+"""Time per operation. Methods predict their time from these values, and the planner chooses by predicted time.
 
-The values are for warm calls on two cores. Their precision is sufficient for choosing between methods. `python -m
-validation.benchmarks.fit_costs` times the operations and prints the results next to these values.
+The values are for calls with compiled kernels on two cores. They are precise enough to choose between methods. `python
+-m validation.benchmarks.fit_costs` times the operations and prints the results next to these values.
 """
 
 from __future__ import annotations
@@ -38,9 +38,9 @@ PAIRS_PER_SECOND = 2.5e8  # pairs of node and point in the direct sum
 
 # Seconds per call, independent of its size.
 CALL = {
-    "angular_spectrum": 2e-3,  # also with its paraxial part split off
+    "angular_spectrum": 2e-3,  # also "split_angular_spectrum"
     "far_field": 2e-3,  # per node of the window
-    "fresnel": 3e-4,  # also Fraunhofer's integral
+    "fresnel": 3e-4,  # also "fraunhofer"
     "geometric": 1e-3,
     "hankel": 1e-3,
     "low_rank": 1.5e-3,
@@ -51,7 +51,7 @@ DFT_CALL = 2e-4  # per Fourier sum
 
 # Seconds per sample, entry, node or pair.
 FFT_LINE_SAMPLE = 5e-9  # copying a sample into the line of a transform
-FOLDED_SAMPLE = 5e-9  # sample of a sum by even and odd parts
+FOLDED_SAMPLE = 5e-9  # sample of a sum that is computed from even and odd parts
 FFT_COPY = 8e-9  # copying a sample between Dr.Jit and SciPy
 PUPIL_SAMPLE = 1e-8  # optical path and phase, without the soft edge
 SOFT_EDGE_SAMPLE = 1e-8  # soft edge from a table along one edge

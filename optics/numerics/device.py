@@ -1,8 +1,9 @@
 """The device that Dr.Jit computes on: the processor, through LLVM, unless the environment selects a GPU.
 
-RHABDOM_DEVICE=cpu    the processor (default); the physics of sim and the learner of evolve also run there
-RHABDOM_DEVICE=cuda   an NVIDIA GPU, for PSFs, eyes and rays
+RHABDOM_DEVICE=cpu    the processor (default) RHABDOM_DEVICE=cuda   an NVIDIA GPU, for PSFs, eyes and rays
 RHABDOM_DEVICE=auto   a GPU if Dr.Jit finds one, else the processor
+
+The physics of `sim` and the learner of `evolve` always run on the processor.
 """
 
 from __future__ import annotations
@@ -38,7 +39,7 @@ def device() -> Device:
 
 
 def make_ready() -> Device:
-    """Prepare Dr.Jit for the selected device and return the device. Call this before anything uses Dr.Jit.
+    """Prepare Dr.Jit for the selected device and return the device. Call this function before any use of Dr.Jit.
 
     Raises:
         BackendError: Dr.Jit cannot use the device. The message is one line with the remedy.

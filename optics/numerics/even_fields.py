@@ -1,8 +1,11 @@
 """Fields that are even in x and y, stored on a quarter of the plane, and their Fourier sums.
 
-Only the cosine of exp(2πi jk/period) remains. A sum therefore takes a sixteenth of the products, and a phase a quarter
-of the sines. A quarter extends from the centre sample to the last sample of the longer side. An even number of samples
-has one sample without a mirror image. It counts half on either side.
+Of the factor exp(2πi jk/period), only the cosine contributes to a sum. A sum therefore takes a sixteenth of the
+products, and a phase factor takes a quarter of the sines.
+
+Sample n//2 is the centre. If n is even, one side has one more sample than the other. The quarter extends from the
+centre to the last sample of the longer side. The last sample has no mirror image there, so it counts half on either
+side.
 """
 
 from __future__ import annotations
@@ -20,7 +23,7 @@ Shape = tuple[int, int]
 
 
 def quarter(grid: Grid) -> Grid:
-    """Return the samples of a centred grid from its centre to the end of the longer side."""
+    """Return the quarter of a centred grid, from its centre to the end of the longer sides."""
     height, width = (n // 2 + 1 for n in grid.shape)
     return Grid((height, width), grid.dx, (width // 2 * grid.dx, height // 2 * grid.dx))
 
@@ -32,9 +35,9 @@ def even_seconds(shape_in: Shape, shape_out: Shape) -> float:
 
 
 def even_sum(field: Field, shape: Shape, period: Scalar, grid: Grid) -> Field:
-    """Return Σ_j u[j] exp(± 2πi j·k / period), as in `fourier.dft2`, for k on the quarter of `grid`.
+    """Return Σ_j u[j] exp(± 2πi j·k / period), as in `fourier.dft2`, for samples k of the quarter `grid`.
 
-    field: given on the quarter of a plane of `shape` samples.
+    field: values u on the quarter of a plane of `shape` samples.
     """
     types, (ny, nx), (my, mx) = field.types, shape, grid.shape
     quarters = field.evaluated().grid.shape
@@ -49,7 +52,7 @@ def even_sum(field: Field, shape: Shape, period: Scalar, grid: Grid) -> Field:
 
 
 def _cosines(types: Precision, n_out: int, n_in: int, period: Scalar) -> Array:
-    """Return the weights of sample j and its mirror image for frequency k: (k, j), both counted from 0."""
+    """Return the weights (k, j) of sample j together with its mirror image for frequency k, both counted from 0."""
     import drjit as dr
 
     entries = Grid((n_out // 2 + 1, n_in // 2 + 1), 1.0)
@@ -63,7 +66,7 @@ def _cosines(types: Precision, n_out: int, n_in: int, period: Scalar) -> Array:
 
 
 def whole(field: Field, grid: Grid) -> Field:
-    """Return a field on all of a centred grid, given its quarter."""
+    """Return a field on a whole centred grid, given the field on its quarter."""
     import drjit as dr
 
     types, width = field.types, field.grid.shape[1]

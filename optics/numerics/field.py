@@ -57,9 +57,9 @@ class Field:
         return self.re * self.re + self.im * self.im
 
     def evaluated(self) -> Field:
-        """Return this field after computing both parts in one kernel.
+        """Return this field after evaluating its real and imaginary part in one kernel.
 
-        Evaluated one after the other, each part would compute their common terms again.
+        If the parts were evaluated one after the other, their common terms would be computed twice.
         """
         import drjit as dr
 

@@ -4,10 +4,10 @@ One function, `dft2`, computes all transforms of this package:
 
     U[k] = Σ_j u[j] exp(± 2πi j·k / period),   j and k counted from the centre sample n//2.
 
-The period is arbitrary, because a matrix DFT can have any output pitch. If the period is a whole number, the FFT can be
-used. The predicted time (optics.numerics.cost) decides between the two. Dr.Jit's matrix product does more operations
-per second, and SciPy's FFT needs fewer. Matrices are therefore faster for small windows and the FFT for large ones.
-Both are differentiable.
+The period may have any value, because a matrix DFT can have any output pitch. If the period is a whole number, the FFT
+can be used instead. `dft2` selects the one with the shorter predicted time (optics.numerics.cost). Dr.Jit's matrix
+product executes more operations per second, but SciPy's FFT needs fewer operations. Matrices are therefore faster for
+small windows, and the FFT is faster for large windows. Both are differentiable.
 """
 
 from __future__ import annotations
@@ -37,20 +37,20 @@ __all__ = [
 ]
 
 LONGEST_FFT = 2**31
-AT_A_TIME, FEWEST_LINES = 2**17, 16  # choice: samples transformed at once (a megabyte), and the least number of lines
+AT_A_TIME, FEWEST_LINES = 2**17, 16  # choice: samples transformed at once (a megabyte), and fewest lines
 
 
 def fast_length(least: float) -> int:
-    """Return the smallest 5-smooth integer >= least, a length for which the FFT is fast."""
+    """Return a length of at least `least` for which the FFT is fast: the smallest integer of the form 2^a 3^b 5^c."""
     if least > LONGEST_FFT:
-        return ceil(least)  # longer than any FFT that is used
+        return ceil(least)  # no FFT is used for such lengths
     lengths = _smooth_numbers()
     return lengths[bisect_left(lengths, max(1, ceil(least)))]
 
 
 @lru_cache(maxsize=1)
 def _smooth_numbers() -> list[int]:
-    """Return all 2^a 3^b 5^c up to LONGEST_FFT in ascending order."""
+    """Return all numbers 2^a 3^b 5^c up to LONGEST_FFT in ascending order."""
     threes_and_fives = [3**b * 5**c for b in range(20) for c in range(14)]
     return sorted(n << a for n in threes_and_fives for a in range(32) if n << a <= LONGEST_FFT)
 
@@ -63,9 +63,11 @@ def dft2(
     pitch: float,
     centre: tuple[float, float] = (0.0, 0.0),
 ) -> Field:
-    """Return the Fourier sum of a field onto `shape` samples (formula above), on a grid of the given output pitch.
+    """Return the Fourier sum of a field at `shape` output samples (formula above).
 
-    sign: -1 forward (exp(-2πi...)), +1 inverse; neither is normalised.
+    The result is a Field on a grid of the given output pitch.
+
+    sign: sign of the exponent: -1 for the forward, +1 for the inverse transform. Neither is normalised.
     centre: (x, y) of the output's centre sample, in the unit of `pitch`.
     """
     grid = Grid(shape, pitch, centre)
@@ -79,7 +81,7 @@ def dft2(
 
 
 def fourier_sum(u: np.ndarray, period: float, shape: tuple[int, int], sign: int) -> np.ndarray:
-    """Return the sum of `dft2` for a complex NumPy array, without derivatives and without Dr.Jit."""
+    """Return the sum of `dft2` for a complex NumPy array, computed without Dr.Jit and without derivatives."""
     if _fft_wins(u.shape, period, shape):
         for axis in (1, 0):
             u = _fft_axis(u, int(period), shape[axis], sign, axis)
@@ -90,9 +92,9 @@ def fourier_sum(u: np.ndarray, period: float, shape: tuple[int, int], sign: int)
 
 @lru_cache(maxsize=16)
 def dft_matrix(n_out: int, n_in: int, period: float, sign: int, dtype: str) -> np.ndarray:
-    """Return the sum along one axis as a matrix, exp(±2πi k j / period) in row k and column j, both counted from n//2.
+    """Return the matrix of a sum along one axis: exp(±2πi k j / period) in row k and column j, counted from n//2.
 
-    Whole waves are subtracted first, because they would cost digits of the remainder.
+    Whole waves are subtracted from k j / period first, because they would reduce the precision of the remainder.
     """
     k, j = np.arange(n_out) - n_out // 2, np.arange(n_in) - n_in // 2
     waves = np.outer(k, j) / period
@@ -100,9 +102,9 @@ def dft_matrix(n_out: int, n_in: int, period: float, sign: int, dtype: str) -> n
 
 
 def _recentred(field: Field, period: Scalar, by: tuple[float, float]) -> Field:
-    """Return the field whose sum onto samples k equals that of `field` onto samples k + c: u[j] exp(±2πi j·c / period).
+    """Return u[j] exp(±2πi j·c / period). Its sum at samples k equals the sum of `field` at samples k + c.
 
-    by: ±c, (x, y) in samples of the output; fractions are allowed.
+    by: ±c, (x, y), in samples of the output. Fractions are allowed.
     """
     types = field.types
     j_x, j_y = Grid(field.grid.shape, 1.0).coordinates(types)
@@ -111,10 +113,10 @@ def _recentred(field: Field, period: Scalar, by: tuple[float, float]) -> Field:
 
 
 def periodic_spectrum(u: np.ndarray, period: int, across: int) -> np.ndarray:
-    """Return Σ_j u[j] exp(-2πi j·k / period) of a complex NumPy array u (y, x) that is at most one period wide.
+    """Return Σ_j u[j] exp(-2πi j·k / period) for a complex NumPy array u (y, x) that is at most one period wide.
 
-    The result is (across fx, period fy) in FFT order, along fx only `kept_indices(across)`. fy is the last axis,
-    because contiguous lines transform twice as fast.
+    The result is (fx, fy) in FFT order: `across` frequencies fx, which are `kept_indices(across)`, and `period`
+    frequencies fy. fy is the last axis, because transforms of contiguous lines are twice as fast.
     """
     from scipy import fft
 
@@ -125,7 +127,7 @@ def periodic_spectrum(u: np.ndarray, period: int, across: int) -> np.ndarray:
 
 
 def periodic_sum(spectrum: np.ndarray, period: int, step: int, shape: tuple[int, int]) -> np.ndarray:
-    """Return Σ_k U[k] exp(2πi j·k / period), as (y, x), at every `step`-th j around the centre.
+    """Return Σ_k U[k] exp(2πi j·k / period) as an array (y, x), at every `step`-th j around the centre.
 
     spectrum: as returned by `periodic_spectrum`.
     """
@@ -143,7 +145,7 @@ def periodic_sum(spectrum: np.ndarray, period: int, step: int, shape: tuple[int,
 
 
 def kept_indices(across: int) -> np.ndarray:
-    """Return the `across` indices nearest 0, in FFT order: 0, 1, …, -2, -1. They do not depend on the period."""
+    """Return the `across` indices nearest 0 in FFT order: 0, 1, …, -2, -1. They are the same for every period."""
     kept = np.arange(across) - across // 2
     return np.roll(kept, -(across // 2))
 
@@ -172,14 +174,14 @@ def _fft(field: Field, period: int, shape: tuple[int, int], sign: int) -> tuple[
     types, shape_in = field.types, field.grid.shape
 
     def transform(re: Array, im: Array, to: tuple[int, int], from_: tuple[int, int], turn: int) -> tuple[Array, Array]:
-        dr.eval(re, im)  # both in one kernel; separate kernels would compute their common terms twice
+        dr.eval(re, im)  # one kernel for both, since separate kernels would compute their common terms twice
         parts = re.numpy().reshape(from_), im.numpy().reshape(from_)
         return _fft_of_parts(parts, period, to, turn, types)
 
     class FourierSum(dr.CustomOp):
         """The Fourier sum as a differentiable operation.
 
-        Its adjoint is the sum of the other sign, from the samples of the output to the samples of the input.
+        Its adjoint is the sum with the opposite sign, from the output's samples to the input's samples.
         """
 
         def eval(self, re: Array, im: Array) -> tuple[Array, Array]:
@@ -200,7 +202,7 @@ def _fft(field: Field, period: int, shape: tuple[int, int], sign: int) -> tuple[
 def _fft_of_parts(
     parts: tuple[np.ndarray, np.ndarray], period: int, to: tuple[int, int], sign: int, types: Precision
 ) -> tuple[Array, Array]:
-    """Return the sum over both axes, a block of lines at a time, because a whole padded plane exceeds the cache."""
+    """Return the sum over both axes, in blocks of lines, because a whole padded plane exceeds the cache."""
     from scipy import fft
 
     turned, norm = (fft.fft, None) if sign < 0 else (fft.ifft, "forward")
@@ -227,13 +229,13 @@ def _fft_of_parts(
 
 
 def _lines(n: int, period: int) -> list[slice]:
-    """Return blocks of the n lines, each line one period long."""
+    """Return slices that divide n lines, each one period long, into blocks."""
     step = max(FEWEST_LINES, AT_A_TIME // period)
     return [slice(start, min(start + step, n)) for start in range(0, n, step)]
 
 
 def _runs(n: int, period: int) -> list[tuple[slice, slice]]:
-    """Return slices of n centred samples and the slices of one period in FFT order that they belong to.
+    """Return pairs of slices: of n centred samples, and of their positions within one period in FFT order.
 
     Samples beyond one period are aliased onto it.
     """
@@ -247,7 +249,7 @@ def _runs(n: int, period: int) -> list[tuple[slice, slice]]:
 
 
 def _fft_axis(u: np.ndarray, period: int, n_out: int, sign: int, axis: int) -> np.ndarray:
-    """Return the sum along one axis: wrap the centred samples into one period, transform, and unwrap n_out samples."""
+    """Return the sum along one axis: wrap the samples into one period, transform, and select n_out centred samples."""
     from scipy import fft
 
     wrapped = _wrap(u, period, axis)
@@ -262,7 +264,7 @@ def _fft_axis(u: np.ndarray, period: int, n_out: int, sign: int, axis: int) -> n
 
 
 def _wrap(u: np.ndarray, period: int, axis: int) -> np.ndarray:
-    """Return centred samples in FFT order, zero-padded to one period; samples beyond one period are aliased onto it."""
+    """Return centred samples in FFT order, zero-padded to one period. Samples beyond one period are aliased onto it."""
     n = u.shape[axis]
     start = -(n // 2) % period
     periods = -(-(start + n) // period)

@@ -1,8 +1,8 @@
-"""Fourier sums as matrix products in Dr.Jit, for any period. The period may carry a derivative.
+"""Fourier sums as matrix products in Dr.Jit. The period may have any value and may carry a derivative.
 
-A wave e^{iθjk} that is counted from the centre has an even cosine and an odd sine, along j and along k. Large sums
-therefore use u[j] ± u[-j] for j >= 0 and two real matrices with a quarter of the entries. They give the results for ± k
-with a quarter of the products.
+If j and k are counted from the centre, the cosine of e^{iθjk} is even and the sine odd, in j and in k. Large sums
+therefore use u[j] ± u[-j] for j >= 0, and two real matrices with a quarter of the entries. A quarter of the products
+then gives the results for k and for -k.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ def halves_pay(shape_in: Shape, shape_out: Shape) -> bool:
 
 
 def _products(shape_in: Shape, shape_out: Shape) -> tuple[int, int]:
-    """Return the number of products along x and then along y."""
+    """Return the number of products of the sum along x, and of the sum along y that follows."""
     (ny, nx), (my, mx) = shape_in, shape_out
     return ny * nx * mx, ny * mx * my
 
@@ -67,7 +67,7 @@ def by_whole_matrices(field: Field, period: Scalar, shape: Shape, sign: int) -> 
 def _matrix(types: Precision, n_out: int, n_in: int, period: Scalar, sign: int) -> Parts:
     """Return exp(±2πi k j / period) in row k and column j, both counted from n//2.
 
-    The two tensors are the real and the imaginary part.
+    The result is two tensors: real and imaginary part.
     """
     entries = Grid((n_out, n_in), 1.0)
     j, k = entries.coordinates(types)
@@ -76,7 +76,7 @@ def _matrix(types: Precision, n_out: int, n_in: int, period: Scalar, sign: int) 
 
 
 def by_halves(field: Field, period: Scalar, shape: Shape, sign: int) -> Parts:
-    """Return the same sum, along x and then along y, from u[j] + u[-j] and u[j] - u[-j]."""
+    """Return the same sum from u[j] + u[-j] and u[j] - u[-j], first along x and then along y."""
     types, (ny, nx), (my, mx) = field.types, field.grid.shape, shape
     cosine, sine = along_y = _quarter(types, mx, nx, period, sign)
     even, odd = _folded_columns(field)
@@ -112,7 +112,7 @@ def _folded_columns(field: Field) -> tuple[list[Array], list[Array]]:
 def _folded_rows(across: list[Array], size: Shape, types: Precision) -> tuple[list[Array], list[Array]]:
     """Return sums and differences of rows j and -j of (ny, mx) numbers.
 
-    across: halves of these numbers in the form that `_both_sides` reads.
+    across: sums over the rows' samples, as the halves that `_both_sides` combines.
     """
     ny, mx = size
     shape = ny // 2 + 1, mx
@@ -140,9 +140,9 @@ def _unfolded_rows(down: list[Array], shape: Shape, types: Precision) -> Parts:
 
 
 def _both_sides(halves: list[Array], place: Array, k: Array, types: Precision, there: Array = True) -> Parts:
-    """Return real and imaginary part of Σ (even cos + i odd sin), for k of either sign.
+    """Return the real and imaginary part of Σ (even cos + i odd sin) for k of either sign.
 
-    halves: sums for |k|, the even ones first.
+    halves: sums for |k|: those of the even parts, then those of the odd parts.
     """
     import drjit as dr
 

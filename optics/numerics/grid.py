@@ -22,7 +22,12 @@ def sample_positions(n: int, dx: float) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Grid:
-    """Samples of a plane: shape (y, x), pitch dx [m] (or [1/m] for spatial frequencies), n//2 at centre (x, y)."""
+    """Samples of a plane.
+
+    shape: number of samples (y, x).
+    dx: pitch [m], or [1/m] for spatial frequencies.
+    centre: position (x, y) of sample n//2.
+    """
 
     shape: tuple[int, int]
     dx: float
@@ -32,13 +37,13 @@ class Grid:
         if self._is_plain:
             return  # fast path: planning creates hundreds of grids from valid plain numbers
         object.__setattr__(self, "shape", shape_2d("shape", self.shape))
-        # A NumPy scalar would convert a Dr.Jit array to NumPy in a product.
+        # dx becomes a Python number, because a NumPy scalar would convert a Dr.Jit array to NumPy in a product.
         object.__setattr__(self, "dx", positive("dx", self.dx))
         object.__setattr__(self, "centre", point_2d("centre", self.centre))
 
     @property
     def _is_plain(self) -> bool:
-        """True if all numbers have Python's own types and are in range."""
+        """True if all numbers have Python's built-in types and are in range."""
         height, width = self.shape if type(self.shape) is tuple and len(self.shape) == 2 else (None, None)
         return (
             type(height) is int
@@ -104,14 +109,14 @@ class Grid:
 
 
 class HasWindow(Protocol):
-    """An object with samples on a grid."""
+    """Interface of objects with samples on a grid."""
 
     @property
     def window(self) -> Grid: ...
 
 
 class OnWindow:
-    """Mixin with the sample positions of an object that has a `window`."""
+    """Mixin that adds sample positions to objects with a `window`."""
 
     @property
     def x(self: HasWindow) -> np.ndarray:

@@ -1,6 +1,7 @@
 """Interpolation between samples (linear, Lagrange polynomials, cubic B-splines), and tabulated functions.
 
-Functions of positions accept Dr.Jit and NumPy arrays. Only `linear_weights` and `lagrange_basis` require NumPy arrays.
+Functions of positions accept Dr.Jit and NumPy arrays, except `linear_weights` and `lagrange_basis`, which require NumPy
+arrays.
 """
 
 from __future__ import annotations
@@ -27,14 +28,14 @@ __all__ = [
     "linear_weights",
 ]
 
-# Choice: samples per axis for interpolation onto a grid. The error falls with the eighth power of their distance.
-# Tables of functions, whose samples are computed only once, use six samples and the sixth power.
+# Choice: number of samples along an axis for interpolation onto a grid. The error falls with the eighth power of their
+# distance. Tables of functions are interpolated from six samples, with an error that falls with the sixth power.
 TAPS = 8
-# Largest error of eight taps for e^{iφ}, divided by (radians per sample)⁸: |Π(t - x_j)| / 8!. Halfway between the
-# middle two samples it is (1·3·5·7)²/2⁸ / 8!.
+# Largest error of eight-point interpolation of e^{iφ}, divided by (radians per sample)⁸. It is |Π(t - x_j)| / 8!, and
+# halfway between the middle two samples (1·3·5·7)²/2⁸ / 8!.
 LAGRANGE_8 = 1.07e-3
 TABLE_TAPS = 6
-MARGIN = TABLE_TAPS // 2 - 1  # samples beyond either end of a table that interpolation reads
+MARGIN = TABLE_TAPS // 2 - 1  # number of samples beyond either end of a table that interpolation reads
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,26 +52,26 @@ class Interpolant:
     ) -> Interpolant:
         """Return a table of a function with at most `cycles` cycles between the ends and constant values beyond.
 
-        The function is evaluated at Chebyshev nodes only, because it is expensive. Six-point interpolation of a unit
-        wave has the error (225/64)/720 (2π/N)⁶ with N samples per cycle. The spectrum of a step falls with frequency,
-        so 1/20 of that is assumed.
+        The function is expensive, so it is evaluated only at Chebyshev nodes, from which the table is computed. With N
+        samples per cycle, six-point interpolation of a unit wave has the error (225/64)/720 (2π/N)⁶. A twentieth of
+        this error is assumed, because the functions are steps, whose spectrum falls with frequency.
         """
         per_cycle = 2 * pi * (2.4e-4 / error) ** (1 / 6)
-        n = int(cycles * per_cycle + 64)  # choice: at least 64
-        # A wave of z = π cycles has Chebyshev coefficients 2 J_m(z), which fall fast beyond m = z. The margin beyond m
-        # = z is a choice.
+        n = int(cycles * per_cycle + 64)  # choice: at least 64 samples
+        # A wave with z = π · cycles has the Chebyshev coefficients 2 J_m(z), which fall fast beyond m = z. The margin
+        # beyond m = z is a choice.
         degree = int(pi * cycles - 3 * np.log10(error) + 12)
         middle, half = (ends[0] + ends[1]) / 2, (ends[1] - ends[0]) / 2
         values = function(middle + half * np.cos(pi * (np.arange(degree) + 0.5) / degree))
         series = np.polynomial.Chebyshev(_cosine_sums(values) / degree * np.where(np.arange(degree) == 0, 0.5, 1))
         step = 2 / (n - 1)
         samples = series(np.clip(np.arange(-MARGIN, n + MARGIN) * step - 1, -1, 1))
-        # Exact values where the function is constant.
+        # Beyond the ends, where the function is constant, values are exact.
         samples[: MARGIN + 1], samples[-MARGIN - 1 :] = function(np.array(ends))
         return cls(ends[0], step * half, samples)
 
     def at(self, place: Array, types: Precision) -> Array:
-        """Return interpolated values at a flat Dr.Jit Float64 array; differentiable."""
+        """Return interpolated values at positions in a flat Dr.Jit Float64 array. The result is differentiable."""
         import drjit as dr
 
         last = opaque(types, len(self.samples) - 2 * MARGIN - 1)
@@ -95,12 +96,12 @@ def _cosine_sums(values: np.ndarray) -> np.ndarray:
 
 
 def lagrange_weights(t: Array, taps: int) -> list[Array]:
-    """Return the Lagrange weights of `taps` samples (an even number) at unit distance.
+    """Return the Lagrange weights of `taps` samples (an even number), which are 1 apart.
 
         L_i(t) = Π_{j≠i} (t - x_j) / (x_i - x_j),   x_i = i + 1 - taps/2,   i = 0 ... taps - 1.
 
-    t in [0, 1] is the position between the middle two samples. Each weight is the product over the nodes before i times
-    the product over the nodes after i, divided by (-1)^(taps-1-i) i! (taps-1-i)!.
+    t in [0, 1] is the position between the middle two samples. Each numerator is computed as the product over the nodes
+    before i times the product over the nodes after i. The denominator is (-1)^(taps-1-i) i! (taps-1-i)!.
     """
     last = taps - 1
     steps = [t + (taps // 2 - 1 - i) for i in range(taps)]
@@ -113,12 +114,12 @@ def lagrange_weights(t: Array, taps: int) -> list[Array]:
 
 
 def linear_weights(x: np.ndarray, nodes: np.ndarray) -> np.ndarray:
-    """Return weights (node, *x.shape) of linear interpolation between rising nodes; constant beyond the ends."""
+    """Return the weights (node, *x.shape) of linear interpolation between ascending nodes, constant beyond the ends."""
     return np.stack([np.interp(x, nodes, row) for row in np.eye(len(nodes))])
 
 
 def cubic_bsplines(t: Array) -> list[Array]:
-    """Return the four uniform cubic B-splines on a knot interval, at t in [0, 1].
+    """Return the four uniform cubic B-splines that are nonzero in a knot interval, at t in [0, 1].
 
     Source: Piegl & Tiller, The NURBS Book, ch. 2.
     """
@@ -132,7 +133,7 @@ def chebyshev_points(n: int) -> np.ndarray:
 
 
 def lagrange_basis(x: np.ndarray, nodes: np.ndarray) -> np.ndarray:
-    """Return the Lagrange polynomials of arbitrary nodes at x, (node, *x.shape)."""
+    """Return the values at x of the Lagrange polynomials of arbitrary nodes, (node, *x.shape)."""
     basis = np.ones((len(nodes), *np.shape(x)))
     for i, node in enumerate(nodes):
         for other in np.delete(nodes, i):
@@ -141,9 +142,9 @@ def lagrange_basis(x: np.ndarray, nodes: np.ndarray) -> np.ndarray:
 
 
 def chebyshev_basis(x: np.ndarray, n: int) -> np.ndarray:
-    """Return the weights of values at `chebyshev_points(n)` in their polynomial at x in [-1, 1], (*x.shape, node).
+    """Return the weights (*x.shape, node) of polynomial interpolation from `chebyshev_points(n)` to x in [-1, 1].
 
-    Barycentric formula: Berrut & Trefethen, SIAM Review 46, 501, 2004, eq. 4.2.
+    Source of the barycentric formula: Berrut & Trefethen, SIAM Review 46, 501, 2004, eq. 4.2.
     """
     nodes, angle = chebyshev_points(n), np.pi * (np.arange(n) + 0.5) / n
     apart = np.asarray(x)[..., None] - nodes

@@ -7,7 +7,8 @@ from optics.numerics.autodiff import Array
 __all__ = ["complex_flops", "complex_matmul", "matmul"]
 
 Parts = tuple[Array, Array]
-THREE_PAY = 1e7  # choice: number of multiplications above which a fourth product costs more than three sums
+# Choice: size of a product, in multiplications, above which three products and extra sums cost less than four products.
+THREE_PAY = 1e7
 
 
 def matmul(left: Array, right: Array, transposed: bool = False) -> Array:
@@ -18,21 +19,24 @@ def matmul(left: Array, right: Array, transposed: bool = False) -> Array:
 
 
 def complex_matmul(left: Parts, right: Parts, transposed: bool = False) -> Parts:
-    """Return the product of matrices that are given as real and imaginary parts (transposed, not conjugated)."""
+    """Return the product of two matrices, each a pair of real and imaginary part.
+
+    transposed: whether to transpose (not conjugate) `right`.
+    """
     import drjit as dr
 
-    dr.eval(left, right)  # in one kernel; separate kernels would compute common terms again
+    dr.eval(left, right)  # one kernel for all, since separate kernels would compute common terms twice
     return _by_three(left, right, transposed) if _three_pay(left[0], right[0]) else _by_four(left, right, transposed)
 
 
 def complex_flops(products: int) -> float:
-    """Return the operations of a matrix product that multiplies `products` pairs of complex numbers."""
+    """Return the number of operations of a matrix product that multiplies `products` pairs of complex numbers."""
     return (6 if products > THREE_PAY else 8) * products
 
 
 def _three_pay(left: Array, right: Array) -> bool:
     height, (down, across) = left.shape[0], right.shape
-    return height * down * across > THREE_PAY  # valid for both orientations of `right`
+    return height * down * across > THREE_PAY  # correct for `right` and for its transpose
 
 
 def _by_four(left: Parts, right: Parts, transposed: bool) -> Parts:
@@ -44,9 +48,9 @@ def _by_four(left: Parts, right: Parts, transposed: bool) -> Parts:
 
 
 def _by_three(left: Parts, right: Parts, transposed: bool) -> Parts:
-    """Return ac - bd and (a + b)(c + d) - ac - bd.
+    """Return the real part ac - bd and the imaginary part (a + b)(c + d) - ac - bd.
 
-    Three products replace four (Gauss). The result is equally accurate in the norm.
+    Three products replace four (Gauss's method). Relative to its norm, the result is equally accurate.
     """
     (a, b), (c, d) = left, right
     ac, bd = matmul(a, c, transposed), matmul(b, d, transposed)

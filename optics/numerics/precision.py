@@ -15,12 +15,12 @@ from optics.numerics.device import Device, make_ready
 
 __all__ = ["ROOM", "Precision", "opaque", "padded_for_packets", "precision"]
 
-ROOM = 64  # choice, elements: more than any processor reads at once
+ROOM = 64  # choice: number of padding elements, more than any processor reads at once
 
 
 @dataclass(frozen=True)
 class Precision:
-    """Dr.Jit types. Float: type of fields. Float64: type of optical paths.
+    """Dr.Jit types. Float is the type of fields, Float64 the type of optical paths.
 
     Whole waves of a path are subtracted before the conversion to Float.
     """
@@ -59,11 +59,11 @@ def _precision(dtype: str, place: Device) -> Precision:
 
 
 def padded_for_packets(values: np.ndarray) -> np.ndarray:
-    """Return the same numbers, flat, in memory that can be read some way past their end.
+    """Return the same numbers as a flat array, in memory that can be read beyond the end of the array.
 
     Dr.Jit uses NumPy's memory without a copy. Its kernels read whole packets of numbers, sixteen with AVX-512, and
-    ignore numbers past the end. If the next memory page is not mapped, the process ends there. This happens to arrays
-    of some megabytes (observed with Dr.Jit 1.5 and 2087 x 2087 numbers).
+    ignore the numbers beyond the end. If the next memory page is not mapped, reading it crashes the process. This can
+    happen with arrays of some megabytes (observed with Dr.Jit 1.5 and 2087 x 2087 numbers).
     """
     room = np.empty(values.size + ROOM, values.dtype)
     flat = room[: values.size]
@@ -72,7 +72,7 @@ def padded_for_packets(values: np.ndarray) -> np.ndarray:
 
 
 def opaque(types: Precision, value: Scalar) -> Array:
-    """Return a float64 scalar that Dr.Jit treats as data, so that another value does not compile another kernel.
+    """Return a float64 scalar that Dr.Jit treats as data. A kernel is then not compiled again for another value.
 
     A Dr.Jit array of one element is returned with its derivative.
     """

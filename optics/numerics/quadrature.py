@@ -1,9 +1,10 @@
 """The number of quadrature nodes that a wave needs, and Gauss-Legendre nodes.
 
-Both rules here fail by aliasing. n equidistant nodes on a circle treat the harmonics J_n(z) and beyond of e^{iz cos φ}
-as constant (Jacobi-Anger). n Gauss-Legendre nodes are exact for polynomials up to degree 2n - 1. The Chebyshev series
-of a wave whose phase reaches ±z radians at the ends has the coefficients 2 J_m(z). One count therefore serves both: the
-smallest m from which on 2 |J_m(z)| stays below the requested error.
+The error of both rules here is due to aliasing. With n equidistant nodes on a circle, harmonics of e^{iz cos φ} of
+order n and above alias; their amplitudes are J_n(z) and beyond (Jacobi-Anger expansion). n Gauss-Legendre nodes are
+exact for polynomials up to degree 2n - 1. The Chebyshev series of a wave whose phase is ±z radians at the ends has the
+coefficients 2 J_m(z). The same number therefore determines both rules: the smallest m from which on 2 |J_m(z)| stays
+below the requested error.
 """
 
 from __future__ import annotations
@@ -17,14 +18,14 @@ from optics.numerics.bessel import bessel_j
 
 __all__ = ["gauss_legendre", "gauss_legendre_count", "harmonics", "stepped_up"]
 
-NEWTON_STEPS = 10  # far more than necessary
-STEPS = 16  # choice: steps per octave; on average a number is half a step (2 %) too large
+NEWTON_STEPS = 10  # far more than convergence needs
+STEPS = 16  # choice: values per octave in `stepped_up`; on average, cycles increase by half a step (2 %)
 
 
 def harmonics(z: np.ndarray, digits: float) -> np.ndarray:
-    """Return the smallest m with 2 |J_m| <= 10^-digits from there on and for all arguments up to z, by bisection."""
+    """Return the smallest m from which on 2 |J_m| <= 10^-digits for all arguments up to z, by bisection."""
     z = np.asarray(z, dtype=np.float64)
-    # |J_m(z)| falls steadily in m beyond m = z, and is below (ez/2m)^m, which bounds the search: e/2 is 1.36.
+    # Beyond m = z, |J_m(z)| falls steadily with m and is below (ez/2m)^m. This bounds the search, since e/2 is 1.36.
     low, high = np.floor(z), np.ceil(1.36 * z + 3 * digits + 4)
     while np.any(high - low > 1):
         middle = np.ceil((low + high) / 2)
@@ -34,9 +35,9 @@ def harmonics(z: np.ndarray, digits: float) -> np.ndarray:
 
 
 def gauss_legendre_count(cycles: float, digits: float, degree: int = 0) -> int:
-    """Return the number of nodes for an integrand with this many cycles between the ends, times a polynomial.
+    """Return the number of Gauss-Legendre nodes for a wave with `cycles` cycles between the ends, times a polynomial.
 
-    degree: of the polynomial.
+    degree: degree of the polynomial.
     """
     return ceil((int(harmonics(np.array(pi * cycles), digits)) + degree) / 2)
 
@@ -45,10 +46,10 @@ def gauss_legendre_count(cycles: float, digits: float, degree: int = 0) -> int:
 def gauss_legendre(n: int) -> tuple[np.ndarray, np.ndarray]:
     """Return Gauss-Legendre nodes and weights on [0, 1].
 
-    The nodes are the roots of Legendre's polynomial, by Newton's method from Tricomi's estimate. The weights are 2 /
-    ((1 - x²) P'²) (Davis & Rabinowitz, Methods of Numerical Integration, §2.7).
+    The nodes are the roots of Legendre's polynomial P. Newton's method computes them, starting from Tricomi's estimate.
+    The weights are 2 / ((1 - x²) P'²) (Davis & Rabinowitz, Methods of Numerical Integration, §2.7).
     """
-    half = (n + 1) // 2  # the other half mirrors these
+    half = (n + 1) // 2  # the other half of the nodes follows by symmetry
     x = (1 - (n - 1) / (8.0 * n**3)) * np.cos(pi * (4 * np.arange(1, half + 1) - 1) / (4 * n + 2))
     if n % 2:
         x[-1] = 0.0
@@ -80,6 +81,6 @@ def _legendre(n: int, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def stepped_up(cycles: float) -> float:
     """Return `cycles` rounded up to one of a few values.
 
-    Similar problems then share cached tables.
+    Similar problems then use the same cached rules.
     """
     return 2.0 ** (ceil(STEPS * log2(cycles) - 1e-9) / STEPS) if cycles > 0 else 0.0

@@ -1,4 +1,4 @@
-"""Rotationally symmetric images: computed along one radius and interpolated onto a grid."""
+"""Rotationally symmetric images, which are computed along one radius and interpolated onto a grid."""
 
 from __future__ import annotations
 
@@ -17,21 +17,22 @@ from optics.numerics.quadrature import harmonics
 
 __all__ = ["DistinctRadii", "RadialProfile"]
 
-# Choice: entries of the matrix from points to table; 128 MB in float64. Longer lines are computed directly at the
-# positions of the table.
+# Choice: entries of the matrix that maps points to the table; 128 MB in float64. If the matrix would be larger, the
+# image is computed at the positions of the table.
 LARGEST_MATRIX = 2**24
-BESIDE = TAPS // 2 - 1  # positions of the table beyond either end; one more beyond the rim
+BESIDE = TAPS // 2 - 1  # number of positions of the table beyond the axis; there is one more beyond the rim
 
 
 @dataclass(frozen=True)
 class RadialProfile:
-    """An image that is even in r, needed up to `rim` [m].
+    """A rotationally symmetric image up to the radius `rim` [m], as a function of the radius r. It is even in r.
 
-    It is computed at Chebyshev points on [0, radius] and interpolated to a finer, evenly spaced table. The table is
-    interpolated onto the grid. A line of very many zones is computed at the positions of the table themselves.
+    The image is computed at Chebyshev points on [0, radius], interpolated to a finer, evenly spaced table, and
+    interpolated from the table onto the grid. If the matrix between points and table would be too large, it is computed
+    at the positions of the table instead.
 
-    An even function is a polynomial in r²; its Chebyshev points are radius · cos of the angles in a quarter turn. The
-    radius exceeds the rim by the range of local interpolation.
+    An even function is approximated by a polynomial in r², so the Chebyshev points are radius · cos α with angles α in
+    a quarter turn. `radius` exceeds the rim, because interpolation from the table reads points beyond the rim.
     """
 
     rim: float
@@ -41,10 +42,11 @@ class RadialProfile:
 
     @classmethod
     def resolving(cls, rim: float, band: float, distance: float, error: float) -> RadialProfile:
-        """Return points that represent intensity frequencies up to `band` [1/m] with a relative error of about `error`.
+        """Return points that resolve spatial frequencies up to `band` [1/m] with a relative error of about `error`.
 
-        A wave of r over [-R, R] has the Chebyshev coefficients 2 J_m(2πbR). Obliquity has poles at ±i distance, whose
-        coefficients fall like e^{-m asinh(distance / R)}. The error of eight-point interpolation is LAGRANGE_8 (2πbh)⁸.
+        The number of points follows from Chebyshev coefficients over [-R, R]. Those of a wave of frequency b are 2
+        J_m(2πbR). Obliquity factors have poles at ±i distance, so their coefficients fall like e^{-m asinh(distance /
+        R)}. The pitch h of the table follows from the error of eight-point interpolation, LAGRANGE_8 (2πbh)⁸.
         """
         digits = -math.log10(error)
         turns = 2 * math.pi * band * rim + 2 * rim / distance
@@ -62,28 +64,28 @@ class RadialProfile:
         return self.points == self.table + TAPS - 1
 
     def pays(self, outputs: int) -> bool:
-        """Return whether the line has fewer points than the window has samples.
+        """Return whether the line has fewer points than the window has samples (`outputs`).
 
-        A window far off the axis covers only a short piece of a long line.
+        This is not always the case: a window far off the axis needs only a short piece of a long line.
         """
         return self.points < outputs
 
     @property
     def entries(self) -> int:
-        """Number of entries of the matrix from points to table."""
+        """Number of entries of the matrix that maps points to the table."""
         return 0 if self.is_table else self.points * self.table
 
     @property
     def positions(self) -> np.ndarray:
-        """Radii [m]: from the rim inwards, or the positions of the table from beyond the axis outwards."""
+        """Radii [m] of the points in descending order, or of the table's positions in ascending order."""
         if self.is_table:
             return np.abs(self.rim * _places(self.table))
         return self.radius * np.cos(np.pi * (np.arange(self.points) + 0.5) / (2 * self.points))
 
     def onto(self, values: Array, window: Grid, types: Precision, signed: bool = False) -> Array:
-        """Return values at `positions` interpolated to the samples of the window, flat.
+        """Return values, given at `positions` and interpolated to the samples of the window, flat.
 
-        They are at least 0 unless signed, and 0 beyond the rim.
+        The result is 0 beyond the rim. Negative results are replaced by 0 unless `signed` is True.
         """
         import drjit as dr
 
@@ -100,16 +102,16 @@ class RadialProfile:
         return dr.select(within, total if signed else dr.maximum(total, 0), 0)
 
     def _refined(self, values: Array, types: Precision) -> Array:
-        """Return the table from values at Chebyshev points."""
+        """Return the values of the table, given values at Chebyshev points."""
         matrix = types.Tensor(_refinement(self.points, self.table, self.rim / self.radius, types.dtype))
         return matmul(matrix, types.Tensor(values, (self.points, 1))).array
 
 
 @dataclass(frozen=True)
 class DistinctRadii:
-    """The distinct radii of a window's samples, for few samples of many zones.
+    """The distinct radii of a window's samples. They are used if a window has few samples but covers many zones.
 
-    A square about the axis has fewer distinct radii than an eighth of its samples.
+    The number of distinct radii of a square about the axis is less than an eighth of the number of its samples.
     """
 
     window: Grid
@@ -134,7 +136,7 @@ class DistinctRadii:
         return 0
 
     def onto(self, values: Array, window: Grid, types: Precision, signed: bool = False) -> Array:
-        """Return values at `positions` at the samples of the window, flat."""
+        """Return values, given at `positions`, at the samples of the window, flat."""
         import drjit as dr
 
         return dr.gather(types.Float, types.Float(values), types.Index(_distinct(self.window)[1]))
@@ -144,7 +146,7 @@ class DistinctRadii:
 def _distinct(window: Grid) -> tuple[np.ndarray, np.ndarray]:
     """Return the distinct radii [m] and, for every sample, the index of its radius, flat."""
     squared = np.add.outer(np.square(window.y), np.square(window.x)).ravel() / window.dx**2
-    # Rounded so that equal radii are not split by rounding errors.
+    # Squared radii are rounded, because rounding errors would make equal radii distinct.
     found, which = np.unique(np.round(squared, 6), return_inverse=True)
     return np.sqrt(found) * window.dx, padded_for_packets(which.ravel().astype(np.uint32))
 
@@ -157,9 +159,10 @@ def _places(table: int) -> np.ndarray:
 
 @lru_cache(maxsize=32)
 def _refinement(points: int, table: int, rim: float, dtype: str) -> np.ndarray:
-    """Return even Chebyshev interpolation to positions -3 ... table + 3 of an even spacing, (table + 7, points).
+    """Return the matrix (table + 7, points) of even Chebyshev interpolation to the positions -3 ... table + 3.
 
-    The rim (in units of the line's radius) is at position table - 1.
+    The positions are evenly spaced. The axis is position 0, and the rim, in units of the line's radius, is position
+    table - 1.
     """
     radius = rim * _places(table)
     nodes = np.cos(np.pi * (np.arange(points) + 0.5) / (2 * points))

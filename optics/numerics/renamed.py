@@ -20,7 +20,7 @@ def warn_renamed(old: str, new: str, stacklevel: int = 3) -> None:
 
 
 def renamed(new: str) -> Any:
-    """Return a class attribute under an old name: it warns once and returns the attribute `new`."""
+    """Return a class attribute for an old name. Reading it warns once and returns the attribute `new`."""
     return _Renamed(new)
 
 

@@ -1,9 +1,9 @@
-"""Fourier sums between scattered points and a grid: points are spread over a few cells, which are then transformed.
+"""Fourier sums between scattered points and a grid. Points are spread over a few cells, which are then transformed.
 
     S(k) = Σ_j u_j e^{2πi (p_j k_x + q_j k_y)},   u(j) = Σ_k S_k e^{2πi (p_j k_x + q_j k_y)},   k counted from n//2.
 
-The spreading kernel is e^{β(√(1 - z²) - 1)} (Barnett, Magland & af Klinteberg, SIAM J. Sci. Comput. 41, C479, 2019).
-The period has two cells per sample of the sum. The result is divided by the transform of the kernel.
+The spreading kernel is e^{β(√(1 - z²) - 1)} (Barnett, Magland & af Klinteberg, SIAM J. Sci. Comput. 41, C479, 2019). A
+period consists of two cells per sample of the sum. The result is divided by the transform of the kernel.
 """
 
 from __future__ import annotations
@@ -21,16 +21,17 @@ from optics.numerics.quadrature import gauss_legendre
 
 __all__ = ["ScatteredSum", "sums_at"]
 
-FINER = 2.0  # choice: cells of the period per sample of the sum
-SLOPE = 2.30  # β per cell of the spreading kernel, for this ratio (eq. 4.5)
+FINER = 2.0  # choice: cells per sample of the sum
+SLOPE = 2.30  # β per cell of the spreading kernel, for two cells per sample (eq. 4.5 of the paper)
 TRANSFORM_NODES = 40
 
 
 class ScatteredSum:
     """Fourier sums over scattered points.
 
-    p, q: coordinates of the points [turns per sample], flat. shape: (y, x) of the sums. digits: accuracy of the sums
-        relative to Σ|u|.
+    p, q: coordinates of the points [turns per sample], flat.
+    shape: number of samples (y, x) of the sums.
+    digits: digits of the sums relative to Σ|u|.
     """
 
     def __init__(self, p: np.ndarray, q: np.ndarray, shape: tuple[int, int], digits: float = 6.0) -> None:
@@ -41,7 +42,7 @@ class ScatteredSum:
         (first_x, by_x), (first_y, by_y) = (_spread(at, self.period, self.width) for at in (p, q))
         across, down = (np.arange(self.width) + first[:, None] for first in (first_x, first_y))
         low_x, low_y = int(across.min()), int(down.min())
-        # Points that cover less than a period are spread over no more cells than they need.
+        # Only the cells that contain spread points are stored.
         self.held = int(down.max()) - low_y + 1, int(across.max()) - low_x + 1
         cells = (down[:, :, None] - low_y) * self.held[1] + (across[:, None, :] - low_x)
         weights = by_y[:, :, None] * by_x[:, None, :]
@@ -63,7 +64,7 @@ class ScatteredSum:
         return found
 
     def _factor(self) -> np.ndarray:
-        """Return the phase of the cells' position divided by the transform of the spreading kernel, (y, x)."""
+        """Return the phase of the cells' position, divided by the transform of the spreading kernel, (y, x)."""
         axes = []
         for first, n in zip(self.first, self.shape, strict=True):
             turns = (np.arange(n) - n // 2) * first / self.period
@@ -72,7 +73,7 @@ class ScatteredSum:
 
 
 def sums_at(sums: ScatteredSum, samples: Array) -> tuple[Array, Array]:
-    """Return real and imaginary parts of `sums.at` for real samples, with derivatives.
+    """Return the real and imaginary part of `sums.at` for real samples, with derivatives.
 
     Both are flat Float64 arrays (sum, point).
     """
@@ -81,7 +82,7 @@ def sums_at(sums: ScatteredSum, samples: Array) -> tuple[Array, Array]:
     types = precision("float64")
 
     class SumsAt(dr.CustomOp):
-        """Sums at the points. The adjoint is the real part of the sum onto the samples."""
+        """Sums at the points as a differentiable operation. The adjoint is the real part of the sum at the samples."""
 
         def eval(self, samples: Array) -> tuple[Array, Array]:
             found = sums.at(samples.numpy().reshape(-1, *sums.shape))
@@ -99,7 +100,7 @@ def sums_at(sums: ScatteredSum, samples: Array) -> tuple[Array, Array]:
 
 
 def _spread(turns: np.ndarray, period: int, width: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return the first cell of each point's spreading kernel and its weights (point, cell)."""
+    """Return the first cell that each point's spreading kernel covers, and the kernel's weights (point, cell)."""
     place = np.asarray(turns, dtype=np.float64) * period
     first = np.ceil(place - width / 2).astype(np.int64)
     z = (np.arange(width) + first[:, None] - place[:, None]) * (2 / width)
