@@ -1,12 +1,12 @@
-"""Coupling of the light on a pupil into a waveguide's modes, for every direction of incidence.
+"""Coupling of the light on a pupil into the modes of a waveguide, for every direction of incidence.
 
-The amplitude of a mode is the overlap of its field with the light in its plane. That light is a Rayleigh-Sommerfeld
-integral over the pupil, and the order of the two integrals may be exchanged:
+The amplitude of a mode is the overlap of its field ψ with the light U in the plane of the waveguide's end. U is a
+Rayleigh-Sommerfeld integral over the pupil, and the order of the two integrals can be exchanged:
 
     c(s) = ∫ ψ(x) U_s(x) dx = ∫ P(ξ) e^{ik n₀ s·ξ} Ψ(ξ) dξ,   Ψ(ξ) = ∫ ψ(x) z/(2πD²) (1/D - ik) e^{ikD} dx.
 
-A mode is thus propagated back to the pupil once, and all directions s (sines) are one Fourier sum. A waveguide off the
-pupil's axis points at the pupil's centre. The field that it radiates is computed in `radiation`.
+Each mode is therefore propagated back to the pupil once. The amplitudes for all directions s (sines) then follow from
+one Fourier sum. A waveguide off the pupil's axis points at the pupil's centre. The module `radiation` computes Ψ.
 """
 
 from __future__ import annotations
@@ -28,16 +28,19 @@ from optics.ommatidia.waveguide import Mode
 
 __all__ = ["ModesAtPupil", "modes_at_pupil"]
 
-TOGETHER = 8  # choice, by memory: modes at once
-PAIRS = 4_000_000  # choice, by memory: pairs of nodes at once
+TOGETHER = 8  # choice, limited by memory: modes that are transformed at once
+PAIRS = 4_000_000  # choice, limited by memory: pairs of node and direction that are computed at once
 
 
 @dataclass(frozen=True, eq=False)
 class ModesAtPupil:
-    """Back-propagated modes at the pupil: nodes x, y [m], and weights P Ψ dξ, (mode, node).
+    """Modes of a waveguide, propagated back to the nodes of a pupil.
+
+    x, y: positions of the nodes [m].
+    weights: P Ψ dξ, (mode, node).
 
     area_of: dξ of each node [m²].
-    wavenumber: k n₀ [1/m], in front of the pupil.
+    wavenumber: k n₀ [1/m] in front of the pupil.
     area: open area of the pupil [m²].
     """
 
@@ -49,9 +52,9 @@ class ModesAtPupil:
     area: float
 
     def power(self, sine_x: np.ndarray, sine_y: np.ndarray) -> np.ndarray:
-        """Share of the light on the pupil that enters each mode, (mode, direction), from directions with these sines.
+        """Return the share of the light on the pupil that enters each mode, (mode, direction).
 
-        Sines are relative to the source's.
+        sine_x, sine_y: sines of the light's directions, relative to the sines of the source's direction.
         """
         sx, sy = np.ravel(sine_x), np.ravel(sine_y)
         found = np.empty((len(self.weights), sx.size))
@@ -63,9 +66,10 @@ class ModesAtPupil:
         return found
 
     def power_on(self, sines: Grid, taken: np.ndarray, digits: float = DIGITS) -> np.ndarray:
-        """Share of the light on the pupil that all modes accept, (y, x), from directions on a grid of sines.
+        """Return the share of the light on the pupil that the modes accept, weighted and added up, (y, x).
 
-        taken: weight of each mode's light.
+        sines: grid of sines of the light's directions.
+        taken: weight of each mode, for example the share of its light that is absorbed.
         """
         per_sample = self.wavenumber / (2 * math.pi) * sines.dx
         sums = ScatteredSum(self.x * per_sample, self.y * per_sample, sines.shape, digits)
@@ -78,7 +82,7 @@ class ModesAtPupil:
         return found / self.area
 
     def total(self, taken: np.ndarray) -> float:
-        """Integral of `power_on` over all sines, by Parseval: (λ/n₀)² Σ |P Ψ|² dξ over the area."""
+        """Return the integral of `power_on` over all sines, (λ/n₀)² Σ |P Ψ|² dξ / area, by Parseval's theorem."""
         squares = (np.abs(self.weights) ** 2 / self.area_of).sum(axis=1)
         return float(taken @ squares) * (2 * math.pi / self.wavenumber) ** 2 / self.area
 
@@ -90,21 +94,21 @@ def modes_at_pupil(
     place: tuple[float, float] = (0.0, 0.0),
     digits: float = DIGITS,
 ) -> ModesAtPupil:
-    """Back-propagate modes of a waveguide whose end lies in a beam's plane.
+    """Propagate modes of a waveguide back to the pupil. The waveguide's end lies in the plane at the beam's distance.
 
-    steepest: largest sine of a direction, relative to that of the beam's source.
-
+    steepest: largest sine of the light's directions, relative to the beam's source.
     place: position (x, y) [m] of the end off the axis.
-    digits: accuracy of the sums over the pupil.
+    digits: digits of the sums over the pupil.
 
     Raises:
-        ValueError: a relief of pixels, or anything with a derivative.
+        ValueError: the pupil has a relief of pixels, or an argument carries a derivative.
     """
     pupil, wavelength, z = beam.pupil, beam.wavelength, number(beam.distance)
     if pupil.pixels:
         raise ValueError("height is a PixelRelief: must be smooth before a waveguide, or None")
     k, types = 2 * math.pi * beam.index / wavelength, precision("float64")
-    # Cycles per radius of pupil, mode and direction together: the curvature of a lens and that of the path cancel.
+    # The cycles are those of the combined phase of pupil, path and direction, because the curvatures of lens and path
+    # cancel.
     window = Grid((3, 3), reach(modes), place)
     residue = pupil.slopes(wavelength, beam.source).turning(z, window, beam.index)[1] / wavelength
     cycles = pupil.radius * (residue + pupil.index_before(wavelength) * steepest / wavelength)

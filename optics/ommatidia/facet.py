@@ -26,10 +26,9 @@ class FacetLens:
     radius_front, radius_back: radii of curvature [m], positive if the centre lies behind the surface. A biconvex lens
         has a negative radius_back.
     thickness: [m].
-    n: refractive index of the lens.
-    object_n: index in front of it.
-    medium_n: index of the cone behind it. All indices are numbers or curves. With curves, an `Ommatidium` that holds
-        the lens has chromatic foci; the lens' `pupil` has one focus for all wavelengths.
+    n, object_n, medium_n: refractive indices of the lens, of the medium in front of it, and of the cone behind it. Each
+        is a number or a dispersion curve. With curves, the focus of an `Ommatidium` with this lens depends on the
+        wavelength. The lens' `pupil` has the same focus for all wavelengths.
     shape: "hexagon", with corners along y, or "circle".
 
     Raises:
@@ -60,20 +59,20 @@ class FacetLens:
             raise ValueError(f"radius_front = {self.radius_front:g}: must make a lens that focuses parallel light")
 
     def power(self, wavelength: float) -> float:
-        """P = P₁ + P₂ - t P₁P₂/n [1/m] at a vacuum wavelength [m]."""
+        """Return the power P = P₁ + P₂ - t P₁P₂/n [1/m] at a vacuum wavelength [m]."""
         front, back, n = self._surfaces(wavelength)
         return front + back - self.thickness / n * front * back
 
     def focal_length(self, wavelength: float = MIDDLE) -> float:
-        """f' = n'/P [m] behind the second principal plane, in the cone."""
+        """Return the focal length f' = n'/P [m] in the cone, measured from the second principal plane."""
         return self._index("medium_n", wavelength) / self.power(wavelength)
 
     def object_focal_length(self, wavelength: float = MIDDLE) -> float:
-        """f = n₀/P [m]: a receptor of width d sees the angle d/f."""
+        """Return the focal length f = n₀/P [m] in front of the lens. A receptor of width d sees the angle d/f."""
         return self._index("object_n", wavelength) / self.power(wavelength)
 
     def principal_planes(self, wavelength: float = MIDDLE) -> tuple[float, float]:
-        """Distances [m] of the first and the second principal plane behind the front vertex."""
+        """Return the distances [m] of the first and the second principal plane behind the front vertex."""
         front, back, n = self._surfaces(wavelength)
         power, thickness = self.power(wavelength), self.thickness
         first = self._index("object_n", wavelength) * thickness * back / (n * power)
@@ -81,9 +80,9 @@ class FacetLens:
         return first, second
 
     def pupil(self, wavelength: float = MIDDLE, **others: Any) -> Pupil:
-        """Equivalent pupil in the principal planes: the facet with an ideal lens.
+        """Return the equivalent pupil in the principal planes: the facet with an ideal lens.
 
-        The lens has this lens' focal length at one wavelength [m], for light of all wavelengths.
+        For light of all wavelengths, the ideal lens has the focal length of this lens at `wavelength` [m].
 
         others: further arguments of `Pupil`, such as a wavefront for the lens' aberrations.
         """
@@ -101,7 +100,7 @@ class FacetLens:
         return Polygon.regular(6, 90.0) if self.shape == "hexagon" else Circle()
 
     def _surfaces(self, wavelength: float) -> tuple[float, float, float]:
-        """Powers [1/m] of both surfaces, and the index between them."""
+        """Return the powers [1/m] of both surfaces, and the index between them."""
         before, n, behind = (self._index(name, wavelength) for name in ("object_n", "n", "medium_n"))
         return (n - before) / self.radius_front, (behind - n) / self.radius_back, n
 

@@ -15,15 +15,15 @@ from optics.ommatidia.ommatidium import Ommatidium
 __all__ = ["AppositionEye", "hexagonal_directions"]
 
 MOST_RINGS = 60
-PER_CYCLE = 4  # choice: directions per λ/D, the finest detail of a facet's sensitivity
-WIDTHS = 3.0  # choice: half width of a field, in acceptance angles
+PER_CYCLE = 4  # choice: directions per λ/D, the finest detail in the sensitivity of a facet
+WIDTHS = 3.0  # choice: half width of an ommatidium's field, in acceptance angles
 FINEST = 0.5  # sine of the widest direction
 
 
 def hexagonal_directions(rings: int, interommatidial_deg: float) -> np.ndarray:
-    """Angles (n, 2) [rad] along x and y of ommatidia in hexagonal rings about the axis.
+    """Return the viewing directions (n, 2) of ommatidia in hexagonal rings about the axis: angles [rad] along x and y.
 
-    Neighbours are Δφ apart, and rows run along x.
+    The angle between neighbours is Δφ, and rows run along x.
 
     Raises:
         ValueError: rings outside 0 to 60, or an angle that is not positive.
@@ -41,8 +41,8 @@ def hexagonal_directions(rings: int, interommatidial_deg: float) -> np.ndarray:
 class AppositionEye:
     """Identical ommatidia with hexagonally arranged viewing directions.
 
-    ommatidium: model of all ommatidia.
-    rings: rings about the one on the axis.
+    ommatidium: the ommatidium that all directions share.
+    rings: number of rings around the ommatidium on the axis.
     interommatidial_deg: Δφ between neighbours.
 
     Raises:
@@ -60,11 +60,11 @@ class AppositionEye:
 
     @cached_property
     def directions(self) -> np.ndarray:
-        """Angles (ommatidium, 2) [rad] along x and y."""
+        """Viewing directions (ommatidium, 2): angles [rad] along x and y."""
         return hexagonal_directions(self.rings, self.interommatidial_deg)
 
     def field(self, wavelength: float = 500e-9) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Directions x, y [rad] relative to an ommatidium's own, flat, and their weights, which sum to 1."""
+        """Return directions x, y [rad] relative to the ommatidium's axis, flat, and their weights, which sum to 1."""
         eye, at = self.ommatidium, vacuum_wavelength(wavelength)
         half = WIDTHS * max(eye.acceptance_angle(at), eye.acceptance_angle(at, 90.0))
         half = min(half, math.asin(FINEST) / 1.5)
@@ -75,10 +75,12 @@ class AppositionEye:
         return x, y, weights / weights.sum()
 
     def see(self, radiance: Callable[[np.ndarray, np.ndarray], np.ndarray], wavelength: float = 500e-9) -> np.ndarray:
-        """Return signals (ommatidium,) of a scene, a radiance over angles x, y [rad]; a uniform radiance 1 gives 1.
+        """Return the signals (ommatidium,) for a scene. A uniform radiance of 1 gives signals of 1.
+
+        radiance: function that returns the radiance for arrays of angles x, y [rad].
 
         Raises:
-            ValueError: the radiance is not finite, or of another shape than its angles.
+            ValueError: the radiance is not finite, or its shape differs from that of the angles.
         """
         if not callable(radiance):
             raise ValueError(f"radiance = {shown(radiance)}: must be a function of angles x and y [rad]")
@@ -91,10 +93,10 @@ class AppositionEye:
         return found
 
     def contrast(self, cycles_per_degree: float, wavelength: float = 500e-9, azimuth_deg: float = 0.0) -> float:
-        """Contrast of a sine grating in an ommatidium's signal: the transform of its angular sensitivity.
+        """Return the contrast of a sine grating in an ommatidium's signal: the transform of the angular sensitivity.
 
-        It falls as the grating becomes finer, and is 0 beyond 2R n/λ cycles per radian, n in front of the lens. (The
-        array resolves gratings up to 1/(√3 Δφ).)
+        The contrast falls as the grating becomes finer. It is 0 beyond 2R n/λ cycles per radian, where n is the index
+        in front of the lens. (The array of ommatidia resolves gratings up to 1/(√3 Δφ).)
 
         Raises:
             ValueError: a negative frequency, or numbers that are not finite.

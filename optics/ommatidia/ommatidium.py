@@ -1,4 +1,4 @@
-"""Ommatidia: a facet's lens in front of a rhabdom as a waveguide, and the directions from which it receives light."""
+"""Ommatidia: a lens in front of a rhabdom, which is a waveguide, and their sensitivity to direction."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ __all__ = ["Ommatidium", "snyder_acceptance"]
 
 STEEPEST = (0.03, 0.06, 0.12, 0.25, 0.5)  # sines of directions, in ascending order, for which modes are prepared
 ALONG = 121  # choice: directions in the search for an acceptance angle
-WIDE = 6.0  # choice: their range, over the sum of the diffraction angle and the rhabdom's angle
+WIDE = 6.0  # choice: range of these directions, relative to the sum of λ/D and the angle of the rhabdom
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,9 +29,9 @@ class Ommatidium:
 
     lens: a FacetLens, or any Pupil.
     rhabdom: the waveguide.
-    distance: distance [m] from the lens' (second principal) plane to the rhabdom's end; None: the lens' focal length.
-        Both are values at 550 nm. The rhabdom's position is fixed; the focus of other wavelengths follows from a
-        FacetLens with dispersion curves.
+    distance: distance [m] from the plane of the lens (the second principal plane of a FacetLens) to the end of the
+        rhabdom, at 550 nm. None: the focal length of the lens at 550 nm. The position of the rhabdom is the same for
+        all wavelengths, but a FacetLens with dispersion curves focuses each wavelength at its own distance.
 
     Raises:
         ValueError: names argument, value and valid range.
@@ -50,14 +50,14 @@ class Ommatidium:
 
     @property
     def pupil(self) -> Pupil:
-        """Pupil of the lens; for a FacetLens the one at 550 nm."""
+        """Pupil of the lens. For a FacetLens, it is the equivalent pupil at 550 nm."""
         return self.lens.pupil() if isinstance(self.lens, FacetLens) else self.lens
 
     def _beam(self, wavelength: float) -> Beam:
-        """Axial light of a vacuum wavelength [m], up to the rhabdom's end.
+        """Return axial light of a vacuum wavelength [m], from the lens to the end of the rhabdom.
 
         Raises:
-            ValueError: the lens' principal plane lies behind that end.
+            ValueError: the principal plane of the lens lies behind the end of the rhabdom.
         """
         if not isinstance(self.lens, FacetLens):
             return Beam(self.lens, PointSource(), wavelength, self._distance())
@@ -66,11 +66,11 @@ class Ommatidium:
         return Beam(self.lens.pupil(wavelength), PointSource(), wavelength, distance)
 
     def modes(self, wavelength: float = 500e-9) -> tuple[Mode, ...]:
-        """Guided modes of the rhabdom at a vacuum wavelength [m]: see `Waveguide.modes`."""
+        """Return the guided modes of the rhabdom at a vacuum wavelength [m]: see `Waveguide.modes`."""
         return self.rhabdom.modes(wavelength)
 
     def mode_power(self, angle_x: np.ndarray, angle_y: np.ndarray, wavelength: float = 500e-9) -> np.ndarray:
-        """Share of the light on the facet that enters each mode, (mode, ...), from a far point at these angles [rad].
+        """Return the share of the light on the facet that enters each mode, (mode, ...), from a distant point source.
 
         Angles are the point's direction along the lens' x and y off the axis. The light travels in the opposite
         direction: its `PointSource` has the negative angles.
@@ -94,7 +94,9 @@ class Ommatidium:
         return found.reshape(len(found), *x.shape)
 
     def sensitivity(self, angle_x: np.ndarray, angle_y: np.ndarray, wavelength: float = 500e-9) -> np.ndarray:
-        """Share of the light on the facet that the rhabdom absorbs, from a point at these angles [rad], any shape.
+        """Return the share of the light on the facet that the rhabdom absorbs, from a distant point source.
+
+        angle_x, angle_y: see `mode_power`; arrays of any shape. The result has the same shape.
 
         Raises:
             ValueError: see `mode_power`.
@@ -103,9 +105,10 @@ class Ommatidium:
         return np.asarray(np.tensordot(taken, self.mode_power(angle_x, angle_y, wavelength), axes=1))
 
     def acceptance_angle(self, wavelength: float = 500e-9, azimuth_deg: float = 0.0) -> float:
-        """Δρ [rad]: full width at half maximum of the sensitivity, along a line through the axis at an azimuth from x.
+        """Return the acceptance angle Δρ [rad]: the full width at half maximum of the sensitivity.
 
-        With several lobes the outermost angles at half maximum count.
+        It is measured along a line through the axis at an azimuth from x. If there are several lobes, the outermost
+        angles at half maximum count.
 
         Raises:
             ValueError: see `mode_power`.
@@ -128,13 +131,13 @@ class Ommatidium:
 
     @staticmethod
     def _top(at: np.ndarray, seen: np.ndarray) -> float:
-        """Position of the maximum of a parabola through three points."""
+        """Return the position of the maximum of a parabola through three points."""
         (left, middle, right), step = seen, float(at[1] - at[0])
         bend = left - 2 * middle + right
         return float(at[1]) if bend >= 0 else float(at[1]) + step * (left - right) / (2 * bend)
 
     def _half(self, low: float, high: float, peak: float, turn: float, wavelength: float) -> float:
-        """Angle between two others at which the sensitivity is half the peak's, by a cubic through four points."""
+        """Return the angle between `low` and `high` at which the sensitivity is half of `peak`, by a cubic."""
         at = np.linspace(low, high, 4)
         seen = self.sensitivity(at * math.cos(turn), at * math.sin(turn), wavelength)
         return float(np.polynomial.polynomial.polyval(peak / 2, np.polynomial.polynomial.polyfit(seen, at, 3)))
@@ -152,11 +155,13 @@ def _coupled(eye: Ommatidium, wavelength: float, steepest: float) -> ModesAtPupi
 
 
 def snyder_acceptance(diameter: float, focal_length: float, rhabdom: float, wavelength: float) -> float:
-    """Δρ [rad] after Snyder (J. Comp. Physiol. 116, 161, 1977), √((λ/D)² + (d/f)²).
+    """Return the acceptance angle Δρ [rad] after Snyder (J. Comp. Physiol. 116, 161, 1977), √((λ/D)² + (d/f)²).
 
-    This treats diffraction and rhabdom as Gaussians, and the rhabdom not as a waveguide.
+    The formula treats diffraction and the rhabdom's aperture as Gaussians. It does not treat the rhabdom as a
+    waveguide.
 
-    focal_length: focal length of the object space, n₀/P [m].
+    diameter, rhabdom: diameters D of the facet and d of the rhabdom [m].
+    focal_length: focal length f = n₀/P [m] in front of the lens.
 
     Raises:
         ValueError: a length that is not positive.

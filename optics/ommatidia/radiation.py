@@ -1,12 +1,14 @@
 """Radiation of a waveguide's modes at a pupil's points.
 
-Seen from the waveguide it is cos lφ or sin lφ times a function of the angle θ from its axis and of the distance D:
+In coordinates around the waveguide's axis, the radiated field is cos lφ or sin lφ, times a function of the angle θ from
+this axis and of the distance D:
 
     Ψ(ξ) = z e^{ikD} cos lφ G(sin θ, D),   G = ∫ ψ(x) (1/d - ik)/(2πd²) e^{ik(d - D)} dx,   d = |ξ - x|.
 
-z is the distance of the waveguide's end from the pupil's plane. Off the pupil's axis the end is oblique to that plane,
-and the error of Ψ reaches 5e-3 of its largest value. G is integrated at Chebyshev points in sin θ and 1/D and
-interpolated by a polynomial between them. On the pupil's axis D is z/cos θ, and G a function of sin θ alone.
+z is the distance of the waveguide's end from the pupil's plane. The end of a waveguide off the pupil's axis is oblique
+to this plane. The error of Ψ is then up to 5e-3 of the largest value of Ψ. The integral G is computed at Chebyshev
+points in sin θ and 1/D, and interpolated between them by polynomials. For a waveguide on the pupil's axis, D is z/cos
+θ, so G depends on sin θ alone.
 """
 
 from __future__ import annotations
@@ -24,12 +26,13 @@ from optics.ommatidia.waveguide import Mode
 __all__ = ["DIGITS", "radiated", "reach"]
 
 DIGITS = 6.0  # choice: digits of all sums
-FAR = 14.0  # choice: a mode's field is cut at a decay of e^-14 from the core's edge
-# Choice: limit in core radii, for modes near their cut-off. 100 radii take up to seven times as long and change 2e-4.
+FAR = 14.0  # choice: a mode's field is neglected where it has decayed by e^-14 from the core's edge
+# Choice: limit of the field in core radii, for modes near their cut-off. A limit of 100 radii would take up to seven
+# times as long and change the result by 2e-4.
 FARTHEST = 40.0
-PAIRS = 4_000_000  # choice, by memory: pairs of points and nodes at once
-SPARE_POINTS = 10, 5  # choice: Chebyshev points in sin θ and 1/D beyond the radians of half their range
-LINE = 5e-3  # choice: radians between points of linear interpolation, for DIGITS
+PAIRS = 4_000_000  # choice, limited by memory: pairs of point and node that are computed at once
+SPARE_POINTS = 10, 5  # choice: Chebyshev points in sin θ and in 1/D, in addition to 1.2 per radian of the phase
+LINE = 5e-3  # choice: radians between points of linear interpolation, fine enough for DIGITS
 CLEAR = 1e-9  # margin for rounding at the ends of ranges
 
 Ends = tuple[float, float]
@@ -37,7 +40,7 @@ OfMode = Callable[[int], np.ndarray]
 
 
 def reach(modes: tuple[Mode, ...]) -> float:
-    """Distance [m] from the axis beyond which these modes' fields are negligible."""
+    """Return the distance [m] from the waveguide's axis beyond which these modes' fields are negligible."""
     return max(mode.radius * _radii(mode) for mode in modes)
 
 
@@ -48,11 +51,11 @@ def _radii(mode: Mode) -> float:
 def radiated(
     modes: tuple[Mode, ...], x: np.ndarray, y: np.ndarray, end: tuple[float, float, float], k: float
 ) -> np.ndarray:
-    """Ψ of each mode at a pupil's points, up to a constant phase, (mode, point).
+    """Return Ψ of each mode at points of a pupil, (mode, point), up to a constant phase.
 
-    end: position (x, y, z) [m] of the waveguide's end, with the pupil's centre at 0. The waveguide's axis passes
-        through both.
-    k: [1/m].
+    end: position (x, y, z) [m] of the waveguide's end, relative to the pupil's centre. The waveguide's axis passes
+        through both points.
+    k: wavenumber [1/m] behind the pupil.
     """
     sine, phi, distance = _seen_from(x, y, end)
     function = (_along_axis if end[:2] == (0.0, 0.0) else _aside)(modes, sine, distance, k)
@@ -66,7 +69,7 @@ def radiated(
 
 
 def _along_axis(modes: tuple[Mode, ...], sine: np.ndarray, distance: np.ndarray, k: float) -> OfMode:
-    """G D² for D = z/cos θ, as a function of the mode's number; linear interpolation between close points."""
+    """Return G D² for D = z/cos θ, as a function of the mode's number, by linear interpolation between close points."""
     z = float((distance * np.sqrt(1 - sine**2)).mean())
     sines = 0.0, float(sine.max()) * (1 + CLEAR)
     radians = k * reach(modes) * sines[1] / 2
@@ -82,7 +85,7 @@ def _along_axis(modes: tuple[Mode, ...], sine: np.ndarray, distance: np.ndarray,
 
 
 def _aside(modes: tuple[Mode, ...], sine: np.ndarray, distance: np.ndarray, k: float) -> OfMode:
-    """G D² for arbitrary sines and distances, as a function of the mode's number."""
+    """Return G D² for arbitrary sines and distances, as a function of the mode's number."""
     sines = 0.0, float(sine.max()) * (1 + CLEAR)
     nearness = (1 - CLEAR) / float(distance.max()), (1 + CLEAR) / float(distance.min())
     far = reach(modes)
@@ -96,9 +99,9 @@ def _aside(modes: tuple[Mode, ...], sine: np.ndarray, distance: np.ndarray, k: f
 
 
 def _seen_from(x: np.ndarray, y: np.ndarray, end: tuple[float, float, float]) -> tuple[np.ndarray, ...]:
-    """sin θ, φ and D of a pupil's points, seen from a waveguide's end.
+    """Return sin θ, φ and D of points of a pupil, in the frame of the waveguide's end.
 
-    Its frame is the pupil's, rotated along the shortest arc from the pupil's axis to the waveguide's.
+    This frame is the pupil's frame, rotated along the shortest arc from the pupil's axis to the waveguide's axis.
     """
     there = np.stack([x - end[0], y - end[1], np.full(len(x), -end[2])])
     axis, normal = -np.array(end) / math.hypot(*end), np.array([0.0, 0.0, -1.0])
@@ -116,14 +119,14 @@ def _scaled(at: np.ndarray, ends: Ends) -> np.ndarray:
 
 
 def _between(ends: Ends, radians: float, spare: int) -> np.ndarray:
-    """Chebyshev points for a function whose phase changes by this many radians over half a range."""
+    """Return Chebyshev points for a function whose phase changes by `radians` over half the range."""
     return (ends[0] + ends[1] + (ends[1] - ends[0]) * chebyshev_points(math.ceil(1.2 * radians) + spare)) / 2
 
 
 def _integrated(modes: tuple[Mode, ...], sine: np.ndarray, distance: np.ndarray, k: float) -> np.ndarray:
-    """G D² at places (sin θ, D), (mode, place)."""
+    """Return G D² at places (sin θ, D), (mode, place), by quadrature."""
     u, v, weight = _mode_nodes(modes, k * float(sine.max()))
-    # A sine mode has the same function as its cosine twin, and only the twin is nonzero at φ = 0.
+    # G of a mode with sin lφ equals that of its twin with cos lφ. Only the twin is nonzero at φ = 0, so it is used.
     amplitude = np.stack([weight * replace(mode, sine=False).field(u, v) for mode in modes], axis=1)
     found = np.empty((len(sine), len(modes)), dtype=complex)
     step = max(1, PAIRS // u.size)
@@ -137,13 +140,15 @@ def _integrated(modes: tuple[Mode, ...], sine: np.ndarray, distance: np.ndarray,
 
 
 def _mode_nodes(modes: tuple[Mode, ...], k: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """x, y [m] and weights over the modes' fields, for light of transverse wavenumbers up to k [1/m] along x.
+    """Return x, y [m] and weights of quadrature nodes over the modes' fields.
 
-    Only one side of that axis has nodes, because the integrand is symmetric.
+    The nodes suit light with transverse wavenumbers up to k [1/m] along x.
+
+    Only one side of the x axis has nodes, because the integrand is symmetric about it.
     """
     b, parts = modes[0].radius, []
     fastest, farthest, most = max(mode.u for mode in modes), max(map(_radii, modes)), max(mode.l for mode in modes)
-    steep = max(mode.w for mode in modes) * (farthest - 1)  # degree of a polynomial that approximates the fields' decay
+    steep = max(mode.w for mode in modes) * (farthest - 1)  # polynomial degree that the fields' decay requires
     for low, high, turns, degree in ((0.0, b, fastest, 0), (b, b * farthest, 0.0, int(steep) + 8)):
         cycles = (k * (high - low) + turns) / (2 * math.pi)
         u, weight = gauss_legendre(gauss_legendre_count(cycles, DIGITS, 2 + degree))

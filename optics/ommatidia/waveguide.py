@@ -1,4 +1,4 @@
-"""A rhabdom as a waveguide: guided modes of a thin cylinder of higher refractive index."""
+"""A rhabdom as a waveguide: guided modes of a thin cylinder whose refractive index exceeds that of the surroundings."""
 
 from __future__ import annotations
 
@@ -20,10 +20,14 @@ EDGE = 1e-9  # margin for rounding next to the poles of the equation
 
 @dataclass(frozen=True)
 class Mode:
-    """A linearly polarised mode LP_lm of a step-index cylinder (Gloge, Appl. Opt. 10, 2252, 1971; Snyder & Love,
-    Optical Waveguide Theory, ch. 14), with l dark planes through its axis and m - 1 dark rings.
+    """A linearly polarised mode LP_lm of a step-index cylinder.
 
-    u, w: roots, U² + W² = V². radius: b of the core [m]. sine: modes with l >= 1 come in pairs, with cos lφ and sin lφ.
+    It has l dark planes through the axis and m - 1 dark rings. Sources: Gloge, Appl. Opt. 10, 2252, 1971; Snyder &
+    Love, Optical Waveguide Theory, ch. 14.
+
+    u, w: U and W, solutions of the mode equation with U² + W² = V².
+    radius: radius b of the core [m].
+    sine: True for a mode with sin lφ, False with cos lφ. Modes with l >= 1 come in such pairs.
     """
 
     l: int
@@ -34,7 +38,7 @@ class Mode:
     sine: bool = False
 
     def field(self, x: Any, y: Any) -> np.ndarray:
-        """Amplitude ψ [1/m] at (x, y) [m], with ∫ψ² = 1: J_l(Ur/b) within the core, K_l(Wr/b) beyond."""
+        """Return the amplitude ψ [1/m] at (x, y) [m], with ∫ψ² = 1: J_l(Ur/b) in the core and K_l(Wr/b) outside."""
         from scipy.special import jv, kve
 
         x, y = np.broadcast_arrays(reals("x", x), reals("y", y))
@@ -50,7 +54,7 @@ class Mode:
     def core_share(self) -> float:
         """Share of the mode's light that travels within the core and can be absorbed.
 
-        It is (W² + U²κ)/V² with κ = K_l²/(K_{l-1} K_{l+1}) (Gloge's eq. 17).
+        The share is (W² + U²κ)/V² with κ = K_l²/(K_{l-1} K_{l+1}) (Gloge 1971, eq. 17).
         """
         square = self.u**2 + self.w**2
         return 1 - self.u**2 / square * (1 - self._kappa())
@@ -62,7 +66,7 @@ class Mode:
         return here * here / (below * above)
 
     def _square(self) -> float:
-        """∫ of the squared field, normalised to 1 at the core's edge, in closed form with κ."""
+        """Return the integral of the squared field, if the field is 1 at the core's edge, in closed form with κ."""
         azimuth = math.pi * (2 if self.l == 0 else 1)
         outside = self.radius**2 / 2 * (1 / self._kappa() - 1)
         return azimuth * outside / (1 - self.core_share)
@@ -70,12 +74,12 @@ class Mode:
 
 @dataclass(frozen=True)
 class Waveguide:
-    """A straight cylinder: a rhabdom, or a rhabdomere.
+    """A waveguide with the shape of a straight cylinder: a rhabdom or a rhabdomere.
 
-    diameter: [m].
-    n_core, n_clad: refractive indices, constant or dispersive. The core's should be slightly larger, because modes are
-        computed for weak guiding.
-    length: length [m] along which light is absorbed (None: all guided light counts).
+    diameter: diameter [m] of the core.
+    n_core, n_clad: refractive indices of core and surroundings, constant or dispersive. The index of the core should be
+        only slightly larger, because modes are computed for weak guiding.
+    length: length [m] over which light is absorbed (None: all guided light is absorbed).
     absorption: absorption coefficient of the core [1/m] at the pigment's peak. A mode loses 1 - exp(-absorption · share
         · length) of its light.
 
@@ -98,10 +102,10 @@ class Waveguide:
         positive("absorption", self.absorption, "1/m")
 
     def v_number(self, wavelength: float) -> float:
-        """V = πd/λ √(n_core² - n_clad²) at a vacuum wavelength [m]; below 2.405 there is one mode.
+        """Return V = πd/λ √(n_core² - n_clad²) at a vacuum wavelength [m]. Below 2.405 there is a single mode.
 
         Raises:
-            ValueError: the core's index is not above the surrounding index, or V is above 60.
+            ValueError: the index of the core is not above that of the surroundings, or V is above 60.
         """
         at = vacuum_wavelength(wavelength)
         core, clad = (index_of(name, getattr(self, name)).at(at) for name in ("n_core", "n_clad"))
@@ -113,7 +117,7 @@ class Waveguide:
         return v
 
     def modes(self, wavelength: float) -> tuple[Mode, ...]:
-        """Guided modes at a vacuum wavelength [m], the best confined first; those with l >= 1 come in pairs.
+        """Return the guided modes at a vacuum wavelength [m], the best confined first. Modes with l >= 1 come in pairs.
 
         Raises:
             ValueError: see `v_number`.
@@ -126,15 +130,15 @@ class Waveguide:
         return tuple(sorted(found, key=lambda mode: mode.u))
 
     def absorbed(self, mode: Mode) -> float:
-        """Share of a mode's light that is absorbed along the whole length."""
+        """Return the share of a mode's light that is absorbed along the whole length."""
         return 1.0 if self.length is None else 1 - math.exp(-self.absorption * mode.core_share * self.length)
 
 
 @lru_cache(maxsize=4096)
 def _roots(l: int, v: float) -> tuple[float, ...]:
-    """U of all guided modes of azimuthal order l, roots of U J_{l+1}(U)/J_l(U) = W K_{l+1}(W)/K_l(W).
+    """Return U of all guided modes of azimuthal order l: the roots of U J_{l+1}(U)/J_l(U) = W K_{l+1}(W)/K_l(W).
 
-    From its cut-off there is one between each two zeros of J_l and of J_{l-1}.
+    Each mode, from its cut-off on, has one root between a zero of J_{l-1} and the next zero of J_l.
     """
     from scipy.optimize import brentq
     from scipy.special import jn_zeros, jv, kve

@@ -4,14 +4,14 @@ psf            psf, plan
 psf_result     PSFResult: a PSF that can be recomputed over other windows
 request        Request: the parameters of one PSF
 planner        the cheapest method within the tolerance
-pictures       computation of requested PSFs, repeated if a check fails
+pictures       computation of requested PSFs, which is repeated if a check fails
 spot_check     comparison of a PSF with the direct sum at a few points
 vector_focus   vector_focus: beyond scalar theory
 converging     VectorFocus: a polarised field behind a pupil
-disk_sum       light on a round receptor
+disk_sum       sum of the light on a round receptor
 microvilli     Microvilli: receptors with polarisation sensitivity
-population     one plan for many pupils
-population_members  parameters of each pupil for this plan
+population     PSFs of many pupils with one plan
+population_members  parameters of each pupil for the common plan
 batch          psf_batch: PSFs of many eyes at once
 modulation_transfer  MTF: contrast at any frequency
 contrast       mtf, image_quality

@@ -38,9 +38,13 @@ __all__ = ["PSFBatch", "psf_batch"]
 class PSFBatch(OnWindow):
     """PSFs of many eyes.
 
-    tensor: PSFs [1/m²] in Dr.Jit, (eye, depth, wavelength, y, x), with derivatives; psf: the same in NumPy.
-    plans: in the same order, flat. members: the eyes of these PSFs, also flat. setup: common parameters of all PSFs.
-    See PSFResult.
+    tensor: PSFs [1/m²] as a Dr.Jit tensor (eye, depth, wavelength, y, x) with derivatives.
+    psf: the same as a NumPy array.
+    plans: one plan per PSF, in the same order, as a flat tuple.
+    members: parameters of each PSF, in the same order.
+    setup: parameters that all PSFs share.
+
+    See PSFResult for conventions.
     """
 
     tensor: Array
@@ -59,7 +63,7 @@ class PSFBatch(OnWindow):
         return self.setup.window
 
     def result(self, eye: int, depth: int = 0) -> PSFResult:
-        """Return one eye's PSFs at one depth as a result of `optics.psf`, for `optics.strehl_ratio` and other measures.
+        """Return the PSFs of one eye at one depth as a PSFResult, for `optics.strehl_ratio` and other measures.
 
         Raises:
             ValueError: the eye or depth does not exist.
@@ -104,14 +108,18 @@ def psf_batch(
 ) -> PSFBatch:
     """Return `optics.psf` of every pupil over one window, for every source distance and wavelength.
 
-    Sources are on the axis, at distances [m]. Wavelengths are in vacuum [m].
+    pupils: one pupil per eye.
+    wavelengths: wavelengths [m] in vacuum.
 
-    sensor_distance: None: where each pupil's ideal lens images the first source; see `optics.psf`.
+    sensor_distance: distance [m] of the sensor behind the pupil. None: the distance at which each pupil's ideal lens
+        images the first source, see `optics.psf`.
+    source_distances: distances [m] of sources on the axis.
+    dx, shape, tolerance, method, dtype: see `optics.psf`.
 
-    One plan and one stack of matrix products serve all pupils with smooth reliefs of 4 x 4 points or none, Zernike
-    wavefronts, masks and two media. This computes thousands of PSFs per second. It is used if the tolerance is 1e-3 or
-    more and the plan is accurate enough. The other PSFs are all planned before any is computed, and each is computed
-    while the next one is prepared.
+    Pupils without a relief, or with a smooth relief of 4 x 4 points, can share one plan and one stack of matrix
+    products. They may have Zernike wavefronts, masks, and different media in front and behind. The shared plan computes
+    thousands of PSFs per second. It is used if the tolerance is 1e-3 or more and the plan is accurate enough. All other
+    PSFs are planned before the first of them is computed. Each of them is computed while the next one is prepared.
 
     Raises:
         ValueError: an argument is invalid, or a sequence is empty.
@@ -149,7 +157,7 @@ def _members(
     sensor_distance: Scalar | None,
     source_distances: Sequence[Scalar],
 ) -> Iterator[Member]:
-    """Yield all combinations of eyes, depths and wavelengths; the last index varies fastest."""
+    """Yield all combinations of eyes, depths and wavelengths. The wavelength varies fastest."""
     if sensor_distance is not None:
         positive("sensor_distance", sensor_distance, carried=True)
     lambdas = [vacuum_wavelength(wavelength) for wavelength in wavelengths]

@@ -1,6 +1,6 @@
 """Concentration of the light: the peak of a PSF, and the power within a circle.
 
-If the PSF carries derivatives, so do these numbers: they are then Dr.Jit arrays, otherwise NumPy arrays.
+If the PSF carries derivatives, the results are Dr.Jit arrays that carry derivatives. Otherwise they are NumPy arrays.
 """
 
 from __future__ import annotations
@@ -22,37 +22,38 @@ from optics.point_spread.psf_result import SUM_ERROR, PSFResult
 
 __all__ = ["encircled_energy", "strehl_ratio"]
 
-AT_A_PEAK = 1 / 32  # choice: pitch in units of 1/cutoff at which a paraboloid has the error PARABOLOID_ERROR
+AT_A_PEAK = 1 / 32  # choice: pitch in units of 1/cutoff at which the fit of a paraboloid has the error PARABOLOID_ERROR
 LOBES = 0.4  # choice: coarsest pitch in units of 1/cutoff at which samples miss no lobe
 BETWEEN = 1 / 16  # choice: pitch in units of 1/cutoff at which the spline is evaluated
 MOST_SPLINED = 20_000  # choice, limited by time: number of brightest samples around which the spline is evaluated
-NOT_YET = 0.9  # choice: factor on the least value next to the peak, because the PSF has errors, too
-CLIMBS = 8  # choice: largest number of windows that are moved to their brightest sample
+NOT_YET = 0.9  # choice: factor on the lower bound of samples next to the peak, because the PSF has errors, too
+CLIMBS = 8  # choice: most windows, each moved to the brightest sample of the previous one
 NEIGHBOURHOOD = 9  # choice: samples along a side of such a window
 PARABOLOID_ERROR = 3e-5
-OF_A_MASK = 1e-6  # choice: neglected level of a mask's spectrum in the unaberrated peak
+OF_A_MASK = 1e-6  # choice: neglected level of a mask's spectrum for the peak without aberration
 RIPPLE = 1e-5  # choice: ripple of the circle's spectrum
 DIGITS = 10.0  # choice: digits of the peak without aberration
-FINE = 1 / 3  # choice: coarsest pitch for circles in units of 1/cutoff; finer samples extend less beyond them
+FINE = 1 / 3  # choice: coarsest pitch for circles in units of 1/cutoff; finer pitches need less area beyond a circle
 
 
 def strehl_ratio(result: PSFResult | Mixture, with_error: bool = False) -> Any:
     """Return the peak of the PSF relative to the peak of the same aperture without aberration, (wavelength,).
 
-    The result for a `WhitePSF` is (type,). The unaberrated wave is the spherical wave that converges on the sensor's
-    axis. With L = √(z² + r²), its field there is
+    The result for a `WhitePSF` is (type,). The wave without aberration is spherical and converges on the point where
+    the axis hits the sensor. Its field at this point is, with L = √(z² + r²),
 
         U = ∫ z/(2πL²) (1/L - ik) dξ
 
-    (first Rayleigh-Sommerfeld integral of exp(-ikL(r)); for a circle |1 - z/L - ikz ln(L/z)|). The peak is the maximum
-    near the brightest sample. If samples are coarse, finer ones are computed there. The peak of a mean over wavelengths
-    (`PSFResult.mean`) is compared with the mean of the unaberrated peaks.
+    the first Rayleigh-Sommerfeld integral of exp(-ikL(r)). Its modulus for a circle is |1 - z/L - ikz ln(L/z)|. The
+    peak of the PSF is the maximum near the brightest sample. If the samples are too coarse, finer samples are computed
+    there. The peak of a mean over wavelengths (`PSFResult.mean`) is divided by the mean of the peaks without
+    aberration.
 
     with_error: whether to return (value, predicted error), each (wavelength,).
 
     Raises:
-        AccuracyError: the peak lies outside the window, or rays land at a brighter point outside; or the samples are
-            too coarse and finer ones cannot be computed. The message states which samples would be sufficient.
+        AccuracyError: the peak lies outside the window, the PSF is brighter at a point outside where rays land, or the
+            samples are too coarse and finer ones cannot be computed. The message states which samples are sufficient.
     """
     import drjit as dr
 
@@ -80,7 +81,7 @@ def _unaberrated(result: PSFResult, wavelengths: np.ndarray) -> Array:
     types = precision("float64")
     mask, own = result.pupil.mask, result.pupil.radius
     bends = 0.0 if mask is None else mask.bandwidth(OF_A_MASK, own) * own
-    # Slants add no phase, but they are not polynomials: their poles lie at height z.
+    # Obliquity factors add no phase, but they are not polynomials: they have poles at the height z.
     poles = DIGITS * np.log(10) / (2 * np.pi) * own / number(result.sensor_distance)
     nodes = result.pupil.aperture.nodes(0.5 + bends + poles, DIGITS)
     radius, z = opaque(types, result.pupil.aperture_radius), opaque(types, result.sensor_distance)
@@ -119,9 +120,9 @@ def _peak(result: PSFResult, index: int) -> tuple[Array, float]:
 def _brightest(result: PSFResult, index: int) -> tuple[float, float]:
     """Return the point (x, y) at which the spline through the samples is brightest.
 
-    Of two lobes, the higher one may have the lower sample. A non-negative function with no frequency beyond the cutoff
-    f and a peak p is at least p cos²(πfd) at a distance d < 1/(2f) from it (M. Riesz 1914). A sample next to the peak
-    is at least that bright.
+    The brightest sample need not belong to the highest lobe. A non-negative function with a peak p and no frequency
+    beyond the cutoff f is at least p cos²(πfd) at a distance d < 1/(2f) from the peak (M. Riesz 1914). All samples with
+    at least this value, for the largest distance of a sample from the peak, are therefore searched.
     """
     from scipy.ndimage import map_coordinates, spline_filter
 
@@ -158,7 +159,7 @@ def _check_inside(result: PSFResult, at: tuple[float, float]) -> None:
 
 
 def _refuse_brighter_outside(result: PSFResult, index: int, peak: float) -> None:
-    """Check that the window contains more than a side lobe of an image outside (AccuracyError)."""
+    """Raise an AccuracyError if the PSF is brighter outside the window, at a point where rays land."""
     rays = result.requests[index].problem.rays if result.can_recompute and not result.holds_cells else None
     if rays is None or not len(rays):
         return
@@ -192,7 +193,7 @@ def _vertex(result: PSFResult, index: int) -> tuple[Array, float]:
     if not result.holds_cells:
         left, right, below, above = (value(row + i, column + j) for i, j in ((0, -1), (0, 1), (-1, 0), (1, 0)))
         corners = [value(row + i, column + j) * (i * j / 4) for i in (-1, 1) for j in (-1, 1)]
-        # p + g·x - xᵀBx/2 has its maximum at x = B⁻¹g, which is higher than p by gᵀB⁻¹g/2.
+        # The maximum of p + g·x - xᵀBx/2 lies at x = B⁻¹g and exceeds p by gᵀB⁻¹g/2.
         gx, gy, bxy = (right - left) / 2, (above - below) / 2, -sum(corners[1:], corners[0])
         bxx, byy = 2 * peak - left - right, 2 * peak - below - above
         determinant = bxx * byy - bxy * bxy
@@ -200,7 +201,7 @@ def _vertex(result: PSFResult, index: int) -> tuple[Array, float]:
         peak = peak + dr.select((determinant > 0) & (bxx > 0), rise, 0)
     around = float(np.linalg.norm(image)) / float(image[row, column])
     plan = result.plans[index if len(result.plans) > 1 else 0]
-    # Error for a cosine at the cutoff, halfway between samples.
+    # Error for a cosine at the cutoff frequency whose peak lies halfway between samples.
     coarse = (2 * math.pi * result.dx * float(result.cutoff[index])) ** 4 / 170
     return peak, plan.predicted_error * around + max(PARABOLOID_ERROR, 0.0 if result.holds_cells else coarse)
 
@@ -213,17 +214,17 @@ def encircled_energy(
 ) -> Any:
     """Return the fraction of the pupil's power within `radii` [m] of `centre` (x, y) [m], (wavelength, radius).
 
-    The result for a `WhitePSF` is (type, radius). It is a sum over samples, weighted with the fraction of each that
-    lies within the circle. The circle is convolved with a kernel whose spectrum is 1 at all frequencies of the
-    intensity and 0 at frequencies that alias onto them. The sum then equals that of the sharp circle. It includes
-    samples beyond the circle, which are computed if the window does not contain them.
+    The result for a `WhitePSF` is (type, radius). It is a weighted sum over samples. The weights are the circle,
+    convolved with a kernel whose spectrum is 1 at all frequencies of the intensity and 0 at frequencies that alias onto
+    them. The sum therefore equals the integral over the sharp circle. It includes samples beyond the circle. They are
+    computed if the window does not contain them.
 
     centre: None for the middle of the PSF's window. with_error: whether to return (value, predicted error).
 
     Raises:
         ValueError: a radius is negative or extends beyond the window.
-        AccuracyError: the samples are too coarse, or too few around the circle, and others cannot be computed. The
-            message states which would be sufficient.
+        AccuracyError: the samples are too coarse, or too few around the circle, and other samples cannot be computed.
+            The message states which samples are sufficient.
     """
     import drjit as dr
 
@@ -287,7 +288,7 @@ def _around(result: PSFResult, middle: tuple[float, float], radius: float, edge:
 
 
 def _within(distance: np.ndarray, radius: float, result: PSFResult, cutoff: float) -> np.ndarray:
-    """Return the fraction of each sample that lies within the circle."""
+    """Return the weight of each sample: the softened circle at this distance from its centre."""
     if radius == 0:
         return np.zeros(distance.shape)
     if result.holds_cells:

@@ -1,6 +1,6 @@
-"""Contrast as a function of spatial frequency, and image quality of an eye as one number.
+"""Contrast as a function of spatial frequency, and the image quality of an eye as one number.
 
-If the PSF carries derivatives, so do these numbers: they are then Dr.Jit arrays, otherwise NumPy arrays.
+If the PSF carries derivatives, the results are Dr.Jit arrays that carry derivatives. Otherwise they are NumPy arrays.
 """
 
 from __future__ import annotations
@@ -23,10 +23,10 @@ from optics.point_spread.request import Request
 
 __all__ = ["combined_mtf", "image_quality", "mtf"]
 
-# Choice: allowed excess of the window's light over the light that arrives, because sums have errors.
+# Choice: the light in the window may exceed the light that arrives by this amount, because sums have errors.
 HELD_TOO_MUCH = 1e-2
 GROWTHS = 3  # choice: largest number of windows that are tried
-ROOM = 0.5  # choice: half steps, each a factor of √2, by which a grown window exceeds the necessary width
+ROOM = 0.5  # choice: exponent of the factor √2 by which an enlarged window exceeds the necessary width
 
 
 def mtf(result: PSFResult | Mixture, arriving: Any = None, tolerance: float = 0.02) -> MTF:
@@ -35,14 +35,15 @@ def mtf(result: PSFResult | Mixture, arriving: Any = None, tolerance: float = 0.
     For a `WhitePSF` there is one MTF per receptor type.
 
     arriving: fraction of the pupil's power that arrives on the unbounded plane, a number or (wavelength,), in (0, 1].
-        None: everything except light that the pupil's edge, or slopes of its relief beyond grazing, make evanescent.
-    tolerance: of any contrast. Light that the window loses may be missing at any frequency. Samples more than 1/(2
-        cutoff) apart alias frequencies. In both cases the PSF is recomputed over a wider or finer window.
+        None: all light except the evanescent part, which is due to the pupil's edge or to slopes of its relief that
+        bend light beyond grazing.
+    tolerance: largest error of any contrast. Light outside the window causes errors at any frequency, and samples more
+        than 1/(2 cutoff) apart alias frequencies. If necessary, the PSF is recomputed over a wider or finer window.
 
     Raises:
-        ValueError: arriving has another shape, or is below the light in the window by more than 0.01.
+        ValueError: arriving has the wrong shape, or the light in the window exceeds it by more than 0.01.
         AccuracyError: samples or window are insufficient for the tolerance, and others cannot be computed. The message
-            states which would be sufficient.
+            states which are sufficient.
     """
     positive("tolerance", tolerance, "contrast")
     if not isinstance(result, PSFResult):
@@ -66,9 +67,9 @@ def mtf(result: PSFResult | Mixture, arriving: Any = None, tolerance: float = 0.
 
 
 def combined_mtf(result: PSFResult, weights: np.ndarray, tolerance: float) -> MTF:
-    """Return `mtf` of sums over the PSF's wavelengths.
+    """Return the MTF of weighted sums over the PSF's wavelengths, see `mtf`.
 
-    weights: (sum, wavelength); some may be negative.
+    weights: (sum, wavelength). They may be negative.
     """
     positive("tolerance", tolerance, "contrast")
     light, unsure = _arriving(result, None)
@@ -87,8 +88,8 @@ def combined_mtf(result: PSFResult, weights: np.ndarray, tolerance: float) -> MT
 def _wide(result: PSFResult, known: np.ndarray, tolerance: float) -> PSFResult:
     """Return the PSF over a window that loses at most the tolerance.
 
-    Diffracted light falls like r⁻³, so the loss of a window is proportional to the inverse of its width. Widths and
-    pitches change in steps, so that a small change of the pupil changes neither.
+    The intensity of diffracted light falls like r⁻³ with the distance r, so the loss of a window is proportional to the
+    inverse of its width. Widths and pitches change in steps, so that a small change of the pupil changes neither.
     """
     seen, coarsest = result, 0.5 / result.highest_cutoff
     for _ in range(GROWTHS):
@@ -104,7 +105,7 @@ def _wide(result: PSFResult, known: np.ndarray, tolerance: float) -> PSFResult:
 
 
 def _transformed(seen: PSFResult, light: Array, error: np.ndarray) -> MTF:
-    """Return the MTF of a PSF.
+    """Return the MTF of a PSF that already has a sufficient window.
 
     light: all light that arrives, (wavelength,), with derivatives.
     """
@@ -121,7 +122,7 @@ def _transformed(seen: PSFResult, light: Array, error: np.ndarray) -> MTF:
 
 
 def _arriving(result: PSFResult, arriving: Any) -> tuple[Array, np.ndarray]:
-    """Return the fraction of the pupil's light that arrives anywhere, and its uncertainty, (wavelength,)."""
+    """Return the fraction of the pupil's light that arrives on the plane, and its uncertainty, (wavelength,)."""
     types = precision("float64")
     if arriving is None:
         return _not_evanescent(result)
@@ -136,9 +137,10 @@ def _arriving(result: PSFResult, arriving: Any) -> tuple[Array, np.ndarray]:
 def _not_evanescent(result: PSFResult) -> tuple[Array, np.ndarray]:
     """Return the fraction of light that is not evanescent, and its uncertainty.
 
-    A straight edge has 1/(2π²f) of |its spectrum|² per length beyond the frequency f. For an aperture with perimeter P
-    and area A, the fraction λP/(2π²A) is therefore evanescent. It is multiplied by the mask's transmission at the edge
-    relative to that of the whole aperture. Light that the relief bends beyond grazing is evanescent, too.
+    The squared spectrum of a straight edge, integrated over frequencies above f, is 1/(2π²f) per length of the edge.
+    For an aperture of perimeter P and area A, the fraction λP/(2π²A) is therefore evanescent. It is multiplied by the
+    mask's transmission along the edge, relative to that of the whole aperture. Light that the relief bends beyond
+    grazing is evanescent, too.
     """
     import drjit as dr
 
@@ -176,10 +178,11 @@ def image_quality(
 
         IQ = T / f_N ∫_0^f_N max(MTF(f) - σ / T, 0) df,   in [0, 1]
 
-    The contrast at the noise level, σ / T, rises as the pupil closes. After Tiwary, Young et al. (2025).
+    The noise floor σ / T rises as the pupil closes. Source: Tiwary, Young et al. (2025).
 
-    nyquist: of the retina, f_N = 1 / (2 receptor pitch) [1/m]. throughput: T = a². noise_sigma: σ in units of the
-        signal.
+    nyquist: Nyquist frequency of the retina, f_N = 1 / (2 receptor pitch) [1/m].
+    throughput: T = a².
+    noise_sigma: σ, in units of the signal.
     tolerance: see `optics.mtf`. with_error: whether to return (value, predicted error), each (wavelength,).
 
     Raises:
@@ -204,7 +207,7 @@ def image_quality(
     value = to_user(types.Tensor(_mean_over(above, f.size, 1), (waves,)))
     if not with_error:
         return value
-    # With twice the step, the error would be four times as large, or twice at a corner.
+    # The error of a sum with twice the step would be four times as large, or twice as large at a corner of the MTF.
     unsure = np.abs(plain(value) - plain(_mean_over(above, f.size, 2)))
     return value, number(throughput) * transfer.predicted_error + unsure
 

@@ -1,4 +1,4 @@
-"""Polarised light on its way to a focus, and its field over a window, which can be recomputed over other windows."""
+"""Polarised light behind a pupil, and its field over a window, which can be recomputed over other windows."""
 
 from __future__ import annotations
 
@@ -28,17 +28,18 @@ __all__ = ["Converging", "VectorFocus"]
 PLANE_WAVES = "plane_waves"
 MOST_NODES = 400_000  # choice, limited by memory: number of plane waves in a sum; each is spread over 81 cells
 SUM_ERROR = 1e-8  # error of a sum of plane waves
-CHECK_SECONDS = 0.5  # choice: assumed time of a field; a check takes at most a third of it
-MOST_SECONDS, FIELDS = 60.0, 7  # choice: time limit, and the number of fields that share it
-SINGLE = 1e-4  # choice: tolerance from which on float32 is sufficient
+CHECK_SECONDS = 0.5  # choice: assumed time of a field [s], of which a check takes at most a third
+MOST_SECONDS, FIELDS = 60.0, 7  # choice: time limit [s], and the number of fields that share it
+SINGLE = 1e-4  # choice: smallest tolerance for which float32 is sufficient
 
 
 @dataclass(frozen=True, eq=False)
 class Converging:
     """Light behind a pupil.
 
-    jones: Jones vectors of its parts that do not interfere, (part, 2). stokes: Stokes parameters of all light, divided
-        by the first. tolerance: relative L2 error of the intensity over a window.
+    jones: Jones vectors of the parts of the light that do not interfere with each other, (part, 2).
+    stokes: Stokes parameters of all light, divided by the first.
+    tolerance: relative L2 error of the intensity over a window.
     """
 
     beam: Beam
@@ -60,7 +61,8 @@ class Converging:
     def cutoff(self) -> float:
         """Highest frequency [1/m] of the intensity.
 
-        It results from interference of light from opposite rims, whose directions differ most on the axis.
+        It results from interference between light from opposite sides of the rim. Their directions differ most on the
+        axis.
         """
         radius, z = self.beam.pupil.radius, number(self.beam.distance)
         sine = radius / z if self.aplanatic else radius / math.hypot(radius, z)
@@ -79,7 +81,7 @@ class Converging:
         return VectorFocus(intensity, scalar, window.dx, pure, parts, window.centre, self.stokes, plan, self)
 
     def _aplanatic(self, window: Grid) -> tuple[np.ndarray, Plan]:
-        """Return the sum of plane waves, by which an aplanatic lens is defined."""
+        """Return the field behind an aplanatic lens, which is defined as a sum of plane waves."""
         rule = VectorSum(self.beam, window, True)
         if (nodes := rule.nodes) > MOST_NODES:
             far = f"{window.own_half_diagonal:.3g} m from the image"
@@ -90,7 +92,7 @@ class Converging:
         return rule.components(), Plan(PLANE_WAVES, (nodes, 1), "float64", SUM_ERROR, why)
 
     def _plane_waves(self, window: Grid) -> tuple[np.ndarray, Plan] | None:
-        """Return the sum of plane waves, or None if its error exceeds the tolerance or is unknown."""
+        """Return the field as a sum of plane waves, or None if its error exceeds the tolerance or is unknown."""
         rule = VectorSum(self.beam, window)
         if window.own_half_diagonal > number(self.beam.distance) or (nodes := rule.nodes) > MOST_NODES:
             return None
@@ -104,8 +106,9 @@ class Converging:
     def _crossed(self, scalar: np.ndarray, window: Grid) -> float:
         """Return the error of field components to which both planes of polarisation contribute.
 
-        A check of one plane of polarisation does not include it. Plane waves use the same curvature of the path for the
-        whole pupil. The fraction s² of the fields, which rays turn, interferes.
+        A check of a single plane of polarisation does not detect this error. It is due to the approximation that the
+        path has the same curvature for the whole pupil. Only the fraction s² of the fields interferes, because this is
+        the part that the rotation of rays moves to the other component.
         """
         z, bright = number(self.beam.distance), np.abs(scalar) ** 2
         off = np.add.outer((window.y - self.image[1]) ** 2, (window.x - self.image[0]) ** 2)
@@ -115,7 +118,7 @@ class Converging:
         return bend * math.sqrt(float((bright * off**2).sum() / bright.sum())) * squared / 2
 
     def _exact(self, window: Grid) -> tuple[np.ndarray, Plan]:
-        """Return the field from Smythe's integral. All fields use the method that is suitable for the scalar one."""
+        """Return the field from Smythe's integral. All fields use the method that suits the scalar field."""
         made = self._scalar(window, "float32" if self.tolerance >= SINGLE else "float64")
         sampling, root = cast(WithField, made.sampling), math.sqrt(self.beam.pupil.area)
 
@@ -146,9 +149,11 @@ class Converging:
         return replace(self.beam, pupil=RayField(self.beam, 0, weights).pupil)
 
     def _errors(self, problem: Problem, fields: dict[Weights, np.ndarray]) -> float | None:
-        """Return the largest relative error of fields (y, x) behind these masks, by comparison with the direct sum.
+        """Return the largest relative error of fields (y, x), by comparison with the direct sum.
 
-        None if the comparison is too expensive.
+        fields: each field, with the weights of the mask behind which it propagates, see `RayField`.
+
+        The result is None if the comparison would take too long.
         """
         errors = [
             spot_check(self._behind(weights), problem, np.abs(field.ravel()) ** 2, CHECK_SECONDS)
@@ -161,15 +166,15 @@ class Converging:
 class VectorFocus:
     """The electric field about an image.
 
-    intensity: |Ex|², |Ey|², |Ez|² over the pupil's area, (3, y, x) [1/m²]: the excitation of a molecule whose dipole
-        lies along x, y or z.
+    intensity: |Ex|², |Ey|², |Ez|² divided by the pupil's area, (3, y, x) [1/m²]. These are the excitations of molecules
+        with a dipole along x, y or z.
     scalar: the PSF of scalar theory, (y, x).
-    field: Ex, Ey, Ez, (3, y, x), without the carrier e^{ikz}; None unless the light is fully polarised.
-    parts: one or two fields that do not interfere and together are the light, (part, 3, y, x).
+    field: Ex, Ey, Ez, (3, y, x), without the carrier e^{ikz}. None unless the light is fully polarised.
+    parts: the one or two fields of which the light consists and which do not interfere, (part, 3, y, x).
     centre: (x, y) [m] of the middle sample.
-    polarization: Stokes parameters of the light before the pupil, divided by the first.
-    plan: method and predicted error, relative L2 of the intensity over the window.
-    towards: the light from which the field can be recomputed; None if the field was not made by `vector_focus`.
+    polarization: Stokes parameters of the light in front of the pupil, divided by the first.
+    plan: method and predicted error, the relative L2 error of the intensity over the window.
+    towards: the light from which the field can be recomputed. None if `vector_focus` did not compute the field.
     """
 
     intensity: np.ndarray

@@ -1,4 +1,4 @@
-"""Light on a round receptor: sums over samples that equal those over a sharp disk, and their errors."""
+"""Light on a round receptor: sums over samples that equal integrals over a sharp disk, and the errors of the sums."""
 
 from __future__ import annotations
 
@@ -17,17 +17,18 @@ from optics.point_spread.converging import Converging, VectorFocus
 __all__ = ["DiskSum"]
 
 RIPPLE = 1e-5  # choice: ripple of a disk's spectrum
-SUM_ERROR = 0.1  # choice: largest error of a sum in units of the ripple: test_microvilli.py
-FINE = 1 / 3  # choice: coarsest pitch in units of 1/cutoff; finer samples extend less beyond a disk
-MOST_AGAIN = 1025  # choice: samples along a side of a recomputed window
+SUM_ERROR = 0.1  # choice: largest error of a sum in units of the ripple; see test_microvilli.py
+FINE = 1 / 3  # choice: coarsest pitch in units of 1/cutoff; a finer pitch needs fewer samples beyond a disk
+MOST_AGAIN = 1025  # choice: most samples along a side of a recomputed window
 
 
 @dataclass(frozen=True, eq=False)
 class DiskSum:
     """A sum over a disk.
 
-    light: light over samples that are fine enough for sums. share: weight of each sample, (y, x). radius [m] of the
-        disk.
+    light: light on samples that are fine enough for sums.
+    share: weight of each sample, (y, x).
+    radius: radius [m] of the disk.
     """
 
     light: VectorFocus
@@ -36,15 +37,17 @@ class DiskSum:
 
     @classmethod
     def over(cls, light: VectorFocus, radius: float, centre: tuple[float, float] | None = None) -> DiskSum:
-        """Return the sum over a disk in the light's window; centre: (x, y) [m], None for the window's middle.
+        """Return the sum over a disk in the light's window.
 
         The disk is convolved with a kernel whose spectrum is 1 at all frequencies of the intensity and 0 at frequencies
         that alias onto them: see `optics.encircled_energy`. If samples are too coarse, or too few around the disk, the
-        light is recomputed.
+        light is recomputed on other samples.
+
+        centre: centre (x, y) [m] of the disk; None for the window's middle.
 
         Raises:
             ValueError: the disk extends beyond the window.
-            AccuracyError: such samples cannot be computed; the message states which would be sufficient.
+            AccuracyError: suitable samples cannot be computed. The message states which samples are sufficient.
         """
         positive("radius", without_derivative("radius", radius))
         middle = light.centre if centre is None else point_2d("centre", centre)
@@ -65,16 +68,19 @@ class DiskSum:
         return cls(seen, share, radius)
 
     def integrate(self, picture: np.ndarray) -> tuple[float, float]:
-        """Return the integral over the disk of (a part of) the light's intensity (y, x) [1/m²], and its error."""
+        """Return the integral over the disk of an intensity (y, x) [1/m²], and its error.
+
+        picture: intensity of the light or of a part of it.
+        """
         found = float((picture * self.share).sum()) * self.light.dx**2
         bright = min(math.pi * self.radius**2 * float(self.light.psf.max()), 1.0)
         return found, self.light_error + SUM_ERROR * RIPPLE * bright
 
     @property
     def light_error(self) -> float:
-        """Upper bound of the error of such an integral that results from the error of the light over its window.
+        """Upper bound of the error of an integral over the disk that is due to the error of the light over its window.
 
-        By the Cauchy-Schwarz inequality.
+        The bound follows from the Cauchy-Schwarz inequality.
         """
         norms = float(np.linalg.norm(self.light.psf) * np.linalg.norm(self.share))
         return self.light.plan.predicted_error * norms * self.light.dx**2

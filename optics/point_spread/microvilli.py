@@ -1,4 +1,4 @@
-"""Receptors with polarisation sensitivity: pigment in microvilli absorbs light that is polarised along them."""
+"""Receptors with polarisation sensitivity: pigment in microvilli absorbs mainly light that is polarised along them."""
 
 from __future__ import annotations
 
@@ -19,8 +19,9 @@ __all__ = ["Microvilli"]
 class Microvilli:
     """Parallel microvilli across the light's axis, as in a rhabdomere.
 
-    azimuth_deg: their direction, from x to y. dichroic_ratio: absorption of light polarised along them, divided by
-        absorption of light polarised across them; from 1 (no preference) to infinite.
+    azimuth_deg: direction of the microvilli, from x towards y.
+    dichroic_ratio: absorption of light polarised along the microvilli, divided by absorption of light polarised across
+        them. It ranges from 1 (no preference) to infinity.
 
     Raises:
         ValueError: names argument, value and valid range.
@@ -36,9 +37,9 @@ class Microvilli:
             in_range("dichroic_ratio", ratio, 1.0, 1e12)
 
     def absorbed(self, light: VectorFocus) -> np.ndarray:
-        """Return the absorbed light, (y, x) [1/m²], if all light polarised along the microvilli is absorbed.
+        """Return the absorbed light, (y, x) [1/m²], with complete absorption of light polarised along the microvilli.
 
-        It is |E·m|² + (|E|² - |E·m|²)/ratio.
+        With m the direction of the microvilli, it is |E·m|² + (|E|² - |E·m|²)/ratio.
         """
         of_kind("light", light, VectorFocus, "vector_focus(pupil)")
         along = (np.abs(self._along(light)) ** 2).sum(axis=0)
@@ -52,11 +53,15 @@ class Microvilli:
         centre: tuple[float, float] | None = None,
         with_error: bool = False,
     ) -> Any:
-        """Return the fraction of the pupil's light that a round receptor of a radius [m] absorbs.
+        """Return the fraction of the pupil's light that a round receptor absorbs.
 
-        It does not depend on the light's samples. If these are too coarse, or too few around the receptor, the light is
-        recomputed. centre: (x, y) [m] of the receptor, None for the window's middle. with_error: whether to return
-        (value, predicted error); the error includes that of the sum and that of `vector_focus`.
+        The result does not depend on the samples of the light. If they are too coarse, or too few around the receptor,
+        the light is recomputed.
+
+        radius: radius [m] of the receptor.
+        centre: centre (x, y) [m] of the receptor; None for the window's middle.
+        with_error: whether to return (value, predicted error). The error includes the errors of the sum and of
+            `vector_focus`.
 
         Raises:
             ValueError: the receptor extends beyond the window.
@@ -73,10 +78,11 @@ class Microvilli:
     ) -> float:
         """Return the largest signal divided by the smallest over all planes of linear polarisation before the pupil.
 
-        It equals the dichroic ratio if rays are flat, and is smaller if they are steep. See `signal`.
+        If rays are nearly parallel to the axis, it equals the dichroic ratio. If rays are steep, it is smaller. For the
+        arguments, see `signal`.
 
         Raises:
-            ValueError: the light is polarised. Only for unpolarised light are both planes of polarisation known.
+            ValueError: the light is polarised. Both planes of polarisation are known only for unpolarised light.
         """
         of_kind("light", light, VectorFocus, "vector_focus(pupil)")
         if any(light.polarization[1:]):

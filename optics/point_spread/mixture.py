@@ -1,4 +1,4 @@
-"""Sums over wavelengths, and the interface of mixtures with their own measures."""
+"""Sums over wavelengths, and the interface of light of several wavelengths."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ __all__ = ["Mixture", "a_mixture", "flat", "mixed"]
 
 
 class Mixture(Protocol):
-    """Light of several wavelengths at once, such as a WhitePSF; see the functions of the same names."""
+    """Light of several wavelengths, such as a WhitePSF. For its methods, see the functions of the same names."""
 
     def mtf(self, tolerance: float = 0.02) -> Any: ...
 
@@ -28,7 +28,7 @@ class Mixture(Protocol):
 
 
 def a_mixture(result: Any) -> Mixture:
-    """Return `result`; ValueError if it has no measures, for example a batch or a plain array."""
+    """Return `result`; ValueError unless it is a Mixture. A batch and a plain array, for example, are not."""
     if not hasattr(result, "strehl_ratio"):
         batch = ", as its `result(eye)` is" if hasattr(result, "result") else ""
         raise ValueError(f"result is a {type(result).__name__}: must be a PSFResult{batch}, or a WhitePSF")
@@ -37,7 +37,7 @@ def a_mixture(result: Any) -> Mixture:
 
 
 def mixed(tensor: np.ndarray | Array, weights: np.ndarray) -> Array:
-    """Return Σ_λ weights[row, λ] tensor[λ, …], (row, …) in Dr.Jit, with derivatives."""
+    """Return Σ_λ weights[row, λ] tensor[λ, …] as a Dr.Jit tensor (row, …) with derivatives."""
     import drjit as dr
 
     types = precision("float64")

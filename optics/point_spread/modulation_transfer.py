@@ -1,6 +1,6 @@
-"""Contrast by spatial frequency: on a grid and at any other frequency.
+"""Contrast as a function of spatial frequency, on a grid and at any other frequency.
 
-If the PSF carries derivatives, so do contrasts: they are then Dr.Jit arrays, otherwise NumPy arrays.
+If the PSF carries derivatives, contrasts are Dr.Jit arrays that carry derivatives. Otherwise they are NumPy arrays.
 """
 
 from __future__ import annotations
@@ -22,26 +22,26 @@ from optics.point_spread.mixture import flat
 
 __all__ = ["MTF"]
 
-# Choice: initial number of orientations in the mean of a profile, within half a turn, because contrasts at f and -f are
-# equal.
+# Choice: initial number of orientations in the mean of a profile. Half a turn is sufficient, because contrasts at f and
+# -f are equal.
 ORIENTATIONS = 16
 MOST_ORIENTATIONS = 1024
-# Choice: fraction of the predicted error within which means over the two halves of the orientations must agree.
+# Choice: fraction of the predicted error within which means over even and odd orientations must agree.
 PART = 0.1
-FINEST = 1e-5  # choice: these means need not agree more closely than this
+FINEST = 1e-5  # choice: the two means need not agree more closely than this
 DIGITS = 7.0  # choice: digits of sums over the PSF
-AT_A_TIME = 2**17  # choice: frequencies that are summed at once, each spread over 64 cells: some hundred megabytes
+AT_A_TIME = 2**17  # choice: frequencies that are summed at once; with 64 cells each, they take some hundred megabytes
 
 
 @dataclass(frozen=True, eq=False)
 class MTF:
     """Modulation transfer function on a square grid of spatial frequencies, zero frequency at n//2.
 
-    tensor: (wavelength, fy, fx) in Dr.Jit, 1 at zero frequency; mtf: the same as a NumPy array.
-    fx, fy: cycles per metre on the sensor, 1 / (widest side of the window) apart.
-    cutoff: (wavelength,) highest frequency [1/m] that a pupil of this size transmits, 2 sin θ / λ.
-    predicted_error: (wavelength,) of any contrast, at the grid's frequencies and between them.
-    shares: (wavelength, y, x) in Dr.Jit, fraction of all arriving light in each of the PSF's samples.
+    tensor: contrast as a Dr.Jit tensor (wavelength, fy, fx), which is 1 at zero frequency; mtf: the same in NumPy.
+    fx, fy: frequencies of the grid [cycles per metre on the sensor]. Their pitch is 1 / (longest side of the window).
+    cutoff: highest frequency [1/m] that a pupil of this size transmits, 2 sin θ / λ, (wavelength,).
+    predicted_error: predicted error of any contrast, at the grid's frequencies and between them, (wavelength,).
+    shares: fraction of all arriving light in each sample of the PSF, as a Dr.Jit tensor (wavelength, y, x).
     """
 
     tensor: Array
@@ -82,7 +82,7 @@ class MTF:
         """Return the MTF of the first `count` wavelengths.
 
         Raises:
-            ValueError: there are fewer, or count is not a whole number.
+            ValueError: there are fewer wavelengths, or count is not a whole number.
         """
         count = whole("count", count, 1, self.tensor.shape[0])
         tensor, shares = (_first(part, count) for part in (self.tensor, self.shares))
@@ -91,12 +91,13 @@ class MTF:
     def profile(self, frequencies: np.ndarray) -> np.ndarray | Array:
         """Return the mean over all orientations at radial `frequencies` [1/m], (wavelength, frequency).
 
-        The frequencies need not lie on the grid. Contrasts are 0 beyond the Nyquist frequency of the PSF's samples
-        (half a cycle per sample).
+        The frequencies need not lie on the grid. Beyond the Nyquist frequency of the PSF's samples (half a cycle per
+        sample), contrasts are 0.
 
         Raises:
             ValueError: the PSF has a single sample, or the frequencies are invalid.
-            AccuracyError: contrasts change so fast with orientation that a mean of 1024 may exceed the predicted error.
+            AccuracyError: contrasts change so fast with orientation that the error of a mean over 1024 orientations may
+                exceed the predicted error.
         """
         if self.fx.size < 2:
             raise ValueError("the PSF has one sample and therefore only the frequency 0: must be at least 2 x 2")
@@ -120,7 +121,7 @@ class MTF:
     def _mean(self, f: np.ndarray, n: int, shift: float) -> Array:
         """Return the mean over n orientations within half a turn, (wavelength, frequency).
 
-        shift: of the first orientation, in steps.
+        shift: angle of the first orientation, in steps between orientations.
         """
         import drjit as dr
 
@@ -131,7 +132,7 @@ class MTF:
         return types.Tensor(dr.select(types.Float(np.tile(f == 0, waves)) > 0, 1, mean), (waves, f.size))
 
     def _sum(self, f: np.ndarray, angle: np.ndarray) -> Array:
-        """Return the sum over directions, flat (wavelength, frequency)."""
+        """Return the sum of contrasts over the directions `angle`, flat (wavelength, frequency)."""
         import drjit as dr
 
         types, waves = precision("float64"), self.shares.shape[0]

@@ -1,4 +1,4 @@
-"""Computation of requested PSFs: planning, evaluation, comparison with the direct sum, and repetition if it fails."""
+"""Computation of requested PSFs: planning, evaluation, comparison with the direct sum, and repetition if necessary."""
 
 from __future__ import annotations
 
@@ -22,17 +22,17 @@ from optics.point_spread.spot_check import spot_check
 __all__ = ["PSFPicture", "pictures"]
 
 TRIES = 3  # choice: number of attempts to meet a tolerance
-# Choice: after an error f times too large, the next tolerance is f / 0.3 times smaller, so that one more attempt is
-# sufficient.
+# Choice: if an error is f times too large, the next tolerance is f / 0.3 times smaller. One more attempt is then
+# usually sufficient.
 NEXT_TOLERANCE = 0.3
-LAST_TOLERANCE = 1e-2  # choice: additional factor for the last attempt
+LAST_TOLERANCE = 1e-2  # choice: additional factor on the tolerance of the last attempt
 
 
 class PSFPicture(NamedTuple):
-    """A PSF, flat, and its plan.
+    """A computed PSF, as a flat array, and its plan.
 
-    field: complex amplitude whose square it is, including the carrier, if it was requested. sampling, problem: samples
-        and problem that it was computed from.
+    field: complex amplitude, including the carrier, if it was requested; else None.
+    sampling, problem: samples and problem from which the PSF was computed.
     """
 
     image: Array
@@ -44,9 +44,10 @@ class PSFPicture(NamedTuple):
 
 @dataclass(frozen=True)
 class _Attempt:
-    """A PSF and the parameters that it was computed from.
+    """A PSF, and the parameters from which it was computed.
 
-    request: its tolerance may be smaller than that of the original request. image: the PSF, flat.
+    request: the request, whose tolerance may be smaller than that of the user's request.
+    image: the PSF as a flat array.
     """
 
     request: Request
@@ -57,9 +58,9 @@ class _Attempt:
 
     @classmethod
     def at(cls, request: Request, planned: tuple[Plan, Sampling]) -> _Attempt:
-        """Return the PSF as planned, or by an exact method if the planned one has no derivatives.
+        """Return the PSF by the planned method, or by an exact method if the planned one cannot compute derivatives.
 
-        Dr.Jit records the computation and executes it on first access.
+        Dr.Jit only records the computation here, and executes it when the PSF is first read.
         """
         import drjit as dr
 
@@ -88,18 +89,18 @@ class _Attempt:
         return self.sampling.model_error > 0
 
     def stated(self, error: float) -> PSFPicture:
-        """Return the PSF and its plan with the error that is now known."""
+        """Return the PSF, and its plan with this error as the predicted error."""
         plan = replace(self.plan, predicted_error=error)
         return PSFPicture(self.image, plan, self.field, self.sampling, self.request.problem)
 
     def repeated(self, error: float, tolerance: float, last: bool) -> _Attempt | None:
-        """Return the next attempt after the check found an error above the tolerance.
+        """Return the next attempt, after the spot check has found an error above the tolerance.
 
-        It uses an exact method or else a smaller tolerance, because a dark window needs more digits than a bright one.
-        None if the dtype has no more digits.
+        If the method was an approximation, the next attempt uses an exact method. Otherwise it has a smaller tolerance,
+        because a dark window needs more digits than a bright one. The result is None if the dtype has no more digits.
 
-        last: this is the last attempt, so the tolerance is reduced further. Quadrature rules come in steps, and a
-            slightly smaller tolerance may give the same nodes.
+        last: whether this is the last attempt. Its tolerance is reduced further, because quadrature rules change in
+            steps, and a slightly smaller tolerance may give the same nodes.
         """
         request, problem = self.request, self.request.problem
         if self.approximates:
@@ -109,20 +110,20 @@ class _Attempt:
             smaller = max(share * problem.tolerance * tolerance / error, 10 * FLOAT_NOISE[problem.dtype])
             if smaller >= problem.tolerance:
                 return None
-            # The problem is derived again, because fine detail of the relief also has more weight at a smaller
-            # tolerance.
+            # The problem is derived again, because it depends on the tolerance: finer detail of the relief then
+            # matters.
             problem = Problem.from_beam(request.beam, problem.window, smaller, problem.dtype)
             request = replace(request, problem=problem)
         return _Attempt.at(request, request.planned())
 
 
 def pictures(requests: Sequence[Request], alike: bool = False) -> list[PSFPicture]:
-    """Return PSFs, flat, and their plans.
+    """Return PSFs as flat arrays, with their plans.
 
-    All are planned before any is computed, so an impossible request is refused at once. All are started before any
-    result is awaited.
+    All PSFs are planned before the first is computed, so an impossible request raises its error at once. All
+    computations are started before the first result is awaited.
 
-    alike: whether each request may reuse the method of the one before.
+    alike: whether each request may reuse the method of the request before.
 
     Raises:
         AccuracyError: no method meets a tolerance, or a window is so dark that rounding errors exceed it.
@@ -137,18 +138,18 @@ def pictures(requests: Sequence[Request], alike: bool = False) -> list[PSFPictur
     for attempt in started:
         dr.eval(
             attempt.image, attempt.field and (attempt.field.re, attempt.field.im)
-        )  # one kernel launch per PSF; a joint kernel would be compiled again for every number of PSFs
+        )  # each PSF has its own kernel launch, since a joint kernel would be compiled again for every number of PSFs
     return [_checked(attempt, attempt.request, TRIES) for attempt in started]
 
 
 def _checked(attempt: _Attempt, asked: Request, tries: int) -> PSFPicture:
-    """Return the PSF, or a better one, and its plan with the error from the spot check.
+    """Return the PSF, or a more accurate one, and its plan with the error from the spot check.
 
-    asked: the original request. An approximation that it names is used regardless of its error.
+    asked: the user's request. If it names an approximation, this is used regardless of its error.
     tries: number of remaining attempts, including this one.
 
     Raises:
-        AccuracyError: the last attempt also exceeds the tolerance.
+        AccuracyError: the error of the last attempt also exceeds the tolerance.
     """
     problem, tolerance = attempt.request.problem, asked.problem.tolerance
     image = attempt.image.numpy()
@@ -174,16 +175,16 @@ def _checked(attempt: _Attempt, asked: Request, tries: int) -> PSFPicture:
 
 
 def _predicted_error(image: np.ndarray, sampling: Sampling, problem: Problem) -> float:
-    """Return the error that follows from the PSF itself if no check was made.
+    """Return the error that follows from the PSF itself. It is used if there was no spot check.
 
-    Sampling has half the tolerance. Rounding adds an error δU to the field U that is as large in a dark window as in a
-    bright one. Its mean square is ε² times the mean intensity of the pupil's light if the transform spreads it evenly.
-    In a PSF's units this intensity is 1/W² over a plane of width W. The error of the intensity is then 2|U| |δU| +
-    |δU|², so
+    Sampling may use half the tolerance. Rounding adds an error δU to the field U, which is as large in a dark window as
+    in a bright one. If the transform spreads the error evenly over a plane of width W, the mean square of δU is ε²
+    times the mean intensity of the pupil's light on this plane, which is 1/W² in the units of a PSF. The error of the
+    intensity is then 2|U| |δU| + |δU|², so
 
         rounding = (2 ε √(mean PSF / W²) + ε² / W²) / √(mean PSF²).
 
-    An approximation that leaves the window dark misses all its light.
+    If an approximation predicts a dark window, its error is total, because it misses all light there.
 
     Raises:
         AccuracyError: the window is so dark that rounding errors exceed the tolerance.

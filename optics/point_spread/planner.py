@@ -1,23 +1,30 @@
-"""The choice of method and samples: the cheapest combination whose predicted error is within the tolerance.
+"""The choice of method and samples: the fastest combination whose predicted error is within the tolerance.
 
-All methods evaluate the same integral (the angular spectrum of the thin-element field, equal to the first
-Rayleigh-Sommerfeld integral). They differ in their samples:
+All exact methods evaluate the same integral: the angular spectrum of the field behind the thin element, which equals
+the first Rayleigh-Sommerfeld integral. They differ in their samples:
 
-- "hankel": a rotationally symmetric pupil on its axis needs two one-dimensional transforms and no soft edge.
-- "low_rank": the Fourier kernel times a slow factor of low rank, one matrix product. Best for lenses near their focus
-  and for small pupils. The pupil is sampled for the combined phase of lens and path, which is far below either alone.
-- "far_field": one Fourier transform onto direction cosines for each of a few nodes of the window. The slow factor of
-  the kernel is interpolated between the nodes. Best for small pupils and wide windows. Intensity only.
-- "angular_spectrum": pupil -> spectrum -> sensor plane, both planes within one period. Best at short distances.
-- "split_angular_spectrum": exp(ikz cos θ) is split into its paraxial part, whose Fourier transform is known, and the
-  rest, whose spectrum is narrow. Period and number of samples no longer grow with the distance.
-- "rayleigh_sommerfeld": the direct sum over edge-fitted nodes; needs no grid, costs nodes x outputs. The reference.
+- "hankel": two one-dimensional transforms, without a soft edge, for a rotationally symmetric pupil and light on its
+  axis.
+- "low_rank": one matrix product, whose matrix is the Fourier kernel times a slow factor of low rank. It is best near
+  the focus of lenses and for small pupils. The pupil needs samples only for the combined phase of lens and path, which
+  varies far less than either alone. - "far_field": one Fourier transform onto direction cosines for each of a few nodes
+  of the window, with interpolation of the kernel's slow factor between the nodes. It is best for small pupils and wide
+  windows. It computes only the intensity.
+- "angular_spectrum": two transforms, from the pupil to the spectrum and on to the sensor's plane. Both planes have the
+  same period. It is best at short distances.
+- "split_angular_spectrum": the same, but exp(ikz cos θ) is split into the paraxial part, whose Fourier transform is
+  known, and a remainder, whose Fourier transform is narrow. Period and number of samples then do not grow with the
+  distance.
+- "rayleigh_sommerfeld": the direct sum over nodes that are fitted to the edge. It needs no grid, and its time is
+  proportional to nodes x outputs. It is the reference.
 
-The cheap methods approximate this integral and predict their error. "auto" uses them only if this error is within the
-tolerance, too. If one is requested by name, it always runs, and its plan states the error:
+Approximate methods are faster and predict their error. "auto" uses one of them only if its error is within the
+tolerance. If the user requests one by name, it runs regardless of its error, and the plan states the error:
 
-- "fresnel": the paraxial integral. "fraunhofer": the paraxial far field.
-- "geometric": density of rays, for shadows and coarse windows. "pinhole": all light in one cell.
+- "fresnel": the paraxial integral.
+- "fraunhofer": the paraxial far field.
+- "geometric": the density of rays, for shadows and coarse windows.
+- "pinhole": all light in one cell.
 """
 
 from __future__ import annotations
@@ -43,7 +50,7 @@ from optics.numerics.cost import CALL, DFT_CALL, PAIRS_PER_SECOND, WINDOW_SAMPLE
 __all__ = ["APPROXIMATE", "EXACT", "FIELDS", "METHODS", "choose"]
 
 
-# Each function maps a problem to the samplings with which it meets the tolerance: none, one or several.
+# Each function returns the samplings with which its method meets a problem's tolerance: none, one or several.
 EXACT: dict[str, Callable[[Problem], Sequence[Sampling]]] = {
     "hankel": hankel,
     "low_rank": low_rank,
@@ -59,14 +66,14 @@ APPROXIMATE: dict[str, Callable[[Problem], Sequence[Sampling]]] = {
     "pinhole": pinhole,
 }
 METHODS = EXACT | APPROXIMATE
-FIELDS = tuple(name for name in EXACT if name != "far_field")  # methods with a complex field
-# Reasons why a method may have no sampling at all.
+FIELDS = tuple(name for name in EXACT if name != "far_field")  # methods that can return the complex field
+# Reasons why a method may have no sampling.
 UNSUITED = {
     "hankel": "requires a circle or ring with a rotationally symmetric relief and light along the axis",
     "low_rank": "the matrix between this pupil and this wide window exceeds the limit on entries",
     "far_field": "for interpolation in angle, the window is too wide or too near, or the tolerance too small",
 }
-# Methods with nodes within pixels. A grid cannot represent light that jumps from pixel to pixel.
+# Methods with nodes within pixels. A grid cannot represent a field that jumps from pixel to pixel.
 FOR_PIXELS: dict[str, Callable[[Problem], Sequence[Sampling]]] = {
     "low_rank": low_rank,
     "angular_spectrum": whole_pixel_spectrum,
@@ -77,10 +84,11 @@ FOR_PIXELS: dict[str, Callable[[Problem], Sequence[Sampling]]] = {
 
 @dataclass(frozen=True)
 class Weighing:
-    """The cost of a method as known before it is evaluated.
+    """Lower bound of a method's time, known before the method plans its samples.
 
-    least: shortest possible time of a PSF [s]. per_sample: time per sample of the window [s]. asking: time to evaluate
-        the method's true cost (choice).
+    least: shortest possible time of a PSF [s].
+    per_sample: time per sample of the window [s].
+    asking: time [s] that planning the method's samples takes (choice).
     """
 
     least: float
@@ -88,12 +96,12 @@ class Weighing:
     asking: float = 0.0
 
     def pays(self, best: float, outputs: int) -> bool:
-        """Return whether the method may save more time relative to `best` [s] than its evaluation takes."""
+        """Return whether the method may save more time, relative to `best` [s], than planning its samples takes."""
         return self.least + outputs * self.per_sample + self.asking < best
 
 
-# Methods are evaluated in this order. Choice for approximations: three times the time of an evaluation, because most
-# evaluations of them are in vain.
+# Methods are compared in this order. For approximations, `asking` is three times the actual time (a choice), because
+# most of them turn out to be too inaccurate.
 WEIGHING = {
     "hankel": Weighing(CALL["hankel"]),
     "low_rank": Weighing(CALL["low_rank"]),
@@ -110,13 +118,13 @@ WEIGHING = {
 
 @lru_cache(maxsize=256)
 def choose(problem: Problem, method: str = "auto", most_seconds: float = 60.0) -> tuple[Plan, Sampling]:
-    """Return the cheapest sampling that meets the problem's tolerance.
+    """Return the plan and the fastest sampling that meets the problem's tolerance.
 
     Planning takes as long as a small PSF, so plans are cached.
 
-    method: "auto" compares all methods that may save time, "exact" only exact ones, "field" only exact ones with a
-        phase. A method's name selects that method. Its sampling then has to meet the tolerance, but its model error
-        does not.
+    method: "auto" compares all methods that may save time, "exact" only exact methods, and "field" only exact methods
+        with a complex field. A method's name selects this method. Its sampling must then meet the tolerance, but its
+        model error may exceed it.
 
     Raises:
         ValueError: unknown method.
@@ -157,7 +165,7 @@ def _check_dtype(problem: Problem) -> None:
 
 
 def _model_tolerance(problem: Problem) -> float:
-    """Return the part of the tolerance that sampling and rounding do not use."""
+    """Return the part of the tolerance that is left for the model error, after sampling and rounding."""
     return problem.tolerance - _sampling_error(problem)
 
 

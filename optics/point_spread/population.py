@@ -1,12 +1,12 @@
-"""One plan for a whole population: pupils of any size and relief over one window, as one stack of matrix products.
+"""PSFs of a whole population with one plan: pupils of different sizes and reliefs, as one stack of matrix products.
 
-Each PSF is a low_rank PSF of rank 1: a Fourier kernel times a slow factor that is evaluated at the window's centre,
+Each PSF is computed like "low_rank" with rank 1. The Fourier kernel is multiplied by the slow factor at the centre,
 
     U(x) ≈ (z/ρ)² Σ_ξ P(ξ) z/(λD²) e^{ik(D - z)} Π (1 + 2ξx/z²) e^{-ik ξ·x/c},   D = √(ξ² + z²), ρ = √(x² + z²).
 
-Pupils are sampled in units of their own radius, so all share a soft edge, positions, B-splines and powers. The phase of
-the slow factor away from the centre is neglected. This error is predicted for each PSF from its own light. If it
-exceeds the tolerance, the PSF is computed in the ordinary way.
+Pupils are sampled in units of their radius, so all share the soft edge, the positions, B-splines and powers. The change
+of the slow factor's phase over the window is neglected. The resulting error is predicted for each PSF from its own
+light. If the error exceeds the tolerance, the PSF is computed in the ordinary way.
 """
 
 from __future__ import annotations
@@ -31,31 +31,30 @@ from optics.point_spread.population_members import Member, powers
 
 __all__ = ["population_pictures"]
 
-LOOSEST = 1e-3  # choice: tolerance from which on float32 and rank 1 may be sufficient
-FEW_WAVES = 3000.0  # choice: largest number of waves in float32
-FAR = 200.0  # choice: kz from which on the near-field term of the kernel is negligible
-RIPPLE = 0.3  # choice: ripple of the soft edge relative to the tolerance; test_population.py
+LOOSEST = 1e-3  # choice: smallest tolerance for which float32 and rank 1 may be sufficient
+FEW_WAVES = 3000.0  # choice: largest number of waves of a phase in float32
+FAR = 200.0  # choice: smallest kz for which the near-field term of the kernel is negligible
+RIPPLE = 0.3  # choice: ripple of the soft edge relative to the tolerance; see test_population.py
 SAMPLING = 0.2  # choice: error due to the soft edge, relative to the tolerance
-# Choice: transmitted light, relative to the brightest light of a mask next to the aperture, for which SAMPLING is
-# valid; test_population_members.py. If masks are bright where the aperture is closed, the soft edge has a larger error
-# than this light.
+# Choice: smallest transmitted light, relative to a mask's brightest light next to the aperture, for which SAMPLING is
+# valid; see test_population_members.py. The error of the soft edge is relative to the light next to the aperture.
 LEAST_LIGHT = 1e-2
-SPREAD = 1.1  # choice: error of the intensity per spread of the phase; test_population.py, test_population_members.py
-TURNS = 1.3  # choice: ratio between numbers of samples, so that similar pupils share a plan
-STACK = 2_000_000  # choice, limited by memory: pupil samples in a stack
+SPREAD = 1.1  # choice: error of the intensity divided by the spread of the phase; see test_population.py
+TURNS = 1.3  # choice: ratio of successive numbers of samples; similar pupils then share a plan
+STACK = 2_000_000  # choice, limited by memory: samples of pupils in a stack
 SECONDS = 3e-4  # approximate time per PSF
-RINGS = 12  # choice: rings of the window over which the error is predicted
+RINGS = 12  # choice: number of rings of the window for which the error is predicted
 SLOPES = np.linspace(-1, 1, 9) * (1 + EDGE_REACH)  # positions where the slope of a relief is evaluated
-PER_ORDER = 4  # choice: positions for the slope of a wavefront, per order
-STEP = 1e-4  # choice [radii]: step of a wavefront's differences
+PER_ORDER = 4  # choice: positions per order at which the slope of a wavefront is evaluated
+STEP = 1e-4  # choice [radii]: step of the differences that give a wavefront's slope
 
 
 def population_pictures(
     members: Sequence[Member], window: Grid, tolerance: float
 ) -> Iterator[tuple[int, np.ndarray, Plan]]:
-    """Yield the PSFs for which one plan is accurate enough: index of the member, PSF (y, x) [1/m²], plan.
+    """Yield the PSFs for which the common plan is accurate enough: index of the member, PSF (y, x) [1/m²], plan.
 
-    window: about the axis. With a tolerance below LOOSEST there are none.
+    If the tolerance is below LOOSEST, there are none. window: a window about the axis.
     """
     groups: dict[tuple[Aperture, int], list[int]] = defaultdict(list)
     plain = [index for index, member in enumerate(members) if member.plain]
@@ -96,7 +95,7 @@ def _plan(member: Member, samples: _Samples, error: float, leaving: float) -> Pl
 
 @dataclass(frozen=True, eq=False)
 class _Stack:
-    """Parameters of many members, each (member, 1, 1) float32."""
+    """Parameters of many members, as arrays (member, 1, 1) of float32."""
 
     radius: np.ndarray
     wavelength: np.ndarray
@@ -124,7 +123,7 @@ class _Stack:
 
 @dataclass(frozen=True, eq=False)
 class _Samples:
-    """Samples of a soft aperture, in radii: positions, pitch, transmittance (y, x), B-splines (position, 4)."""
+    """Samples of a soft aperture: positions and pitch in radii, transmittance (y, x), and B-splines (position, 4)."""
 
     at: np.ndarray
     pitch: float
@@ -134,7 +133,7 @@ class _Samples:
 
 @lru_cache(maxsize=64)
 def _samples(aperture: Aperture, turns: float, ripple: float) -> _Samples:
-    """Return the fewest samples for this number of cycles per radius."""
+    """Return the fewest samples for a phase with `turns` cycles per radius."""
     types, soft = precision("float64"), aperture.soften(turns, ripple, EDGE_REACH)
     pitch = 1 / (turns + soft.stopband)
     grid = Grid.square(2 * math.ceil((1 + soft.reach) / pitch) + 1, pitch)
@@ -145,7 +144,7 @@ def _samples(aperture: Aperture, turns: float, ripple: float) -> _Samples:
 
 
 def _turns(stack: _Stack, window: Grid) -> tuple[np.ndarray, np.ndarray]:
-    """Return cycles per radius of the combined phase to any point of the window, and the largest leaving sine."""
+    """Return cycles per radius of the combined phase to any point of the window, and the largest sine of the light."""
     slopes = SLOPES if stack.order < 2 else np.linspace(-1, 1, PER_ORDER * stack.order + 1) * (1 + EDGE_REACH)
     r = stack.radius * np.hypot(slopes[:, None], slopes[None, :]).astype(np.float32)
     outward = stack.before * r / np.hypot(r, stack.source) - np.sign(stack.focal) * r / np.hypot(r, stack.focal)
@@ -158,7 +157,7 @@ def _turns(stack: _Stack, window: Grid) -> tuple[np.ndarray, np.ndarray]:
         x, y = np.meshgrid(slopes, slopes)
         for along, (dx, dy) in ((along_x, (STEP, 0.0)), (along_y, (0.0, STEP))):
             rise = powers(x + dx, y + dy, stack.order) - powers(x - dx, y - dy, stack.order)
-            # High powers would dominate in the corners, where the pupil is dark.
+            # Corners are omitted: the pupil is dark there, but high powers are large.
             rise = np.where(np.hypot(x, y) <= 1 + EDGE_REACH, rise / (2 * STEP), 0)
             along += np.tensordot(stack.powers, rise, 1).astype(np.float32)
     detail = np.array([member.detail for member in stack.members], np.float32)
@@ -170,20 +169,20 @@ def _turns(stack: _Stack, window: Grid) -> tuple[np.ndarray, np.ndarray]:
     found += detail
     waves = np.abs(found) + (np.square(stack.radius) / (stack.distance * stack.wavelength))[:, 0, 0]
     near = (stack.distance / stack.wavelength)[:, 0, 0] * 2 * math.pi < FAR
-    # Infinite if float32 or the far-field kernel is not sufficient.
+    # The result is infinite if float32 or the far-field kernel is not sufficient.
     turns = np.where((waves > FEW_WAVES) | near | ~np.isfinite(found), math.inf, found)
     return turns, (leaving + 1) * (stack.wavelength / stack.radius)[:, 0, 0]
 
 
 def _splines_and_slopes(t: np.ndarray) -> tuple[list[np.ndarray], list[np.ndarray]]:
-    """Return B-splines at t and their slopes by x, t = (x + 1)/2."""
+    """Return B-splines at t = (x + 1)/2, and their derivatives with respect to x."""
     s = 1 - t
     slopes = [-s * s / 2, (3 * t * t - 4 * t) / 2, -(3 * s * s - 4 * s) / 2, t * t / 2]
     return list(cubic_bsplines(t)), [slope / 2 for slope in slopes]
 
 
 def _sine(stack: _Stack, window: Grid, at: np.ndarray) -> np.ndarray:
-    """Return the sine ξ/c(ξ) along one axis; c² is z² + ξ² + an average over the other axis and the window."""
+    """Return the sine ξ/c(ξ) along one axis. c² is z² + ξ², plus an average over the other axis and the window."""
     elsewhere = np.square(stack.radius) / 4 + np.float32((0.4 * window.own_half_width) ** 2)
     found: np.ndarray = at / np.sqrt(np.square(stack.distance) + np.square(at) + elsewhere)
     return found
@@ -202,7 +201,7 @@ def _masks(stack: _Stack, samples: _Samples) -> np.ndarray:
 
 
 def _light(samples: _Samples, masks: np.ndarray) -> np.ndarray:
-    """Return the transmitted light relative to a mask's brightest light next to the aperture, (member or 1,)."""
+    """Return the transmitted light, relative to the mask's brightest light next to the aperture, (member or 1,)."""
     power, soft = np.square(masks).reshape(len(masks), -1), samples.soft.ravel()
     passed, brightest = power @ np.square(soft) / np.square(soft).sum(), power[:, soft < 0.5].max(axis=1)
     return np.asarray(passed / np.maximum(brightest, 1e-30))
@@ -243,14 +242,14 @@ def _powers(at: bytes, order: int) -> np.ndarray:
 
 
 def _fourier(stack: _Stack, u: np.ndarray, window: Grid, at: np.ndarray) -> np.ndarray:
-    """Return the Fourier kernel times the linear part of z²/D² along one axis, (member, place, sample)."""
+    """Return the Fourier kernel times the linear part of z²/D² along one axis, (member, position, sample)."""
     xi, places = stack.radius * u, at.astype(np.float32)[None, :, None]
     sines = _sine(stack, window, xi) / stack.wavelength
     return _turned(1 + 2 * xi * places / np.square(stack.distance), -sines * places)
 
 
 def _turned(size: np.ndarray, waves: np.ndarray) -> np.ndarray:
-    """Return size · exp(2πi waves). Float32 sines are many times faster than complex exponentials."""
+    """Return size · exp(2πi waves), by sines in float32, which are many times faster than complex exponentials."""
     angle = (waves - np.rint(waves)) * np.float32(2 * math.pi)
     found = np.empty(waves.shape, np.complex64)
     np.multiply(size, np.cos(angle), out=found.real)
@@ -259,13 +258,13 @@ def _turned(size: np.ndarray, waves: np.ndarray) -> np.ndarray:
 
 
 def _model_errors(stack: _Stack, images: np.ndarray, window: Grid) -> np.ndarray:
-    """Return the relative L2 error due to the constant slow factor, (member,)."""
+    """Return the relative L2 error that results from the constant phase of the slow factor, (member,)."""
     ring, count = _rings(window)
     flat = images.reshape(len(images), -1)
     squares = np.stack([np.bincount(ring, np.square(image), RINGS) for image in flat.astype(np.float64)])
     means = np.stack([np.bincount(ring, image, RINGS) for image in flat.astype(np.float64)]) / count
     spread = _spread(stack, window)
-    # The phase spread is an error of the amplitude, weighted with the light of the sample and of its ring.
+    # The spread of the phase causes an error of the amplitude. It is weighted with the light.
     wrong = np.square(SPREAD * spread) * (squares + count * np.square(means))
     found: np.ndarray = np.sqrt(wrong.sum(axis=1) / squares.sum(axis=1))
     return found
@@ -273,21 +272,21 @@ def _model_errors(stack: _Stack, images: np.ndarray, window: Grid) -> np.ndarray
 
 @lru_cache(maxsize=8)
 def _rings(window: Grid) -> tuple[np.ndarray, np.ndarray]:
-    """Return the ring of each sample, flat, by its distance from the axis, and the number of samples per ring."""
+    """Return the index of each sample's ring around the axis, flat, and the number of samples per ring."""
     radius = np.hypot(window.x[None, :], window.y[:, None]).ravel()
     ring = np.minimum((radius / max(window.half_diagonal, window.dx) * RINGS).astype(np.intp), RINGS - 1)
     return ring, np.maximum(np.bincount(ring, minlength=RINGS), 1)
 
 
 def _spread(stack: _Stack, window: Grid) -> np.ndarray:
-    """Return the spread [rad] of the slow factor's phase over the pupil, for each ring's outer end, (member, ring)."""
+    """Return the spread [rad] of the slow factor's phase over the pupil, at each ring's outer end, (member, ring)."""
     turns = (np.arange(40) + 0.5) * (math.sqrt(5) - 1) / 2
     r = np.sqrt((np.arange(40) + 0.5) / 40)
     xi = stack.radius[:, 0, :, None].astype(np.float64) * (r * np.exp(2j * np.pi * turns))
     out = np.arange(1, RINGS + 1) / RINGS * max(window.half_diagonal, window.dx)
     z = stack.distance.astype(np.float64)[:, 0, :, None]
     sines = _sine(stack, window, xi.real) + 1j * _sine(stack, window, xi.imag)
-    # Root mean square, without the mean and relative to the window's centre: the larger one of axis and diagonal.
+    # Standard deviation of the phase relative to the window's centre: the larger one of axis and diagonal.
     worst = np.zeros((len(stack.radius), RINGS))
     for angle in (0.0, math.pi / 4):
         x = (out * np.exp(1j * angle))[None, :, None]

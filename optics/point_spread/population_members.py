@@ -1,4 +1,4 @@
-"""Members of a population: the parameters of each that the common plan uses."""
+"""Members of a population, with the parameters that the common plan uses."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from optics.numerics.autodiff import Scalar, is_differentiable
 
 __all__ = ["HIGHEST_ORDER", "Member", "powers"]
 
-HIGHEST_ORDER = 12  # choice: highest order of Zernike polynomials; as sums of powers, higher ones lose digits
+HIGHEST_ORDER = 12  # choice: highest order of Zernike polynomials; higher orders lose digits as sums of powers
 MASK_LEVEL = 1e-3  # choice: neglected amplitude in a mask's spectrum
 
 
 @dataclass(frozen=True, eq=False)
 class Member:
-    """One PSF of a population. wavelength in vacuum, distances [m]."""
+    """One PSF of a population. Lengths are in m, and the wavelength is that in vacuum."""
 
     pupil: Pupil
     wavelength: float
@@ -33,8 +33,8 @@ class Member:
     def plain(self) -> bool:
         """True if the common plan supports the member.
 
-        It requires a relief of at most 4 x 4 points, a Zernike wavefront up to HIGHEST_ORDER, a known kind of mask and
-        no derivatives.
+        The plan supports a relief of at most 4 x 4 points, a Zernike wavefront up to HIGHEST_ORDER and known kinds of
+        masks. It supports no derivatives.
         """
         pupil = self.pupil
         numbers = (pupil.aperture_radius, self.distance, self.source, pupil.thin_lens_focal_length)
@@ -67,8 +67,8 @@ class Member:
     def numbers(self) -> tuple[float, ...]:
         """Parameters as plain numbers.
 
-        Radius, wavelength in the medium behind, distances of sensor and source, focal length [m]; index before the
-        pupil divided by that behind; waist of a mask [m].
+        Radius, wavelength in the medium behind the pupil, distances of sensor and source, and focal length [m]. Index
+        in front of the pupil divided by the index behind it. Waist of a mask [m].
         """
         pupil, vacuum = self.pupil, self.wavelength
         focal = math.inf if pupil.thin_lens_focal_length is None else pupil.thin_lens_focal_length
@@ -81,7 +81,7 @@ class Member:
     def relief(self) -> np.ndarray:
         """Control points of the relief in waves, without their mean.
 
-        The mean does not affect the light, but it would cost digits in float32.
+        The mean does not affect the light, but it would reduce the precision of float32.
         """
         if self.pupil.height is None:
             return np.zeros((4, 4))
@@ -91,7 +91,7 @@ class Member:
 
     @property
     def powers(self) -> np.ndarray:
-        """Coefficients of `powers` in the wavefront in waves, (term,)."""
+        """Coefficients of `powers` in the wavefront, in waves, (term,)."""
         wavefront, known = self._wavefront, _indices(HIGHEST_ORDER)
         found = np.zeros(len(known))
         if wavefront is None:
@@ -102,7 +102,7 @@ class Member:
                 continue
             for power, share in _radial(n, m):
                 found[known[power, m]] -= value * UM / self.wavelength * share * scale**power
-        found[known[0, 0]] = 0.0  # the phase common to the whole pupil, as for a relief
+        found[known[0, 0]] = 0.0  # the constant term does not affect the light, as for a relief
         return found
 
     @property
@@ -112,7 +112,7 @@ class Member:
 
     @property
     def detail(self) -> float:
-        """Cycles per radius of a wavefront and a mask that slopes do not include."""
+        """Cycles per radius that a wavefront and a mask have in addition to those of the slopes."""
         pupil, found = self.pupil, 0.0
         if pupil.wavefront is not None:
             found = pupil.wavefront.bandwidth(0.0)
@@ -120,7 +120,7 @@ class Member:
         return found if pupil.mask is None else found + pupil.mask.bandwidth(MASK_LEVEL, pupil.radius) * pupil.radius
 
     def mask(self, at: np.ndarray) -> np.ndarray | None:
-        """Return the amplitudes of a map at positions in radii along either axis, (y, x)."""
+        """Return the amplitudes (y, x) of a mask map at positions in radii along either axis; None for other masks."""
         mask = self.pupil.mask
         if not isinstance(mask, MaskMap):
             return None
@@ -140,7 +140,7 @@ def powers(x: np.ndarray, y: np.ndarray, order: int) -> np.ndarray:
 
 @lru_cache(maxsize=HIGHEST_ORDER + 1)
 def _indices(order: int) -> dict[tuple[int, int], int]:
-    """Return the index of every (k, m), in ascending order of k, so that lower orders come first."""
+    """Return the index of every term (k, m) of `powers`, in ascending order of k."""
     pairs = [(k, m) for k in range(order + 1) for m in range(-k, k + 1, 2)]
     return {pair: place for place, pair in enumerate(pairs)}
 

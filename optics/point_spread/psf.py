@@ -35,18 +35,21 @@ def psf(
     centre: tuple[float, float] = (0.0, 0.0),
     field: bool = False,
 ) -> PSFResult:
-    """Return |U|² / (pupil area) of the field U that a unit-amplitude wave produces behind the pupil.
+    """Return the PSF |U|² / (pupil area) of a pupil. U is the field behind it if a wave of unit amplitude arrives.
 
-    wavelengths: in vacuum [m], one or a row of them; eight and more use the plan of the first one if it is accurate
-        enough.
-    sensor_distance: [m] behind the pupil; None: where an ideal lens images the source, or 240 µm without such a lens.
-    source_distance, source_angle: [m], (x, y) [rad]: see PointSource.
-    dx, shape, centre: of the window: pitch [m], samples (y, x), position of sample n//2 (x, y) [m].
+    wavelengths: one or several wavelengths [m] in vacuum. If there are eight or more, the plan of the first is used for
+        all, provided that it is accurate enough.
+    sensor_distance: distance [m] of the sensor behind the pupil. None: the distance at which the pupil's ideal lens
+        images the source, or 240 µm without such a lens.
+    source_distance, source_angle: distance [m] and direction (x, y) [rad] of the source, see PointSource.
+    dx, shape, centre: pitch [m], number of samples (y, x) and position (x, y) [m] of sample n//2 of the window.
     tolerance: relative L2 error of the intensity over the window.
-    method: "auto", "exact" (no approximations), or one of planner.METHODS. An approximation that is requested by name
-        always runs. The tolerance then applies to its sampling only, and the plan states the error.
-    field: whether to return the complex amplitude as well, at no additional cost (`PSFResult.field`). Only methods with
-        a phase are then compared.
+    method: "auto", "exact" (no approximations), or one of planner.METHODS. If an approximation is requested by name, it
+        runs regardless of its error. The tolerance then applies only to its sampling, and the plan states the error.
+    dtype: "float32" or "float64".
+    field: whether to return the complex amplitude as well, at no additional cost (`PSFResult.field`). Only methods that
+        compute it are then compared.
+
     Both distances and all parameters of the pupil may be Dr.Jit arrays that carry derivatives: see PSFResult.tensor.
 
     Raises:

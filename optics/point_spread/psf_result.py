@@ -1,9 +1,9 @@
-"""A PSF over a window, which can be recomputed over other windows if a measure needs finer or wider samples.
+"""A PSF over a window. It can be recomputed over other windows if a measure needs finer or wider samples.
 
-A point of the sensor at distance z sees a pupil of radius R under rays whose sines differ by at most 2R/√(R² + z²). The
-highest frequency of the intensity there is therefore f_c = 2R/(λ√(R² + z²)), independent of the pupil's relief. Samples
-dx apart repeat the spectrum every 1/dx. Sums over them are correct for dx < 1/f_c (about λz/2R), and all contrasts for
-dx <= 1/(2 f_c).
+A pupil of radius R illuminates a point of the sensor, at the distance z, with rays whose sines differ by at most
+2R/√(R² + z²). The highest frequency of the intensity is therefore f_c = 2R/(λ√(R² + z²)), independent of the pupil's
+relief. The spectrum of samples at the pitch dx repeats every 1/dx. Sums over samples are therefore correct if dx <
+1/f_c (about λz/2R), and all contrasts are correct if dx <= 1/(2 f_c).
 """
 
 from __future__ import annotations
@@ -30,26 +30,26 @@ from optics.point_spread.request import Request
 
 __all__ = ["PSFResult", "spread"]
 
-MOST_AGAIN = 2049  # choice: samples along a side of a recomputed window
-MANY = 8  # choice: number of wavelengths from which on separate planning would take longer than computing
+MOST_AGAIN = 2049  # choice: most samples along a side of a recomputed window
+MANY = 8  # choice: smallest number of wavelengths for which planning each separately would take longer than computing
 MOST_SECONDS = 20.0  # choice: time limit for a recomputed window [s]
-SUM_ERROR = 3.0  # choice: relative error of a sum divided by that of the PSF: test_measure_errors.py
+SUM_ERROR = 3.0  # choice: relative error of a sum divided by that of the PSF; see test_measure_errors.py
 OF_CELLS = ("pinhole", "geometric", "perfect_lens")  # methods whose samples are means over cells
 
 
 @dataclass(frozen=True, eq=False)
 class PSFResult(OnWindow):
-    """PSF on a grid of sensor positions, sample n//2 at `centre` (x, y) [m], with y increasing with the row.
+    """A PSF on a grid of positions on the sensor. Sample n//2 is at `centre` (x, y) [m], and y increases with the row.
 
     tensor: the PSF as a Dr.Jit tensor (wavelength, y, x) that carries the derivatives of the parameters.
-    psf: the same as a NumPy array [1/m²]; its integral over an unbounded plane is the fraction of the pupil's power
-        that arrives (evanescent light does not). Never renormalised.
-    plans: one per wavelength; `plan` is the least accurate of them.
-    requests: one per wavelength, from which measures recompute the PSF; empty for a PSF that `psf` did not compute.
-    shares: (request,) weights of a mean over wavelengths, see `mean`; None: one PSF per request.
-    field_parts: real and imaginary part of the complex amplitude, Dr.Jit tensors (wavelength, y, x) with derivatives,
-        if `psf` was called with field=True; `field`: both in one NumPy array. Its squared modulus is the PSF, and it
-        includes the carrier exp(ikz).
+    psf: the same as a NumPy array [1/m²]. Its integral over an unbounded plane is the fraction of the pupil's power
+        that arrives. Evanescent light, for example, does not arrive. The PSF is never renormalised.
+    plans: one plan per wavelength; `plan` is the least accurate one.
+    requests: one request per wavelength, from which measures recompute the PSF; empty if `psf` did not compute it.
+    shares: weights of a mean over wavelengths, (request,), see `mean`. None: there is one PSF per request.
+    field_parts: real and imaginary part of the complex amplitude, as Dr.Jit tensors (wavelength, y, x) with
+        derivatives; None unless `psf` was called with field=True. The amplitude includes the carrier exp(ikz), and its
+        squared modulus is the PSF. `field` is the same as one complex NumPy array.
     """
 
     tensor: Array
@@ -71,7 +71,7 @@ class PSFResult(OnWindow):
         return re + 1j * im
 
     def __repr__(self) -> str:
-        """Return a short description, because requests contain grids of slopes."""
+        """Return a short description that omits the requests, because these contain grids of slopes."""
         count, height, width = self.tensor.shape
         planes = f"{count} wavelength{'s' * (count > 1)}, {height} x {width} samples {self.dx:.3g} m apart"
         return f"<PSFResult {planes}, predicted error {self.plan.predicted_error:.1e}>"
@@ -92,12 +92,12 @@ class PSFResult(OnWindow):
     def power(self) -> np.ndarray | Array:
         """Fraction of the pupil's power inside the window, (wavelength,).
 
-        The window extends half a cell beyond the outermost samples. If the samples are too coarse for a sum, finer ones
-        are computed.
+        The window extends half a cell beyond the outermost samples. If the samples are too coarse for a sum, finer
+        samples are computed.
 
         Raises:
-            AccuracyError: the samples are too coarse, and finer ones cannot be computed; the message states which would
-                be sufficient.
+            AccuracyError: the samples are too coarse, and finer ones cannot be computed. The message states which
+                samples are sufficient.
         """
         return self._resolved.window_sums
 
@@ -105,8 +105,8 @@ class PSFResult(OnWindow):
     def power_error(self) -> np.ndarray:
         """Predicted error of `power`, (wavelength,).
 
-        It includes the error of the PSF, and half of the power at the window's rim, whose position samples define only
-        to a cell.
+        It includes the error of the PSF and half of the power at the window's rim, because samples define the position
+        of the rim only to within a cell.
         """
         seen = self._resolved
         image = seen.psf.astype(np.float64)
@@ -124,12 +124,12 @@ class PSFResult(OnWindow):
 
     @property
     def holds_cells(self) -> bool:
-        """True if samples are means over cells, whose sum is the whole power, and not values at points."""
+        """True if samples are means over cells, whose sum is the whole power; False if they are values at points."""
         return all(plan.method in OF_CELLS for plan in self.plans)
 
     @property
     def window_sums(self) -> np.ndarray | Array:
-        """Sum over the samples times their area, (wavelength,), for any pitch."""
+        """Return the sum over the samples, times their area, (wavelength,), without checking the pitch."""
         import drjit as dr
 
         waves, flat = self.tensor.shape[0], self.psf.reshape(len(self.psf), -1)
@@ -141,7 +141,7 @@ class PSFResult(OnWindow):
 
     @property
     def sum_error(self) -> np.ndarray:
-        """Error of sums over the PSF due to its own error, as fractions of the pupil's power, (wavelength,)."""
+        """Error of sums over the PSF due to the error of the PSF, relative to the pupil's power, (wavelength,)."""
         errors = [plan.predicted_error for plan in self.plans]
         own = np.array(errors if len(errors) == len(self.psf) else [max(errors)] * len(self.psf))
         found: np.ndarray = SUM_ERROR * own * self.psf.sum(axis=(1, 2), dtype=np.float64) * self.dx**2
@@ -159,7 +159,7 @@ class PSFResult(OnWindow):
 
     @property
     def highest_cutoff(self) -> float:
-        """Highest frequency [1/m] of all PSFs, including the components of a mean."""
+        """Highest frequency [1/m] of the intensity of all PSFs, including the components of a mean."""
         if self.shares is None or not self.can_recompute:
             return float(self.cutoff.max())
         shortest = min(request.beam.wavelength for request in self.requests)
@@ -168,10 +168,10 @@ class PSFResult(OnWindow):
     def mean(self, shares: np.ndarray) -> PSFResult:
         """Return the PSF of light of all wavelengths at once, (1, y, x), at their mean wavelength, with derivatives.
 
-        shares: (wavelength,) fraction of each in the light; they sum to 1.
+        shares: fraction of each wavelength in the light, (wavelength,). Fractions sum to 1.
 
         Raises:
-            ValueError: shares has another shape or sum.
+            ValueError: shares has the wrong shape or sum.
         """
         parts = reals("shares", shares)
         if parts.shape != self.wavelengths.shape or not math.isclose(float(parts.sum()), 1, rel_tol=1e-6):
@@ -193,10 +193,11 @@ class PSFResult(OnWindow):
     def recompute_on(self, window: Grid, what: str, waves: slice = slice(None)) -> PSFResult:
         """Return the PSF of the same light over another window, to the same tolerance, for some of the wavelengths.
 
-        what: name of the measure, for the message.
+        what: name of the measure, for the error message.
+        waves: slice of the wavelengths.
 
         Raises:
-            AccuracyError: the requests of the PSF are unknown, or the window is too large.
+            AccuracyError: the requests of the PSF are not known, or the window is too large.
         """
         height, width = window.shape
         here = f"{self.tensor.shape[1]} x {self.tensor.shape[2]} samples {self.dx:.3g} m apart"
@@ -213,8 +214,8 @@ class PSFResult(OnWindow):
     def with_pitch(self, coarsest: float, what: str) -> PSFResult:
         """Return a PSF whose samples are at most `coarsest` [m] apart.
 
-        It is this PSF if its samples are fine enough. Otherwise each sample is replaced by an odd number of samples
-        along each axis, which fill the same cell.
+        If the samples of this PSF are fine enough, it is this PSF. Otherwise each sample is replaced by an odd number
+        of samples along each axis, which fill the same cell.
 
         Raises:
             AccuracyError: see `recompute_on`.
@@ -223,15 +224,15 @@ class PSFResult(OnWindow):
             return self
         parts = 2 * math.ceil((self.dx / coarsest - 1) / 2 - 1e-9) + 1
         pitch, (height, width) = self.dx / parts, self.tensor.shape[1:]
-        # With an even number of samples, the cell of the middle sample begins at the middle of the window. Its middle
-        # part must begin there, too.
+        # With an even number of samples, the cell of sample n//2 begins at the middle of the window. The cell of the
+        # new sample n//2 must begin there, too.
         shift = pitch * (parts - 1) / 2
         x, y = (at - shift * (n % 2 == 0) for at, n in zip(self.centre, (width, height), strict=True))
         return self.recompute_on(Grid((parts * height, parts * width), pitch, (x, y)), what)
 
     @cached_property
     def _resolved(self) -> PSFResult:
-        """The PSF over samples that are fine enough for sums."""
+        """Return the PSF over samples that are fine enough for sums."""
         return self.with_pitch(0.5 / self.highest_cutoff, "power")
 
 
@@ -245,7 +246,8 @@ def _through(request: Request, window: Grid) -> Request:
 def spread(requests: Sequence[Request]) -> PSFResult:
     """Return PSFs of one pupil at several wavelengths over one window.
 
-    From MANY wavelengths on, all use the plan of the first one if it is accurate enough.
+    If there are at least MANY wavelengths, the plan of the first one is used for all, provided that it is accurate
+    enough.
 
     Raises:
         AccuracyError: no method meets the tolerance, or a window is so dark that rounding errors exceed it.

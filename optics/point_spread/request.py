@@ -17,17 +17,20 @@ from optics.point_spread.planner import EXACT, METHODS, choose
 
 __all__ = ["Request", "Setup"]
 
-MOST_SECONDS_OF_JUMPS = 2.0  # choice: time limit for a height map with jumps
-GROWN = 1.25  # choice: time relative to the previous wavelength from which on all methods are compared again
+MOST_SECONDS_OF_JUMPS = 2.0  # choice: time limit for a height map with jumps [s]
+GROWN = 1.25  # choice: all methods are compared again if the time exceeds the previous wavelength's time by this factor
 
 
 @dataclass(frozen=True)
 class Request:
-    """One monochromatic PSF that is to be computed.
+    """A request for one monochromatic PSF.
 
-    beam: the light; problem: the same as numbers, with the window and the tolerance.
-    method: "auto", "exact" or a method's name. most_seconds: time limit of the PSF. keeps_field: whether to return its
-        complex amplitude as well. like: a plan whose method is tried before all methods are compared.
+    beam: the light.
+    problem: numbers that describe the light, the window and the tolerance.
+    method: "auto", "exact" or a method's name.
+    most_seconds: time limit of the PSF.
+    keeps_field: whether to return the complex amplitude as well.
+    like: a plan whose method is tried before all methods are compared.
     """
 
     beam: Beam
@@ -38,10 +41,10 @@ class Request:
     like: Plan | None = None
 
     def after(self, other: Request, plan: Plan) -> Request:
-        """Return this request with the plan of another one that differs only in wavelength and samples.
+        """Return this request with the plan of another request that differs only in wavelength and samples.
 
-        A method that is suitable for one wavelength is suitable for the next, and comparing methods takes as long as a
-        small PSF.
+        A method that is suitable for one wavelength is usually suitable for the next. Trying it first saves the
+        comparison of methods, which takes as long as a small PSF.
         """
         mine, its = self.beam, other.beam
         same = mine.pupil is its.pupil and mine.source == its.source and mine.distance is its.distance
@@ -91,9 +94,12 @@ def _wrapped(jump: float) -> str:
 
 @dataclass(frozen=True)
 class Setup:
-    """Parameters of a PSF except the pupil and the wavelength.
+    """Parameters of a PSF, except the pupil and the wavelength.
 
-    sensor_distance: [m] behind the pupil. window: the samples on the sensor. See `optics.psf` for the others.
+    sensor_distance: distance [m] of the sensor behind the pupil.
+    window: samples on the sensor.
+
+    See `optics.psf` for the other parameters.
     """
 
     sensor_distance: Scalar

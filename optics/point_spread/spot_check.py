@@ -1,4 +1,4 @@
-"""Comparison of a PSF with the direct sum at a few of its points, which finds errors that predictions miss."""
+"""Comparison of a PSF with the direct sum at a few points. It finds errors that predictions miss."""
 
 from __future__ import annotations
 
@@ -19,23 +19,24 @@ from optics.numerics.quadrature import stepped_up
 
 __all__ = ["CAUTION", "spot_check"]
 
-# Choice, to cover the spread of the estimate: 40 points give the root mean square within a factor of about two. With
-# this factor, the stated error bounds the true error: tests/optics/point_spread/test_robustness.py checks this.
+# Choice: safety factor on the estimate. From 40 points, the root mean square of the error is known only to within a
+# factor of about two. tests/optics/point_spread/test_robustness.py checks that the stated error bounds the true error.
 CAUTION = 3.5
 
 
-DIGITS_STEP = 0.25  # choice: step of the digits of a rule, so that cached rules are used
+DIGITS_STEP = 0.25  # choice: digits of a rule are rounded to multiples of this, so that cached rules are used
 
 
 @dataclass(frozen=True)
 class Effort:
-    """Limits on the effort of a check; all are choices.
+    """Limits on the effort of a spot check. All values are choices.
 
-    points: number of points; points_along_radius: number of points of a rotationally symmetric PSF.
-    fewest: with fewer points, the estimate is useless.
-    spare_digits: additional digits of the direct sum relative to the requested accuracy; the first affordable value is
-        used.
-    share: fraction of the time of the PSF; seconds: time that any check may take.
+    points: number of points of a PSF that is not rotationally symmetric.
+    points_along_radius: number of points of a rotationally symmetric PSF.
+    fewest: number of points below which the estimate is useless.
+    spare_digits: digits of the direct sum in addition to the requested accuracy. The first affordable value is used.
+    share: time of the check relative to the time of the PSF.
+    seconds: time [s] that every check may take.
     """
 
     points: int = 40
@@ -51,9 +52,9 @@ EFFORT = Effort()
 
 @dataclass(frozen=True)
 class _DirectSum:
-    """The reference at a number of points.
+    """The reference: the direct sum at a number of points.
 
-    Its nodes are for `cycles` cycles per radius and accurate to `digits`.
+    Its nodes resolve `cycles` cycles per radius and are accurate to `digits` digits.
     """
 
     points: int
@@ -64,12 +65,16 @@ class _DirectSum:
 def spot_check(beam: Beam, problem: Problem, image: np.ndarray, seconds: float) -> float | None:
     """Return the relative L2 error of the intensity over the window, estimated from the direct sum.
 
-    The points are drawn with the probabilities of `_chances`. None if the check would be too expensive.
+    The points are selected according to the probabilities from `_chances`. The result is None if the check is
+    impossible or would take too long.
 
-    image: flat, |U|² / (pupil area); seconds: time of its computation. Σ (δI)² is estimated by Σ (δI_k)² / (n p_k).
+    With n points of probability p_k, the sum of squared errors Σ (δI)² is estimated by Σ (δI_k)² / (n p_k).
+
+    image: the PSF |U|² / (pupil area), flat.
+    seconds: time of its computation.
     """
     if problem.reach is not None:
-        return None  # such a PSF is not accurate everywhere by design
+        return None  # by design, such a PSF is not accurate everywhere
     total = float(np.sum(np.square(image, dtype=np.float64)))
     if total == 0:
         return None
@@ -80,28 +85,31 @@ def spot_check(beam: Beam, problem: Problem, image: np.ndarray, seconds: float) 
     drawn, chance = _drawn(problem, image, reference.points)
     exact = _exact(beam, problem, reference, drawn)
     squared = float(np.mean(np.square(image[drawn] - exact) / chance))
-    # Choice, an error of a tenth: the PSF is then an approximation and may be much brighter than the exact one.
+    # Choice: above an error of a tenth, the PSF may be much brighter than the exact PSF, with which it is then
+    # compared.
     if squared > 0.01 * total:
         total = min(total, float(np.mean(np.square(exact) / chance)))
     rounding = max(FLOAT_NOISE["float64"], float(np.finfo(precision(problem.dtype).dtype).eps))
-    # The error of the direct sum itself: 10^-digits of the amplitude that nodes could add up to, and twice that for the
-    # intensity.
+    # The last term is the error of the direct sum: 10^-digits of the amplitude of all light in phase, and twice that
+    # for the intensity.
     return CAUTION * math.sqrt(squared / total) + rounding + 2 * 10.0 ** (darkness - reference.digits)
 
 
 def _darkness(beam: Beam, problem: Problem, mean: float) -> float:
-    """Return the digits by which the window's amplitude is below that of all light in phase.
+    """Return the number of digits by which the amplitude in the window is below that of all light in phase.
 
-    mean: root mean square of the PSF over the window. The error of the nodes is proportional to the light of the whole
-        aperture of area A. In phase this light gives U = A/(λz) and a PSF of U²/A = A/(λz)². Amplitudes are square
-        roots, hence half the digits.
+    The error of the direct sum is proportional to the amplitude that the light of the whole aperture, of area A, would
+    have in phase: U = A/(λz), with a PSF of U²/A = A/(λz)². The digits are halved, because amplitudes are square roots
+    of the PSF.
+
+    mean: root mean square of the PSF over the window.
     """
     in_phase = beam.pupil.area / (problem.wavelength * problem.distance) ** 2
     return max(0.0, 0.5 * math.log10(in_phase / mean))
 
 
 def _affordable(problem: Problem, darkness: float, seconds: float, samples: int) -> _DirectSum:
-    """Return the direct sum with the points and digits that the time of the PSF allows."""
+    """Return the direct sum with as many points and digits as the time of the PSF allows."""
     pairs = max(EFFORT.share * seconds, EFFORT.seconds) * PAIRS_PER_SECOND
     wanted = min(EFFORT.points_along_radius if problem.symmetric else EFFORT.points, samples)
     for spare in EFFORT.spare_digits:
@@ -118,10 +126,10 @@ def _affordable(problem: Problem, darkness: float, seconds: float, samples: int)
 def _drawn(problem: Problem, image: np.ndarray, points: int) -> tuple[np.ndarray, np.ndarray]:
     """Return the flat indices of the points to compare, and the probability with which each was drawn.
 
-    They are drawn evenly along the cumulative probability, so that no likely point is omitted.
+    They are drawn at even steps of the cumulative probability, so that no likely point is omitted.
     """
     if points == image.size:
-        chance = np.full(points, 1 / points)  # every point once
+        chance = np.full(points, 1 / points)  # there are few points, so each is compared once
     else:
         chance = _chances(image.astype(np.float64), problem.window.shape)
     order = _by_radius(problem.window) if problem.symmetric else np.arange(image.size)
@@ -131,7 +139,7 @@ def _drawn(problem: Problem, image: np.ndarray, points: int) -> tuple[np.ndarray
 
 
 def _exact(beam: Beam, problem: Problem, reference: _DirectSum, drawn: np.ndarray) -> np.ndarray:
-    """Return the PSF at the drawn points, by the direct sum in float64."""
+    """Return the exact PSF at the drawn points, by the direct sum in float64."""
     import drjit as dr
 
     row, column = np.divmod(drawn, problem.window.shape[1])
@@ -152,13 +160,15 @@ KINDS = 6  # kinds of points in `_chances`
 def _chances(bright: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
     """Return the probability with which each point is drawn, flat.
 
-    It is the sum of six equal parts: even; in proportion to the intensity; to its square; to the nearness of a side; to
-    the nearness of a corner; and to the intensity near sides and corners.
+    It is the mean of six distributions. The first is uniform. The others are proportional to the intensity; to the
+    square of the intensity; to the nearness of a side; to the nearness of a corner; and to the product of intensity and
+    nearness.
 
-    An even error of the amplitude has an effect proportional to the root of the intensity. The second part detects it
-    if a focus hides it from the others. A focus of one sample has its errors next to it, so the square is spread over
-    its neighbours. Phases change fastest at sides and corners. Quadratures fail there first, and within a few samples.
-    The light of a slit reaches few places at the sides, and errors occur in bright places.
+    The reasons are as follows. If the amplitude has the same error everywhere, the error of the intensity is
+    proportional to its square root. If there is a bright focus, only the second distribution detects such an error. The
+    errors of a focus of one sample lie next to it, so the square is spread over neighbouring samples. Phases change
+    fastest at sides and corners, so quadratures fail there first, and within a few samples. The light of a slit reaches
+    the sides only in few places, and errors are large where the light is bright; hence the product.
     """
     height, width = shape
     squares = np.zeros((height + 2, width + 2))
@@ -175,15 +185,15 @@ def _chances(bright: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
 def _by_radius(window: Grid) -> np.ndarray:
     """Return flat indices in order of the distance from the axis.
 
-    If points are drawn evenly from these, no important ring is omitted.
+    If points are drawn at even steps from this order, no important ring is omitted.
     """
     radii = np.add.outer(np.square(window.y), np.square(window.x)).ravel()
-    # Rounded so that equal radii are not split by rounding errors.
+    # Squared radii are rounded, so that rounding errors do not change the order of equal radii.
     return np.argsort(np.round(radii / window.dx**2, 6), kind="stable")
 
 
-# Choice: exponent of u², with u in [-1, 1] across the window. The power is one half at 1 - |u| = ln 2 / 24, a
-# seventieth of the window's width.
+# Choice: exponent of u², where u in [-1, 1] is the position across the window. u²⁴ has fallen to one half at 1 - |u| =
+# ln 2 / 24, a seventieth of the window's width from the side.
 STEEP = 12
 
 
@@ -192,7 +202,8 @@ def _fixed_chances(shape: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
     """Return the nearness of sides and corners, flat, and the sum of the three parts that do not depend on the PSF."""
     height, width = shape
     y, x = (np.square(np.linspace(-1, 1, n)) if n > 1 else np.ones(1) for n in shape)
-    # Each pair of sides has equal weight, regardless of its length. Half of it belongs to the outermost samples alone.
+    # Both pairs of sides have the same weight, regardless of their lengths. One half of it is for the outermost samples
+    # alone.
     sides = np.zeros(shape)
     for steepness in (STEEP, math.inf):
         across, along = x**steepness, y**steepness

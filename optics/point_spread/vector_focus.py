@@ -20,7 +20,7 @@ from optics.point_spread.converging import Converging, VectorFocus
 
 __all__ = ["vector_focus"]
 
-FEWEST_ZONES = 20.0  # choice: Fresnel number of an aplanatic lens from which on rays meet in a point
+FEWEST_ZONES = 20.0  # choice: smallest Fresnel number of an aplanatic lens whose rays meet in a point
 ROUNDING = 1e-9
 STEEPEST = 0.98  # choice: largest sine of rays behind the pupil, because fields change abruptly near 1
 
@@ -37,26 +37,29 @@ def vector_focus(
     shape: tuple[int, int] = (65, 65),
     tolerance: float = 1e-3,
 ) -> VectorFocus:
-    """Return the electric field behind a pupil of any shape about the image of a distant point.
+    """Return the electric field around the image of a distant point, behind a pupil of any shape.
 
-    Rays give the field in the pupil's plane, perpendicular to each ray. Smythe's integral (1947) gives the field behind
-    it according to Maxwell's equations. A sum of plane waves, one for each point of the pupil (Debye's integral), is
-    much faster. It is used if it meets the tolerance, as near foci of high Fresnel number.
+    Geometrical optics gives the field in the pupil's plane: it is perpendicular to each ray. Smythe's integral (1947)
+    then gives the field behind the pupil according to Maxwell's equations. A sum of plane waves, one for each point of
+    the pupil (Debye's integral), is much faster. It is used if it meets the tolerance, for example near foci of high
+    Fresnel number.
 
-    sensor_distance: [m]; None: the focus of the lens.
-    polarization: of the light before the pupil. Jones vector (x, y), or Stokes parameters (S0, S1, S2, S3) with S1 =
-        |Ex|² - |Ey|², S2 = 2 Re(Ex* Ey), S3 = 2 Im(Ex* Ey); None: unpolarised. In oblique light, x and y are rotated
-        with it.
-    source_angle: (x, y) [rad], as in `optics.psf`; the window then lies about the image.
-    apodization: "flat", uniform light over a flat pupil; "aplanatic", as behind a corrected objective and on its axis.
-        The pupil is then seen from the focus under the sine ξ/z, and the light is a sum of plane waves (Richards and
-        Wolf 1959).
+    wavelength: wavelength [m] in vacuum.
+    sensor_distance: distance [m] behind the pupil; None: the focus of the lens.
+    polarization: polarisation of the light in front of the pupil: a Jones vector (x, y), or Stokes parameters (S0, S1,
+        S2, S3) with S1 = |Ex|² - |Ey|², S2 = 2 Re(Ex* Ey), S3 = 2 Im(Ex* Ey). None: unpolarised. For oblique light, the
+        x and y of these definitions are rotated with the light's direction.
+    source_angle: direction (x, y) [rad] of the light, as in `optics.psf`. The window lies around the image.
+    apodization: "flat": uniform light over a flat pupil. "aplanatic": light on the axis of a corrected objective. The
+        ray from ξ then arrives at the focus with the sine ξ/z, and the light is a sum of plane waves (Richards and Wolf
+        1959).
+    dx, shape: pitch [m] and number of samples (y, x) of the window.
     tolerance: relative L2 error of the intensity over the window.
 
     Raises:
         ValueError: an argument is invalid, the relief is pixelated, or a parameter carries derivatives.
-        AccuracyError: no method meets the tolerance within the limits on memory and time; or an aplanatic lens has a
-            Fresnel number below 20, so that its rays do not meet in a point.
+        AccuracyError: no method meets the tolerance within the limits on memory and time; or the Fresnel number of an
+            aplanatic lens is below 20, so that its rays do not meet in a point.
     """
     of_kind("pupil", pupil, Pupil, "Pupil(25e-6)")
     lambda_, source = vacuum_wavelength(wavelength), PointSource(math.inf, source_angle)
@@ -74,7 +77,7 @@ def vector_focus(
 
 
 def _check_plain(pupil: Pupil, wavelength: float) -> None:
-    """Check that the pupil carries no derivative (ValueError)."""
+    """Raise a ValueError if a parameter of the pupil carries a derivative."""
     types = precision("float64")
     at, middle = types.Float64(0.5), types.Float64(0.0)
     path = pupil.path(at * pupil.radius, middle, wavelength, PointSource(), types)
@@ -83,7 +86,7 @@ def _check_plain(pupil: Pupil, wavelength: float) -> None:
 
 
 def _check_rays(beam: Beam) -> None:
-    """Check that rays propagate behind the pupil (AccuracyError): evanescent waves have no direction."""
+    """Raise an AccuracyError unless rays propagate behind the pupil, because evanescent waves have no direction."""
     steepest = beam.pupil.slopes(beam.wavelength, beam.source).steepest_inside / beam.index
     if steepest > STEEPEST:
         raise AccuracyError(
@@ -106,7 +109,7 @@ def _check_aplanatic(beam: Beam) -> None:
 
 
 def _polarised(polarization: Any) -> tuple[np.ndarray, tuple[float, float, float, float]]:
-    """Return Jones vectors of parts that do not interfere, (part, 2), and Stokes parameters divided by the first."""
+    """Return Jones vectors (part, 2) of parts that do not interfere, and the Stokes parameters divided by the first."""
     without_derivative("polarization", polarization)
     try:
         given = np.asarray((1, 0, 0, 0) if polarization is None else polarization, dtype=complex)

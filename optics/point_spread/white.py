@@ -1,4 +1,4 @@
-"""White light: the PSF and its measures, with the wavelengths of a lamp weighted by each type of receptor."""
+"""White light: PSFs, and their measures, for the spectrum of a lamp as each type of receptor weights it."""
 
 from __future__ import annotations
 
@@ -28,20 +28,23 @@ from optics.spectra.spectrum import Spectrum, illuminant
 __all__ = ["WhitePSF", "white_psf"]
 
 FIRST, MOST_WAVES = 9, 513  # choice: initial and largest number of wavelengths
-# Choice: error relative to the change if only every second wavelength is used. It is a fifteenth for splines that
-# converge with the fourth power of the step; tests/optics/point_spread/test_white.py.
+# Choice: predicted error, relative to the change if only every second wavelength is used. In theory it is a fifteenth,
+# because splines converge with the fourth power of the step; see tests/optics/point_spread/test_white.py.
 LEFT = 0.25
-OF_PICTURES = 0.5  # choice: part of the tolerance for the PSFs; the rest is for the spectrum
+OF_PICTURES = 0.5  # choice: part of the tolerance that the PSFs may use; the rest is for the spectrum
 
 
 @dataclass(frozen=True, eq=False)
 class WhitePSF(OnWindow):
-    """PSF of each type of receptor, Σ_λ w(λ) PSF_λ with weights that sum to 1.
+    """PSFs in white light, one for each type of receptor: Σ_λ w(λ) PSF_λ with weights that sum to 1.
 
-    waves: the PSFs (wavelength, y, x) of the sum. weights: (type, wavelength). Between wavelengths PSFs are cubic
-        splines, so a weight may be slightly negative. coarse: weights for every second wavelength, and 0 between.
-    spectral_error: (type,) predicted relative L2 error due to the number of wavelengths: a quarter of the difference
-        from the result of every second one. It falls with the fourth power of their number.
+    waves: the monochromatic PSFs (wavelength, y, x) of the sum.
+    weights: w, (type, wavelength). Cubic splines interpolate PSFs between wavelengths, so a weight may be slightly
+        negative.
+    coarse: weights of a sum over every second wavelength; those of the other wavelengths are 0.
+    spectral_error: predicted relative L2 error that is due to the number of wavelengths, (type,). It is a quarter of
+        the difference from the result with every second wavelength. It falls with the fourth power of the number of
+        wavelengths.
     """
 
     waves: PSFResult
@@ -74,12 +77,12 @@ class WhitePSF(OnWindow):
 
     @property
     def predicted_error(self) -> np.ndarray:
-        """Relative L2 error over the window due to the spectrum and to the PSFs, (type,)."""
+        """Relative L2 error over the window that is due to the spectrum and to the PSFs, (type,)."""
         found: np.ndarray = self.spectral_error + self.waves.plan.predicted_error * np.abs(self.weights).sum(axis=1)
         return found
 
     def mtf(self, tolerance: float = 0.02) -> MTF:
-        """Return |Σ_λ w(λ) OTF_λ| of each type, (type, fy, fx), including the blur from shifts between colours.
+        """Return |Σ_λ w(λ) OTF_λ| of each type, (type, fy, fx). It includes the blur that shifts between colours cause.
 
         See `optics.mtf`.
 
@@ -92,7 +95,7 @@ class WhitePSF(OnWindow):
         return replace(found.first(count), predicted_error=error)
 
     def strehl_ratio(self, with_error: bool = False) -> np.ndarray | Array:
-        """Return the peak in white light relative to that of the same light without aberration, (type,).
+        """Return the peak in white light, divided by the peak of the same light without aberration, (type,).
 
         See `optics.strehl_ratio`.
 
@@ -150,15 +153,16 @@ def white_psf(
     Receptors count photons, so w(λ) ∝ light(λ) λ sensitivity(λ).
 
     light: name of an illuminant, a Spectrum, or spectral power as a function of wavelengths [m].
-    receptors: see `optics.receptors_of`; their types, in order.
-    waves: "auto", the fewest wavelengths over the receptors' range that meet the tolerance; or an odd number of them.
-        Between them PSFs are cubic splines. All use the plan of the first one if it is accurate enough.
-    tolerance: relative L2 error over the window, of PSFs and spectrum together.
-    asked: all other arguments of `optics.psf`.
+    receptors: receptor types, see `optics.receptors_of`. Results are in the order of the types.
+    waves: number of wavelengths over the receptors' range: an odd number, or "auto" for the fewest that meet the
+        tolerance. Cubic splines interpolate PSFs between the wavelengths. The plan of the first wavelength is used for
+        all, provided that it is accurate enough.
+    tolerance: relative L2 error over the window that is due to PSFs and spectrum together.
+    asked: further arguments of `optics.psf`.
 
     Raises:
         ValueError: an argument is invalid, or a type of receptor does not absorb the light.
-        AccuracyError: there are too few wavelengths (the message states a sufficient number); or see `optics.psf`.
+        AccuracyError: there are too few wavelengths (the message states a sufficient number), or see `optics.psf`.
     """
     by_itself = isinstance(waves, str) and waves == "auto"
     count = FIRST if by_itself else whole("waves", waves, 5, MOST_WAVES)
@@ -196,7 +200,7 @@ def _weighed(result: PSFResult, caught: np.ndarray, ends: tuple[float, float]) -
 
 
 def _quantum_catch(light: Any, kinds: Any) -> np.ndarray:
-    """Return the normalised quantum catch of each type, to 1 nm, (type, nm)."""
+    """Return the normalised quantum catch of each type at steps of 1 nm, (type, nm)."""
     source = illuminant(light) if isinstance(light, str) else light
     if not isinstance(source, Spectrum) and not callable(source):
         raise ValueError(f"light = {shown(light)}: must be an illuminant's name, a Spectrum or a function of λ [m]")
@@ -219,7 +223,7 @@ def _nanometres(ends: tuple[float, float]) -> np.ndarray:
 
 
 def _splines(nodes: np.ndarray, ends: tuple[float, float]) -> np.ndarray:
-    """Return cubic splines that are 1 at one of the nodes [nm] and 0 at the others, (nm, wavelength)."""
+    """Return cubic splines (nm, wavelength). Each is 1 at one of the nodes [nm] and 0 at all others."""
     from scipy.interpolate import CubicSpline
 
     found: np.ndarray = CubicSpline(nodes, np.eye(len(nodes)))(_nanometres(ends))
@@ -227,7 +231,7 @@ def _splines(nodes: np.ndarray, ends: tuple[float, float]) -> np.ndarray:
 
 
 def _with_middles(result: PSFResult, between: PSFResult) -> PSFResult:
-    """Return both results as one, with the wavelengths of the second between the wavelengths of the first."""
+    """Return both results as one. The wavelengths of the second lie between those of the first."""
     import drjit as dr
 
     def braided(first: Any, second: Any) -> list[Any]:

@@ -1,8 +1,8 @@
 """A plane of a system, sampled for the light that it transmits.
 
-The aperture of a pupil is softened such that frequencies that can reach the next plane are exact
-(optics.apertures.aperture). Its samples are so dense that aliases stay beyond these frequencies. Sums over samples then
-converge spectrally.
+The aperture of a pupil is softened such that all frequencies that can reach the next plane are exact
+(optics.apertures.aperture). The samples of the pupil are so dense that no aliases fall onto these frequencies. Sums
+over samples then converge spectrally.
 """
 
 from __future__ import annotations
@@ -25,12 +25,12 @@ from optics.propagation.transfer_function import kept_band, kept_square
 
 __all__ = ["PlaneField", "PupilSampling", "StepSettings", "Stop"]
 
-REACH_MARGIN = 1.02  # choice, relative to the planes' half widths: `propagate` adds a sample to each of them
+REACH_MARGIN = 1.02  # choice: factor on the planes' half widths, because `propagate` extends each plane by a sample
 
 
 @dataclass(frozen=True)
 class PlaneField:
-    """Samples of a plane; band [1/m]: their highest frequency."""
+    """The field on the samples of a plane. band: highest frequency [1/m] of the field."""
 
     u: np.ndarray
     dx: float
@@ -47,7 +47,11 @@ class PlaneField:
 
 @dataclass(frozen=True)
 class Stop:
-    """A pupil, or the output window (None), `distance` [m] after the previous stop; negative backwards."""
+    """A pupil, or the output window, at a distance from the previous stop.
+
+    pupil: None for the output window.
+    distance: distance [m] from the previous stop, negative for backward propagation.
+    """
 
     distance: float
     pupil: Pupil | None
@@ -56,7 +60,7 @@ class Stop:
 
 @dataclass(frozen=True)
 class StepSettings:
-    """Settings that are the same at every plane. tolerance: of each step; wavelength: vacuum [m]."""
+    """Settings that are the same at every plane. tolerance: tolerance of each step; wavelength: in vacuum [m]."""
 
     wavelength: float
     medium_n: float
@@ -70,13 +74,14 @@ class StepSettings:
 
     @property
     def edge_ripple(self) -> float:
-        """Ripple of soft edges, which rounding bounds from below."""
+        """Ripple of soft edges. It is not below LEAST_RIPPLE, because of rounding errors."""
         return max(self.ripple, LEAST_RIPPLE)
 
     def reaching(self, half_widths: float, distance: float) -> float:
         """Return the highest frequency [1/m] that `propagate` keeps between planes, including its fade.
 
-        It is infinite within one plane. Close to a plane, evanescent waves count until they have decayed.
+        The result is infinite if both planes coincide. If they are close, it includes evanescent waves that have not
+        yet decayed.
 
         half_widths: sum of the half widths of the two planes [m].
         """
@@ -92,7 +97,7 @@ class StepSettings:
         return math.hypot(1 / wavelength, math.log(1 / self.ripple) / (2 * math.pi * z))
 
     def carried(self, field: PlaneField, distance: float, window: Grid) -> PropagationResult:
-        """Return the field after propagation through free space onto the samples of a plane."""
+        """Return the field after propagation through free space, on the samples of another plane."""
         return propagate(
             field.u,
             dx=field.dx,
@@ -108,7 +113,7 @@ class StepSettings:
 
 @dataclass(frozen=True)
 class PupilSampling:
-    """Samples of a pupil, its soft aperture, and the band [1/m] that they transmit."""
+    """Samples of a pupil, its soft aperture, and the highest frequency [1/m] (`band`) that they transmit."""
 
     pupil: Pupil
     source: PointSource
@@ -122,8 +127,8 @@ class PupilSampling:
     ) -> PupilSampling:
         """Return the sampling of the pupil at a stop.
 
-        The frequencies of the arriving light, of the pupil's phase and of its edge add up. Sums beyond the band may
-        alias, but not into the band.
+        The frequencies of the arriving light, of the pupil's phase and of the pupil's edge add up. Frequencies beyond
+        the band may be aliased, but not into the band.
 
         arriving: highest frequency [1/m] of the arriving light.
 
@@ -140,7 +145,7 @@ class PupilSampling:
         turns = arriving + slope + pupil.bandwidth(settings.wavelength, settings.edge_ripple)
         band = settings.reaching(stop.half_width + following.half_width, following.distance)
         if math.isinf(band):
-            band = turns  # the next plane is this plane: the edge is as soft as the finest detail of the light
+            band = turns  # if the next plane is this plane, the edge is as soft as the finest detail of the light
         soft = pupil.aperture.soften((turns + band) * pupil.radius, settings.edge_ripple, EDGE_REACH)
         pitch = 1 / (turns + band + soft.stopband / pupil.radius)
         across = 2 * math.ceil((1 + soft.reach) * pupil.radius / pitch) + 1

@@ -1,13 +1,13 @@
-"""Propagation of a sampled field from plane to plane by its angular spectrum.
+"""Propagation of a sampled field from one plane to another by its angular spectrum.
 
-The samples represent the band-limited function through them, zero outside. Their spectrum is multiplied by the transfer
-function of free space and summed at the output samples:
+The samples represent the band-limited function through them, which is zero outside. The spectrum is multiplied by the
+transfer function of free space and transformed onto the output samples:
 
     U(x, y; z) = F⁻¹{F{U₀} H}     (Goodman, §3.10.2; H in optics.propagation.transfer_function)
 
-A finite transform repeats the field every period. The period is chosen such that light that lands near the window is
-represented once. Light that lands farther away is faded out before it can wrap around. Light that is too near grazing
-incidence for either is included in the predicted error.
+A finite transform repeats the field every period. The period is so long that light that lands near the window does not
+wrap around. Light that lands farther away is faded out before it can wrap around. Both are impossible for light close
+to grazing incidence; the predicted error includes this light.
 """
 
 from __future__ import annotations
@@ -30,28 +30,29 @@ from optics.propagation.transform_sampling import TransformSampling, blur_left, 
 __all__ = ["PROPAGATION_METHODS", "WRAP_RIPPLE_PER_TOLERANCE", "PropagationResult", "propagate"]
 
 PROPAGATION_METHODS = ("angular_spectrum", "fresnel")
-# Choice: fraction of faded light that strays into the window. It is small, because the window may contain far less
-# light than is faded.
+# Choice: fraction of the faded light that may reach the window, relative to the tolerance. It is small, because the
+# window may contain far less light than is faded.
 WRAP_RIPPLE_PER_TOLERANCE = 3e-3
-# Choice: initial padding for the blur of light truncated at the Nyquist frequency [√(λz)].
+# Choice: initial padding, in units of √(λz), for the blur that truncation at the Nyquist frequency causes.
 SPARE = 1.0
-# Choice: factor on the allowed blur before a field is propagated again. The estimate of the blur is accurate to a
-# factor of two or three.
+# Choice: a field is propagated again if the blur exceeds the allowed blur by this factor. The estimate of the blur is
+# accurate to a factor of two or three.
 CLEARLY = 1.5
-# Choice: light that is missing, relative to the light that arrives, from which on the evanescent part is subtracted.
-# Less light uses next to nothing of the tolerance.
+# Choice: the evanescent part is subtracted from the missing light if the latter exceeds the arriving light by this
+# factor. Smaller amounts use almost nothing of the tolerance.
 MUCH = 100.0
 
-HELD = (1e-20, 1e30)  # powers [Σ|u|²] for which float32 also represents the terms of the error estimate
-ONE = np.ones(1)  # marks a sum without weights
+HELD = (1e-20, 1e30)  # range of the power Σ|u|² for which float32 can represent the terms of the error estimate
+ONE = np.ones(1)  # weight of a sum without weights
 
 
 @dataclass(frozen=True, eq=False)
 class PropagationResult(OnWindow):
     """A propagated field.
 
-    u: complex field (…, y, x) at pitch dx [m], centre sample n//2. plan: method and predicted error. window: the
-        samples of u, also `x` and `y` [m].
+    u: complex field (…, y, x) at the pitch dx [m]. Sample n//2 is the centre.
+    plan: method and predicted error.
+    window: positions of the samples, which `x` and `y` also contain [m].
     """
 
     u: np.ndarray
@@ -68,10 +69,10 @@ class PropagationResult(OnWindow):
 
     @cached_property
     def evanescent_power(self) -> float:
-        """Fraction of the input's power in waves that do not propagate (for several planes, the largest).
+        """Fraction of the input's power in waves that do not propagate. For several planes, it is the largest fraction.
 
-        Forwards these waves decay. Backwards they are dropped, because undoing the decay would amplify noise without
-        bound.
+        In forward propagation, these waves decay. In backward propagation they are omitted, because undoing the decay
+        would amplify noise without bound.
         """
         return max(_evanescent_share(plane, self._sampling) for plane in self._source)
 
@@ -90,17 +91,19 @@ def propagate(
     method: str = "auto",
     dtype: str = "float32",
 ) -> PropagationResult:
-    """Return the field at `distance` [m] behind (or, negative, before) the plane of u, including the carrier exp(ikz).
+    """Return the field at a distance from the plane of u, including the carrier exp(ikz).
 
-    u: complex (…, y, x), pitch dx [m], centre sample n//2. wavelength: vacuum [m].
-    out_dx, out_shape, out_centre: pitch, shape (y, x) and centre (x, y) [m] of the output; default as u's, on the axis.
-    tolerance: relative L2 error of the intensity over the window, in addition to that of the sampling of u itself. If
-        light at the Nyquist frequency of u causes a larger error, the plan states it.
-    method: "auto" and "angular_spectrum" are exact; "fresnel" is the paraxial approximation, only on request.
+    u: complex field (…, y, x) at the pitch dx [m]. Sample n//2 is the centre. wavelength: wavelength [m] in vacuum.
+    distance: distance [m] behind the plane of u; negative for planes in front of it.
+    out_dx, out_shape, out_centre: pitch [m], shape (y, x) and centre (x, y) [m] of the output. By default, pitch and
+        shape equal those of u, and the centre is on the axis.
+    tolerance: relative L2 error of the intensity over the window, in addition to the error of the samples u. If light
+        at the Nyquist frequency of u causes a larger error, the plan states this error.
+    method: "auto" and "angular_spectrum" are exact. "fresnel" is the paraxial approximation.
 
     Raises:
         ValueError: an argument is invalid; the message names it with its value and valid range.
-        AccuracyError: the tolerance cannot be met; the message states which one can.
+        AccuracyError: no sampling meets the tolerance. The message states which tolerance is possible.
     """
     if not isinstance(method, str) or method not in ("auto", *PROPAGATION_METHODS):
         raise ValueError(f"method = {shown(method)}: must be 'auto' or one of {', '.join(PROPAGATION_METHODS)}")
@@ -111,7 +114,7 @@ def propagate(
     lit = _lit(given)
     source = Grid(lit.shape[-2:], dx)
     sources = lit.reshape(-1, *source.shape)
-    if np.may_share_memory(sources, u):  # the result stores them, so later changes of u must not affect them
+    if np.may_share_memory(sources, u):  # the result stores the sources, so later changes of u must not affect them
         sources = sources.copy()
     in_range("tolerance", tolerance, 10 * FLOAT_NOISE[precision(dtype).dtype], 0.5)
     passage = Passage(
@@ -144,9 +147,9 @@ def _field(u: np.ndarray) -> np.ndarray:
 
 
 def _lit(field: np.ndarray) -> np.ndarray:
-    """Return the smallest part around the centre sample that contains all light.
+    """Return the smallest part of a field, around the centre sample, that contains all light.
 
-    Darkness around it would be propagated at the same cost.
+    Dark samples around it would only increase the cost.
     """
     for axis in (-2, -1):
         n = field.shape[axis]
@@ -161,8 +164,9 @@ def _lit(field: np.ndarray) -> np.ndarray:
 class _Carried:
     """A propagated plane.
 
-    u: (y, x). error: predicted error of its intensity. blur: additional error from light at the Nyquist frequency of
-        the samples.
+    u: field (y, x).
+    error: predicted error of the intensity.
+    blur: additional error from light at the Nyquist frequency of the samples.
     """
 
     u: np.ndarray
@@ -175,8 +179,8 @@ def _with_room(
 ) -> tuple[TransformSampling, list[_Carried]]:
     """Return the planes, propagated with the padding that the light at the Nyquist frequency requires.
 
-    No padding is added if even the largest useful padding is insufficient. Such a blur is an error of the samples
-    themselves, and more padding would not reduce it.
+    If even the largest useful padding is insufficient, no padding is added. The blur is then an error of the samples
+    themselves, which more padding would not reduce.
     """
     most = most_spare(passage, grids[0])
     spare = min(SPARE * math.sqrt(passage.wavelength * abs(passage.z)), most)
@@ -185,7 +189,7 @@ def _with_room(
     blur = max(plane.blur for plane in planes)
     allowed = CLEARLY * (tolerance - max(plane.error for plane in planes))
     if spare < most and blur > allowed and blur * blur_left(how, sampling(passage, *grids, most)) < allowed:
-        # The blur falls like 1 / spare. Choice: a fifth more padding than this implies.
+        # The blur is proportional to 1 / spare. Choice: a fifth more padding than this implies.
         how = sampling(passage, *grids, min(1.2 * CLEARLY * blur / allowed * spare, most))
         planes = [_one(plane, how, types) for plane in sources]
     return how, planes
@@ -196,7 +200,8 @@ def _one(plane: np.ndarray, how: TransformSampling, types: Precision) -> _Carrie
     with np.errstate(over="ignore"):
         plane = np.ascontiguousarray(given, dtype=types.complex_dtype)
         total = _power(plane)
-    if not HELD[0] < total < HELD[1]:  # divided by the brightest sample, so that float32 can represent the powers
+    # Then u is divided by the brightest sample, so that float32 can represent the powers.
+    if not HELD[0] < total < HELD[1]:
         brightest = float(np.abs(given).max(initial=0.0))
         if brightest == 0:
             return _Carried(np.zeros(how.window.shape, types.complex_dtype), 0.0, 0.0)
@@ -210,8 +215,8 @@ def _one(plane: np.ndarray, how: TransformSampling, types: Precision) -> _Carrie
     grazing = _power(spectrum, space.grazing) / how.period**2
     blurred = blurred_back(spectrum, how)
     spectrum *= space.transfer
-    # By Parseval's theorem, missing power was faded or evanescent. In float32 the difference is a rounding error, which
-    # is small compared with the remainder of the fade.
+    # By Parseval's theorem, power that is missing was faded out or is evanescent. If no power is missing, the
+    # difference in float32 is a rounding error, which is small compared with the remainder of the fade.
     faded = max(total - _power(spectrum) * how.period**2, 0.0) if how.passage.band.fade else 0.0
     if how.step:
         result = periodic_sum(spectrum, how.period, how.step, how.window.shape)
@@ -240,7 +245,7 @@ def _evanescent_share(plane: np.ndarray, how: TransformSampling) -> float:
 
 
 def _power(u: np.ndarray, weight: np.ndarray | None = ONE) -> float:
-    """Return Σ w |u|² with weights of real and imaginary parts; 0 if the weight is None."""
+    """Return Σ w |u|². The weights are for real and imaginary parts. The result is 0 if the weight is None."""
     if weight is None:
         return 0.0
     if weight is ONE:
@@ -253,7 +258,7 @@ def _power(u: np.ndarray, weight: np.ndarray | None = ONE) -> float:
 def _free_space(how: TransformSampling, dtype: str) -> TransferFunction:
     """Return the transfer function over the spectrum, including the scale of the sums.
 
-    It is cached, because the same distance is often used again and it costs more than the transforms.
+    It is cached, because it takes more time than the transforms, and the same distance is often used again.
     """
     step = 1 / (how.period * how.source.dx)
     if how.step:  # the axes of the spectrum are (fx, fy)
@@ -267,9 +272,9 @@ def _free_space(how: TransformSampling, dtype: str) -> TransferFunction:
 
 
 def _untold(planes: list[_Carried], tolerance: float) -> str:
-    """Return a note on the error of the samples themselves if it exceeds the tolerance, else an empty string.
+    """Return a note on the error of the input samples if it exceeds the tolerance, else an empty string.
 
-    The predicted error does not include it.
+    The predicted error does not include the error of the input samples.
     """
     blur = max(plane.blur for plane in planes)
     if blur <= tolerance:

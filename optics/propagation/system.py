@@ -23,7 +23,7 @@ __all__ = ["FreeSpace", "StackResult", "SystemStep", "propagate_through"]
 
 @dataclass(frozen=True)
 class FreeSpace:
-    """`distance` [m] of a medium of index medium_n.
+    """Free space: a `distance` [m] in a medium with the refractive index medium_n.
 
     Raises:
         ValueError: names argument, value and valid range.
@@ -39,12 +39,13 @@ class FreeSpace:
 
 @dataclass(frozen=True)
 class SystemStep:
-    """Power and accuracy of the propagation to one plane.
+    """Power and accuracy of one step: the propagation to the next plane.
 
-    distance [m], negative backwards. plan: how it was computed; its error is relative to the light within the window.
-    power_in, power_out [intensity m²]: light that starts, and light that arrives within the window.
-    evanescent_power: fraction of power_in in waves that do not propagate (see PropagationResult), as far as the samples
-        include them. Waves that cannot reach the next plane are not sampled.
+    distance: distance [m] of the step, negative for backward propagation.
+    plan: plan of the step. Its error is relative to the light within the next plane's window.
+    power_in, power_out: power [intensity m²] at the start, and power that arrives within the window.
+    evanescent_power: fraction of power_in in waves that do not propagate (see PropagationResult). It includes only
+        waves that the samples represent, and samples need not represent waves that cannot reach the next plane.
     """
 
     distance: float
@@ -58,8 +59,9 @@ class SystemStep:
 class StackResult(OnWindow):
     """A field behind a system.
 
-    u: complex field (y, x) at pitch dx [m], centre sample n//2. predicted_error: relative L2 error of its intensity.
-        window: its samples, also `x` and `y` [m].
+    u: complex field (y, x) at the pitch dx [m]. Sample n//2 is the centre.
+    predicted_error: relative L2 error of the intensity.
+    window: positions of the samples, which `x` and `y` also contain [m].
     """
 
     u: np.ndarray
@@ -89,17 +91,18 @@ def propagate_through(
 ) -> StackResult:
     """Return the field behind a system of pupils and free space, including the carrier exp(ikz).
 
-    elements: in the order in which light passes them forwards; all in one medium.
-    u: complex (y, x) in the plane before the first element, pitch dx [m], zero outside. If u is None, the first element
-        is a pupil that `source` illuminates (by default a plane wave of unit amplitude).
-    wavelength: vacuum [m]. out_dx, out_shape: pitch and shape (y, x) of the output; default as u's.
-    tolerance: relative L2 error of the intensity over the window, in addition to that of the sampling of u itself.
-    backward: u lies behind the last element and is propagated back to the plane before the first one. Distances and
-        phases are undone. Light that apertures blocked or that decayed is not restored.
+    elements: elements in the order in which light passes them in forward propagation. All lie in the same medium.
+    u: complex field (y, x) in front of the first element, at the pitch dx [m]; the field is zero outside. If u is None,
+        the first element must be a pupil, which `source` illuminates (by default, a plane wave of unit amplitude).
+    wavelength: wavelength [m] in vacuum.
+    out_dx, out_shape: pitch [m] and shape (y, x) of the output. By default, they equal those of u.
+    tolerance: relative L2 error of the intensity over the window, in addition to the error of the samples u.
+    backward: whether u is the field behind the last element, to be propagated back to the plane in front of the first
+        element. Distances and phases are undone. Light that apertures blocked or that decayed is not restored.
 
     Raises:
         ValueError: an argument is invalid (named with its value and valid range), or a parameter carries derivatives.
-        AccuracyError: the tolerance cannot be met; the message states which one can.
+        AccuracyError: no sampling meets the tolerance. The message states which tolerance is possible.
     """
     if isinstance(elements, str) or not isinstance(elements, Sequence):
         raise ValueError(f"elements = {shown(elements)}: must be a list of Pupil and FreeSpace")
@@ -140,10 +143,10 @@ def propagate_through(
 def _start(
     u: np.ndarray | None, dx: float | None, out_dx: float | None, out_shape: tuple[int, int] | None
 ) -> tuple[PlaneField | None, Grid, float]:
-    """Return the field before the first stop, the output window, and the modulus of the brightest sample.
+    """Return the field in front of the first stop, the output window, and the modulus of the brightest sample.
 
-    The field is None if a source illuminates the first pupil. It is divided by its brightest sample, because float32
-    cannot represent the power of every field.
+    The field is None if a source illuminates the first pupil. Otherwise it is divided by its brightest sample, because
+    float32 cannot represent the power of every field.
     """
     if u is None:
         if out_dx is None or out_shape is None:
@@ -162,9 +165,9 @@ def _start(
 
 
 def _stops(elements: Sequence[Pupil | FreeSpace], backward: bool, window: Grid) -> list[Stop]:
-    """Return the pupils with the distances before them, and the output window as the last stop.
+    """Return the stops: the pupils, each with the distance in front of it, and the output window as the last stop.
 
-    Adjacent stretches of free space are added, which is exact.
+    Distances of adjacent elements of free space are added, which is exact.
     """
     if not elements:
         raise ValueError("elements is empty: must hold at least one Pupil or FreeSpace")
@@ -201,7 +204,7 @@ def _medium(elements: Sequence[Pupil | FreeSpace]) -> float:
 def _arriving(field: PlaneField | None, stop: Stop, settings: StepSettings) -> float:
     """Return the highest frequency [1/m] of the light that arrives at a stop.
 
-    The frequencies of a source are part of the pupil's own phase.
+    It does not include the frequencies of a source, because they are part of the first pupil's phase.
     """
     if field is None:
         return 0.0
@@ -211,7 +214,8 @@ def _arriving(field: PlaneField | None, stop: Stop, settings: StepSettings) -> f
 def _error(steps: list[SystemStep], tolerance: float, settings: StepSettings) -> float:
     """Return the sum of the errors of the steps and of the soft edges between them.
 
-    Each error is multiplied by the loss of light since.
+    Errors are relative. Light that is lost after a step increases its relative error, so each error is multiplied by
+    the loss of light after the step.
 
     Raises:
         AccuracyError: the sum exceeds the tolerance.

@@ -1,10 +1,11 @@
-"""Free space between two planes as a filter: the frequencies that may matter, and the transfer function over them.
+"""Free space between two planes as a filter: the frequencies that matter, and the transfer function for them.
 
     H = exp(2πi z √((n/λ)² - fx² - fy²))     (Goodman, §3.10.2)
 
-Light of a frequency moves z tan θ to the side. Light that moves farther than from the far edge of one plane to the far
-edge of the other is faded out before it can wrap around. A narrow fade blurs over a large distance, so the band must
-include light that far outside the window. A wide fade keeps light that moves far to the side.
+Light whose angle to the axis is θ moves z tan θ to the side. Light that moves farther than from the far edge of one
+plane to the far edge of the other cannot reach the window. It is faded out before it can wrap around. A fade blurs the
+field. The width of the fade is a compromise: a narrow fade blurs over a large distance, so the unfaded band must
+include light that lands this far outside the window, and a wide fade includes light that moves far to the side.
 """
 
 from __future__ import annotations
@@ -24,25 +25,27 @@ from optics.numerics.precision import Precision, opaque, padded_for_packets
 
 __all__ = ["PERIOD_MAX_SINE", "Band", "TransferFunction", "evanescent", "kept_band", "kept_square", "walk"]
 
-# Choice: steepest light that a period allows for, as sin θ; beyond it z tan θ has no bound.
+# Choice: sin θ of the steepest light for which the period is long enough. z tan θ has no bound at grazing incidence.
 PERIOD_MAX_SINE = 0.995
-# Choice: steepest fade along each axis; towards grazing incidence fades would become ever narrower.
+# Choice: largest sine at which a fade along each axis may end. Towards grazing incidence, fades would become ever
+# narrower.
 STEEPEST_SQUARE = 0.8
-# Choice, relative to the blur: a fade also blurs beyond the distance that its own light moves. That part is smaller,
-# because the end of a fade is dark.
+# Choice: blur beyond the displacement of the outermost light, relative to the blur of the whole fade. It is smaller,
+# because the outer end of a fade is dark.
 OUTWARDS = 0.6
-# Choice: widths of the fade to try, as sines.
+# Choice: widths of the fade to try, in units of the sine.
 FADE_SINES = np.geomspace(0.003, 0.6, 33)
 
 
 @dataclass(frozen=True)
 class Band:
-    """Light that is kept up to `kept` [1/m] and faded out from there to kept + fade.
+    """A band of frequencies: light is unchanged up to `kept` [1/m] and faded out between `kept` and `kept` + `fade`.
 
-    kept is infinite if nothing may fade.
-    square: whether the fade acts along each axis separately, independent of the frequency along the other; else it acts
-        on the angle to the axis.
-    walk: distance [m] that the outermost kept light moves to the side, including the blur.
+    kept: infinite if no light may be faded.
+    square: False for a fade of the radial frequency √(fx² + fy²). True for the product of two fades, one along x and
+        one along y. In the paraxial case, they depend on fx and on fy. Otherwise the fade along x depends on fx / √(1 -
+        λ²fy²), and that along y correspondingly.
+    walk: distance [m] that the outermost light of the fade moves to the side, including the blur.
     """
 
     kept: float
@@ -55,9 +58,9 @@ class Band:
         return self.kept + self.fade
 
     def diagonal(self, wavelength: float) -> float:
-        """Return the highest frequency [1/m] of a square band.
+        """Return the highest radial frequency [1/m] of a square band.
 
-        It lies on the diagonal: fx = fy and fx / √(1 - λ²fy²) = end.
+        It lies on the diagonal fx = fy, where fx / √(1 - λ²fy²) = end.
         """
         return math.sqrt(2) * self.end / math.hypot(1, self.end * wavelength)
 
@@ -72,18 +75,19 @@ def walk(frequency: float, wavelength: float, z: float, paraxial: bool = False) 
 
 
 def kept_band(corner: float, wavelength: float, z: float, ripple: float, paraxial: bool = False) -> Band:
-    """Return the band for light that may move `corner` [m] to the side over z, with the shortest period.
+    """Return the band for light that moves up to `corner` [m] to the side over the distance z.
 
-    The band includes the fade beyond it. `EVERYTHING` if nothing may fade.
+    It is the band with the shortest period, or `EVERYTHING` if no light may be faded.
     """
     return _shortest(corner, wavelength, z, ripple, paraxial, square=False)
 
 
 def kept_square(half: float, wavelength: float, z: float, ripple: float, paraxial: bool = False) -> Band:
-    """Return the band for light that may move `half` [m] along each axis, because sides are nearer than corners.
+    """Return the square band for light that moves up to `half` [m] along each axis over the distance z.
 
-    Along x the distance depends on fx / √(1 - λ²fy²), so the fade acts on this expression. Because of its gradient the
-    blur is larger than that of a fade in fx alone.
+    It can be smaller than the band of `kept_band`, because sides of a window are nearer than corners. The displacement
+    along x depends on fx / √(1 - λ²fy²), so the fade is a function of this expression. Because of the gradient of the
+    expression, the blur is larger than that of a fade in fx alone.
     """
     return _shortest(half, wavelength, z, ripple, paraxial, square=True)
 
@@ -94,7 +98,7 @@ def _shortest(distance: float, wavelength: float, z: float, ripple: float, parax
     best = EVERYTHING
     for fade in FADE_SINES / wavelength if z else ():
         band = 0.0
-        # The band and the gradient of its fade depend on each other.
+        # The band and the gradient of its fade depend on each other, hence the iteration.
         for _ in range(3 if square and not paraxial else 1):
             sine = (band + fade) * wavelength
             if not paraxial and sine >= steepest:
@@ -119,10 +123,10 @@ def _gradient(sine: float) -> float:
 
 @lru_cache(maxsize=4)
 def evanescent(samples: int, dx: float, wavelength: float) -> np.ndarray:
-    """Return the fraction of each frequency of a whole spectrum that does not propagate.
+    """Return the fraction of the cell of each frequency, in a whole spectrum, that does not propagate.
 
-    The result is (samples, samples) in FFT order. A cell on the circle f = n/λ has the fraction of it that lies
-    outside, approximated by a straight edge. The error is of the order of the cell's width squared.
+    The result is (samples, samples) in FFT order. The circle f = n/λ cuts some cells. The fraction of such a cell that
+    lies outside the circle is approximated by a straight edge. The error is of the order of the cell's width squared.
     """
     f = np.fft.fftfreq(samples) * wavelength / dx
     share: np.ndarray = np.clip((np.hypot(f[None, :], f[:, None]) - 1) * samples * dx / wavelength + 0.5, 0, 1)
@@ -133,7 +137,7 @@ def evanescent(samples: int, dx: float, wavelength: float) -> np.ndarray:
 def _fade_table(ripple: float) -> Interpolant:
     """Return a fade from 1 at 0 to 0 at 1: the complement of the integral of a Kaiser window.
 
-    It blurs by β/(π fade); beyond that, `ripple` remains.
+    The fade blurs a field over the distance β/(π fade). Beyond this distance, a share `ripple` remains.
     """
     beta = kaiser_beta(ripple)
     nodes, weights = np.polynomial.legendre.leggauss(math.ceil(beta) + 24)
@@ -151,11 +155,11 @@ def _fade_table(ripple: float) -> Interpolant:
 
 @dataclass(frozen=True, eq=False)
 class TransferFunction:
-    """Factors over a spectrum.
+    """Factors for each frequency of a spectrum.
 
     transfer: the transfer function, with all factors that do not depend on the field.
-    grazing: fraction of each frequency that is too near grazing incidence, for real and imaginary parts (fy, 2 fx);
-        None if all are 0.
+    grazing: fraction of the light of each frequency that is too near grazing incidence, for real and imaginary parts,
+        (fy, 2 fx); None if all are 0.
     """
 
     transfer: np.ndarray
@@ -164,10 +168,12 @@ class TransferFunction:
 
 @dataclass(frozen=True)
 class Passage:
-    """Parameters of a transfer function.
+    """Parameters of a transfer function: the passage of light from one plane to another.
 
-    centre: position of the window (x, y) [m]. ripple: remainder of the light beyond a fade. Evanescent waves decay
-        forwards and are dropped backwards (z < 0).
+    centre: position (x, y) [m] of the window.
+    ripple: share of the light that remains beyond a fade.
+
+    Evanescent waves decay in forward propagation and are omitted in backward propagation (z < 0).
     """
 
     wavelength: float
@@ -187,7 +193,7 @@ class Passage:
         return TransferFunction(self._transfer(fx, fy, types), weight)
 
     def _transfer(self, fx: np.ndarray, fy: np.ndarray, types: Precision) -> np.ndarray:
-        """Return H under the fade, including the displacement to the window's centre.
+        """Return H times the fade, including the displacement to the window's centre.
 
         Whole waves are subtracted in float64.
         """

@@ -1,18 +1,19 @@
-"""The period of a finite transform: long enough that light does not wrap around into the window.
+"""The period of a finite transform. It is so long that light does not wrap around into the window.
 
-A finite transform repeats the field every period. Light that lands near the window must be represented once. Light that
-lands farther away is faded out before it can wrap around. Light of frequency f moves z tan θ to the side, sin θ = λ|f|.
+A finite transform repeats the field every period. Light that lands near the window must not wrap around, and light that
+lands farther away is faded out before it can wrap around. Light of frequency f moves z tan θ to the side, with sin θ =
+λ|f|.
 
-If nothing can be faded, the spectrum is truncated at the Nyquist frequency f_N, which causes a blur. Along one axis the
-field is ∫ S(f) e^{2πi (f x + z √(1/λ² - f²))} df up to f_N, and the end of the integral alone gives
+If no light can be faded, the spectrum is truncated at the Nyquist frequency f_N, which causes a blur. Along one axis,
+the field is ∫ S(f) e^{2πi (f x + z √(1/λ² - f²))} df up to f_N. The contribution of the integral's end is
 
     |b(x)| = |S(f_N)| / (2π d),   d = |x - walk(f_N)|,                                                             (1)
 
-where 2πd is the derivative of the phase (the first term of an integral's expansion about its end; Bleistein &
-Handelsman, Asymptotic Expansions of Integrals, §3.2). This decreases so slowly that the blur of the next period reaches
-the window. Consider a source of width L that emits such light evenly and incoherently. Between its displaced light in
-the next period and a window of width W lies a gap g. Per power |S|² at the end of the spectrum, the source contributes
-to the window
+where 2πd is the derivative of the phase. This is the first term of an integral's expansion about its end (Bleistein &
+Handelsman, Asymptotic Expansions of Integrals, §3.2). It decreases so slowly with d that the blur from the next period
+reaches the window. Consider a source of width L that emits light of this frequency evenly and incoherently. Let g be
+the gap between the displaced light of the source in the next period and a window of width W. Divided by the power |S|²
+at the end of the spectrum, the power that comes back into the window is
 
     ∫_0^L ds/L ∫_0^W dx / (2π (g + s + x))² = ln(1 + L W / (g (g + L + W))) / (4π² L).                             (2)
 """
@@ -32,9 +33,10 @@ from optics.propagation.transfer_function import EVERYTHING, PERIOD_MAX_SINE, Pa
 
 __all__ = ["TransformSampling", "blur_left", "blurred_back", "most_spare", "sampling"]
 
-# Rounding: pitches are equal if they differ by less than this fraction of a sample over the whole window.
+# Pitches count as equal if positions differ by less than this fraction of a sample over the whole window (rounding).
 SAME_PITCH = 1e-9
-# Choice: fraction of the spectrum, and number of its lines, that determine the power about the Nyquist frequency.
+# Choice: fraction of the spectrum, and number of its lines, from which the power at the Nyquist frequency is
+# determined.
 NYQUIST_SHARE, NYQUIST_LINES = 1 / 16, 9
 
 
@@ -42,9 +44,10 @@ NYQUIST_SHARE, NYQUIST_LINES = 1 / 16, 9
 class TransformSampling:
     """Sampling of a transform between two planes.
 
-    period: in samples of the source. across: frequencies kept along each axis. step: the window's pitch in samples of
-        the source if it is a whole number, else 0. reach [m]: distance from the far edge of one plane to the far edge
-        of the other along the longer axis.
+    period: period in samples of the source.
+    across: number of frequencies along each axis.
+    step: pitch of the window in samples of the source if this is a whole number, else 0.
+    reach: distance [m] from the far edge of one plane to the far edge of the other, along the longer axis.
     """
 
     passage: Passage
@@ -62,16 +65,16 @@ class TransformSampling:
 
 @lru_cache(maxsize=64)
 def sampling(passage: Passage, source: Grid, window: Grid, spare: float) -> TransformSampling:
-    """Return the sampling with the shortest period for a passage, and determine the band of the passage.
+    """Return the sampling with the shortest period for a passage. It determines the band of the passage.
 
-    spare [m]: padding for the blur of a truncated spectrum.
+    spare: padding [m] for the blur of a truncated spectrum.
 
     Raises:
         AccuracyError: the period needs more samples than the limit.
     """
     wavelength, z, ripple, paraxial = passage.wavelength, abs(passage.z), passage.ripple, passage.paraxial
-    # Distance from the source's far edge (its samples, and one for the function through them) to the window's, across
-    # the axis.
+    # Distance from the far edge of the source to the far edge of the window. The source is extended by one sample, for
+    # the band-limited function through the samples.
     reach = max(
         (n // 2 + 1) * source.dx + (m // 2) * window.dx + abs(middle)
         for n, m, middle in zip(source.shape, window.shape, window.centre[::-1], strict=True)
@@ -83,14 +86,14 @@ def sampling(passage: Passage, source: Grid, window: Grid, spare: float) -> Tran
     )
     band = min(bands, key=lambda band: band.walk)
     far, nyquist = band.walk, 0.5 / source.dx
-    # If nothing can fade, all frequencies of the samples may matter.
+    # If no light can be faded, all frequencies of the samples matter.
     if band.end >= (nyquist if band.square else math.sqrt(2) * nyquist):
         band, far = EVERYTHING, _farthest(nyquist, wavelength, z, paraxial) + spare
     # Light that moves `far` from the source's far edge must not wrap around to the window's edge, and the source must
     # fit into the period.
     least = max(reach + far, 2 * (max(source.shape) // 2 + 1) * source.dx)
     samples = fast_length(least / source.dx)
-    half = band.end * samples * source.dx  # a float, because it may be infinite
+    half = band.end * samples * source.dx  # this is a float, because it may be infinite
     across = 2 * math.ceil(half) + 1 if band.fade and 2 * half + 2 < samples else samples
     if max(across, *window.shape) > MOST_SAMPLES:
         raise AccuracyError(
@@ -107,8 +110,8 @@ def sampling(passage: Passage, source: Grid, window: Grid, spare: float) -> Tran
 def most_spare(passage: Passage, source: Grid) -> float:
     """Return the largest useful padding [m] for the blur of a truncated spectrum.
 
-    It assumes that the light with the largest displacement, at the spectrum's corner √2 f_N, moves along an axis
-    instead of the diagonal.
+    This is a bound, which assumes that the light with the largest displacement, from the spectrum's corner √2 f_N,
+    moves along an axis instead of the diagonal.
     """
     nyquist, z, paraxial = 0.5 / source.dx, abs(passage.z), passage.paraxial
     end = math.sqrt(2) * nyquist
@@ -117,11 +120,11 @@ def most_spare(passage: Passage, source: Grid) -> float:
 
 
 def _farthest(nyquist: float, wavelength: float, z: float, paraxial: bool) -> float:
-    """Return the largest distance [m] along an axis that light with frequencies up to f_N along each axis moves.
+    """Return the largest displacement [m] along an axis of light with frequencies up to f_N along each axis.
 
-    Light moves in the direction of (fx, fy): along x by z tan θ fx/|f|. This is largest for fx = f_N and the largest
-    tan θ, in the corner |f| = √2 f_N or at the steepest light that a period allows for. Paraxially it is zλ fx for
-    every fy.
+    Light moves in the direction of (fx, fy), so the displacement along x is z tan θ fx/|f|. It is largest for fx = f_N
+    and the largest tan θ, which is that of the corner |f| = √2 f_N or of PERIOD_MAX_SINE. In the paraxial case it is zλ
+    fx for every fy.
     """
     if paraxial:
         return walk(nyquist, wavelength, z, paraxial)
@@ -130,20 +133,22 @@ def _farthest(nyquist: float, wavelength: float, z: float, paraxial: bool) -> fl
 
 
 def blurred_back(spectrum: np.ndarray, how: TransformSampling) -> float:
-    """Return the power (of u's samples) that the truncation at the Nyquist frequency brings back into the window.
+    """Return the power that comes back into the window due to truncation at the Nyquist frequency.
 
-    It is assumed that the source emits such light evenly. spectrum: of the field at the source, (fx, fy) in FFT order
-    if the window's pitch is a whole number of samples, else centred (fy, fx).
+    The power is in units of the samples u. It is assumed that the source emits light of this frequency evenly.
+
+    spectrum: spectrum of the field at the source: (fx, fy) in FFT order if the window's pitch is a whole number of
+        samples, else (fy, fx) centred.
     """
     nyquist = 0.5 / how.source.dx
     if how.passage.band.fade or not (how.passage.paraxial or nyquist * how.passage.wavelength < PERIOD_MAX_SINE):
-        return 0.0  # a spectrum that fades or decays is not truncated
+        return 0.0  # a spectrum that is faded or decays is not truncated
     width = max(round(NYQUIST_SHARE * how.period), 1)
     lines = np.unique(np.linspace(-width, width, NYQUIST_LINES).round().astype(int))
     lines = (lines + (how.period // 2 if how.step else 0)) % how.period
     total = 0.0
     for axis in (0, 1):  # axis along which the blur comes back: y, x
-        across = axis if how.step else 1 - axis  # axis of the spectrum with the other frequency
+        across = axis if how.step else 1 - axis  # axis of the spectrum for the frequency along the other axis
         u = np.take(spectrum, lines, axis=1 - across)
         power = u.real**2 + u.imag**2
         total += float(power.mean(axis=1 - across) @ _blur_weights(how, axis))
@@ -151,7 +156,7 @@ def blurred_back(spectrum: np.ndarray, how: TransformSampling) -> float:
 
 
 def blur_left(how: TransformSampling, roomier: TransformSampling) -> float:
-    """Return the blur's amplitude in a sampling with more padding, relative to `how`.
+    """Return the amplitude of the blur in a sampling with more padding, relative to that in `how`.
 
     It is assumed that the power at the Nyquist frequency is the same for all frequencies along the other axis.
     """
@@ -163,9 +168,10 @@ def blur_left(how: TransformSampling, roomier: TransformSampling) -> float:
 def _blur_weights(how: TransformSampling, axis: int) -> np.ndarray:
     """Return the fraction of the power |U|² at the Nyquist frequency along one axis that comes back into the window.
 
-    There is one weight per frequency along the other axis. In samples, U = Σ u e^{-2πi...} is S/dx. (2) times dx² |U|²
-    is therefore the power ∫|b|² dx, and divided by dx it is the sum over samples along the axis. Parseval's 1/period
-    sums along the other axis. The spectrum has two ends, ±f_N.
+    There is one weight per frequency along the other axis. The weight is derived as follows. In terms of samples, U = Σ
+    u e^{-2πi...} equals S/dx. Therefore (2) times dx² |U|² is the power ∫|b|² dx. Divided by dx, it is the sum over
+    samples along the axis. The factor 1/period gives the sum along the other axis, by Parseval's theorem. A factor of 2
+    is due to the two ends ±f_N of the spectrum.
     """
     source, window = how.source, how.window
     others = (np.arange(how.period) - how.period // 2) / (how.period * source.dx)
@@ -179,10 +185,11 @@ def _blur_weights(how: TransformSampling, axis: int) -> np.ndarray:
 
 
 def _share_that_meets(walks: np.ndarray, how: TransformSampling, axis: int) -> np.ndarray:
-    """Return the fraction of a source's light that lands within the window's range along an axis (0: y).
+    """Return the fraction of a source's light that lands within the window's range along an axis (0 for y, 1 for x).
 
-    walks: displacement of the light along this axis [m]. The fraction is the overlap of two intervals of widths `lit`
-        and `seen` whose centres are `missed` apart.
+    The fraction is the overlap of two intervals of widths `lit` and `seen`, whose centres are `missed` apart.
+
+    walks: displacements [m] of the light along this axis.
     """
     lit, seen = (grid.shape[axis] * grid.dx for grid in (how.source, how.window))
     missed = np.maximum(walks - abs(how.window.centre[1 - axis]), 0)
@@ -191,9 +198,9 @@ def _share_that_meets(walks: np.ndarray, how: TransformSampling, axis: int) -> n
 
 
 def _walks(fx: float, fy: np.ndarray, how: TransformSampling) -> tuple[np.ndarray, np.ndarray]:
-    """Return the distances [m] that light of (fx, fy) moves along x and along y, z tan θ fx/|f| = z λ fx / cos θ.
+    """Return the displacements [m] of light along x and y, for x z tan θ fx/|f| = z λ fx / cos θ.
 
-    They are infinite too near grazing incidence.
+    They are infinite for light that is too near grazing incidence.
     """
     wavelength, z = how.passage.wavelength, abs(how.passage.z)
     sine2 = 0 * fy if how.passage.paraxial else (fx**2 + fy**2) * wavelength**2

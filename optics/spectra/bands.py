@@ -1,4 +1,4 @@
-"""Spectral bands: light as a few numbers, with a weight for each receptor type."""
+"""Spectral bands: light described by a few numbers, with weights for each receptor type."""
 
 from __future__ import annotations
 
@@ -17,19 +17,19 @@ from optics.spectra.spectrum import Spectrum, cie_1931, daylight
 
 __all__ = ["SpectralBands", "cie_1931", "daylight", "pigment_absorptance"]
 
-FINEST = 64  # choice
-CATCHES_FIRST = 1e4  # choice: weight of catches over means in least squares
+FINEST = 64  # choice: largest number of bands
+CATCHES_FIRST = 1e4  # choice: weight of quantum catches relative to means in the least-squares fit
 
 
 @dataclass(frozen=True)
 class SpectralBands:
     """Bands of light and their weights for each receptor channel.
 
-    wavelengths: (band,) [m], the bands' centres.
-    weights: (channel, band); Σ_b weights[c, b] daylight(wavelengths[b]) = 1 for every channel c, so that a white
-        surface in unit daylight gives 1.
-    white_catch: (channel,) ∫ daylight(λ) λ S_c(λ) dλ [m²], with S_c the pigment's quantal sensitivity with peak 1: the
-        quantum catch from a white surface in unit daylight before the weights are normalised.
+    wavelengths: centres of the bands [m], (band,).
+    weights: (channel, band). For every channel c, Σ_b weights[c, b] daylight(wavelengths[b]) = 1, so that the signal of
+        a white surface in unit daylight is 1.
+    white_catch: quantum catch from a white surface in unit daylight, before the weights are normalised, (channel,): ∫
+        daylight(λ) λ S_c(λ) dλ [m²]. S_c is the pigment's quantal sensitivity, with a peak of 1.
     """
 
     wavelengths: np.ndarray
@@ -40,8 +40,9 @@ class SpectralBands:
     def uniform(cls, bands: int, receptors: Any = "rgb") -> SpectralBands:
         """Return equal bands over the receptors' range.
 
-        The weights integrate sensitivity x daylight exactly (to 1 nm) for every reflectance that is linear between the
-        bands' centres. The error is O(bands⁻²) for smooth reflectances.
+        For every reflectance that is linear between the bands' centres, the weights give the exact integral of
+        sensitivity x daylight x reflectance (by quadrature to 1 nm). For other smooth reflectances, the error is
+        O(bands⁻²).
 
         receptors: `Receptors`, or any argument of `receptors_of`.
         """
@@ -57,17 +58,18 @@ class SpectralBands:
     def band_values(
         self, radiance: Spectrum | Callable[[np.ndarray], np.ndarray], receptors: Any, nonnegative: bool = False
     ) -> np.ndarray:
-        """Convert a spectral radiance to these bands (band,), in units of daylight's at 560 nm.
+        """Convert a spectral radiance to values for these bands (band,), in units of daylight at 560 nm.
 
-        The spectrum may have any shape, such as a fluorescent lamp's lines, which samples at the bands' centres hit or
-        miss. The values are means over the bands, weighted by the receptors' sensitivity and relative to daylight. They
-        receive the smallest change that makes Σ_b weights[c, b] radiance[b] the quantum catch of receptor type c
-        (quadrature to 1 nm). This is exact unless there are fewer bands than types, and a least-squares solution
-        otherwise. Lines in few bands may make a value negative.
+        The spectrum may have any shape, including the lines of a fluorescent lamp, which samples at the bands' centres
+        could miss. The values are first computed as means over the bands, weighted by the receptors' sensitivity and
+        relative to daylight. Then they receive the smallest change with which Σ_b weights[c, b] radiance[b] is the
+        quantum catch of receptor type c (by quadrature to 1 nm). The catches are exact if there are at least as many
+        bands as types. Otherwise they are a least-squares solution. If a spectrum with lines is divided into few bands,
+        a value may be negative.
 
-        radiance: a Spectrum, or a function of wavelengths [m] (for a surface: reflectance times illuminant).
+        radiance: a Spectrum, or a function of wavelengths [m]. For a surface, it is reflectance times illuminant.
         receptors: the receptors for which these bands were made.
-        nonnegative: True for values of at least 0, with the nearest possible catches.
+        nonnegative: whether values must be at least 0. Catches are then as close as possible to the exact ones.
         """
         if not isinstance(radiance, Spectrum) and not callable(radiance):
             raise ValueError(
@@ -81,19 +83,19 @@ class SpectralBands:
         seen = catch.sum(axis=0)
         shares = linear_weights(nm, self.wavelengths * 1e9) * (
             seen + 1e-6 * seen.max()
-        )  # invisible light has a mean, too
+        )  # the mean of a band must be defined even if receptors do not absorb its light
         means = daylight(self.wavelengths) * (shares @ of_daylight) / shares.sum(axis=1)
         caught = catch @ of_daylight
         found: np.ndarray = means + np.linalg.pinv(self.weights) @ (caught - self.weights @ means)
         return _nonnegative(self.weights, caught, means) if nonnegative and found.min() < 0 else found
 
     def white_light(self, kernels: np.ndarray) -> np.ndarray:
-        """Kernels (channel, k, k) for a colourless scene in daylight, from kernels (band, k, k)."""
+        """Return kernels (channel, k, k) for a colourless scene in daylight, given kernels (band, k, k)."""
         return np.tensordot(self.weights * daylight(self.wavelengths), kernels, axes=1)
 
 
 def _nonnegative(weights: np.ndarray, caught: np.ndarray, means: np.ndarray) -> np.ndarray:
-    """x >= 0 with weights @ x as close as possible to the catches, and among these the closest to the means."""
+    """Return x >= 0 with weights @ x closest to the catches and, among these x, the one closest to the means."""
     from scipy.optimize import lsq_linear
 
     equations = np.concatenate([weights * CATCHES_FIRST, np.eye(len(means))])
@@ -103,7 +105,7 @@ def _nonnegative(weights: np.ndarray, caught: np.ndarray, means: np.ndarray) -> 
 
 
 def _values(found: Any, shape: tuple[int, ...]) -> np.ndarray:
-    """Values that a function returned for wavelengths, checked."""
+    """Return the values of a spectrum at wavelengths, or raise a ValueError."""
     try:
         values = np.broadcast_to(np.asarray(found, np.float64), shape)
     except (TypeError, ValueError, OverflowError):
@@ -114,7 +116,7 @@ def _values(found: Any, shape: tuple[int, ...]) -> np.ndarray:
 
 
 def _catch(kinds: Receptors) -> tuple[np.ndarray, np.ndarray]:
-    """Wavelengths [nm] over the receptors' range, and each type's catch of daylight there, weighted for summation."""
+    """Return wavelengths [nm] over the receptors' range, and each type's catch of daylight with quadrature weights."""
     low, high = kinds.limits_nm
     nm = np.arange(low, high + 0.5)
     catch = kinds.catch(nm)

@@ -1,4 +1,4 @@
-"""Photons that a receptor absorbs: the light level that corresponds to a signal of 1."""
+"""Photons that a receptor absorbs for a signal of 1, from the light level."""
 
 from __future__ import annotations
 
@@ -14,17 +14,18 @@ from optics.spectra.spectrum import cie_1931, daylight
 __all__ = ["PhotonBudget"]
 
 PLANCK, LIGHT_SPEED = 6.62607015e-34, 299792458.0  # [J s], [m/s], exact in the SI
-LUMENS_PER_WATT = 683.0  # CIE 018: K_m, to 0.002 %
+LUMENS_PER_WATT = 683.0  # K_m of CIE 018, accurate to 0.002 %
 
 
 @dataclass(frozen=True)
 class PhotonBudget:
-    """Illumination of the scene, and integration time and efficiency of the receptors.
+    """Illuminance of the scene, with integration time and quantum efficiency of the receptors.
 
-    illuminance: E_v [lx] of daylight (CIE D65) on the scene: 1e5 in the sun, 1e4 under an overcast sky, 10 at dusk.
-    integration_time: Δt [s] over which a receptor integrates; 10 to 50 ms in insects and vertebrates.
-    quantum_efficiency: η, the share of photons at its pigment's peak that a receptor absorbs, including losses in
-        front.
+    illuminance: illuminance E_v [lx] of the scene by daylight (CIE D65): 1e5 in the sun, 1e4 under an overcast sky, 10
+        at dusk.
+    integration_time: integration time Δt [s] of a receptor. It is 10 to 50 ms in insects and vertebrates.
+    quantum_efficiency: η, the share of photons at the peak wavelength of its pigment that a receptor absorbs, reduced
+        by losses in front of the receptor.
 
     Raises:
         ValueError: names argument, value and valid range.
@@ -47,13 +48,13 @@ class PhotonBudget:
         return self.illuminance / (LUMENS_PER_WATT * float(visible.sum()) * 5e-9)
 
     def photons(self, bands: SpectralBands, etendue: float) -> np.ndarray:
-        """Photons absorbed per integration time from a white Lambertian surface, (channel,):
+        """Return the photons absorbed per integration time from a white Lambertian surface, (channel,):
 
             N_c = η Δt G ∫ E_λ/π · λ/(hc) · S_c(λ) dλ
 
-        etendue: G [m² sr], pupil area times the solid angle from which a receptor receives light. With G = (π/4) D²
-            (d/f)² it is Land's sensitivity (Warrant & Nilsson 1998, Vision Research 38:195, eq. 1) with daylight's
-            spectrum instead of one wavelength, for square receptors of side d.
+        etendue: G [m² sr], the pupil's area times the solid angle from which a receptor receives light. With G = (π/4)
+            D² (d/f)², N_c corresponds to Land's sensitivity (Warrant & Nilsson 1998, Vision Research 38:195, eq. 1),
+            but for the spectrum of daylight instead of one wavelength, and for square receptors of side d.
 
         Raises:
             ValueError: names argument, value and valid range.

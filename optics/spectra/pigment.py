@@ -1,8 +1,8 @@
-"""Visual pigments: spectral sensitivity from the wavelength of the peak.
+"""Visual pigments: spectral sensitivity, given the wavelength of the peak.
 
-Templates after Govardovskii, Fyhrquist, Reuter, Kuzmin & Donner (2000), "In search of the visual pigment template",
-Visual Neuroscience 17:509-528: absorbance of pigments with retinal (A1) or 3,4-didehydroretinal (A2), measured for
-peaks from 357 to 620 nm.
+The templates are those of Govardovskii, Fyhrquist, Reuter, Kuzmin & Donner (2000), "In search of the visual pigment
+template", Visual Neuroscience 17:509-528. They describe the absorbance of pigments with retinal (A1) or
+3,4-didehydroretinal (A2), measured for peaks from 357 to 620 nm.
 """
 
 from __future__ import annotations
@@ -21,7 +21,10 @@ LAMBDA_MAX_NM = (330.0, 700.0)
 
 @dataclass(frozen=True)
 class _Template:
-    """α band, eq. 1: 1 / (exp A(a - x) + exp B(b - x) + exp C(c - x) + D), x = λmax/λ; β band, eq. 4: a Gaussian.
+    """Parameters of a template: the α band and the β band.
+
+    The α band is 1 / (exp A(a - x) + exp B(b - x) + exp C(c - x) + D) with x = λmax/λ (eq. 1). The β band is a Gaussian
+    (eq. 4).
 
     A, a, beta_peak [nm] and beta_width [nm] are functions of λmax [nm]; the other parameters are numbers.
     """
@@ -67,10 +70,12 @@ CHROMOPHORES = {
 
 
 def pigment_absorptance(wavelengths: np.ndarray, lambda_max: float, chromophore: str = "A1") -> np.ndarray:
-    """Quantal sensitivity of a visual pigment at `wavelengths` [m]: α band with peak 1 at `lambda_max` [m], and β band.
+    """Return the quantal sensitivity of a visual pigment at `wavelengths` [m].
+
+    It is the sum of the α band, with a peak of 1 at `lambda_max` [m], and the β band.
 
     Raises:
-        ValueError: lambda_max outside 330-700 nm, or another chromophore than "A1" and "A2".
+        ValueError: lambda_max is outside 330-700 nm, or the chromophore is neither "A1" nor "A2".
     """
     t = CHROMOPHORES[one_of("chromophore", chromophore, CHROMOPHORES)]
     peak = in_range("lambda_max", lambda_max, LAMBDA_MAX_NM[0] * 1e-9, LAMBDA_MAX_NM[1] * 1e-9) * 1e9
@@ -83,10 +88,10 @@ def pigment_absorptance(wavelengths: np.ndarray, lambda_max: float, chromophore:
 
 @dataclass(frozen=True)
 class Pigment:
-    """A receptor type whose sensitivity is that of its visual pigment.
+    """A receptor type with the sensitivity of its visual pigment.
 
     lambda_max_nm: peak of the α band [nm], in [330, 700].
-    chromophore: "A1" (retinal) or "A2" (3,4-didehydroretinal, of freshwater fish and amphibians).
+    chromophore: "A1" (retinal) or "A2" (3,4-didehydroretinal, as in freshwater fish and amphibians).
 
     Raises:
         ValueError: names argument, value and valid range.
@@ -105,5 +110,5 @@ class Pigment:
         return self.lambda_max_nm
 
     def at(self, wavelengths: np.ndarray) -> np.ndarray:
-        """Quantal sensitivity at `wavelengths` [m]."""
+        """Return the quantal sensitivity at `wavelengths` [m]."""
         return pigment_absorptance(wavelengths, self.lambda_max_nm * 1e-9, self.chromophore)

@@ -15,22 +15,23 @@ from optics.spectra.spectrum import LIMITS_NM, Spectrum, cone_fundamentals, dayl
 
 __all__ = ["RECEPTORS", "Receptors", "receptors_of"]
 
-# Light beyond either end of the range, as a share of each type's catch from white in daylight, that is neglected.
+# Neglected light beyond either end of the range of wavelengths, as a share of each type's catch from white in daylight.
 NEGLIGIBLE = 1e-3
-STEP_NM = 10  # ends of the range are multiples of it
+STEP_NM = 10  # ends of the range are multiples of this step
 
 
 @dataclass(frozen=True)
 class Receptors:
-    """The receptor types of an eye, one channel of signals each, or a mosaic of them.
+    """The receptor types of an eye, and their arrangement over the retina.
 
-    types: a `Pigment`; a number, the λmax [nm] of an A1 pigment; or a `Spectrum`, a measured quantal sensitivity, for
-        each type. Their order is that of the channels.
-    mosaic: None: every receptor has all types, like the pixels of a camera, and signals are (type, h, w). Or rows of
-        indices into `types`, ((0, 1), (1, 2)), repeated over the retina from its top left corner: every receptor has
-        one type, as in a real retina, and signals are (1, h, w).
-    range_nm: (low, high) [nm], whole numbers within 300-780: range of light that is divided into bands. None: wide
-        enough to omit less than 1e-3 of any type's catch from white in daylight at either end.
+    types: one entry per type: a `Pigment`; a number, which is the λmax [nm] of an A1 pigment; or a `Spectrum`, which is
+        a measured quantal sensitivity. Channels have the order of the types.
+    mosaic: None, or rows of indices into `types` such as ((0, 1), (1, 2)). None: every position of the retina has
+        receptors of all types, like the pixels of a camera, and signals are (type, h, w). Rows: every receptor has one
+        type, as in a real retina, and signals are (1, h, w). The rows are repeated over the retina from its top left
+        corner.
+    range_nm: range of wavelengths (low, high) [nm] that is divided into bands: whole numbers within 300-780. None: a
+        range so wide that less than 1e-3 of any type's catch from white in daylight is omitted at either end.
 
     Raises:
         ValueError: names argument, value and valid choices.
@@ -53,12 +54,12 @@ class Receptors:
 
     @cached_property
     def limits_nm(self) -> tuple[float, float]:
-        """Range of the light that counts [nm]."""
+        """Range of wavelengths [nm] that is divided into bands."""
         return _range_of(self) if self.range_nm is None else self.range_nm
 
     @property
     def channels(self) -> int:
-        """Number of signals at each place of the retina."""
+        """Number of signals at each position of the retina."""
         return len(self.types) if self.mosaic is None else 1
 
     def arranged(self, mosaic: Sequence[Sequence[int]] | np.ndarray | None) -> Receptors:
@@ -73,10 +74,10 @@ class Receptors:
         return tile[np.ix_(*(np.arange(n) % m for n, m in zip(resolution, tile.shape, strict=True)))]
 
     def catch(self, nm: np.ndarray) -> np.ndarray:
-        """Catch of each type from unit daylight per wavelength [nm], (type, wavelength), up to a common factor.
+        """Return each type's catch from unit daylight at wavelengths [nm], (type, wavelength), up to a common factor.
 
-        Receptors count photons while radiance is energy; hence the factor λ in addition to the quantal sensitivity,
-        whose peak is 1.
+        The catch is daylight times λ times the quantal sensitivity, whose peak is 1. The factor λ is necessary because
+        receptors count photons, while radiance is energy.
 
         Raises:
             ValueError: invalid wavelengths.
@@ -132,7 +133,7 @@ def _range(range_nm: Any) -> tuple[float, float]:
 
 
 def _range_of(receptors: Receptors) -> tuple[float, float]:
-    """Range of the light that any type catches, except for NEGLIGIBLE of it at either end."""
+    """Return the range of wavelengths outside which every type catches at most a share NEGLIGIBLE at either end."""
     nm = np.arange(LIMITS_NM[0], LIMITS_NM[1] + 1)
     so_far = np.cumsum(receptors.catch(nm), axis=1)
     so_far /= so_far[:, -1:]
@@ -141,8 +142,8 @@ def _range_of(receptors: Receptors) -> tuple[float, float]:
     return float(first // STEP_NM * STEP_NM), float(-(-last // STEP_NM) * STEP_NM)
 
 
-# Red, green and blue, as in swallowtail butterflies (Arikawa 2003, J. Comp. Physiol. A 189:791). They are far enough
-# apart to # separate colours like three RGB channels; human cones (566, 541, 441 nm) are not.
+# Peaks of red, green and blue receptors, as in swallowtail butterflies (Arikawa 2003, J. Comp. Physiol. A 189:791).
+# They are far enough apart to separate colours like three RGB channels, unlike those of human cones (566, 541, 441 nm).
 _RGB_NM = (600.0, 520.0, 460.0)
 
 RECEPTORS: Mapping[str, Callable[[], Receptors]] = {
@@ -156,10 +157,12 @@ RECEPTORS: Mapping[str, Callable[[], Receptors]] = {
 
 
 def receptors_of(receptors: Any) -> Receptors:
-    """Convert an argument to Receptors: Receptors themselves, one of RECEPTORS' names, or receptor types.
+    """Convert an argument to `Receptors`.
+
+    receptors: `Receptors`, a name such as "rgb" or "lms" (the keys of RECEPTORS), or a sequence of receptor types.
 
     Raises:
-        ValueError: an unknown name, with the nearest one; no types, or invalid types.
+        ValueError: an unknown name (the message suggests the most similar one), no types, or invalid types.
     """
     if isinstance(receptors, Receptors):
         return receptors

@@ -1,6 +1,7 @@
 """Spectra as tables: illuminants, reflectances, cone fundamentals, and user data.
 
-The tables are copied from colour-science (its sources are named with each); tests compare them with it.
+The tables are copied from the package colour-science, and tests compare them with the package. The original sources are
+named with each table.
 """
 
 from __future__ import annotations
@@ -26,19 +27,21 @@ __all__ = [
     "reflectance",
 ]
 
-LIMITS_NM = (300.0, 780.0)  # CIE D65 is tabulated from here; no eye's receptors reach beyond
+LIMITS_NM = (300.0, 780.0)  # the table of CIE D65 starts at 300 nm; no receptors absorb beyond 780 nm
 SHORTEST_NM = 1.0  # shortest entry of a table; smaller numbers are probably metres
-NORMAL_NM = 560.0  # illuminants are 1 here
+NORMAL_NM = 560.0  # wavelength at which illuminants are 1
 
 
 @dataclass(frozen=True)
 class Spectrum:
-    """A quantity over wavelength: linear between the table's entries, constant beyond its ends (as CIE 15 advises).
+    """A quantity as a function of wavelength, given by a table.
 
-    wavelengths_nm: ascending [nm].
-    values: one per wavelength, finite and not negative.
+    It is linear between the table's entries and constant beyond the ends (as CIE 15 advises).
 
-    Equal tables are equal spectra.
+    wavelengths_nm: wavelengths [nm] in ascending order.
+    values: one value per wavelength, finite and not negative.
+
+    Two spectra are equal if their tables are equal.
 
     Raises:
         ValueError: names argument, value and valid choices.
@@ -64,7 +67,7 @@ class Spectrum:
         return self.wavelengths_nm[int(np.argmax(self.values))]
 
     def at(self, wavelengths: np.ndarray) -> np.ndarray:
-        """Values at `wavelengths` [m]."""
+        """Return the values at `wavelengths` [m]."""
         return np.interp(vacuum_wavelengths(wavelengths) * 1e9, self.wavelengths_nm, self.values)
 
 
@@ -85,7 +88,7 @@ def _spectrum(nm: np.ndarray, values: np.ndarray) -> Spectrum:
 
 @lru_cache(maxsize=4)
 def _table(name: str) -> tuple[tuple[str, ...], np.ndarray]:
-    """Column names and columns (column, wavelength) of a CSV file, the wavelengths [nm] first."""
+    """Return names and values (column, wavelength) of a CSV file's columns. The first column is wavelengths [nm]."""
     with resources.files("optics.spectra").joinpath("data", name).open() as file:
         names = tuple(file.readline().strip().split(","))
         return names[1:], np.loadtxt(file, delimiter=",").T
@@ -97,17 +100,20 @@ def _columns(name: str) -> dict[str, np.ndarray]:
 
 
 def daylight(wavelengths: np.ndarray) -> np.ndarray:
-    """Relative spectral power of CIE D65, 1 at 560 nm, linear between the 5 nm table's entries.
+    """Return the relative spectral power of CIE D65, which is 1 at 560 nm and linear between entries 5 nm apart.
 
     Raises:
-        ValueError: a wavelength [m] outside 300-780 nm.
+        ValueError: a wavelength [m] is outside 300-780 nm.
     """
     nm, d65 = _table("colour_tables.csv")[1][:2]
     return np.interp(_nanometres(wavelengths), nm, d65 / np.interp(NORMAL_NM, nm, d65))
 
 
 def cie_1931(wavelengths: np.ndarray) -> np.ndarray:
-    """CIE 1931 2° colour matching functions x̄, ȳ, z̄ -> (wavelength, 3); wavelengths [m] in 300-780 nm, 0 below 360."""
+    """Return the CIE 1931 2° colour matching functions x̄, ȳ, z̄, (wavelength, 3).
+
+    wavelengths: wavelengths [m] in 300-780 nm. The functions are 0 below 360 nm.
+    """
     table = _table("colour_tables.csv")[1]
     nm = _nanometres(wavelengths)
     return np.stack([np.interp(nm, table[0], column) for column in table[2:]], axis=-1)
@@ -122,13 +128,13 @@ def _nanometres(wavelengths: np.ndarray) -> np.ndarray:
     return nm
 
 
-# CIE 15: incandescent light, phases of daylight, fluorescent lamps and a phosphor-converted white LED, and equal
-# energy. The tables of # the lamps and the LED start at 380 nm; they are dark below.
+# Source: CIE 15. A is incandescent light, D are phases of daylight, E is equal energy, FL are fluorescent lamps, and
+# LED-B3 is a phosphor-converted white LED. The tables of the lamps and the LED start at 380 nm; below, they are dark.
 ILLUMINANTS = ("A", "D50", "D55", "D65", "D75", "E", "FL2", "FL11", "LED-B3")
 
 
 def illuminant(name: str) -> Spectrum:
-    """Relative spectral power of a CIE illuminant, 1 at 560 nm, on 300-780 nm.
+    """Return the relative spectral power of a CIE illuminant on 300-780 nm. It is 1 at 560 nm.
 
     Raises:
         ValueError: an unknown name.
@@ -153,7 +159,7 @@ REFLECTANCES = (
 
 
 def reflectance(name: str) -> Spectrum:
-    """Reflectance of a patch of the ColorChecker, measured on 380-780 nm (constant below 380 nm).
+    """Return the reflectance of a patch of the ColorChecker, measured on 380-780 nm and constant below 380 nm.
 
     Raises:
         ValueError: an unknown name.
@@ -163,10 +169,10 @@ def reflectance(name: str) -> Spectrum:
 
 
 def cone_fundamentals() -> tuple[Spectrum, Spectrum, Spectrum]:
-    """Quantal sensitivities of human L, M and S cones at the cornea, with peaks of 1, for 2° fields.
+    """Return the quantal sensitivities of human L, M and S cones at the cornea, with peaks of 1, for 2° fields.
 
-    Source: Stockman & Sharpe (2000), Vision Research 40:1711, adopted by CIE 170-1:2006. They start at 390 nm; below,
-    lens and cornea transmit almost no light.
+    Source: Stockman & Sharpe (2000), Vision Research 40:1711, adopted by CIE 170-1:2006. The tables start at 390 nm,
+    because lens and cornea transmit almost no light of shorter wavelengths.
     """
     nm = _table("cone_fundamentals.csv")[1][0]
     cones = (energy / nm for energy in _columns("cone_fundamentals.csv").values())
