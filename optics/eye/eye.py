@@ -194,8 +194,8 @@ class Eye(EyeSpec):
 
         radiance: radiance (band, Y, X) of the scene's cells, whose side is pitch / samples_per_receptor. It is constant
             within each cell (for the alternative, see `light_from` of `Eye.sight`). The scene is centred on the axis
-            and dark outside. With s = samples_per_receptor, it has at least h s x w s cells, or an even number of cells
-            more.
+            and dark outside. Its smallest size is h s x w s cells, with s = samples_per_receptor; larger scenes exceed
+            this height and this width by even numbers.
         rng: random generator of the noise; None for signals without noise. Noise carries no derivative.
         z: distance [m] of the scene along the axis, a number or one per cell (Y, X).
         sight: kernels from `Eye.sight` with the same samples_per_receptor; None computes them. Objects outside its

@@ -72,8 +72,8 @@ class Ommatidium:
     def mode_power(self, angle_x: np.ndarray, angle_y: np.ndarray, wavelength: float = 500e-9) -> np.ndarray:
         """Return the share of the light on the facet that enters each mode, (mode, ...), from a distant point source.
 
-        Angles are the point's direction along the lens' x and y off the axis. The light travels in the opposite
-        direction: its `PointSource` has the negative angles.
+        angle_x, angle_y: direction [rad] of the source, along x and y off the lens' axis. The light travels in the
+            opposite direction, so the angles of its `PointSource` are the negative of these.
 
         Raises:
             ValueError: an angle whose sine is above 0.5, angles of different shapes, or a rhabdom without guided modes.

@@ -7,9 +7,10 @@ the first Rayleigh-Sommerfeld integral. They differ in their samples:
   axis.
 - "low_rank": one matrix product, whose matrix is the Fourier kernel times a slow factor of low rank. It is best near
   the focus of lenses and for small pupils. The pupil needs samples only for the combined phase of lens and path, which
-  varies far less than either alone. - "far_field": one Fourier transform onto direction cosines for each of a few nodes
-  of the window, with interpolation of the kernel's slow factor between the nodes. It is best for small pupils and wide
-  windows. It computes only the intensity.
+  varies far less than either alone.
+- "far_field": one Fourier transform onto direction cosines for each of a few nodes of the window, with interpolation of
+  the kernel's slow factor between the nodes. It is best for small pupils and wide windows. It computes only the
+  intensity.
 - "angular_spectrum": two transforms, from the pupil to the spectrum and on to the sensor's plane. Both planes have the
   same period. It is best at short distances.
 - "split_angular_spectrum": the same, but exp(ikz cos θ) is split into the paraxial part, whose Fourier transform is
