@@ -120,7 +120,7 @@ def _check(outline: Outline, pieces: Outline, contains: Contains) -> None:
 
 
 def _edges(middle: np.ndarray, left: np.ndarray, pieces: Outline, contains: Contains) -> tuple[np.ndarray, np.ndarray]:
-    """Return two masks of pieces: those that belong to the boundary, and those with the opening on their right.
+    """Return a mask of the pieces that belong to the boundary, and a mask of pieces with the opening on their right.
 
     Pieces of the boundary lie between open and closed areas. Of coinciding pieces, only the first belongs to it.
 

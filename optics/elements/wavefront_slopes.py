@@ -107,7 +107,7 @@ class Slopes:
         return float(found[0]), float(found[1])
 
     def rays(self, distance: float, medium_n: float) -> tuple[np.ndarray, np.ndarray]:
-        """Return the points where rays from the disk hit a plane at `distance` [m]; infinite for evanescent rays."""
+        """Return the points at which rays from the disk hit a plane at `distance` [m]; infinite for evanescent rays."""
         inside = self.distance_from_axis <= self.radius
         px, py = self.along_x[inside] / medium_n, self.along_y[inside] / medium_n
         axial = np.sqrt(np.maximum(1 - px**2 - py**2, 0))

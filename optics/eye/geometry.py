@@ -32,7 +32,7 @@ def behind_pupil(pupil: Pupil | None, focal: Scalar) -> Scalar:
 
 
 def check_pupil(pupil: Pupil | None, width: float, full_aperture: float | None) -> None:
-    """Raise a ValueError unless `pupil` is None, or a Pupil that is no wider than one with a throughput of 1."""
+    """Raise a ValueError unless `pupil` is None, or a Pupil at most as wide as one with a throughput of 1."""
     if full_aperture is not None:
         positive("full_aperture", full_aperture)
     if pupil is None:

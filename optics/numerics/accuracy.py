@@ -55,7 +55,7 @@ class Plan:
         polarisation. It is an additional error that all methods share; only `optics.vector_focus` avoids it. The bound
         is valid for windows that contain the brightest point of the light, but not for windows that are dark
         everywhere.
-    seconds: predicted time of a call with compiled kernels on two cores; 0 if there is no prediction.
+    seconds: predicted time of a call with compiled kernels on two cores; 0 without a prediction.
     options: all methods that were compared.
     """
 

@@ -142,7 +142,7 @@ def _unfolded_rows(down: list[Array], shape: Shape, types: Precision) -> Parts:
 def _both_sides(halves: list[Array], place: Array, k: Array, types: Precision, there: Array = True) -> Parts:
     """Return the real and imaginary part of Σ (even cos + i odd sin) for k of either sign.
 
-    halves: sums for |k|: those of the even parts, then those of the odd parts.
+    halves: sums for |k| of the even parts, followed by sums of the odd parts.
     """
     import drjit as dr
 

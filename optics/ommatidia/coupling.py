@@ -38,7 +38,6 @@ class ModesAtPupil:
 
     x, y: positions of the nodes [m].
     weights: P Ψ dξ, (mode, node).
-
     area_of: dξ of each node [m²].
     wavenumber: k n₀ [1/m] in front of the pupil.
     area: open area of the pupil [m²].

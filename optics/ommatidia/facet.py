@@ -25,7 +25,7 @@ class FacetLens:
     diameter: width [m] of the hexagon between opposite sides, or of the circle.
     radius_front, radius_back: radii of curvature [m], positive if the centre lies behind the surface. A biconvex lens
         has a negative radius_back.
-    thickness: [m].
+    thickness: thickness [m] of the lens on its axis.
     n, object_n, medium_n: refractive indices of the lens, of the medium in front of it, and of the cone behind it. Each
         is a number or a dispersion curve. With curves, the focus of an `Ommatidium` with this lens depends on the
         wavelength. The lens' `pupil` has the same focus for all wavelengths.

@@ -110,7 +110,6 @@ def psf_batch(
 
     pupils: one pupil per eye.
     wavelengths: wavelengths [m] in vacuum.
-
     sensor_distance: distance [m] of the sensor behind the pupil. None: the distance at which each pupil's ideal lens
         images the first source, see `optics.psf`.
     source_distances: distances [m] of sources on the axis.

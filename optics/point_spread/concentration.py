@@ -52,8 +52,8 @@ def strehl_ratio(result: PSFResult | Mixture, with_error: bool = False) -> Any:
     with_error: whether to return (value, predicted error), each (wavelength,).
 
     Raises:
-        AccuracyError: the peak lies outside the window, the PSF is brighter at a point outside where rays land, or the
-            samples are too coarse and finer ones cannot be computed. The message states which samples are sufficient.
+        AccuracyError: the peak lies outside the window; the PSF is brighter at a point outside, at which rays land; or
+            the samples are too coarse and finer ones cannot be computed. The message states sufficient samples.
     """
     import drjit as dr
 
@@ -159,7 +159,7 @@ def _check_inside(result: PSFResult, at: tuple[float, float]) -> None:
 
 
 def _refuse_brighter_outside(result: PSFResult, index: int, peak: float) -> None:
-    """Raise an AccuracyError if the PSF is brighter outside the window, at a point where rays land."""
+    """Raise an AccuracyError if the PSF is brighter outside the window, at a point that rays hit."""
     rays = result.requests[index].problem.rays if result.can_recompute and not result.holds_cells else None
     if rays is None or not len(rays):
         return

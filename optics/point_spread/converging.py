@@ -170,7 +170,7 @@ class VectorFocus:
         with a dipole along x, y or z.
     scalar: the PSF of scalar theory, (y, x).
     field: Ex, Ey, Ez, (3, y, x), without the carrier e^{ikz}. None unless the light is fully polarised.
-    parts: the one or two fields of which the light consists and which do not interfere, (part, 3, y, x).
+    parts: one or two fields that do not interfere and add up to the light, (part, 3, y, x).
     centre: (x, y) [m] of the middle sample.
     polarization: Stokes parameters of the light in front of the pupil, divided by the first.
     plan: method and predicted error, the relative L2 error of the intensity over the window.

@@ -97,7 +97,7 @@ class _Attempt:
         """Return the next attempt, after the spot check has found an error above the tolerance.
 
         If the method was an approximation, the next attempt uses an exact method. Otherwise it has a smaller tolerance,
-        because a dark window needs more digits than a bright one. The result is None if the dtype has no more digits.
+        because a dark window needs more digits than a bright one. The result is None if the dtype cannot provide more digits.
 
         last: whether this is the last attempt. Its tolerance is reduced further, because quadrature rules change in
             steps, and a slightly smaller tolerance may give the same nodes.
@@ -175,7 +175,7 @@ def _checked(attempt: _Attempt, asked: Request, tries: int) -> PSFPicture:
 
 
 def _predicted_error(image: np.ndarray, sampling: Sampling, problem: Problem) -> float:
-    """Return the error that follows from the PSF itself. It is used if there was no spot check.
+    """Return the error that follows from the PSF itself. It is used without a spot check.
 
     Sampling may use half the tolerance. Rounding adds an error δU to the field U, which is as large in a dark window as
     in a bright one. If the transform spreads the error evenly over a plane of width W, the mean square of δU is ε²

@@ -112,7 +112,7 @@ class Member:
 
     @property
     def detail(self) -> float:
-        """Cycles per radius that a wavefront and a mask have in addition to those of the slopes."""
+        """Cycles per radius of a wavefront and a mask, in addition to the cycles that follow from slopes."""
         pupil, found = self.pupil, 0.0
         if pupil.wavefront is not None:
             found = pupil.wavefront.bandwidth(0.0)

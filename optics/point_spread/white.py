@@ -41,7 +41,7 @@ class WhitePSF(OnWindow):
     waves: the monochromatic PSFs (wavelength, y, x) of the sum.
     weights: w, (type, wavelength). Cubic splines interpolate PSFs between wavelengths, so a weight may be slightly
         negative.
-    coarse: weights of a sum over every second wavelength; those of the other wavelengths are 0.
+    coarse: weights of a sum over every second wavelength; the weights of all other wavelengths are 0.
     spectral_error: predicted relative L2 error that is due to the number of wavelengths, (type,). It is a quarter of
         the difference from the result with every second wavelength. It falls with the fourth power of the number of
         wavelengths.
@@ -231,7 +231,7 @@ def _splines(nodes: np.ndarray, ends: tuple[float, float]) -> np.ndarray:
 
 
 def _with_middles(result: PSFResult, between: PSFResult) -> PSFResult:
-    """Return both results as one. The wavelengths of the second lie between those of the first."""
+    """Return both results as one. The wavelengths of the second lie between the wavelengths of the first."""
     import drjit as dr
 
     def braided(first: Any, second: Any) -> list[Any]:

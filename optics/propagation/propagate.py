@@ -93,7 +93,8 @@ def propagate(
 ) -> PropagationResult:
     """Return the field at a distance from the plane of u, including the carrier exp(ikz).
 
-    u: complex field (…, y, x) at the pitch dx [m]. Sample n//2 is the centre. wavelength: wavelength [m] in vacuum.
+    u: complex field (…, y, x) at the pitch dx [m]. Sample n//2 is the centre.
+    wavelength: wavelength [m] in vacuum.
     distance: distance [m] behind the plane of u; negative for planes in front of it.
     out_dx, out_shape, out_centre: pitch [m], shape (y, x) and centre (x, y) [m] of the output. By default, pitch and
         shape equal those of u, and the centre is on the axis.

@@ -63,9 +63,9 @@ class SpectralBands:
         The spectrum may have any shape, including the lines of a fluorescent lamp, which samples at the bands' centres
         could miss. The values are first computed as means over the bands, weighted by the receptors' sensitivity and
         relative to daylight. Then they receive the smallest change with which Σ_b weights[c, b] radiance[b] is the
-        quantum catch of receptor type c (by quadrature to 1 nm). The catches are exact if there are at least as many
-        bands as types. Otherwise they are a least-squares solution. If a spectrum with lines is divided into few bands,
-        a value may be negative.
+        quantum catch of receptor type c (by quadrature to 1 nm). The catches are exact unless there are fewer bands
+        than types; then they are a least-squares solution. If a spectrum with lines is divided into few bands, a value
+        may be negative.
 
         radiance: a Spectrum, or a function of wavelengths [m]. For a surface, it is reflectance times illuminant.
         receptors: the receptors for which these bands were made.

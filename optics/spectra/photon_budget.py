@@ -54,7 +54,7 @@ class PhotonBudget:
 
         etendue: G [m² sr], the pupil's area times the solid angle from which a receptor receives light. With G = (π/4)
             D² (d/f)², N_c corresponds to Land's sensitivity (Warrant & Nilsson 1998, Vision Research 38:195, eq. 1),
-            but for the spectrum of daylight instead of one wavelength, and for square receptors of side d.
+            with the spectrum of daylight instead of one wavelength, for square receptors of side d.
 
         Raises:
             ValueError: names argument, value and valid range.

@@ -1,7 +1,7 @@
 """Visual pigments: spectral sensitivity, given the wavelength of the peak.
 
-The templates are those of Govardovskii, Fyhrquist, Reuter, Kuzmin & Donner (2000), "In search of the visual pigment
-template", Visual Neuroscience 17:509-528. They describe the absorbance of pigments with retinal (A1) or
+The templates were published by Govardovskii, Fyhrquist, Reuter, Kuzmin & Donner (2000), "In search of the visual
+pigment template", Visual Neuroscience 17:509-528. They describe the absorbance of pigments with retinal (A1) or
 3,4-didehydroretinal (A2), measured for peaks from 357 to 620 nm.
 """
 
