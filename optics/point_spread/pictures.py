@@ -97,7 +97,7 @@ class _Attempt:
         """Return the next attempt, after the spot check has found an error above the tolerance.
 
         If the method was an approximation, the next attempt uses an exact method. Otherwise it has a smaller tolerance,
-        because a dark window needs more digits than a bright one. The result is None if the dtype cannot provide more digits.
+        because a dark window needs more digits than a bright one. The result is None if the dtype cannot provide them.
 
         last: whether this is the last attempt. Its tolerance is reduced further, because quadrature rules change in
             steps, and a slightly smaller tolerance may give the same nodes.
