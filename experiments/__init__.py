@@ -1,4 +1,5 @@
-"""Experiments, one per module: each was run once, and its page in docs/results is made from the stored numbers.
+"""Experiments, and the pages of docs/results that show them.
 
-Records of the underlying runs are in experiments/records.
+Each experiment was run once, and its page is made from the stored numbers. Records of the underlying runs are in
+experiments/records.
 """

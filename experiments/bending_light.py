@@ -86,7 +86,7 @@ def joining(store: Store) -> int | None:
 def of_phase(store: Store, group: str, phase: int) -> list[Row]:
     """Return the rows of a group in phase I or in phase II.
 
-    For a group whose genes are all open from the start, the same generations are used.
+    A group whose genes are all open from the start is divided at the same generation as the other groups.
     """
     start = joining(store)
     rows = store.group(group)
@@ -178,7 +178,7 @@ def lenses(store: Store) -> set[str]:
 
 
 def pupils(store: Store, group: str, seed: int) -> tuple[float, float, float]:
-    """Return a search's mean relative aperture in the first generation, at the end of phase I, and at the end.
+    """Return a search's mean relative aperture in the first generation and at the ends of phases I and II.
 
     NaN stands for a phase that the search has not reached.
     """
@@ -193,7 +193,7 @@ def pupils(store: Store, group: str, seed: int) -> tuple[float, float, float]:
 def extremes(rows: Sequence[Row]) -> tuple[Row, Row] | tuple[()]:
     """Return the fittest and the least fit animal of the last generations within the last phase.
 
-    The result is () if no animal succeeded.
+    The result is () if every animal with a relief failed.
     """
     first = max(row.generation for row in rows) - LAST + 1
     late = [r for r in rows if r.generation >= first and r.phase == max(row.phase for row in rows)]

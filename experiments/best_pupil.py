@@ -46,7 +46,7 @@ COLORS = {"hole": "#D55E00", "lens": "#0072B2"}
 
 @dataclass(frozen=True)
 class Row:
-    """Measures of an eye; see the page."""
+    """Measures of an eye at one noise, which docs/results/best_pupil.md defines."""
 
     pupil: str
     relative_aperture: float
@@ -68,7 +68,9 @@ def eye(pupil: str, aperture: float) -> optics.Eye:
 
 
 def measures(contrasts: Floats, throughput: float, noise_sigma: float) -> tuple[float, float, float]:
-    """Return (image quality, contrast above the noise, bits per receptor) of an MTF at even steps from 0 to Nyquist.
+    """Return image quality, contrast above the noise, and bits per receptor, from an MTF.
+
+    contrasts: the MTF at equal steps from 0 to the Nyquist frequency
 
     With f in units of the Nyquist frequency, T the throughput and c the scene's contrast,
 
@@ -86,10 +88,11 @@ def measures(contrasts: Floats, throughput: float, noise_sigma: float) -> tuple[
 
 
 def stripes(contrasts: Floats, throughput: float, width: int) -> float:
-    """Return T MTF for stripes of a width in receptors, that is, at the Nyquist frequency divided by the width.
+    """Return the throughput times the MTF for stripes of a width in receptors.
 
-    This is the amplitude of the stripes in the signals, independent of noise. It is 0 beyond the first zero of the MTF,
-    where stripes are reversed or invisible.
+    The frequency of these stripes is the Nyquist frequency divided by the width. The result is the amplitude of the
+    stripes in the signals, independent of noise. It is 0 beyond the first zero of the MTF, where stripes are reversed
+    or invisible.
     """
     falls, rises = np.diff(contrasts)[:-1] < 0, np.diff(contrasts)[1:] >= 0
     zeros = np.flatnonzero(falls & rises & (contrasts[1:-1] < ZERO)) + 1
@@ -117,7 +120,11 @@ def computed(apertures: Sequence[float] = APERTURES, noises: Sequence[float] = N
 
 
 def best(rows: Iterable[Row], pupil: str, noise_sigma: float, measure: str) -> float:
-    """Return the relative aperture at the peak of a measure: of a parabola in log a through the three best samples."""
+    """Return the relative aperture a at which a measure peaks.
+
+    The peak is that of a parabola in log a through the best sample and its two neighbours. If the best sample is the
+    first or the last one, its aperture is returned.
+    """
     chosen = [row for row in rows if row.pupil == pupil and math.isclose(row.noise_sigma, noise_sigma)]
     place = np.log([row.relative_aperture for row in chosen])
     value = np.array([getattr(row, measure) for row in chosen])

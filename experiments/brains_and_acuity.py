@@ -26,8 +26,8 @@ COLORS = {"navigation": "#D55E00", "detection": "#0072B2", "tracking": "#009E73"
 PUBLISHED = {"navigation": 0.69, "detection": 0.74, "tracking": 0.59}
 CLASSES = 4  # number of acuity classes
 TICKS = (1.0, 2.0, 3.0, 5.0, 7.0)  # ticks in a decade
-FEW = (1.0, 3.0)  # ticks in a decade on longer axes
-MANY = 30.0  # ratio of the ends of an axis above which it counts as longer
+FEW = (1.0, 3.0)  # ticks in a decade on axes that span several decades
+MANY = 30.0  # ratio of an axis's ends above which the axis has FEW ticks
 Size = Callable[[Row], float]
 FACTORS: dict[str, Size] = {
     "acuity": lambda row: row.cpd,
@@ -39,8 +39,8 @@ FACTORS: dict[str, Size] = {
 def error(row: Row) -> float:
     """Return the share of episodes in which the goal did not come first, as (k + 1/2) / (n + 1) (Jeffreys' mean).
 
-    The mean is never 0, so that it has a logarithm. In a maze, whose goal no animal reaches, the error is the missing
-    share of a full return.
+    This mean is never 0, so its logarithm exists. In a maze, no animal reaches the goal. The error is then 1 minus the
+    fitness divided by the full return.
     """
     if math.isfinite(row.full_return):
         return 1 - row.fitness / row.full_return
@@ -113,7 +113,7 @@ def factors(store: Store) -> str:
 
 
 def classes(rows: Sequence[Row]) -> list[list[Row]]:
-    """Return candidates in CLASSES parts of equal size, from coarse to fine acuity, or in fewer non-empty parts."""
+    """Return candidates in CLASSES parts of equal size, from coarse to fine acuity, without empty parts."""
     ordered = sorted(rows, key=lambda row: row.cpd)
     parts = [[ordered[i] for i in part] for part in np.array_split(np.arange(len(ordered)), CLASSES)]
     return [part for part in parts if part]
@@ -193,7 +193,7 @@ def brain(row: Row) -> float:
 
 
 def dots(place: Any, rows: Sequence[Row], sizes: tuple[Size, Size], color: str) -> None:
-    """Draw a dot per candidate, at its first size, with a darkness by its rank in the second."""
+    """Draw the error of each candidate over its first size, as a dot whose darkness is its rank in the second size."""
     across, shade = sizes
     ranks = np.argsort(np.argsort([shade(row) for row in rows])) / max(len(rows) - 1, 1)
     for row, rank in zip(rows, ranks, strict=True):

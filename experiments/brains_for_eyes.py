@@ -43,16 +43,17 @@ SIGMA = 0.01
 # Number of eyes and the arc over which they are spread, chosen so that each task can be learnt.
 EYES = {"detection": (2, 45.0), "tracking": (2, 45.0), "navigation": (10, 135.0)}
 PUBLISHED = {"navigation": 0.69, "detection": 0.74, "tracking": 0.59}
-# There is one evaluation during training, because its 320 episodes have a sixth of the steps of the training itself.
-# All training runs make ten passes throughout, as the first ones did before the schedule with fewer passes.
+# Each training run is evaluated only once, because the 320 episodes take a sixth as many steps as the training itself.
+# All training runs make ten passes throughout, without the schedule that lowers the number of passes.
 SETTINGS = (
     *("learning.total_steps=500000", "learning.eval_interval=500000", "learning.least_epochs=10"),
     "evaluation.episodes=320",
 )
-# The rows of navigators are lower if they are finer; eyes of the control have the same width and are 45 degrees high.
+# A navigator's eye is a row of receptors, and finer rows are less tall. Eyes of the control are equally wide and 45
+# degrees high.
 CONTROL_WIDTHS, CONTROL_BRAIN, CONTROL_SEEDS = (4, 8), 64, range(1)
 IN_VAIN = {"navigation": "one row: finer eyes are lower"}
-GAIN = 0.5  # chosen share of the coarsest eyes' error below which finer eyes count as better
+GAIN = 0.5  # finer eyes count as better below this share of the coarsest eyes' error (a choice)
 SHADES = ("#c6dbef", "#9ecae1", "#6baed6", "#2171b5", "#08306b")  # brains from small to large
 D = TypeVar("D", bound=Design)
 Errors = dict[tuple[int, int], float]  # by width and brain
@@ -95,7 +96,8 @@ def missed(rows: Sequence[Trained]) -> Errors:
 def shortfall(rows: Sequence[Trained]) -> Errors:
     """Return each animal's distance from the best training run, relative to the distance from the best to the worst.
 
-    As in `missed`, half a run is added, and n + 1 replaces n.
+    The value of an animal is a mean over its n training runs. As in `missed`, half a run is added to their sum, and
+    n + 1 replaces n.
     """
     fitness = [row.fitness for row in rows if not row.failed]
     high = max(fitness, default=0.0)

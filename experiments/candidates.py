@@ -1,4 +1,4 @@
-"""Results of runs of evolution, with a row per candidate."""
+"""Results of evolution runs as tables with a row per candidate."""
 
 from __future__ import annotations
 
@@ -31,18 +31,21 @@ NO_NUMBER = math.nan
 
 @dataclass(frozen=True)
 class Row:
-    """A candidate of a run; optical measures are NaN except for the best candidate of each generation.
+    """A candidate of a run.
+
+    Optical measures are NaN except for the best candidate of each generation.
 
     group: task, or variant of an experiment, that the run belongs to
-    phase: number of times that genes have opened, 0 in the first generation
+    phase: number of times that genes have opened since the first generation
     episodes: number of evaluation episodes; fitness and success rate are means over them
-    parameters: number of parameters of the trained policy, critic included
+    cpd: acuity [cycles/degree]
+    parameters: number of parameters of the trained policy, including the critic
     full_return: return of an episode straight to the goal without any contact; NaN if a new goal follows each goal
-    above_noise: contrast above the noise; see experiments.best_pupil
+    above_noise: contrast above the noise, as in experiments.best_pupil
     above_noise_of_hole: contrast above the noise of the same pupil without its relief
-    relief: heights in [0, 1] of an eye with optics, row by row
-    glass_power: power relative to that in focus; see experiments.glass
-    peaks_nm: peaks of inherited pigments
+    relief: heights of the relief in [0, 1], row by row; empty for perfect lenses
+    glass_power: power of the glass relative to the power that focuses; see experiments.glass
+    peaks_nm: peak wavelengths of evolved pigments [nm]; empty if pigments do not evolve
     """
 
     group: str
@@ -92,7 +95,7 @@ def rows_of(run: Run, group: str) -> list[Row]:
 
 
 def complete(run: Run) -> list[int]:
-    """Return the generations with all candidates on record, through all rungs."""
+    """Return the generations in which all candidates have completed all rungs of their training."""
     return [g for g in range(run.config.search.generations) if successive_halving.complete(run, g)]
 
 
@@ -134,7 +137,7 @@ def full_return(task: str, course: str = "short") -> float:
 
 
 def anatomy(animal: Phenotype, eye: EyeConfig) -> dict[str, Any]:
-    """Return the fields of a row that describe the animal."""
+    """Return the fields of a row that depend only on the animal's phenotype."""
     has_optics = animal.relative_aperture is not None
     return {
         "n_eyes": animal.n_eyes,
@@ -177,6 +180,6 @@ def _seen(config: RunConfig, animal: Phenotype) -> dict[str, Any]:
 
 @cache
 def parameters(shape: PolicyConfig) -> int:
-    """Return the number of parameters of a policy of this shape, without its file."""
-    with torch.device("meta"):  # shapes only, because drawing the weights would take a hundred times longer
+    """Return the number of parameters of a policy of this shape, without loading a trained policy."""
+    with torch.device("meta"):  # no values: drawing the weights would take a hundred times longer
         return sum(tensor.numel() for tensor in learnt(build_policy(shape)).values())

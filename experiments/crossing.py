@@ -27,12 +27,14 @@ Both: TypeAlias = tuple[Floats, Floats]  # values of compound eyes and of camera
 
 @dataclass(frozen=True)
 class Crossing:
-    """Fitness of camera eyes minus that of compound eyes in each task, and the interaction of eyes and task.
+    """Comparison of camera eyes with compound eyes in two tasks.
 
+    differences: fitness with camera eyes minus fitness with compound eyes, by task
     interaction: difference in detection minus that in navigation, in standard deviations of training runs with one
         kind of eyes
-    p: share of permutations with an interaction of at least this size. Permutations assign the eyes at random within
-        each task. Here the unit is the standard deviation of all runs of a task, which permutations do not change.
+    p: share of permutations whose interaction is at least as large as the observed one. Permutations assign the eyes at
+        random within each task. For p, the unit of the interaction is the standard deviation of all runs of a task,
+        which permutations do not change.
     """
 
     differences: dict[str, Interval]
@@ -44,7 +46,7 @@ def crossing(rows: Sequence[Trained], chance: np.random.Generator) -> Crossing:
     """Return the comparison of the training runs in one light.
 
     Raises:
-        ValueError: there are fewer than two training runs of some eyes in a task.
+        ValueError: a kind of eyes has fewer than two training runs in a task.
     """
     fitness = {task: (_of(rows, task, COMPOUND), _of(rows, task, CAMERA)) for task in TASKS}
     if min(one.size for both in fitness.values() for one in both) < FEWEST_LIVES:
@@ -52,25 +54,25 @@ def crossing(rows: Sequence[Trained], chance: np.random.Generator) -> Crossing:
     dealt = {task: _permuted(*both, chance) for task, both in fitness.items()}
     differences = {task: difference(camera, compound) for task, (compound, camera) in fitness.items()}
     null = np.abs(_joint(dealt))
-    # Some permutations only change the order of the runs, and their sums differ by rounding.
+    # Some permutations only reorder the runs of each kind. Their interaction differs from the observed one by rounding.
     p = (1 + int((null >= abs(_joint(fitness)) * (1 - ROUNDING)).sum())) / (1 + null.size)
     return Crossing(differences, _interaction(fitness), p)
 
 
 def _of(rows: Sequence[Trained], task: str, eyes: tuple[int, int]) -> Floats:
-    """Return the fitness of all animals with these numbers of eyes and receptors across, except failed ones."""
+    """Return the fitness of animals with these numbers of eyes and of receptors across, without failed animals."""
     mine = [row for row in rows if not row.failed and row.task == task and (row.n_eyes, row.width) == eyes]
     return np.array([row.fitness for row in mine])
 
 
 def _permuted(compound: Floats, camera: Floats, chance: np.random.Generator) -> Both:
-    """Return fitness values with randomly assigned eyes, (RESAMPLES, runs) of each kind."""
+    """Return fitness values with randomly assigned eyes: an array (RESAMPLES, runs) for each kind of eyes."""
     mixed = chance.permuted(np.tile(np.concatenate([compound, camera]), (RESAMPLES, 1)), axis=1)
     return mixed[:, : compound.size], mixed[:, compound.size :]
 
 
 def _interaction(fitness: Mapping[str, Both]) -> Interval:
-    """Return the advantage of camera eyes in detection minus that in navigation (Hedges and Olkin 1985, §5.B and E).
+    """Return camera eyes' advantage in detection minus their advantage in navigation (Hedges and Olkin 1985, §5.B, E).
 
     The unit is the standard deviation of training runs with one kind of eyes. With a small number of runs, a bootstrap
     would underestimate this deviation.
@@ -87,7 +89,7 @@ def _interaction(fitness: Mapping[str, Both]) -> Interval:
 
 
 def _joint(fitness: Mapping[str, Both]) -> Floats:
-    """Return the interaction in standard deviations of all runs of a task, which permutations do not change."""
+    """Return the interaction in units of the standard deviation of all runs of a task."""
     apart = {task: _ahead(*both) / np.concatenate(both, axis=-1).std(axis=-1, ddof=1) for task, both in fitness.items()}
     return np.asarray(apart["detection"] - apart["navigation"])
 
@@ -97,7 +99,7 @@ def _ahead(compound: Floats, camera: Floats) -> Floats:
 
 
 def by_light(rows: Sequence[Trained]) -> dict[float, Crossing]:
-    """Return the comparisons in all lights with a sufficient number of training runs."""
+    """Return the comparison for each noise σ (light) that has a sufficient number of training runs."""
     found = {}
     for sigma in lights(rows):
         with suppress(ValueError):

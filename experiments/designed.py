@@ -1,4 +1,4 @@
-"""Designed experiments: animals without evolution, trained several times for several tasks."""
+"""Designed experiments: animals that do not evolve are trained several times for several tasks."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ from experiments.store import Origin, read_rows, write_rows
 __all__ = ["Design", "Experiment", "Trained", "crossed", "main", "train_all"]
 
 
-INDEX = 1.9  # refractive index of glass, high enough for large powers within the limit of height
+INDEX = 1.9  # refractive index of glass; strong lenses then stay within the maximum height of reliefs
 
 
 @dataclass(frozen=True)
 class Design:
     """An animal, its task and light, and the seed of its training run.
 
-    relative_aperture: width of pupils with a paraboloid of glass; 0: perfect lenses
+    relative_aperture: pupil diameter / retina width of eyes with a paraboloid of glass; 0: eyes with perfect lenses
     glass_power: power of the glass, 1 in focus (see experiments.glass)
     """
 
@@ -77,7 +77,11 @@ class Design:
 
 @dataclass(frozen=True)
 class Trained(Design):
-    """Result of a design: means over evaluation episodes, number of steps, and seconds of a worker."""
+    """A design and the result of its training run.
+
+    fitness, success_rate: means over evaluation episodes · episodes: number of these episodes
+    steps: number of training steps · seconds: wall time of the worker
+    """
 
     failed: int = 0
     fitness: float = 0.0
@@ -106,8 +110,8 @@ class Trained(Design):
 def train_all(designs: Iterable[Design], settings: Sequence[str], path: Path, workers: int = 0) -> list[Trained]:
     """Return the rows of all designs in their order, after training the missing ones.
 
-    Each row is written as soon as it is complete, so an interrupted call can be repeated. The total hours are stored in
-    a JSON file of the same name.
+    Each row is written as soon as it is complete. After an interruption, a repeated call trains only the designs that
+    are still missing. The total hours are stored in a JSON file of the same name.
 
     settings: "section.name=value" for all designs, in addition to the tasks' settings
     workers: number of processes; 0: one per core
@@ -137,7 +141,7 @@ def train_all(designs: Iterable[Design], settings: Sequence[str], path: Path, wo
 def crossed(
     animals: Iterable[Design], tasks: Iterable[str], noises: Iterable[float], seeds: Iterable[int]
 ) -> list[Design]:
-    """Return all combinations of animals, tasks, noises and seeds; in navigation an eye is one row of receptors."""
+    """Return all combinations of animals, tasks, noises and seeds. In navigation, each eye is one row of receptors."""
     return [
         replace(animal, task=task, height=animal.width if task != "navigation" else 1, noise_sigma=sigma, seed=seed)
         for seed, sigma, task, animal in itertools.product(seeds, noises, tasks, animals)

@@ -1,4 +1,4 @@
-"""Stored null model of the searches on a page."""
+"""Null model of the searches on a page, as rows that are stored with the page's numbers."""
 
 from __future__ import annotations
 
@@ -21,10 +21,13 @@ SEEDS = 1000
 
 @dataclass(frozen=True)
 class Drift:
-    """Mean of a quantity over the candidates of a generation: median over searches, and the range of 95 % of them.
+    """Distribution of a quantity under the null model, in one generation.
 
-    The end of a phase has an additional row for its last LAST generations together, with the results of all searches
-    (`ends`).
+    The quantity is averaged over the candidates of the generation. The end of a phase has an additional row, in which
+    the quantity is averaged over the last LAST generations.
+
+    median: median over the searches · low, high: ends of the range that contains 95 % of the searches
+    ends: results of all searches, separated by spaces, only in the additional rows
     """
 
     group: str
@@ -72,7 +75,7 @@ def drifted(
 
 
 def of_the_end(drift: list[Drift], generation: int) -> Drift | None:
-    """Return the row of the phase that ends with a generation; None if no phase ends there."""
+    """Return the row for the end of the phase that ends in this generation; None if no phase ends in it."""
     return next((one for one in drift if one.ends and one.generation == generation), None)
 
 
@@ -82,7 +85,7 @@ def shade(axes: Any, drift: list[Drift], color: str) -> None:
     if rows:
         x, low, high = ([getattr(one, name) for one in rows] for name in ("generation", "low", "high"))
         axes.fill_between(x, low, high, color=color, alpha=0.1, lw=0)
-        for edge in (low, high):  # ranges of several groups overlap
+        for edge in (low, high):  # lines at the edges distinguish the overlapping ranges of several groups
             axes.plot(x, edge, color=color, alpha=0.4, lw=0.6)
 
 

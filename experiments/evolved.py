@@ -1,4 +1,4 @@
-"""Storage of runs of evolution, and pages from the stored rows."""
+"""Stored results of evolution runs, and the pages that are made from them."""
 
 from __future__ import annotations
 
@@ -37,8 +37,8 @@ class RunMetadata:
     """Conditions of a run.
 
     generations, planned: numbers of complete and of planned generations
-    worker_hours: wall time, which other work on the machine increases
-    commits: first digits of rhabdom's commits at the starts of the run; +: with changes
+    worker_hours: sum of the candidates' wall times, which other work on the machine increases
+    commits: abbreviated commits of rhabdom that started or continued the run; + marks a commit with local changes
     noise_sigma: noise of the receptors
     relief_height: height of a relief with gene value 1 [m]
     """
@@ -64,7 +64,7 @@ class RunMetadata:
 
 @dataclass(frozen=True)
 class Store:
-    """Contents of a page: rows, conditions of their runs, drift of the null model, origin, and the written answer."""
+    """Contents of a page: rows, conditions of their runs, null model (drift), origin, and the written answer."""
 
     rows: list[Row]
     run_metadata: list[RunMetadata]
@@ -164,7 +164,7 @@ def main(
     arguments: Sequence[str] | None = None,
     quantities: Quantities | None = None,
 ) -> int:
-    """Collect runs and the null model of the quantities if requested; make the page from the stored rows."""
+    """Collect runs and compute the null model of the quantities if requested; make the page from the stored rows."""
     options = parser(text)
     options.add_argument("--runs", nargs="+", metavar="GROUP=DIR", help="collect these run directories")
     options.add_argument("--answer", help="answer on the page, in Markdown; stored until the numbers change")

@@ -31,8 +31,8 @@ FOV_DEG = 45.0
 # Number of eyes, receptors across each, and the arc over which eyes are spread: from compound eyes to a camera eye.
 SHAPES = ((10, 4, 135.0), (5, 8, 90.0), (2, 15, 45.0), (2, 15, 30.0), (1, 15, 0.0))
 COMPOUND, CAMERA = (10, 4), (2, 15)
-# Controls in navigation: number of eyes, receptors (up, across) and arc. Finer rows of square receptors are lower. Most
-# of these eyes are 45 degrees high instead, like the published ones at any resolution.
+# Controls in navigation: number of eyes, receptors (up, across) and arc. Rows of finer receptors are less tall. Most of
+# the control's eyes are 45 degrees high instead, like the published eyes at any resolution.
 CONTROLS = (
     (10, 4, 4, 135.0),
     (5, 8, 8, 90.0),
@@ -65,7 +65,7 @@ def with_rows(rows: Sequence[Trained]) -> list[Trained]:
 
 
 def with_squares(rows: Sequence[Trained]) -> list[Trained]:
-    """Return the rows in bright light with eyes 45 degrees high in both tasks: the comparison without confound."""
+    """Return the rows in bright light with eyes 45 degrees high in both tasks, which removes the confound."""
     return [row for row in rows if row.height == row.width and row.noise_sigma == BRIGHT]
 
 

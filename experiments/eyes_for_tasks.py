@@ -59,7 +59,7 @@ def page(rows: Sequence[Trained], origin: Origin, answer: str) -> Page:
 
 
 def _lives(rows: Sequence[Trained], sigma: float) -> str:
-    """Return the number of training runs per animal in this light as text, for animals that have any."""
+    """Return the number of training runs per animal in this light as text, without animals that have none."""
     counts = [len(_cell(rows, task, sigma, shape)) for task in TASKS for shape in SHAPES]
     least, most = min(filter(None, counts)), max(counts)
     return f"{least}{f' to {most}' if most > least else ''} at σ = {sigma:g}"

@@ -28,7 +28,7 @@ from experiments.page import new_figure, save
 
 __all__ = ["draw", "height_message", "light_message"]
 
-MATTERS = 0.1  # chosen minimum difference for a title, relative to the fitness of a straight path
+MATTERS = 0.1  # smallest difference that a title reports, relative to the fitness of a straight path
 
 
 def draw(rows: Sequence[Trained], path: Path) -> None:
@@ -63,9 +63,9 @@ def draw(rows: Sequence[Trained], path: Path) -> None:
 
 
 def height_message(rows: Sequence[Trained]) -> str:
-    """Return the title: whether fine eyes are worse in navigation if they are low, and if they are high.
+    """Return the title, which states whether fine eyes are worse in navigation if they are low, and if they are high.
 
-    Only a difference beyond chance and above MATTERS counts.
+    A difference counts only if its interval excludes 0 and its size exceeds MATTERS.
     """
     behind = []
     for mine in (with_rows(rows), with_squares(rows)):
@@ -110,7 +110,7 @@ def _draw_lights(place: Any, rows: Sequence[Trained]) -> None:
 
 
 def light_message(crossings: Mapping[float, Crossing]) -> str:
-    """Return a title: whether the better eyes in bright light are worse in dimmer light, by more than chance."""
+    """Return a title, which states whether the better eyes in bright light are worse in dimmer light beyond chance."""
     if len(crossings) < 2:
         return "in dim light"
     bright, *dim = (crossings[sigma].differences for sigma in sorted(crossings))

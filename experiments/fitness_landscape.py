@@ -20,7 +20,8 @@ from experiments.glass import blur
 __all__ = ["SPREAD", "WIDE", "Landscape", "Life", "behind_glass", "fitted", "holes", "lenses", "opening"]
 
 Floats = NDArray[np.float64]
-# Standard deviation of a training run's fitness: its value at 0, and its slope. `Landscape.misfit` measures the fit.
+# Standard deviation of a training run's fitness: its value at an expected fitness of 0, and its slope over the expected
+# fitness. `Landscape.misfit` compares it with the deviations of real training runs.
 SPREAD = 5.0, 0.17
 
 
@@ -35,7 +36,10 @@ class Life:
 
 @dataclass(frozen=True)
 class Landscape:
-    """Surrogate fitness of an animal: a product of a factor for light, which is low for narrow pupils, and sharpness.
+    """Surrogate fitness of an animal: low + high · exp(-(aperture / a)^light) · exp(-(blur / width)^fall).
+
+    The first exponential is a factor for light, which is low for pupils with a small relative aperture a. The second is
+    a factor for sharpness.
 
     low: fitness without any useful signal · high: additional fitness with the sharpest and brightest image
     aperture, light: scale and exponent of the factor for light · width, fall: scale and exponent of the blur
@@ -77,12 +81,12 @@ def lenses(rows: Sequence[Trained]) -> list[Life]:
 
 
 def holes(run: Run) -> list[Life]:
-    """Return the training runs of a search for lenses while only its pupil may change."""
+    """Return the training runs of a search for lenses from the generations in which only the pupil may change."""
     return [_life(c, run.config.eye) for c in run.candidates if succeeded(c) and c.generation < opening(run.config)]
 
 
 def behind_glass(run: Run) -> list[Life]:
-    """Return the training runs of the same search after glass may change."""
+    """Return the training runs of the same search from the generations in which glass may change."""
     return [_life(c, run.config.eye) for c in run.candidates if succeeded(c) and c.generation >= opening(run.config)]
 
 

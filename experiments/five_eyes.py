@@ -26,7 +26,7 @@ from sim.worlds.state import WorldState
 __all__ = ["STAGES", "Stage", "View", "scene", "view"]
 
 Floats = NDArray[np.floating]
-FINE, COARSE, CELLS = 90, 30, 180  # receptors along a side of either retina, and cells of the scene
+FINE, COARSE, CELLS = 90, 30, 180  # receptors along a side of the two retinas, and cells of the scene over that side
 SENSOR_WIDTH, FOV_DEG, NOISE, INDEX = 200e-6, 45.0, 0.003, 1.5
 WIDE = 0.38  # relative aperture of cup and lenses, the maximum for a focused lens within the genes' range
 SPP = 128
@@ -34,9 +34,9 @@ SPP = 128
 
 @dataclass(frozen=True)
 class Stage:
-    """A pupil.
+    """A stage of the eye, which is defined by its pupil.
 
-    power: power of its glass, 1 in focus; 0: no glass
+    power: power of the glass in the pupil, 1 in focus; 0: no glass
     """
 
     name: str
@@ -80,7 +80,7 @@ class View:
 def scene() -> Floats:
     """Return the path-traced spectral radiance (band, y, x) in front of the eye on the tangent plane.
 
-    Cells are retina / 180 wide. The goal is on the left and an adversary on the right. The scene extends to all
+    A cell is 1/180 of the retina wide. The goal is on the left and an adversary on the right. The scene extends to all
     directions from which light reaches the retina through the widest pupil.
     """
     world = sim.build_world("detection")
@@ -98,7 +98,7 @@ def eye(pupil: optics.Pupil | None, side: int) -> optics.Eye:
 
 
 def view(pupil: optics.Pupil | None, radiance: Floats, seed: int = 0) -> View:
-    """Return the signals of an eye; None: a perfect lens, also with noise on the coarse retina."""
+    """Return the signals of an eye with this pupil, or with a perfect lens (None); only the coarse retina has noise."""
     fine, coarse = eye(pupil, FINE), eye(pupil, COARSE)
     gain = 1 / float(fine.throughput)
     sharp, blocks = (eye(None, side).see(radiance, CELLS // side) for side in (FINE, COARSE))

@@ -22,14 +22,14 @@ def power(animal: Phenotype, config: EyeConfig) -> float:
     """Return the power of an eye's glass relative to the power that focuses distant objects on its retina.
 
     1 is in focus, 0 means no lens, and a negative power diverges light. The power of a perfect lens is NaN.
-    It is the power of the paraboloid nearest to the relief over the pupil's disk (least squares: Zernike defocus). If
+    A relief has the power of the paraboloid nearest to it over the pupil's disk (least squares: Zernike defocus). If
     the optical path falls by d from the centre to the rim, P = 2 d / R² (paraxial; Goodman, Introduction to Fourier
     Optics, §5.1). The retina is at f = L / (2 tan(fov/2)), so that P f = d / (a² L tan(fov/2) / 4).
     """
     if animal.relief is None or animal.relative_aperture is None or animal.refractive_index is None:
         return math.nan
     heights = np.array(animal.relief)
-    fall = float(_fall(math.isqrt(heights.size)) @ (heights - heights[0]))  # exactly 0 where it is flat
+    fall = float(_fall(math.isqrt(heights.size)) @ (heights - heights[0]))  # exactly 0 for flat glass
     way = (animal.refractive_index - 1) * config.relief_height * fall + 0.0  # no -0
     width = retina_width(animal.resolution[1], config)
     return 4 * way / (animal.relative_aperture**2 * width * math.tan(math.radians(animal.fov_deg) / 2))
@@ -39,8 +39,8 @@ def blur(animal: Phenotype, config: EyeConfig) -> float:
     """Return the blur of a distant point in receptors: the root mean square distance of rays from their centroid.
 
     A ray through the pupil at r reaches the retina at r + f (n - 1) grad h (paraxial; Goodman, §5.1), where f is the
-    distance from pupil to retina. Diffraction is ignored. Without glass this is the blur of the pinhole; for a perfect
-    lens it is NaN.
+    distance from pupil to retina. Diffraction is ignored. Without glass, the result is the blur of the pinhole. For a
+    perfect lens, it is NaN.
     """
     if animal.relief is None or animal.relative_aperture is None or animal.refractive_index is None:
         return math.nan
@@ -55,7 +55,7 @@ def blur(animal: Phenotype, config: EyeConfig) -> float:
 def paraboloid(
     power: float, relative_aperture: float, fov_deg: float, index: float, eye: EyeConfig
 ) -> tuple[float, ...]:
-    """Return sixteen heights in [0, 1] of glass of this power, with a minimum of 0.
+    """Return the sixteen heights in [0, 1] of a paraboloid of glass with this power; the lowest height is 0.
 
     Raises:
         ValueError: the glass exceeds the maximum height of reliefs.
@@ -72,14 +72,17 @@ def paraboloid(
 
 
 def relief_of(heights: NDArray[np.float64]) -> optics.BSplineRelief | NDArray[np.float64]:
-    """Return N² heights in the form for a pupil: a patch for 4 x 4 genes, or an array of heights for more."""
+    """Return a pupil's relief from N² heights: a bicubic patch for 4 x 4 heights, otherwise an array of heights."""
     side = math.isqrt(heights.size)
     return optics.BSplineRelief(heights.reshape(side, side)) if side == 4 else heights.reshape(side, side)
 
 
 @cache
 def _fall(side: int) -> NDArray[np.float64]:
-    """Return the fall of the nearest paraboloid from centre to rim per height; a relief is linear in its genes."""
+    """Return the fall of the nearest paraboloid from centre to rim, per unit of each height of a relief.
+
+    A relief is linear in its heights, so that their contributions add up.
+    """
     reliefs = [relief_heights(optics.Pupil(1.0, relief_of(gene))) for gene in np.eye(side * side)]
     inside = reliefs[0][1]
     centre = (np.array(inside.shape) - 1) / 2
@@ -91,7 +94,7 @@ def _fall(side: int) -> NDArray[np.float64]:
 
 @cache
 def _slopes(side: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return points in a pupil of radius 1, (n, 2), and the slopes there per height, (side², n, 2)."""
+    """Return points in a pupil of radius 1, (n, 2), and the slopes there per unit of each height, (side², n, 2)."""
     reliefs = [relief_heights(optics.Pupil(1.0, relief_of(gene))) for gene in np.eye(side * side)]
     inside, pixels = reliefs[0][1], len(reliefs[0][1])
     places = (np.argwhere(inside) + 0.5) * 2 / pixels - 1

@@ -44,7 +44,7 @@ __all__ = ["CASES", "Check", "Searched", "Told", "page", "searched"]
 
 Floats = NDArray[np.float64]
 NAME = "imitated_lenses"
-RECORD = "lens-003-0"  # a real search: pinholes for the fit of the surrogate, and lenses for its test
+RECORD = "lens-003-0"  # a real search; its pinholes are part of the surrogate's fit, and its lenses test the surrogate
 SETTINGS = ("eye.noise_sigma=0.003", "search.population=16")
 ALL_GENES, ACTIVE = "eye.relief_symmetric=false", "search.active=true"
 CASES = {
@@ -62,9 +62,10 @@ COLORS = {0.3: "#0072B2", 0.45: "#D55E00"}
 
 @dataclass(frozen=True)
 class Searched:
-    """End of a search: means over the animals of its last generations, and their expected fitness.
+    """End of a search, summarised over the animals of its last generations.
 
-    closed: width of the pupil before glass may change
+    closed: mean relative aperture in the last generations before glass may change
+    aperture: mean relative aperture · power, blur: medians · fitness: mean expected fitness
     strehl: Strehl ratio of the animal with the median blur in the last generation
     """
 
@@ -137,7 +138,7 @@ class Check:
 class Told:
     """Contents of the page.
 
-    lives: training runs of the surrogate's fit · check: test with other training runs
+    lives: training runs to which the surrogate was fitted · check: comparison with other training runs
     """
 
     rows: Sequence[Searched]

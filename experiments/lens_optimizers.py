@@ -35,12 +35,12 @@ __all__ = [
 
 Floats = NDArray[np.float64]
 WAVELENGTH, RADIUS, RELIEF_HEIGHT = 550e-9, 25e-6, 100e-6
-RETINA = 200e-6 / (2 * math.tan(math.radians(45) / 2))  # distance in the default eye; the pupil has a = 0.25
+RETINA = 200e-6 / (2 * math.tan(math.radians(45) / 2))  # distance from pupil to retina in the default eye; a = 0.25
 SPOTS = (16e-6, 6e-6, 2e-6)  # successive standard deviations of the spot in which light is maximised [m]
-SPREAD = 0.1  # standard deviation of the genes at the start of searches, around flat glass of n = 1.5
+SPREAD = 0.1  # standard deviation of the genes at the start of a search, around flat glass of n = 1.5
 POPULATION, GENERATIONS, STEP = 16, 126, 0.2
 MOST_GRADIENTS = 300
-FIRST_STEP = 0.05  # first step of L-BFGS over all genes; with 1, its default, some searches jump to a corner and stop
+FIRST_STEP = 0.05  # first step of L-BFGS over all genes; with the default of 1, some searches jump to a corner and stop
 RECORDED = tuple(sorted({round(1.15**i) for i in range(80)}))
 TOLERANCE = 1e-2
 BOUNDS = ("paraboloid", "paraboloid, then gradient")  # best lenses within the genes' ranges
@@ -70,7 +70,7 @@ def lens(genome: Any) -> optics.Pupil:
 
 
 def loss(genome: Any, spot: float | None) -> Any:
-    """Return -log of the Strehl ratio near the axis (spot None), or of the light in a Gaussian spot on the axis."""
+    """Return -log of the light in a Gaussian spot on the axis, or of the Strehl ratio near the axis (spot None)."""
     import drjit as dr
     from drjit.llvm.ad import Float64
 
@@ -130,7 +130,7 @@ class Watch:
         self.best = math.inf
 
     def saw(self, genome: Floats, value: float) -> None:
-        """Count a genome that a search has evaluated."""
+        """Count a genome that a search has evaluated, and record the best lens if an interval ends."""
         self.seconds += time.process_time() - self._since
         self.evaluations += 1
         if value < self.best:

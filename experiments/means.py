@@ -20,7 +20,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Interval:
-    """A mean and its 95 % interval; `low` and `high` are NaN without an interval."""
+    """A mean and its 95 % interval; `low` and `high` are NaN for a mean without an interval."""
 
     mean: float
     low: float
@@ -56,7 +56,7 @@ def difference(of: Floats, less: Floats) -> Interval:
 
 
 def of_generation(rows: Iterable[Row], value: Callable[[Row], float]) -> tuple[Floats, Floats]:
-    """Return generations, and the mean of finite values over the successful candidates of each."""
+    """Return generations, and the mean of finite values over the candidates of each generation that did not fail."""
     found: dict[int, list[float]] = {}
     for row in rows:
         if not row.failed and math.isfinite(value(row)):

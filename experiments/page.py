@@ -38,10 +38,10 @@ class Page:
     """A page of results, made from the template of the same name in experiments/pages.
 
     name: name of the template and of the page's file
-    command: command that computes numbers and page; the template's $command
-    values: numbers, tables and other text, by the template's placeholders
+    command: command that computes the numbers and makes the page; replaces $command in the template
+    values: numbers, tables and other text, by the names of the placeholders that they replace
     figures: figures of the page; the template shows each of them with its caption
-    origin: origin of the numbers; the template's $origin
+    origin: origin of the numbers; its sentence replaces $origin in the template
     """
 
     name: str
@@ -76,7 +76,10 @@ class Page:
 
 
 def parser(text: str) -> argparse.ArgumentParser:
-    """Return a parser with the option that every experiment has; its help is the module's docstring."""
+    """Return an argument parser with the option that all experiments have.
+
+    text: docstring of the module, whose first line describes the program in the help
+    """
     found = argparse.ArgumentParser(description=text.split("\n")[0])
     found.add_argument("--docs", type=Path, default=Path("docs/results"), help="directory of page, figures and data")
     return found

@@ -17,7 +17,10 @@ RESAMPLES = 2000
 
 @dataclass(frozen=True)
 class PowerLaw:
-    """error = scale · Π sizeᵢ^-exponentᵢ; explained: share of the variance of log error."""
+    """Power law error = scale · Π sizeᵢ^-exponentᵢ.
+
+    explained: share of the variance of log error that the law explains
+    """
 
     exponents: tuple[Interval, ...]
     scale: float
@@ -42,7 +45,7 @@ def power_law(errors: Floats, *sizes: Floats, seed: int = 0) -> PowerLaw:
         raise ValueError("errors, sizes: must be positive, because others have no logarithms")
     y = np.log(errors)
     x = np.log(np.stack(sizes, axis=1))
-    middle = x.mean(axis=0)  # centring separates the constant from sizes of one order of magnitude
+    middle = x.mean(axis=0)  # without this, sizes within one order of magnitude would resemble the constant
     design = np.column_stack([np.ones(len(y)), x - middle])
     least = len(sizes) + 2
     if len(np.unique(x, axis=0)) < least or np.linalg.matrix_rank(design) < design.shape[1]:
@@ -55,7 +58,7 @@ def power_law(errors: Floats, *sizes: Floats, seed: int = 0) -> PowerLaw:
     chance = np.random.default_rng(seed)
     drawn = chance.integers(len(y), size=(RESAMPLES, len(y)))
     solved = [np.linalg.lstsq(design[one], y[one], rcond=None) for one in drawn]
-    # With few candidates, some resamples do not determine an exponent.
+    # With few candidates, some resamples do not determine all exponents. They are left out.
     slopes = [slope[1:] for slope, _, rank, _ in solved if rank == design.shape[1]]
     low, high = np.quantile(slopes, [0.025, 0.975], axis=0)
     exponents = tuple(Interval(-float(m), -float(h), -float(b)) for m, b, h in zip(found[1:], low, high, strict=True))

@@ -27,11 +27,11 @@ __all__ = ["Lens", "designs", "lens_of", "page", "worth"]
 
 NAME = "sharp_lenses"
 SIGMA = 0.003
-APERTURES = (0.3, 0.45)  # approximate ends of evolving pupils as pinholes and as lenses
+APERTURES = (0.3, 0.45)  # approximate relative apertures of evolved pinholes and of evolved lenses
 POWERS = (0.0, 0.5, 0.7, 0.8, 0.9, 0.95, 1.0, 1.05, 1.1, 1.2, 1.3)
 SEEDS = range(4)
 SETTINGS = ("learning.total_steps=130000", "learning.eval_interval=65000")  # as in the preset `lens`
-SHARP = 0.3  # Strehl ratio
+SHARP = 0.3  # Strehl ratio above which a lens counts as sharp
 NEARLY = 0.1  # maximum difference of a nearly sharp lens's contrast from the best, relative to the best
 COLOR = "#0072B2"
 
@@ -76,8 +76,8 @@ def _powers(rows: Sequence[Trained], aperture: float) -> list[float]:
 def worth(rows: Sequence[Trained], aperture: float) -> Interval | None:
     """Return the mean fitness behind sharp lenses minus that behind nearly sharp ones, with Welch's interval.
 
-    A nearly sharp lens is not sharp, but has nearly the contrast of the best lens. The result is None with fewer than
-    two training runs of either kind.
+    A nearly sharp lens is not sharp, but its contrast is nearly that of the best lens in the same pupil. The result is
+    None with fewer than two training runs of either kind.
     """
     lenses = {power: lens_of(aperture, power) for power in _powers(rows, aperture)}
     best = max((lens.contrast for lens in lenses.values()), default=math.nan)

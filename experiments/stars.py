@@ -22,7 +22,7 @@ __all__ = ["picture", "pupils"]
 
 RADIUS, DISTANCE = 30e-6, 241.4e-6
 WAVELENGTHS = np.linspace(420e-9, 670e-9, 11)
-SIDE, DX, NEAR_DX = 161, 0.5e-6, 0.2e-6  # NEAR_DX: for focused light
+SIDE, DX, NEAR_DX = 161, 0.5e-6, 0.2e-6  # NEAR_DX: sample distance for focused light
 DECADES = 3.0
 
 

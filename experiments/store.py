@@ -55,11 +55,11 @@ def write_rows(rows: Iterable[Any], path: Path) -> None:
 class Origin:
     """Origin of stored numbers.
 
-    hours: processor time of one core, or wall time of one worker
+    hours: processor time in core hours, or wall time in worker hours
     machine: processor and number of cores
     versions: versions of the software that influences the numbers
-    whose: "core" or "worker"
-    earlier: commits that made some of the rows earlier
+    whose: "core" or "worker", the unit of `hours`
+    earlier: other commits, with which some of the rows were computed before
     """
 
     hours: float
