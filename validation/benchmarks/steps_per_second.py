@@ -1,23 +1,26 @@
 """Steps per second of worlds and models, and the share of rendering
 
 How many steps per second do worlds and models reach, and what share of a step is rendering? With 64 worlds, detection
-reaches 11701 steps per CPU second and the humanoid 1107. Rendering takes 49 % to 71 % of physics and rendering
-together.
+reaches 11701 steps per CPU second and the humanoid 1107. Rendering takes 49 % to 71 % of the time of physics and
+rendering together.
 
-**Method.** Two of rhabdom's own tasks and two of Gymnasium's models (ant, humanoid; MIT) are measured. Each has two
-eyes of 15 x 15 receptors and 60°, 4 rays each in direct light, 4 bands, noise included. Actions are random, and
+**Method.** The benchmark uses two built-in tasks and two of Gymnasium's models (ant, humanoid; MIT). Each agent has two
+eyes of 15 x 15 receptors and 60°, with 4 rays per receptor in direct light, 4 bands, and noise. Actions are random, and
 episodes restart when they end. Rates are steps per CPU second of one thread, the median of a few rounds in one process.
-In these rounds, physics and rules alone, rendering alone, and whole steps take turns. Other work on the machine
+Each round measures physics and rules alone, rendering alone, and whole steps, in turns. Other work on the machine
 therefore hardly changes the comparison.
 
-**Table.** "render" is rendering alone and "step" is whole steps. The last two columns are ratios: rendering's share of
-physics and rendering, and the time of a whole step relative to the sum of both.
+**Table.** "render" is the rate of rendering alone and "step" is the rate of whole steps. "share" is the share of
+rendering in the time of physics and rendering. "step/sum" is the time of a whole step relative to the sum of both.
 
-**Bounds.** They hold for every model at 64 worlds or more. Rendering of a world is at least twice as fast as for one
-world alone (2.7 to 3.7 times were measured, since a kernel launch is paid once). A whole step takes at most 1.25 times
-as long as its parts (at most 1.17 were measured, because the parts take turns in the caches).
+**Bounds.** The bounds apply to every model with 64 worlds or more.
 
-**Limits.** Absolute rates depend on the machine and the code alike.
+- Rendering per world is at least twice as fast as with a single world. Measured ratios are 2.7 to 3.7, because the
+  worlds of a batch share one kernel launch.
+- A whole step takes at most 1.25 times as long as physics and rendering alone. Measured ratios are at most 1.17. They
+  exceed 1 because physics and rendering displace each other's data from the caches.
+
+**Limits.** Absolute rates depend on the machine and on the code.
 
     python -m validation.benchmarks.steps_per_second [--only ant] [--out DIR] [--docs DIR]
 """

@@ -1,43 +1,47 @@
 """Learning curves: what is learnt, how fast, and with which settings
 
-How many steps does it take to learn the tasks? Two eyes of 15 x 15 receptors solve detection after 86,016 and 143,360
-steps (23 and 40 CPU seconds, two seeds) and tracking after 159,744. A single receptor stays at chance. In the maze the
-goal is not reached within these budgets.
+How many steps does it take to learn the tasks? Animals with two eyes of 15 x 15 receptors solve detection after 86,016
+and 143,360 steps (23 and 40 CPU seconds, two seeds) and tracking after 159,744. An animal with a single receptor stays
+at chance. In the maze, no animal reaches the goal within these budgets.
 
-**Method.** Each row is a training run with `evolve.learning.ppo` in sim's worlds. Every 50,000 steps, 100 episodes
-evaluate the policy without exploration, in worlds that it never saw. Detection is solved if the goal comes first in
-80 % of the episodes. An agent that reaches objects without distinguishing them finds it first in a third. Eyes of many
-receptors are sampled with one ray per receptor (in mazes 4), the single receptor with 96.
+**Method.** Each row is a training run with `evolve.learning.ppo` in sim's worlds. Every 50,000 steps the policy is
+evaluated without exploration, in 100 episodes in worlds that were not used for training. Detection counts as solved if
+the agent reaches the goal first in 80 % of the episodes. An agent that reaches objects without distinguishing them
+finds the goal first in a third of the episodes. Eyes with many receptors use one ray per receptor (four in mazes), and
+the single receptor uses 96 rays.
 
-**First table.** CPU seconds are of one thread, for rollouts and updates without these evaluations. "update" is the
-share of the updates. The brackets hold the 95 % confidence interval of the last evaluation (Wilson). Returns are
-undiscounted training returns per episode. The single receptor stays at chance: if it reaches an object at all, that is
-the goal in one of three cases.
+**First table.** "CPU s" is CPU time of one thread, for rollouts and updates without the evaluations. "update" is the
+share of the updates in this time. Brackets contain the 95 % confidence interval of the last evaluation (Wilson).
+"return" is the undiscounted return per training episode. The single receptor is at chance: if the agent reaches an
+object at all, this object is the goal in one of three cases.
 
-**Second table.** In the maze, the table states how far from its start an episode ends, and what it earned. The return
-is 0.25 per metre, minus 1 for every action in contact with a wall. The fitness is 1.5 per metre, minus 2 for every such
-action. Means have 95 % confidence intervals. That of the fitness is an upper bound.
+**Second table.** In the maze, the table states the distance from the start at which an episode ends, and its return.
+The return is 0.25 per metre, minus 1 for every action in contact with a wall. The fitness is 1.5 per metre, minus 2 for
+every such action. Means have 95 % confidence intervals. The interval of the fitness is an upper bound.
 
-Standing still earns 0, and an animal with one eye learns little more than that. Animals with ten eyes travel. They get
-farther than a hand-written controller that receives the true distances of the walls in eleven directions and steers in
-the direction of most space. That controller reaches 21.8 m at 1.5 m/s with 2.6 actions in contact and a return of 2.8 ±
-0.9, or 25.6 m and -14 at 5 m/s. The return of the animals with ten eyes is about 0, because every action in contact
-costs as much as four metres earn. Their fitness, by which they are selected, is above 0.
+An animal that stands still earns 0, and an animal with one eye learns little more than that. Animals with ten eyes
+travel. They travel farther than a hand-written controller that receives the true distances of the walls in eleven
+directions and steers towards the largest free space. At 1.5 m/s, that controller reaches 21.8 m with 2.6 actions in
+contact and a return of 2.8 ± 0.9. At 5 m/s it reaches 25.6 m and a return of -14. The return of the animals with ten
+eyes is about 0, because every action in contact costs as much as four metres earn. Their fitness, which selection uses,
+is above 0.
 
-**Settings.** They are the defaults of the task except for those named.
+**Settings.** All settings that are not listed here are the defaults of the task.
 
-- "With tanh" rows use earlier defaults: 64 worlds x 64 steps, 4 epochs, a constant learning rate of 1e-3, tanh, and
-  mini-batches of stretches of 32 steps. The detection runs are from the last commit with these defaults.
-- The other rows use 128 x 32, 10 epochs, a learning rate of 3e-3 that falls as one over the steps after 75,000 (in
-  mazes 200,000), leaky rectifiers and stretches of 8. In these runs the number of epochs is constant. The present
-  learner reduces it before the learning rate (`fewer_epochs`).
+- Rows "with tanh" use earlier defaults: 64 worlds x 64 steps, 4 epochs, a constant learning rate of 1e-3, tanh units,
+  and mini-batches made of segments of 32 consecutive steps. The detection runs are from the last commit with these
+  defaults.
+- The other rows use 128 worlds x 32 steps, 10 epochs, leaky rectifiers, and segments of 8 steps. Their learning rate is
+  3e-3 and falls as one over the number of steps after 75,000 steps (in mazes after 200,000). In these runs the number
+  of epochs is constant. The present learner reduces the number of epochs before the learning rate (`fewer_epochs`).
 
 **Bounds.** Two eyes of 15 x 15 receptors solve detection and tracking. A single receptor is not better than chance. In
-the maze, ten eyes beat one in fitness and in distance.
+the maze, animals with ten eyes have a higher fitness and travel farther than animals with one eye.
 
-**Limits.** A row of few steps is a training run that was stopped there, not one that learnt so fast. Except in
-detection, the learner of the "with tanh" rows had no bounds on the means of actions. In its maze, contact had its full
-price after 500,000 steps. `docs/measurements/learning.md` lists other settings that were tried.
+**Limits.** If a row states few steps, the training run was stopped there; it did not finish learning sooner. In the
+rows "with tanh" except detection, the learner had no bounds on the means of actions. In the maze row "with tanh",
+contact had its full price only after 500,000 steps. `docs/measurements/learning.md` lists other settings that were
+tried.
 
 Training runs take minutes each, so their results are stored (`docs/validation/data/learning_curves.csv`). The page is
 written from the stored results.

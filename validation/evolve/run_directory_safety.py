@@ -3,20 +3,20 @@
 Are a stranger's run and a killed run safe to open? Yes: 2,605 random trials of 13 promises had 0 failures.
 
 **Method.** Most trials damage a fresh copy of a small run (or a policy, an image, a model, a page) and pass it to a
-command (`validation/evolve/hostile.py`). Such a trial fails if one of these happens:
+command (`validation/evolve/hostile.py`). Such a trial fails in any of these cases:
 
 - the command prints a traceback or more than one line;
-- it ends with another exit code than promised;
-- it takes more than a second where sizes are checked;
-- it touches a file outside the run.
+- the exit code is not the promised one;
+- where sizes are checked, the command takes more than a second;
+- the command touches a file outside the run.
 
-The other trials kill a run with SIGKILL at a random moment and continue it. They fail if the record or a policy differs
-by a bit from that of the same run without kills. `tests/evolve/search/kills.py` uses candidates in closed form, and
-`tests/evolve/search/training_kills.py` real training runs.
+The other trials kill a run with SIGKILL at a random moment and resume it. They fail if the record or a policy differs
+by a bit from that of the same run without kills. `tests/evolve/search/kills.py` uses candidates whose fitness has a
+closed form, and `tests/evolve/search/training_kills.py` uses real training runs.
 
 **Table.** It counts trials and failures of each promise.
 
-**Limits.** The trials cover the listed promises only. Short versions run as tests.
+**Limits.** The trials cover the listed promises only. Short versions of the trials are part of the tests.
 `tests/validation/evolve/test_hostile.py` also breaks each promise on purpose, and checks that the trial notices.
 
 Trials take half an hour, so their results are stored (`docs/validation/data/run_directory_safety.csv`). The page is

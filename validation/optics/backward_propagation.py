@@ -1,25 +1,26 @@
 """Backward propagation: decayed waves cannot be recovered
 
-How far back can a field be propagated? With the textbook's angular spectrum, float32 has lost all digits after one
-wavelength and float64 after two. `optics.propagate` recovers a Gaussian spot of w = 2 λ with an error of 6.1e-11 after
-one wavelength and of 1.1e-07 after 40.
+How far back can a field be propagated? With the textbook's angular spectrum, float32 has lost all digits after one and
+a half wavelengths and float64 after two. `optics.propagate` recovers a Gaussian spot of w = 2 λ with an error of
+6.1e-11 after one wavelength and of 1.1e-07 after 40.
 
-**Method.** Behind a plane, waves finer than the wavelength decay like exp(-2πz √(f² - 1/λ²)). Backwards, the textbook's
-angular spectrum amplifies them by the same factor, and with them the rounding errors of the samples. A wave of
-f = 2.8/λ grows by 7 decades per wavelength of distance. A pitch of λ/4 represents such a wave on its diagonal. At
-larger distances the numbers overflow.
+**Method.** Behind a plane, waves with a period below the wavelength (spatial frequency f > 1/λ) decay like exp(-2πz
+√(f² - 1/λ²)). In backward propagation, the textbook's angular spectrum amplifies these waves by the same factor, and
+with them the rounding errors of the samples. A wave of f = 2.8/λ grows by 7 decades per wavelength of distance. Samples
+with a pitch of λ/4 represent such a wave along their diagonal. At larger distances the numbers overflow.
 
-With a negative distance, `optics.propagate` only reverses phases. It drops waves beyond 1/λ, and
+With a negative distance, `optics.propagate` only reverses phases. It drops waves beyond f = 1/λ, and
 `result.evanescent_power` reports their share of the input's power. Waves that have decayed cannot be recovered. The
-recovered field therefore lacks the evanescent part of the original, and its error equals √(evanescent share). In
-forward propagation, the same number predicts that error.
+recovered field therefore lacks the evanescent part of the original, and its error equals √(evanescent share). The share
+that forward propagation reports thus predicts the error of the recovered field.
 
-**Tables.** Both use Gaussian spots exp(-r²/w²), whose exact field at z is summed from their closed-form spectrum. The
-first table has w = 2 λ and almost no evanescent part, so it shows only the error of the method. The second table has
-z = λ/2 and spots of 1 λ down to 0.2 λ. The spot of 0.2 λ is 45 % evanescent.
+**Tables.** Both use Gaussian spots exp(-r²/w²), whose exact field at z is summed from their closed-form spectrum. In
+the first table w is 2 λ. This spot has almost no evanescent part, so the table shows only the error of the method. In
+the second table z is λ/2 and w falls from 1 λ to 0.2 λ. The spot of w = 0.2 λ is 45 % evanescent.
 
-**Limits.** Light that leaves the window, or that is too close to grazing for it, cannot be recovered either.
-`propagate` includes the second part in its predicted error, and refuses if that error exceeds the tolerance.
+**Limits.** Two more kinds of light cannot be recovered: light that leaves the window, and light that is too close to
+grazing for the window. `propagate` includes light near grazing in its predicted error, and raises an `AccuracyError` if
+that error exceeds the tolerance.
 
     python -m validation.optics.backward_propagation [--out DIR] [--docs DIR]
 """

@@ -3,19 +3,33 @@
 Does every input at the edge of the domain give the right value or a clear error? Yes: all 12 inputs with a known value
 reach it within their tolerance, and all 26 invalid inputs are refused in one line.
 
-**Method.** Each row of the table requests something at the edge of the domain, and has an expected outcome. Either the
-result agrees with a value known in closed form to the stated tolerance, or an error names the argument, its value and
-the valid range. Nothing else may happen: no NaN, no mere warning, no image of noise.
+**Method.** Each row of the table passes an input at the edge of the domain to `optics`, and has an expected outcome. An
+accepted input has a value that is known, mostly in closed form, and the result must agree with it within a bound that
+the script sets for this row. A refused input must raise an error that names the problem, in most cases as argument,
+value and valid range. No other outcome is allowed: no NaN, no mere warning, and no image of noise.
 
-**Accepted inputs.** These inputs have a known value: pupils far below the wavelength (Rayleigh-Sommerfeld's cos²θ
-lobe), a relief of the medium's index, a DOE of one pixel (a plate: no change), a source in the focal plane (collimated:
-the bare aperture's shadow), a window of one sample, windows far off the axis, sources at grazing incidence, and a plane
-at distance 0 in `optics.propagate`.
+**Accepted inputs.** The table states the relative error of the result, or for darkness the brightest sample:
 
-**Refused inputs.** These inputs raise an error: lengths of 0, NaN or beyond 1e±15 m, wavelengths outside the colour
-tables (300 to 780 nm) or at which a dispersion curve falls below 1, more digits than the dtype has, windows so close
-that light reaches them only at grazing angles, and more samples than 4096 across. The last three raise an
-`AccuracyError`, which is a `ValueError`.
+- pupils far below the wavelength, compared with the cos²θ lobe of Rayleigh-Sommerfeld's integral;
+- a relief with the refractive index of the medium, and a DOE of one pixel (a plate), compared with the bare pupil;
+- a source in the focal plane of a lens. The lens collimates its light, and the result is compared with the shadow of
+  the bare aperture;
+- a window of one sample, compared with the closed form; a window far off the axis, compared with quadrature; and a
+  source at grazing incidence, compared with a result in float64;
+- `optics.propagate` over a distance of 0, for an evanescent wave, and for a field of zeros.
+
+**Refused inputs.** These inputs raise an error:
+
+- lengths of 0, NaN, below 1e-15 m or above 1e15 m, and a relief higher than 100 radii;
+- arrays that are empty, not finite, or of the wrong shape;
+- refractive indices below 1, also if a dispersion curve falls below 1 at some wavelength;
+- wavelengths outside the colour tables (300 to 780 nm), and pigments outside their range of peaks;
+- a source behind the pupil;
+- a tolerance of 0, or below what the dtype allows;
+- windows so close that light reaches them only at grazing angles;
+- cases that need more than 4096 samples across.
+
+The last three kinds, except a tolerance of 0, raise an `AccuracyError`, which is a `ValueError`.
 
     python -m validation.optics.limiting_cases [--out DIR] [--docs DIR]
 """

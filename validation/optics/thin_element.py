@@ -1,21 +1,23 @@
 """Thin element: effects that a phase mask omits from a real relief
 
-What does a phase mask miss of a real relief, and when does that matter? rhabdom uses the mask throughout. Slopes below
-10° and lenses below NA = 1.16 (λ/f)^¼ are safe. That NA is 0.25 for f = 240 µm.
+Which effects of a real relief does a phase mask omit, and when do they matter? `optics` models every relief as a phase
+mask. The mask is accurate for slopes below 10° and for lenses below NA = 1.16 (λ/f)^¼. That NA is 0.25 for f = 240 µm.
 
-**Method.** A relief of height h is modelled as the phase k(n - 1)h in one plane. The model is chosen before any
-propagation starts, and no predicted error covers it: `predicted_error` is that of propagating the mask. Rays through
-the real surface show the effects that the mask omits (Snell's law, light from inside the glass of n = 1.5,
-`validation/optics/refraction.py`):
+**Method.** A relief of height h is modelled as the phase k(n - 1)h in one plane. This is a choice of model, so no
+predicted error covers it: `predicted_error` is the error of propagating the mask. Rays through the real surface show
+the effects that the mask omits. They follow Snell's law and come from inside the glass of n = 1.5
+(`validation/optics/refraction.py`):
 
-- **Refraction at a slope.** A prism of angle α deviates by arcsin(n sin α) - α, the mask by arcsin((n - 1) tan α). The
-  mask's deviation is the same for light from either side. The mask is 1 % off at α = 11° and 10 % at 30°.
-- **Total reflection.** Beyond 41.8° no light leaves, while the mask transmits up to 63°. A lens made of one relief ends
-  there, at NA = 0.45. The mask has no such limit.
-- **Fresnel reflection.** It is 4 % at normal incidence, 10 % at 36° and 25 % at 40°. No PSF here includes it.
-- **Thickness.** Rays bend at the surface, not in the plane. A relief whose mask is an ideal lens is not an ideal lens
-  itself. Its Strehl ratio falls below 0.8 at NA = 1.16 (λ/f)^¼, and the focus spreads along the axis by many depths of
-  field.
+- **Refraction at a slope.** A prism of angle α deviates light by arcsin(n sin α) - α, the mask by arcsin((n - 1) tan
+  α). The deviation of the mask is the same for light from either side. The mask's deviation is 1 % too small at α = 11°
+  and 10 % too small at 30°.
+- **Total reflection.** Beyond a slope of 41.8° no light leaves the glass, but the mask transmits light up to 63°. A
+  lens made of one relief cannot exceed this slope, which limits it to NA = 0.45. The mask has no such limit.
+- **Fresnel reflection.** The reflected share is 4 % at normal incidence, 10 % at 36° and 25 % at 40°. No PSF here
+  includes it.
+- **Thickness.** Rays bend at the surface and not in the plane. A relief whose mask is an ideal lens is therefore not an
+  ideal lens itself. Its Strehl ratio falls below 0.8 at NA = 1.16 (λ/f)^¼. Its focus spreads along the axis by several
+  depths of field at this NA, and by more at a higher NA.
 - **Neighbouring ridges.** A sinusoidal corrugation starts to reflect totally if its depth is 0.28 of its period. From
   0.30 on, some rays that have left the surface hit the next ridge.
 

@@ -1,21 +1,21 @@
 """Undersampled lens: a speckle pattern that resembles a PSF
 
-What does a lens on too few samples look like? It gives a regular speckle pattern with a bright centre. For f/2 on 51
-samples, Airy's first dark ring contains 6.2e-06 of the light instead of 0.8278. The share is right once the pitch falls
-below λ / (2 NA), and not before.
+What does a lens on too few samples look like? It gives a regular speckle pattern with a bright centre. At f/2 with 51
+samples, Airy's first dark ring contains 6.2e-06 of the light instead of 0.8278. The share becomes correct only when the
+pitch is below λ / (2 NA).
 
-**Method.** The published setting is a pupil of a few mm on 51 or 101 samples. Here f = 4 mm and 550 nm, on a grid of
-2 mm, with lenses of f/2, f/8 and f/13.5. At a pitch of λ / (2 NA), the phase of a lens turns by half a wave from sample
-to sample at its rim. On 51 samples the pitch is 35, 9 and 5 times that. The samples then describe a pattern of many
-false lenses instead of one lens, and most light goes elsewhere. Nothing in the image shows the mistake: it is finite
-and positive, and its power is conserved.
+**Method.** The published setting is a pupil of a few mm on 51 or 101 samples. Here the lenses are f/2, f/8 and f/13.5,
+with f = 4 mm at 550 nm on a grid of 2 mm. At a pitch of λ / (2 NA), the phase at the rim of a lens changes by half a
+wave between neighbouring samples. With 51 samples the pitch is 35, 9 and 5 times that. The samples then describe a
+pattern of many false lenses instead of one lens, and most light goes elsewhere. The image does not show the mistake: it
+is finite and positive, and its power is conserved.
 
-`optics.psf` takes no samples of the pupil. It chooses them from the slope of the phase, or uses a method that needs
-none. PSFs of the same pupils are right to the requested tolerance.
+`optics.psf` does not take samples of the pupil from the user. It chooses them from the slope of the phase, or uses a
+method that needs no grid. Its PSFs of the same pupils are accurate to the requested tolerance.
 
-**Table.** It shows the energy inside Airy's first dark ring, as a share of the light through the pupil. The textbook's
-angular spectrum on the samples' own grid (with band-limited interpolation between its points) is compared with the
-exact Rayleigh-Sommerfeld integral.
+**Table.** It shows the energy inside Airy's first dark ring, as a share of the light through the pupil. "textbook" is
+the angular spectrum on the grid of the samples, with band-limited interpolation between its points. "exact" is the
+Rayleigh-Sommerfeld integral.
 
     python -m validation.optics.undersampled_lens [--out DIR] [--docs DIR]
 """

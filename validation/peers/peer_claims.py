@@ -2,12 +2,12 @@
 
 Do the claims of other codes' tests and of textbooks hold here? All 89 claims hold.
 
-**Method.** The test suites of prysm, poppy and hcipy assert closed forms, and textbooks contain tables. Each claim is
-expressed with this package's functions.
+**Method.** The test suites of prysm, poppy and hcipy assert closed forms, and textbooks contain tables. Each of these
+claims is computed with the functions of `optics`.
 
-**Table.** Each row shows the value of the source, our value, and the largest difference allowed between them. If a
-suite states a bound, the same bound is used. Where the exact integral differs from a paraxial claim, the bound is wider
-and says so. Most claims are paraxial. Their systems are therefore slow (f/100), and lengths are in units of λf/D.
+**Table.** Each row shows the value of the source, our value, and the largest difference allowed between them. If a test
+suite states a bound, the same bound is used. Where the exact integral differs from a paraxial claim, the bound is
+wider. Most claims are paraxial, so most systems are slow (f/100). Lengths are in units of λf/D.
 
 **Limits.** The claims listed below the table have no counterpart here. Each one is followed by the reason.
 

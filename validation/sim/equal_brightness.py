@@ -1,25 +1,29 @@
 """Equal brightness of goal and adversary to a single receptor
 
-Can a single photoreceptor distinguish goal from adversary by brightness? Not from 2 m on: averaged over directions, the
-difference is at most 0.04 of the receptor noise.
+Can a single photoreceptor distinguish goal from adversary by brightness? At distances of 2 m or more it cannot: the
+mean difference over directions is at most 0.04 of the receptor noise.
 
-**Method.** The kinds of objects in detection and tracking differ only in the direction of their stripes. Light comes
-from above. Level bands of equal width would therefore make adversaries brighter or darker than goals, and one
-photoreceptor could distinguish them. The edges of the bands are fitted by least squares to remove that difference. The
-fit covers all directions and distances from which an eye of 45° sees (nearly) all of an object. The bands stay near
-30°, as wide as a goal's sectors. The two lowest edges can hardly be seen and are not fitted.
+**Method.** In detection and tracking, objects are spheres with black and white stripes. A goal has vertical sectors of
+30°, and an adversary has horizontal bands. Light comes from above. If all bands had the same width, adversaries would
+therefore be brighter or darker than goals, and one photoreceptor could distinguish them. The edges of the bands are
+fitted by least squares so that an adversary is as bright as grey. The fit covers 24 directions, and distances at which
+an eye of 45° sees (nearly) all of an object. It starts from edges that are 30° apart, and penalises deviations from
+them. The two lowest edges can hardly be seen and are not fitted.
 
-Rays are traced to one illuminated sphere, without the renderer. `tests/sim/worlds/test_balance.py` compares the
-renderer with the same calculation.
+The light of one illuminated sphere is computed by tracing rays, without the renderer.
+`tests/sim/worlds/test_balance.py` computes the same difference from rendered signals.
 
-**Table.** It shows adversary minus goal, in units of the receptor noise (a standard deviation of 0.01), for one
-receptor that looks straight ahead. Each cell is a mean or root mean square over 24 directions.
+**Table.** It states the signal of an adversary minus that of a goal, in units of the receptor noise (a standard
+deviation of 0.01), for one receptor that looks straight at the object. Each cell is a mean or a root mean square over
+24 directions. The first pair of columns uses the shipped edges of the built-in adversaries, which have seven bands. The
+second pair uses six bands of 30°.
 
-**Bounds.** From 2 m on, the mean difference is below a fifth of the noise, and at most a tenth of the noise worse than
-with the fitted edges. (All edges may shift together by some degrees. The shipped ones were rounded from such a fit.)
+**Bounds.** At distances of 2 m or more, the mean difference is below a fifth of the noise. It also exceeds the mean
+difference with the fitted edges by at most a tenth of the noise. (The shipped edges differ from the fitted ones by up
+to 3.0°.)
 
-**Limits.** Nearer than 2 m, an eye misses the top of an object, and the difference grows to several times the noise.
-The difference between the illuminated side and the other side of either kind grows there as well.
+**Limits.** At distances below 2 m, an eye does not see the top of an object, and the difference grows to several times
+the noise. There, objects of one kind also differ more in brightness between their lit and their shaded side.
 
     python -m validation.sim.equal_brightness [--out DIR] [--docs DIR]
 """

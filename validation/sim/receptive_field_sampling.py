@@ -5,20 +5,28 @@ wherever a slope can be fitted. The automatic choice has an error of at most 0.1
 
 **Method.** Behind a pupil, all receptors of an eye share one set of rays, drawn from the mixture of their receptive
 fields. The signal of a receptor is a weighted sum over these rays. The reference is the published method: an image of
-the tangent plane, wider than the retina by the reach of the kernel, is convolved with the PSF (`Eye.see`). Its cells
-form a different grid from the one on which the rays' receptive fields are tabulated. Each cell has many rays of its
-own, or many areas if all light is followed. The light is the same, so only the sampling differs.
+the tangent plane is convolved with the PSF (`Eye.see`). On every side this image is wider than the retina by the reach
+of the kernel. The cells of the image form a different grid from the one on which the receptive fields of the rays are
+tabulated. Each cell is rendered with many rays of its own, or with many areas if all light is followed. Rays and
+reference use the same light, so they differ only in sampling.
 
 Errors are root mean squares over receptors, channels and states of an agent that acts at random in the detection world.
-They are in units of the receptor noise, σ = 0.01 of the signal of white behind a wide-open pupil. The pupils are: none
-(the perfect lens), a pinhole (a = 0.04 of the retina's width), open without a lens, a relief drawn at random, and a
-lens in focus (a = 0.25). The perfect lens uses 24 states, because its errors differ much between views. Pupils use 4.
+They are in units of the receptor noise: σ is 0.01 of the signal of white behind a pupil as wide as the retina (a = 1).
+The five kinds of pupil are:
 
-**Table.** The last column shows the choice of `rays_per_receptor = "auto"`, rays or areas, and its error. No slope is
-given if fewer than three errors are above 0.01 σ.
+- perfect: no pupil (the perfect lens);
+- pinhole: a = 0.04;
+- open: an aperture of a = 0.25 without a lens;
+- random relief: a = 0.25, with a relief drawn at random;
+- lens: a = 0.25, with a lens in focus.
+
+The perfect lens uses 24 states, because its errors differ much between views. The other pupils use 4 states.
+
+**Table.** Retinas are given as width x height. The last column shows the choice of `rays_per_receptor = "auto"`, which
+is a number of rays or of areas, and its error. No slope is given if fewer than three errors are above 0.01 σ.
 
 **Bounds.** The error of the automatic choice is at most half of the noise. Errors fall at least like n^-0.5, as with
-independent rays, down to 0.01 σ. Two tables of one PSF may differ by that much.
+independent rays, down to 0.01 σ. Differences of this size can come from the two grids on which one PSF is tabulated.
 
     python -m validation.sim.receptive_field_sampling [--out DIR] [--docs DIR]
 """

@@ -1,23 +1,25 @@
 """Mirrored scenes of third-party models, compared with MuJoCo's own renderer
 
-Do mirrored models agree with MuJoCo's own renderer? In each of 59 third-party models, at least 99.796 % of the pixels
-show the same geom. Of those, at least 99.900 % have the same depth to 1e-3.
+Do mirrored models agree with MuJoCo's own renderer? (The mirror of a model is its conversion to a Mitsuba scene.) In
+each of 59 third-party models, at least 99.796 % of the pixels show the same geom. Of the pixels that show the same
+geom, at least 99.900 % have the same depth to 1e-3.
 
-**Method.** Every model is put into five random poses. Each pose is rendered from a random direction, and by one of the
-model's own cameras, if it has one (fixed or tracking). In each image, the geom seen through the centre of every pixel
-is compared with MuJoCo's segmentation renderer. Where they agree, depth is compared with MuJoCo's ray caster. (The
-renderer draws round shapes as polygons, here of 96 slices. The ray caster uses their exact shapes.)
+**Method.** Every model is put into five random poses. Each pose is rendered from a random direction. If the model has
+cameras (fixed or tracking), the pose is also rendered by one of these. In each image, the geom seen through the centre
+of every pixel is compared with MuJoCo's segmentation renderer. Where the geoms agree, the depth is compared with
+MuJoCo's ray caster. (The segmentation renderer draws round shapes as polygons, here of 96 slices. The ray caster uses
+exact shapes.)
 
 **Table.** The columns state the number of geoms, the share of pixels that show the same geom, this share in the worst
-image, and the share of the same depth. The last column lists the features of the model that the mirror lacks, as
-reported by the mirror.
+image, and the share of these pixels that have the same depth. The last column lists the features of the model that the
+mirror lacks, as reported by the mirror.
 
-**Bounds.** At least 99.5 % of the pixels of every model show the same geom, and of those at least 99.9 % have the same
+**Bounds.** In every model, at least 99.5 % of the pixels show the same geom, and at least 99.9 % of those have the same
 depth to 1e-3.
 
 **Limits.** The remaining pixels are at the limb of surfaces that the mirror tessellates. The models are those in
 dm_control (suite, locomotion, third-party robots), gymnasium-robotics and gymnasium that compile on their own. They are
-not part of rhabdom. Install them with `pip install 'rhabdom[validation]'`. If pins conflict, use
+not part of rhabdom. Install them with `pip install 'rhabdom[validation]'`. If pinned versions conflict, use
 `pip install --no-deps --target DIR dm_control gymnasium-robotics` and add DIR to PYTHONPATH.
 
     python -m validation.sim.scene_against_mujoco [--only WORD] [--out DIR] [--docs DIR]

@@ -1,43 +1,44 @@
 """Speed against accuracy of rendering for agents' eyes
 
 How much accuracy does each rendering speed allow, and does the automatic choice keep its promise of an error below σ/2?
-It does in all six scenes: its largest error is 0.399 σ. It reaches 0.95 to 1.00 of the speed of the fastest setting
-that is at least as accurate.
+The automatic choice keeps the promise in all six scenes: its largest error is 0.399 σ. Its speed is 0.95 to 1.00 of
+that of the fastest setting that is at least as accurate.
 
-**Errors.** Each way to render a world for its agents' eyes is shown by its error and its speed. The error is the root
-mean square difference from a reference, over channels, eyes, states and receptors. Errors are in units of the
-photoreceptors' noise, σ = 0.01. Errors below σ/2 are small compared with the noise of one receptor (but an agent could
-still learn one that many receptors share). There are two populations of receptors:
+**Errors.** The error of a setting is the root mean square difference from a reference, over channels, eyes, states and
+receptors. Errors are in units of the receptor noise, σ = 0.01. Errors below σ/2 are small compared with the noise of
+one receptor. (An agent could still learn to use an error that many receptors share.) Errors are computed over two
+populations of receptors:
 
 - all receptors, in 4 states that agents reached;
-- the receptors that see an object, in 24 views with an object 0.8 to 4 m ahead. Perfect lenses use 8 views, because
-  their references are expensive. Mazes have no objects, so there this population is empty.
+- the receptors that see an object, in 24 views with an object 0.8 to 4 m ahead. With a perfect lens there are 8 views,
+  because their references are expensive. Mazes have no objects, so this population is empty there.
 
-The reference is Mitsuba's path tracer in 8 bands. Behind a lens, the convolution `Eye.see` follows.
+The reference is Mitsuba's path tracer in 8 bands. Behind a lens, its image is convolved with the kernel of the eye
+(`Eye.see`).
 
-**Speed.** It is the number of agent-steps (all eyes of one agent, once) per second of one core's CPU time, without
-physics. The best of several interleaved rounds counts.
+**Speed.** The speed is the number of agent-steps per second of one core's CPU time, without physics. In an agent-step,
+all eyes of one agent are rendered once. The best of several interleaved rounds counts.
 
-**Settings.** The eyes are as in the published experiments, with a perfect lens, and behind a lens in focus with a pupil
-of radius a times half the retina's width. The following settings vary:
+**Settings.** The eyes are those of the published experiments. Each is rendered with a perfect lens, and behind a lens
+in focus whose pupil has a radius of a times half the retina's width. The following settings vary:
 
-- samples: rays by closed forms, rays by Mitsuba's ray tracer, areas, or the reference renderer with few samples;
+- samples: rays traced in closed form, rays traced by Mitsuba, areas, or the reference renderer with few samples;
 - the number of samples per receptor;
-- bands;
-- light: direct; with one bounce, which is light that is reflected twice; all light, which areas take from tables; or
-  paths of any length;
-- depth layers.
+- the number of bands;
+- light: "direct"; "bounce", which adds light that is reflected twice; "all" light, which areas take from tables; or
+  "path", which is paths of any length;
+- the number of depth layers.
 
-Everything is float32, the only arithmetic that Mitsuba's spectral variants are built with, so precision does not vary.
+All settings use float32, because Mitsuba's spectral variants are built for float32 only.
 
-**Table.** "auto" is the choice of `choose_fidelity`, bands included. "front" marks the Pareto front of the greater of
-the two errors. The last column is the error over all receptors against the same light with very many rays, so that only
-samples and bands differ.
+**Table.** "auto" is the choice of `choose_fidelity`, bands included. "front" marks settings on the Pareto front of
+speed against error, where the error is the greater of the two populations' errors. "vs same light" is the error over
+all receptors relative to very many rays in the same light, so it contains only the effects of samples and bands.
 
 **Bounds.** Compared with path-traced light, the error of "auto" must not exceed the promised σ/2 (plus the noise of the
 reference) in either population, unless a `FidelityWarning` was raised. If the promise is broken, the table states the
-error. "auto" must also be on the Pareto front of the greater of the two errors, or within 20 % of the speed that this
-front has at its error. It was tuned on none of these views.
+error. "auto" must also be on the Pareto front, or at most 20 % slower than the front at the same error. "auto" was not
+tuned on any of these views.
 
     python -m validation.sim.speed_accuracy [--out DIR] [--docs DIR] [--scenes N]
 """
