@@ -7,21 +7,21 @@ mirror, Mirror                      any MuJoCo model as a Mitsuba scene
 BatchedRenderer                     all eyes of all worlds, rendered as one wavefront
 choose_fidelity, Fidelity           rendering accuracy, matched to the receptors' noise
 FidelityWarning                     warning that no level of fidelity is accurate enough
-ReferenceRenderer                   slow reference: Mitsuba's integrators and the convolution in optics
-ModelRenderer, Mount, Poses         eyes on any MuJoCo model; fan, ring and both_sides place several eyes
-choose_model_fidelity               rendering accuracy for eyes on a model
-Task                                a user task for a robot with eyes, for make_vec_env
-BatchTask                           the same on arrays of all worlds, which is faster
-check_batch_task                    test of a batch task against the protocol
+ReferenceRenderer                   slow reference: Mitsuba's integrators and the convolution in optics ModelRenderer,
+Mount, Poses         eyes on any MuJoCo model; fan, ring and both_sides return several mounts choose_model_fidelity
+rendering accuracy for eyes on a model
+Task                                a user task for a robot with eyes, written for one world at a time
+BatchTask                           a user task written for arrays of all worlds, which runs faster check_batch_task
+test whether a batch task follows the protocol of BatchTask
 Outcome, RewardTerms                return values of `judge` in a batch task
 Physics                             protocol of the physics of a batch of worlds
-ArrayWorlds, SlidingAgents          two implementations: any MuJoCo model, and the built-in agent
+ArrayWorlds, SlidingAgents          two implementations of Physics: for any MuJoCo model, and for the built-in agent
 Encounter, Frozen                   several animals in one world that see each other
 make_parallel_env                   an encounter as a PettingZoo environment
-make_vec_env, make_env              environments, natively batched or single
-                                    (also gymnasium.make("rhabdom/Detection-v0"), Foraging, Maze ...)
-register_task                       a Gymnasium id for a user task
-View, write_exr, read_exr           rendered views in EXR files
+make_vec_env, make_env              environments of many worlds in one batch, or of a single world
+                                    (or gymnasium.make("rhabdom/Detection-v0"), "rhabdom/Maze-v0" ...)
+register_task                       registration of a user task under a Gymnasium id
+View, write_exr, read_exr           images of eyes in EXR files
 """
 
 from __future__ import annotations

@@ -1,12 +1,13 @@
 """Images of eyes as OpenEXR files in the spectral layout of Fichet, Pacanowski and Wilkie (2021), "An OpenEXR Layout
 for Spectral Images", JCGT 10(3).
 
-One part per eye and view: `left.spectral` (spectral radiance, channels `S0.450,000000nm`), `left.receptors`
-(photoreceptor signals, channels `receptor_0` ...), each with a linear sRGB preview R, G, B. Plain viewers show the
-preview. Readers that support a single part (colour-science) read the first one, which is spectral if any part is.
-Pixels are 32-bit floats with ZIP compression.
+A file has up to two parts for each eye. For an eye named "left", these are `left.spectral` (spectral radiance, channels
+`S0.450,000000nm` ...) and `left.receptors` (photoreceptor signals, channels `receptor_0` ...). Each part also contains
+a linear sRGB preview in the channels R, G and B, which plain viewers show. Readers that support only one part, such as
+colour-science, read the first part. Spectral parts precede receptor parts. Pixels are 32-bit floats with ZIP
+compression.
 
-Files are written whole or not at all, and each part carries a SHA-256 of its contents.
+A file is written completely or not at all. Each part stores a SHA-256 hash of its contents.
 """
 
 from __future__ import annotations
@@ -28,8 +29,9 @@ from sim.scene.color import preview
 LAYOUT_VERSION = "1.0"
 UNITS = "W.m^-2.sr^-1"
 SCALE = "relative: a white Lambertian facing unit daylight has radiance D65, 1 at 560 nm"
-MOST_BYTES = 2**30  # of pixels: fifteen times as many as sixteen eyes of 128 x 128 in 64 bands have
-_HELD = "rhabdom"  # attribute: JSON of all that is not a channel
+# Bytes of pixels in a file; fifteen times as many as the pixels of sixteen eyes of 128 x 128 in 64 bands.
+MOST_BYTES = 2**30
+_HELD = "rhabdom"  # name of the attribute that stores everything other than channels, as JSON
 _HASH = "sha256"
 _PREVIEW = ("R", "G", "B")
 
@@ -42,13 +44,14 @@ class ExrError(ValueError):
 class View:
     """Image of one eye.
 
-    name: of the eye: "left"
-    wavelengths_nm: (band,), the radiance's
+    name: name of the eye, such as "left"
+    wavelengths_nm: wavelengths of the radiance's bands, (band,)
     radiance: (band, y, x) float32, or None
     receptors: (channel, y, x) float32, or None
     rgb: (y, x, 3) float32 linear sRGB preview of the radiance; None: computed when written
-    attributes: values that JSON can represent: seed, time step, position, ...
-    peaks_nm: (channel,), of the receptors; the preview shows the longest as red; None: channels are in descending order
+    attributes: further values that JSON can represent, such as seed, time step or position
+    peaks_nm: peak wavelength of each receptor channel, (channel,); the preview shows the longest as red. None: channels
+        are in descending order of their peaks.
     """
 
     name: str
@@ -86,7 +89,7 @@ class View:
 
 
 def _shape(image: Any) -> tuple[int, ...]:
-    """Shape of an array of any library; () for other objects."""
+    """Return the shape of an array of any library; () for other objects."""
     return tuple(getattr(image, "shape", ()))
 
 
@@ -96,10 +99,10 @@ def _kind(image: Any) -> str:
 
 
 def write_exr(path: str | os.PathLike[str], views: Sequence[View]) -> None:
-    """Write views to an OpenEXR file, whole or not at all; an existing file is replaced.
+    """Write views to an OpenEXR file, completely or not at all; an existing file is replaced.
 
     Raises:
-        ValueError: no views, a name twice, or attributes that JSON cannot hold.
+        ValueError: there are no views, two views have the same name, or JSON cannot represent an attribute.
         OSError: the file cannot be written.
     """
     import OpenEXR
@@ -110,7 +113,7 @@ def write_exr(path: str | os.PathLike[str], views: Sequence[View]) -> None:
         raise ValueError(f"write_exr: views = {names}: must be at least one, and no name twice")
     spectral = [_part(view, "spectral") for view in views if view.radiance is not None]
     receptors = [_part(view, "receptors") for view in views if view.receptors is not None]
-    # One display window for all parts: OpenEXR demands it, and the images differ in size.
+    # OpenEXR requires one display window for all parts, but the images differ in size.
     shapes = [channels["R"].shape for _, channels, _ in spectral + receptors]
     corner = np.array([max(width for _, width in shapes) - 1, max(height for height, _ in shapes) - 1], np.int32)
     header = {
@@ -122,21 +125,21 @@ def write_exr(path: str | os.PathLike[str], views: Sequence[View]) -> None:
     for name, channels, attributes in spectral + receptors:
         attributes["parts"] = str(len(spectral) + len(receptors))
         attributes[_HASH] = _digest(name, channels, attributes)
-        # OpenEXR writes arrays that are not contiguous wrong, without a word: _part makes them so.
+        # OpenEXR silently writes wrong pixels if an array is not contiguous. _part makes all arrays contiguous.
         parts.append(OpenEXR.Part({**header, **attributes}, channels, name))
-    encoded = io.BytesIO()  # OpenEXR opens no file whose name is not UTF-8
+    encoded = io.BytesIO()  # written to memory first, because OpenEXR cannot open files whose names are not UTF-8
     OpenEXR.File(parts).write(encoded)
     _write_whole(Path(path), encoded.getbuffer())
 
 
 def read_exr(path: str | os.PathLike[str], most_bytes: int = MOST_BYTES) -> list[View]:
-    """Read what `write_exr` wrote.
+    """Read the views from a file that `write_exr` wrote.
 
-    most_bytes: of pixels that the file may unpack to; a small file can promise any number of them
+    most_bytes: largest allowed size of the unpacked pixels [bytes]; the header of a small file can announce any size
 
     Raises:
-        ExrError: one line, for a truncated, damaged, foreign, forged or too large file.
-        FileNotFoundError: there is none.
+        ExrError: the file is truncated, damaged, altered, too large, or not written by `write_exr`; one line.
+        FileNotFoundError: the file does not exist.
     """
     import OpenEXR
 
@@ -152,7 +155,7 @@ def read_exr(path: str | os.PathLike[str], most_bytes: int = MOST_BYTES) -> list
         held = [_checked(part, expected) for part in parts]
     except ExrError as error:
         raise ExrError(f"{path}: {error}") from None
-    except Exception as error:  # OpenEXR raises whatever its C++ throws
+    except Exception as error:  # OpenEXR passes on C++ exceptions of any type
         raise ExrError(f"{path}: no readable OpenEXR file ({str(error).splitlines()[0]})") from None
     if len(parts) != expected:
         raise ExrError(f"{path}: truncated ({len(parts)} of {expected} parts are whole)")
@@ -164,7 +167,7 @@ def read_exr(path: str | os.PathLike[str], most_bytes: int = MOST_BYTES) -> list
 
 
 def _pixel_bytes(header: Mapping[str, Any]) -> int:
-    """Memory that a part's pixels take, by what its header says."""
+    """Return the memory of a part's pixels [bytes], computed from its header."""
     low, high = (np.asarray(corner, dtype=np.int64) for corner in header["dataWindow"])
     width, height = (int(side) for side in np.maximum(high - low + 1, 0))
     return width * height * len(header["channels"]) * 4
@@ -175,7 +178,7 @@ def _channel(nm: float) -> str:
 
 
 def _part(view: View, kind: str) -> tuple[str, dict[str, np.ndarray], dict[str, str]]:
-    """Name, channels and attributes of one part."""
+    """Return the name, channels and attributes of one part."""
     held: dict[str, Any] = {"attributes": dict(view.attributes)}
     attributes: dict[str, str] = {}
     if kind == "spectral":
@@ -200,7 +203,10 @@ def _part(view: View, kind: str) -> tuple[str, dict[str, np.ndarray], dict[str, 
 
 
 def _false_colors(receptors: np.ndarray, peaks_nm: Sequence[float] | np.ndarray | None) -> np.ndarray:
-    """(y, x, 3): the longest waves' receptors as red, the next as green, then blue; a single channel is grey."""
+    """Return an image (y, x, 3) that shows the receptors of the longest waves as red, the next as green, then blue.
+
+    A single channel is shown as grey.
+    """
     count = len(receptors)
     order = np.arange(count) if peaks_nm is None else np.argsort(-np.asarray(peaks_nm, float), kind="stable")
     return np.moveaxis(np.asarray(receptors)[order[np.minimum(range(3), count - 1)]], 0, -1)
@@ -220,7 +226,7 @@ _OWN_ATTRIBUTES = ("spectralLayoutVersion", "emissiveUnits", "radianceScale", _H
 
 
 def _checked(part: Any, expected: int) -> tuple[str, dict[str, np.ndarray], dict[str, Any]]:
-    """A part's name, channels and held values, if they are what was written."""
+    """Return a part's name, channels and stored values after a check of its hash."""
     name, header = part.name(), part.header
     if _HASH not in header or _HELD not in header:
         raise ExrError(f"part {name!r} was not written by rhabdom")
@@ -255,10 +261,11 @@ def _views(parts: list[tuple[str, dict[str, np.ndarray], dict[str, Any]]]) -> li
 
 
 def _write_whole(path: Path, content: memoryview) -> None:
-    """Write to a neighbouring temporary file, flush it to the disk, and give it its name."""
-    temporary = str(path.with_name(f".{path.name}.{os.getpid()}.tmp"))  # not tempfile's, which none but we may read
+    """Write a temporary file in the same folder, flush it to the disk, and rename it to `path`."""
+    # Not made by tempfile, whose files only their owner may read.
+    temporary = str(path.with_name(f".{path.name}.{os.getpid()}.tmp"))
     try:
-        Path(temporary).unlink(missing_ok=True)  # a link, maybe, that leads elsewhere
+        Path(temporary).unlink(missing_ok=True)  # an existing entry might be a link to another file
         with os.fdopen(os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666), "wb") as file:
             file.write(content)
             file.flush()

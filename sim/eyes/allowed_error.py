@@ -6,21 +6,21 @@ import math
 
 import optics
 
-# Independent errors add in quadrature: an error of half the noise increases the total to √(1 + 1/4) = 1.12 times the
+# Independent errors add in quadrature. An error of half the noise increases the total to √(1 + 1/4) = 1.12 times the
 # noise.
 SHARE_OF_NOISE = 0.5
-# Chosen: smaller errors, as a share of white's signal, are never reduced by more rays, even if the noise is lower.
+# Chosen: an error below this share of white's signal is not reduced by more rays, even if the noise is lower.
 LEAST_TOLERANCE = 5e-3
 
 
 def allowed_error(eye: optics.Eye, tolerance: float | None) -> float:
-    """Return the error allowed to a signal (root mean square).
+    """Return the allowed root mean square error of a signal.
 
-    The default, for tolerance=None, is half of the receptors' noise, but at least LEAST_TOLERANCE times the signal of
-    white behind the eye's pupil.
+    If the tolerance is None, the allowed error is half of the receptors' noise, but at least LEAST_TOLERANCE times the
+    signal of white behind the eye's pupil.
 
     Raises:
-        ValueError: a tolerance that is not positive.
+        ValueError: the tolerance is not positive.
     """
     if tolerance is None:
         return max(SHARE_OF_NOISE * float(eye.noise_sigma), LEAST_TOLERANCE * float(eye.throughput))

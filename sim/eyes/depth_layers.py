@@ -1,4 +1,4 @@
-"""Depth layers: an eye blurs light from different distances differently."""
+"""Depth layers: distances for which an eye has a PSF, because blur depends on distance."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from optics.numerics.autodiff import Array
 class DepthLayers:
     """Distances for which an eye has a PSF, evenly spaced in inverse distance 1/z, in which defocus is linear.
 
-    Light from between two layers is divided between them linearly. Light from beyond the ends belongs to the nearest
-    layer.
+    Light from between two layers is divided between them linearly in 1/z. Light from beyond the first or last layer
+    belongs to that layer.
 
     farthest, nearest: distances [m]; farthest may be infinite
     count: number of layers; a single layer is at the mean inverse distance
@@ -43,7 +43,7 @@ class DepthLayers:
         return tuple(1 / v if (v := far + place * (near - far)) > 0 else math.inf for place in places)
 
     def shares(self, vergence: Array) -> list[Array]:
-        """Return the share of each layer in light from 1/z [1/m], as Dr.Jit arrays; they sum to 1."""
+        """Return each layer's share in light from inverse distance 1/z [1/m], as Dr.Jit arrays that sum to 1."""
         if self.count == 1:
             return [1.0]
         far, near = 1 / self.farthest, 1 / self.nearest

@@ -22,33 +22,33 @@ if TYPE_CHECKING:
     from optics import Eye, Pupil, Waveguide
 
 BODY_RADIUS = 0.2  # [m]
-MOST = 10**6  # chosen limit for all counts, beyond what memory can hold
+MOST = 10**6  # chosen limit for all counts; more would exceed any memory
 EYE_HEIGHT = BODY_RADIUS  # [m] above the floor: the equator of a sphere that stands on it
 
 
 @dataclass(frozen=True)
 class Eyes:
-    """The eyes of one agent. They differ only in azimuth.
+    """The eyes of one agent, which differ only in azimuth.
 
     n_eyes: number of eyes, >= 1
     resolution: receptors of one eye (height, width), each >= 1
     fov_deg: horizontal field of view of one eye [deg], in [0.001, 170]
-    placement_range_deg: azimuth from the leftmost to the rightmost eye [deg], in [0, 360]; at 360 these two look in the
-        same direction
-    optics: pupil of every eye; None: a perfect lens
+    placement_range_deg: angle from the leftmost to the rightmost eye [deg], in [0, 360]; at 360 these two eyes look in
+        the same direction
+    optics: optics.Pupil of every eye; None: a perfect lens
     sensor_width: width of the retina [m]
     noise_sigma: standard deviation of a receptor's noise, in units of its signal
     bands: number of spectral bands, 1 to 64
     receptors: receptor types: "rgb" (three channels), "lms" (human cones), "honeybee", "goldfish", peak wavelengths of
-        visual pigments [nm] such as (350, 440, 530), or `optics.Receptors`, which can describe a mosaic. The attribute
-        is then an optics.Receptors.
-    photon_budget: optics.PhotonBudget: the amount of light and the integration time of the receptors. Its shot noise is
-        added to `noise_sigma`. None: unlimited light, without shot noise.
-    waveguide: optics.Waveguide: receptors are rhabdoms, which receive light in waveguide modes (only behind a pupil).
-        None: each receptor receives all light on its square.
+        visual pigments [nm] such as (350, 440, 530), or an `optics.Receptors`, which can also describe a mosaic. The
+        attribute of an instance is always an optics.Receptors.
+    photon_budget: an optics.PhotonBudget, which defines the amount of light and the integration time of the receptors.
+        The resulting shot noise is added to the noise `noise_sigma`. None: unlimited light, without shot noise.
+    waveguide: an optics.Waveguide: receptors are rhabdoms, which receive light in waveguide modes (only behind a
+        pupil). None: each receptor receives all light that falls on its square.
 
     Raises:
-        ValueError: values outside these ranges, or unknown receptors; the message suggests the nearest name.
+        ValueError: a value is outside its range, or the receptors are unknown; the message suggests the nearest name.
     """
 
     n_eyes: int = 2
@@ -140,7 +140,7 @@ class Eyes:
         return special.get(self.n_eyes, tuple(f"eye_{i}" for i in range(self.n_eyes)))
 
     def fov_vertical_deg(self) -> float:
-        """Vertical field of view [deg]: receptors are square on a flat retina."""
+        """Return the vertical field of view [deg] of a flat retina with square receptors."""
         height, width = self.resolution
         return math.degrees(2 * math.atan(math.tan(math.radians(self.fov_deg) / 2) * height / width))
 
@@ -155,14 +155,14 @@ def _is_pupil(value: Any) -> bool:
 
 
 def eye_positions(azimuths: np.ndarray) -> np.ndarray:
-    """Pupil centres in the agent's frame [m], (n, 3): on the skin, at the equator."""
+    """Return the pupil centres in the agent's frame [m], (n, 3), on the equator of its body."""
     return BODY_RADIUS * np.stack([np.cos(azimuths), np.sin(azimuths), np.zeros_like(azimuths)], axis=-1)
 
 
 def eye_rotations(azimuths: np.ndarray) -> np.ndarray:
-    """Eye frames in the agent's frame, (n, 3, 3), columns (x right, y up, z optical axis, outwards).
+    """Return the eyes' frames in the agent's frame, (n, 3, 3), with columns (x right, y up, z optical axis, outwards).
 
-    x × y = -z: these are image coordinates, so the determinant is -1 (docs/architecture.md, "Coordinates").
+    These are image coordinates: x × y = -z, so the determinant is -1 (docs/architecture.md, "Coordinates").
     """
     cos, sin, zero, one = np.cos(azimuths), np.sin(azimuths), np.zeros_like(azimuths), np.ones_like(azimuths)
     right = np.stack([sin, -cos, zero], axis=-1)
@@ -172,5 +172,5 @@ def eye_rotations(azimuths: np.ndarray) -> np.ndarray:
 
 
 def camera_rotations(azimuths: np.ndarray) -> np.ndarray:
-    """MuJoCo camera frames of the same eyes, (n, 3, 3): x right, y up, looking along -z (determinant +1)."""
+    """Return MuJoCo's camera frames of the same eyes, (n, 3, 3): x right, y up, view along -z (determinant +1)."""
     return eye_rotations(azimuths) * np.array([1.0, 1.0, -1.0])

@@ -1,9 +1,9 @@
 """Rectangles of the visual field for an eye behind a pupil, and the share of each receptor's field in each of them.
 
-A receptor's signal is a sum over rectangles: the mean light in a rectangle times the share of the receptive field in
-it. The result is exact if only the field, and not the light, varies within a rectangle. If fields are hardly wider than
-receptors, as behind a lens in focus, one rectangle per receptor is enough, since sharp fields are the rectangles
-themselves.
+A receptor's signal is a sum over rectangles. Each term is the mean light in a rectangle times the share of the
+receptive field in that rectangle. The sum is exact if the light is constant within each rectangle. If receptive fields
+are hardly wider than receptors, as behind a lens in focus, one rectangle per receptor is enough, because each field
+then almost coincides with its rectangle.
 """
 
 from __future__ import annotations
@@ -16,17 +16,17 @@ import numpy as np
 from sim.eyes.receptive_fields import ReceptiveFields
 
 # Chosen: the largest share of all receptors' light that may come from beyond either side of the lattice. This light is
-# then attributed to the rectangles within. Behind a lens in focus, a quarter as wide as the retina, the share is 0.012
-# for 1 x 4 receptors and 0.004 for 15 x 15. These lattices have no rim, and a rim would change their errors by less
-# than a tenth.
+# attributed to the rectangles inside the lattice. Behind a lens in focus that is a quarter as wide as the retina, the
+# share beyond a lattice without a rim is 0.012 for 1 x 4 receptors and 0.004 for 15 x 15. These lattices therefore have
+# no rim. A rim would change their errors by less than a tenth.
 BEYOND = 0.015
 
 
 @dataclass(frozen=True)
 class FieldAreas:
-    """A lattice of rectangles, row by row.
+    """A lattice of rectangles of the visual field, numbered row by row.
 
-    edges: edges of its rows and of its columns, relative to the eye's axis [receptor pitches], y down
+    edges: edges of the lattice's rows, and of its columns, relative to the eye's axis [receptor pitches], y down
     """
 
     edges: tuple[np.ndarray, np.ndarray]
@@ -35,11 +35,11 @@ class FieldAreas:
     def from_fields(cls, fields: ReceptiveFields, parts: tuple[float, float], beyond: float = BEYOND) -> FieldAreas:
         """Divide each receptor's square into rows and columns, and add a rim of rectangles around the receptors.
 
-        The rim is wide enough that at most the share `beyond` of the light comes from beyond it, on either side. With
-        half a row per receptor, two receptors share a row; the outermost rows may then reach beyond the outermost
-        receptors.
+        The rim is wide enough that at most the share `beyond` of the receptors' light comes from beyond the rim, on
+        either side. With half a row per receptor, two receptors share a row. The outermost rows may then extend beyond
+        the outermost receptors.
 
-        parts: rows and columns per receptor
+        parts: numbers of rows and of columns per receptor
         """
         found = []
         for axis, (n, per_receptor) in enumerate(zip(fields.resolution, parts, strict=True)):
@@ -64,8 +64,13 @@ class FieldAreas:
         return float(x[1] - x[0]), float(y[1] - y[0])
 
     def weights(self, fields: ReceptiveFields, receptors: np.ndarray) -> np.ndarray:
-        """Return the weights of the rectangles' mean light for some receptors (numbered row by row), (plane, receptor,
-        rectangle). A receptor's weights sum to the power of its field."""
+        """Return the weights of the rectangles' mean light in the signals of some receptors, (plane, receptor,
+        rectangle).
+
+        A receptor's weights sum to the power of its field.
+
+        receptors: receptors, numbered row by row
+        """
         size, cells = fields.field.shape[1], fields.cells
         rows, columns = np.divmod(receptors, fields.resolution[1])
         down, across = (
@@ -80,16 +85,16 @@ class FieldAreas:
 
 
 def _within(n: int, per_receptor: float) -> int:
-    """Number of rectangles that n receptors in a line occupy."""
+    """Return the number of rectangles that n receptors in a line occupy."""
     return math.ceil(n * per_receptor - 1e-9)
 
 
 def _rim(profile: np.ndarray, line: tuple[int, float], cells: int, beyond: float) -> int:
-    """Number of rectangles before the first receptor's rectangle.
+    """Return the width of the rim before the first receptor of a line, as a number of rectangles.
 
-    It is the smallest number that leaves at most the share `beyond` of a line's light outside.
+    It is the smallest number with which at most the share `beyond` of the line's light comes from beyond the rim.
 
-    profile: profile of a receptor's field along the line
+    profile: power of a receptor's field in each of its cells along the line
     line: number of receptors in the line, and rectangles per receptor
     """
     n, per_receptor = line
@@ -104,7 +109,9 @@ def _rim(profile: np.ndarray, line: tuple[int, float], cells: int, beyond: float
 
 
 def _shares(edges: np.ndarray, centre: float, size: int, cells: int) -> np.ndarray:
-    """Return the share of each of a field's cells that lies between successive edges, (rectangle, cell); centre: centre
-    of the field, in units of the edges."""
+    """Return the share of each cell of a field that lies between successive edges, (rectangle, cell).
+
+    centre: centre of the field, in units of the edges
+    """
     places = (edges - centre) * cells + size / 2
     return np.diff(np.clip(places[:, None] - np.arange(size), 0, 1), axis=0)

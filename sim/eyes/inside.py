@@ -6,18 +6,20 @@ import mujoco
 import numpy as np
 
 _TYPES = mujoco.mjtGeom
-# Unit vectors in all directions, spaced by the golden angle, so that few of them hit edges of meshes. Openings of a
-# mesh are found if they extend over 20 degrees in all directions.
+# Unit vectors in all directions. They are spaced by the golden angle, so that few of them hit edges of meshes. An
+# opening of a mesh is found if its diameter, seen from the point, is at least 20 degrees.
 _N_WAYS = 64
 _HEIGHTS, _AROUND = 1 - (2 * np.arange(_N_WAYS) + 1) / _N_WAYS, np.arange(_N_WAYS) * np.pi * (3 - np.sqrt(5))
 _WAYS = np.column_stack([np.sqrt(1 - _HEIGHTS**2) * f(_AROUND) for f in (np.cos, np.sin)] + [_HEIGHTS])
-_BEYOND = 1e-9  # offset at which a ray continues behind a crossing, in units of a mesh's radius; far above rounding
+# Offset at which a ray continues behind a crossing, in units of a mesh's radius; far larger than rounding errors.
+_BEYOND = 1e-9
 
 
 def depth_inside(model: mujoco.MjModel, data: mujoco.MjData, geom: int, point: np.ndarray) -> float:
     """Return the depth of a point below the surface of a primitive or a closed mesh [m].
 
-    The depth is 0 outside, and for all other geoms. For ellipsoids and meshes it is approximate.
+    The depth is 0 for a point outside the geom, and for all other types of geoms. For ellipsoids and meshes the depth
+    is approximate.
     """
     p = data.geom_xmat[geom].reshape(3, 3).T @ (point - data.geom_xpos[geom])
     size, kind = model.geom_size[geom], model.geom_type[geom]
@@ -39,7 +41,7 @@ def depth_inside(model: mujoco.MjModel, data: mujoco.MjData, geom: int, point: n
 
 
 def _inside_mesh(model: mujoco.MjModel, data: mujoco.MjData, geom: int, point: np.ndarray) -> float:
-    """Return the distance to the nearest crossing if rays in all directions leave the mesh; 0 if one does not."""
+    """Return the distance to the nearest crossing if rays in all directions leave the mesh; otherwise 0."""
     if np.linalg.norm(point - data.geom_xpos[geom]) > model.geom_rbound[geom]:
         return 0.0
     nearest = np.inf

@@ -1,4 +1,4 @@
-"""Places of eyes on a model."""
+"""Mounts: positions and directions of eyes on a MuJoCo model."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from optics.numerics.arguments import did_you_mean, finite, items, of_kind, real
 
 EXAMPLE = "sim.Mount('head')"
 MOST_EYES = 10_000  # chosen limit for a fan, more than any animal has
-KINDS = ("site", "camera", "body")  # the kinds among which a name is searched, in this order
-# Axes (ahead, left, up) in the frame of the object that carries the eye, as rows. In general x points ahead and z up.
-# MuJoCo's cameras look along -z with x to the right.
+KINDS = ("site", "camera", "body")  # kinds of objects in which a name is searched, in this order
+# Axes (ahead, left, up) in the frame of the object that carries the eye, as rows. In the frame of a body or site, x
+# points ahead and z up. MuJoCo's cameras look along -z, with x to the right.
 _AXES = {
     "site": np.eye(3),
     "body": np.eye(3),
@@ -25,18 +25,19 @@ _AXES = {
 
 @dataclass(frozen=True)
 class Mount:
-    """Place of an eye on a model. The eye looks along +x of a body or site, or in a camera's direction, turned by these
-    angles.
+    """Position and direction of one eye on a model.
+
+    With all angles 0, the eye looks along +x of a body or site, or in the direction of a camera.
 
     on: name of a site, a camera or a body of the model
     azimuth_deg: rotation to the left, about the frame's z axis (a camera's up)
     elevation_deg: rotation upwards, applied after the azimuth
-    roll_deg: rotation about the eye's own axis, its top towards its left, applied last
-    offset: offset of the pupil from the frame's origin [m], (ahead, left, up), not turned by the angles
-    kind: "site", "camera" or "body", if several of them have that name; None: the first of these
+    roll_deg: rotation about the eye's optical axis, which turns its top towards its left; applied last
+    offset: offset of the pupil from the origin of the object's frame [m], (ahead, left, up). The angles do not turn it.
+    kind: "site", "camera" or "body", for a name that objects of several kinds have; None: the first kind in this order
 
     Raises:
-        ValueError: not a name, angles or offsets that are not finite, or an unknown kind.
+        ValueError: `on` is not a name, an angle or offset is not finite, or the kind is unknown.
     """
 
     on: str
@@ -78,8 +79,11 @@ class Mount:
         raise ValueError(f"Mount: no {what} {self.on!r} in the model{did_you_mean(self.on, names)}")
 
     def local(self, kind: str) -> tuple[np.ndarray, np.ndarray]:
-        """Return the pupil [m] (3,) and the eye's frame (3, 3), with columns (right, up, ahead), in the frame of the
-        object that carries it."""
+        """Return the position of the pupil [m] (3,) and the eye's frame (3, 3), in the frame of the object that carries
+        the eye.
+
+        The columns of the eye's frame are (right, up, ahead).
+        """
         ahead, left, up = _AXES[kind]
         azimuth, elevation, roll = np.radians([self.azimuth_deg, self.elevation_deg, self.roll_deg])
         level = np.cos(azimuth) * ahead + np.sin(azimuth) * left
@@ -95,7 +99,7 @@ def mounts_of(where: str, said: Any) -> tuple[Mount, ...]:
     """Check and return a sequence of mounts.
 
     Raises:
-        ValueError: `said` is a single mount, or something else.
+        ValueError: `said` is a single mount, or not a sequence of mounts.
     """
     if not isinstance(said, Sequence) or not all(isinstance(mount, Mount) for mount in said):
         raise ValueError(f"{where} = {said!r:.80}: must be several of sim.Mount, such as (sim.Mount('head'),)")
@@ -103,16 +107,17 @@ def mounts_of(where: str, said: Any) -> tuple[Mount, ...]:
 
 
 def both_sides(mounts: Iterable[Mount]) -> tuple[Mount, ...]:
-    """Return each mount and its mirror image: left, right, left, right ..."""
+    """Return each mount followed by its mirror image on the other side of the body."""
     return tuple(one for mount in items("mounts", mounts, Mount, EXAMPLE) for one in (mount, mount.mirrored()))
 
 
 def ring(on: str, n_eyes: int, placement_range_deg: float, radius: float) -> tuple[Mount, ...]:
-    """Return eyes in a circle around a body's z axis that look outwards, left to right, as `Eyes` places them on the
-    built-in agent.
+    """Return mounts in a circle around a body's z axis, which look outwards, from left to right.
 
-    The placement range is measured from the first to the last eye. A range of 360 (n - 1) / n closes a circle of n eyes
-    evenly.
+    `Eyes` uses the same arrangement on the built-in agent.
+
+    The placement range is the angle from the first to the last eye. With a range of 360 (n - 1) / n, n eyes are evenly
+    spaced around the whole circle.
 
     Raises:
         ValueError: less than one eye.
@@ -121,7 +126,7 @@ def ring(on: str, n_eyes: int, placement_range_deg: float, radius: float) -> tup
 
 
 def fan(mount: Mount, n_eyes: int, placement_range_deg: float, elevation_deg: float = 0.0) -> tuple[Mount, ...]:
-    """Return eyes from left to right, evenly spaced over a range of azimuths.
+    """Return mounts from left to right, evenly spaced over a range of azimuths.
 
     Each eye is a copy of `mount`, including its offset, turned about the upward axis of the object that carries it, and
     then turned upwards by `elevation_deg`. A single eye keeps the azimuth of `mount`.

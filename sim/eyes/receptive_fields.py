@@ -1,4 +1,4 @@
-"""Receptive fields of an eye behind a pupil, and random directions drawn from all of them together.
+"""Receptive fields of an eye behind a pupil, and random directions drawn from the mixture of all fields.
 
 Fields are tabulated on square cells of the visual field's tangent plane, in the coordinates of `sim.eyes.sensor`.
 """
@@ -13,10 +13,11 @@ import numpy as np
 import optics
 from sim.eyes.depth_layers import ONE_PSF, DepthLayers
 
-# Chosen: the least number of cells across the eye on which receptive fields are tabulated.
-# validation/sim/receptive_field_sampling.py reports the resulting part of the error.
+# Chosen: the smallest number of cells across the eye's visual field. validation/sim/receptive_field_sampling.py reports
+# the error that such cells cause.
 MIN_CELLS = 32
-CELLS_ACROSS, MOST_CELLS = 4, 64  # chosen: least number across a waveguide; largest number along a receptor's side
+# Chosen: smallest number of cells across a waveguide; largest number along a receptor's side.
+CELLS_ACROSS, MOST_CELLS = 4, 64
 
 
 class NoRaysError(ValueError):
@@ -25,10 +26,10 @@ class NoRaysError(ValueError):
 
 @dataclass(frozen=True)
 class Draw:
-    """Random directions.
+    """Random directions, drawn from the mixture of receptive fields.
 
     points: points on the tangent plane [receptor pitches], x right, y down, (ray, 2), in order of y
-    rows, columns: the cells that contain them, counted from the first cell of the mixture, (ray,)
+    rows, columns: indices of the mixture's cells that contain the points, (ray,)
     """
 
     points: np.ndarray
@@ -43,9 +44,10 @@ class Draw:
 class ReceptiveFields:
     """Tabulated receptive fields of an eye.
 
-    field: power per cell of one receptor's field, (plane, y, x), with a plane for every band of every depth layer. It
-        is the PSF, rotated by 180° and convolved with the receptor's square, or the acceptance of a waveguide.
-    density: probability per cell of the mean over all receptors and planes with equal weights, (Y, X)
+    field: power per cell of one receptor's field, (plane, y, x), with one plane for each band of each depth layer. It
+        is the PSF, rotated by 180° and convolved with the receptor's square. If receptors are waveguides, it is a
+        waveguide's acceptance of light from each cell.
+    density: probability per cell of the mixture, which is the mean of the fields of all receptors and planes, (Y, X)
     resolution: receptors (height, width)
     cells: cells along a receptor's side
     """
@@ -62,14 +64,15 @@ class ReceptiveFields:
         Raises:
             optics.AccuracyError: see `optics.Eye.kernel`.
         """
-        # (K ⊗ L)(r) = Σ_v K(r - v) L(v): as weights around the receptor, the kernel is rotated by 180°.
+        # A signal is (K ⊗ L)(r) = Σ_v K(r - v) L(v). The weight of light L at v is therefore the kernel K, rotated by
+        # 180° around the receptor at r.
         kernels = _as_wide([eye.kernel(cells, z)[:, ::-1, ::-1] for z in depth.distances])
         field = _averaged(kernels, cells) if eye.waveguide is None else kernels.astype(np.float64)
         everyone = np.arange(np.prod(eye.resolution))
         return cls(field, _mixture(field, eye.resolution, cells, everyone), eye.resolution, cells)
 
     def drawn_for(self, receptors: np.ndarray) -> ReceptiveFields:
-        """Return the same fields with the mixture of only these receptors."""
+        """Return the same fields with a mixture of these receptors only."""
         return replace(self, density=_mixture(self.field, self.resolution, self.cells, receptors))
 
     @property
@@ -80,18 +83,21 @@ class ReceptiveFields:
 
     @property
     def widths(self) -> tuple[float, float]:
-        """Height and width of the narrowest plane's field [receptor pitches].
+        """Height and width of the field in the plane in which it is narrowest [receptor pitches].
 
-        They are the widths (sum p)² / sum p² of the profiles p, that is, the width of a uniform field with the same
-        concentration. The width is 1 for a receptor's square.
+        They are the equivalent widths (sum p)² / sum p² of the field's vertical and horizontal profiles p. A uniform
+        field that covers a receptor's square has the width 1.
         """
         profiles = (self.field.sum(axis=axis) for axis in (2, 1))
         height, width = (((p.sum(axis=1) ** 2) / (p**2).sum(axis=1)).min() / self.cells for p in profiles)
         return float(height), float(width)
 
     def draw(self, n: int) -> Draw:
-        """Return n low-discrepancy draws from the mixture, by inverting the marginal over rows and then each row's
-        cumulative distribution."""
+        """Return n low-discrepancy draws from the mixture.
+
+        The row of a draw results from inverting the cumulative distribution of rows, its column from inverting the
+        cumulative distribution within the row.
+        """
         density, points = self.density, low_discrepancy(n)
         rows = np.concatenate([[0.0], np.cumsum(density.sum(axis=1))])
         rows /= rows[-1]
@@ -109,8 +115,9 @@ class ReceptiveFields:
         return Draw(cells / self.cells - np.array(density.shape)[::-1] / (2 * self.cells), ys, xs)
 
     def weights(self, draw: Draw, receptors: np.ndarray) -> np.ndarray:
-        """Return the weights of the rays for some receptors (numbered row by row), (plane, receptor, ray). A receptor's
-        weights sum to `power`.
+        """Return the weights of rays in the signals of some receptors (numbered row by row), (plane, receptor, ray).
+
+        A receptor's weights sum to `power`.
 
         Raises:
             NoRaysError: a receptor has no ray in its field.
@@ -131,12 +138,12 @@ class ReceptiveFields:
 
 
 def cells_per_receptor(resolution: tuple[int, int]) -> int:
-    """Cells along a receptor's side on which receptive fields are tabulated."""
+    """Return the number of cells along a receptor's side."""
     return max(4, -(-MIN_CELLS // max(resolution)))
 
 
 def cells_for(eye: optics.Eye) -> int:
-    """Return the same number, increased if a narrower waveguide needs finer cells."""
+    """Return the number of cells along a receptor's side, which is larger if a narrow waveguide needs finer cells."""
     fewest = cells_per_receptor(eye.resolution)
     if eye.waveguide is None:
         return fewest
@@ -144,7 +151,7 @@ def cells_for(eye: optics.Eye) -> int:
 
 
 def receptive_fields_of(eye: optics.Eye, depth: DepthLayers = ONE_PSF) -> ReceptiveFields:
-    """Return the fields of an eye on the finest cells on which its PSF can be computed.
+    """Return the receptive fields of an eye, tabulated on the finest cells on which its PSF can be computed.
 
     Raises:
         optics.AccuracyError: a pupil that spreads light too far even for the coarsest cells.
@@ -154,27 +161,31 @@ def receptive_fields_of(eye: optics.Eye, depth: DepthLayers = ONE_PSF) -> Recept
         try:
             return ReceptiveFields.from_eye(eye, cells, depth)
         except optics.AccuracyError:
-            # A PSF that extends over too many cells is smooth on the scale of coarser cells.
+            # A PSF that extends over too many cells is smooth, so coarser cells are enough.
             if cells == 1:
                 raise
             cells //= 2
 
 
 def low_discrepancy(n: int) -> np.ndarray:
-    """Return n points in the unit square, (n, 2): the Hammersley set (van der Corput in base 2 against i/n), shifted to
-    the centres of the strata."""
+    """Return n low-discrepancy points in the unit square, (n, 2).
+
+    They are the Hammersley set (i/n, and van der Corput's sequence in base 2), shifted to the centres of the strata.
+    """
     first_dyadic = 2.0 ** -np.ceil(np.log2(max(n, 2)))
     return np.stack([(np.arange(n) + 0.5) / n, van_der_corput(n, 2) + first_dyadic / 2], axis=-1)
 
 
 def bounce_samples(n: int) -> np.ndarray:
-    """Return n more points in the unit square, (n, 2), that together with `low_discrepancy` fill the hypercube evenly:
-    the next bases of Halton's sequence, starting from index 1."""
+    """Return n more points in the unit square, (n, 2), from the next two bases of Halton's sequence.
+
+    Together with the points of `low_discrepancy`, they fill the four-dimensional hypercube evenly.
+    """
     return np.stack([van_der_corput(n + 1, 3), van_der_corput(n + 1, 5)], axis=-1)[1:]
 
 
 def van_der_corput(n: int, base: int) -> np.ndarray:
-    """Return 0 ... n - 1 with their digits mirrored at the radix point, (n,)."""
+    """Return the numbers 0 ... n - 1 with their digits mirrored at the radix point, (n,)."""
     inverse, scale, rest = np.zeros(n), 1 / base, np.arange(n)
     while rest.any():
         inverse += scale * (rest % base)
@@ -184,14 +195,14 @@ def van_der_corput(n: int, base: int) -> np.ndarray:
 
 
 def _as_wide(kernels: list[np.ndarray]) -> np.ndarray:
-    """Return all kernels' planes, (plane, y, x), with narrower ones padded by zeros."""
+    """Return the planes of all kernels as one array (plane, y, x); zeros are added around narrower kernels."""
     side = max(kernel.shape[-1] for kernel in kernels)
     margins = [(side - kernel.shape[-1]) // 2 for kernel in kernels]
     return np.concatenate([np.pad(k, ((0, 0), (m, m), (m, m))) for k, m in zip(kernels, margins, strict=True)])
 
 
 def _averaged(kernel: np.ndarray, cells: int) -> np.ndarray:
-    """The kernel convolved with the receptor's square, (plane, y, x)."""
+    """Return the kernel convolved with the receptor's square, (plane, y, x)."""
     fields = kernel.astype(np.float64)
     for axis in (1, 2):
         ends = [(0, 0)] * 3
@@ -204,7 +215,7 @@ def _averaged(kernel: np.ndarray, cells: int) -> np.ndarray:
 
 
 def _mixture(field: np.ndarray, resolution: tuple[int, int], cells: int, receptors: np.ndarray) -> np.ndarray:
-    """Probability per cell of the mean field over these receptors and all planes."""
+    """Return the probability per cell of the mean of all planes of these receptors' fields."""
     one = (field / field.sum(axis=(1, 2), keepdims=True)).mean(axis=0)
     total = np.zeros([size + cells * (n - 1) for size, n in zip(one.shape, resolution, strict=True)])
     for i, j in zip(*np.divmod(receptors, resolution[1]), strict=True):

@@ -1,8 +1,8 @@
-"""Sums over samples for each receptor: matrix products, one per row of receptors.
+"""Weighted sums over samples for each receptor, as one matrix product per row of receptors.
 
 Rays are ordered by their height in the visual field, so each row of receptors uses a contiguous range of rays. The
-narrower the receptive fields, the shorter the range. If light has few components (`sim.tracing.closed_form_tracer`),
-the weights are multiplied with the bands' weights in advance.
+range becomes shorter as receptive fields become narrower. If light has few spectral components
+(`sim.tracing.closed_form_tracer`), the receptors' weights are multiplied by the weights of the bands in advance.
 """
 
 from __future__ import annotations
@@ -13,11 +13,12 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse
 
-# Largest number of views in one product. It never depends on the number of worlds, so that a world's signals are
-# bit-identical for any number of neighbours: BLAS rounds differently for different shapes.
+# Largest number of views in one product. BLAS rounds differently for different shapes. This number is constant, so that
+# the signals of a world are bit-identical for any number of other worlds in the batch.
 BLOCK = 32
-# Number of multiplications in a product that OpenBLAS certainly computes on one thread. Its threads busy-wait for each
-# other. If Dr.Jit or another process uses the cores, this has taken a hundred times as long as the product itself.
+# Largest number of multiplications in a product that OpenBLAS is certain to compute on one thread. The threads of
+# OpenBLAS busy-wait for each other. When Dr.Jit or another process used the cores, waiting took a hundred times as long
+# as the product itself.
 ONE_THREAD = 2**18
 
 
@@ -60,19 +61,21 @@ class RowProduct:
 
 
 def _views_at_once(weights: np.ndarray) -> int:
-    """Largest number of views that one thread can multiply; BLOCK if that number is small, since the products are then
-    large enough for several threads."""
+    """Return the largest number of views in a product that one thread computes.
+
+    If that number is small, products are large enough for several threads, and the result is BLOCK.
+    """
     return next((n for n in (BLOCK, BLOCK // 2, BLOCK // 4, BLOCK // 8) if n * weights.size <= ONE_THREAD), BLOCK)
 
 
-# Function that maps components of light, (component, view, ...), to signals, (view, channel, ...):
+# Function that maps spectral components of light, (component, view, ...), to signals, (view, channel, ...):
 # signals_c = sum_b mixing[c, b] sum_k basis[k, b] (light of component k, weighted by band b).
-# Every sum has a fixed order, and therefore the same rounding for any number of worlds.
+# Every sum has a fixed order. Rounding is therefore the same for any number of worlds.
 ReceptorSums = Callable[[np.ndarray], np.ndarray]
 
 
 def of_receptors(factors: np.ndarray) -> ReceptorSums:
-    """Return sums for light that is already summed over each receptor: factors (channel, component)."""
+    """Return the map to signals from light that is already summed over each receptor; factors (channel, component)."""
     factors = factors.astype(np.float32)
 
     def signals(light: np.ndarray) -> np.ndarray:
@@ -87,8 +90,10 @@ def of_receptors(factors: np.ndarray) -> ReceptorSums:
 def of_components(
     weights: Sequence[scipy.sparse.csr_array], resolution: tuple[int, int], mixing: np.ndarray, basis: np.ndarray
 ) -> ReceptorSums:
-    """Return sums for light along rays, with one product per component and channel; bands and channels are multiplied
-    into the weights."""
+    """Return the map to signals from light along rays, with one matrix product per component and channel.
+
+    The factors of bands and channels are multiplied into the weights in advance.
+    """
     products = [
         RowProduct.from_weights([_mixed(weights, channel * component) for channel in mixing], resolution)
         for component in basis
@@ -104,8 +109,10 @@ def of_components(
 
 
 def of_bands(products: Sequence[RowProduct], mixing: np.ndarray, basis: np.ndarray) -> ReceptorSums:
-    """Return sums for light along rays, with one product per band. This is cheaper if the number of components equals
-    the number of bands."""
+    """Return the map to signals from light along rays, with one matrix product per band.
+
+    This is cheaper than `of_components` if the number of components equals the number of bands.
+    """
     mixing, basis = mixing.astype(np.float32), basis.astype(np.float32)
     every = np.array_equal(basis, np.eye(len(basis)))
 
@@ -133,16 +140,16 @@ def within_stretches(
 ) -> tuple[scipy.sparse.csr_array, ...]:
     """Return weights (receptor, ray) per band without the first and last rays of each row of receptors.
 
-    The ends are the longest that remove at most `share` of each receptor's sum. The remaining weights are scaled to
-    keep the sum.
+    The largest number of rays is removed that reduces each receptor's sum of weights by at most `share`. The remaining
+    weights are scaled so that the sum is unchanged.
     """
     height, width = resolution
     rows: list[list[scipy.sparse.csr_array]] = [[] for _ in weights]
     for row in range(height):
         mine = [w[row * width : (row + 1) * width].toarray().astype(np.float64) for w in weights]
         sums = [w.sum(axis=1, keepdims=True) for w in mine]
-        # Number of rays at an end that contribute at most half of the share to every receptor; the other end has the
-        # other half.
+        # Number of rays at one end that together contribute at most half of `share` to every receptor. The rays at the
+        # other end contribute at most the other half.
         ends = [
             min(
                 int((np.cumsum(w[:, ::step], axis=1) <= share / 2 * s).sum(axis=1).min())
@@ -158,7 +165,7 @@ def within_stretches(
 
 
 def _mixed(weights: Sequence[scipy.sparse.csr_array], factors: np.ndarray) -> scipy.sparse.csr_array:
-    """sum_b factors[b] weights_b, in double precision."""
+    """Return sum_b factors[b] weights_b, in double precision."""
     total = float(factors[0]) * weights[0].astype(np.float64)
     for factor, band in zip(factors[1:], weights[1:], strict=True):
         total = total + float(factor) * band.astype(np.float64)

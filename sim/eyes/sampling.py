@@ -1,4 +1,4 @@
-"""Choice of the samples of an eye's visual field: rays or areas, in the requested number.
+"""Samples of an eye's visual field: rays or rectangular areas, in the requested number.
 
 `sim.eyes.sensor` defines the coordinates.
 """
@@ -27,18 +27,18 @@ from sim.eyes.receptive_fields import (
 from sim.eyes.receptor_sums import within_stretches
 from sim.eyes.sensor import BoxSensor, ReceptiveFieldSensor, Sensor
 
-# Chosen: weights are omitted if together they change no signal by more than this share of the receptors' noise. The
-# total error is then at most √(1 + 0.1²) = 1.005 times the noise.
+# Chosen: small weights are omitted if their sum changes no signal by more than this share of the receptors' noise. The
+# noise with this error is then at most √(1 + 0.1²) = 1.005 times the noise alone.
 NEGLIGIBLE = 0.1
 
 
 @dataclass(frozen=True)
 class Trial:
-    """Samples for some receptors only, without building the whole sensor.
+    """Samples for some of the receptors, computed without building the sensor of the whole eye.
 
-    directions: (ray, 3)
-    bounce_samples: (ray, 2)
-    weights: (layer * band, receptor, ray)
+    directions: directions of the rays or centres of the areas, (ray, 3)
+    bounce_samples: see `sim.eyes.sensor.BoxSensor`, (ray, 2)
+    weights: weight of each ray in each receptor's signal, (layer * band, receptor, ray)
     extent: width and height of areas; None for rays
     """
 
@@ -52,28 +52,30 @@ class Trial:
 class BoxSampling:
     """Samples of an eye with a perfect lens.
 
-    Every receptor's square is sampled by the same low-discrepancy points, a whole number of them. Each receptor's
-    points are shifted (on the torus) by a fixed random offset, so that the errors of neighbours are independent.
+    Every receptor's square is sampled at the same low-discrepancy points; their number is a whole number. The points of
+    each receptor are shifted by a fixed random offset (with wrap-around at the edges of the square), so that the errors
+    of neighbouring receptors are independent.
     """
 
     eye: optics.Eye
     depth: DepthLayers = ONE_PSF
 
     def sensor(self, rays_per_receptor: float) -> BoxSensor:
-        """Return the sensor with this number of rays per receptor."""
+        """Return the eye's sensor with this number of rays per receptor."""
         rays = max(1, round(rays_per_receptor))
         return BoxSensor(*self._rays(rays, np.arange(np.prod(self.eye.resolution))), rays)
 
     def areas(self, per_receptor: float, *, in_rows: bool = True) -> BoxSensor:
         """Return the sensor whose samples divide each receptor's square into this number of rectangles.
 
-        The rectangles form one row, or, with `in_rows`, a grid in which rows do not outnumber columns.
+        With `in_rows`, the rectangles form a grid with at most as many rows as columns. Without it, they form one row.
         """
         count = max(1, round(per_receptor))
         return BoxSensor(*self._areas(count, in_rows, np.arange(np.prod(self.eye.resolution))))
 
     def area_trial(self, per_receptor: float, receptors: np.ndarray, *, in_rows: bool = True) -> Trial:
-        """Return the samples of that sensor for these receptors (numbered row by row)."""
+        """Return the samples of the sensor with this number of areas, for these receptors only (numbered row by
+        row)."""
         count = max(1, round(per_receptor))
         plane, unused, _, _, extent = self._areas(count, in_rows, receptors)
         return Trial(plane, unused, self._means(len(receptors), count), extent)
@@ -89,13 +91,16 @@ class BoxSampling:
         return plane, _unused(plane), count, self.depth, _extent(self.eye, (1 / columns, 1 / rows))
 
     def trial(self, rays_per_receptor: float, receptors: np.ndarray) -> Trial:
-        """Return the samples of that sensor for these receptors (numbered row by row)."""
+        """Return the samples of the sensor with this number of rays, for these receptors only (numbered row by row)."""
         rays = max(1, round(rays_per_receptor))
         return Trial(*self._rays(rays, receptors), self._means(len(receptors), rays))
 
     def beyond_rim(self, rays: int) -> np.ndarray:
-        """Return directions through squares of a receptor's size around the field: one beyond every receptor at its
-        rim, and one at each corner; row by row, (square * rays, 3)."""
+        """Return directions through a ring of squares of a receptor's size around the field, (square * rays, 3).
+
+        The ring has one square next to every receptor at the rim of the field, and one at each corner. Squares are
+        numbered row by row.
+        """
         rows, columns = (side + 2 for side in self.eye.resolution)
         row, column = np.nonzero(beyond_rim_of(self.eye.resolution))
         corners = np.stack([column - columns / 2, row - rows / 2], axis=-1)[:, None]
@@ -124,12 +129,12 @@ class BoxSampling:
 
 @dataclass(frozen=True)
 class FieldSampling:
-    """Samples of an eye behind a pupil: directions drawn from the mixture of all receptive fields.
+    """Samples of an eye behind a pupil: directions drawn from the mixture of all receptors' receptive fields.
 
     If the requested number leaves a receptor without a ray, more are drawn until every receptor has one.
 
-    tolerance: error allowed to a signal, see `sim.eyes.allowed_error`; white beyond the lattice of areas, on either
-        side, contributes at most this signal
+    tolerance: error allowed to a signal, see `sim.eyes.allowed_error`. The lattice of areas is wide enough that a white
+        scene beyond it, on either side, contributes at most this signal.
     """
 
     eye: optics.Eye
@@ -138,7 +143,7 @@ class FieldSampling:
     tolerance: float | None = None
 
     def sensor(self, rays_per_receptor: float) -> ReceptiveFieldSensor:
-        """Return the sensor with this number of rays per receptor, on average."""
+        """Return the eye's sensor with this number of rays per receptor, on average."""
         rays = self._rays(rays_per_receptor)
         while True:
             try:
@@ -147,10 +152,10 @@ class FieldSampling:
                 rays += max(1, rays // 4)
 
     def trial(self, rays_per_receptor: float, receptors: np.ndarray) -> Trial:
-        """Return the samples of that sensor for these receptors.
+        """Return the samples of the sensor with this number of rays, for these receptors only.
 
         Raises:
-            NoRaysError: one of them has no ray.
+            NoRaysError: one of these receptors has no ray.
         """
         draw = self.fields.draw(self._rays(rays_per_receptor))
         weights = self.fields.weights(draw, receptors)
@@ -160,10 +165,10 @@ class FieldSampling:
         return max(1, round(rays_per_receptor * np.prod(self.eye.resolution)))
 
     def areas(self, per_receptor: float, *, in_rows: bool = True) -> ReceptiveFieldSensor:
-        """Return the sensor whose samples are rectangles.
+        """Return the sensor whose samples are this number of rectangles per receptor.
 
-        Each receptor's square is divided as in `BoxSampling.areas`, or, with less than one rectangle per receptor,
-        several receptors share a rectangle. More rectangles cover the rest of the receptors' fields.
+        Each receptor's square is divided as in `BoxSampling.areas`. If the number is below 1, several receptors share a
+        rectangle. Additional rectangles cover the parts of receptive fields that lie outside all receptors' squares.
         """
         lattice = self._lattice(per_receptor, in_rows)
         plane = on_tangent_plane(self.eye, lattice.middles).astype(np.float32)
@@ -172,13 +177,15 @@ class FieldSampling:
         return ReceptiveFieldSensor(plane, _unused(plane), weights, self.eye.resolution, self.depth, extent)
 
     def may_share(self, per_receptor: float, *, in_rows: bool = True) -> bool:
-        """Return whether shared areas, with this number per receptor, are at most half as wide as one receptor's field.
-        Wider areas would give different neighbours the same signal."""
+        """Return whether areas are at most one receptor wide, or at most half as wide as one receptor's field.
+
+        Wider areas would give the same signal to neighbouring receptors with different fields.
+        """
         sides = (1 / n for n in _parts_or_share(per_receptor, in_rows))
         return all(side <= max(1, width / 2) for side, width in zip(sides, self.fields.widths, strict=True))
 
     def area_trial(self, per_receptor: float, receptors: np.ndarray, *, in_rows: bool = True) -> Trial:
-        """Return the samples of that sensor for these receptors."""
+        """Return the samples of the sensor with this number of areas, for these receptors only."""
         lattice = self._lattice(per_receptor, in_rows)
         plane = on_tangent_plane(self.eye, lattice.middles).astype(np.float32)
         return Trial(plane, _unused(plane), lattice.weights(self.fields, receptors), _extent(self.eye, lattice.size))
@@ -194,7 +201,7 @@ class FieldSampling:
         return ReceptiveFieldSensor(directions, _bounce_samples(draw), weights, self.eye.resolution, self.depth)
 
     def _in_rows(self, of: Callable[[np.ndarray], np.ndarray]) -> tuple[scipy.sparse.csr_array, ...]:
-        """Return the weights of all receptors, computed row by row, without negligible ones."""
+        """Return the weights of all receptors without negligible weights, computed one row of receptors at a time."""
         height, width = self.eye.resolution
         rows: list[list[scipy.sparse.csr_array]] = []
         for i in range(height):
@@ -211,15 +218,18 @@ def parts_of(count: int, in_rows: bool) -> tuple[int, int]:
 
 
 def _parts_or_share(per_receptor: float, in_rows: bool) -> tuple[float, float]:
-    """Return the rows and columns of a receptor, a whole number in total. Less than one is its share of a larger
-    area."""
+    """Return the numbers of rows and columns of areas per receptor.
+
+    From 1 area per receptor on, the number of areas is rounded to a whole number. Below 1, both numbers are a
+    receptor's share of a larger area.
+    """
     if per_receptor >= 1:
         return parts_of(round(per_receptor), in_rows)
     return (math.sqrt(per_receptor), math.sqrt(per_receptor)) if in_rows else (1.0, per_receptor)
 
 
 def _unused(plane: np.ndarray) -> np.ndarray:
-    """Return placeholders for the bounce samples of areas, for which a table of reflected light is used instead."""
+    """Return placeholders for the bounce samples of areas, whose reflected light is read from a table instead."""
     return np.zeros((len(plane), 2), np.float32)
 
 
@@ -233,18 +243,18 @@ def _bounce_samples(draw: Draw) -> np.ndarray:
     return bounce_samples(len(draw)).astype(np.float32)
 
 
-# Builds sensors of one eye, with any number of rays.
+# Factory of the sensors of one eye, for any number of rays.
 EyeSampling = BoxSampling | FieldSampling
 
 
 def beyond_rim_of(resolution: tuple[int, int]) -> np.ndarray:
-    """Mask of the squares beyond the rim of a field that is extended by one square on every side, (height + 2, width +
-    2)."""
+    """Return the mask (height + 2, width + 2) of the added squares, for a field extended by one square on every
+    side."""
     return np.pad(np.zeros(resolution, bool), 1, constant_values=True)
 
 
 def eye_sampling(eye: optics.Eye, depth: DepthLayers = ONE_PSF) -> EyeSampling:
-    """Return the sampling of an eye.
+    """Return the sampling of an eye: `BoxSampling` for a perfect lens, otherwise `FieldSampling`.
 
     Raises:
         optics.AccuracyError: a pupil that spreads light too far to be computed.
@@ -253,7 +263,7 @@ def eye_sampling(eye: optics.Eye, depth: DepthLayers = ONE_PSF) -> EyeSampling:
 
 
 def build_sensor(eye: optics.Eye, rays_per_receptor: float, depth: DepthLayers = ONE_PSF) -> Sensor:
-    """Return the sensor of an eye.
+    """Return the sensor of an eye with this number of rays per receptor.
 
     Raises:
         optics.AccuracyError: a pupil that spreads light too far to be computed.
@@ -262,18 +272,23 @@ def build_sensor(eye: optics.Eye, rays_per_receptor: float, depth: DepthLayers =
 
 
 def directions_of(eye: optics.Eye, plane: np.ndarray) -> np.ndarray:
-    """Return unit vectors (ray, 3) in the eye's frame, from points (x right, y down) [receptor pitches] on the tangent
-    plane."""
+    """Return unit vectors (ray, 3) in the eye's frame towards points of the tangent plane.
+
+    plane: points (x right, y down) [receptor pitches], (ray, 2)
+    """
     v = on_tangent_plane(eye, plane)
     return (v / np.linalg.norm(v, axis=-1, keepdims=True)).astype(np.float32)
 
 
 def on_tangent_plane(eye: optics.Eye, plane: np.ndarray) -> np.ndarray:
-    """Return the same points in the eye's frame, on the plane at distance 1, (ray, 3)."""
+    """Return points of the tangent plane as points in the eye's frame at distance 1 along its axis, (ray, 3).
+
+    plane: points (x right, y down) [receptor pitches], (ray, 2)
+    """
     side = eye.receptor_pitch / eye.sensor_distance
     return np.stack([plane[:, 0] * side, -plane[:, 1] * side, np.ones(len(plane))], axis=-1)
 
 
 def negligible_share(eye: optics.Eye) -> float:
-    """Share of a receptor's weights that can be omitted: a share s changes a signal by at most a² s."""
+    """Return the share of a receptor's weights that can be omitted; a share s changes a signal by at most a² s."""
     return min(NEGLIGIBLE * eye.noise_sigma / eye.aperture_throughput, eye.tolerance)

@@ -1,8 +1,9 @@
 """The rays of an image as one frozen Dr.Jit kernel, and the direct light along them.
 
-A ray is specified by a whole number: 8 times its pixel, plus the number of its sample within the pixel. Every light is
-sampled once per ray, whereas Mitsuba's `direct` draws one of them at random. Points and directional lights therefore
-cause no noise. Skies and glowing geoms do, but the fixed samples of a pixel make this noise the same in every frame.
+A ray is specified by a whole number: 8 times the number of its pixel, plus the number of its sample within the pixel.
+Every light is sampled once per ray, whereas Mitsuba's `direct` draws one of them at random. Points and directional
+lights therefore cause no noise. Skies and glowing geoms cause noise, but the samples of a pixel are fixed, so the noise
+is the same in every frame.
 """
 
 from __future__ import annotations
@@ -23,8 +24,8 @@ from sim.scene.frozen_kernels import garbage_kept
 from sim.scene.variant import MitsubaObject, variant
 
 # Four wavelengths fill one mi.Spectrum. All sets on a grid of 5 nm with distances of at least 25 nm were compared.
-# This set comes closest to `sim.scene.color.preview` at the eight wavelengths of the slow image, over colours and white
-# in daylight.
+# Over colours and white in daylight, this set comes closest to `sim.scene.color.preview` at the eight wavelengths of
+# the slow image (`sim.envs.follow_camera`).
 WAVELENGTHS_NM = (450.0, 525.0, 590.0, 630.0)
 SRGB = np.array(  # linear sRGB per radiance at these wavelengths, (3, wavelength); fitted so that daylight is white
     [
@@ -34,13 +35,14 @@ SRGB = np.array(  # linear sRGB per radiance at these wavelengths, (3, wavelengt
     ]
 )
 
-# A pixel's samples, relative to its middle [pixels]: first the middle, and no two in one column or row of fifths.
+# A pixel's samples, relative to its middle [pixels]. The middle comes first. If a pixel is divided into five rows and
+# five columns, no two samples share one.
 SAMPLES = np.array([[0, 0], [0.2, 0.4], [0.4, -0.2], [-0.2, -0.4], [-0.4, 0.2]])
 CODES = 8  # codes per pixel
 NESTED = 64  # largest number of nested bodies that a camera may be inside of
 # Rays of a packet go through neighbouring pixels, and then towards one sun. Embree traverses its tree once for them.
 COHERENT = True
-WANTED = int(mi.RayFlags.UV) | int(mi.RayFlags.ShadingFrame)  # no texture of a mirror needs derivatives
+WANTED = int(mi.RayFlags.UV) | int(mi.RayFlags.ShadingFrame)  # properties of hits; textures need no derivatives
 _VIEW = 5  # rows of four floats of a view: position, columns of the rotation, (half, near, width, height)
 
 
@@ -49,8 +51,8 @@ class RayLight:
     """Light along rays, and the planes that they hit.
 
     linear: sRGB, not clipped, (3, ray)
-    plane: 1 / depth [1/m] = plane @ (across, above, 1) of the tangent plane at the hit point, for all rays of the image
-        (`plane_coordinates`); 0 without a hit, (3, ray)
+    plane: tangent plane at the hit point, as coefficients of its inverse depth: 1 / depth [1/m] = plane @ (across,
+        above, 1) for all rays of the image (`plane_coordinates`); 0 without a hit, (3, ray)
     """
 
     linear: np.ndarray
@@ -61,7 +63,7 @@ class RayLight:
 class CameraInputs:
     """Inputs of kernels that are the same for every image of a mirror.
 
-    samples: of a pixel, in twos [pixels] · weights: of the suns, in fours
+    samples: positions within a pixel, in twos [pixels] · weights: irradiance from each directional light, in fours
     closed: for each shape, whether a camera inside looks out of it
     bsdfs: unused; BSDFs among the inputs make the recording collect their textures
     """
@@ -172,7 +174,7 @@ def _looked_out_of(scene: MitsubaObject, si: Array, ray: Array, closed: Array) -
 
 @dataclass(frozen=True)
 class _Axes:
-    """position: of the camera · directions: to the right, up and ahead."""
+    """Frame of a camera. position: its position · directions: unit vectors to the right, up and ahead."""
 
     position: Array
     directions: tuple[Array, Array, Array]
@@ -204,7 +206,7 @@ def plane_coordinates(fovy_deg: float, size: tuple[int, int]) -> tuple[np.ndarra
 def _pose(
     view: Viewpoint, size: tuple[int, int], near: float, suns: Mapping[int, np.ndarray], n_lights: int
 ) -> np.ndarray:
-    """Return everything that changes between frames, in fours."""
+    """Return all numbers that change between frames, in fours."""
     rows = aligned(4 * (_VIEW + n_lights), np.float32).reshape(-1, 4)
     rows[0, :3], rows[1:4, :3] = view.position, view.rotation.T
     rows[4] = np.tan(np.radians(view.fovy_deg) / 2), near, size[1], size[0]

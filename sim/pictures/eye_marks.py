@@ -61,6 +61,6 @@ def _off(start: np.ndarray, end: np.ndarray, size: tuple[int, int]) -> np.ndarra
 
 
 def _paint(shown: np.ndarray, off: np.ndarray, radius: float, color: np.ndarray) -> None:
-    """Paint in place, with smooth edges."""
+    """Paint a line or dot into an image in place, with smooth edges; off: distance of pixels' middles from it."""
     opacity = OPACITY * np.clip(radius + 0.5 - off, 0, 1)[..., None]
     shown += opacity * (color - shown)

@@ -1,6 +1,7 @@
 """A lattice of every fifth pixel, a knight's move apart: each other pixel is adjacent to exactly one of them.
 
-No horizontal, vertical or diagonal line of pixels passes between them: the lattice has every fifth pixel of each line.
+Every horizontal, vertical or diagonal line of pixels contains every fifth of its pixels. No such line passes between
+pixels of the lattice.
 """
 
 from __future__ import annotations
@@ -15,10 +16,12 @@ _CROSS = ((0, 0), (1, 0), (-1, 0), (0, 1), (0, -1))
 
 @dataclass(frozen=True)
 class Lattice:
-    """size: of the image (height, width)
+    """The pixels of an image that are traced first.
+
+    size: size of the image (height, width)
     pixels: numbers of the lattice's pixels, row by row, and of pixels at the border that touch none of them, (n,)
-    nearest: place in `pixels` of the nearest one for each pixel, (height · width,)
-    pairs: neighbours in the lattice, as places in `pixels`, (2, m)
+    nearest: for each pixel, the index in `pixels` of the nearest one, (height · width,)
+    pairs: neighbours in the lattice, as indices in `pixels`, (2, m)
     """
 
     size: tuple[int, int]
@@ -44,7 +47,11 @@ class Lattice:
         return Lattice(size, pixels, nearest.ravel(), pairs)
 
     def between(self, differ: np.ndarray) -> np.ndarray:
-        """Return the pixels around lattice pixels that differ from a neighbour; differ: true for such pairs, (m,)."""
+        """Return the numbers of pixels outside the lattice whose nearest lattice pixel differs from a neighbour in the
+        lattice.
+
+        differ: true for pairs of neighbours that differ, (m,)
+        """
         rough = np.zeros(len(self.pixels), bool)
         rough[self.pairs[:, differ]] = True
         wanted = rough[self.nearest]
@@ -53,7 +60,7 @@ class Lattice:
 
 
 def _shifted(place: np.ndarray, dx: int, dy: int) -> np.ndarray:
-    """Return place at (x + dx, y + dy), -1 beyond the border."""
+    """Return place at (x + dx, y + dy); -1 beyond the border."""
     height, width = place.shape
     padded = np.pad(place, 1, constant_values=-1)
     return padded[1 + dy : 1 + dy + height, 1 + dx : 1 + dx + width]

@@ -1,6 +1,6 @@
-"""A mirror of fewer shapes: all static geoms of one material are one mesh.
+"""A mirror of fewer shapes (`sim.mirror`): all static geoms of one material are one mesh.
 
-Every shape costs time in every launch of a kernel, and every geom in every `sync`. Static geoms cannot be identified in
+Every shape adds time to each launch of a kernel, and every geom to each `sync`. Static geoms cannot be identified in
 the image.
 """
 
@@ -24,7 +24,8 @@ from sim.scene.variant import variant as in_variant
 class MergedMirror(Mirror):
     """A Mitsuba scene that mirrors all of a model; moving shapes are "geom_<geom id>_<part>", others "still_<n>".
 
-    closed: names of the shapes from which a camera inside looks out
+    model, spectra: see `sim.mirror`
+    closed: names of the shapes that are invisible from inside, so that a camera inside them looks out
     """
 
     def __init__(self, model: mujoco.MjModel, spectra: Mapping[str, Spectrum | str] | None = None) -> None:
@@ -66,7 +67,7 @@ class MergedMirror(Mirror):
         return np.asarray(direction / np.linalg.norm(direction))
 
     def surrounds(self, point: np.ndarray) -> bool:
-        """Return whether a point may be inside a geom: whether it is inside a geom's bounding box."""
+        """Return whether a point may be inside a geom, because it is inside the geom's bounding box."""
         sizes, bounded = self.model.geom_rbound[self.geoms], self.model.geom_rbound[self.geoms] > 0
         offset = point - self._places.geom_xpos[self.geoms]
         local = np.einsum("gij,gi->gj", self._places.geom_xmat[self.geoms].reshape(-1, 3, 3), offset)

@@ -1,8 +1,8 @@
 """Images with smooth edges, from few rays.
 
-First a fifth of the pixels is traced, through their middles (`Lattice`). A pixel between two pixels of the same colour
-gets this colour. Between other pixels, all pixels are traced. If one differs from its neighbours, four more rays smooth
-the edge.
+First, one ray is traced through the middle of every fifth pixel (`Lattice`). The pixels around a traced pixel get its
+colour if all neighbouring pixels of the lattice have this colour, too. Otherwise, one ray is traced through each of
+them. If a pixel then differs from an adjacent pixel, four more rays through it smooth the edge.
 """
 
 from __future__ import annotations
@@ -24,7 +24,8 @@ from sim.scene.color import encode_srgb
 from sim.scene.mirror import MirrorWarning
 from sim.scene.rays import check_size
 
-# Of 255. Steps of up to EDGE between neighbours do not look jagged; pixels that differ by up to SAME count as equal.
+# sRGB levels, of 255. Steps of up to EDGE between neighbours do not look jagged. Pixels that differ by up to SAME count
+# as equal.
 EDGE, SAME = 8, 1
 LEVELS = 1 << 14  # levels of linear light in the table of sRGB values: finer than 8 bits in dark colours
 _DISPLAYED = np.rint(255 * encode_srgb(np.arange(LEVELS) / (LEVELS - 1))).astype(np.uint8)
@@ -32,10 +33,12 @@ _DISPLAYED = np.rint(255 * encode_srgb(np.arange(LEVELS) / (LEVELS - 1))).astype
 
 @dataclass(frozen=True)
 class QuickImage:
-    """picture: sRGB, (y, x, 3) uint8
-    planes: that rays hit, see `RayLight`, (3, ray)
-    ray: number of the ray for each pixel's middle, (pixel,)
-    fovy_deg: of the camera
+    """An image, with the planes that its rays hit.
+
+    picture: sRGB, (y, x, 3) uint8
+    planes: planes that rays hit, see `RayLight`, (3, ray)
+    ray: for each pixel, the number of the ray through its middle, or through the nearest lattice pixel, (pixel,)
+    fovy_deg: vertical field of view of the camera
     """
 
     picture: np.ndarray
@@ -53,11 +56,12 @@ class QuickImage:
 
 
 class QuickCamera:
-    """A camera for any MuJoCo model, without OpenGL: images of its mirror in direct light (`sim.mirror`).
+    """A camera for any MuJoCo model that works without OpenGL. It renders the model's mirror in direct light.
 
     model, spectra: see `sim.mirror`
+    mirror: the mirror, a Mitsuba scene that is a copy of the model (`sim.mirror`)
 
-    Warns (`sim.MirrorWarning`) of transparent geoms, which are dark and opaque here.
+    Transparent geoms are rendered dark and opaque, and named in a warning (`sim.MirrorWarning`).
     """
 
     def __init__(self, model: mujoco.MjModel, spectra: Mapping[str, Spectrum | str] | None = None) -> None:
@@ -79,7 +83,7 @@ class QuickCamera:
         return self.render(data, camera, width, height).picture
 
     def render(self, data: mujoco.MjData, camera: str | int | Viewpoint, width: int, height: int) -> QuickImage:
-        """Return the same image, with inverse distances."""
+        """Return the same image as `picture`, with inverse distances."""
         check_size(width, height, 1)
         self.mirror.sync(data)
         view, size = self.mirror.viewpoint(camera), (height, width)
@@ -97,7 +101,8 @@ class QuickCamera:
         return look
 
     def _middles(self, view: Viewpoint, lattice: Lattice) -> tuple[QuickImage, np.ndarray]:
-        """Return an image of all pixels' middles, and linear sRGB along the traced rays, (3, ray)."""
+        """Return an image in which each pixel has the colour of its middle, and linear sRGB along the rays, (3,
+        ray)."""
         found = self._rays.trace(view, lattice.size, CODES * lattice.pixels)
         linear, planes, ray, shown = found.linear, found.plane, lattice.nearest, _displayed(found.linear)
         picture = shown.T.copy().take(ray, axis=0)

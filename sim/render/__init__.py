@@ -1,4 +1,4 @@
-"""Rendering of all eyes in all worlds. Start with one_ray: the other renderers do the same, faster.
+"""Rendering of all eyes in all worlds. Start with one_ray: the other renderers compute the same values faster.
 
 one_ray             see: one world, one ray for each receptor
 eye_renderer        EyeRenderer: all eyes of all worlds of any scene as one wavefront
@@ -7,7 +7,7 @@ ray_kernel          kernel of rays: lanes, rays, light, depth layers, sums
 area_kernel         kernel of area sampling
 eye_rays            rays of upright eyes, and of eyes that may be anywhere
 edge_rays           adaptive edge sampling: many rays at edges, few in other places
-light_factors       factors of the light of each world
+light_factors       factors by which the light of each world is multiplied
 labels              Labels: depth, ids and optic flow
 optic_flow          motion on the retina
 batched_renderer    BatchedRenderer: eyes of the agents in a built-in world
@@ -18,11 +18,11 @@ reference_renderer  ReferenceRenderer: Mitsuba's integrators, slow
 fidelity            Fidelity: samples, bands, depth layers and light, and the reasons for them
 fidelity_choice     cheapest: the cheapest fidelity that receptor noise allows
 world_fidelity      choose_fidelity: fidelity of a built-in world
-fidelity_stages     choice of its bands, depth layers and light
-sample_choice       choice of its rays or areas
-fidelity_trials     trials that measure the errors of these choices
+fidelity_stages     choice of bands, depth layers and light for a built-in world
+sample_choice       choice of rays or areas for a built-in world, and of their number
+fidelity_trials     trials that measure the errors of fidelities in a built-in world
 random_views        random views for the trials
-model_fidelity      choose_model_fidelity: fidelity of any other model, tried at given moments
+model_fidelity      choose_model_fidelity: fidelity of any other model, from trials at given poses
 memory_budget       check of the memory that rendering needs
 receptor_noise      noise for all worlds at once
 pending_frame       frames that are launched early and read late

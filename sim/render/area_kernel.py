@@ -1,4 +1,5 @@
-"""The kernel of area sampling. Results that the areas of a world or of a column share are computed once, beforehand."""
+"""The kernel of area sampling. Results that are the same for several areas of a world or of a column are computed once,
+beforehand."""
 
 from __future__ import annotations
 
@@ -22,8 +23,11 @@ from sim.tracing.areas.patch import Area
 
 @dataclass(frozen=True)
 class BorderInputs:
-    """Level directions to the borders that areas share. lanes: of all borders of all eyes · sizes: numbers of borders
-    and of eyes · sides: numbers of each area's left and right border."""
+    """Level directions to the borders that areas share.
+
+    lanes: numbers of the borders of all eyes · sizes: number of borders of an eye, and number of eyes
+    along: directions to the borders · sides: numbers of each area's left and right border
+    """
 
     lanes: Array
     sizes: Array
@@ -33,8 +37,10 @@ class BorderInputs:
 
 @dataclass(frozen=True)
 class AreaInputs(KernelInputs):
-    """extent: width and height of areas on the tangent plane · borders: None: areas share no borders
-    places: lanes of the places of all worlds' bodies; None: light that bodies reflect is not followed
+    """Inputs of an area kernel that are the same in every call, in addition to `KernelInputs`.
+
+    extent: width and height of areas on the tangent plane · borders: None: areas share no borders
+    places: numbers of the places on the bodies of all worlds; None: light that bodies reflect is not followed
     """
 
     extent: Array | None = None
@@ -43,9 +49,10 @@ class AreaInputs(KernelInputs):
 
 
 class AreaKernel(RayKernel):
-    """A kernel for the light in areas.
+    """A kernel that computes the light in areas.
 
-    areas: tracer · eyes: upright eyes
+    areas: tracer · eyes: upright eyes · sensor: directions and extent of the areas
+    n_envs, n_eyes: numbers of worlds, and of eyes in each world
     """
 
     def __init__(self, areas: AreaTracer, eyes: EyeRays, sensor: Sensor, n_envs: int, n_eyes: int) -> None:

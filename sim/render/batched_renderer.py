@@ -20,19 +20,20 @@ from sim.worlds.world import World
 class BatchedRenderer(EyeRenderer):
     """A renderer of `n_envs` worlds with the same eyes.
 
-    world: geometry, materials and lights; shared by all worlds
-    eyes: of every agent
+    world: geometry, materials and lights, which all worlds share
+    eyes: the eyes of every agent
     n_envs: number of worlds in a state
-    fidelity: samples and bands: `Fidelity(4, bands=4)` traces 4 rays for each receptor in 4 bands; None:
-        `choose_fidelity(world, eyes, bands="own")`, the cheapest that the receptors' noise allows. The fidelity in use
-        is in `.fidelity`
-    tracer: "closed_form" (worlds of upright walls, a floor and spheres), "mitsuba" (any shapes), or "auto"; the tracer
-        in use is in `.tracer.name`, and the reason for its choice in `.tracer.why`
+    fidelity: number and kind of samples, bands, depth layers and light. `Fidelity(4, bands=4)` traces 4 rays for each
+        receptor in 4 bands. None: `choose_fidelity(world, eyes, bands="own")`, the cheapest fidelity that the
+        receptors' noise allows. The fidelity in use is in `.fidelity`
+    tracer: "closed_form" (worlds of upright walls, a floor and spheres), "mitsuba" (any shapes), or "auto": the closed
+        form if the world has one. The tracer in use is in `.tracer.name`, and the reason for its choice in
+        `.tracer.why`
     brightest: signal of a white surface that faces all lights at once
 
     Raises:
-        ValueError: less than one world, more rays than fit into memory, a fidelity that the world does not support, or
-            a requested closed form that the world does not have.
+        ValueError: n_envs below 1, more rays than fit into memory, a fidelity that the world does not support, or
+            tracer="closed_form" for a world without a closed form.
     """
 
     def __init__(

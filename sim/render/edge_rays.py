@@ -1,10 +1,11 @@
-"""Adaptive edge sampling: many rays for receptors that see an edge, few for others. For perfect lenses on user models.
+"""Adaptive edge sampling: many rays for receptors that see an edge, few for others.
 
-Four rays through a receptor's square show whether the square is uniform (Whitted 1980 compares a pixel's corners). If
-they differ, all rays are traced. An edge may pass between the four rays and cut off a corner, at most a quarter of the
-square. The surface beyond such an edge fills a neighbour, so receptors that differ strongly from a neighbour get all
-rays, too. For this comparison, the first rays include squares beyond the rim of the field. An object is missed if it is
-smaller than the gaps between the four rays and fills no neighbour.
+It requires a perfect lens, and is chosen automatically only for user models. Four rays through a receptor's square show
+whether the square is uniform (Whitted 1980 compares a pixel's corners). If the four signals differ, all rays are
+traced. An edge may also pass between the four rays and cut off a corner, at most a quarter of the square. The surface
+beyond such an edge fills a neighbouring square. Receptors that differ strongly from a neighbour therefore get all rays,
+too. For this comparison, the first rays include squares beyond the rim of the field. An object is missed if it is
+smaller than the gaps between the four rays and fills no neighbouring square.
 """
 
 from __future__ import annotations
@@ -30,8 +31,8 @@ FIRST = 4  # first rays, through every receptor's square
 class EdgeRays:
     """The sums of `RayKernel.sums` over many rays per receptor, estimated from fewer rays.
 
-    kernel: follows the rays
-    sampling: of the receptors · rays: per receptor, at edges
+    kernel: kernel that follows the rays
+    sampling: sampling of the receptors · rays: number of rays for a receptor at an edge
     signals: contribution of a component to the signal of each type of receptor, (channel, component)
     noticed: largest difference between the signals of rays that count as equal
     """
@@ -50,8 +51,9 @@ class EdgeRays:
     def launch(self, launch: Launch) -> Callable[[], np.ndarray]:
         """Start rendering, and return a function that waits for the sums, flat (component, world, eye, receptor).
 
-        All sums are scaled to FIRST rays. launch: starts a frozen kernel; the worlds must not change before the sums
-        are read
+        All sums are scaled to FIRST rays per receptor. The worlds must not change before the sums are read.
+
+        launch: function that starts a frozen kernel
         """
         found = launch(self._coarse, self._first)
         return lambda: self._refined(found(), launch)
@@ -117,7 +119,8 @@ def _sums(components: list[Array], rays: int) -> tuple[Array, ...]:
 
 
 def edges_pay(resolution: tuple[int, int], rays: float) -> bool:
-    """Return whether the first rays, including those beyond the rim, are at most half of all rays.
+    """Return whether the first rays, including rays beyond the rim, are at most half of the rays without adaptive
+    sampling.
 
     With more first rays, nothing is saved if a few receptors need all rays.
     """

@@ -1,6 +1,6 @@
-"""Two ways to generate rays: from eyes that stand upright on one body, and from eyes that may be anywhere.
+"""Generation of rays from eyes that stand upright on one body, and from free eyes, which may be anywhere.
 
-Upright eyes read four floats per world, free eyes sixteen floats per eye.
+The kernel reads four floats per world for upright eyes, and sixteen floats per eye for free eyes.
 """
 
 from __future__ import annotations
@@ -23,7 +23,10 @@ EYE_ROWS = 4  # rows of four floats: the pupil, right, up and ahead
 
 @dataclass(frozen=True)
 class Lane:
-    """One lane of a kernel: a sample of an eye in a world. row: number of the eye among all eyes of all worlds."""
+    """One lane of a kernel: a sample of an eye in a world.
+
+    world, eye, sample: their numbers · row: number of the eye among all eyes of all worlds
+    """
 
     world: Array
     eye: Array
@@ -33,8 +36,11 @@ class Lane:
 
 @dataclass(frozen=True)
 class Directions:
-    """ways: directions of all samples, in fours, in the eyes' frames; of upright eyes in their body's, with cosines
-    origins, axes: pupils of upright eyes in their body's frame, and their axes, in fours; None for free eyes
+    """Directions of samples on the device, in rows of four floats.
+
+    ways: directions of all samples. For free eyes, they are in the eye's frame. For upright eyes, they are in the
+        body's frame, and the fourth float is the cosine of the angle to the eye's axis
+    origins, axes: pupils and axes of upright eyes in the body's frame; None for free eyes
     """
 
     ways: Array
@@ -55,7 +61,7 @@ class EyeRays(Protocol):
         """Return the directions of samples (ray, 3), given in an eye's frame."""
 
     def ray(self, rows: Array, along: Directions, lane: Lane, samples: Array) -> EyeRay:
-        """Return the ray of a lane, inside the kernel; samples: number of samples of an eye."""
+        """Return the ray of a lane, inside the kernel; rows: see `array` · samples: number of samples of an eye."""
 
 
 class UprightEyes:

@@ -1,6 +1,7 @@
-"""Rendering of all eyes in all worlds as one wavefront: one frozen kernel, with any tracer.
+"""Rendering of all eyes in all worlds as one wavefront, by one frozen kernel, with any tracer.
 
-Directions and wavelengths are fixed, so a call only uploads poses and launches the kernel that the first call recorded.
+Directions and wavelengths are fixed. A call therefore only uploads poses and launches the kernel that the first call
+recorded.
 """
 
 from __future__ import annotations
@@ -42,17 +43,17 @@ MOST_ENVS = 2**31 - 1
 class EyeRenderer:
     """A renderer of `n_envs` worlds of one scene with the same eyes.
 
-    scene: the model and its eyes · n_envs: number of worlds · fidelity: samples, depth layers and light; its bands are
-        the scene's
-    eye, mounts, model: of the scene
+    scene: the model and its eyes · n_envs: number of worlds
+    fidelity: samples, depth layers and light; its number of bands must be the scene's
+    eye, mounts, model: the scene's eye, mounts and model
     sensor: the sampled directions · tracer: the method of tracing rays, with its name, why, light and basis
     brightest: signal of a white surface that faces all directional lights at once
 
-    Warns (`sim.MirrorWarning`) once of features of the model that are not rendered, and of lamps with spectral lines
-    in too few bands.
+    One warning (`sim.MirrorWarning`) lists features of the model that are not rendered. Others name lamps with spectral
+    lines for which the eye has too few bands.
 
     Raises:
-        ValueError: less than one world, more rays than fit into memory, or a fidelity that the scene does not support.
+        ValueError: n_envs below 1, more rays than fit into memory, or a fidelity that the scene does not support.
     """
 
     def __init__(self, scene: PreparedScene, n_envs: int, fidelity: Fidelity) -> None:
@@ -89,7 +90,7 @@ class EyeRenderer:
 
     @property
     def _samples_per_receptor(self) -> float:
-        """Number of samples per receptor; behind a pupil it includes areas around the receptors' own."""
+        """Number of samples per receptor. Behind a pupil, it includes areas around the receptors' squares."""
         return len(self.sensor.directions) / float(np.prod(self.eye.resolution))
 
     def _check_memory(self, n_envs: int, samples_per_receptor: float) -> None:
@@ -123,11 +124,12 @@ class EyeRenderer:
     # --- signals and labels
 
     def signals(self, poses: Placed, light: np.ndarray | None = None) -> np.ndarray:
-        """Return noise-free photoreceptor signals, (env, eye, channel, height, width) float32:
-        a² sum_b weights[channel, b] radiance_b.
+        """Return noise-free photoreceptor signals, (env, eye, channel, height, width) float32: a² sum_b
+        weights[channel, b] radiance_b.
 
-        poses: of every world, after mj_forward or mj_step: its data, or arrays stacked over worlds; the data of a
-            single world need not be in a list; for built-in worlds, the state is also accepted
+        poses: poses of every world: a list of their MjData after mj_forward or mj_step, or `sim.Poses`, arrays stacked
+            over worlds. The MjData of a single world need not be in a list. For built-in worlds, a state is also
+            accepted
         light: factors of all lights of each world, (env, band); None: lights as in the model
 
         Raises:
@@ -139,14 +141,14 @@ class EyeRenderer:
     begin, begin_some = renamed("launch"), renamed("launch_some")
 
     def launch(self, poses: Placed, light: np.ndarray | None = None) -> PendingFrame:
-        """Start rendering. It runs asynchronously until the signals are waited for."""
+        """Start rendering in the background, and return a frame; its `wait` returns the same as `signals`."""
         factors = None if light is None else LightFactors.from_light(light, (self.n_envs, self.eye.bands))
         return self._launched(poses).then(lambda found: self._signals(found, factors))
 
     def launch_some(self, poses: Placed, worlds: np.ndarray, light: np.ndarray | None = None) -> PendingFrame:
-        """Start rendering only some of the worlds, (len(worlds), eye, channel, height, width).
+        """Start rendering only some of the worlds; the signals are (len(worlds), eye, channel, height, width).
 
-        A few worlds have their own buffers, so they can be rendered while a frame of all worlds is pending.
+        At most FEW worlds have their own buffers, so that they can be rendered while a frame of all worlds is pending.
         """
         if not len(worlds) <= FEW < self.n_envs:
             return self.launch(poses, light).then(lambda seen: seen[worlds])
@@ -221,7 +223,8 @@ class EyeRenderer:
 
     @property
     def recordings(self) -> int:
-        """Number of times that kernels were recorded: once per kernel in use, up to three times if meshes move."""
+        """Number of times that kernels were recorded: once per kernel in use, and up to three times per kernel if
+        meshes move."""
         edges = 0 if self._edges is None else self._edges.recordings
         labels = vars(self).get("labels")
         recorded = self._rays.n_recordings + self._sums.n_recordings + edges
@@ -230,7 +233,7 @@ class EyeRenderer:
     # --- kernels
 
     def _launched(self, poses: Placed, frozen: Any = None) -> PendingFrame:
-        """Launch the kernels for receptors' sums, or another frozen kernel, on these worlds."""
+        """Launch on these worlds the kernels that compute the receptors' sums, or another frozen kernel."""
         placed = self.scene.placed(poses)
         self.scene.check_poses(placed, self.n_envs)
 

@@ -1,4 +1,7 @@
-"""The fidelity with which a world is rendered for given eyes, and the reasons for it."""
+"""The fidelity with which a world is rendered for given eyes, and the reasons for it.
+
+A fidelity is chosen in four stages: bands, depth layers, light and samples.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +15,7 @@ from sim.eyes.eyes import Eyes
 from sim.tracing.lighting import ALL, DIRECT, LEVELS
 
 RAYS, AREAS, EDGES = SAMPLES = ("rays", "areas", "edges")
-MOST_RAYS = 1e7  # per receptor; larger numbers are mistakes, and their arithmetic overflows
+MOST_RAYS = 1e7  # per receptor; a larger number is a mistake, and calculations with it would overflow
 MOST_BANDS = 4096
 
 
@@ -20,8 +23,9 @@ MOST_BANDS = 4096
 class Level:
     """The level that was chosen for one stage, and the reason.
 
-    predicted_error: of a signal (root mean square); None if unknown. For the eyes' own bands it is a bound: the largest
-        error over measured reflectances and types of receptors, which may exceed any tolerance
+    stage, level: names of the stage and of the level · why: the reason
+    predicted_error: error of a signal (root mean square); None if unknown. For the eyes' own bands it is a bound: the
+        largest error over measured reflectances and types of receptors. This bound may exceed any tolerance
     """
 
     stage: str
@@ -34,19 +38,21 @@ class Level:
 class Fidelity:
     """Accuracy with which a world is rendered for given eyes. Printing it gives a table.
 
-    rays_per_receptor: average number of samples per receptor. Behind a pupil it may be below 1, since receptors share
-        rays and may share areas.
+    rays_per_receptor: average number of samples (rays or areas) per receptor. Behind a pupil it may be below 1, since
+        receptors share rays and may share areas.
     bands: number of spectral bands, used instead of the eye's own
     depth: distances for which the eye has a PSF
-    light: "direct"; "bounce", which adds light that was reflected twice; or, with areas only, "all" reflections
-    samples: "rays", "areas" or "edges". Areas divide each receptor's square into rays_per_receptor rectangles, and the
-        mean light in each is computed in closed form. Behind a pupil there are also rectangles around the receptors,
-        and receptors share larger ones if the number is below 1. Areas need an upright world. Edges are adaptive edge
-        sampling: a few rays per receptor, and rays_per_receptor where these differ. Edges need perfect lenses and
-        direct light. They serve user models and, on request, built-in worlds, for which "auto" never chooses them.
-    tolerance: error allowed to a receptor's signal (root mean square); None if nothing was chosen. In adaptive edge
-        sampling, rays whose signals agree within it count as equal.
-    levels: choice of each stage, with its reason
+    light: "direct": light of lamps that is reflected once; "bounce": also light that is reflected twice; "all": light
+        that is reflected any number of times, with samples="areas" only
+    samples: "rays", "areas" or "edges". With "areas", each receptor's square is divided into rays_per_receptor
+        rectangles, and the mean light in each of them is computed in closed form. Behind a pupil, there are also
+        rectangles around the receptors, and receptors share larger rectangles if rays_per_receptor is below 1. Areas
+        need an upright world. "edges" is adaptive edge sampling: four rays per receptor, and rays_per_receptor rays
+        where these differ. It needs a perfect lens and direct light. It is chosen automatically only for user models,
+        and used for built-in worlds only on request.
+    tolerance: allowed error of a receptor's signal (root mean square); None if nothing was chosen. In adaptive edge
+        sampling, rays whose signals differ by at most the tolerance count as equal.
+    levels: chosen level of each stage, with its reason
 
     Raises:
         ValueError: bands, rays_per_receptor or a tolerance that are not numbers or out of range, unknown light or

@@ -1,8 +1,8 @@
-"""Choice of the cheapest fidelity that receptor noise allows: bands, depth layers, light and samples.
+"""Choice of the cheapest fidelity that receptor noise allows, in four stages: bands, depth layers, light and samples.
 
-A brain cannot distinguish an error below half of the noise. Every stage has levels, starting with the cheapest. The
-cheapest level whose predicted error is allowed is taken, and stored with the reason. The available levels and their
-errors depend on the kind of scene (`world_fidelity`, `model_fidelity`). The choice between them does not.
+A brain cannot distinguish an error below half of the noise. Every stage has levels, ordered by cost. The cheapest level
+whose predicted error is allowed is taken, and stored with the reason. The available levels and their errors depend on
+the kind of scene (`world_fidelity`, `model_fidelity`). The rule by which a level is chosen does not.
 """
 
 from __future__ import annotations
@@ -18,15 +18,15 @@ from sim.render.fidelity import Fidelity, Level
 
 
 class FidelityWarning(UserWarning):
-    """No available level keeps the error within the tolerance."""
+    """Warning that no available level keeps the error within the tolerance."""
 
 
 @dataclass(frozen=True)
 class Samples:
-    """The choice of rays or areas.
+    """The chosen samples: rays, areas or adaptive edge sampling.
 
-    kind: "rays", "areas" or "edges" · light, level: chosen levels of light and of samples · number: per receptor
-    enough: whether the error is at most the allowed one
+    kind: "rays", "areas" or "edges" · light, level: chosen levels of light and of samples
+    number: number of samples per receptor · enough: whether the error is at most the allowed one
     """
 
     kind: str
@@ -37,13 +37,16 @@ class Samples:
 
     @property
     def error(self) -> float:
-        """Error by the samples and by the light that is left out."""
+        """Error that is due to the samples and to the light that is left out."""
         return math.hypot(self.light.predicted_error or 0, self.level.predicted_error or 0)
 
 
 @dataclass(frozen=True)
 class Allowed:
-    """Allowed error of the samples (root mean square), and the same if no light is left out."""
+    """Allowed error of the samples (root mean square).
+
+    error: if some light is left out, whose error is subtracted · without_light: if no light is left out
+    """
 
     error: float
     without_light: float
@@ -51,7 +54,7 @@ class Allowed:
 
 @dataclass(frozen=True)
 class Shares:
-    """Shares of the tolerance that the stages before the samples may use. Errors add up as squares, and the samples may
+    """Shares of the tolerance that the stages before the samples may use. Squares of errors add up, and the samples may
     use the rest."""
 
     bands: float
@@ -59,7 +62,10 @@ class Shares:
     light: float
 
     def left(self, allowed: float, has_layers: bool, light: float) -> Allowed:
-        """Return the rest of an allowed error for the samples; light: error by the light that is left out."""
+        """Return the rest of an allowed error, which the samples may use.
+
+        has_layers: whether the eye has depth layers · light: error by the light that is left out
+        """
         spent = self.bands**2 + (self.depth**2 if has_layers else 0)
         for_light = min(light / allowed, self.light) ** 2
         return Allowed(allowed * math.sqrt(1 - (spent + for_light)), allowed * math.sqrt(1 - spent))
@@ -68,8 +74,9 @@ class Shares:
 class Stages(Protocol):
     """Levels of fidelity that a scene offers, and their errors.
 
-    eye: its receptors' noise decides · allowed: error of a signal by all stages together (root mean square)
-    shares: of the allowed error; None: each stage is judged separately and may use all of it
+    eye: its receptor noise determines the allowed error
+    allowed: allowed error of a signal by all stages together (root mean square)
+    shares: shares of the allowed error; None: each stage may use all of it
     """
 
     eye: optics.Eye
@@ -80,13 +87,13 @@ class Stages(Protocol):
         """Return the eye's own bands, and their error."""
 
     def depth(self, allowed: float) -> tuple[DepthLayers, Level | None]:
-        """Return the layers for which the eye has a PSF, and their level, or None without a choice."""
+        """Return the depth layers for which the eye has a PSF, and their level; None without a choice of layers."""
 
     def light(self, depth: DepthLayers, allowed: float) -> Level:
-        """Return the light that is followed."""
+        """Return the level of light: which reflections are followed."""
 
     def samples(self, depth: DepthLayers, light: Level, allowed: Allowed) -> Samples:
-        """Return the number and kind of samples."""
+        """Return the kind and number of samples."""
 
 
 def cheapest(stages: Stages) -> Fidelity:
@@ -104,7 +111,7 @@ def cheapest(stages: Stages) -> Fidelity:
     levels = [level for level in (stages.bands(), depth_level, samples.light, samples.level) if level is not None]
     bands = stages.eye.bands
     found = Fidelity(samples.number, bands, depth, allowed, tuple(levels), samples.light.level, samples.kind)
-    # Only a bound of the bands' error is known, which may be far above the error.
+    # The bands are left out: only a bound of their error is known, which may be far above the error.
     _warn_if_worse(levels[1:], allowed, together=shares is not None)
     return found
 

@@ -1,4 +1,7 @@
-"""Stages of the choice of a fidelity for a world, each with its levels, starting with the cheapest, and a reason."""
+"""The first stages in the choice of a fidelity for a built-in world: bands, depth layers and light.
+
+Each stage has levels, ordered by cost. The cheapest level whose error is allowed is chosen, with a reason.
+"""
 
 from __future__ import annotations
 
@@ -16,11 +19,11 @@ from sim.scene.band_error import band_error, measured
 from sim.tracing.lighting import BOUNCE, DIRECT
 from sim.worlds.world import World
 
-# Chosen: factor on an error in a few random views, because agents' episodes have another error
-# (tests/sim/render/test_fidelity.py compares that error with the noise).
+# Chosen: safety factor for errors that are measured in a few random views, because the error in agents' episodes
+# differs (tests/sim/render/test_fidelity.py compares the latter with the noise).
 CAUTION = 1.2
-LAYERS = (1, 3, 5, 9)  # nodes of each are among those of the next
-NEAREST = 0.005  # chosen: quantile of the distances that counts as the nearest
+LAYERS = (1, 3, 5, 9)  # numbers of layers that are tried; the layers of each number are also layers of the next
+NEAREST = 0.005  # chosen: quantile of the visible distances that counts as the nearest distance
 
 
 def bands(eye: optics.Eye, allowed: float) -> tuple[int, Level]:
@@ -34,7 +37,7 @@ def bands(eye: optics.Eye, allowed: float) -> tuple[int, Level]:
 
 
 def own_bands(world: World, eye: optics.Eye) -> Level:
-    """Return the eye's own bands, with their error for measured reflectances; for RGB colours the error is unknown."""
+    """Return the eye's own bands, with their error for measured reflectances. For RGB colours, the error is unknown."""
     if not (spectra := measured(world.model, world.spectra)):
         return Level("bands", f"{eye.bands}", None, "the eyes' own")
     error = float(eye.throughput) * band_error(spectra, eye.receptors, eye.bands)
@@ -42,11 +45,13 @@ def own_bands(world: World, eye: optics.Eye) -> Level:
 
 
 def depth(trials: FidelityTrials, eye: optics.Eye, allowed: float) -> tuple[DepthLayers, Level]:
-    """Return one PSF for infinity if it is certainly enough, otherwise the fewest layers for random views of the world.
+    """Return one PSF for infinity if its error is certainly allowed, otherwise the fewest layers for random views of
+    the world.
 
-    Light from the distance z through the pupil's point p is shifted by f p/z from light from infinity. Averaged over a
-    disk of radius R, this is |Δx| + |Δy| = 8/(3π) f R/z. A square receptor's field moves by this share of its width,
-    which bounds the error of any scene up to white.
+    Light that comes from a point at the distance z and passes the pupil at p is shifted by f p/z, compared with light
+    from infinity. The mean of this shift over a disk of radius R is |Δx| + |Δy| = 8/(3π) f R/z. Relative to the width
+    of a square receptor, it is the share of the receptor's field that moves. This share bounds the error of any scene
+    up to white.
     """
     if eye.pupil is None:
         return ONE_PSF, Level("depth", str(ONE_PSF), 0.0, "a perfect lens does not blur")
@@ -70,8 +75,8 @@ def depth(trials: FidelityTrials, eye: optics.Eye, allowed: float) -> tuple[Dept
 def light(trials: FidelityTrials, sampling: EyeSampling, allowed: float) -> Level:
     """Return direct light if light that is reflected twice adds little, otherwise both.
 
-    The error by light that is reflected more often is estimated: it is as small relative to the light that is reflected
-    twice as that is relative to direct light.
+    In the second case, the error by light that is reflected more often is estimated. This light is assumed to have the
+    same ratio to light that is reflected twice as the latter has to direct light.
     """
     try:
         twice, direct = trials.reflected_twice(sampling)

@@ -1,9 +1,9 @@
 """Trials of sampling methods in views of a world, before any kernel is recorded.
 
-A trial renders some of an eye's receptors and compares their signals with signals of many more rays. Errors are taken
+A trial renders some of an eye's receptors and compares their signals with signals from many more rays. Errors are taken
 over two populations: all receptors in views from any place, and receptors that see an object in views with an object
-nearby. Objects decide how an episode ends, and most receptors see floor and walls, which would hide errors at objects.
-All draws have fixed seeds, so the same world and eyes give the same result.
+nearby. The second is separate because objects decide how an episode ends. Most receptors see floor and walls, and would
+hide errors at objects. All draws have fixed seeds, so the same world and eyes give the same result.
 """
 
 from __future__ import annotations
@@ -39,8 +39,8 @@ VIEWS = (12, 96)  # smallest and largest number of views in one trial
 FINER = 8  # smallest ratio of the reference's rays to the trial's
 TRUE = 4096  # smallest number of rays of a reference behind a pupil
 TRUE_AREA = (1024, 8192)  # smallest and largest number of rays per receptor in a reference for areas
-WEIGHTS = 2**23  # largest number of weights of a reference, unless it would not be finer
-ON_OBJECT = 0.02  # smallest share of a receptor's field that an object fills if the receptor sees it
+WEIGHTS = 2**23  # largest number of weights of a reference, unless it would then not be finer than the trial
+ON_OBJECT = 0.02  # share of a receptor's field: a receptor sees an object that fills more than this share
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ class Population:
     counted: np.ndarray
 
     def rms(self, error: np.ndarray) -> float:
-        """Return the root mean square of an error (view, channel, receptor) in the first views; 0 if nothing counts."""
+        """Return the root mean square of an error (view, channel, receptor) in the first views; 0 if none counts."""
         counted = np.broadcast_to(self.counted[: len(error), None], error.shape)
         return float(np.sqrt(np.mean(error[counted] ** 2))) if counted.any() else 0.0
 
@@ -90,7 +90,8 @@ class FidelityTrials:
         return [self._everywhere, Population(near, shares > ON_OBJECT)]
 
     def errors(self, sampling: EyeSampling, light: str = lighting.DIRECT) -> Callable[[float], float]:
-        """Return a function of rays per receptor: the signals' root mean square error, the larger of both populations'.
+        """Return a function from rays per receptor to the signals' root mean square error, the larger of the two
+        populations'.
 
         Raises:
             NoRaysError: a receptor has no rays, when the returned function is called.
@@ -128,7 +129,8 @@ class FidelityTrials:
         return True
 
     def area_errors(self, sampling: EyeSampling, light: str) -> Callable[[float], float]:
-        """Return the same error as a function of areas per receptor; it includes the noise of the reference."""
+        """Return a function from areas per receptor to the same error, which here includes the noise of the
+        reference."""
         true = self._truth(sampling)
         populations = self._populations(sampling)
         truths = [self._signals(true, sampling.depth, light, p.views, TRUE_RAYS) for p in populations]
@@ -144,16 +146,16 @@ class FidelityTrials:
         return error
 
     def may_share(self, sampling: EyeSampling, per_receptor: float) -> bool:
-        """Return whether receptors may share areas, with this number per receptor, without becoming copies."""
+        """Return whether receptors may share areas, with this number per receptor, without having identical signals."""
         return self._scene.may_share(sampling, per_receptor)
 
     def areas_seen(self, sampling: EyeSampling, per_receptor: float) -> float:
-        """Return the number of rendered areas per receptor; behind a pupil it includes areas around the receptors."""
+        """Return the number of rendered areas per receptor. Behind a pupil, it includes areas around the receptors."""
         n = len(self._scene.area_trial(sampling, per_receptor, self._receptors[:1]).directions)
         return n / float(np.prod(self._eyes.resolution)) if self._eye.pupil else float(n)
 
     def _truth(self, sampling: EyeSampling) -> Trial:
-        """Return the rays of the reference for areas; behind a pupil, rays that are drawn for these receptors."""
+        """Return the reference's rays for areas. Behind a pupil, the rays are drawn for these receptors only."""
         of_a_view = TRUE_RAYS // (VIEWS[1] // 2)
         if isinstance(sampling, BoxSampling):
             return sampling.trial(int(np.clip(of_a_view // len(self._receptors), *TRUE_AREA)), self._receptors)
@@ -169,11 +171,12 @@ class FidelityTrials:
         return _rms(all_ - twice)
 
     def reflected_twice(self, sampling: EyeSampling) -> tuple[float, float]:
-        """Return the root mean square of the signals by light that is reflected twice, and by direct light, for the
-        population with more of the former.
+        """Return root mean squares of the signals by light that is reflected twice, and by direct light.
+
+        They are for the population in which the former is larger.
 
         Raises:
-            ValueError: it cannot be followed.
+            ValueError: light that is reflected twice cannot be followed.
         """
         trial = sampling.trial(TRUE / np.prod(self._eyes.resolution), self._receptors)
         found = []
@@ -210,7 +213,7 @@ class FidelityTrials:
     def _signals(
         self, trial: Trial, depth: DepthLayers, light: str, views: RandomViews | None = None, most: int = RAYS
     ) -> np.ndarray:
-        """Return signals (view, channel, receptor) in the views that `most` rays allow."""
+        """Return signals (view, channel, receptor) in the first views; most: rays, which limit the number of views."""
         rays = len(trial.directions)
         views = (views or self._views).take(int(np.clip(most // rays, *VIEWS)))
         if trial.extent:
@@ -256,8 +259,8 @@ class FidelityTrials:
         return tracer.body_light(place, [_points(b, tracer.places) for b in bodies], tracer.inputs)
 
     def _trace(self, views: RandomViews, trial: Trial, light: str) -> tuple[list[Array], Array]:
-        """Return the components of light along a trial's rays of each view's eye, and the distance to its source along
-        the eye's axis [m]: Dr.Jit, flat (view, ray)."""
+        """Return the components of light along a trial's rays of each view's eye, and the distance to the visible
+        surface along the eye's axis [m]: Dr.Jit, flat (view, ray)."""
         origins, world = views.in_agents(self._eyes, trial.directions)
         rays, tracer = len(trial.directions), self._scene.tracers.tracer_for(light)
         with variant(self._scene.variant):

@@ -62,10 +62,10 @@ class Labels:
         return np.concatenate([scene.movers.geoms, geoms])[found].astype(np.int32)
 
     def flow(self, poses: Placed, later: Placed) -> np.ndarray:
-        """Return the optic flow from one moment to another: the motion on the retina of the point that each receptor's
-        centre sees, to the right and down [receptors].
+        """Return the optic flow from one moment to another, to the right and down [receptors].
 
-        (env, eye, 2, height, width) float32; NaN without a hit, or if the point is then not in front of the eye
+        It is the motion on the retina of the point that each receptor's centre sees: (env, eye, 2, height, width)
+        float32. It is NaN without a hit, or if the point is not in front of the eye at the later moment.
         """
         moments = self.scene.placed(poses), self.scene.placed(later)
         self.scene.check_poses(moments[1], self.n_envs)

@@ -1,4 +1,4 @@
-"""Factors of all lights in each world."""
+"""Factors by which all lights of each world are multiplied."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 @dataclass(frozen=True)
 class LightFactors:
-    """bands: a factor for each band in each world, (env, band) float32"""
+    """Factors by which all lights of each world are multiplied. bands: one per band and world, (env, band) float32."""
 
     bands: np.ndarray
 

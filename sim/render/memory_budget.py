@@ -11,10 +11,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 INDICES = 2**32  # elements of one Dr.Jit array
-RAY_BYTES = 64  # direction and place of a ray, and the numbers from which they are computed
+RAY_BYTES = 64  # direction and origin of a ray, and the numbers from which they are computed
 GIB = 2**30
 CGROUPS = Path("/sys/fs/cgroup")
-# Control groups of versions 2 and 1: limit, use, statistics, and in these the prefix of entries for files' pages.
+# Files of control groups, version 2 and version 1: limit, usage and statistics. The last entry is the prefix of cached
+# files in the statistics.
 _GROUPS = (
     ("memory.max", "memory.current", "memory.stat", ""),
     ("memory/memory.limit_in_bytes", "memory/memory.usage_in_bytes", "memory/memory.stat", "total_"),
@@ -25,7 +26,8 @@ _GROUPS = (
 class Demand:
     """The least memory that rendering needs.
 
-    rays_per_receptor · worlds · eyes: of one agent · resolution: receptors (height, width) of an eye
+    rays_per_receptor · worlds: number of worlds · eyes: number of eyes of one agent
+    resolution: receptors (height, width) of an eye
     planes: components of light times depth layers, along every ray
     weights: planes of weights behind a pupil (bands times depth layers); 0 without a pupil
     """
@@ -105,7 +107,7 @@ def _of_container(root: Path) -> float:
 
 
 def _of_files(statistics: Path, prefix: str) -> int:
-    """Return the bytes of files' pages in use, which the system frees when memory is needed."""
+    """Return the bytes of cached files, which the system frees when memory is needed."""
     try:
         lines = [line.split() for line in statistics.read_text("ascii").splitlines()]
         return sum(int(size) for name, size in lines if name in (f"{prefix}active_file", f"{prefix}inactive_file"))

@@ -1,8 +1,8 @@
 """Choice of the fewest rays that receptor noise allows on a user model, from trials at given moments.
 
-Each moment is rendered with increasing numbers of rays, and with many rays as a reference. A receptor with a uniform
-field needs only one ray. Most receptors may have one, and they would hide the error of the others. The error is
-therefore taken over the receptors for which one ray is not enough.
+A moment is a set of poses. Each moment is rendered with increasing numbers of rays, and with many rays as a reference.
+A receptor with a uniform field needs only one ray. If most receptors have a uniform field, they would hide the error of
+the others. The error is therefore computed only over receptors for which the fewest rays are not enough.
 """
 
 from __future__ import annotations
@@ -32,18 +32,20 @@ from sim.scene.poses import Poses
 from sim.tracing import lighting
 from sim.tracing.model_tracer import ModelTracer
 
-# Rays per receptor that are tried, and those of the reference. Behind a pupil all receptors share all rays.
+# Rays per receptor that are tried, and rays per receptor of the reference, for perfect lenses and behind a pupil, where
+# all receptors share all rays.
 PERFECT, PERFECT_TRUTH = (1, 2, 4, 8, 16, 32, 64, 128, 256), 1024
 SHARED, SHARED_TRUTH = (0.25, 0.5, 1, 2, 4, 8, 16), 64
 AUTO, FOLLOWED = "auto", (lighting.DIRECT, lighting.BOUNCE)
-SPLIT = 0.1  # share of the allowed error: a receptor with a larger error for the fewest rays has no uniform field
+# Share of the allowed error; a receptor whose error with the fewest rays is larger does not have a uniform field.
+SPLIT = 0.1
 
 
 @dataclass(frozen=True)
 class Trials:
     """Errors of signals over the receptors without a uniform field (root mean square), by rays per receptor.
 
-    share: of these receptors
+    share: share of all receptors that do not have a uniform field
     """
 
     errors: Mapping[float, float]
@@ -64,15 +66,16 @@ def choose_model_fidelity(
 ) -> Fidelity:
     """Return the fidelity with the fewest rays for `ModelRenderer` whose error at these poses is within the tolerance.
 
-    A FidelityWarning states by how much the tolerance is exceeded if there is none. Bands are the eye's own.
+    If there is none, a FidelityWarning states by how much the tolerance is exceeded. Bands are the eye's own.
 
-    poses: moments that represent the later views
-    tolerance: of a signal (root mean square), over receptors without a uniform field; None: half of the receptors'
-        noise, but at least LEAST_TOLERANCE of the signal of white behind the eye's pupil
-
+    model, eye, mounts: see `ModelRenderer`
+    poses: poses at moments that represent the later views
+    tolerance: allowed error of a signal (root mean square), over receptors without a uniform field; None: half of the
+        receptors' noise, but at least `sim.eyes.allowed_error.LEAST_TOLERANCE` of the signal of white behind the eye's
+        pupil
     groups, spectra, varied: see `ModelRenderer`
-    light: the part that is followed, "direct" or "bounce"; "auto": "bounce" if the error by direct light alone exceeds
-        the tolerance at these moments, over receptors that bounced light reaches
+    light: light that is followed, "direct" or "bounce"; "auto": "bounce" if direct light alone has an error above the
+        tolerance at these moments, over receptors that bounced light reaches
 
     Raises:
         ValueError: a tolerance that is not positive, another light, or an argument that ModelRenderer refuses.
@@ -142,7 +145,7 @@ class ModelStages:
 
 
 def _light(asked: str, truth: Callable[[str], np.ndarray], allowed: float) -> Level:
-    """Return the light that is followed; truth: light -> signals with very many rays."""
+    """Return the level of light; truth: function from the light that is followed to signals with many rays."""
     if asked != AUTO:
         return Level("light", asked, None, "as requested")
     off = np.abs(truth(lighting.BOUNCE) - truth(lighting.DIRECT)).max(axis=2)
@@ -165,7 +168,7 @@ def _with(rays: float, eye: optics.Eye, allowed: float, light: str) -> Fidelity:
 def tried(seen: Callable[[float], np.ndarray], ladder: Sequence[float], truth: float, allowed: float) -> Trials:
     """Return the errors of increasing numbers of rays, compared with `truth` rays, up to the first allowed error.
 
-    seen: rays per receptor -> signals (env, eye, channel, height, width)
+    seen: function from rays per receptor to signals (env, eye, channel, height, width) · ladder: numbers of rays to try
     """
     right = seen(truth)
     errors: dict[float, float] = {}

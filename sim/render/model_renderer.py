@@ -26,27 +26,28 @@ class ModelRenderer(EyeRenderer):
     """A renderer of many worlds of one model, with eyes of one kind that are mounted anywhere on it.
 
     model: an MjModel, or a source that compiles to one (`sim.mirror`)
-    eye: its optics and retina; the fidelity's bands replace its bands
+    eye: optics and retina of all eyes; the fidelity's bands replace its bands
     mounts: places of the eyes on the model
     n_envs: number of worlds
-    fidelity: rays per receptor and bands; None: 16 rays in the direct light of lamps and the eye's own bands, 4 by
+    fidelity: samples, bands and light. None: 16 rays per receptor, direct light of lamps, and the eye's own bands, 4 by
         default. light="bounce" adds light that is reflected twice, and the light of the sky and of glowing geoms.
-        samples="edges" traces all rays only where a few of them differ, in direct light. samples="areas" uses closed
-        forms instead of rays, if the model has them
+        samples="edges" traces all rays only where the first four differ; it needs direct light. samples="areas" uses
+        closed forms instead of rays, if the model has them
     groups, spectra: see `sim.mirror`
-    varied: names of geoms whose size or colour may differ between worlds; `poses` contain these, from the worlds'
-        mjModels. {"floor": ("sand", "grass")} also lists materials that a geom may have, which replace other colours
+    varied: names of geoms whose size or colour may differ between worlds; poses contain the sizes and colours in the
+        worlds' mjModels. A mapping such as {"floor": ("sand", "grass")} also lists materials that a geom may have. The
+        colour of such a geom differs only with its material
     tracer: "mitsuba" (any shapes), "closed_form" (upright walls, a floor and spheres), or "auto": the closed form if
         the model has one. The tracer in use is in `.tracer.name`
     brightest: signal of a white surface that faces all directional lights at once
 
-    Warns (`sim.MirrorWarning`) once of features of the model that are not rendered, and of lamps with spectral lines
-    in too few bands.
+    One warning (`sim.MirrorWarning`) lists features of the model that are not rendered. Others name lamps with spectral
+    lines for which the eye has too few bands.
 
     Raises:
-        ValueError: a bad argument, a mount on a part that the model lacks, an eye with an eccentricity, an eye inside a
-            sphere, a capsule, another primitive or a closed mesh in the model's reference pose, a fidelity that the
-            model does not support, or more rays than fit into memory.
+        ValueError: an invalid argument, a mount on a part that the model lacks, or an eye with an eccentricity. An eye
+            must not be inside a sphere, a capsule, another primitive or a closed mesh in the model's reference pose.
+            The model must support the fidelity, and the rays must fit into memory.
         optics.AccuracyError: a pupil whose light spreads too far.
     """
 

@@ -29,8 +29,8 @@ def flow_between(
 
     It is NaN without a hit, or if the point is not in front of the eye at the second moment.
 
-    depth, ids: of the point that each receptor's centre sees at the first moment, (world, eye, height, width)
-    moments: poses at both moments · frames: of the eyes at both moments
+    depth, ids: depth and geom that each receptor's centre sees at the first moment, (world, eye, height, width)
+    moments: poses at both moments · frames: eyes' frames at both moments
     """
     worlds, eyes = depth.shape[:2]
     geoms, far = ids.reshape(worlds, eyes, -1), depth.reshape(worlds, eyes, -1, 1)
@@ -49,7 +49,7 @@ def flow_between(
 
 
 def _carried(points: np.ndarray, geoms: np.ndarray, moments: tuple[Poses, Poses]) -> np.ndarray:
-    """Return the later places of points (world, eye, receptor, 3) on these geoms."""
+    """Return the positions, at the second moment, of points (world, eye, receptor, 3) that are fixed to these geoms."""
     world = np.arange(len(points))[:, None, None]
     (old_place, old_turn), (place, turn) = (
         (poses.geom_xpos[world, geoms], poses.geom_xmat[world, geoms]) for poses in moments

@@ -1,8 +1,8 @@
 """Frames that are launched early and read late, so that other work runs in the meantime.
 
 A kernel reads its inputs from a buffer that the next launch overwrites. Each launcher has a FrameSlot, which reads the
-pending frame before the next one is launched. Each frame therefore keeps its own values, in whatever order frames are
-waited for.
+pending frame before the next one is launched. Each frame therefore keeps its own values, whatever the order in which
+frames are waited for.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import numpy as np
 class PendingFrame:
     """Values that are being computed.
 
-    read: waits for the device and returns them
+    read: function that waits for the device and returns the values
     """
 
     def __init__(self, read: Callable[[], np.ndarray]) -> None:
@@ -33,7 +33,7 @@ class PendingFrame:
         """Return the values and hand them over to the caller, who may write into them.
 
         Raises:
-            RuntimeError: they were handed over before.
+            RuntimeError: the values were handed over before.
         """
         if self._taken:
             raise RuntimeError("this frame was waited for before, and its values may have been changed: launch another")
@@ -43,7 +43,7 @@ class PendingFrame:
         return values
 
     def then(self, what: Callable[[np.ndarray], np.ndarray]) -> PendingFrame:
-        """Return a frame that is computed from this one's values when it is waited for."""
+        """Return a frame whose values are computed from the values of this frame when they are waited for."""
         return PendingFrame(lambda: what(self.wait()))
 
 

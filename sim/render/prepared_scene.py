@@ -34,7 +34,7 @@ Placed: TypeAlias = Poses | Sequence[mujoco.MjData] | mujoco.MjData | Any  # pos
 class PreparedScene:
     """A model in the spectral bands of given eyes. Nothing in it depends on the fidelity, except for the bands.
 
-    model · eye: its optics and retina, with its own bands · mounts: places of the eyes on the model
+    model: the MuJoCo model · eye: optics and retina, with its own bands · mounts: places of the eyes on the model
     spectra, groups: see `sim.mirror` · varied: see `sim.ModelRenderer`
     tracer: method of tracing rays, see `sim.BatchedRenderer`
     stand: the body that the eyes are fixed to, if they stand upright on one; None: derived from the mounts
@@ -80,7 +80,7 @@ class PreparedScene:
         return self.scene.variant
 
     def tell(self, light: str) -> None:
-        """Warn once of features that are not rendered if this part of the light is followed."""
+        """Warn of features that are not rendered if this light is followed. Later calls do not warn again."""
         if not self._is_told:
             self._is_told = True
             self.scene.tell_what_is_missing(light)
@@ -93,10 +93,10 @@ class PreparedScene:
 
     @property
     def upright(self) -> UprightScene:
-        """The closed form.
+        """The closed form of the scene.
 
         Raises:
-            NoClosedForm: there is none.
+            NoClosedForm: a scene without a closed form.
         """
         if isinstance(self.tracers.upright, UprightScene):
             return self.tracers.upright
@@ -111,15 +111,15 @@ class PreparedScene:
         return self.tracers.areas(light)
 
     def area_sensor(self, sampling: EyeSampling, per_receptor: float) -> Sensor:
-        """Return the sensor with this number of areas per receptor."""
+        """Return a sensor with this number of areas per receptor."""
         return sampling.areas(per_receptor, in_rows=self._in_rows)
 
     def area_trial(self, sampling: EyeSampling, per_receptor: float, receptors: np.ndarray) -> Trial:
-        """Return the part of this sensor for these receptors."""
+        """Return the part of an area sensor, with this number of areas per receptor, that these receptors need."""
         return sampling.area_trial(per_receptor, receptors, in_rows=self._in_rows)
 
     def may_share(self, sampling: EyeSampling, per_receptor: float) -> bool:
-        """Return whether areas may be larger than receptors' squares, with this number per receptor."""
+        """Return whether areas may be larger than a receptor's square, with this number of areas per receptor."""
         return isinstance(sampling, FieldSampling) and sampling.may_share(per_receptor, in_rows=self._in_rows)
 
     @property
@@ -132,7 +132,7 @@ class PreparedScene:
     def sampling(self, depth: DepthLayers, tolerance: float | None = None) -> EyeSampling:
         """Return the sampling of the eye with these depth layers; its PSFs are computed once, on first use.
 
-        tolerance: error allowed to a signal, see `sim.eyes.allowed_error`
+        tolerance: allowed error of a signal, see `sim.eyes.allowed_error`
 
         Raises:
             optics.AccuracyError: a pupil whose light spreads too far to be computed.

@@ -11,7 +11,8 @@ from sim.eyes.eyes import EYE_HEIGHT, Eyes, eye_positions, eye_rotations
 from sim.worlds.layout import CLEARANCE
 from sim.worlds.world import World
 
-# Largest distance from a cell's centre along either axis [m]: less than half a cell minus the agent's body, 1 - 0.2.
+# Largest distance from a cell's centre along either axis [m]: less than half a cell minus the radius of the agent's
+# body, 1 - 0.2.
 STRAY = 0.75
 NEAR = (0.8, 8.0)  # distance from an object's centre [m] at which its appearance decides the agents' actions
 TRIES = 100
@@ -21,7 +22,8 @@ TRIES = 100
 class RandomViews:
     """Views of single eyes; the first axis is the view.
 
-    position: of the agent [m], (n, 2) · heading [rad], (n,) · objects: centres [m], (n, k, 3) · eye: its number, (n,)
+    position: position of the agent [m], (n, 2) · heading: [rad], (n,) · objects: centres [m], (n, k, 3)
+    eye: number of the eye that sees the view, (n,)
     """
 
     position: np.ndarray
@@ -42,7 +44,10 @@ class RandomViews:
         return np.column_stack([self.position, np.full(len(self), EYE_HEIGHT)])
 
     def in_agents(self, eyes: Eyes, directions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the eyes' positions [m], (n, 3), and directions (r, 3) of an eye's frame, (n, r, 3), in the world."""
+        """Return the eyes' positions [m], (n, 3), and directions, (n, r, 3), in the world.
+
+        directions: in an eye's frame, (r, 3)
+        """
         azimuths = eyes.azimuths()
         cos, sin = np.cos(self.heading), np.sin(self.heading)
         zero, one = np.zeros_like(cos), np.ones_like(cos)
@@ -53,8 +58,8 @@ class RandomViews:
 
 
 def random_views(world: World, eyes: Eyes, n: int) -> RandomViews:
-    """Return views of agents near cells where agents or objects may start, in any direction; objects are on their own
-    cells."""
+    """Return views in any direction, of agents near cells in which agents or objects may start. Objects are on cells in
+    which objects may start."""
     rng = np.random.default_rng(0)
     cells, objects = _cells(world), _objects(world, n, rng)
     position = np.empty((n, 2))
@@ -115,7 +120,7 @@ def _stray(rng: np.random.Generator) -> np.ndarray:
 
 
 def _clear_of(objects: np.ndarray, draw: Callable[[], np.ndarray], clearance: float = CLEARANCE) -> np.ndarray:
-    """Return the first of at most TRIES drawn places that is clear of objects."""
+    """Return the first drawn place that is clear of objects, or the last of TRIES drawn places."""
     place = np.zeros(2)
     for _ in range(TRIES):
         place = draw()

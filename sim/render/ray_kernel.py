@@ -31,9 +31,9 @@ SECOND = 3  # seed of the samples for a second reflection
 class KernelInputs:
     """Inputs of a kernel that are the same in every call.
 
-    lanes: their numbers · sizes: numbers of samples of an eye, of eyes of a world, and of lanes
-    along: directions of the samples · tables: the tracer's
-    bounces: samples for the directions of bounced light, four numbers each; None: it is not followed
+    lanes: numbers of the lanes · sizes: number of samples of an eye, number of eyes of a world, and number of lanes
+    along: directions of the samples · tables: the tracer's inputs
+    bounces: four numbers per sample, for the directions of bounced light; None: bounced light is not followed
     """
 
     lanes: Array
@@ -52,7 +52,7 @@ class Frame:
 
 
 class Moving:
-    """Buffers of all worlds that a kernel reads: the only inputs that change."""
+    """Buffers of all worlds that a kernel reads. No other inputs change."""
 
     def __init__(self, eyes: EyeRays, things: Buffers) -> None:
         self._eyes, self._things = eyes, things
@@ -68,9 +68,9 @@ class Moving:
 
 
 class RayKernel:
-    """A kernel that follows rays. Its body is traced once; only arrays that are passed to it may change.
+    """A kernel that follows rays. Its body is recorded once; only arrays that are passed to it may change.
 
-    tracer: intersects rays · eyes: generate rays · n_envs, n_eyes: numbers of worlds and eyes
+    tracer: intersects rays · eyes: generate rays · n_envs, n_eyes: numbers of worlds, and of eyes in each world
     depth: layers among which light is divided
     """
 
@@ -80,8 +80,8 @@ class RayKernel:
     def inputs(self, ways: np.ndarray, bounces: np.ndarray | None = None) -> KernelInputs:
         """Return the inputs for these samples (ray, 3) of every eye.
 
-        They are inputs and not constants, so that eyes of any resolution and field of view, in any number of worlds,
-        share a kernel.
+        The samples are inputs and not constants, so that eyes of any resolution and field of view, in any number of
+        worlds, share a kernel.
         """
         lanes = self.n_envs * self.n_eyes * len(ways)
         more = None

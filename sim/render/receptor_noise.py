@@ -1,9 +1,9 @@
 """Receptor noise for all worlds at once: standard normal numbers by Philox, in one frozen kernel.
 
 A counter-based generator (Salmon et al. 2011) needs only a key per world and the number of drawn frames as its state. A
-world's noise therefore depends on its own seed and history, and not on other worlds.
+world's noise therefore depends on the world's own seed and history, and not on other worlds.
 
-Images of a single eye get their noise from `optics.eye.photoreceptor`, which counts photons one by one. Both kinds of
+Images of a single eye get their noise from `optics.eye.photoreceptor`, which draws numbers of photons. Both kinds of
 noise have the same mean, variance and third moment.
 """
 
@@ -27,13 +27,13 @@ from sim.scene.frozen_kernels import garbage_kept
 from sim.scene.variant import variant
 
 PER_DRAW = 4  # normal numbers from one evaluation of Philox4x32
-FEW = 8  # worlds of the narrower kernel, which serves a few of them
+FEW = 8  # width of a second kernel, for draws in at most this number of worlds
 
 
 class Normals:
-    """Standard normal numbers, `shape` of them per world and frame.
+    """Standard normal numbers, an array of shape `shape` per world and frame.
 
-    keys: one per world, (n,) uint64 · shape: of one world's receptors
+    keys: one per world, (n,) uint64 · shape: shape of one world's receptors
     """
 
     def __init__(self, keys: np.ndarray, shape: tuple[int, ...]) -> None:
@@ -48,7 +48,7 @@ class Normals:
 
     @property
     def place(self) -> np.ndarray:
-        """Keys and numbers of drawn frames, (n, 2) uint64: the state of every world's generator."""
+        """State of every world's generator: its key and its number of drawn frames, (n, 2) uint64."""
         return np.stack([self._keys, self._frames.astype(np.uint64)], axis=1)
 
     def go_on_from(self, place: np.ndarray) -> None:

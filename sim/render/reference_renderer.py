@@ -1,6 +1,6 @@
 """A slow reference for the fast renderer: Mitsuba's own integrators, and the convolution of `optics`.
 
-It shares the world's model and the eyes' places with the batched renderer, but none of the computation of light.
+It uses the same world model and the same places of the eyes as the batched renderer, but computes light independently.
 """
 
 from __future__ import annotations
@@ -27,19 +27,19 @@ class ReferenceRenderer:
     """A renderer of one eye at a time: a path-traced image on the tangent plane, then `Eye.see`.
 
     world, eyes: as in `sim.BatchedRenderer`
-    integrator: of Mitsuba: "path", "direct", or a description, {"type": "path", "max_depth": 3}
+    integrator: Mitsuba's integrator: "path", "direct", or a description, {"type": "path", "max_depth": 3}
     spp: samples per cell of an image
-    samples_per_receptor: cells along a receptor's side; None: 4 behind a pupil, more for narrow rhabdoms, 1 for the
-        perfect lens (pixels)
+    samples_per_receptor: cells along a receptor's side; None: 1 for a perfect lens (cells are pixels), 4 behind a
+        pupil, more for narrow rhabdoms
     depths: nearest and farthest distance [m] between which the PSF follows the scene's depth; None: all light is
         blurred like light from infinity
     depth_layers: number of kernels between these distances, or "auto"
-    sampler: of Mitsuba: "multijitter" for less noise
+    sampler: Mitsuba's sampler: "independent", or "multijitter" for less noise
     variant: spectral variant of Mitsuba; None: the device's; scalar_spectral runs without LLVM
-    seed: of the samples; may be changed between images
+    seed: seed of the samples; the attribute may be changed between images
 
     Raises:
-        ValueError: a bad argument.
+        ValueError: an invalid argument.
         optics.AccuracyError: a pupil whose light spreads too far.
     """
 
@@ -83,7 +83,8 @@ class ReferenceRenderer:
         return np.array([[self._picture(view) for view in self._views(state, i)] for i in range(state.n)])
 
     def radiance(self, state: WorldState) -> np.ndarray:
-        """Return the same in the batched renderer's shape, (env, eye, ray, band): an image's cells, row by row."""
+        """Return the spectral radiance in the batched renderer's shape, (env, eye, ray, band). Rays are an image's
+        cells, row by row."""
         pictures = self.pictures(state)
         return np.moveaxis(pictures.reshape(*pictures.shape[:3], -1), 2, 3)
 

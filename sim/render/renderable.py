@@ -1,4 +1,4 @@
-"""A check of a fidelity against the eye that it is for."""
+"""A check whether a fidelity fits the eye that it is used for."""
 
 from __future__ import annotations
 

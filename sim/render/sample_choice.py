@@ -17,14 +17,15 @@ from sim.tracing.lighting import ALL, BOUNCE
 # Numbers of rays that are tried, in steps of about √2, so that few more rays are traced than needed.
 PERFECT_LENS_RAYS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128, 192, 256)
 PUPIL_RAYS = (*(2.0**k * (1 + half / 2) for k in range(-4, 6) for half in (0, 1)), 64.0)
-FEW_RAYS = 1  # per receptor, behind a pupil: if this number is enough, areas are not tried
+FEW_RAYS = 1  # rays per receptor behind a pupil; if they are enough, areas are not tried
 NUMBERS_OF_AREAS = (1, 2, 4, 6, 9, 12, 16, 20, 25, 30)
-SHARED_AREAS = (4 / 9, 1 / 4, 1 / 9)  # shared by several receptors: 1.5, two and three receptors wide
-# Cost of an area in rays (docs/measurements/rendering.md). If fewer rays than this are enough, rays are taken. Behind a
-# pupil the difference is smaller, because the kernel spreads the light of either among receptors.
+SHARED_AREAS = (4 / 9, 1 / 4, 1 / 9)  # areas per receptor if areas are shared: they are 1.5, 2 and 3 receptors wide
+# Cost of an area, in rays (docs/measurements/rendering.md). If fewer rays than this are enough, rays are taken. Behind
+# a pupil, the difference is smaller, because rays and areas have the same additional cost: their light is distributed
+# among receptors.
 PERFECT_LENS_AREA, PUPIL_AREA = 3, 1.6
-PUPIL_AREA_IN_ALL_LIGHT = 2  # cost in rays with a bounce
-HARDLY_MORE = 1.1  # times the smallest error: going below this is not worth several times the samples
+PUPIL_AREA_IN_ALL_LIGHT = 2  # cost of an area with all light, in rays with a bounce
+HARDLY_MORE = 1.1  # times the smallest error: a smaller error is not worth several times the samples
 
 
 def fewest_samples(trials: FidelityTrials, sampling: EyeSampling, light: Level, allowed: Allowed) -> Samples:
@@ -64,7 +65,7 @@ def _areas(
 ) -> Samples | None:
     """Return the fewest areas whose error is allowed, or None if area sampling is not possible in the world.
 
-    shared: numbers below one, in decreasing order, that are tried if one is enough
+    shared: numbers of areas per receptor below one, in decreasing order, which are tried if one area is enough
     """
     if not trials.have_areas(*((BOUNCE, ALL) if light.level == BOUNCE else (light.level,))):
         return None
@@ -86,8 +87,8 @@ def _fewest(
 ) -> tuple[float, Level, bool]:
     """Return the lowest number of samples whose error is allowed, its level, and whether it is accurate enough.
 
-    If no error is allowed, it is the lowest number whose error is close to the smallest. Errors are assumed to fall at
-    most like 1/n, and numbers that would be too low by this rule are skipped.
+    If no error is allowed, it is the lowest number whose error is close to the smallest error. Errors are assumed to
+    fall at most like 1/n. Numbers that are too low by this rule are skipped.
     """
     at = 0
     tried: dict[float, float] = {}

@@ -16,7 +16,7 @@ from sim.render.sample_choice import fewest_samples
 from sim.render.world_scene import WorldScene
 from sim.worlds.world import World
 
-SHARES = Shares(bands=0.35, depth=0.35, light=0.5)  # chosen; 0.71 of the tolerance is left for samples
+SHARES = Shares(bands=0.35, depth=0.35, light=0.5)  # chosen; 0.71 of the tolerance remains for samples
 
 
 def choose_fidelity(
@@ -24,13 +24,14 @@ def choose_fidelity(
 ) -> Fidelity:
     """Return the cheapest fidelity whose predicted error is within the tolerance.
 
-    A FidelityWarning states by how much the tolerance is exceeded if there is none.
+    If there is none, a FidelityWarning states by how much the tolerance is exceeded.
 
-    tolerance: of a receptor's signal (root mean square), over all receptors and over receptors that see a nearby
-        object; None: half of the receptors' noise, but at least LEAST_TOLERANCE of the signal of white behind the
-        eyes' pupil
-    bands: "auto": the fewest for scenes of any colours; "own": the eyes' own, as in environments
-    tracer: of the trials, see `sim.BatchedRenderer`
+    world, eyes: the world, and the eyes of every agent in it
+    tolerance: allowed error of a receptor's signal (root mean square), both over all receptors and over receptors that
+        see a nearby object; None: half of the receptors' noise, but at least `sim.eyes.allowed_error.LEAST_TOLERANCE`
+        of the signal of white behind the eyes' pupil
+    bands: "auto": the fewest that are accurate for scenes of any colours; "own": the eyes' own, as in environments
+    tracer: tracer for the trials, see `sim.BatchedRenderer`
 
     Raises:
         ValueError: a tolerance that is not positive, unknown bands, or a world that BatchedRenderer refuses.
@@ -53,7 +54,7 @@ def chosen_fidelity(scene: WorldScene, tolerance: float | None = None) -> Fideli
 
 
 class WorldStages:
-    """Levels that a built-in world offers, tried at random views; see `Stages`."""
+    """Levels that a built-in world offers, tried in random views; see `Stages`."""
 
     shares: Shares | None = SHARES
 

@@ -21,7 +21,7 @@ class WorldScene(PreparedScene):
     """A world and the eyes of every agent in it.
 
     world: geometry, materials and lights
-    eyes: of every agent, with their own bands
+    eyes: the eyes of every agent, with their own bands
     tracer: method of tracing rays, see `sim.BatchedRenderer`
 
     Raises:
@@ -40,11 +40,11 @@ class WorldScene(PreparedScene):
         self._turns = self._reference.poses.xmat[0, bodies]
 
     def placed(self, poses: Placed | WorldState) -> Poses:
-        """Return the poses as arrays; also accepts a state."""
+        """Return the poses as arrays; a state is also accepted."""
         return self.poses(poses) if isinstance(poses, WorldState) else super().placed(poses)
 
     def poses(self, state: WorldState) -> MovedBodies:
-        """Return the poses of a state's worlds."""
+        """Return the poses of all worlds of a state."""
         return self.poses_at(state.position, state.heading, state.objects)
 
     def poses_at(self, position: np.ndarray, heading: np.ndarray, objects: np.ndarray) -> MovedBodies:

@@ -15,19 +15,19 @@ sky            the skybox as light from infinity
 pose_snapshot  a copy of all poses at one moment
 cameras        cameras as sensors
 rays           radiance and first hits along a sensor's rays
-inventory      features without a counterpart in the scene, in words
+inventory      messages about features without a counterpart in the scene
 color          sRGB and linear light
 device_arrays  aligned arrays for kernels
 variant        Mitsuba's variant during a call
 poses          Poses: poses, sizes and colours in all worlds
 moved_bodies   poses of models in which only a few bodies move
 variation      ranges of quantities that differ between episodes
-world_models   a model for each world, if models differ
+world_models   a model for each world, if worlds differ
 model_settings fields of a model that physics uses, as bytes
 appearances    materials that a geom may have
 model_snapshot a renderer's model at the time when the renderer was made
 primitive_geoms geoms that rays intersect in closed form
 solids         geoms as plain shapes, for other programs
-band_error     errors of a few bands on measured colours
-frozen_kernels conditions for recording kernels
+band_error     errors of measured colours in a few bands
+frozen_kernels kernels that are recorded once and replayed
 """

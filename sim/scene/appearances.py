@@ -27,7 +27,7 @@ class Appearance:
 
     geom: id of the geom
     model: a model in which the geom has this appearance
-    drawn: True if it is one of several materials' appearances
+    drawn: True if the geom has an appearance for each of several materials, and this is one of them
     """
 
     geom: int
@@ -36,7 +36,7 @@ class Appearance:
 
     @property
     def material(self) -> int:
-        """Id of its material; -1: none."""
+        """Id of the geom's material; -1: no material."""
         return int(self.model.geom_matid[self.geom])
 
     @property
@@ -90,8 +90,9 @@ def material_of(model: mujoco.MjModel, material: str, where: str) -> int:
 def varied_geoms(
     model: mujoco.MjModel, seen: Sequence[int], varied: Varied, spectra: Spectra
 ) -> dict[int, tuple[int, ...]]:
-    """Return the geoms that differ from world to world, with the ids of the materials that they may have; no ids: size
-    or colour differs.
+    """Return the geoms that differ from world to world, with the ids of the materials that they may have.
+
+    A geom whose size or colour differs has no ids.
 
     Raises:
         ValueError: no visible geom or no material of this name, or the reflectance is measured.

@@ -15,7 +15,7 @@ from sim.scene.spectra import Spectra
 __all__ = ["band_error", "lights_in_bands", "measured"]
 
 FINE_BANDS = 64
-LEAST_MISS = 1e-3  # of white in daylight: largest error of a type's quantum catch from a lamp that causes no warning
+LEAST_MISS = 1e-3  # relative to white in daylight: largest error of a quantum catch from a lamp without a warning
 
 
 def lights_in_bands(model: mujoco.MjModel, spectra: Spectra, eye: Eye) -> tuple[Spectra, list[str]]:
@@ -23,8 +23,9 @@ def lights_in_bands(model: mujoco.MjModel, spectra: Spectra, eye: Eye) -> tuple[
     catches.
 
     The values of lights at the bands' centres are chosen such that each receptor type has the correct quantum catch
-    from white (`SpectralBands.band_values`). Sampling spectral lines at the centres would depend on chance. Spectra of
-    materials are unchanged. A message names each light for which the bands give a type another quantum catch.
+    from white (`SpectralBands.band_values`). Sampling at the centres would include a spectral line only by chance.
+    Spectra of materials are unchanged. A message names each light for which the bands give a receptor type a wrong
+    quantum catch.
     """
     materials = {model.material(i).name for i in range(model.nmat)}
     found, off = dict(spectra), []

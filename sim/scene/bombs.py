@@ -1,4 +1,4 @@
-"""Checks for models that would exhaust the memory or that contain values that are not finite, before they are built.
+"""Checks before a model is built: whether it would exhaust the memory, and whether all its values are finite.
 
 A few lines of MJCF can request a million copies. The elements of the text are counted before MuJoCo compiles it, and
 the elements of a compiled model before Mitsuba receives it. Included files count, too.
@@ -33,10 +33,10 @@ OWNERS = {"geom": "geom", "body": "body", "mat": "material", "light": "light"}
 
 
 def require_modest(text: str, name: str) -> None:
-    """Refuse MJCF that exceeds the memory of a computer. Text that is not XML is left for MuJoCo to refuse.
+    """Refuse MJCF that exceeds the memory of a computer. Text that is not XML is ignored here; MuJoCo refuses it.
 
     Raises:
-        ValueError: one line that names the elements that are too many.
+        ValueError: too many elements or cells; one line names them.
     """
     try:
         root = ElementTree.fromstring(text)
@@ -57,7 +57,7 @@ def require_modest_file(path: Path, name: str, seen: frozenset[Path] = frozenset
     it exists, since MuJoCo would wait for a pipe forever.
 
     Raises:
-        ValueError: one line that names the elements that are too many, or the irregular file.
+        ValueError: too many elements or cells, or a file that is not regular; one line names them.
     """
     text = path.read_text(encoding="utf-8", errors="replace")
     require_modest(text, name)
@@ -100,7 +100,7 @@ def _copies(element: ElementTree.Element) -> float:
 
 
 def _count(text: str | None) -> float:
-    """Return the number in an attribute; anything else is left for MuJoCo to refuse."""
+    """Return the number in an attribute; 0 for anything else, which MuJoCo refuses."""
     try:
         number = float(text or 0)
     except ValueError:

@@ -1,8 +1,8 @@
 """Materials as Mitsuba BSDFs. A surface is Lambertian unless its material has one of these properties:
 
-- specular > 0: a rough dielectric coat, with reflectance 0.08 specular at normal incidence (0.5 is glass of index 1.5;
-Burley 2012) and Beckmann roughness √(2 / (n + 2)) for the exponent n = 128 shininess (Walter et al. 2007). specular =
-shininess = 0.5 are the defaults of MuJoCo's compiler for unset values: Lambertian.
+- specular > 0: a rough dielectric coat. Its reflectance at normal incidence is 0.08 · specular (0.5 is glass of index
+  1.5; Burley 2012). Its Beckmann roughness is √(2 / (n + 2)) for the exponent n = 128 · shininess (Walter et al.
+  2007). If specular and shininess are both 0.5, MuJoCo's defaults for unset values, the surface is Lambertian.
 - metallic or roughness set: Burley's principled BSDF.
 - reflectance, on planes and on top of boxes as in MuJoCo: this share of the light is reflected as by a mirror.
 """
@@ -22,8 +22,8 @@ from sim.scene.variant import Description, MitsubaObject
 
 _TYPES = mujoco.mjtGeom
 _UNSET_GLOSS = (0.5, 0.5)  # specular, shininess
-# Roughness of mirrors: an image blurred by 0.2°. In a `blendbsdf`, Mitsuba 3.9.1 assigns a wrong weight to a perfect
-# mirror.
+# Roughness of mirrors, which blurs reflections by 0.2°. A perfect mirror is avoided, because Mitsuba 3.9.1 assigns a
+# wrong weight to it in a `blendbsdf`.
 _SILVER = 0.003
 _OPAQUE = 0.995  # MuJoCo treats lower alpha as transparent
 

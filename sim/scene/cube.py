@@ -1,9 +1,10 @@
 """Cube textures: six square images around a geom, mapped to its triangles.
 
 MuJoCo looks up a cube texture by direction: a point's coordinates in the geom's frame, divided by its half sizes unless
-the texture is uniform. Mitsuba has no such texture. Triangles are therefore cut where two faces adjoin. Their texture
-coordinates refer to one image that contains the six faces below each other, R L U D F B as MuJoCo stores them: R/L =
-+x/-x, U/D = +y/-y, F/B = +z/-z (the faces' own axes are OpenGL's, table 3.19 of its 2.1 specification).
+the texture is uniform. Mitsuba has no such texture. Triangles are therefore cut along the seams between faces of the
+cube. Their texture coordinates refer to one image that contains the six faces below each other, in MuJoCo's order R L U
+D F B: R/L = +x/-x, U/D = +y/-y, F/B = +z/-z. The directions of each face's own axes are OpenGL's (table 3.19 of its 2.1
+specification).
 """
 
 from __future__ import annotations
@@ -20,8 +21,8 @@ _COLUMN, _COLUMN_SIGN = np.array([2, 2, 0, 0, 0, 0]), np.array([-1, 1, 1, 1, 1, 
 _ROW, _ROW_SIGN = np.array([1, 1, 2, 2, 1, 1]), np.array([-1, -1, 1, -1, -1, -1])
 _SEAMS = ((0, 1, 1), (0, 1, -1), (1, 2, 1), (1, 2, -1), (0, 2, 1), (0, 2, -1))  # planes d_a = ± d_b between faces
 # Texture coordinates are a ratio of two functions that are linear on a triangle. Treating the ratio as linear causes an
-# error of about one eighth of its range times the divisor's. Triangles are halved until the error is below this
-# fraction of a face.
+# error of about one eighth of its range times the relative variation of the divisor. Triangles are halved until the
+# error is below this fraction of a face.
 TOLERANCE = 2e-3
 _HALVINGS = 12
 
@@ -37,8 +38,8 @@ def padded(pixels: np.ndarray) -> np.ndarray:
 def directions(vertices: np.ndarray, kind: mujoco.mjtGeom, size: np.ndarray, uniform: bool) -> np.ndarray:
     """Return the directions of MuJoCo's cube texture lookups, (n, 3), for points (n, 3) in a geom's frame.
 
-    size: half sizes (3,) along x, y, z; a capsule's describe its side, and its caps are looked up as if the
-        side's unit cylinder continued
+    size: half sizes (3,) along x, y, z; for a capsule, half sizes of its side. Its caps are looked up as if the side's
+        unit cylinder continued
     """
     if kind in (mujoco.mjtGeom.mjGEOM_MESH, mujoco.mjtGeom.mjGEOM_SDF, mujoco.mjtGeom.mjGEOM_HFIELD):
         found = vertices.copy()

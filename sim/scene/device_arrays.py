@@ -1,7 +1,7 @@
 """NumPy arrays in aligned memory that kernels can read.
 
-Dr.Jit compiles a kernel again for every alignment of its inputs. It also records a frozen kernel again for the
-alignment of every existing shape, in any scene.
+Dr.Jit compiles a kernel again for every alignment of its inputs. It also records a frozen kernel again if the alignment
+of any existing shape's arrays differs, even in another scene.
 """
 
 from __future__ import annotations
@@ -73,12 +73,12 @@ def as_whole_numbers(values: Any) -> np.ndarray:
 
 
 def counted(n: int) -> Array:
-    """Return 0 ... n - 1 in separate memory, so that a frozen kernel that reads it lane by lane is replayed at this
+    """Return 0 ... n - 1 in separate memory. A frozen kernel that reads this array lane by lane is replayed at this
     width.
 
     If a kernel reads only tables, Dr.Jit 1.5 takes its width from one of them, depending on what else the process has
-    loaded. It replayed 126 of 128 lanes in one case, and left the last receptors dark without a message
-    (tests/test_parameters.py does each training run twice and has found this error).
+    loaded. In one case it replayed 126 of 128 lanes, and left the last receptors dark without a message.
+    tests/test_parameters.py repeats each training run and detects this error.
     """
     found = dr.arange(mi.UInt32, n)
     dr.eval(found)
@@ -86,7 +86,7 @@ def counted(n: int) -> Array:
 
 
 def in_fours(vectors: np.ndarray, fourth: np.ndarray | float) -> np.ndarray:
-    """Return vectors (..., 3) flat, each followed by a fourth number, because four aligned floats are gathered in one
+    """Return vectors (..., 3) flat, each followed by a fourth number, because kernels gather four aligned floats in one
     operation."""
     rows = np.empty((*vectors.shape[:-1], 4), np.float32)
     rows[..., :3], rows[..., 3] = vectors, fourth

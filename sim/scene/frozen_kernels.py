@@ -1,4 +1,4 @@
-"""Frozen kernels with typed inputs, and conditions while Dr.Jit records or replays them."""
+"""Frozen kernels with typed inputs, and a context in which Dr.Jit can safely record or replay them."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from optics.numerics.autodiff import Array
 class FrozenKernel:
     """A kernel that is recorded once and replayed, whose inputs are dataclasses.
 
-    Dr.Jit receives only their arrays. Otherwise it would traverse every dataclass at every launch.
+    Dr.Jit receives only the arrays in them. Otherwise it would traverse every dataclass at every launch.
 
     body: function (scenes, moving, fixed) -> arrays, with Mitsuba scenes, inputs that change at every launch, and
         inputs that rarely change
@@ -49,7 +49,7 @@ class FrozenKernel:
 
 @cache
 def _names(kind: Any) -> tuple[str, ...]:
-    """Return the names of a dataclass's fields; none for another type."""
+    """Return the names of a dataclass's fields; an empty tuple for another type."""
     return tuple(field.name for field in fields(kind)) if is_dataclass(kind) else ()
 
 

@@ -2,7 +2,7 @@
 
 Units: a light of diffuse 1 gives the irradiance π · daylight(λ) on a surface that faces it. A white Lambertian surface
 there has radiance daylight(λ): D65, 1 at 560 nm. Mitsuba's own `d65` is scaled differently (1.0101 at 560 nm), and its
-`rgb` emitters inherit this scale. The tables here belong to optics.
+`rgb` emitters inherit this scale. This module therefore uses the tables of `optics`.
 
 A light has a single colour: its diffuse colour also makes the highlights, and its specular colour is ignored. Light
 from a point decreases with the square of the distance. If MuJoCo's attenuation differs, both agree at the model's
@@ -36,7 +36,7 @@ _UNMIRRORED = {"intensity": 0.0, "bulbradius": 0.02, "range": 10.0, "softness": 
 
 @dataclass(frozen=True)
 class Emitter:
-    """A light described for Mitsuba; its `position` and `direction` follow the data."""
+    """A description of a light for Mitsuba. Its position and direction follow the data."""
 
     name: str
     light: int  # id in the model; -1: not one of its lights (the camera's headlight, the sky)
@@ -64,8 +64,8 @@ def emission(rgb: np.ndarray, scale: float, measured: Spectrum | None = None) ->
 
 
 def glow(model: mujoco.MjModel, geom: int, to_uv: np.ndarray | None, measured: Spectrum | None) -> Description | None:
-    """Return the radiance of a geom with an emissive material: a share of the radiance that it would have in full
-    daylight."""
+    """Return the radiance of a geom with an emissive material: its emission times the radiance that the geom would have
+    in full daylight. None if the geom does not glow."""
     material = model.geom_matid[geom]
     if material < 0 or model.mat_emission[material] <= 0:
         return None

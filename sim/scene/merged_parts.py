@@ -19,7 +19,8 @@ PlacedPart = tuple[str, Part, np.ndarray, MitsubaObject]  # name, part, pose (4,
 def merged(parts: Iterable[PlacedPart], prefix: str) -> Description:
     """Return Mitsuba shapes by name (of the variant in force).
 
-    Triangles of one material are merged, with the name "<prefix>_<n>". Shapes that are not meshes keep their names.
+    Triangles of one material are merged into a shape with the name "<prefix>_<n>". Shapes that are not meshes keep
+    their names.
     """
     description: Description = {}
     meshes: dict[tuple[int, bool, bool], tuple[MitsubaObject, list[Triangles]]] = {}

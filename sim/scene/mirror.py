@@ -40,15 +40,16 @@ def mirror(
     variant: str | None = None,
     spectra: Mapping[str, Spectrum | str] | None = None,
 ) -> Mirror:
-    """Mirror a MuJoCo model.
+    """Return the mirror of a MuJoCo model: a Mitsuba scene that follows the model's data.
 
     model: an MjModel, or a source that compiles to one: an MjSpec, the path of an MJCF, URDF or MJB file, or MJCF text
     data: initial poses; None: the model's reference pose
-    bodies: names of the bodies whose geoms are included ("world" is the static one); None: all
+    bodies: names of the bodies whose geoms are included ("world" is the static body); None: all bodies
     groups: visible geom groups; a geom with alpha 0 is never visible
-    variant: a spectral Mitsuba variant; None: that of the device. scalar_spectral runs without LLVM, but slowly.
-    spectra: reflectances of materials and emission of lights, by name, which replace their colours: `optics.Spectrum`,
-        or names accepted by `optics.reflectance` and `optics.illuminant`; {"headlight": "A"} is the camera's light
+    variant: a spectral Mitsuba variant; None: the device's. scalar_spectral runs without LLVM, but slowly.
+    spectra: reflectances of materials and emission of lights, by name, which replace their colours. Values are
+        `optics.Spectrum`, or names accepted by `optics.reflectance` and `optics.illuminant`. "headlight" is the name of
+        the camera's light: {"headlight": "A"}
 
     A MirrorWarning lists features that have no counterpart.
 
@@ -143,12 +144,12 @@ class Mirror:
 
         camera: name or id of a camera of the model, or a Viewpoint
         integrator: a Mitsuba integrator: "direct", "path", ..., or its description, {"type": "path", "max_depth": 3}
-        spp: samples per pixel
+        spp: samples per pixel · seed: seed of the samples
         sampler: "independent", or "multijitter", which has less noise in images
 
         Units: a white Lambertian surface that faces a light of diffuse 1 has radiance D65(λ), 1 at 560 nm.
 
-        A MirrorWarning appears once if "direct" would have to show something behind a transparent geom.
+        "direct" does not show what is behind a transparent geom; a MirrorWarning names such geoms once.
 
         Raises:
             ValueError: an unknown camera, less than one pixel or sample, wavelengths beyond 300 to 780 nm, or an
@@ -167,7 +168,7 @@ class Mirror:
             return taken.radiance(integrator, spp, asked, seed, sampler)
 
     def _tell_of_glass(self) -> None:
-        """Warn once about transparent geoms: Mitsuba's `direct` treats a mask's opacity as part of its colour, and
+        """Warn once about transparent geoms. Mitsuba's `direct` treats a mask's opacity as part of its colour, and
         shows only emitters behind it."""
         glass = [int(g) for g in self.geoms if surfaces.rgba(self.model, int(g))[3] < 1]
         if glass and not self._told_of_glass:
@@ -248,7 +249,7 @@ class Mirror:
 
     def _move_light(self, name: str, to_world: MitsubaObject) -> None:
         matrix = np.array(to_world.matrix)
-        if (key := f"{name}.position") in self._params:  # a point light, which is the same from all sides
+        if (key := f"{name}.position") in self._params:  # a point light, which has no direction
             place = matrix[:3, 3].astype(np.float32)
             if not np.array_equal(place, np.array(self._params[key]).ravel()):
                 self._params[key] = mi.Point3f(*place.tolist())

@@ -1,6 +1,6 @@
 """Fields of a model that physics uses, as bytes, so that changes are detected at every step and can be undone.
 
-Names and large fields (textures, meshes and heights) are omitted. A change of these fields is not undone.
+Names and large fields (textures, meshes and heights) are omitted. Changes of these are neither detected nor undone.
 """
 
 from __future__ import annotations

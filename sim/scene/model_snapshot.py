@@ -1,5 +1,4 @@
-"""A renderer's model at the time when the renderer was made. Differences in a world that the renderer cannot show are
-refused."""
+"""A model at the time when its renderer was made. It refuses worlds with differences that the renderer cannot show."""
 
 from __future__ import annotations
 
@@ -11,7 +10,7 @@ import numpy as np
 from sim.scene import inventory, surfaces
 from sim.scene.poses import HEADLIGHT, OF_MODELS, OTHERS, Poses, of_model
 
-ROUNDING = 1e-6  # [m], relative beyond 1 m, and for entries of rotations: a few rounding steps of float32
+ROUNDING = 1e-6  # a few rounding steps of float32, for positions [m] (relative beyond 1 m) and entries of rotations
 _MORE = {"size": ", and be a primitive without a texture", "material": ", with its materials"}
 # Elements other than geoms, by fields of `Poses`; the last entry is MuJoCo's name.
 _THINGS = (
@@ -30,7 +29,7 @@ class ModelSnapshot:
     hidden: geoms that are invisible only because their alpha is 0
     moving: geoms that rays can hit at any pose
     resizable: geoms whose sizes may differ
-    varied: geoms that may differ, with ids of the materials that they may have (`appearances.varied_geoms`)
+    varied: geoms that may differ, with the ids of the materials that each may have (`appearances.varied_geoms`)
     """
 
     def __init__(

@@ -15,7 +15,8 @@ _PREFIX = {"geom": "geom_x", "site": "site_x", "camera": "cam_x"}
 class ReferencePose:
     """A model in its reference pose, from which a few bodies move.
 
-    bodies: ids of the moving bodies; they carry geoms, sites and cameras rigidly, and no other body
+    bodies: ids of the moving bodies. Geoms, sites and cameras move rigidly with them; no other body may be attached to
+        them
     """
 
     def __init__(self, model: mujoco.MjModel, bodies: Sequence[int]) -> None:
@@ -27,7 +28,7 @@ class ReferencePose:
         self._slots: dict[tuple[int, ...], np.ndarray | None] = {}
 
     def moved(self, kind: str) -> list[int]:
-        """Return the ids of the elements of a kind that the bodies carry."""
+        """Return the ids of the elements of a kind that are fixed to the bodies."""
         return [int(i) for i in np.flatnonzero(np.isin(self.body_of[kind], self.bodies))]
 
     def local(self, kind: str, index: int) -> tuple[np.ndarray, np.ndarray]:
@@ -59,7 +60,7 @@ class MovedBodies(Poses):
 
     positions: positions of the moved bodies [m], (world, body, 3)
     rotations: (world, body, 3, 3)
-    models: models of all worlds, if their sizes, colours or materials differ; None: as the renderer's model
+    models: models of all worlds, if their sizes, colours or materials differ; None: as in the renderer's model
     """
 
     reference: ReferencePose

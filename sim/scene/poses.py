@@ -23,7 +23,7 @@ OF_MODELS = (
     "heights",
     "others",
 )
-OTHERS = (  # other fields that appearances depend on
+OTHERS = (  # other fields of mjModel that appearances depend on
     "geom_group",
     "geom_type",
     "geom_dataid",
@@ -40,17 +40,20 @@ HEADLIGHT = ("active", "diffuse")
 
 @dataclass(frozen=True)
 class Poses:
-    """Positions [m] (world, thing, 3) and rotations (world, thing, 3, 3), as in mjData after mj_forward.
+    """Positions [m] (world, element, 3) and rotations (world, element, 3, 3), as in mjData after mj_forward.
 
     geom_xpos, geom_xmat, site_xpos, site_xmat, cam_xpos, cam_xmat: of geoms, sites and cameras
     xpos, xmat: of bodies
-    light_xpos, light_xdir: of lights
-    geom_size: (world, geom, 3), from each world's mjModel; None, here and below: as in the renderer's model
+    light_xpos, light_xdir: positions and directions of lights
+
+    The other arrays are from each world's mjModel. None: as in the renderer's model.
+
+    geom_size: (world, geom, 3)
     geom_rgba: (world, geom, 4)
     geom_matid: (world, geom)
-    mat_rgba, mat_emission, light_diffuse, light_active: as in each world's mjModel
-    heights: a checksum of each height field, (world, hfield), since there are many heights
-    others: a checksum of each of OTHERS and of HEADLIGHT, (world, field)
+    mat_rgba, mat_emission, light_diffuse, light_active: as in mjModel, for each world
+    heights: a checksum of each height field, (world, hfield), which stands for many heights
+    others: a checksum of each field in OTHERS and in HEADLIGHT, (world, field)
     """
 
     geom_xpos: np.ndarray

@@ -34,7 +34,8 @@ def checked_wavelengths(wavelengths: Any) -> np.ndarray:
     """Return wavelengths [m], (band,).
 
     Raises:
-        ValueError: none, or some outside the range of the spectra, for example because they are in nanometres.
+        ValueError: no wavelength, or a wavelength outside the range of the spectra, for example because it is in
+            nanometres.
     """
     found = np.asarray(wavelengths, float)
     low, high = (1e-9 * limit for limit in LIMITS_NM)
@@ -75,9 +76,9 @@ class Camera:
         """Return the radiance (band, y, x) float32 at `wavelengths` [m]: the mean over `spp` random positions in each
         pixel.
 
-        sampler: Mitsuba's "independent", or "multijitter", which stratifies the samples of a pixel. Its noise is lower,
-            and a standard error does not describe it. It is not available in scalar variants, or for spp that it would
-            round.
+        sampler: Mitsuba's "independent", or "multijitter", which stratifies the samples of a pixel. Its noise is lower
+            than the standard error of independent samples. It is not available in scalar variants, or for an spp that
+            it would round.
         """
         width, height = self.size
         method = _integrator(integrator)
@@ -121,7 +122,7 @@ class Camera:
         return si.shape.id(), np.array(ray(si.t), dtype=float)
 
     def _look(self, ray: Array) -> Array:
-        """Return the first intersection of the ray. The origin of the ray is moved past invisible inner faces."""
+        """Return the first visible intersection of the ray; moves the ray's origin past invisible inner faces."""
         si = self.scene.ray_intersect(ray)
         for _ in range(NESTED):
             inner = self._is_inner(si, ray)

@@ -1,8 +1,8 @@
 """Geoms as Mitsuba shapes.
 
 Planes and spheres, and capsules and cylinders without a texture, are exact (rectangle, sphere, cylinder, disk). Geoms
-for which Mitsuba's texture coordinates differ from MuJoCo's are tessellated. Ellipsoids are tessellated, too, since
-Mitsuba intersects its own ellipsoids in float32. Its hit points on small, flat or distant ones are wrong.
+for which Mitsuba's texture coordinates differ from MuJoCo's are tessellated. Ellipsoids are tessellated, too, because
+Mitsuba intersects its own ellipsoids in float32, with wrong hit points on small, flat or distant ellipsoids.
 """
 
 from __future__ import annotations

@@ -57,15 +57,15 @@ def of_geom(model: mujoco.MjModel, geom: int, spectra: Spectra) -> Spectrum | No
 
 
 def in_daylight(reflectance: Spectrum) -> Spectrum:
-    """Return the emission of a surface with this reflectance in unit daylight, at the entries of both tables."""
+    """Return the emission of a surface with this reflectance in unit daylight, at the wavelengths of both tables."""
     entries = {*np.arange(LIMITS_NM[0], LIMITS_NM[1] + 1, 5.0), *reflectance.wavelengths_nm}
     nm = np.array([x for x in sorted(entries) if LIMITS_NM[0] <= x <= LIMITS_NM[1]])
     return Spectrum(tuple(nm), tuple(reflectance.at(nm * 1e-9) * daylight(nm * 1e-9)))
 
 
 def described(spectrum: Spectrum, scale: float = 1.0) -> Description:
-    """Return Mitsuba's description of scale · spectrum on 300-780 nm. Mitsuba's `rgb` and `d65` would be dark in the
-    ultraviolet."""
+    """Return Mitsuba's description of scale · spectrum on 300-780 nm. Mitsuba's `rgb` and `d65` are not used, because
+    they are dark in the ultraviolet."""
     inside = [nm for nm in spectrum.wavelengths_nm if LIMITS_NM[0] < nm < LIMITS_NM[1]]
     nm = np.array([LIMITS_NM[0], *inside, LIMITS_NM[1]])
     return {

@@ -22,13 +22,14 @@ _ROLES = mujoco.mjtTextureRole
 
 
 def geom_type(model: mujoco.MjModel, geom: int) -> mujoco.mjtGeom:
-    """Return a geom's kind as an enum, since comparisons between NumPy's integers and its members work in one direction
-    only."""
+    """Return a geom's kind as an enum. Without the conversion, a comparison of NumPy's integer with the enum's members
+    would work in one direction only."""
     return mujoco.mjtGeom(int(model.geom_type[geom]))
 
 
 def set_rgba(color: Sequence[float]) -> np.ndarray:
-    """Return the nearest colour (4,) that MuJoCo does not interpret as unset, like the grey UNSET_RGBA."""
+    """Return a colour (4,) for a geom. The grey UNSET_RGBA, which MuJoCo interprets as unset, is replaced by the
+    nearest grey."""
     found = np.array(color, np.float32)
     if np.array_equal(found, UNSET_RGBA):
         found[:3] = np.nextafter(found[:3], np.float32(1))  # all three, so that a grey still reflects all bands alike
@@ -36,8 +37,8 @@ def set_rgba(color: Sequence[float]) -> np.ndarray:
 
 
 def rgba(model: mujoco.MjModel, geom: int) -> np.ndarray:
-    """Return the display-referred colour (4,) of a geom by MuJoCo's rule: its own unless unset, otherwise that of its
-    material."""
+    """Return the display-referred colour (4,) of a geom by MuJoCo's rule: the geom's own colour unless it is unset,
+    otherwise its material's colour."""
     own = model.geom_rgba[geom]
     material = model.geom_matid[geom]
     if material >= 0 and np.array_equal(own, UNSET_RGBA):

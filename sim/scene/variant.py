@@ -38,8 +38,8 @@ def on_gpu() -> bool:
 def computed(*values: Any) -> None:
     """Compute these values now if the device is a GPU.
 
-    OptiX supports one scene per kernel, and ignores others except for a line on stderr. On the CPU everything is
-    computed in one kernel.
+    OptiX supports one scene per kernel. It ignores further scenes, and reports them only by a line on stderr. On the
+    CPU, everything is computed in one kernel.
     """
     if on_gpu():
         dr.eval(values)

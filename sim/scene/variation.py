@@ -1,8 +1,8 @@
 """Quantities that differ between the episodes of a task: light, and sizes, colours, materials and places of objects.
 
-All lights of a world, including the sky, are multiplied by one spectrum. This multiplies the signals by exactly the
-same factor, since light is additive. Each world has its own sizes, colours, materials and places, see
-`sim.scene.world_models`. All worlds therefore still share one kernel.
+All lights of a world, including the sky, are multiplied by one spectrum. Since light is additive, this multiplies the
+radiance in each band by exactly the same factor. Each world has its own sizes, colours, materials and places, see
+`sim.scene.world_models`. All worlds still share one kernel.
 """
 
 from __future__ import annotations
@@ -127,8 +127,9 @@ class Variation:
         return factors.astype(np.float32)
 
     def extremes(self, wavelengths: np.ndarray) -> np.ndarray:
-        """Return `light` at the ends of all its ranges, (case, band). The brightest of all bands is among them. A
-        single band may be brighter in between, with warm and cold light by a third."""
+        """Return the factors of `light` at all combinations of the ends of its ranges, (case, band). The largest factor
+        of all bands is among them. A single band's factor may be larger in between, by a third for ranges from warm to
+        cold light."""
         names = self.of_light
         ends = [self.ranges[name] for name in names]
         corners = np.stack(np.meshgrid(*ends, indexing="ij"), axis=-1).reshape(-1, len(names)) if names else None

@@ -87,7 +87,7 @@ class WorldModels:
     def require_unchanged(self, before: bytes, whose: str) -> None:
         """Compare the shared model with the settings that `noted` returned.
 
-        A single world gets its own model as soon as a task changes it.
+        If there is only one world, it gets its own model as soon as a task changes it.
 
         whose: beginning of the message
 
@@ -104,7 +104,7 @@ class WorldModels:
             )
 
     def start_episode(self, world: int, drawn: Drawn) -> None:
-        """Set a world's sizes, colours and materials. Otherwise its own model is as it was compiled.
+        """Set a world's sizes, colours and materials, and reset everything else in its own model to the compiled state.
 
         Raises:
             ValueError: a material that is not one of the geom's.

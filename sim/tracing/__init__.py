@@ -4,7 +4,7 @@ tracer               protocol of tracers, and the choice of one for a scene
 eye_places           positions of a model's eyes, and whether they stay level
 eye_ray              a ray that leaves an eye
 closed_form_tracer   ClosedForm: rays through upright walls, a floor and spheres in closed form
-upright_scene        a model in this form, or the reason why it has another
+upright_scene        a model as walls, a floor and spheres, or the reason why it has another form
 spheres              intersections of rays with moving spheres
 walls                upright walls and the floor of a model
 wall_intersection    intersections of rays with upright walls

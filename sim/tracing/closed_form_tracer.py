@@ -1,10 +1,10 @@
 """A ray tracer in closed form for worlds of upright walls, a floor and spheres.
 
-A few walls are solved one by one. Many are found by a walk through a grid of cells, on which their faces must lie
-(Amanatides and Woo 1987). Colours are Mitsuba's (`sim.tracing.reflectance_atlas`). If all lights have one spectrum and
-all materials share a few, one component is traced per independent spectrum, instead of one per band. Light that is
-reflected twice has products of the materials' spectra. If it is followed, all bands are traced, unless all materials
-are grey.
+A few walls are intersected one by one. If there are more, a ray walks through a grid in which each wall fills whole
+cells (Amanatides and Woo 1987). Reflectances are Mitsuba's (`sim.tracing.reflectance_atlas`). Components of light are
+usually bands. If all lights share one spectrum, and few spectra span the materials' spectra, there is one component per
+spanning spectrum. The spectrum of light that is reflected twice is a product of two materials' spectra. If such light
+is followed, all bands are traced, unless all materials are grey.
 """
 
 from __future__ import annotations
@@ -28,10 +28,10 @@ from sim.tracing.walls import ALIGNED, NoClosedForm
 
 # Singular values below this share of the largest are rounding errors. It is eight times float32's 1.2e-7.
 RANK_TOLERANCE = 1e-6
-# Chosen: largest deviation of a grey's reflectances between bands, in Mitsuba's spectra of greys, that is not a hue.
+# Chosen: largest deviation of a grey reflectance from its mean over the bands. Mitsuba's greys are not quite flat.
 GREY = 1e-4
-Irradiance = Callable[[Array, Array], list[Array]]  # per component, at a point of a surface with this normal
-ROW = 12  # floats per face: column and row of the texel as affine functions of (x, y, z), then the texture's place
+Irradiance = Callable[[Array, Array], list[Array]]  # function (point, normal) of a surface: irradiance per component
+ROW = 12  # floats per face: affine functions of (x, y, z) for the texel's column and row, then the texture's place
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ class Components:
 
 
 def components_of(texels: np.ndarray, irradiance: np.ndarray) -> Components:
-    """Return the fewest components that texels (texel, band) under lights (light, band) need."""
+    """Return the smallest set of components that describes texels (texel, band) under lights (light, band)."""
     n_bands = texels.shape[1]
     brightest = irradiance[np.argmax(irradiance.sum(axis=1))]
     level = irradiance @ brightest / (brightest @ brightest)
@@ -59,7 +59,7 @@ def components_of(texels: np.ndarray, irradiance: np.ndarray) -> Components:
 
 
 def reflected_components_of(texels: np.ndarray, irradiance: np.ndarray) -> Components:
-    """Return components in which reflected light is a product: a texel's reflectance times the arriving component."""
+    """Return components in which reflection multiplies each component of light by the same component of the texel."""
     grey = texels.mean(axis=1, keepdims=True)
     if np.abs(texels - grey).max() <= GREY:
         few = components_of(np.tile(grey, texels.shape[1]), irradiance)
@@ -82,8 +82,8 @@ class _Hit:
 
 @dataclass(frozen=True)
 class ClosedFormTables:
-    """Arrays that kernels read in all worlds. texels: reflectance, one array per component · faces: see `face_rows`
-    cells: grid on which the walls stand; None: each wall is solved
+    """Arrays that are the same in all worlds. texels: reflectance, one array per component · faces: see `face_rows`
+    cells: grid in which the walls stand; None: walls are intersected one by one
     """
 
     texels: list[Array]
@@ -93,7 +93,7 @@ class ClosedFormTables:
 
 @dataclass(frozen=True)
 class ClosedFormSurroundings:
-    """centres: of the visible spheres in one lane's world (Point3f) · tables: the same for all worlds"""
+    """Spheres and tables for one lane. centres: of the visible spheres in its world (Point3f) · tables: see above."""
 
     centres: list[Array]
     tables: ClosedFormTables
@@ -103,15 +103,14 @@ class ClosedForm:
     """A tracer of rays through one scene of upright walls, a floor and spheres.
 
     name, why: name of the tracer, and the reason for its choice, for reports
-    light: the part of the light that is followed, one of `lighting.LEVELS`
+    light: one of `lighting.LEVELS`: which reflections are followed
     basis: (component, band): contribution of each component to each band
     world, walls, footprints, lights, components: the parts of the scene
     faces: textures of walls and floor, see `face_rows` · sphere_textures: maps to the texels, and the texels' places
 
     Raises:
-        NoClosedForm: walls that lie on no grid. If light that is reflected twice is followed, also walls of several
-            heights or lower than the bodies between them, bodies that change their height, and a texture that would
-            turn with the eyes' body.
+        NoClosedForm: walls that lie on no grid. For light that is reflected twice also: walls of several heights, walls
+            lower than a body, bodies that may change their height, and a texture on the body that carries the eyes.
     """
 
     name = "closed_form"
@@ -152,14 +151,14 @@ class ClosedForm:
         return ClosedFormSurroundings(spheres.centres_in(rows, len(self.world.spheres), world), tables)
 
     def all_bodies(self, centres: list[Array], stand: Array) -> list[Array]:
-        """Return the centres of the visible spheres and, if it is a sphere, of the eyes' own body; stand: its place."""
+        """Return the centres of the visible spheres and of the eyes' own body at `stand`, if this body is a sphere."""
         if not self.world.has_own:
             return centres
         return [*centres, mi.Point3f(stand.x, stand.y, float(self.world.heights[-1]))]
 
     def radiance(self, seen: EyeRay, there: ClosedFormSurroundings, samples: Array) -> tuple[list[Array], Array]:
-        """Return the light along each ray, one array per component, and the distance to its source [m]. Light that
-        bounces uses the first two samples of each ray, on the unit square (`lighting.spawn_bounce_ray`)."""
+        """Return the light along each ray, one array per component, and the distance to the visible surface [m]. The
+        first two samples of a ray, on the unit square, determine its bounce ray (`lighting.spawn_bounce_ray`)."""
         centres, tables = there.centres, there.tables
         bodies = self.all_bodies(centres, seen.body)
         hit = self._hit(seen.ray, centres, tables)
@@ -172,8 +171,8 @@ class ClosedForm:
         return [r * e for r, e in zip(hit.reflectance, light, strict=True)], hit.t
 
     def returned(self, ray: Array, shade: Array, radius: float, more: Irradiance | None = None) -> list[Array]:
-        """Return the light that walls and floor send back along each ray, per component. They receive direct light in
-        the shade of one sphere and, if given, `more` irradiance."""
+        """Return the light that walls and floor reflect towards the origin of each ray, per component. They receive
+        direct light, which the sphere at `shade` may block, and `more` irradiance, if given."""
         hit = self._hit(ray, [], self.inputs)
         light = self._irradiance(hit, [shade], self.inputs, [radius])
         if more:
@@ -187,7 +186,7 @@ class ClosedForm:
         floor_first = on_floor & (t_floor < t)
         t = dr.select(floor_first, t_floor, t)
         seen = dr.isfinite(t)
-        # Rays without a hit get the face of the floor, which exists in worlds without walls, too.
+        # Rays without a hit use the floor's face, which also exists in worlds without walls.
         face = dr.select(floor_first | ~seen, self._n_faces - 1, face)
         normal = dr.select(floor_first, mi.Normal3f(0, 0, 1), normal)
         t, which = spheres.nearest(self._bodies, centres, ray, t)
@@ -216,8 +215,8 @@ class ClosedForm:
     def _irradiance(
         self, hit: _Hit, bodies: list[Array], tables: ClosedFormTables, radii: list[float] | None = None
     ) -> list[Array]:
-        """Return the irradiance per component: the sum of level · cos θ over unobstructed lights; radii: of the bodies,
-        None: their own."""
+        """Return the irradiance per component: the sum of level · cos θ over unobstructed lights; radii: of the
+        bodies."""
         levels = self.components.levels
         start = lighting.clear_of(hit.point, hit.normal)
         radii = list(map(float, self._bodies.radii)) if radii is None else radii
@@ -265,7 +264,7 @@ class ClosedForm:
 
 
 def _check_tops(scene: UprightScene) -> None:
-    """Refuse scenes in which the top of a wall is visible from a point of a wall or mover, which may reflect light."""
+    """Refuse scenes in which a ray from a wall or body could hit the top of a wall, which the closed form lacks."""
     for geom, settled in zip(scene.bodies.geoms, scene.settled, strict=True):
         if not settled:
             raise NoClosedForm(f"geom {scene.model.geom(geom).name or str(geom)!r} may change its height")

@@ -12,7 +12,7 @@ import numpy as np
 from sim.eyes.mounts import Mount
 from sim.scene.poses import Poses
 
-ROUNDING = 1e-9  # rounding error of rotations and of lengths [m] in a compiled model
+ROUNDING = 1e-9  # largest rounding error of rotations and of lengths [m] in a compiled model
 _SLIDE, _HINGE = int(mujoco.mjtJoint.mjJNT_SLIDE), int(mujoco.mjtJoint.mjJNT_HINGE)
 
 
@@ -21,7 +21,10 @@ class NotLevelError(ValueError):
 
 
 class EyeFrames(NamedTuple):
-    """origins: pupils [m], (world, eye, 3) · rotations: columns (right, up, ahead), (world, eye, 3, 3)"""
+    """Positions and orientations of all eyes in all worlds.
+
+    origins: pupils [m], (world, eye, 3) · rotations: columns (right, up, ahead), (world, eye, 3, 3)
+    """
 
     origins: np.ndarray
     rotations: np.ndarray
@@ -31,7 +34,7 @@ class EyeFrames(NamedTuple):
 class LevelStand:
     """Eyes that are fixed to one body, which only moves and turns on a level plane.
 
-    body: its id · height: of its origin [m]
+    body: id of the body · height: height of the body's origin [m]
     origins: pupils in the body's frame [m], (eye, 3) · rotations: eyes' frames in the body's frame, (eye, 3, 3)
     """
 
@@ -49,7 +52,8 @@ class LevelStand:
     def radius(self) -> float | None:
         """Common distance of all pupils from the body's vertical axis [m].
 
-        None if it differs between eyes, or if an eye is not upright or does not look straight out from the axis.
+        None if the distance differs between eyes, or if an eye is not upright or does not look straight away from the
+        axis.
         """
         level, axes = self.origins[:, :2], self.rotations[:, :, 2]
         radii = np.linalg.norm(level, axis=1)
@@ -93,10 +97,10 @@ class EyePlaces:
         return EyeFrames(np.stack(origins, axis=1), np.stack(rotations, axis=1))
 
     def stand(self) -> LevelStand:
-        """Return the body that the eyes are fixed to, with their places on it.
+        """Return the body that the eyes are fixed to, with the eyes' positions on it.
 
         Raises:
-            NotLevelError: several bodies, or a body that may tilt or change its height.
+            NotLevelError: eyes on several bodies, or on a body that may tilt or change its height.
         """
         bodies = {self._body_of(kind, index) for kind, index in self._things}
         if len(bodies) > 1:
@@ -127,7 +131,8 @@ class EyePlaces:
         return origin + rotation @ offset, rotation @ turn
 
     def _require_level(self, body: int, data: mujoco.MjData) -> None:
-        """Refuse joints between world and body that do more than move it on a level plane or turn it about z."""
+        """Refuse a body that may tilt or change its height. All joints between the world and the body must move it in a
+        level plane or turn it about z."""
         model, name = self._model, self._model.body(body).name
         if abs(data.xmat[body].reshape(3, 3)[2, 2] - 1) > ROUNDING:
             raise NotLevelError(f"the eyes are on body {name!r}, which is tilted")

@@ -9,9 +9,10 @@ from optics.numerics.autodiff import Array
 
 @dataclass(frozen=True)
 class EyeRay:
-    """ray: from the pupil into the scene (Ray3f) · axis: of the eye (Vector3f) · cosine: of the angle between the two
+    """A ray, with the axis and the body of its eye.
 
-    body: place of the eyes' body (Point3f) if they stand upright on one; otherwise the pupil
+    ray: from the pupil into the scene (Ray3f) · axis: of the eye (Vector3f) · cosine: of the angle between the two
+    body: position of the body that carries the eyes (Point3f), if they stand upright on one; otherwise the pupil
     """
 
     ray: Array

@@ -1,6 +1,6 @@
 """Lights of any model, which may move: directional lights, points, spots, and the headlight of each eye.
 
-Their emission is Mitsuba's (`sim.scene.lights`), so the renderer agrees with `sim.mirror`.
+Mitsuba's emitters (`sim.scene.lights`) determine their emission, so that the renderer agrees with `sim.mirror`.
 """
 
 from __future__ import annotations
@@ -28,10 +28,12 @@ _DIRECTIONAL, _POINT, _SPOT = "directional", "point", "spot"
 
 @dataclass(frozen=True)
 class ModelLight:
-    """light: id in the model; -1: the headlight of the observing eye · kind: "directional", "point" or "spot"
-    level: irradiance on a surface that faces the light; for points and spots, intensity (1 m away), per band (band,)
-    cutoff, exponent: of a spot: cosine of its half angle, and exponent of its falloff to the side
-    direction: towards a directional light in the reference pose, in Mitsuba's scene, unit (3,)
+    """One light of a model.
+
+    light: id in the model; -1: the headlight of the observing eye · kind: "directional", "point" or "spot"
+    level: irradiance per band (band,) on a surface that faces the light; for points and spots, at a distance of 1 m
+    cutoff, exponent: for a spot, the cosine of its half angle, and the exponent of its falloff to the side
+    direction: unit vector (3,) towards a directional light in the model's reference pose; None for other lights
     """
 
     light: int
@@ -45,8 +47,11 @@ class ModelLight:
 def model_lights(
     model: mujoco.MjModel, spectra: Spectra, wavelengths: np.ndarray
 ) -> tuple[list[ModelLight], list[str]]:
-    """Return a model's lights without the sky at these wavelengths [m], in the current variant, and descriptions of
-    features that have no counterpart here."""
+    """Return a model's lights, except for the sky, at wavelengths [m], and messages about properties of lights that
+    cannot be mirrored.
+
+    The scene's Mitsuba variant must be in force.
+    """
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     emitters, left_out = lights.emitters(model, data, spectra)
@@ -89,7 +94,8 @@ class Lights:
         return len(self.found)
 
     def rows(self, poses: Poses) -> np.ndarray:
-        """Return positions and directions of lights, (world, light, 4 ROWS) float32; headlights' rows are not read."""
+        """Return positions and directions of lights, (world, light, 4 ROWS) float32; a headlight's rows are not
+        used."""
         rows = np.zeros((poses.n, len(self), ROWS, 4), np.float32)
         for k, light in enumerate(self.found):
             if light.light >= 0:
@@ -100,7 +106,7 @@ class Lights:
 
     def towards(self, k: int, point: Array, axis: Array, there: WorldRows) -> tuple[Array, Array, Array]:
         """Return the unit vector from a point to a light, the distance [m], and the share of the light's level that
-        arrives on a surface that faces it; axis: of the observing eye."""
+        arrives on a surface that faces the light; axis: axis of the observing eye."""
         light = self.found[k]
         if light.light < 0:
             return -axis, mi.Float(FAR), mi.Float(1)

@@ -39,15 +39,16 @@ _HERE = Path(__file__).parents[1]
 class ModelScene:
     """The parts of a model that tracers need. Mitsuba's scenes are built on first use.
 
-    model · eye: determines the spectral bands · variant: of Mitsuba · geoms: ids of all visible geoms
-    looks: appearances of all these geoms · moving: appearances that may change their place, size or colour
+    model: the MuJoCo model · eye: determines the spectral bands · variant: Mitsuba's variant
+    geoms: ids of all visible geoms · looks: appearances of all these geoms
+    moving: appearances that may change their place, size or colour
     bsdfs: one for every appearance; stored here, because a BSDFPtr does not keep its objects alive
     lights: all lights · spectra: measured spectra of materials and lights, by name
     has_sky: whether rays without a hit reach a sky
     glows: BSDFs whose reflectance is the radiance of a glowing geom, by appearance; such geoms count as movers
-    varied: geoms whose size or colour differs between worlds, and ids of the materials that each may have; they count
-        as movers, although they may be static
-    as_built: snapshot of the model, which worlds are compared with
+    varied: geoms whose size or colour differs between worlds, with the ids of the materials that each may have; they
+        count as movers, although they may be static
+    as_built: snapshot of the model, with which worlds are compared
 
     Raises:
         ValueError: a model without visible geoms; spectra or variation of a part that the model lacks.
@@ -91,8 +92,8 @@ class ModelScene:
         return _moves(self.model, look.geom) or look.geom in self.varied or look in self.glows
 
     def tell_what_is_missing(self, light: str = DIRECT) -> None:
-        """Warn (`sim.MirrorWarning`) once of features that have no counterpart if this part of the light is followed,
-        and of measured lights for which the eye has too few bands."""
+        """Warn (`sim.MirrorWarning`) of features that are not rendered if this part of the light is followed, and of
+        measured lights for which the eye has too few bands."""
         model = self.model
         of_sky = ["light of the sky on surfaces"] if light == DIRECT and self.has_sky else []
         missing = [*self._unlit, *of_sky, *inventory.left_out(model, self._seen, self._groups)]
@@ -102,7 +103,7 @@ class ModelScene:
 
     @cached_property
     def as_built(self) -> ModelSnapshot:
-        """Snapshot of the model, which worlds are compared with."""
+        """Snapshot of the model, with which worlds are compared."""
         model, groups = self.model, self._groups
         reachable = [g for g in range(model.ngeom) if model.geom_group[g] in groups and shapes.has_shape(model, g)]
         hidden = [g for g in reachable if g not in self._seen]
@@ -140,8 +141,8 @@ class ModelScene:
         return bsdfs.matt(look.model, look.geom, to_uv, of_geom(look.model, look.geom, self.spectra))
 
     def _glow(self, look: Appearance, white: bool) -> MitsubaObject | None:
-        """Return a BSDF whose reflectance is the radiance of a glowing geom. The kernel evaluates it like other BSDFs,
-        and multiplies a white one by its world's colour."""
+        """Return a BSDF whose reflectance is the radiance of a glowing geom; None if the geom does not glow. The kernel
+        evaluates it like other BSDFs. If it is white, the kernel multiplies it by its world's colour."""
         to_uv, geom = shapes.uv_transform(look.model, look.geom), look.geom
         model = in_white(look.model, geom) if white else look.model
         radiance = lights.glow(model, geom, to_uv, of_geom(model, geom, self.spectra))
@@ -157,8 +158,8 @@ class ModelScene:
 
     @cached_property
     def told_apart(self) -> tuple[MitsubaObject, np.ndarray]:
-        """Mitsuba scene of the static geoms as separate shapes, and the geoms by the shapes' ids in Mitsuba, -1 for
-        unused ids. On a GPU, the id is all that a ray reports about the shape that it hits."""
+        """Mitsuba scene in which every static geom has its own shapes, and a table from the shapes' ids in Mitsuba to
+        geoms (-1 for unused ids). On a GPU, a ray reports only the id of the shape that it hits."""
         with in_variant(self.variant):
             built = {name: shapes.build(part, pose, name, bsdf, None) for name, part, pose, bsdf in self._still_parts()}
             scene = mi.load_dict({"type": "scene", **built}, optimize=False)
@@ -184,7 +185,7 @@ def _moves(model: mujoco.MjModel, geom: int) -> bool:
 
 
 def _outside() -> int:
-    """Return the stack level of the nearest caller outside `sim`, where a warning should point."""
+    """Return the stack level of the nearest caller outside `sim`, to which a warning should point."""
     frame, level = sys._getframe(1), 1
     while frame.f_back is not None and Path(frame.f_code.co_filename).is_relative_to(_HERE):
         frame, level = frame.f_back, level + 1

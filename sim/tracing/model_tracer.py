@@ -1,8 +1,9 @@
 """A tracer of rays through any model: Mitsuba intersects static geoms, `sim.tracing.movers` the moving ones.
 
-Direct light is the light of lamps. For light that bounces (`sim.tracing.lighting`), a visible surface samples one
-direction for light that is reflected once more, for the sky and for glowing geoms. The surface that is hit there
-samples one more direction for the latter two. All light that is reflected at most twice is included.
+Direct light comes from lamps only. For light that bounces (`sim.tracing.lighting`), a bounce ray leaves every visible
+surface. It collects light that the second surface reflects or emits, or light of the sky. If there is a sky or a
+glowing geom, another ray leaves the second surface and collects only their light. All light that is reflected at most
+twice is included.
 """
 
 from __future__ import annotations
@@ -37,10 +38,9 @@ class Scenes:
 
 @dataclass(frozen=True)
 class Tables:
-    """Arrays that kernels read in all worlds.
+    """Arrays that are the same in all worlds. bsdfs: of all movers · ends, painted: see `Movers` and `Paint`
 
-    bsdfs: of all movers · ends, painted: see `Movers` and `Paint`
-    sky: an emitter · glowing: number of each mover's glow · glows: BSDFs of these; None: no sky, no glow
+    sky: an emitter, or None · glowing: for each mover, its index in `glows` · glows: BSDFs of glowing geoms, or None
     """
 
     bsdfs: Array
@@ -53,7 +53,7 @@ class Tables:
 
 @dataclass(frozen=True)
 class Rows:
-    """Arrays of all worlds that kernels read: places of movers and lights, and colours."""
+    """Arrays that differ between worlds, for all worlds: places of movers and lights, and colours."""
 
     movers: Array
     lights: Array
@@ -62,7 +62,7 @@ class Rows:
 
 @dataclass(frozen=True)
 class Surroundings:
-    """All of these for the world of one lane."""
+    """Scenes, rows and tables for the world of one lane."""
 
     still: MitsubaObject
     movers: MoverRows
@@ -100,7 +100,7 @@ class _SurfaceHit:
     """First hits of rays.
 
     si: interaction for the BSDF · colors, glow: factors of its reflectance and of its emission, per chunk of bands
-    which: mover, or the number of movers for none · seen: whether anything is hit · active: rays that are traced
+    which: number of the mover, or the number of movers for none · seen: whether anything is hit · active: traced rays
     point, normal: in the world, the normal towards the ray's origin · t: distance [m] · direction: of the ray
     """
 
@@ -168,8 +168,8 @@ class ModelTracer:
         )
 
     def radiance(self, seen: EyeRay, there: Surroundings, samples: Array) -> tuple[list[Array], Array]:
-        """Return the light along each ray, per band, and the distance to its source [m]. Light that bounces uses the
-        samples of each ray: two pairs of numbers on the unit square (`lighting.spawn_bounce_ray`)."""
+        """Return the light along each ray, per band, and the distance to the visible surface [m]. The samples of a ray,
+        two points on the unit square, determine its bounce rays (`lighting.spawn_bounce_ray`)."""
         met = self._met(seen.ray, there)
         arrives = self._irradiance(met, seen.axis, there, shadow_of_headlight=False)
         if self.light == lighting.BOUNCE:
@@ -179,8 +179,8 @@ class ModelTracer:
         return [spectra[b // lighting.LANES][b % lighting.LANES] for b in range(len(self.basis))], met.t
 
     def _returned(self, met: _SurfaceHit, axis: Array, there: Surroundings, samples: Array) -> list[Array]:
-        """Return the light that reaches visible surfaces from one direction each, drawn from Lambert's cosine: light of
-        lamps that is reflected there, and light of the sky and of glowing geoms, emitted or reflected there."""
+        """Return the light that reaches each visible surface from one direction, drawn from Lambert's cosine: light of
+        the sky or of a glowing geom, and light of lamps, sky and glowing geoms that a second surface reflects."""
         bounce_ray = lighting.spawn_bounce_ray(met.point, met.normal, mi.Point2f(samples.x, samples.y))
         second = self._met(bounce_ray, there, met.seen)
         arrives = self._irradiance(second, axis, there, shadow_of_headlight=True)
@@ -199,7 +199,7 @@ class ModelTracer:
         ray.wavelengths = self._bands[0]
         si = there.still.ray_intersect(ray, active) if self._any_still else _nothing()
         if movers.apart:
-            computed(si)  # evaluated once: otherwise every kernel that reads it would trace the rays again
+            computed(si)  # evaluated here: otherwise every kernel that reads `si` would trace the rays again
         far = dr.select(active, si.t, 0)
         hit = movers.nearest(ray, far, there.movers)
         on_mover = active & (hit.which < len(movers))
@@ -229,8 +229,8 @@ class ModelTracer:
         return self._scene.movers.nearest(ray, far, there.movers).t
 
     def which(self, ray: Array, there: Surroundings) -> Array:
-        """Return the first hit of each ray: a mover's number, or the number of movers plus a static shape's id in
-        Mitsuba, 0 for none. Static geoms are separate shapes, see `ModelScene.told_apart`."""
+        """Return the first hit of each ray: a mover's number, or the number of movers plus the Mitsuba id of a static
+        shape, 0 for none. Every static geom has its own shapes, see `ModelScene.told_apart`."""
         movers, any_still = len(self._scene.movers), len(there.still.shapes()) > 0
         si = there.still.ray_intersect_preliminary(ray) if any_still else _nothing()
         far = dr.select(si.is_valid(), si.t, dr.inf)

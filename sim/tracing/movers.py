@@ -1,7 +1,7 @@
 """Intersections of rays with moving geoms in the renderer's kernel: primitives in closed form, meshes by Mitsuba.
 
-Each mesh has its own scene in the geom's frame, and rays are transformed to this frame. Nothing is rebuilt when it
-moves. On a GPU each mesh has its own kernel.
+Each mesh has its own scene in the geom's frame, and rays are transformed to this frame. When a mesh moves, its scene is
+not rebuilt. On a GPU, each mesh is intersected in a separate kernel.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ _TYPES = mujoco.mjtGeom
 # and one of its sizes.
 ROWS = 4
 MESHES = 32  # largest number of meshes; on a CPU all of them are scenes in one kernel
-# Distance that each kind reaches from its origin [m], from its half sizes (..., 3).
+# Largest distance of a geom's surface from its origin [m] as a function of the half sizes (..., 3), for each kind.
 _REACH: dict[mujoco.mjtGeom, Callable[[np.ndarray], np.ndarray]] = {
     _TYPES.mjGEOM_SPHERE: lambda size: size[..., 0],
     _TYPES.mjGEOM_ELLIPSOID: lambda size: size.max(axis=-1),
@@ -41,7 +41,8 @@ _REACH: dict[mujoco.mjtGeom, Callable[[np.ndarray], np.ndarray]] = {
 
 @dataclass(frozen=True)
 class Hit:
-    """t: distance [m], infinite without a hit · which: mover · normal: unit, in the world · uv: of meshes"""
+    """First hit of a ray. t: distance [m], infinite without a hit · which: number of the mover · normal: unit vector in
+    the world · uv: texture coordinates of meshes."""
 
     t: Array
     which: Array
@@ -51,7 +52,7 @@ class Hit:
 
 @dataclass(frozen=True)
 class _Frame:
-    """axes: of a mover in the world (3 Vector3f) · origin (Vector3f)"""
+    """A mover's frame. axes: its axes in the world (3 Vector3f) · origin: its origin in the world (Vector3f)."""
 
     axes: tuple[Array, Array, Array]
     origin: Array
@@ -67,7 +68,7 @@ class _Frame:
 
 @dataclass(frozen=True)
 class MoverRows(WorldRows):
-    """Rows of one world: a sphere around all movers, then ROWS for each. ends: see `Movers`"""
+    """Rows of one world: a sphere around all movers, then ROWS rows for each mover. ends: see `Movers`."""
 
     ends: Array
 
@@ -75,8 +76,8 @@ class MoverRows(WorldRows):
 class Movers:
     """The moving geoms of a model, primitives first, by kind. A geom with drawn materials has a mover per appearance.
 
-    looks: appearance of each mover · geoms: their ids, (mover,) · n_primitives: number of primitives
-    resizable: ids of geoms whose sizes may differ between worlds: geoms that are always primitives
+    looks: appearance of each mover · geoms: geom id of each mover, (mover,) · n_primitives: number of primitives
+    resizable: ids of geoms whose sizes may differ between worlds: geoms that are primitives in all their appearances
     meshes: Mitsuba scenes of the other movers
     ends: number of the first mover of each kind, for the kernel
 
@@ -120,7 +121,7 @@ class Movers:
         return 1 + ROWS * len(self)
 
     def rows(self, poses: Poses) -> np.ndarray:
-        """Return the rows of the kernel: a sphere around all movers, then each mover, (world, 4 n_rows) float32."""
+        """Return the kernel's rows: a sphere around all movers, then each mover, (world, 4 n_rows) float32."""
         rows = np.zeros((poses.n, self.n_rows, 4), np.float32)
         if len(self):
             places, (sizes, reach) = poses.geom_places(self.geoms), self._extents(poses)
@@ -138,7 +139,8 @@ class Movers:
         return rows.reshape(poses.n, -1)
 
     def _absent(self, poses: Poses) -> np.ndarray | None:
-        """Return which appearances a world lacks, (world or 1, mover); None if it has all."""
+        """Return a mask of the appearances that a world does not show, (world or 1, mover); None if all worlds show
+        all."""
         if not self._drawn.any():
             return None
         here = self._as_built if poses.geom_matid is None else poses.geom_matid
@@ -146,8 +148,8 @@ class Movers:
         return absent
 
     def _extents(self, poses: Poses) -> tuple[np.ndarray, np.ndarray]:
-        """Return half sizes (world or 1, mover, 3), for spheres three times the radius, and how far each mover reaches
-        from its origin, (world or 1, mover) [m]."""
+        """Return the movers' half sizes (world or 1, mover, 3), a sphere's radius three times, and the largest distance
+        of each mover's surface from its origin [m], (world or 1, mover)."""
         if poses.geom_size is None:
             sizes = self._sizes[None].copy()
         else:
@@ -180,7 +182,7 @@ class Movers:
         return Hit(*found)
 
     def block(self, ray: Array, farthest: Array, there: MoverRows) -> Array:
-        """Return whether any mover lies on a ray, nearer than `farthest`."""
+        """Return whether any mover blocks a ray at a distance less than `farthest`."""
         if self.apart:
             computed(ray, farthest, there.fours, there.first)
             return self._block(ray, farthest, there)
@@ -232,7 +234,8 @@ class Movers:
         return blocked
 
     def _is_there(self, k: int, frame: _Frame) -> Array | bool:
-        """Return whether a world has mover k. Embree's and OptiX's results for rays with NaN origins are undefined."""
+        """Return whether a world shows mover k. The origin of an absent mover is NaN, for which Embree's and OptiX's
+        results are undefined."""
         return ~dr.isnan(frame.origin.x) if self._drawn[k] else True
 
     def _kinds(self) -> list[tuple[int, Primitive]]:
@@ -252,7 +255,8 @@ class Movers:
 
 
 def _met(hit: Callable[..., Array], ray: Array, there: MoverRows, k: Array) -> Array:
-    """Return the distance to mover k along a ray [m]. Most rays and their neighbours miss the sphere around it."""
+    """Return the distance to mover k along a ray [m]. A branch skips the intersection if a ray misses the sphere around
+    the mover, as most rays and their neighbours do."""
 
     def within() -> Array:
         frame, size = _frame(there, k)

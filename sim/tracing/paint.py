@@ -1,8 +1,8 @@
 """Colours that differ between worlds, as reflectances in the eye's bands, for the kernel.
 
-Painted geoms are built white, including their textures, and the kernel multiplies them by their world's colour. In
-MuJoCo, a colour multiplies a texture, too. Spectra of colours are Mitsuba's (Jakob and Hanika 2019), as in all scenes.
-Glowing geoms glow in their world's colour, with the spectrum of `sim.scene.lights.emission`.
+Painted geoms are built in white, multiplied by their texture if they have one. The kernel multiplies them by their
+world's colour, as MuJoCo multiplies a texture by a colour. Spectra of colours are Mitsuba's (Jakob and Hanika 2019), as
+in all scenes. Glowing geoms glow in their world's colour, with the spectrum of `sim.scene.lights.emission`.
 """
 
 from __future__ import annotations
@@ -31,10 +31,10 @@ class PaintRows(WorldRows):
 
 
 class Paint:
-    """Colours of some geoms, in the order of `geoms`; needs the scene's Mitsuba variant to be set.
+    """Colours of some geoms, in the order of `geoms`. The scene's Mitsuba variant must be in force.
 
-    movers: ids of all movers · glow: whether any of the geoms glows
-    painted: number of each mover among the geoms, for the kernel
+    geoms: ids of the geoms · movers: geom id of each mover · glow: whether any of the geoms glows
+    painted: index in `geoms` of each mover's geom, or len(geoms) for geoms without paint, for the kernel
     """
 
     def __init__(
@@ -58,7 +58,8 @@ class Paint:
         return max(len(self) * len(self._spectra) * (1 + self.glow), 1)
 
     def rows(self, poses: Poses) -> np.ndarray:
-        """Return reflectances, (world, 4 n_rows) float32, followed by the factors of the glow if any geom glows."""
+        """Return reflectances, (world, 4 n_rows) float32. If any geom glows, the factors of the glow follow in each
+        world."""
         rows = np.zeros((poses.n, self.n_rows * lighting.LANES), np.float32)
         if not len(self):
             return rows
@@ -70,7 +71,8 @@ class Paint:
         return rows
 
     def _colors(self, poses: Poses) -> np.ndarray:
-        """Return sRGB colours, (world or 1, geom, 3): a world's own or, by default, the material's, as in MuJoCo."""
+        """Return sRGB colours, (world or 1, geom, 3). As in MuJoCo, a geom whose own colour is unset has its
+        material's."""
         if poses.geom_rgba is None:
             return self._own[None]
         here = poses.geom_rgba[:, self.geoms]
@@ -89,7 +91,8 @@ class Paint:
         return found
 
     def _spectrum(self, rgb: tuple[float, ...], emitted: bool) -> np.ndarray:
-        """Return the reflectance (band,) of a display-referred colour or, as in emitters, its hue's times its level."""
+        """Return the reflectance (band,) of a display-referred colour. emitted: as for emitters, the reflectance of the
+        colour's hue times the colour's largest component."""
         if (rgb, emitted) not in self._known:
             if len(self._known) > 10_000:
                 self._known.clear()

@@ -1,8 +1,8 @@
 """Intersections of rays with MuJoCo's primitives, in the geom's own frame, from outside.
 
 Only the outer sides of faces are visible. As in MuJoCo's rendering, an eye inside a body looks out of it. Distances are
-multiples of the direction's length, and infinite for a miss. Roots are computed relative to the point where the ray
-passes nearest, so that hits of small or distant geoms are accurate in float32.
+multiples of the direction's length, and infinite for a miss. Roots are computed relative to the point at which the ray
+is nearest to the geom's centre or axis, so that hits of small or distant geoms are accurate in float32.
 """
 
 from __future__ import annotations
@@ -16,12 +16,16 @@ import mitsuba as mi
 from optics.numerics.autodiff import Array
 
 TINY = 1e-20
-PARALLEL = 1e-9  # component of a unit direction across a surface below which a ray is parallel to it and misses it
+# If the component of a unit direction across a surface is smaller, the ray counts as parallel to it and misses it.
+PARALLEL = 1e-9
 
 
 @dataclass(frozen=True)
 class Primitive:
-    """hit(origin, direction, size): distance · normal(point, size): outwards, not normalised; size: MuJoCo's"""
+    """Functions for one kind of primitive; size: MuJoCo's sizes.
+
+    hit: (origin, direction, size) -> distance · normal: (point, size) -> outward normal, not normalised
+    """
 
     hit: Callable[[Array, Array, Array], Array]
     normal: Callable[[Array, Array], Array]
@@ -106,7 +110,7 @@ def _box_normal(p: Array, size: Array) -> Array:
     return mi.Vector3f(dr.select(x, q.x, 0), dr.select(y, q.y, 0), dr.select(x | y, 0, q.z))
 
 
-# Primitives by name, in the order of movers of these kinds; spheres are ellipsoids.
+# Primitives by name. Movers are sorted by kind in this order. Spheres are ellipsoids.
 PRIMITIVES = {
     "ellipsoid": Primitive(_ellipsoid_hit, _ellipsoid_normal),
     "capsule": Primitive(_capsule_hit, _capsule_normal),

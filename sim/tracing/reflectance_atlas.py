@@ -21,9 +21,12 @@ from sim.tracing import lighting
 
 @dataclass(frozen=True)
 class Atlas:
-    """texels: reflectance, (texel, band), of all textures in sequence, row by row
-    places: per texture: first texel, columns, rows, (texture, 3)
-    to_texels: per texture: (column, row) = to_texels @ (u, v, 1), (texture, 2, 3); texel centres at whole numbers
+    """Reflectances of several textures in one table.
+
+    texels: reflectance, (texel, band), of all textures in sequence, row by row
+    places: for each texture, its first texel and its numbers of columns and rows, (texture, 3)
+    to_texels: for each texture, the map (column, row) = to_texels @ (u, v, 1), (texture, 2, 3); texel centres are at
+        whole numbers
     """
 
     texels: np.ndarray
@@ -37,7 +40,8 @@ class Atlas:
 
 
 def bake(model: mujoco.MjModel, geoms: Sequence[int], bsdfs: Sequence[MitsubaObject], wavelengths: np.ndarray) -> Atlas:
-    """Return the atlas of these geoms' BSDFs at wavelengths [m]: a texture per geom; geoms of one BSDF share texels."""
+    """Return the atlas of these geoms' BSDFs at wavelengths [m], with one texture per geom. Geoms with the same BSDF
+    share texels."""
     texels: list[np.ndarray] = []
     places: dict[int, tuple[tuple[int, int, int], np.ndarray]] = {}
     for geom, bsdf in zip(geoms, bsdfs, strict=True):

@@ -1,9 +1,9 @@
 """Intersections of rays with moving spheres, in closed form inside the renderer's kernel.
 
 Moving a shape of a Mitsuba scene rebuilds its acceleration structure. For a few spheres per world, closed forms are
-cheaper. Texture coordinates are Mitsuba's and MuJoCo's for a sphere: u = azimuth / 2π, v = polar angle / π from +z,
-both in the sphere's own frame. This module serves scenes in closed form, and an eye may be inside a sphere. The module
-`primitives` has the shapes of all other models, which are hit only from outside.
+cheaper. Mitsuba and MuJoCo have the same texture coordinates on a sphere: u = azimuth / 2π, v = polar angle / π from
++z, both in the sphere's own frame. The closed-form tracer uses this module, in which a ray may start inside a sphere.
+The tracer for all other models uses `sim.tracing.primitives`, whose shapes are hit only from outside.
 """
 
 from __future__ import annotations
@@ -27,10 +27,10 @@ class Spheres:
     """The moving spheres of a scene; only their positions differ between worlds.
 
     radii: [m], (k,)
-    frames: rotation from the sphere's frame to the world's, (k, 3, 3)
-    textured: which have a texture, (k,)
-    names: of the geoms
-    bsdfs: one Mitsuba BSDF each; stored here, because a BSDFPtr does not keep its objects alive
+    frames: rotation from each sphere's frame to the world's, (k, 3, 3)
+    textured: whether each sphere has a texture, (k,)
+    names: names of the geoms
+    bsdfs: one Mitsuba BSDF per sphere; stored here, because a BSDFPtr does not keep its objects alive
     geoms: ids of the geoms, (k,)
     """
 
@@ -57,7 +57,7 @@ class SphereRows:
         self._frames, self._names = spheres.frames[textured], [spheres.names[k] for k in textured]
 
     def fill(self, poses: Poses) -> None:
-        """Write the centres of these worlds.
+        """Write the centres of the spheres in these worlds.
 
         Raises:
             ValueError: a sphere with a texture has turned.
@@ -83,14 +83,17 @@ def centres_in(rows: Array, n: int, world: Array) -> list[Array]:
 
 
 def nearest(spheres: Spheres, centres: list[Array], ray: Array, t: Array) -> tuple[Array, Array]:
-    """Return the distance [m] to the nearest of `t` and the spheres along the ray, and the number of that sphere,
-    len(spheres) for none. With fewer centres than spheres, the last spheres are left out."""
+    """Return the distance [m] to the first sphere that a ray hits closer than `t`, and the number of this sphere.
+
+    Without such a hit, they are `t` and len(spheres). If there are fewer centres than spheres, the last spheres are
+    left out.
+    """
     which = mi.UInt32(len(spheres))
     for k, centre in enumerate(centres):
         b, c = _quadratic(ray, centre, float(spheres.radii[k]))
         discriminant = b * b - c
         root = dr.sqrt(dr.maximum(discriminant, 0))
-        # From inside (c < 0) the far side is visible.
+        # From inside (c < 0), the far side is visible.
         t_k = dr.select(c < 0, root - b, -b - root)
         hit = (discriminant > 0) & (t_k > 0) & (t_k < t)
         t = dr.select(hit, t_k, t)

@@ -37,7 +37,7 @@ class Tracer(Protocol):
     """A method of tracing rays.
 
     name: one of TRACERS · why: reason for its choice
-    light: the part of the light that is followed, one of `lighting.LEVELS`
+    light: one of `lighting.LEVELS`: which reflections are followed
     basis: (component, band): radiance_b = sum_k basis[k, b] component_k
     """
 
@@ -48,7 +48,7 @@ class Tracer(Protocol):
 
     @property
     def scene(self) -> Any:
-        """Mitsuba's scenes, which are a separate argument of the kernel; None if there are none."""
+        """Mitsuba's scenes, which are a separate argument of the kernel; None without scenes."""
 
     @property
     def inputs(self) -> Any:
@@ -58,17 +58,17 @@ class Tracer(Protocol):
         """Return buffers for the rows of `n_envs` worlds."""
 
     def around(self, scenes: Any, rows: Any, inputs: Any, world: Array) -> Any:
-        """Return the surroundings of a lane in this world, taken from the three."""
+        """Return the surroundings of a lane in this world, from the scenes, rows and inputs."""
 
     def radiance(self, seen: EyeRay, there: Any, samples: Array) -> tuple[list[Array], Array]:
-        """Return the light along each ray, one array per component, and the distance to its source [m].
+        """Return the light along each ray, one array per component, and the distance to the visible surface [m].
 
         samples: four numbers on the unit interval for each ray, for light that bounces (`lighting.spawn_bounce_ray`)
         """
 
 
 class Tracers:
-    """The tracers of a scene, one for each part of the light.
+    """The tracers of a scene, one for each level of light (`lighting.LEVELS`).
 
     name: one of TRACERS; "auto": the closed form if the scene has one, otherwise Mitsuba
     stand: the body that the eyes are fixed to; None: derived from their mounts
@@ -103,10 +103,10 @@ class Tracers:
         return self.tracer_for(lighting.DIRECT).name == ClosedForm.name
 
     def tracer_for(self, light: str) -> Tracer:
-        """Return the tracer that follows this part of the light.
+        """Return the tracer that follows this light, one of `lighting.LEVELS`.
 
         Raises:
-            ValueError: there is none.
+            ValueError: no tracer follows this light.
         """
         if light not in self._known:
             with variant(self._scene.variant):
@@ -134,7 +134,8 @@ class Tracers:
         """Return the tracer that uses area sampling.
 
         Raises:
-            ValueError: a world without closed forms for areas, or a tracer that was requested and has no areas.
+            ValueError: a world without closed forms for areas, or a request for the tracer "mitsuba", which traces only
+                rays.
         """
         if self._name == ModelTracer.name:
             raise ValueError(f"samples = 'areas': tracer = {self._name!r} traces rays only")

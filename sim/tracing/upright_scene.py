@@ -1,6 +1,6 @@
-"""A model as upright walls, a floor and moving spheres, seen by eyes that stay level, if it has this form.
+"""A model as upright walls, a floor and moving spheres, seen by eyes that stay level.
 
-If a model has another form, the reason is one line that names the geom, light or body.
+For models of another form, `NoClosedForm` states the reason in one line, with the name of the geom, light or body.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from sim.tracing.spheres import Spheres
 from sim.tracing.walls import ALIGNED, NoClosedForm, Walls, walls_of
 
 _SPHERE = mujoco.mjtGeom.mjGEOM_SPHERE
-# Modes of lights that do not change their direction.
+# Modes in which a light keeps its direction.
 _KEEP_THEIR_WAY = (int(mujoco.mjtCamLight.mjCAMLIGHT_FIXED), int(mujoco.mjtCamLight.mjCAMLIGHT_TRACK))
 
 
@@ -30,12 +30,13 @@ _KEEP_THEIR_WAY = (int(mujoco.mjtCamLight.mjCAMLIGHT_FIXED), int(mujoco.mjtCamLi
 class UprightScene:
     """A model in closed form.
 
-    stand: the body that the eyes are fixed to · walls: with the floor · lights: all lights
-    spheres: all visible spheres · bodies: the same, followed by the eyes' own body, which they do not see, if it is a
-        sphere
-    heights: of all bodies' centres in the reference pose [m], (body,)
+    stand: the body that the eyes are fixed to · walls: all walls and the floor · lights: all lights
+    spheres: all visible spheres · bodies: these spheres, followed by the eyes' own body if it is a sphere, which the
+        eyes do not see
+    heights: heights of all bodies' centres in the reference pose [m], (body,)
     settled: whether each body keeps this height, (body,)
-    model · variant: of Mitsuba · bsdfs: of each geom, by id; geoms that look alike share one object
+    model: the MuJoCo model · variant: Mitsuba's variant
+    bsdfs: BSDF of each geom, by id; geoms that look alike share one object
     """
 
     model: mujoco.MjModel
@@ -59,7 +60,7 @@ def upright_scene(scene: ModelScene, stand: LevelStand) -> UprightScene:
     """Return the closed form of a model.
 
     Raises:
-        NoClosedForm: it has none.
+        NoClosedForm: a model of another form.
     """
     _refuse_what_shines(scene)
     model = scene.model
@@ -126,7 +127,8 @@ def _checked(model: mujoco.MjModel, light: ModelLight) -> DirectionalLight:
 def _refuse_what_eyes_would_see(
     model: mujoco.MjModel, data: mujoco.MjData, stand: LevelStand, own: Sequence[int]
 ) -> None:
-    """Refuse eyes that would see their own body. It must be a sphere, with eyes on its skin that look straight out."""
+    """Refuse eyes that would see their own body. The body must be a sphere, with eyes on its surface that look straight
+    away from its centre."""
     if not own:
         return
     name = model.body(stand.body).name

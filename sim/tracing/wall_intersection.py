@@ -1,4 +1,4 @@
-"""Intersections of rays with upright walls: a few are solved one by one, many are found by a walk through a grid."""
+"""Intersections of rays with upright walls: one by one for few walls, by a walk through a grid for more."""
 
 from __future__ import annotations
 
@@ -14,15 +14,19 @@ from optics.numerics.autodiff import Array
 from sim.scene.device_arrays import floats
 from sim.tracing.walls import ALIGNED, SIDES, NoClosedForm, Walls
 
-FEW = 8  # largest number of walls that are solved one by one; a walk through a grid costs about the same
+# Largest number of walls that are tested one by one; for this number, a walk through a grid costs about the same.
+FEW = 8
 CELLS = 1_000_000  # largest number of cells in a grid
-NEVER_ZERO = 1e-9  # smallest component of a direction; smaller ones are replaced, which shifts no hit off a wall's end
+NEVER_ZERO = 1e-9  # replaces smaller components of directions, which shifts no hit past the end of a wall
 
 
 @dataclass(frozen=True)
 class CellTables:
-    """The cells of a grid, row by row. wall: number of the wall that fills it · top: of that wall [m] · stop: height
-    below which a ray ends there [m]"""
+    """Tables of a grid's cells, row by row.
+
+    wall: number of the wall that fills the cell · top: height of this wall's top [m]
+    stop: height [m] below which a ray ends in the cell
+    """
 
     wall: Array
     top: Array
@@ -30,16 +34,26 @@ class CellTables:
 
 
 class Footprints(Protocol):
-    """A method of intersecting rays with walls. how: description · tables: arrays that the kernel reads, if any."""
+    """A method of intersecting rays with walls.
+
+    how: description for reports · tables: the grid's cells, for the kernel; None: walls are tested one by one
+    """
 
     how: str
     tables: CellTables | None
 
     def hit(self, ray: Array, cells: CellTables | None) -> tuple[Array, Array, Array]:
-        """Return the distance [m] to the nearest wall (inf: none; 0: inside one), its face, and the face's normal."""
+        """Return the distance [m] to the nearest wall (inf: none; 0: inside one), the number of the hit face, and its
+        normal.
+
+        cells: `tables`, passed as an argument of the kernel
+        """
 
     def blocks(self, start: Array, direction: np.ndarray, cells: CellTables | None) -> Array:
-        """Return whether a wall stands between a point outside all walls and a light in this upward direction."""
+        """Return whether a wall stands between a point outside all walls and a light in this upward direction.
+
+        cells: `tables`, passed as an argument of the kernel
+        """
 
 
 def footprints_of(walls: Walls) -> Footprints:
@@ -52,7 +66,7 @@ def footprints_of(walls: Walls) -> Footprints:
 
 
 class EachWall:
-    """A slab test of every wall, unrolled."""
+    """A slab test of every wall; the loop over walls is unrolled."""
 
     def __init__(self, walls: Walls) -> None:
         self._walls = walls
@@ -94,7 +108,8 @@ class EachWall:
 
 
 class Cells:
-    """A walk through a grid of cells that are empty or filled by one wall. Rays end in a ring of cells around it."""
+    """A walk through a grid of cells that are empty or filled by one wall. Rays that leave the grid end in a ring of
+    cells around it."""
 
     def __init__(self, walls: Walls) -> None:
         self._side, origin, cells = cells_of(walls)
@@ -180,8 +195,8 @@ class Cells:
 
 
 def cells_of(walls: Walls) -> tuple[float, np.ndarray, np.ndarray]:
-    """Return the coarsest grid on which the walls lie: side of its cells [m], its lower corner (2,), and the number of
-    the wall that fills each cell (row, column), -1 for none.
+    """Return the coarsest grid in which each wall fills whole cells: the side of a cell [m], the grid's lower corner
+    (2,), and the number of the wall that fills each cell (row, column), -1 for none.
 
     Raises:
         NoClosedForm: walls that lie on no grid, or overlap.
@@ -197,7 +212,8 @@ def cells_of(walls: Walls) -> tuple[float, np.ndarray, np.ndarray]:
 
 
 def _finished(t: Array, face: Array, through_x: Array, dx: Array, dy: Array) -> tuple[Array, Array, Array]:
-    """Return distance, hit face and its normal; face: the first of a wall, whose faces are ordered -x, +x, -y, +y."""
+    """Return the distance, the number of the hit face, and its normal; face: number of the wall's first face. Faces are
+    ordered -x, +x, -y, +y."""
     x, y = dr.select(dx > 0, -1.0, 1.0), dr.select(dy > 0, -1.0, 1.0)
     side = dr.select(
         through_x, dr.select(dx > 0, mi.UInt32(0), mi.UInt32(1)), dr.select(dy > 0, mi.UInt32(2), mi.UInt32(3))
@@ -211,7 +227,8 @@ def _never_zero(d: Array) -> Array:
 
 
 def _grid(walls: Walls) -> tuple[float, np.ndarray, tuple[int, int]]:
-    """Return cell side [m], lower corner (2,), and rows and columns of the coarsest square grid that fits all faces."""
+    """Return the side of a cell [m], the lower corner (2,), and the numbers of rows and columns of the coarsest square
+    grid whose lines contain all faces of the walls."""
     faces = [np.unique(np.round(np.concatenate([walls.lower[:, a], walls.upper[:, a]]), 6)) for a in range(2)]
     origin = np.array([f[0] for f in faces])
     side = 0.0

@@ -1,7 +1,7 @@
 """A static world in closed form: upright walls on a floor, if the model consists of these.
 
 Walls are axis-aligned boxes that reach from the floor to above the eyes. Their tops and bottoms are not visible from
-the eyes. A ray therefore hits a wall at its entry into the wall's footprint, if it is low enough there. Texture
+the eyes. A ray therefore hits a wall when it enters the wall's footprint, if it is below the wall's top there. Texture
 coordinates are affine on every face; they are taken from the mirror's own triangles.
 """
 
@@ -17,9 +17,8 @@ from sim.scene import shapes, surfaces
 
 SIDES = 4  # sides of a wall, which face -x, +x, -y, +y
 FACES = 6  # faces of a box, with four corners each
-ALIGNED = (
-    1e-6  # largest deviation of a wall's rotation from quarter turns, and of faces from a common height or grid [m]
-)
+# Largest deviation of a wall's rotation from quarter turns, and of faces from a common height or grid [m].
+ALIGNED = 1e-6
 
 
 class NoClosedForm(ValueError):
@@ -30,10 +29,10 @@ class NoClosedForm(ValueError):
 class Walls:
     """Walls and floor of a world.
 
-    lower, upper: corners of the walls' footprints [m], (n, 2) · top of each [m], (n,)
-    floor: height of the floor [m] · floor_lower, floor_upper: its corners (2,)
+    lower, upper: corners of the walls' footprints [m], (n, 2) · top: height of each wall's top [m], (n,)
+    floor: height of the floor [m] · floor_lower, floor_upper: corners of the floor [m], (2,)
     uv: texture coordinates of faces, (SIDES n + 1, 2, 4): (u, v) = uv @ (x, y, z, 1); the floor comes last
-    geoms: the geom of each face, (SIDES n + 1,)
+    geoms: geom id of each face, (SIDES n + 1,)
     """
 
     lower: np.ndarray
@@ -50,10 +49,15 @@ class Walls:
 
 
 def walls_of(model: mujoco.MjModel, geoms: Sequence[int], eyes: np.ndarray) -> Walls:
-    """Return the walls and the floor that these geoms form; eyes: heights of the pupils [m].
+    """Return the walls and the floor of a world.
+
+    geoms: ids of the static geoms: boxes are walls, and a plane is the floor
+    eyes: heights of the pupils [m]
 
     Raises:
-        NoClosedForm: any other geom or placement.
+        NoClosedForm: a geom that is neither a box nor a plane, not exactly one plane, or a plane that is tilted or
+            turned. Boxes must be aligned with the axes, stand on the floor, lie within it and end above the eyes. They
+            must not have a cube texture. Eyes must be above the floor.
     """
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)

@@ -13,7 +13,7 @@ from sim.scene.device_arrays import three
 
 @dataclass(frozen=True)
 class WorldRows:
-    """fours: rows of all worlds, flat · first: number of the first row of a lane's world"""
+    """Rows of one lane's world. fours: rows of all worlds, flat · first: number of the first row of this world."""
 
     fours: Array
     first: Array

@@ -3,16 +3,16 @@
 area_tracer         AreaTracer: the light in an area
 branches            branches of the kernel for work that few areas need
 illumination        light that falls on a patch
-patch               Area, and the Patch of a surface that is visible in it
+patch               Area, and the Patch of a surface that is visible in an area
 illuminated_bodies  table of the light on moving bodies
 body_light          light on the visible part of a body
-half_planes         shares that straight lines cut off
+half_planes         shares of an area that straight lines cut off
 borders             borders between columns of areas
 columns             walls, floor and sky behind an area
 sphere_areas        spheres in an area
-light_table         tables of the light that walls and floor send to each other
-light_nodes         nodes of these tables, and interpolation between them
-light_baking        computation of these tables
+light_table         lookup of the light that walls and floor reflect to each other
+light_nodes         nodes of the light tables, and interpolation between them
+light_baking        computation of the light tables
 light_store         cache of light tables on disk
 cell_grid           grid of the free cells of a world
 stripes             averages of textures

@@ -1,8 +1,9 @@
 """A renderer by area sampling for worlds of upright walls, a floor and spheres: in closed form, without noise.
 
-Each area is divided among floor, walls, sky and spheres. Each surface's texture is averaged over its patch, and each
-light is reduced by the share of the patch that lies in its shadow. Colours and components are the same as in
-`sim.tracing.closed_form_tracer`, which follows rays through the same worlds.
+Each area is divided among floor, walls, sky and spheres. The part of a surface that is visible in an area is a patch.
+The surface's texture is averaged over the patch, and each light is reduced by the share of the patch that lies in its
+shadow. Colours and components are the same as in `sim.tracing.closed_form_tracer`, which follows rays through the same
+worlds.
 """
 
 from __future__ import annotations
@@ -32,13 +33,19 @@ from sim.tracing.spheres import SphereRows, centres_in
 from sim.tracing.walls import ALIGNED, NoClosedForm
 
 LEAST_DIP = 1e-4  # smallest downward slope of directions that hit the floor
-BANDS = 2  # parts of the floor in an area
-STRETCHES = 2  # parts of a wall's texture, averaged separately: near parts fill more of an area than distant ones
+BANDS = 2  # horizontal bands into which the floor in an area is divided
+# Number of equally wide parts of an area in which a wall's texture is averaged separately: the near part of a wall
+# fills more of the area than a distant part of the same length.
+STRETCHES = 2
 
 
 @dataclass(frozen=True)
 class _LitSphere:
-    """A sphere in an area. number: of the body · light: on it · depth: layers among which its light is divided"""
+    """A sphere in an area.
+
+    number: its number among the bodies · view: its visible part · light: light on it · now: inputs of the current frame
+    depth: layers among which its light is divided
+    """
 
     number: int
     view: SphereView
@@ -53,11 +60,11 @@ class AreaTracer:
     rays: tracer of rays through the same world, for the same light
 
     name, why: name of the tracer, and the reason for its choice, for reports
-    light: the part of the light that is followed
+    light: one of `lighting.LEVELS`: which reflections are followed
     basis: (component, band): contribution of each component to each band
 
     Raises:
-        NoClosedForm: walls of several heights or on no grid, and textures along two axes.
+        NoClosedForm: walls of several heights or on no grid, or a texture that changes along two axes.
     """
 
     name = "areas"
@@ -142,7 +149,7 @@ class AreaTracer:
         return self.rays.buffers(n_envs)
 
     def bodies(self, rows: Array, world: Array, stand: Array) -> list[Array]:
-        """Return the centres of the bodies in a lane's world; stand: place of the eyes' own body."""
+        """Return the centres of the bodies in a lane's world; stand: position of the eyes' own body."""
         return self.rays.all_bodies(centres_in(rows, len(self.rays.world.spheres), world), stand)
 
     @property
@@ -151,7 +158,8 @@ class AreaTracer:
         return self._illumination.bodies.nodes_per_body_set if self._reflected else 0
 
     def body_light(self, place: Array, bodies: list[Array], inputs: AreaTables) -> list[Array]:
-        """Return rows of this table, at places in worlds with these bodies."""
+        """Return rows of the table of illuminated bodies. place: row within a world's table · bodies: centres of the
+        bodies in this world."""
         return self._illumination.bodies.table(place, bodies, inputs.around)
 
     def _wall(self, area: Area, piece: Piece, now: FrameState, depth: DepthLayers) -> list[Array]:
@@ -173,7 +181,8 @@ class AreaTracer:
         return _in_layers(depth, piece.inverse_distance_at(piece.middle), sent_on)
 
     def _floor(self, area: Area, pieces: tuple[Piece, Piece], now: FrameState, depth: DepthLayers) -> list[Array]:
-        """Return the floor's light, from bands of equal height in the area; bands near the horizon are longer."""
+        """Return the floor's light, computed in bands that have equal heights in the area. On the floor, bands near the
+        horizon are longer."""
         share = pieces[0].floor_share + pieces[1].floor_share
         a = sum(piece.middle * piece.floor_share for piece in pieces) / dr.maximum(share, LEAST_DIP)
 
@@ -211,8 +220,9 @@ class AreaTracer:
     def _sphere(
         self, area: Area, k: int, pieces: tuple[Piece, Piece], now: FrameState, depth: DepthLayers
     ) -> list[Array]:
-        """Return the shares of the area in which a sphere hides either wall and the floor, and its light times its
-        share, per component. Parts that nearer spheres hide are left out."""
+        """Return the shares of the area in which a sphere hides the left wall, the right wall and the floor. The
+        sphere's light times its own share follows, per component. Parts of the sphere that nearer spheres hide are left
+        out."""
         view = SphereView(area, now.bodies[k], self._radii[k])
         light = BodyLight.on_patch(self._illumination, self._reflected, k, view.whole().patch, now)
         sphere = _LitSphere(k, view, light, now, depth)
@@ -230,8 +240,8 @@ class AreaTracer:
         return [*hidden, *total]
 
     def _strip(self, area: Area, sphere: _LitSphere, strip: Strip) -> list[Array]:
-        """Return the share of a strip that no other sphere hides, and its light, per component, times its share of the
-        area."""
+        """Return the share of a strip that no other sphere hides, followed by the strip's light times its share of the
+        area, per component."""
         k, view, now, depth = sphere.number, sphere.view, sphere.now, sphere.depth
         texture = self._sphere_textures[k]
 
@@ -250,7 +260,8 @@ class AreaTracer:
         return total
 
     def _not_hidden(self, area: Area, k: int, slice_: Slice, now: FrameState) -> Array:
-        """Return the share of a slice that no other sphere hides. Several spheres are assumed to hide it at random."""
+        """Return the share of a slice that no other sphere hides. The parts that several spheres hide are assumed to
+        overlap at random."""
         way = now.bodies[k] - area.origin
         bare = mi.Float(1)
         for j, other in enumerate(self._seen_bodies(now)):
@@ -272,8 +283,8 @@ def _in_layers(depth: DepthLayers, vergence: Array, light: list[Array]) -> list[
 
 
 def _in_eights(rows: np.ndarray) -> np.ndarray:
-    """Return rows of eight per face: column of the texel as an affine function of (x, y, z), first texel and columns of
-    the texture. The floor's rim has an arbitrary texture, because it is invisible."""
+    """Return eight numbers per face: the texel's column as an affine function of (x, y, z), the texture's first texel
+    and its number of columns. The floor's rim has an arbitrary texture, because it is invisible."""
     found = np.zeros((len(rows) + RIM, 8))
     found[: len(rows), :6] = rows
     found[len(rows) :, 5] = 1

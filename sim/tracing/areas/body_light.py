@@ -15,9 +15,12 @@ from sim.tracing.areas.patch import Patch
 
 @dataclass(frozen=True)
 class BodyLight:
-    """illumination: direct light · visibility: share of each light that reaches the visible part
-    around: reflected light, harmonics in fours per component; empty if it is not followed
-    change: change of reflected light by other bodies, per component
+    """Light on the visible part of one body.
+
+    illumination: direct light · visibility: share of each light that reaches the visible part
+    around: harmonics of the reflected light around the body, in fours, per component; empty if reflected light is not
+        followed
+    change: change of the reflected light by other bodies, per component
     """
 
     illumination: Illumination

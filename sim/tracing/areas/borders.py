@@ -11,7 +11,11 @@ PARTS = 64  # borders closer to each other than an area's width / PARTS are merg
 
 @dataclass(frozen=True)
 class Borders:
-    """x: on the tangent plane at distance 1, (border,) · sides: numbers of areas' left and right borders, (area, 2)"""
+    """Left and right borders of areas.
+
+    x: positions of the borders on the tangent plane at distance 1, (border,)
+    sides: numbers of each area's left and right border, (area, 2)
+    """
 
     x: np.ndarray
     sides: np.ndarray

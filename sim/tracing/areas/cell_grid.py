@@ -15,9 +15,11 @@ from sim.tracing.walls import Walls
 
 @dataclass(frozen=True)
 class CellGrid:
-    """side: of a cell [m] · corner: lower corner of the grid [m], (2,) · free: cells without a wall, (row, column)
+    """Cells of the grid in which the walls of a world stand. The grid ends at the outermost faces of the walls.
 
-    The grid ends at the outermost faces of the walls."""
+    side: side of a cell [m] · corner: lower corner of the grid [m], (2,)
+    free: true for cells without a wall, (row, column)
+    """
 
     side: float
     corner: np.ndarray
@@ -25,10 +27,10 @@ class CellGrid:
 
     @classmethod
     def from_walls(cls, walls: Walls) -> CellGrid:
-        """Return the coarsest grid on which the walls lie.
+        """Return the coarsest grid in which each wall fills whole cells.
 
         Raises:
-            NoClosedForm: there is none.
+            NoClosedForm: walls that lie on no grid, or overlap.
         """
         side, origin, cells = cells_of(walls)
         return cls(side, origin, cells < 0)
@@ -46,8 +48,11 @@ class CellGrid:
         return found
 
     def locate(self, point: Array, table: Array) -> tuple[Array, Array, Array]:
-        """Return the entry for the cell of a point in a table of all cells, row by row, and the place of the point in
-        this cell, x and y in [0, 1]. Points outside the grid are moved to its border."""
+        """Return the table's entry for the cell that contains a point, and the position of the point in this cell, x
+        and y in [0, 1].
+
+        Points outside the grid are moved to its border. table: one number per cell, row by row
+        """
         rows, columns = self.free.shape
         x, y = ((point[i] - float(self.corner[i])) * (1 / self.side) for i in range(2))
         column, row = dr.clip(dr.floor(x), 0, columns - 1), dr.clip(dr.floor(y), 0, rows - 1)

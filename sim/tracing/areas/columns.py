@@ -1,8 +1,10 @@
 """The walls behind an area: the faces at its left and right borders, and the edge between them.
 
-For a level eye, a wall that is hit at the distance t (in lengths of the level direction) ends below at -z/t and on top
-at (top - z)/t. The inverse distance 1/t is linear in a, so the shares of floor, wall and sky have closed forms. If two
-walls are hit at the borders of the area, there is a corner or an edge between them, found from the walls' ends.
+Columns are numbered by a (`sim.tracing.areas.patch.Area`). A level eye at height z sees a wall in column a at the
+distance t, in lengths of the direction's level part. The foot of the wall is visible at the slope (floor - z)/t, and
+its top at (top - z)/t. The inverse distance 1/t is linear in a, so the shares of floor, wall and sky have closed forms.
+If different walls are hit at the two borders of the area, a corner or an edge lies between them. It is computed from
+the ends of the walls.
 """
 
 from __future__ import annotations
@@ -20,9 +22,9 @@ from sim.tracing.areas.patch import Area, Patch, Rectangle
 from sim.tracing.wall_intersection import CellTables, Footprints
 from sim.tracing.walls import SIDES, Walls
 
-LEAST_NEARNESS = 1e-6  # smallest inverse distance [1/m], for stretches of no width
-NOTHING = 1e-12  # height of empty parts
-RIM = 4  # sides of the floor's rim, at which worlds without a wall end
+LEAST_NEARNESS = 1e-6  # smallest inverse distance [1/m], which also prevents divisions by 0
+NOTHING = 1e-12  # smallest height of a part of an area, which prevents divisions by 0
+RIM = 4  # number of sides of the floor, whose rim is hit in directions without a wall
 
 
 @dataclass(frozen=True)
@@ -38,7 +40,7 @@ class Face:
 class Piece:
     """A wall's face in columns start <= a <= end of an area.
 
-    inverse_distance: at a = 0, and its slope along a [1/m]
+    inverse_distance: 1/t at a = 0, and its slope along a [1/m]
     floor_share, wall_share, sky_share: shares of the area that floor, wall and sky fill in these columns
     """
 
@@ -128,7 +130,7 @@ class Columns:
 
     def _edge(self, area: Area, left: Face, right: Face) -> Array:
         """Return the column of the edge between two walls: an end of the nearer wall, or their common corner. If both
-        walls end, the surface between them is unknown, and each wall gets half of the columns."""
+        walls end, the surface between them is unknown, and the edge is put in the middle of the gap."""
         ends = dr.minimum(_column_of(area, left.right, 1.0), 0.5)
         begins = dr.maximum(_column_of(area, right.left, -1.0), -0.5)
         (l0, l1), (r0, r1) = _inverse_distance(area, left), _inverse_distance(area, right)
@@ -177,8 +179,8 @@ def _cross(a: Array, b: Array) -> Array:
 
 
 def _face_ends(walls: Walls) -> np.ndarray:
-    """Return the left and right end of each face, seen from the front, (face, 4): the walls' faces, then the floor's
-    rim, which is seen from inside."""
+    """Return the left and right end of each face, seen from the front, (face, 4): the walls' faces, followed by the
+    sides of the floor's rim, which are seen from inside."""
     found = []
     for (x0, y0), (x1, y1) in zip(walls.lower, walls.upper, strict=True):
         # Faces in the order -x, +x, -y, +y.

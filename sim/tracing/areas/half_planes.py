@@ -1,4 +1,4 @@
-"""Shares that straight lines cut off: the two integrals from which all shares of an area are computed."""
+"""The two integrals from which all shares of an area are computed: shares that straight lines cut off."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ import drjit as dr
 
 from optics.numerics.autodiff import Array
 
-# Smallest ratio of a line's slopes along the two sides: smaller ones are below float32's 1.2e-7 of the sum.
+# Smallest ratio of a line's slopes along the two sides. Smaller ratios are below float32's precision of 1.2e-7.
 PARALLEL = 1e-9
-# For values closer than this, the clamped middle replaces the mean of a clamped line: an error of an eighth of its
-# square.
+# If the two values differ by less than this, their clamped mean replaces the mean of the clamped line. The error is at
+# most an eighth of the difference.
 LEVEL = 1e-2
 
 

@@ -1,6 +1,6 @@
 """The share of each light that reaches the moving bodies, as a whole and on each side of them.
 
-It does not depend on the eye, so it is computed once per world, in a table that all areas of the world read.
+These shares do not depend on the eye. They are computed once per world, in a table that all areas of the world read.
 """
 
 from __future__ import annotations
@@ -16,13 +16,18 @@ from sim.tracing.areas.patch import Patch
 from sim.tracing.areas.shadows import WallShadows, lit_past_sphere
 
 MIDDLE = 2 / 3  # distance from a body's centre to the middle of its visible side, weighted by projected area [radii]
-SIDES = 3  # places along x and along y, the outer ones on the sides' middles: an error of 0.05 between them
-WHOLE = SIDES * SIDES  # number of the whole body among a body's places
+# Number of places along x and along y, of which the outer ones are at the middles of the body's sides. Interpolation
+# between places has an error of 0.05.
+SIDES = 3
+WHOLE = SIDES * SIDES  # number of the place that stands for the whole body
 PLACES = WHOLE + 1
 
 
 class IlluminatedBodies:
-    """shadows: of walls · directions: of the lights · radii: of the bodies [m]"""
+    """Computation and lookup of the light on the moving bodies of all worlds.
+
+    shadows: shadows of walls · directions: directions towards the lights · radii: radii of the bodies [m]
+    """
 
     def __init__(self, shadows: WallShadows, directions: list[list[float]], radii: list[float]) -> None:
         self._shadows, self._directions, self._radii = shadows, directions, radii
@@ -33,8 +38,13 @@ class IlluminatedBodies:
         return PLACES * len(self._radii)
 
     def table(self, place: Array, bodies: list[Array], walls_around: Array | None) -> list[Array]:
-        """Return the share of each light, in fours, at places 0 ... places - 1 of a world: past walls and, for places
-        on a side, past other bodies."""
+        """Return the share of each light that reaches a place on a body of a world, in fours.
+
+        Walls block the light at all places. Other bodies block it only at places on a side, not at the place of the
+        whole body.
+
+        place: row of a world's table · bodies: centres of the world's bodies · walls_around: see `WallShadows`
+        """
         k, side = place // PLACES, place % PLACES
         radius, whole = select(k, self._radii), side == WHOLE
         x, y = (mi.Float(i) * (2 / (SIDES - 1)) - 1 for i in (side % SIDES, side // SIDES))
@@ -56,7 +66,8 @@ class IlluminatedBodies:
 
     def on_side(self, k: Array, towards: Array, world: Array, table: list[Array]) -> list[Array]:
         """Return the share of each light that reaches the k-th body on its side in a direction (unit vector)."""
-        first = (world * len(self._radii) + k) * PLACES  # whole numbers: too large for float32 in very many worlds
+        # In whole numbers, because with many worlds, float32 is not accurate enough.
+        first = (world * len(self._radii) + k) * PLACES
         found = [mi.Float(0) for _ in self._directions]
         for side, weight in corners(mi.Float(0), ((towards.x + 1) / 2, SIDES), ((towards.y + 1) / 2, SIDES)):
             shares = self._row(first + side, table)

@@ -1,4 +1,4 @@
-"""The light that falls on a patch past walls and bodies."""
+"""The light that reaches a patch. Walls and bodies block parts of it, and reflect light towards the patch."""
 
 from __future__ import annotations
 
@@ -21,17 +21,17 @@ from sim.tracing.areas.stripes import StripeTables
 from sim.tracing.closed_form_tracer import ClosedForm
 from sim.tracing.wall_intersection import CellTables
 
-REACH = 8  # radii; a body further away fills less than 1/64 of the view from a patch that it lights or shades
-ITSELF_NONE = 2**16  # number of no body, for a patch that is on none of them
+REACH = 8  # [radii] more distant bodies are ignored, because they fill less than 1/64 of the view from a patch
+ITSELF_NONE = 2**16  # number that no body has, for a patch that does not lie on a body
 
 
 @dataclass(frozen=True)
 class AreaTables:
-    """Arrays that kernels for areas read in all worlds.
+    """Arrays of area sampling that are the same in all worlds.
 
-    faces: of walls, in eights, see `area_tracer` · face_ends: see `Columns` · cells: see `Footprints`
-    around: see `WallShadows` · stripes: textures · reflected: light that walls and floor send to each other; None: it
-        is not followed
+    faces: walls' faces, in eights, see `area_tracer` · face_ends: see `Columns` · cells: see `Footprints`
+    around: see `WallShadows` · stripes: textures
+    reflected: light that walls and floor reflect to each other; None: reflected light is not followed
     """
 
     faces: Array
@@ -46,8 +46,8 @@ class AreaTables:
 class FrameState:
     """Inputs that change between calls.
 
-    bodies: centres of the moving spheres, the agent's last · inputs: tables · world: number of an area's world
-    body_light: tables of `IlluminatedBodies`, world by world, if light that bodies reflect is followed
+    bodies: centres of the moving spheres, the agent's last · inputs: tables · world: number of the world of each area
+    body_light: tables of `IlluminatedBodies`, world by world; empty if light that bodies reflect is not followed
     """
 
     bodies: list[Array]
@@ -59,7 +59,7 @@ class FrameState:
 class Illumination:
     """The light that reaches patches, directly or reflected, past walls and bodies.
 
-    around: which cells around each cell are walls, for the kernel · bodies: the light on bodies
+    around: for each cell, which cells around it are walls, for the kernel · bodies: the light on bodies
 
     Raises:
         NoClosedForm: shadows for which WallShadows has no closed form.
@@ -98,8 +98,8 @@ class Illumination:
     def past_bodies(
         self, patch: Patch, arriving: list[Array], now: FrameState, itself: int = ITSELF_NONE
     ) -> list[Array]:
-        """Return the reflected light on a patch, per component, without the light that bodies hide and with the light
-        that they reflect themselves. The light that they hide is assumed to be average."""
+        """Return the reflected light on a patch, per component, after correction for bodies: light that they hide is
+        subtracted, and light that they reflect is added. The hidden light is assumed to be as bright as the average."""
 
         def past(k: Array, arriving: list[Array]) -> list[Array]:
             radius = select(k, self._radii)
@@ -123,8 +123,8 @@ class Illumination:
         return found
 
     def _exchanged(self, patch: Patch, arriving: list[Array], k: Array, now: FrameState) -> list[Array]:
-        """Return the light from a body minus the light that it hides, by the form factor of a sphere. A sphere that
-        crosses the patch's horizon has Snyder's (1996) form factor."""
+        """Return the light from a body minus the light that it hides, both by the form factor of a sphere. If the
+        patch's horizon crosses the sphere, Snyder's (1996) form factor applies."""
         way, radius = select(k, now.bodies) - patch.point, select(k, self._radii)
         distance = dr.maximum(dr.norm(way), radius)
         height = dr.dot(patch.normal, way)
@@ -135,7 +135,8 @@ class Illumination:
         return [factor * (mine - hidden) - dark for mine, hidden, dark in exchanged]
 
     def _shadow(self, k: Array, patch: Patch, now: FrameState) -> list[Array]:
-        """Return the light, per component, that a patch loses by a body's shadows on the floor: disks' form factors."""
+        """Return the light, per component, that a patch does not receive because of the shadows of a body on the floor.
+        The shadows have the form factors of disks."""
         centre, disk = select(k, now.bodies), math.pi * dr.square(select(k, self._radii))
         total = [mi.Float(0) for _ in range(self._levels.shape[1])]
         lit = self.bodies.on_whole(k, now.world, now.body_light)
@@ -149,10 +150,15 @@ class Illumination:
         return total
 
     def _sent(self, k: Array, towards: Array, nearness: Array, now: FrameState) -> list[Array]:
-        """Return the radiosity of a body, per component, from its mean colour and the light on the middle of its
-        visible side: by Lambert's phase function from far away, by the irradiance of the nearest point from close by.
+        """Return the radiosity of a body as seen from a patch, per component: its mean reflectance times the light on
+        the middle of its visible side.
 
-        nearness: radius / distance; the weight of the two limits is fitted (residual at most 0.05 of the light)
+        The light is a weighted mean of two limits. From far away, the whole visible side counts, and the light follows
+        Lambert's phase function. From close by, only the body's nearest point counts, and the light is the irradiance
+        there.
+
+        towards: unit vector from the body to the patch
+        nearness: radius / distance. The weight as a function of it is fitted (residual at most 0.05 of the light).
         """
         near = nearness * (1.4 - 0.4 * nearness)
         lit = self.bodies.on_side(k, towards, now.world, now.body_light)

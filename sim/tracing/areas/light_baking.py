@@ -1,7 +1,7 @@
 """Computation of the tables of reflected light by brute force, with many rays from every node.
 
-The tables contain the static scene and, as the only effect of moving bodies, the shadow that a body casts on the floor
-that illuminates it.
+The tables describe the static scene. Moving bodies have one effect in them: the shadow that a body casts on the floor
+reduces the light that the floor reflects back to this body.
 """
 
 from __future__ import annotations
@@ -22,18 +22,22 @@ from sim.tracing.closed_form_tracer import ClosedForm, Irradiance
 RAYS = 256  # rays from a node
 NORMALS = 96  # normals of a body's surface, to which sixteen harmonics are fitted
 FOURS = 4  # groups of four floats: sixteen harmonics
-ORDERS = 16  # largest number of reflections; each adds at most the share of light that surfaces reflect
-CHANGE = 1e-3  # share of the largest irradiance: smaller changes end the iteration
+# Largest number of reflections; each further one adds at most the previous light times the surfaces' reflectance.
+ORDERS = 16
+CHANGE = 1e-3  # the iteration ends if all changes are at most this share of the largest irradiance
 LANES = 2**21  # rays traced at once
 
 
 class Baking:
-    """Tables that are not yet baked; kinds: of bodies, radius and height of the centre [m]."""
+    """Computation of the tables of one world.
+
+    kinds: radius and height of the centre [m] of each kind of body
+    """
 
     def __init__(self, tracer: ClosedForm, nodes: LightNodes, kinds: list[tuple[float, float]]) -> None:
         self._tracer, self._nodes, self._kinds = tracer, nodes, kinds
         self._orders = ORDERS if tracer.light == lighting.ALL else 1
-        self._arriving: Irradiance | None = None  # light of fewer reflections, if it is to be added
+        self._arriving: Irradiance | None = None  # irradiance by light of fewer reflections; None: not added
 
     @property
     def ingredients(self) -> list[np.ndarray]:
@@ -148,7 +152,7 @@ class Baking:
 
 
 def _within(length: float, nodes: int) -> np.ndarray:
-    """Return the places of nodes along a length, not at its ends."""
+    """Return the positions of nodes along a length, at least MARGIN away from its ends."""
     return np.clip(np.linspace(0, length, nodes), MARGIN, length - MARGIN)
 
 

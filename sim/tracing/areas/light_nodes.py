@@ -1,6 +1,7 @@
-"""Nodes at which the light that walls and floor send to each other is known, and interpolation between them.
+"""Nodes at which the light that walls and floor reflect to each other is computed, and interpolation between them.
 
-Every free cell of the grid has its own nodes on its floor and on each of the walls around it, and places for bodies.
+Every free cell of the grid has its own nodes on its floor and on each of the walls around it, and places at which the
+light on bodies is computed.
 """
 
 from __future__ import annotations
@@ -29,8 +30,11 @@ SIDES = np.array([[-1, 0], [1, 0], [0, -1], [0, 1]])  # sides of a cell, on whic
 
 @dataclass(frozen=True)
 class LightNodes:
-    """Nodes of a world. floor, top: heights of the floor and of the walls' tops [m] · across, up, places: number of
-    nodes along a cell and up a wall, and of bodies' places along a cell."""
+    """Nodes of a world.
+
+    grid: free cells · floor, top: heights of the floor and of the walls' tops [m]
+    across, up: numbers of nodes along a cell and up a wall · places: number of bodies' places along a cell
+    """
 
     grid: CellGrid
     floor: float
@@ -63,7 +67,10 @@ class LightNodes:
 
 @dataclass(frozen=True)
 class NodeTables:
-    """cells: numbers of the free cells · floor, walls: light at their nodes, one array per component"""
+    """Reflected light at the nodes.
+
+    cells: numbers of the free cells · floor, walls: light at their nodes, one array per component
+    """
 
     cells: Array
     floor: list[Array]
@@ -73,7 +80,7 @@ class NodeTables:
 class NodeLight:
     """Light interpolated between nodes, from tables that are passed to each call.
 
-    nodes: at which the light is known · components: number of components of light
+    nodes: nodes at which the light is known · components: number of components of light
     """
 
     def __init__(self, nodes: LightNodes, components: int) -> None:
@@ -110,7 +117,8 @@ class NodeLight:
 
 
 def corners(first: Array, *axes: tuple[Array, int]) -> Iterator[tuple[Array, Array]]:
-    """Yield index and weight of the four nodes around a place; axes: x and y in [0, 1], each with a number of nodes."""
+    """Yield index and weight of the four nodes around a position. first: index of the grid's first node · axes: x and y
+    in [0, 1], each with its number of nodes."""
     (x, nx), (y, ny) = axes
     x, y = dr.clip(x, 0, 1) * (nx - 1), dr.clip(y, 0, 1) * (ny - 1)
     i, j = dr.minimum(dr.floor(x), nx - 2), dr.minimum(dr.floor(y), ny - 2)

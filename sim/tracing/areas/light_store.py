@@ -24,7 +24,7 @@ def cache_folder() -> Path:
 
 
 def stored(baking: Baking) -> dict[str, np.ndarray]:
-    """Return the tables, from disk if they are there. Without a writable disk they are baked every time."""
+    """Return the tables, from disk if they are stored there. Without a writable disk, they are baked every time."""
     path = cache_folder() / f"{_digest(baking.ingredients)}.npz"
     # If a file is missing, truncated or foreign, the tables are baked again.
     with contextlib.suppress(OSError, ValueError, zipfile.BadZipFile, EOFError), np.load(path) as file:

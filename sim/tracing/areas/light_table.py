@@ -1,6 +1,6 @@
-"""Light that the walls and the floor of a world send to each other, looked up in tables that are baked beforehand.
+"""Light that the walls and the floor of a world reflect to each other, looked up in tables that are baked beforehand.
 
-Every free cell of the grid has its own table for its floor and for each of the walls around it. It also has a table of
+Every free cell of the grid has its own table for its floor and for each of the walls around it. Another table contains
 the light that arrives from all sides on the surface of bodies in the cell (`sim.tracing.areas.light_baking`).
 """
 
@@ -23,14 +23,17 @@ from sim.tracing.closed_form_tracer import ClosedForm
 
 @dataclass(frozen=True)
 class LightTables(NodeTables):
-    """bodies: harmonics of the light on bodies of each kind, one array per component"""
+    """Reflected light at the nodes and on bodies. bodies: harmonics of the light on each kind of body, one array per
+    component."""
 
     bodies: list[list[Array]]
 
 
 class LightTable(NodeLight):
-    """tracer: of rays through the same world; the tables have its components of light
-    radii, heights: of the visible bodies and of their centres [m]
+    """Lookup of reflected light on floor, walls and bodies of one world.
+
+    tracer: tracer of rays through the same world, whose components of light the tables have
+    radii, heights: radii of the visible bodies, and heights of their centres [m]
 
     tables: for the kernel
 
@@ -72,7 +75,8 @@ def _tables(baked: dict[str, np.ndarray], nodes: LightNodes, kinds: int) -> Ligh
 
 
 def sum_of(fours: list[Array], normal: Array) -> Array:
-    """Return the sum of harmonics, given in fours, in a direction."""
+    """Return the value of a sum of spherical harmonics, whose coefficients are given in fours, in the direction
+    `normal`."""
     values = spherical_harmonics(normal.x, normal.y, normal.z)
     return sum((four[i] * v for four, i, v in _spread(fours, values)), mi.Float(0))
 

@@ -1,4 +1,5 @@
-"""The two kinds of area: a rectangle of the visual field, and the patch of a surface that is visible in it."""
+"""The regions that are averaged: an area of the visual field, and the patch of a surface that is visible in the
+area."""
 
 from __future__ import annotations
 
@@ -14,8 +15,8 @@ class Area:
     """A rectangle on the tangent plane of a level eye: directions (ahead + a right, up + b height), |a| and |b| up to
     1/2.
 
-    origin: the pupil (Point3f) · ahead, right: level parts (Vector2f) of the middle's direction, and the whole width
-    up, height: z of the middle's direction, and the whole height
+    origin: the pupil (Point3f) · ahead, up: level part (Vector2f) and z of the direction to the rectangle's middle
+    right, height: whole width (Vector2f), and whole height
     """
 
     origin: Array

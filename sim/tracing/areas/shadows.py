@@ -1,4 +1,4 @@
-"""The share of a patch that a light reaches: edges of shadows are straight lines across the patch."""
+"""The share of a patch that a light reaches. Edges of shadows are treated as straight lines across the patch."""
 
 from __future__ import annotations
 
@@ -16,7 +16,8 @@ from sim.tracing.areas.patch import Patch
 from sim.tracing.wall_intersection import NEVER_ZERO, cells_of
 from sim.tracing.walls import NoClosedForm, Walls
 
-BESIDE = 1e-3  # distance in front of a wall [m], in the cell from which it is visible
+# [m] distance from a patch to a point in front of it, which lies in the cell from which the patch is visible.
+BESIDE = 1e-3
 NEIGHBOURS = tuple((row, column) for row in (-1, 0, 1) for column in (-1, 0, 1))
 
 
@@ -35,8 +36,8 @@ def lit_past_sphere(patch: Patch, directions: list[list[float]], centre: Array, 
 
 
 def _lit_past_sphere(patch: Patch, direction: list[float], way: Array, radius: Array) -> Array:
-    """Return the share without the shadow for one light. On small patches the shadow's rim is one straight line or two;
-    on large patches the shadow is a disk that lies within."""
+    """Return the share of a patch that one light reaches past a sphere. On small patches, the rim of the shadow is one
+    straight line or two. On large patches, the shadow is a disk that lies within the patch."""
     towards = mi.Vector3f(*direction)
     ahead = dr.dot(way, towards)
     beside = way - ahead * towards
@@ -52,14 +53,14 @@ def _lit_past_sphere(patch: Patch, direction: list[float], way: Array, radius: A
 class WallShadows:
     """Shadows of walls of one height, which reach at most into the next cell of the walls' grid.
 
-    Light comes to a point in a free cell over the next cell along x, the next cell along y, or the cell across the
-    corner. A table states for each cell which of these are walls. Three straight lines across the patch decide which of
-    them the ray enters first, and whether it is above their tops there.
+    A ray from a point in a free cell to a light crosses the next cell along x, the next cell along y, or the cell
+    across the corner. A table states for each cell which of these neighbours are walls. Three straight lines across the
+    patch decide which neighbour the ray enters first, and whether the ray is above its top there.
 
-    around: which cells around each cell are walls, for the kernel; None without walls
+    around: for each cell, which cells around it are walls, for the kernel; None without walls
 
     Raises:
-        NoClosedForm: walls on no grid, or shadows that reach further.
+        NoClosedForm: walls on no grid, or shadows that are longer than a cell.
     """
 
     def __init__(self, walls: Walls, directions: list[list[float]]) -> None:
@@ -100,7 +101,8 @@ class WallShadows:
         return only_where(concerns, lit, [1.0] * len(directions))
 
     def _lit_from(self, patch: Patch, direction: list[float], row: Array, column: Array, around: Array) -> Array:
-        """Return 1 - the share behind the cells that the ray enters along x, along y, or through the corner."""
+        """Return the share of a patch that is not in the shadow of the cells that the ray enters along x, along y, or
+        through the corner."""
         dx, dy = (math.copysign(max(abs(d), NEVER_ZERO), d) for d in direction[:2])
         dz = direction[2]
         crosses_x, crosses_y = (

@@ -17,20 +17,24 @@ from sim.tracing.areas.half_planes import share_above
 from sim.tracing.areas.patch import Area, Patch, Rectangle
 from sim.tracing.areas.stripes import Texture
 
-# Chosen: strips across the visible part of a sphere, and slices of each strip. Wide areas have more, because they would
-# have to be split otherwise (docs/measurements/rendering.md#area-sampling).
+# Chosen: number of strips across the visible part of a sphere, and of slices in each strip. Wide areas have more,
+# because otherwise they would have to be divided into smaller areas (docs/measurements/rendering.md#area-sampling).
 SIDES, SIDES_OF_WIDE = 3, 4
 WIDE = 0.0555  # width on the plane at distance 1: 3.2 degrees
 # Smallest cosine between a surface's normal and the direction to the eye. Smaller ones would make its patch longer than
 # the sphere.
 GRAZING = 0.15
 TINY = 1e-12
-NEARLY_OPEN = 1e-4  # chosen: outlines that are longer than some 100 times their width are cut like open ones
+NEARLY_OPEN = 1e-4  # chosen: outlines that are more than about 100 times as long as wide are treated as open
 
 
 @dataclass(frozen=True)
 class SphereTexture:
-    """A texture along one axis: column = to_column @ (u, v, 1) · frame: from the sphere's axes to the world's."""
+    """A texture that changes along one axis.
+
+    texture: its place in the tables · to_column: map column = to_column @ (u, v, 1)
+    frame: rotation from the sphere's axes to the world's, (3, 3)
+    """
 
     texture: Texture
     to_column: np.ndarray
@@ -41,8 +45,8 @@ class SphereTexture:
 class Slice:
     """A slice of a sphere's visible part in an area.
 
-    share: of the area that the slice fills
-    seen, along, across: direction of its middle, and its sides on the area's plane · patch: of the sphere's surface
+    share: share of the area that the slice fills · seen: direction of its middle
+    along, across: its sides on the area's plane · patch: its part of the sphere's surface
     """
 
     share: Array
@@ -59,7 +63,8 @@ class Slice:
 
 @dataclass(frozen=True)
 class Strip(Slice):
-    """A row of slices as one. part: the part of the area that it fills, approximately"""
+    """A strip of a sphere's visible part: a row of slices, treated as one slice. part: the part of the area that it
+    fills, approximately."""
 
     part: Rectangle
 
@@ -81,7 +86,7 @@ class SphereView:
         def slope(side: Array) -> Array:
             return dr.abs(dr.dot(way, ahead) * dr.dot(way, side) - tangent * dr.dot(ahead, side))
 
-        # Lines run towards the outline, so that they cut it at a steep angle.
+        # The lines across the area have the direction in which they cut the outline at the steeper angle.
         self._upright = upright = slope(right) <= slope(up)
         self._along, self._across = dr.select(upright, up, right), dr.select(upright, right, up)
         self._outline = _outline(way, radius, ahead, self._along, self._across)
@@ -97,7 +102,7 @@ class SphereView:
         return self._between(mi.Float(number) * per, (mi.Float(number) + 1) * per)
 
     def _between(self, low: Array, high: Array) -> Strip:
-        """Return the strip between two cumulative shares of the visible part."""
+        """Return the strip between two cumulative shares of the visible part, from 0 to 1."""
         outline = self._outline
         one, other = outline.edge(low), outline.edge(high)
         place, width = (one.place + other.place) / 2, other.place - one.place
@@ -122,7 +127,11 @@ class SphereView:
 
 @dataclass(frozen=True)
 class _Edge:
-    """An edge of a strip. place: across the area, ±1/2 at most · angle, sine: place = outline.middle + .half · sine"""
+    """An edge of a strip.
+
+    place: position across the area, from -1/2 to 1/2
+    angle, sine: parameter of the elliptic outline, and its sine: place = middle[0] + half[0] · sine
+    """
 
     place: Array
     angle: Array
@@ -133,9 +142,9 @@ class _Edge:
 class _Outline:
     """A sphere's outline on an area's tangent plane, in units of the area's sides.
 
-    closed: whether it is an ellipse, which the other fields describe · middle: of it, across and along the area
+    closed: whether it is an ellipse, which the other fields describe · middle: its middle, across and along the area
     half: half of the ellipse's width across the area, and half of the chord through its middle along the area
-    slant: shift of chords along the area per unit of place across it
+    slant: shift of chords along the area per unit of position across it
     low, high: angles at which the area cuts the ellipse off
     """
 
@@ -154,8 +163,8 @@ class _Outline:
         return _Edge(dr.clip(place, -0.5, 0.5), angle, sine)
 
     def mean_chord(self, one: _Edge, other: _Edge) -> tuple[Array, Array]:
-        """Return length and middle of a chord, cut to the area. The chord is as long as the average chord between two
-        edges, so that areas of ellipses are exact."""
+        """Return length and middle of the average chord between two edges, clipped to the area. With this length, areas
+        of ellipses are exact."""
         double = other.sine * dr.cos(other.angle) - one.sine * dr.cos(one.angle)
         mean = (other.angle - one.angle + double) / (2 * dr.maximum(other.sine - one.sine, TINY))
         middle = self.middle[1] + self.slant * ((one.place + other.place) / 2 - self.middle[0])
@@ -217,7 +226,8 @@ def columns_of(texture: SphereTexture, patch: Patch, radius: float) -> tuple[Arr
 
 
 def hidden_by(way: Array, radius: Array, slice_: Slice) -> Array:
-    """Return the share of a slice that another sphere hides, with a straight outline there; way: to its centre."""
+    """Return the share of a slice that another sphere hides, whose outline is approximated by a straight line there;
+    way: vector to the sphere's centre."""
     seen, sides = slice_.seen, (slice_.along, slice_.across)
     length, moment = dr.norm(seen), dr.cross(way, seen)
     beside = dr.maximum(dr.norm(moment), TINY)

@@ -20,7 +20,7 @@ from sim.scene.device_arrays import floats
 # Smallest length of a stretch [texels]. An integral of 100 texels is accurate to 4e-6, a mean over this length to 1e-4.
 LEAST = 0.1
 # Smallest side of a parallelogram, as a share of the texture's columns. The second integral is about 10⁻² of the
-# columns squared. With this side it is accurate enough for a mean to 1e-3.
+# columns squared. With this side, it is accurate enough for a mean with an error of 1e-3.
 LEAST_SIDE = 1 / 256
 
 
@@ -46,7 +46,9 @@ class StripeTables:
 
 
 class Stripes:
-    """reflectance: (texel, component) · places: first texel and columns of each texture, (texture, 2)
+    """Averages of textures along one axis.
+
+    reflectance: (texel, component) · places: first texel and number of columns of each texture, (texture, 2)
 
     tables: for the kernel
     """
@@ -69,7 +71,8 @@ class Stripes:
     def mean(self, texture: Texture, ends: list[Array], spread: Array | float, tables: StripeTables) -> list[Array]:
         """Return the mean reflectance, per component, over consecutive stretches of equal weight.
 
-        ends: of the stretches, texel centres at whole numbers · spread: further width, half of it on either side
+        ends: ends of the stretches, texel centres at whole numbers · spread: additional width, half of it on either
+            side
         """
         found = self._mean(texture, tables)
         for one, other in pairwise(ends):
