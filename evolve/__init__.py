@@ -1,14 +1,14 @@
 """evolve: evolution of eyes and brains in the worlds of `sim`.
 
-This module is a table of contents. Each name is imported on first use.
+This module lists the public names. Each name is imported on first use.
 """
 
 from __future__ import annotations
 
-import rhabdom  # noqa: F401 (finds rhabdom's own optics and sim, even if other packages with these names are installed)
+import rhabdom  # noqa: F401 (makes `import optics` and `import sim` find rhabdom's packages)
 
 TYPE_CHECKING = False
-if TYPE_CHECKING:  # importing `typing` takes milliseconds, during which Ctrl-C is not yet handled
+if TYPE_CHECKING:  # avoids importing `typing`, since Ctrl-C is not yet handled during these milliseconds
     from typing import Any
 
 _HOME = {

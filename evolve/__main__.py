@@ -1,15 +1,15 @@
-"""Entry point of `evolve` and `python -m evolve`; nothing else is imported before Ctrl-C is handled."""
+"""Entry point of `python -m evolve`. Other modules are imported only after Ctrl-C is handled."""
 
 import sys
 
 
 def main() -> int:
-    """Import the command, run it, and return the exit code."""
+    """Import the module of the command, run the command, and return its exit code."""
     try:
         from evolve.cli.main import main as command
 
         return command()
-    except KeyboardInterrupt:  # during the import
+    except KeyboardInterrupt:  # Ctrl-C during the import
         print("evolve: interrupted", file=sys.stderr)
         return 130
 

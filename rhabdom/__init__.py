@@ -1,13 +1,14 @@
-"""rhabdom: eyes that evolve, simulated with physical optics.
+"""rhabdom: evolving eyes, simulated with physical optics.
 
 optics    wave optics, from light to photoreceptor signals
-sim       worlds, and the signals of the eyes in them
-evolve    the search: genomes, learning, runs
+sim       simulated worlds, and the signals of eyes in them
+evolve    evolutionary search: genomes, learning, runs
 
-`rhabdom.optics` and `optics` are the same package. Each package is imported on first use. The modules here:
+`rhabdom.optics` and `optics` are the same package. Each package is imported on first use. This package contains two
+modules:
 
-importing  locations of the three packages, and conflicts with other projects of the same names
-command    the command `evolve`
+importing  locations of the three packages, and conflicts with other packages of the same names
+command    entry point of the command `evolve`
 """
 
 from __future__ import annotations

@@ -1,4 +1,7 @@
-"""Entry point of the command `evolve`. Importing this module puts the packages on Python's path."""
+"""Entry point of the command `evolve`.
+
+Importing this module also imports `rhabdom`, which makes its three packages importable.
+"""
 
 from __future__ import annotations
 
@@ -27,10 +30,10 @@ def run_command() -> int:
 
 
 def _interrupt(number: int, frame: FrameType | None) -> None:
-    """Interrupt the process on Ctrl-C, or end it if a module is being imported.
+    """Interrupt the program on Ctrl-C by an exception, or end the process if a module is being imported.
 
-    An exception raised during an import may come up in the middle of a library's initialisation. Python or the library
-    may then replace or suppress it.
+    During an import, the exception might be raised while a library initialises itself. Python or the library might then
+    replace or suppress it.
     """
     if _imports(frame):
         os.write(2, _SAID)

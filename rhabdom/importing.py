@@ -1,8 +1,9 @@
 """Locations of the packages `optics`, `sim` and `evolve`, and conflicts with other packages of the same names.
 
 In a checkout the three packages lie next to this one. In an installation they lie in `rhabdom/packages`, which
-`rhabdom.pth` adds to Python's path. The reason is that the package index holds another project named `optics`. Two
-projects that install the same folder overwrite each other's files, and uninstalling one deletes files of the other.
+`rhabdom.pth` adds to Python's path. They are not installed next to this package, because the package index contains
+another project named `optics`. Two projects that install the same folder overwrite each other's files, and uninstalling
+one deletes files of the other.
 """
 
 from __future__ import annotations
@@ -25,11 +26,10 @@ HOME = _BESIDE if _BESIDE.is_dir() else _BESIDE.parents[1]  # the folder that co
 
 
 def come_first() -> None:
-    """Make `import optics`, `sim` and `evolve` find rhabdom's packages, and make `rhabdom.optics` the same module as
-    `optics`.
+    """Make `import optics`, `import sim` and `import evolve` import rhabdom's packages.
 
-    Python's path is left unchanged if it already leads to rhabdom's packages. If packages of other projects come first,
-    a warning names them.
+    `rhabdom.optics` then is the same module as `optics`. Python's path stays unchanged if the imports already find
+    rhabdom's packages. If they find packages of other projects, a warning names these projects.
 
     Raises:
         ImportError: another `optics`, `sim` or `evolve` has already been imported; the message names it.
@@ -50,9 +50,11 @@ def come_first() -> None:
 
 
 def namesakes() -> list[str]:
-    """Return one line for each other project that has installed a package `optics`, `sim` or `evolve`, with the
-    remedy."""
-    from importlib import metadata  # imported here since it reads all installed packages
+    """Return one line for each other project that has installed a package `optics`, `sim` or `evolve`.
+
+    The line states how to remove the project.
+    """
+    from importlib import metadata  # imported here because it is needed only for this message
 
     owners = metadata.packages_distributions()
     return [
@@ -84,8 +86,10 @@ class _Alias(MetaPathFinder, Loader):
         return module
 
     def exec_module(self, module: ModuleType) -> None:
-        """Restore the module's own spec, which the import system has just replaced. The module itself has already been
-        executed."""
+        """Restore the module's original spec, which the import system has just replaced.
+
+        The module does not have to be executed, because its original import has already done so.
+        """
         spec = module.__spec__
         assert spec is not None
         module.__spec__ = spec.loader_state

@@ -3,21 +3,21 @@
 Eyes, build_world, World            the eyes of an agent, and the built-in worlds
 Course                              a user-defined course for navigation
 TASKS                               names of the built-in tasks
-mirror, Mirror                      any MuJoCo model as a Mitsuba scene
-BatchedRenderer                     all eyes of all worlds, rendered as one wavefront
-choose_fidelity, Fidelity           rendering accuracy, matched to the receptors' noise
+mirror, Mirror                      conversion of any MuJoCo model to a Mitsuba scene
+BatchedRenderer                     renderer of all eyes of all worlds in one wavefront
+choose_fidelity, Fidelity           rendering accuracy, chosen to match the receptors' noise
 FidelityWarning                     warning that no level of fidelity is accurate enough
-ReferenceRenderer                   slow reference: Mitsuba's integrators and the convolution in optics ModelRenderer,
-Mount, Poses         eyes on any MuJoCo model; fan, ring and both_sides return several mounts choose_model_fidelity
-rendering accuracy for eyes on a model
+ReferenceRenderer                   slow reference: Mitsuba's integrators and the convolution in `optics`
+ModelRenderer, Mount, Poses         eyes on any MuJoCo model; fan, ring and both_sides return several mounts
+choose_model_fidelity               rendering accuracy for eyes on a model
 Task                                a user task for a robot with eyes, written for one world at a time
-BatchTask                           a user task written for arrays of all worlds, which runs faster check_batch_task
-test whether a batch task follows the protocol of BatchTask
+BatchTask                           a user task written for arrays of all worlds, which runs faster
+check_batch_task                    test whether a batch task follows the protocol of BatchTask
 Outcome, RewardTerms                return values of `judge` in a batch task
 Physics                             protocol of the physics of a batch of worlds
 ArrayWorlds, SlidingAgents          two implementations of Physics: for any MuJoCo model, and for the built-in agent
 Encounter, Frozen                   several animals in one world that see each other
-make_parallel_env                   an encounter as a PettingZoo environment
+make_parallel_env                   PettingZoo environment of an Encounter
 make_vec_env, make_env              environments of many worlds in one batch, or of a single world
                                     (or gymnasium.make("rhabdom/Detection-v0"), "rhabdom/Maze-v0" ...)
 register_task                       registration of a user task under a Gymnasium id

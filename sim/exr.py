@@ -3,9 +3,9 @@ for Spectral Images", JCGT 10(3).
 
 A file has up to two parts for each eye. For an eye named "left", these are `left.spectral` (spectral radiance, channels
 `S0.450,000000nm` ...) and `left.receptors` (photoreceptor signals, channels `receptor_0` ...). Each part also contains
-a linear sRGB preview in the channels R, G and B, which plain viewers show. Readers that support only one part, such as
-colour-science, read the first part. Spectral parts precede receptor parts. Pixels are 32-bit floats with ZIP
-compression.
+a linear sRGB preview in the channels R, G and B, which ordinary image viewers show. Spectral parts precede receptor
+parts, because programs that support only one part, such as colour-science, read the first one. Pixels are 32-bit floats
+with ZIP compression.
 
 A file is written completely or not at all. Each part stores a SHA-256 hash of its contents.
 """
@@ -29,15 +29,16 @@ from sim.scene.color import preview
 LAYOUT_VERSION = "1.0"
 UNITS = "W.m^-2.sr^-1"
 SCALE = "relative: a white Lambertian facing unit daylight has radiance D65, 1 at 560 nm"
-# Bytes of pixels in a file; fifteen times as many as the pixels of sixteen eyes of 128 x 128 in 64 bands.
+# Default limit for the bytes of unpacked pixels in a file. Sixteen eyes of 128 x 128 receptors in 64 bands need a
+# fifteenth of it.
 MOST_BYTES = 2**30
-_HELD = "rhabdom"  # name of the attribute that stores everything other than channels, as JSON
+_HELD = "rhabdom"  # name of the attribute that stores all values other than channels, as JSON
 _HASH = "sha256"
 _PREVIEW = ("R", "G", "B")
 
 
 class ExrError(ValueError):
-    """A file that is incomplete, damaged, or not written by `write_exr`."""
+    """Error for a file that is incomplete, damaged, or not written by `write_exr`."""
 
 
 @dataclass(frozen=True)
@@ -46,12 +47,12 @@ class View:
 
     name: name of the eye, such as "left"
     wavelengths_nm: wavelengths of the radiance's bands, (band,)
-    radiance: (band, y, x) float32, or None
-    receptors: (channel, y, x) float32, or None
-    rgb: (y, x, 3) float32 linear sRGB preview of the radiance; None: computed when written
+    radiance: spectral radiance, (band, y, x) float32; None: no spectral part
+    receptors: signals of the receptors, (channel, y, x) float32; None: no receptor part
+    rgb: linear sRGB preview of the radiance, (y, x, 3) float32; None: `write_exr` computes it
     attributes: further values that JSON can represent, such as seed, time step or position
-    peaks_nm: peak wavelength of each receptor channel, (channel,); the preview shows the longest as red. None: channels
-        are in descending order of their peaks.
+    peaks_nm: wavelength of peak sensitivity of each receptor channel, (channel,). The preview shows the channel with
+        the longest peak wavelength as red. None: channels are in descending order of their peak wavelengths.
     """
 
     name: str
@@ -113,7 +114,7 @@ def write_exr(path: str | os.PathLike[str], views: Sequence[View]) -> None:
         raise ValueError(f"write_exr: views = {names}: must be at least one, and no name twice")
     spectral = [_part(view, "spectral") for view in views if view.radiance is not None]
     receptors = [_part(view, "receptors") for view in views if view.receptors is not None]
-    # OpenEXR requires one display window for all parts, but the images differ in size.
+    # OpenEXR requires the same display window in all parts, but images may differ in size, so the largest is used.
     shapes = [channels["R"].shape for _, channels, _ in spectral + receptors]
     corner = np.array([max(width for _, width in shapes) - 1, max(height for height, _ in shapes) - 1], np.int32)
     header = {
@@ -127,7 +128,7 @@ def write_exr(path: str | os.PathLike[str], views: Sequence[View]) -> None:
         attributes[_HASH] = _digest(name, channels, attributes)
         # OpenEXR silently writes wrong pixels if an array is not contiguous. _part makes all arrays contiguous.
         parts.append(OpenEXR.Part({**header, **attributes}, channels, name))
-    encoded = io.BytesIO()  # written to memory first, because OpenEXR cannot open files whose names are not UTF-8
+    encoded = io.BytesIO()  # OpenEXR cannot open files whose names are not UTF-8, so it writes to memory
     OpenEXR.File(parts).write(encoded)
     _write_whole(Path(path), encoded.getbuffer())
 
@@ -135,10 +136,11 @@ def write_exr(path: str | os.PathLike[str], views: Sequence[View]) -> None:
 def read_exr(path: str | os.PathLike[str], most_bytes: int = MOST_BYTES) -> list[View]:
     """Read the views from a file that `write_exr` wrote.
 
-    most_bytes: largest allowed size of the unpacked pixels [bytes]; the header of a small file can announce any size
+    most_bytes: largest allowed size of the unpacked pixels [bytes]; the header of a small file can state any size
 
     Raises:
-        ExrError: the file is truncated, damaged, altered, too large, or not written by `write_exr`; one line.
+        ExrError: the file is truncated, damaged, altered, too large, or not written by `write_exr`. The message is one
+            line.
         FileNotFoundError: the file does not exist.
     """
     import OpenEXR
@@ -203,9 +205,10 @@ def _part(view: View, kind: str) -> tuple[str, dict[str, np.ndarray], dict[str, 
 
 
 def _false_colors(receptors: np.ndarray, peaks_nm: Sequence[float] | np.ndarray | None) -> np.ndarray:
-    """Return an image (y, x, 3) that shows the receptors of the longest waves as red, the next as green, then blue.
+    """Return a false-colour image (y, x, 3) of the receptor signals.
 
-    A single channel is shown as grey.
+    The channel with the longest peak wavelength is shown as red, the next as green, and the next as blue. A single
+    channel is shown as grey.
     """
     count = len(receptors)
     order = np.arange(count) if peaks_nm is None else np.argsort(-np.asarray(peaks_nm, float), kind="stable")
@@ -226,7 +229,7 @@ _OWN_ATTRIBUTES = ("spectralLayoutVersion", "emissiveUnits", "radianceScale", _H
 
 
 def _checked(part: Any, expected: int) -> tuple[str, dict[str, np.ndarray], dict[str, Any]]:
-    """Return a part's name, channels and stored values after a check of its hash."""
+    """Return a part's name, channels and stored values after checking its hash."""
     name, header = part.name(), part.header
     if _HASH not in header or _HELD not in header:
         raise ExrError(f"part {name!r} was not written by rhabdom")
@@ -262,7 +265,7 @@ def _views(parts: list[tuple[str, dict[str, np.ndarray], dict[str, Any]]]) -> li
 
 def _write_whole(path: Path, content: memoryview) -> None:
     """Write a temporary file in the same folder, flush it to the disk, and rename it to `path`."""
-    # Not made by tempfile, whose files only their owner may read.
+    # The module tempfile is not used, because only the owner may read the files that it creates.
     temporary = str(path.with_name(f".{path.name}.{os.getpid()}.tmp"))
     try:
         Path(temporary).unlink(missing_ok=True)  # an existing entry might be a link to another file

@@ -1,9 +1,9 @@
 """Analysis of a run's record and of its animals.
 
-statistics      statistics per generation, acuity, image quality, confidence intervals
-genealogy       lines of descent
-episode_failures  failures of a user task that ended training episodes
-vision          image quality and contrast of an animal's eyes
+statistics      statistics of fitness and genes per generation, acuity, image quality, confidence intervals
+genealogy       a candidate's line of descent
+episode_failures  failures that ended training episodes, mostly of methods of a user task
+vision          image quality and contrast of an animal's eyes, in comparison with a perfect lens
 recorder        recording of an episode that an animal plays
 episode         Episode: one recorded episode
 episode_scene   EpisodeScene: positions of bodies and eyes during an episode

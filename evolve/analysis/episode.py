@@ -1,4 +1,4 @@
-"""One episode of a trained candidate: its signals, actions and poses, and the signals behind a perfect lens."""
+"""Episode: a recording of one episode of a trained candidate, with its signals, actions and poses."""
 
 from __future__ import annotations
 
@@ -20,7 +20,10 @@ __all__ = ["Episode", "Pictures"]
 
 @dataclass(frozen=True)
 class Pictures:
-    """Images for display. times (picture,): time steps of the images · pixels (picture, y, x, 3): uint8 sRGB"""
+    """Images for display.
+
+    times: time step of each image, (picture,) · pixels: uint8 sRGB, (picture, y, x, 3)
+    """
 
     times: np.ndarray
     pixels: np.ndarray
@@ -28,27 +31,29 @@ class Pictures:
 
 @dataclass(frozen=True)
 class Episode:
-    """One evaluation episode, with time along the first axis.
+    """Recording of one evaluation episode. In the shapes of arrays, the axis t is time.
 
-    Row t holds the signals at time t, the action that followed, and the results of this action (rewards and other
-    entries of the observation).
+    Row t of the arrays contains the signals at time t, the action that followed, and the results of this action:
+    rewards and other entries of the observation.
 
-    task, candidate_id, seed, phenotype, eye, world: identity of the episode, its animal and its world
-    commands: meaning of an action's numbers · action (t, number): in [-1, 1]
-    reward (t,), reward_terms name -> (t,): 0 in steps for which the task has not named the term
-    counted: title of a count by reward term, see `sim.BatchTask`
+    task, candidate_id, seed: name of the task, id of the candidate, and seed of the episode
+    phenotype, eye, world: the animal, and the settings of its eyes and of the world
+    commands: meaning of each element of an action · action: in [-1, 1], (t, number)
+    reward: reward of each action, (t,) · reward_terms: name -> (t,); 0 in steps in which the task did not return the
+        term
+    counted: for some reward terms, the title under which steps with this term are counted; see `sim.BatchTask`
     beside: other entries of the observation, name -> (t, number), such as "contact" or "feels"
-    seconds: duration of one action · solved: whether the episode counts as solved
-    failure: reason for which the episode broke off; None if it did not
-    signals: receptor signals, noise included, (t, eye, channel, height, width)
-    perfect_signals: the same receptors behind a perfect lens, without noise
-    wavelengths_nm: wavelengths of the bands, (band,)
+    seconds: duration of one action [s] · solved: whether the episode counts as solved
+    failure: message of the failure that ended the episode; None without a failure
+    signals: receptor signals with noise, (t, eye, channel, height, width)
+    perfect_signals: signals of the same receptors behind a perfect lens, without noise, in the same shape
+    wavelengths_nm: wavelengths of the radiance's bands, (band,)
     radiance_frames: time steps at which radiance was recorded, (frame,)
     radiance: radiance of the scene in front of each eye, on a finer grid, (frame, eye, band, y, x)
     azimuths [rad], elevations_deg: viewing direction of each eye in the frame of its body, site or camera, (eye,)
-    scene: poses of bodies and eyes
+    scene: shapes and poses of bodies, and poses of eyes
     position (t, 2) [m], heading (t,) [rad]: pose of the animal on the ground before the action
-    plan: the world from above, if the task has a ground plan · pictures: images for display, if recorded
+    plan: plan of the world from above; None if the task has none · pictures: images for display; None if not recorded
     """
 
     task: str
@@ -91,12 +96,12 @@ class Episode:
 
     @property
     def eyes(self) -> sim.Eyes:
-        """The animal's eyes; `azimuths` and `scene` hold their poses."""
+        """Design of the animal's eyes; their directions and poses are in `azimuths` and `scene`."""
         return self.phenotype.eyes(self.eye)
 
     @property
     def gain(self) -> float:
-        """Factor 1/a² that compensates the dimming by a pupil of relative aperture a."""
+        """Factor 1/a² that compensates for the dimming by a pupil of relative aperture a."""
         return 1 / float(self.eyes.eye().white_signal)
 
     @property

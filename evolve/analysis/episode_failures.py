@@ -13,7 +13,11 @@ __all__ = ["EpisodeFailure", "episode_failure_lines", "episode_failures_of"]
 
 @dataclass(frozen=True)
 class EpisodeFailure:
-    """A failure's message, with the number of episodes that it ended and of candidates that it affected."""
+    """A kind of failure, which ended one or more episodes.
+
+    said: message of the failure · episodes: number of episodes that it ended · candidates: number of candidates with
+        such episodes
+    """
 
     said: str
     episodes: int
@@ -21,7 +25,7 @@ class EpisodeFailure:
 
 
 def episode_failures_of(candidates: Iterable[Candidate]) -> list[EpisodeFailure]:
-    """Return the failures of the candidates' training episodes, the most frequent first."""
+    """Return the failures that ended the candidates' training episodes, the most frequent failure first."""
     episodes, lives = Counter[str](), Counter[str]()
     for candidate in candidates:
         for said, number in candidate.episode_failures:
@@ -32,7 +36,7 @@ def episode_failures_of(candidates: Iterable[Candidate]) -> list[EpisodeFailure]
 
 
 def episode_failure_lines(found: Sequence[EpisodeFailure]) -> list[str]:
-    """Return one line that summarises the failures, or no line if there were none."""
+    """Return one line that summarises the failures; no line if there are none."""
     if not found:
         return []
     number, most = sum(one.episodes for one in found), found[0]

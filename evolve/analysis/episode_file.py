@@ -1,6 +1,6 @@
-"""Storage of episodes in npz archives of the current and the former format.
+"""Storage of episodes in npz archives. Files of the former format can be read, too.
 
-Loading a file never executes anything that it contains.
+Nothing in a file is executed when it is loaded.
 """
 
 from __future__ import annotations
@@ -34,14 +34,16 @@ from sim.worlds.world import build_world
 
 __all__ = ["load_episode", "save_episode"]
 
-FORM = 2
-MOST_BYTES = 2**31  # limit for an episode; one of 256 steps takes some megabytes, with images about a hundred
+FORM = 2  # number of the current format
+# Maximum size of an unpacked episode [bytes]. An episode of 256 steps takes some megabytes; with images, about a
+# hundred.
+MOST_BYTES = 2**31
 PARTS = {"scene": EpisodeScene, "plan": GroundPlan, "pictures": Pictures}
-BY_NAME = {"term": "reward_terms", "beside": "beside"}  # prefix of arrays -> dictionary of an episode
+BY_NAME = {"term": "reward_terms", "beside": "beside"}  # prefix of arrays in a file -> attribute, a dictionary
 
 
 def save_episode(episode: Episode, path: Path | str) -> None:
-    """Write an episode as npz, completely or not at all: each array separately, and the rest as JSON."""
+    """Write an episode as npz, completely or not at all: its arrays as arrays, and all other values as JSON."""
     arrays: dict[str, Any] = {name: value for name, value in vars(episode).items() if isinstance(value, np.ndarray)}
     for prefix, name in BY_NAME.items():
         arrays |= {f"{prefix}_{key}": array for key, array in getattr(episode, name).items()}
@@ -63,16 +65,16 @@ def save_episode(episode: Episode, path: Path | str) -> None:
             rest["parts"][name] = {key: value for key, value in values.items() if not isinstance(value, np.ndarray)}
     rest["solids"] = [_described(solid, number, arrays) for number, solid in enumerate(episode.scene.solids)]
     content = io.BytesIO()
-    # `allow_pickle` is left out because NumPy 2.0 would store it as an array of that name.
+    # The argument `allow_pickle` is not given, because NumPy 2.0 would store it as an array of that name.
     np.savez_compressed(content, **arrays, rest=np.array(json.dumps(rest)))
     write_whole(Path(path), content.getvalue())
 
 
 def load_episode(path: Path | str) -> Episode:
-    """Load an episode that `save_episode` wrote, also in the former format.
+    """Load an episode that `save_episode` wrote, in the current or the former format.
 
     Raises:
-        ValueError: the file holds no episode; the message is one line that names the file.
+        ValueError: the file contains no episode; the message is one line that names the file.
     """
     try:
         arrays = _arrays(path)
@@ -101,7 +103,11 @@ def _of_second_form(rest: dict[str, Any], arrays: dict[str, Any]) -> Episode:
 
 
 def _of_first_form(rest: dict[str, Any], arrays: dict[str, Any]) -> Episode:
-    """Return an episode of a built-in task from the former format; its world is built again."""
+    """Return an episode that was stored in the former format.
+
+    The former format was only used for built-in tasks, and did not contain the scene. The world is therefore built
+    again.
+    """
     if "course" not in rest.setdefault("world", {}):
         rest["task"] = task_then(rest["task"])
     rest["world"] = _checked_world(rest["world"])
@@ -133,7 +139,7 @@ def _of_first_form(rest: dict[str, Any], arrays: dict[str, Any]) -> Episode:
 
 
 def _checked_world(stored: Mapping[str, Any]) -> WorldConfig:
-    """Return the world's settings after a check of their ranges, so that no world of a billion mazes is built."""
+    """Return the settings of a world, after a check that prevents extreme values such as a billion mazes."""
     world = WorldConfig(**stored)
     check_values(world, prefix="world.")
     return world
@@ -142,14 +148,15 @@ def _checked_world(stored: Mapping[str, Any]) -> WorldConfig:
 def _solved(goal: np.ndarray, adversary: np.ndarray, adversary_first: np.ndarray | None) -> bool:
     """Return whether the first object reached was a goal.
 
-    adversary_first: whether an adversary was reached before the goal within an action; None if unknown
+    goal, adversary: whether an action reached a goal or an adversary, (t,)
+    adversary_first: whether the adversary came first, if an action reached both, (t,); None if unknown
     """
     first = goal if adversary_first is None else goal & ~adversary_first
     return bool(first[goal | adversary][:1].any())
 
 
 def _arrays(path: Path | str) -> dict[str, Any]:
-    """Return an archive's arrays, unless it is not a regular file or would unpack to more than `MOST_BYTES`."""
+    """Return the arrays of an archive, which must be a regular file and unpack to at most `MOST_BYTES`."""
     with regular_files.opened(Path(path)) as content:
         with zipfile.ZipFile(content) as archive:
             size = sum(member.file_size for member in archive.infolist())
@@ -161,17 +168,17 @@ def _arrays(path: Path | str) -> dict[str, Any]:
 
 
 def _taken(arrays: dict[str, Any], prefix: str) -> dict[str, Any]:
-    """Remove and return the arrays whose names start with `prefix`, under their names without it."""
+    """Remove the arrays whose names start with `prefix`, and return them by the rest of their names."""
     return {name.removeprefix(prefix): arrays.pop(name) for name in list(arrays) if name.startswith(prefix)}
 
 
 def _tuples(value: Any) -> Any:
-    """Return a JSON list as a tuple, and any other value as it is."""
+    """Return a list as a tuple, and any other value unchanged."""
     return tuple(value) if isinstance(value, list) else value
 
 
 def _described(solid: Solid, number: int, arrays: dict[str, Any]) -> dict[str, Any]:
-    """Return a solid as JSON values; the arrays of its mesh are added to `arrays`."""
+    """Return a solid as JSON values, and add the arrays of its mesh to `arrays`."""
     if solid.triangles is not None:
         mesh = {name: array for name, array in vars(solid.triangles).items() if array is not None}
         arrays |= {f"solid{number}.{name}": array for name, array in mesh.items()}

@@ -1,4 +1,4 @@
-"""Poses of bodies and eyes during an episode."""
+"""EpisodeScene: shapes and poses of bodies, and poses of eyes, during an episode."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ __all__ = ["EpisodeScene"]
 
 @dataclass(frozen=True)
 class EpisodeScene:
-    """Positions [m] and rotations in world coordinates before each action.
+    """Bodies and eyes of an episode, with their poses before each action, in world coordinates [m].
 
-    solids: all visible geoms in the frames of their bodies, with their appearance at the start of the episode
+    solids: all visible geoms, in the frames of their bodies, with their appearance at the start of the episode
     bodies: names of the bodies; "body_<id>" for a body without a name
     positions (t, body, 3), rotations (t, body, 3, 3): poses of the bodies
-    eye_positions (t, eye, 3): pupils · eye_rotations (t, eye, 3, 3): columns (right, up, ahead)
-    path (t, 3): position of the animal, defined by the body, site or camera that carries the first eye
+    eye_positions (t, eye, 3): positions of the pupils · eye_rotations (t, eye, 3, 3): columns (right, up, ahead)
+    path (t, 3): position of the animal, which is that of the body, site or camera on which the first eye is mounted
     headings (t,): heading of the animal from the world's x axis [rad]
     """
 
@@ -42,7 +42,8 @@ class EpisodeScene:
     ) -> EpisodeScene:
         """Return the scene of an episode.
 
-        poses: poses at all times, with time on the axis of worlds
+        model: the model · solids: its visible geoms · mounts: position and direction of each eye
+        poses: poses before each action; their first axis is time instead of worlds
         """
         places, frames = zip(*(_eye(model, mount, poses) for mount in mounts), strict=True)
         kind, index = mounts[0].found_in(model)

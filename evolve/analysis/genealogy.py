@@ -1,4 +1,4 @@
-"""Lines of descent: the record names each candidate's parents, and a line follows the nearest of them."""
+"""Lines of descent. A candidate may have several parents; its line of descent follows the parent nearest to it."""
 
 from __future__ import annotations
 
@@ -14,8 +14,10 @@ __all__ = ["descent", "nearest_parent"]
 def nearest_parent(candidate: Candidate, known: Mapping[int, Candidate]) -> Candidate | None:
     """Return the parent on record whose genome has the least Euclidean distance, or None if no parent is on record.
 
-    Several parents at the same distance: the earliest. CMA-ES samples a generation around the mean of the better half
-    of the previous one, so its candidates have many parents.
+    If several parents have the same distance, the earliest is returned. Candidates of CMA-ES have many parents, because
+    CMA-ES samples a generation around the mean of the better half of the previous generation.
+
+    known: candidates on record, by id
     """
     parents = [known[candidate_id] for candidate_id in sorted(candidate.parents) if candidate_id in known]
     distances = [float(np.linalg.norm(candidate.vector - parent.vector)) for parent in parents]

@@ -1,4 +1,4 @@
-"""Recording of episodes: a candidate plays, and the same scenes are rendered behind a perfect lens as well."""
+"""Recording of episodes: a candidate plays an episode, whose scenes are also rendered behind a perfect lens."""
 
 from __future__ import annotations
 
@@ -28,24 +28,23 @@ from sim.worlds.ground_plan import GroundPlan
 __all__ = ["FINE_PIXELS", "Recorder", "record"]
 
 FINE_PIXELS = 60  # minimum number of pixels along the longer side of the radiance images
-FINE = {"rays": 16, "areas": 4, "edges": 16}  # samples per receptor and pixel; speed does not matter here
+FINE = {"rays": 16, "areas": 4, "edges": 16}  # samples per receptor or pixel behind a perfect lens
 MOST_PICTURES = 128  # maximum number of images for display, at equal intervals of time
 ELSEWHERE = ("eyes", "previous_action")  # entries of an observation that an episode stores under other names
 
 
 class UnfitPolicy(ValueError):
-    """The policy belongs to an animal with other eyes."""
+    """The policy belongs to an animal with different eyes."""
 
 
 def record(
     run: Run, candidate_id: int | None = None, seed: int = 0, radiance_every: int = 8, pictures: bool = False
 ) -> Episode:
-    """Record one evaluation episode of a candidate (default: the best).
+    """Record one evaluation episode of a candidate. The same arguments give the same episode, bit for bit.
 
-    The same arguments give the same episode, bit for bit.
-
-    radiance_every: actions between two images of the scene's radiance
-    pictures: whether to render images for display; a task without a ground plan always gets them
+    candidate_id: id of the candidate; None: the best candidate
+    radiance_every: number of actions from one recording of the scene's radiance to the next
+    pictures: whether to render images for display; for tasks without a ground plan, they are always rendered
 
     Raises:
         RunError: the candidate does not exist, or its policy is missing or damaged.
@@ -54,7 +53,7 @@ def record(
     candidate = run.candidate(candidate_id)
     path = run.policy_path(candidate.id)
     require_policy(candidate, path)
-    _ = run.config.choice.named_code  # a task that has not been named is reported before the policy is read
+    _ = run.config.choice.named_code  # raises an error now if the user task has not been named
     try:
         policy = load_policy(path)
     except ValueError as error:
@@ -70,9 +69,9 @@ def record(
 
 @dataclass(frozen=True)
 class Recorder:
-    """Plays and records episodes.
+    """Recorder of episodes that an animal plays.
 
-    phenotype, config, policy: the animal, its run's configuration and its policy
+    phenotype, config, policy: the animal, the settings of its run, and its policy
     radiance_every, pictures: see `record`
     """
 
@@ -83,10 +82,10 @@ class Recorder:
     pictures: bool = False
 
     def play(self, candidate_id: int, seed: int) -> Episode:
-        """Play and return one episode; the same arguments give the same episode.
+        """Play one episode, and return its recording. The same arguments give the same episode.
 
         Raises:
-            UnfitPolicy: the policy was trained with other eyes.
+            UnfitPolicy: the policy was trained with different eyes.
             TrainingDiverged: the policy's actions are not finite.
         """
         animal, config = self.phenotype, self.config
@@ -121,8 +120,11 @@ class Recorder:
     def _perfect_views(
         self, prepared: PreparedTask, simulation: Simulation, poses: list[Poses], light: np.ndarray
     ) -> dict[str, Any]:
-        """Return the same scenes in the same light behind a perfect lens, as signals of the same receptors and as
-        radiance on a finer grid."""
+        """Return the fields of an episode that are rendered behind a perfect lens.
+
+        These are the signals of the same receptors, and the radiance on a finer grid, in the same scenes and the same
+        light.
+        """
         perfect = replace(self.phenotype.eyes(self.config.eye), optics=None, waveguide=None)
         height, width = perfect.resolution
         factor = max(1, -(-FINE_PIXELS // max(height, width)))
@@ -144,9 +146,12 @@ class Recorder:
 
 @dataclass(frozen=True)
 class _Beginning:
-    """State at the start of an episode, read before it ends because the next episode starts immediately.
+    """State at the start of an episode.
 
-    observation, info: values at the first step · light: factors of the lights, (1, band) float32
+    It is read at the start, because after the end of the episode the environment immediately starts the next episode.
+
+    observation, info: values after the reset · light: factors by which light is multiplied, (1, band) float32
+    solids: visible geoms · plan: plan of the world from above; None if the task has none
     """
 
     observation: dict[str, np.ndarray]
@@ -168,7 +173,7 @@ class _Beginning:
 
 
 def _model(physics: Any) -> mujoco.MjModel:
-    """Return the model of the only world, as varied for this episode."""
+    """Return the model of the single world, with the values that were drawn for this episode."""
     model: mujoco.MjModel = physics.datas[0].model if hasattr(physics, "datas") else physics.model
     return model
 
@@ -182,7 +187,7 @@ def _require_fit(policy: EyePolicy, worlds: EyesVecEnv) -> None:
 def _play(
     policy: EyePolicy, worlds: EyesVecEnv, begun: _Beginning, pictures: bool
 ) -> tuple[list[Poses], dict[str, Any]]:
-    """Return the poses before each action, and the episode's arrays that playing fills."""
+    """Play one episode; return the poses before each action, and those fields of `Episode` that follow from playing."""
     poses, rows, taken = list[Poses](), list[tuple[Any, ...]](), list[np.ndarray]()
     observation, infos, done, solved = begun.observation, [begun.info], False, None
     every = max(1, -(-worlds.simulation.episode_steps // MOST_PICTURES))
@@ -214,9 +219,9 @@ def _play(
 
 
 def _on_ground(infos: list[Mapping[str, Any]]) -> dict[str, np.ndarray]:
-    """Return positions [m] and headings [rad] before each action if the task's `info` holds them.
+    """Return positions [m] and headings [rad] before each action, if the task's `info` contains them.
 
-    These are exact; values derived from rotations are not.
+    These values are exact, in contrast to headings that are computed from rotation matrices.
     """
     if not all(np.shape(info.get("position", ())) == (2,) and "heading" in info for info in infos):
         return {}

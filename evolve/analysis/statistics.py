@@ -1,6 +1,6 @@
 """Statistics per generation, gene trajectories, acuity, image quality and confidence intervals.
 
-All are pure functions of candidates and phenotypes; the report and the comparisons draw their results.
+All functions depend only on their arguments. The report and the comparisons of runs show the results.
 """
 
 from __future__ import annotations
@@ -39,14 +39,15 @@ __all__ = [
 ]
 
 Floats = NDArray[np.float64]
-SPREAD = (0.1, 0.9)  # quantiles shown as a population's spread
+SPREAD = (0.1, 0.9)  # quantiles between which a population's spread is shown
 PERCENTILE_RESAMPLES = 2000
 
 
 @dataclass(frozen=True)
 class GenerationStatistics:
-    """Fitness of one generation; NaN if every candidate failed.
+    """Statistics of the fitness in one generation; NaN if every candidate has failed.
 
+    evaluated, failed: number of evaluated candidates, and number of failed candidates among them
     low, high: the 10 % and 90 % quantiles of the population (linear interpolation)
     best_so_far: best fitness up to and including this generation
     """
@@ -63,8 +64,9 @@ class GenerationStatistics:
 
 @dataclass(frozen=True)
 class Trajectory:
-    """One quantity of the phenotypes over the generations; all arrays (generation,).
+    """One quantity of the phenotypes over the generations. All arrays have the shape (generation,).
 
+    low, median, high: 10 % quantile, median and 90 % quantile in each population
     best: value of the quantity in the best candidate so far; NaN before a candidate has succeeded
     """
 
@@ -87,7 +89,7 @@ def by_generation(candidates: Sequence[Candidate]) -> list[tuple[int, list[Candi
 
 
 def champions(candidates: Sequence[Candidate]) -> list[tuple[int, Candidate]]:
-    """Return (generation, best candidate so far), from the first generation in which a candidate succeeded."""
+    """Return (generation, best candidate so far) for each generation since the first successful candidate."""
     found: list[tuple[int, Candidate]] = []
     best: Candidate | None = None
     for generation, members in by_generation(candidates):
@@ -100,7 +102,7 @@ def champions(candidates: Sequence[Candidate]) -> list[tuple[int, Candidate]]:
 
 
 def generation_statistics(candidates: Sequence[Candidate]) -> list[GenerationStatistics]:
-    """Return fitness statistics of every generation with candidates; failed candidates are counted separately."""
+    """Return the statistics of fitness in each generation; failed candidates are only counted."""
     rows: list[GenerationStatistics] = []
     best_so_far = math.nan
     for generation, members in by_generation(candidates):
@@ -114,7 +116,10 @@ def generation_statistics(candidates: Sequence[Candidate]) -> list[GenerationSta
 
 
 def trajectory(candidates: Sequence[Candidate], value: Callable[[Phenotype], float]) -> Trajectory:
-    """Return `value` of the phenotypes over the generations: its spread in each population, and the best so far."""
+    """Return a quantity over the generations: its spread in each population, and its value in the best so far.
+
+    value: function that returns the quantity of a phenotype
+    """
     groups = by_generation(candidates)
     spread = np.array([_quantiles(np.array([value(c.phenotype) for c in members])) for _, members in groups])
     best: list[float] = []
@@ -129,7 +134,7 @@ def trajectory(candidates: Sequence[Candidate], value: Callable[[Phenotype], flo
 
 
 def _quantiles(values: Floats) -> tuple[float, float, float]:
-    """Return the low quantile, median and high quantile of the finite values; NaN if there are none."""
+    """Return the 10 % quantile, median and 90 % quantile of the finite values; NaN if there are none."""
     values = values[np.isfinite(values)]
     if not values.size:
         return math.nan, math.nan, math.nan
@@ -140,9 +145,11 @@ def _quantiles(values: Floats) -> tuple[float, float, float]:
 def gene_values(phenotype: Phenotype, eye: EyeConfig | None = None) -> dict[str, float]:
     """Return the values of all genes that the phenotype expresses, by gene name.
 
-    Optical genes are present only with optics on, and spectral genes only if receptors are inherited; the peaks of
-    receptor types that the animal lacks are NaN. If `eye` is given, only genes of a run with such eyes are returned:
-    an eighth of a symmetric relief, and one side of a square eye.
+    Optical genes are present only if optics are on, and spectral genes only if receptors are inherited. For receptor
+    types that the animal lacks, the peak wavelengths are NaN.
+
+    eye: settings of a run's eyes; only genes of this run are returned, such as an eighth of a symmetric relief's
+        heights, or one side of a square eye. None: all values are returned
     """
     height, width = phenotype.resolution
     values = {
@@ -178,9 +185,10 @@ def gene_values(phenotype: Phenotype, eye: EyeConfig | None = None) -> dict[str,
 
 
 def acuity_cpd(phenotype: Phenotype) -> float:
-    """Return the frequency of the finest grating that the animal's sampling resolves [cycles/degree].
+    """Return the acuity: the frequency of the finest grating that the animal's sampling resolves [cycles/degree].
 
-    1 / (2 min(range/(n_eyes - 1), fov/width)), after Tiwary, Young et al. (2025). With a single eye, or if all eyes
+    It is 1 / (2 min(range/(n_eyes - 1), fov/width)), after Tiwary, Young et al. (2025). The first term is the angle
+    between neighbouring eyes, the second the angle between neighbouring receptors. With a single eye, or if all eyes
     look in the same direction, only the second term counts, because no angle separates the eyes.
     """
     between_receptors = phenotype.fov_deg / phenotype.resolution[1]
@@ -191,15 +199,15 @@ def acuity_cpd(phenotype: Phenotype) -> float:
 
 
 def polychromatic(eye: optics.Eye, psf: optics.PSFResult) -> optics.PSFResult:
-    """Return the PSF of white daylight, (1, y, x), with bands weighted by the mean of the receptor channels."""
+    """Return the PSF in white daylight, (1, y, x), with bands weighted by the mean sensitivity of the channels."""
     return psf.mean(_of_daylight(eye))
 
 
 def white_strehl(eye: optics.Eye, psf: optics.PSFResult) -> float:
-    """Return the Strehl ratio in white daylight; NaN if the window does not contain the peak.
+    """Return the Strehl ratio in white daylight; NaN if the PSF's window does not contain the peak.
 
-    The ratio compares the PSF's peak with that of an aperture of the same width that has no aberration at any
-    wavelength. The ratio at the mean wavelength is lower, because peaks are proportional to 1/λ².
+    The reference is the PSF of an aperture of the same width without aberrations at any wavelength, in the same light.
+    Its peak is higher than at the mean wavelength, because peaks are proportional to 1/λ².
     """
     import optics
 
@@ -210,7 +218,7 @@ def white_strehl(eye: optics.Eye, psf: optics.PSFResult) -> float:
 
 
 def _of_daylight(eye: optics.Eye) -> NDArray[np.float64]:
-    """Return the shares of the bands in the receptor channels' mean response to white daylight; they sum to 1."""
+    """Return the share of each band in the mean response of the receptor channels to white daylight; the sum is 1."""
     from optics.spectra.bands import daylight
 
     weights = eye.spectral_bands.weights.mean(axis=0) * daylight(eye.spectral_bands.wavelengths)
@@ -221,7 +229,8 @@ def _of_daylight(eye: optics.Eye) -> NDArray[np.float64]:
 def eye_image_quality(phenotype: Phenotype, config: EyeConfig) -> float:
     """Return `optics.image_quality` of the phenotype's eye in white daylight, in [0, 1].
 
-    Frequencies extend to the Nyquist frequency of the receptors. A perfect lens has contrast 1 at all of them.
+    The quality is averaged over frequencies up to the Nyquist frequency of the receptors. A perfect lens has contrast 1
+    at all frequencies.
 
     Raises:
         optics.AccuracyError: the PSF cannot be computed.
@@ -245,11 +254,12 @@ def bootstrap_interval(
 ) -> tuple[float, float]:
     """Return the percentile bootstrap interval of a statistic (Efron & Tibshirani 1993, ch. 13).
 
-    The same seed gives the same interval. The interval is too narrow for few samples: for six samples of a normal
-    distribution, the 95 % interval of the mean covers it in about 88 % of cases. A single sample contains no
-    information about the spread, and the result is (NaN, NaN).
+    The same seed gives the same interval. For few samples, the interval is too narrow: for six samples of a normal
+    distribution, the 95 % interval contains the true mean in only about 88 % of cases. A single sample contains no
+    information about the spread, so the result is (NaN, NaN).
 
-    statistic: called as statistic(resamples, axis=1)
+    statistic: function that is called as statistic(resamples, axis=1), such as np.mean
+    level: confidence level of the interval
 
     Raises:
         ValueError: samples are missing or not finite, or the level is outside (0, 1).
@@ -269,7 +279,7 @@ def bootstrap_interval(
 def psnr(signals: NDArray[np.floating], reference: NDArray[np.floating], gain: float = 1.0) -> float:
     """Return the peak signal-to-noise ratio of `gain` x signals relative to a reference [dB].
 
-    The peak is 1, the signal of white in daylight. The ratio of equal images is infinite.
+    The peak is 1, the signal of a white surface in daylight. For equal images, the ratio is infinite.
 
     Raises:
         ValueError: the shapes differ.

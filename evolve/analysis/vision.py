@@ -1,4 +1,4 @@
-"""Image quality and contrast of an animal's eyes, and comparison of their images with a perfect lens's images."""
+"""Image quality and contrast of an animal's eyes, and comparison of their images with those of a perfect lens."""
 
 from __future__ import annotations
 
@@ -20,20 +20,21 @@ from sim.tasks.simulation import Simulation
 
 __all__ = ["Vision", "ssim", "vision"]
 
-SCENES = 16  # starts of episodes, the same for all eyes
-RAYS = 16  # per receptor
-WINDOW = 7  # width of the structural similarity's window, in receptors
+SCENES = 16  # number of scenes, which are starts of episodes and the same for all eyes
+RAYS = 16  # number of rays per receptor
+WINDOW = 7  # width of the window in which structural similarity is computed [receptors]
 Floats = NDArray[np.floating]
 
 
 @dataclass(frozen=True)
 class Vision:
-    """Four measures of an eye; NaN for a measure that is undefined.
+    """Four measures of an eye. A measure that is undefined is NaN.
 
-    image_quality: area of the MTF above the noise, times throughput, in [0, 1]: `optics.image_quality`
+    image_quality: area of the MTF above the noise, times throughput, in [0, 1]; see `optics.image_quality`
     contrast: MTF in white daylight at half the receptors' Nyquist frequency
-    psnr_db: peak signal-to-noise ratio of the image, scaled to the brightness of a perfect lens's image, to that image
-    ssim: structural similarity of the same images, in [-1, 1]; NaN for retinas narrower than three receptors
+    psnr_db: peak signal-to-noise ratio of the eye's image relative to the image of a perfect lens [dB]; the eye's image
+        is first scaled to the same brightness
+    ssim: structural similarity of the same two images, in [-1, 1]; NaN for retinas narrower than three receptors
     """
 
     image_quality: float
@@ -43,7 +44,7 @@ class Vision:
 
 
 def vision(animal: Phenotype, config: RunConfig) -> Vision:
-    """Return the measures of an animal's eyes in the run's task; all NaN if their optics cannot be computed."""
+    """Return the measures of an animal's eyes in the run's task. If their optics cannot be computed, all are NaN."""
     eyes = animal.eyes(config.eye)
     try:
         quality, contrast = eye_image_quality(animal, config.eye), _contrast(eyes.eye())
@@ -55,9 +56,9 @@ def vision(animal: Phenotype, config: RunConfig) -> Vision:
 
 
 def seen_and_perfect(animal: Phenotype, config: RunConfig) -> tuple[Floats, Floats]:
-    """Return the signals of an animal's eyes without noise, with its own optics and behind a perfect lens.
+    """Return noise-free signals of an animal's eyes twice: with their own optics, and behind a perfect lens.
 
-    Both are (scene, eye, channel, height, width). The scenes are the same for all eyes of a task.
+    Both arrays are (scene, eye, channel, height, width). The scenes are the same for all eyes of a task.
     """
     eyes, task = animal.eyes(config.eye), animal_task(animal, config)
     if (light := task.compared_light) is None:
@@ -73,10 +74,10 @@ def seen_and_perfect(animal: Phenotype, config: RunConfig) -> tuple[Floats, Floa
 
 
 def ssim(signals: Floats, reference: Floats) -> float:
-    """Return the mean structural similarity (Wang et al. 2004, by scikit-image) of images (…, height, width).
+    """Return the mean structural similarity of images (…, height, width), computed by scikit-image.
 
-    Values range from 0 to 1.
-    The window is 7 receptors wide, or the width of a narrower retina. The result is NaN below 3 receptors.
+    The measure is defined by Wang et al. (2004). Signals must range from 0 to 1. The window is 7 receptors wide; on
+    narrower retinas, it is the largest odd number of receptors that fits. The result is NaN if this is less than 3.
     """
     from skimage.metrics import structural_similarity
 
@@ -89,7 +90,7 @@ def ssim(signals: Floats, reference: Floats) -> float:
 
 
 def _contrast(eye: optics.Eye) -> float:
-    """Return the MTF at half the Nyquist frequency; 1 behind a perfect lens."""
+    """Return the MTF at half the Nyquist frequency of the receptors; 1 for a perfect lens."""
     if eye.pupil is None:
         return 1.0
     white = polychromatic(eye, eye.psf())

@@ -1,12 +1,12 @@
 """The command `evolve`.
 
-main         entry point, and exit codes
+main         entry point, exit codes, and display of errors
 arguments    arguments of all commands, and suggestions for mistyped ones
 commands     implementations of the commands
-notes        warnings, each shown once
-waiting      progress bar for waits other than a run
+notes        display of warnings, each of them once
+waiting      progress bar for work other than a run
 run_plan     predicted steps, hours and disk space of a run
-pace         measured speed of this machine
-tensorboard  fitness, learning and genes for TensorBoard
+pace         measurement of the speed of this machine
+tensorboard  fitness, learning curves and genes for TensorBoard
 doctor       check of the installation
 """

@@ -47,7 +47,7 @@ Commands: TypeAlias = "argparse._SubParsersAction[Parser]"
 
 
 class Parser(argparse.ArgumentParser):
-    """Argument parser whose errors are one line with a suggestion for the mistyped word."""
+    """Argument parser whose error messages are one line, with a suggestion for a mistyped word."""
 
     def error(self, message: str) -> NoReturn:
         said = re.sub(r" \(choose from (.*)\)", "", message)
@@ -61,7 +61,8 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
     """Return the parsed arguments.
 
     Raises:
-        SystemExit: help or the version was requested (code 0), or an argument is unknown (code 2, after one line).
+        SystemExit: help or the version was requested (code 0), or an argument is invalid (code 2, after printing one
+            line).
     """
     parser = build_parser()
     if not arguments:
@@ -154,7 +155,7 @@ def _add_runs(commands: Commands) -> None:
 
 
 def _add_settings(command: argparse.ArgumentParser) -> None:
-    """Add the arguments from which a configuration is assembled."""
+    """Add the arguments that determine the configuration of a run."""
     command.add_argument(
         "task",
         metavar="TASK",
@@ -176,7 +177,7 @@ def _add_settings(command: argparse.ArgumentParser) -> None:
 
 
 def _add_watching(commands: Commands) -> None:
-    """Add the commands that read records."""
+    """Add the commands that show and compare runs."""
     status = _command(commands, "status", "status.status", "show the state of a run", directory=True)
     status.add_argument("--json", action="store_true", help="print JSON")
     status.add_argument("--watch", action="store_true", help="print again at every change until the run ends")
@@ -227,7 +228,7 @@ def _add_products(commands: Commands) -> None:
 
 
 def _add_task(command: argparse.ArgumentParser) -> None:
-    """Add the argument that names a user task; its code runs only if it is named."""
+    """Add the argument that names a user task. The code of the task runs only if this argument is given."""
     command.add_argument(
         "--task", metavar="FILE.py:CLASS", help="user task of the run; its code runs only if you name it here"
     )
@@ -240,7 +241,7 @@ def _add_voice(command: argparse.ArgumentParser) -> None:
 
 
 def _add_tables(commands: Commands) -> None:
-    """Add the commands that list contents and check the installation."""
+    """Add the commands that list tasks, presets, genes and settings, or check results and the installation."""
     validate = _command(
         commands, "validate", "validate.validate", "run the validation scripts of a checkout, which check and draw"
     )
@@ -260,14 +261,14 @@ def _add_tables(commands: Commands) -> None:
 
 
 def _seed(text: str) -> int:
-    """Return a seed that NumPy accepts."""
+    """Return the seed in the text of an argument."""
     if not text.isdecimal():
         raise argparse.ArgumentTypeError(f"{text!r}: must be a whole number, 0 or more")
     return int(text)
 
 
 def _searches(text: str) -> int:
-    """Return a number of searches that is large enough for a p-value."""
+    """Return the number of searches in the text of an argument. A p-value needs at least 2."""
     if not text.isdecimal() or int(text) < 2:
         raise argparse.ArgumentTypeError(f"{text!r}: must be a whole number, 2 or more")
     return int(text)

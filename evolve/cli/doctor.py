@@ -36,7 +36,8 @@ PACKAGES = (
     "tomli-w",
     "pandas",
 )
-# One child process loads Mitsuba, whose import alone can fail on a broken installation, and renders in each variant.
+# Program that renders an image with each variant of Mitsuba. It runs in a child process, because importing Mitsuba can
+# crash a process if the installation is broken.
 RENDER = """
 import sys, mitsuba as mi, numpy as np
 for name in sys.argv[1:]:
@@ -53,9 +54,9 @@ for name in sys.argv[1:]:
 
 
 def unsupported(platform_name: str = sys.platform) -> str | None:
-    """Return one line on a system that cannot run evolutions, else None.
+    """Return a line of text if the operating system is not supported, else None.
 
-    Processes and locks use features of Linux and macOS.
+    Processes and locks use features that only Linux and macOS have.
     """
     if platform_name in ("linux", "darwin"):
         return None
@@ -63,8 +64,11 @@ def unsupported(platform_name: str = sys.platform) -> str | None:
 
 
 def examine() -> dict[str, object]:
-    """Return the findings: python, machine, packages, llvm (every library tried), variants, gpu, device, notes,
-    good."""
+    """Return the findings by name.
+
+    They are python, machine, packages, llvm (all libraries that were tried), variants, gpu, device, notes, and good
+    (whether everything works).
+    """
     chosen, tried = backend.find(cached=False)
     environment = {**os.environ, backend.VARIABLE: chosen.path} if chosen else dict(os.environ)
     wanted = ["scalar_spectral"] + (["llvm_ad_spectral"] if chosen else [])
@@ -101,7 +105,7 @@ def _version(name: str) -> str:
 
 
 def _device() -> str:
-    """Return the device on which PSFs, eyes and rays are computed."""
+    """Return the device on which PSFs, eyes and rays are computed, or the reason why it cannot be used."""
     try:
         return device()
     except backend.BackendError as error:

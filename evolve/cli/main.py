@@ -1,7 +1,8 @@
-"""The command `evolve`: parses arguments, calls the command, and prints errors that users can correct as one line.
+"""The command `evolve`: parses the arguments and runs one of its subcommands.
 
-Exit codes: 0 success, 1 completed with failures, 2 wrong input or environment, 130 interrupted.
-Commands are imported on use, so that help appears immediately.
+Errors that users can correct are printed as one line. The exit code is 0 after success, 1 after completion with
+failures, 2 if the input or the environment is wrong, and 130 after an interruption. Modules of subcommands are imported
+on use, so that help appears immediately.
 """
 
 from __future__ import annotations
@@ -21,27 +22,27 @@ __all__ = ["main"]
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run one command and return the exit code."""
+    """Run one subcommand and return the exit code."""
     given = list(sys.argv[1:] if arguments is None else arguments)
     try:
-        # Runs continue after the reader of a pipe has gone.
+        # `run` and `resume` continue even if the program that reads their output through a pipe has ended.
         with voices(patient=given[:1] in (["run"], ["resume"])), notes():
             return _outcome(given)
     except BrokenPipeError:
-        return 0  # `evolve genes | head`
+        return 0  # the reader of a pipe has ended, for example in `evolve genes | head`
 
 
 def _outcome(arguments: Sequence[str]) -> int:
-    """Return the exit code of a command; errors that users can correct are printed as one line."""
+    """Run one subcommand and return the exit code. Errors that users can correct are printed as one line."""
     try:
         parsed = parse(arguments)
         if parsed.module != "validate":
             _require_system()
-        # Numerical libraries read these variables on import. With several threads the order of sums varies, and runs
-        # must be reproducible.
+        # Numerical libraries read these variables on import. They are limited to one thread because runs must be
+        # reproducible, and with several threads the order of summation varies.
         os.environ.update(dict.fromkeys(("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1"))
         if getattr(parsed, "device", None):
-            os.environ["RHABDOM_DEVICE"] = parsed.device  # workers inherit it
+            os.environ["RHABDOM_DEVICE"] = parsed.device  # worker processes inherit this variable
         command = import_module(f"evolve.cli.commands.{parsed.module}")
         with ExitStack() as silence:
             if getattr(parsed, "quiet", False):
@@ -60,7 +61,7 @@ def _outcome(arguments: Sequence[str]) -> int:
 
 
 def _require_system() -> None:
-    """Exit with an error on Windows, which lacks the required processes and locks."""
+    """Exit with an error on Windows, which does not support the kinds of processes and locks that runs use."""
     if sys.platform == "win32":
         from evolve.cli.doctor import unsupported
 
@@ -75,7 +76,7 @@ def _one_line(error: Exception) -> str:
 
 
 def _is_users(error: Exception) -> bool:
-    """Return whether an error's message is one line for the user; any other error is a bug and keeps its traceback."""
+    """Return whether users can correct the cause of an error. Any other error is a bug and keeps its traceback."""
     from evolve.config.run_config import ConfigError
     from evolve.search.local_executor import ExecutorError
     from evolve.store.directory import RunError

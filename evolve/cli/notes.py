@@ -1,4 +1,4 @@
-"""Warnings of rhabdom's modules, each shown once and in one line."""
+"""Display of warnings from rhabdom's modules: each is shown once, in one line."""
 
 from __future__ import annotations
 
@@ -15,10 +15,11 @@ OWN = ("optics", "sim", "evolve")
 
 @contextmanager
 def notes() -> Iterator[None]:
-    """Show rhabdom's warnings as notes while a command runs; warnings of other packages keep Python's format.
+    """Show rhabdom's warnings as notes while a command runs. Warnings of other packages keep Python's format.
 
-    A command may build the same world several times, for example for a replay and for training. Each build repeats
-    the warning from another line of code, so Python's own filter does not suppress it.
+    Each text is shown once. A command may build the same world several times, for example for training and for a
+    replay, and each time a different line of code may issue the same warning. Python's own filter does not suppress
+    these repetitions.
     """
     python, said = warnings.showwarning, set[str]()
 

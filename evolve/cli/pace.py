@@ -1,4 +1,7 @@
-"""Measured speed of this machine: some ten seconds of real training, in the number of processes of the run."""
+"""Measurement of the speed of this machine.
+
+Some ten seconds of real training are timed, in as many processes as the run will have.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +23,9 @@ from evolve.search.worker import evaluate_candidate, prepare_device
 
 __all__ = ["Pace", "measure_pace"]
 
-ROLLOUTS = 4  # minimum that separates the times of start, step and evaluation; evaluations follow the second and fourth
+# Number of rollouts in a measurement. Four are the minimum from which the times for start, step and evaluation can be
+# computed separately. An evaluation follows the second and the fourth rollout.
+ROLLOUTS = 4
 
 DIED = (
     "a process that measured this machine's pace died, probably because memory ran out: use fewer workers "
@@ -30,13 +35,13 @@ DIED = (
 
 @dataclass(frozen=True)
 class Pace:
-    """Speed of one worker with one animal while all other workers are busy.
+    """Speed of one worker process that trains one animal while all other workers are busy.
 
-    start_s: time until the first world is ready
-    steps_per_s: agent steps trained per second at the start, learning included
-    play_s: time of one evaluation with all its episodes in parallel
-    policy_bytes: size of the trained policy
-    pass_s: time of each pass over the samples, per agent step
+    start_s: time until training starts [s]
+    steps_per_s: number of agent steps per second at the beginning of training, including updates of the policy
+    play_s: time of one evaluation, whose episodes run in parallel [s]
+    policy_bytes: size of the file of a trained policy [bytes]
+    pass_s: time of one pass over the samples in an update, divided by the number of agent steps [s]
     """
 
     start_s: float
@@ -46,28 +51,31 @@ class Pace:
     pass_s: float = 0.0
 
     def candidate_s(self, config: RunConfig) -> float:
-        """Return the seconds for one candidate whose training is not divided into rungs."""
+        """Return the time for one candidate [s] if training is not divided into rungs."""
         return self.rung_s(config.learning, 0, config.learning.total_steps)
 
     def rung_s(self, learning: LearningConfig, begin: int, end: int) -> float:
-        """Return the seconds for a rung from `begin` to `end` steps, with the evaluation after it."""
+        """Return the time [s] for a rung, the part of training from `begin` to `end` steps, and for its evaluations."""
         plays = -(-(end - begin) // learning.eval_interval) + 1
         return self.start_s + self.training_s(learning, begin, end) + plays * self.play_s
 
     def training_s(self, learning: LearningConfig, begin: int, end: int) -> float:
-        """Return the seconds of rollouts and updates; the number of passes decreases with the steps."""
+        """Return the time for rollouts and updates from `begin` to `end` steps [s].
+
+        The number of passes over the samples in an update decreases during training.
+        """
         spared = learning.n_epochs - mean_passes(learning, begin, end)
         return (end - begin) * (1 / self.steps_per_s - spared * self.pass_s)
 
 
 def measure_pace(config: RunConfig, animals: Mapping[str, Phenotype], workers: int) -> dict[str, Pace]:
-    """Return the pace of the slowest worker with each animal; all workers measure at the same time.
+    """Return the pace of the slowest worker for each animal. All workers measure at the same time.
 
     Raises:
-        BackendError: Dr.Jit cannot work here.
-        ConfigError: an animal cannot be evaluated here, for example because its eyes cannot be computed; the message
-            names the animal and the reason.
-        ExecutorError: a process died.
+        BackendError: Dr.Jit does not work on this machine.
+        ConfigError: an animal cannot be evaluated on this machine, for example because its eyes cannot be computed. The
+            message names the animal and the reason.
+        ExecutorError: a worker process died.
     """
     context = multiprocessing.get_context("spawn")
     tried = list(islice(cycle(animals), max(workers, len(animals))))
@@ -97,14 +105,15 @@ def _slowest(paces: list[Pace]) -> Pace:
 
 
 def _short_life(config: RunConfig, animal: Phenotype, seed: int) -> Pace:
-    """Measure a training run of four rollouts, with an evaluation after the second and after the fourth.
+    """Time a training run of four rollouts, with an evaluation after the second and after the fourth.
 
-    The first update has all passes, and the third may have only a third of them.
+    The first update has the full number of passes over the samples, and the third may have only a third of it. The
+    difference between their times is the time of the passes.
     """
     rollout = config.learning.n_envs * config.learning.n_steps
     spans = {"total_steps": ROLLOUTS * rollout, "eval_interval": ROLLOUTS // 2 * rollout, "decay_after": rollout // 2}
     short = replace(config.learning, **spans)
-    # Rungs of so short a training run would be shorter than a rollout.
+    # The training run is not divided into rungs, because they would be shorter than a rollout.
     once = replace(config, learning=short, search=replace(config.search, rungs=1))
     marks: list[float] = []
     with TemporaryDirectory() as folder:

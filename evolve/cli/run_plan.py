@@ -1,4 +1,4 @@
-"""Plan of a run before it starts: genes, evaluations, steps, hours and disk space."""
+"""Plan of a run that has not started: its genes, evaluations and steps, and the predicted time and disk space."""
 
 from __future__ import annotations
 
@@ -25,8 +25,10 @@ from evolve.store.evaluation import Evaluation
 
 __all__ = ["RunPlan", "steps_each"]
 
-REPORT_BYTES = 5_000_000  # allowance for pages; the report of eight candidates has 0.6 MB (`evolve report`)
-# Values of evolve.analysis.recorder for the exported episode. Importing it would load torch; tests compare the values.
+# Allowance for the report. For comparison, `evolve report` writes 0.6 MB for a run with eight candidates.
+REPORT_BYTES = 5_000_000
+# Values for the exported episode, copied from evolve.analysis.recorder because importing this module would load torch.
+# A test checks that they are equal.
 EPISODE_ACTIONS, EXR_EVERY, EXR_PIXELS = 256, 8, 60
 
 
@@ -34,7 +36,7 @@ EPISODE_ACTIONS, EXR_EVERY, EXR_PIXELS = 256, 8, 60
 class RunPlan:
     """Plan of a run.
 
-    paces: the pace of the start animal and of an animal in the middle of all ranges; empty before `measured`
+    paces: measured paces, by name of the animal in `animals`; empty if they have not been measured
     """
 
     config: RunConfig
@@ -47,23 +49,26 @@ class RunPlan:
         return cls(config, directory, config.workers or cores())
 
     def measured(self) -> RunPlan:
-        """Return the plan with the paces of this machine; the measurement takes some ten seconds."""
+        """Return the plan with the paces measured on this machine. The measurement takes some ten seconds."""
         paces = measure_pace(self.config, self.animals, self.workers)
         return RunPlan(self.config, self.directory, self.workers, paces)
 
     @property
     def animals(self) -> dict[str, Phenotype]:
-        """Animals that represent all animals of the run."""
+        """Two animals that represent all others: one with the start values, and one with the middles of all ranges."""
         genotype = Genotype(self.config.genome)
         middle = np.full(genotype.dimension, 0.5)
         return {"start": develop(genotype.start, self.config), "middle": develop(middle, self.config)}
 
     @property
     def hours(self) -> dict[str, float]:
-        """Wall time of the whole run if all candidates resembled one of the animals and completed their training."""
+        """Predicted wall time of the run [h], for each of the animals.
+
+        It is assumed that all candidates take as much time as this animal and complete their training.
+        """
         search, learning = self.config.search, self.config.learning
         if search.steady_state:
-            busy = min(self.workers, search.population)  # maximum number of candidates in training at the same time
+            busy = min(self.workers, search.population)  # maximum number of candidates that train at the same time
             rounds = -(-self.config.candidates // busy)
             return {name: rounds * pace.candidate_s(self.config) / 3600 for name, pace in self.paces.items()}
         rungs = list(zip(sizes(search), pairwise((0, *budgets(search, learning))), strict=True))
@@ -76,7 +81,7 @@ class RunPlan:
 
     @property
     def disk_bytes(self) -> int:
-        """Size of policies, record, report and EXR files for the larger of the animals."""
+        """Predicted size of policies, record, report and EXR files [bytes], computed for the larger of the animals."""
         policy = max(pace.policy_bytes for pace in self.paces.values())
         pictures = max(_exr_bytes(animal, self.config.eye.bands) for animal in self.animals.values())
         lines = evaluations(self.config.search) * self._line_bytes()
@@ -84,19 +89,19 @@ class RunPlan:
 
     @property
     def free_bytes(self) -> int:
-        """Free space on the disk of the run directory."""
+        """Free space on the disk that contains the run directory [bytes]."""
         existing = next(path for path in (self.directory.resolve(), *self.directory.resolve().parents) if path.exists())
         return shutil.disk_usage(existing).free
 
     def _rung_lines(self) -> list[str]:
-        """Return the line with candidates and steps of each rung, if training is divided into rungs."""
+        """Return a line with the number of candidates and steps of each rung; no line if there is only one rung."""
         search = self.config.search
         ends = zip(sizes(search), budgets(search, self.config.learning), strict=True)
         rungs = ", ".join(f"{size} to {steps:,} steps" for size, steps in ends)
         return [f"rungs  {rungs}"] if search.rungs > 1 else []
 
     def _line_bytes(self) -> int:
-        """Return the size of a candidate's line in the record."""
+        """Return the size of a candidate's line in the record [bytes]."""
         config, genotype = self.config, Genotype(self.config.genome)
         plays = -(-config.learning.total_steps // config.learning.eval_interval)
         value = np.pi
@@ -133,7 +138,7 @@ class RunPlan:
         return lines + [f"note           {note}" for note in self.notes()]
 
     def notes(self) -> list[str]:
-        """Return warnings about the run."""
+        """Return warnings about settings and disk space."""
         short = self.paces and self.disk_bytes > self.free_bytes
         return [*lint(self.config), *(["the disk is too small for this run"] if short else [])]
 
@@ -157,7 +162,10 @@ class RunPlan:
 
 
 def steps_each(config: RunConfig) -> str:
-    """Return the steps of one training run; if they were rounded up to whole rollouts, with the configured number."""
+    """Return the number of steps of a training run as text.
+
+    If it was rounded up to whole rollouts, the text also contains the configured number.
+    """
     learning = config.learning
     trained = trained_steps(learning, 0, learning.total_steps)
     rounded = f" ({learning.total_steps:,} rounded up to rollouts of {learning.n_envs * learning.n_steps:,})"
@@ -165,7 +173,7 @@ def steps_each(config: RunConfig) -> str:
 
 
 def _gene_lines(config: RunConfig) -> list[str]:
-    """Return lines with the open genes of each cluster and the generation in which they open."""
+    """Return lines that list the open genes of each cluster, with the generation in which they open."""
     genes = Genotype(config.genome).open_genes
     lines = []
     for cluster in CLUSTERS:
@@ -180,7 +188,7 @@ def _gene_lines(config: RunConfig) -> list[str]:
 
 
 def _exr_bytes(animal: Phenotype, bands: int) -> int:
-    """Return the size of an episode's EXR files before compression: bands and a preview in float32."""
+    """Return the uncompressed size of an episode's EXR files [bytes], which contain bands and a preview as float32."""
     factor = max(1, -(-EXR_PIXELS // max(animal.resolution)))
     pixels = animal.n_eyes * animal.resolution[0] * animal.resolution[1] * factor**2
     return EPISODE_ACTIONS // EXR_EVERY * pixels * (bands + 3) * 4

@@ -1,7 +1,7 @@
 """Scalars of a run for TensorBoard: fitness over the generations, learning curves of training runs, and genes.
 
-TensorBoard's own writer writes them into `tensorboard/` of the run directory. All of them are derived from the record,
-so a continued run writes the files again.
+TensorBoard's own writer writes them into the folder `tensorboard/` of the run directory. All scalars can be derived
+from the record. When a run is continued, the files are therefore deleted and written again.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ FOLDER = "tensorboard"
 
 
 class TensorBoardWriter:
-    """Watcher that writes a run's scalars; a context manager.
+    """Watcher that writes a run's scalars. It is used as a context manager.
 
     Raises:
         ExecutorError: TensorBoard is not installed.
@@ -34,7 +34,7 @@ class TensorBoardWriter:
     def __init__(self, run: Run) -> None:
         self._run = run
         self._writers: dict[str, Any] = {}
-        self._shown: set[int] = set()  # generations
+        self._shown: set[int] = set()  # generations that have been written
         _writer_class()
         shutil.rmtree(run.path / FOLDER, ignore_errors=True)
 
@@ -49,12 +49,13 @@ class TensorBoardWriter:
             writer.close()
 
     def training(self, candidate_id: int, steps: int, planned: int) -> None:
-        """Do nothing, because only values on record are shown."""
+        """Do nothing while a candidate trains, because only values in the record are written."""
 
     def evaluated(self, candidate: Candidate) -> None:
-        """Write the candidate's values over its id, and its learning curve over steps, after each rung.
+        """Write the scalars of a candidate after each rung of its training.
 
-        Values of a complete generation are written over the generation.
+        Outcome and genes are plotted against the candidate's id, and the learning curve against training steps. If the
+        candidate's generation is complete, statistics of this generation are written too.
         """
         if candidate.failure is None:
             values = {"fitness": candidate.fitness, "success_rate": candidate.success_rate}
@@ -67,7 +68,7 @@ class TensorBoardWriter:
             learning = f"learning/{candidate.id:06d}"
             for steps, value in candidate.curve:
                 self._add(learning, {"return": value}, steps)
-            self._close(learning)  # a writer is a thread and an open file
+            self._close(learning)  # each open writer uses a thread and an open file
         if candidate.generation not in self._shown and complete(self._run, candidate.generation):
             self._shown.add(candidate.generation)
             rows = {row.generation: row for row in generation_statistics(self._run.candidates)}
@@ -77,7 +78,7 @@ class TensorBoardWriter:
                 self._add("generations", {f"fitness/{name}": v for name, v in values.items()}, candidate.generation)
 
     def _close(self, name: str) -> None:
-        """Close a writer; later values go to a new file, and TensorBoard reads both."""
+        """Close a writer. Later values are written to a new file, and TensorBoard reads both files."""
         if name in self._writers:
             self._writers.pop(name).close()
 

@@ -1,4 +1,4 @@
-"""Progress bar of a wait: current step, share done and elapsed time; shown only on a terminal."""
+"""Progress bar with the current step, the completed fraction and the elapsed time. It appears only on a terminal."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ __all__ = ["Waiting"]
 
 
 class Waiting:
-    """Progress bar over steps of unknown duration; a context manager.
+    """Progress bar over steps of unknown duration. It is used as a context manager.
 
     steps: number of steps
     shown: whether the bar is shown
-    out: output stream; None for stderr
+    out: output stream; None: stderr
     """
 
     def __init__(self, steps: int, shown: bool = True, out: TextIO | None = None) -> None:
@@ -27,7 +27,7 @@ class Waiting:
         self._progress: Any = None
 
     def of_one_step(self, text: str) -> Waiting:
-        """Return this wait after setting `text` as its only step, which starts with the wait."""
+        """Set the text of the only step, which starts when the context is entered. Return this object."""
         self._first = text
         return self
 
@@ -56,7 +56,7 @@ class Waiting:
         self.within(text, 0.0)
 
     def within(self, text: str, share: float) -> None:
-        """Show the share of the current step that is done."""
+        """Show the completed fraction `share` of the current step, described by `text`."""
         if self._progress is not None:
             shown = printable(text).replace("[", "\\[")
             self._progress.update(self._bar, completed=self._done + share, description=shown)

@@ -2,17 +2,17 @@
 
 run_config     RunConfig: the configuration of a run
 settings       sections of RunConfig: default, range and effect of each setting
-assemble       RunConfig from all sources; later sources override earlier ones
+assemble       RunConfig assembled from all sources of settings; later sources override earlier ones
 sources        presets, tasks, files and options as sources of settings
-provenance     location of a setting: file and line, or option
+provenance     location of a setting: file and line, or command-line option
 checks         type and range checks of single settings
 lint           warnings about settings that are allowed but odd
-relief_starts  start values of a relief's genes
+relief_starts  start values for the genes of a pupil's relief
 formats        formats of config.toml, and conversion of former ones
-square_eyes    one gene for both sides of an eye
-task_choice    TaskChoice: a task, and its code if it may run
+square_eyes    settings of square eyes, which have one gene for height and width
+task_choice    TaskChoice: a task, and its code if the user has named it
 task_card      TaskCard: properties of a task that are known without executing it
 task_code      TaskCode: source text of a user task
-numbering      ids and generations of candidates
+numbering      conversion between a candidate's id and its generation
 tasks/         default settings of the tasks
 """

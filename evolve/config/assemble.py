@@ -1,7 +1,8 @@
-"""A run's configuration assembled from its sources.
+"""Assembly of a run's configuration from all sources of settings.
 
 The sources are the defaults, the preset and its scale, the task, a TOML file, an animal of another run, and
-`--set key=value`. Later sources override earlier ones, but a preset made for the task overrides the task's settings.
+`--set key=value`, in this order. Later sources override earlier ones. There is one exception: the preset overrides the
+settings of the task if the preset was made for this task.
 """
 
 from __future__ import annotations
@@ -50,16 +51,19 @@ def assemble(
     starts: Source | None = None,
     scale: str | None = None,
 ) -> RunConfig:
-    """Return a run's configuration from all its sources; `task` and `assignments` override all others.
+    """Return a run's configuration, assembled from all sources. `task` and `assignments` override all other sources.
 
-    task: one of TASKS, or FILE.py:CLASS; may be missing if preset or file names a task
+    task: one of TASKS, or FILE.py:CLASS; None: the task that the preset or the file names
+    preset: name of a preset; None: no preset
+    file: TOML file with settings; None: no file
     assignments: settings such as "search.population=8"
-    starts: start values of the genes, as `evolve.runs.start_from` reads them from another run
-    scale: size of a preset that comes in several sizes: one of SCALES, "laptop" if not given
+    starts: start values of the genes, which `evolve.runs.start_from` reads from another run; None: the default values
+    scale: scale of a preset that has several, one of SCALES; None: "laptop"
 
     Raises:
-        ConfigError: unknown key, wrong type, value out of range, contradiction, or unreadable file; one line that names
-            key, value, allowed values, and the place of the setting.
+        ConfigError: a key is unknown, a value has the wrong type or is out of range, settings contradict each other, or
+            the file cannot be read. The message is one line that names the key, the value, the allowed values, and the
+            location of the setting.
     """
     choice = None if task is None else TaskChoice.named(task)
     code = None if choice is None else choice.code
@@ -73,7 +77,10 @@ def assemble(
 
 
 def _assembled(below: list[Source], asked: list[Source]) -> RunConfig:
-    """Return the configuration; the sources in `asked` override the settings of task and preset."""
+    """Return the configuration from the preset's sources `below`, the task and the sources `asked`.
+
+    The sources `asked` override the settings of the task and the preset.
+    """
     known_task = [source.tree["task"] for source in (*below, *asked) if "task" in source.tree]
     if not known_task:
         raise ConfigError(f"task: missing; must be one of {', '.join(TASKS)}")
@@ -89,24 +96,28 @@ def _assembled(below: list[Source], asked: list[Source]) -> RunConfig:
 
 
 def from_toml(path: Path) -> RunConfig:
-    """Return the configuration that `to_toml` wrote, in this format or a former one."""
+    """Return the configuration from a file that `to_toml` wrote in the current format or in a former one."""
     return _read_back(read_toml(path))
 
 
 def from_text(text: bytes | str, name: str = "config.toml") -> RunConfig:
-    """Return the configuration in a TOML text, which messages call `name`; see `from_toml`."""
+    """Return the configuration from TOML text; see `from_toml`.
+
+    name: name of the text in error messages
+    """
     return _read_back(parsed_toml(text, name))
 
 
 def _read_back(written: Source) -> RunConfig:
-    """Return a stored configuration; it contains all defaults, so settings of tasks and presets are not needed."""
+    """Return a stored configuration, which contains all settings and therefore needs no preset or task defaults."""
     return _assembled([], [replace(written, tree=upgraded(written.tree))])
 
 
 def _asked_for(source: Source, code: TaskCode | None) -> Source:
     """Return the settings of a user's file, which may be the config.toml of another run.
 
-    The file must have the current format. It cannot name a user task, because only the command may name code to run.
+    The file must have the current format. It cannot select a user task, because only the command line may name code
+    that is executed.
     """
     if names_code(source.tree.get("task")) and code is None:
         raise ConfigError(
@@ -120,7 +131,7 @@ def _asked_for(source: Source, code: TaskCode | None) -> Source:
 
 
 def to_toml(config: RunConfig) -> str:
-    """Return TOML text with every setting; `from_toml` restores an equal configuration."""
+    """Return TOML text with all settings. `from_toml` restores an equal configuration from a file with this text."""
     import tomli_w
 
     tree = {"format": FORMAT, **asdict(replace(config, code=None))}
@@ -134,9 +145,9 @@ def to_toml(config: RunConfig) -> str:
 
 
 def _checked(source: Source) -> Tree:
-    """Return the source's tree after checks of keys and values, with groups of genes expanded.
+    """Return the settings of a source after checking keys and values. Settings of gene groups are expanded to genes.
 
-    Errors name the source and line.
+    Error messages name the source and the line.
     """
     try:
         return {key: _checked_entry(key, value) for key, value in source.tree.items()}
@@ -147,9 +158,9 @@ def _checked(source: Source) -> Tree:
 
 
 def _blamed(error: ConfigError, layers: Iterable[Source]) -> str:
-    """Return the places of contradicting settings, such as " (mine.toml, line 3; --set ...)".
+    """Return the locations of contradicting settings as text, such as " (mine.toml, line 3; --set ...)".
 
-    For each setting, this is the place of the value that is in effect.
+    If several sources contain a setting, the location is that of the value that is in effect.
     """
     won = [next((at for s in reversed(list(layers)) if (at := s.place(key))), None) for key in error.keys]
     places = list(dict.fromkeys(place for place in won if place))
@@ -180,9 +191,9 @@ def _checked_entry(key: str, value: Any) -> Any:
 
 
 def _checked_genome(section: Tree) -> Tree:
-    """Return settings per gene.
+    """Return the settings of each gene, after checking them.
 
-    The name of a cluster or a family stands for all its genes; the name of a smaller group overrides that of a larger.
+    Settings of a cluster or family apply to all its genes. Settings of a smaller group override those of a larger one.
     """
     result: Tree = {}
     for group in sorted(section, key=lambda name: -len(group_members(name))):
@@ -203,13 +214,13 @@ def _checked_genome(section: Tree) -> Tree:
 
 
 def _merged(trees: Iterable[Tree]) -> Tree:
-    """Return all trees merged; later trees override earlier ones."""
+    """Return one tree with the settings of all trees; later trees override earlier ones."""
     empty: Tree = {}
     return reduce(_merge, trees, empty)
 
 
 def _merge(below: Tree, above: Tree) -> Tree:
-    """Return both trees merged; values in `above` override those in `below`."""
+    """Return one tree with the settings of both trees; values in `above` override those in `below`."""
     merged = dict(below)
     for key, value in above.items():
         under = merged.get(key)
@@ -218,7 +229,7 @@ def _merge(below: Tree, above: Tree) -> Tree:
 
 
 def _require_genes(source: Source, eye: EyeConfig, card: TaskCard) -> None:
-    """Check that genes named individually are genes of these eyes."""
+    """Check that animals with these eyes have the genes that a source names individually, not through a group."""
     for name in with_relief(source.tree, eye).get("genome", {}):
         if name in (SIDE, *SIDES) and name not in eye.genes:
             raise ConfigError(no_such_side(name, eye), f"genome.{name}", "eye.square")
@@ -237,7 +248,7 @@ def _require_genes(source: Source, eye: EyeConfig, card: TaskCard) -> None:
 
 
 def _build(trees: list[Tree], layers: list[Source]) -> RunConfig:
-    """Return the RunConfig from checked trees; later trees override earlier ones, and defaults are filled in."""
+    """Return the RunConfig from checked trees. Later trees override earlier ones, and defaults fill the gaps."""
     asked = _merged(trees)
     eye, card = EyeConfig(**asked.get("eye", {})), card_of(asked["task"])
     assert card is not None  # guaranteed by `_checked`
@@ -250,7 +261,7 @@ def _build(trees: list[Tree], layers: list[Source]) -> RunConfig:
     genes = tree.get("genome", {})
     genome = {}
     for name, gene in table.items():
-        # With optics off the optical genes are frozen, unless a setting opens one of them explicitly.
+        # If optics is off, the optical genes are frozen, unless a setting explicitly opens one of them.
         off = gene.cluster == "optical" and not sections["eye"].optics
         genome[name] = replace(gene.default, **{**({"open": False} if off else {}), **genes.get(name, {})})
     top = {name: tree[name] for name in TOP_LEVEL if name in tree}

@@ -1,4 +1,4 @@
-"""Checks of single settings: type and range, with one-line messages that name the allowed values."""
+"""Checks of the type and range of single settings. Error messages are one line that names the allowed values."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ __all__ = [
 ]
 
 SHOWN = 200  # maximum number of characters of a value in a message
-MOST_LISTED = 36  # maximum number of listed words: enough for all genes and tasks, but not for all settings
+MOST_LISTED = 36  # maximum number of words listed in a message: all genes or tasks fit, but not all settings
 
 
 class ConfigError(ValueError):
-    """An invalid setting; the message is one line with key, value and allowed values.
+    """Error for an invalid setting. The message is one line with the key, the value and the allowed values.
 
-    keys: dotted names of the settings that caused the error, from which callers find the place of each
+    keys: dotted names of the settings that caused the error; callers use them to find where each was set
     """
 
     def __init__(self, message: str, *keys: str) -> None:
@@ -41,10 +41,12 @@ class ConfigError(ValueError):
 
 
 def check_value(cls: type, name: str, value: Any, key: str) -> Any:
-    """Return `value`, converted for field `name` of `cls`.
+    """Return `value` after checking it and converting it to the type of the field `name` of `cls`.
+
+    key: dotted name of the setting, for the error message
 
     Raises:
-        ConfigError: the value is invalid; one line that names `key`, the value and the allowed values.
+        ConfigError: the value is invalid. The message is one line that names `key`, the value and the allowed values.
     """
     definition = next(f for f in fields(cls) if f.name == name)
     if definition.type == "float | str":
@@ -57,18 +59,18 @@ def check_value(cls: type, name: str, value: Any, key: str) -> Any:
 
 
 def check_values(settings: Any, names: Iterable[str] | None = None, prefix: str = "") -> None:
-    """Check all settings of a frozen dataclass, or the named ones.
+    """Check all settings of a frozen dataclass, or only those in `names`.
 
     Raises:
         ConfigError: see `check_value`.
     """
     for name in [one.name for one in fields(settings)] if names is None else names:
         value = check_value(type(settings), name, getattr(settings, name), f"{prefix}{name}")
-        object.__setattr__(settings, name, value)  # converted from NumPy's to Python's number types
+        object.__setattr__(settings, name, value)  # NumPy numbers have been converted to Python numbers
 
 
 def check_gene_value(gene: Gene, name: str, value: Any, key: str) -> Any:
-    """Return `value`, converted for a gene's "open", "low", "high", "start" or "opens_at".
+    """Return `value` after checking and converting it for "open", "low", "high", "start" or "opens_at" of a gene.
 
     Raises:
         ConfigError: see `check_value`.
@@ -101,9 +103,9 @@ def check_gene_use(gene: Gene, use: GeneConfig) -> None:
 
 
 def suggestion(word: Any, known: Iterable[str]) -> str:
-    """Return "did you mean X?" if a known word or its last part is similar, else the list of known words.
+    """Return "did you mean X?" if `word` is similar to the known word X, or to its part after the last dot.
 
-    The list ends after MOST_LISTED words.
+    Otherwise, return the list of the first MOST_LISTED known words.
     """
     known, word = list(known), str(word)
     by_last = {name.rpartition(".")[2]: name for name in known}
@@ -116,7 +118,7 @@ def suggestion(word: Any, known: Iterable[str]) -> str:
 
 
 def _checked(value: Any, kind: type[Any], valid: Interval | None, key: str) -> Any:
-    """Return `value` if it has this type and lies in `valid`; integers are accepted as numbers."""
+    """Return `value` if it has the type `kind` and lies in `valid`. Integers are accepted for floats."""
     names = {int: "an integer", float: "a number", bool: "true or false", str: "text"}
     shown = str(value).lower() if isinstance(value, bool) else quoted(value)
     allowed = names[kind] if valid is None else f"{names[kind]} in {valid}"

@@ -1,14 +1,15 @@
-"""Formats of a run's config.toml, and conversion of former ones.
+"""Formats of a run's config.toml, and conversion of former formats.
 
-1   without a number in the file. The task "navigation" means a maze, and `learning.rays_per_eye` limits the rays in
-    training.
-2   the current format. "navigation" means a course, "maze" the maze, and `learning.rays_per_receptor` limits the rays.
+1   Files of this format do not state a format number. The task "navigation" is a maze, and `learning.rays_per_eye`
+    limits the number of rays in training.
+2   This is the current format. The task "navigation" is a course, the task "maze" is a maze, and
+    `learning.rays_per_receptor` limits the number of rays in training.
 
-Runs of both formats may lack `learning.least_epochs`; the number of passes per update is then constant. They may lack
-`search.active`; CMA-ES then also learns from the worse candidates.
+In files of both formats, two settings may be missing. Without `learning.least_epochs`, the number of passes per update
+is constant. Without `search.active`, CMA-ES also learns from the worse candidates.
 
-A run of a former format can be opened, replayed and reported with its original meaning. Its training runs cannot be
-continued, because light is computed differently.
+A run of a former format can be opened, replayed and reported; its settings keep their original meaning. Its training
+runs cannot be continued, because light is computed differently.
 """
 
 from __future__ import annotations
@@ -41,7 +42,7 @@ def format_of(tree: Mapping[str, Any]) -> int:
 
 
 def upgraded(tree: Mapping[str, Any]) -> Tree:
-    """Return a run's settings under the names of this version."""
+    """Return the settings of a run after converting them from the run's format to the current one."""
     number = format_of(tree)
     now = {key: value for key, value in tree.items() if key != "format"}
     if isinstance(learning := now.get("learning"), dict):
@@ -62,5 +63,5 @@ def _learning_then(learning: Tree, number: int) -> Tree:
 
 
 def task_then(task: Any) -> Any:
-    """Return the current name of a task of format 1."""
+    """Return the current name of the task that a file of format 1 names."""
     return "maze" if task == "navigation" else task

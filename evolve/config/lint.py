@@ -1,4 +1,4 @@
-"""Warnings about settings that are allowed but odd: they have no effect, or give wrong colour signals."""
+"""Warnings about settings that are allowed but odd, because they have no effect or cause wrong colour signals."""
 
 from __future__ import annotations
 
@@ -9,9 +9,10 @@ from evolve.genome.genes import INHERITED, LAMBDA_MAX
 
 __all__ = ["coarse_bands", "idle_genes", "idle_settings", "idle_starts", "lint"]
 
-PEAKS = 17  # number of tested peaks of a pigment over an open gene's range
-SHOWN = 4  # maximum number of names in a line
-LEAST_ERROR = 1e-3  # relative to the signal of white; possible error of the reference, which has 64 bands
+PEAKS = 17  # number of peak wavelengths of a pigment that are tested over the range of an open gene
+SHOWN = 4  # maximum number of gene names in a line
+# Possible error of the reference, which has 64 bands, as a fraction of the signal of white. Smaller errors are ignored.
+LEAST_ERROR = 1e-3
 
 
 def lint(config: RunConfig) -> list[str]:
@@ -20,8 +21,11 @@ def lint(config: RunConfig) -> list[str]:
 
 
 def coarse_bands(config: RunConfig) -> list[str]:
-    """Return a line if the bands' error for the world's measured spectra exceeds a receptor's noise."""
-    if config.card.grey is not False:  # spectra are unknown or flat
+    """Return a warning if the error of the signals due to few spectral bands exceeds a receptor's noise.
+
+    The error is computed for the measured spectra of the task's world.
+    """
+    if config.card.grey is not False:  # reflectances are unknown or equal at all wavelengths
         return []
     from sim.scene.band_error import band_error, measured
     from sim.worlds.world import build_world
@@ -42,22 +46,25 @@ def coarse_bands(config: RunConfig) -> list[str]:
 
 
 def _most_light(config: RunConfig) -> float:
-    """Return the signal of white behind the widest pupil that animals may have; 1 in full light."""
+    """Return the signal of a receptor that sees white through the widest pupil that animals may have.
+
+    The signal without a pupil is 1.
+    """
     use = config.genome["relative_aperture"]
     return float(use.high if use.open else use.start) ** 2 if config.eye.optics else 1.0
 
 
 def _doublings(bands: int) -> list[int]:
-    """Return `bands` and its doublings below 64, which is the reference."""
+    """Return `bands` and its repeated doublings below 64, the number of bands of the reference."""
     return [bands * 2**k for k in range(6) if k == 0 or bands * 2**k < 64]
 
 
 def _types(config: RunConfig) -> list[str | tuple[float, ...]]:
-    """Return the receptors of the run.
+    """Return the sets of receptors for which the error is computed.
 
-    If receptors are inherited, one open gene at a time takes values over its range, with the others at their start.
-    Varying all of them together would give a larger error: a third larger in the preset `ultraviolet`, whose peaks
-    lie far apart.
+    If the spectral genes determine the receptors, each open gene in turn takes values over its range, while the others
+    keep their start values. If all genes varied together, the largest error would be larger: a third larger in the
+    preset `ultraviolet`, whose peaks lie far apart.
     """
     if config.eye.receptors != INHERITED:
         return [config.eye.receptors]
@@ -73,7 +80,7 @@ def _types(config: RunConfig) -> list[str | tuple[float, ...]]:
 
 
 def idle_genes(config: RunConfig) -> list[str]:
-    """Return lines about open genes that have no effect because other genes are fixed."""
+    """Return warnings about open genes that have no effect, because of other genes or of the world."""
     uses, table = config.genome, config.genes
     notes = []
     if uses["placement_range_deg"].open and not uses["n_eyes"].open and uses["n_eyes"].start == 1:
@@ -96,11 +103,12 @@ def idle_genes(config: RunConfig) -> list[str]:
 
 
 def idle_settings(config: RunConfig) -> list[str]:
-    """Return lines about settings that were changed although they have no effect."""
+    """Return warnings about settings that were changed although they have no effect."""
     notes, search, eye = [], config.search, config.eye
     for name, gene in config.genes.items():
         use, alike = config.genome[name], [other for other in config.genes.values() if other.cluster == gene.cluster]
-        # A value for a whole cluster applies to its open genes, so its closed genes give no warning.
+        # If all genes of a cluster have the same value, the value was set for the whole cluster and is meant for its
+        # open genes. The closed genes of the cluster then cause no warning.
         together = {config.genome[other.name].opens_at for other in alike} == {use.opens_at}
         if use.opens_at and not use.open and not gene.default.open and not together:
             notes.append(f"genome.{name}.opens_at has no effect: the gene is frozen; set genome.{name}.open = true")
@@ -116,7 +124,7 @@ def idle_settings(config: RunConfig) -> list[str]:
 
 
 def idle_starts(config: RunConfig) -> list[str]:
-    """Return lines about genes whose start was changed although it has no effect, one line per reason."""
+    """Return warnings about genes whose start value was changed although it has no effect, one line per reason."""
     unread = {"optical": f"eye.optics = {config.eye.optics}".lower()} if not config.eye.optics else {}
     if config.eye.receptors != INHERITED:
         unread["spectral"] = f"eye.receptors = {config.eye.receptors}, not {INHERITED}"

@@ -1,4 +1,4 @@
-"""Numbering of candidates: ids run through all generations, with `population` ids in each."""
+"""Numbering of candidates. Ids are consecutive over all generations, each of which has `population` candidates."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ __all__ = ["Place", "generation_ids"]
 
 @dataclass(frozen=True)
 class Place:
-    """Place of a candidate in a search: candidate `id` is number `index` of `generation`; all count from 0."""
+    """Place of a candidate in a search: the candidate `id` is number `index` of `generation`. All count from 0."""
 
     id: int
     generation: int
@@ -17,7 +17,7 @@ class Place:
 
     @classmethod
     def from_id(cls, candidate_id: int, population: int) -> Place:
-        """Return the place of a candidate if every generation has `population` candidates."""
+        """Return the place of the candidate with this id; every generation has `population` candidates."""
         return cls(candidate_id, *divmod(candidate_id, population))
 
 

@@ -1,4 +1,4 @@
-"""Location of a setting: the line of a TOML file, or a `--set` option."""
+"""Location of a setting: a line of a TOML file, or a `--set` option."""
 
 from __future__ import annotations
 
@@ -12,16 +12,17 @@ from evolve.genome.genes import groups_of
 __all__ = ["Source"]
 
 Tree = dict[str, Any]
-LONGEST_VALUE = 100  # maximum number of lines of a value
+LONGEST_VALUE = 100  # maximum number of lines that a value may span
 
 
 @dataclass(frozen=True)
 class Source:
     """Settings from one source.
 
-    name: name in messages: a file's path, "--set fov_deg=3", "preset quick"; "" for a source that messages never name
-    tree: the settings as nested tables
-    text: the TOML text of the settings; None if there is none
+    name: name of the source in messages, such as a file's path, "--set fov_deg=3" or "preset quick"; "" for a source
+        that messages do not name
+    tree: settings as nested tables
+    text: TOML text of the settings; None if the source has no text
     """
 
     name: str
@@ -29,9 +30,9 @@ class Source:
     text: str | None = None
 
     def place(self, key: str) -> str | None:
-        """Return the location of `key` in this source, such as "mine.toml, line 7", or None.
+        """Return the location of `key` in this source, such as "mine.toml, line 7"; None if the source does not set it.
 
-        key: dotted name; a gene is also found through the name of its group
+        key: dotted name; the setting of a gene may also be the setting of its cluster or family
         """
         for path in _spellings(key):
             if not _holds(self.tree, path):
@@ -42,7 +43,10 @@ class Source:
 
 
 def _spellings(key: str) -> Iterator[list[str]]:
-    """Yield the parts of the key, then its parts under each group that contains the gene, the smallest group first."""
+    """Yield the parts of the key.
+
+    For a gene, then yield the parts of the same key for each group that contains the gene, the smallest group first.
+    """
     path = key.split(".")
     yield path
     if path[0] == "genome" and len(path) > 1:
@@ -51,10 +55,10 @@ def _spellings(key: str) -> Iterator[list[str]]:
 
 
 def _line_of(text: str, path: list[str]) -> int | None:
-    """Return the last line of the setting of `path`; None if a value spans more lines than LONGEST_VALUE.
+    """Return the number of the last line of a setting; None if some value spans more lines than LONGEST_VALUE.
 
-    tomllib does not report positions. A setting that is present in the first n lines is also present in any longer
-    part of the file, so bisection finds the smallest n.
+    tomllib does not report line numbers. If the first n lines contain the setting, any larger number of lines also
+    contains it. Bisection therefore finds the smallest n.
     """
     lines = text.splitlines(keepends=True)
     low, high = 0, len(lines)  # the setting is absent from the first `low` lines and present in the first `high`
@@ -71,9 +75,9 @@ def _line_of(text: str, path: list[str]) -> int | None:
 
 
 def _parsed_from(lines: list[str], count: int) -> tuple[int, Tree | None]:
-    """Return the smallest number of lines, at least `count`, after which the file parses, and its settings then.
+    """Return the smallest number of lines, at least `count`, that can be parsed, and the settings in these lines.
 
-    A file that ends within a value of several lines does not parse.
+    Lines that end within a value of several lines cannot be parsed.
     """
     for cut in range(count, min(count + LONGEST_VALUE, len(lines)) + 1):
         try:

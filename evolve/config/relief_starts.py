@@ -1,4 +1,4 @@
-"""Start values of a relief's genes, converted to the number of genes that the run's eyes have."""
+"""Start values for the genes of a pupil's relief, converted to the number of genes that the eyes of a run have."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ Tree = dict[str, Any]
 
 
 def with_relief(tree: Tree, eye: EyeConfig) -> Tree:
-    """Return `tree` with start values for the relief that these eyes have.
+    """Return the settings `tree` with start values for the number of relief genes that these eyes have.
 
-    Start values of all 4 x 4 genes are converted to the same surface with more genes. If reliefs are symmetric and the
-    values have the eightfold symmetry, only an eighth of them is returned.
+    If `tree` contains start values of all 4 x 4 genes and the eyes have more genes, the values are converted to the
+    same surface with more genes. If reliefs are symmetric, start values that follow from others are removed.
 
     Raises:
-        ConfigError: start values are given for more than 4 x 4 genes, but not for the number of genes of these eyes.
+        ConfigError: `tree` contains start values for more than 4 x 4 genes, but the eyes have another number of genes.
     """
     genes, names = tree.get("genome", {}), doe_names(eye.relief_points)
     side = _spelled_out(genes)
@@ -52,7 +52,7 @@ def _spelled_out(genes: Tree) -> int:
 
 
 def _same(one: Tree, other: Tree) -> bool:
-    """Return whether the settings of two genes are equal, with start values equal up to rounding."""
+    """Return whether the settings of two genes are equal, apart from rounding errors of the start values."""
     rest, others = ({key: value for key, value in use.items() if key != "start"} for use in (one, other))
     return rest == others and math.isclose(one["start"], other["start"], abs_tol=1e-9)
 

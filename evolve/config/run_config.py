@@ -1,4 +1,4 @@
-"""Configuration of a run, with all values checked; immutable."""
+"""Immutable configuration of a run. All values are checked."""
 
 from __future__ import annotations
 
@@ -39,18 +39,20 @@ __all__ = [
 ]
 
 RHABDOMS = ("rhabdom_index", "rhabdom_surround", "rhabdom_length", "rhabdom_absorption")
-# Limits of the numerical aperture; a fly's is 0.25. Below the range a rhabdom guides almost no light, and above it
-# there are hundreds of modes.
+# Limits of the numerical aperture of rhabdoms; that of a fly's rhabdom is 0.25. Below the lower limit a rhabdom guides
+# almost no light, and above the upper limit it has hundreds of modes.
 LEAST_STEP, MOST_STEP = 0.2, 0.5
-LEAST_EXPOSURE = 2e-4  # [lx s]: some 30 photons from white at a = 1; with fewer the approximation of noise fails
+# [lx s] smallest allowed exposure. A receptor that sees white through a pupil with relative aperture 1 then absorbs
+# some 30 photons. With fewer photons, the approximation of shot noise fails.
+LEAST_EXPOSURE = 2e-4
 
 
 @dataclass(frozen=True)
 class RunConfig:
-    """All settings that determine a run's outcome, and the number of its processes.
+    """All settings that determine the outcome of a run, and the number of its processes.
 
-    task: one of TASKS, or FILE.py:CLASS for a user's `sim.Task`
-    code: code of a user task that the user has named; code that is not named is never executed
+    task: one of TASKS, or FILE.py:CLASS of a user task
+    code: code of the user task, if the user has named it; code that the user has not named is never executed
 
     Raises:
         ConfigError: settings contradict each other.
@@ -113,14 +115,14 @@ class RunConfig:
         self._check_settings(OF_SLIDING_AGENTS)
 
     def _check_world(self) -> None:
-        """Check the courses, and that the task has the settings of mazes and courses."""
+        """Check the courses, and that settings of mazes and courses are changed only for tasks that have them."""
         for name in ("course", "evaluation_course"):
             if (course := getattr(self.world, name)) not in COURSES:
                 raise ConfigError(f"world.{name} = {course!r}: must be one of {', '.join(COURSES)}", f"world.{name}")
         self._check_settings((*OF_MAZES, *OF_COURSES))
 
     def _check_settings(self, keys: tuple[str, ...]) -> None:
-        """Check that settings of other tasks have their default values."""
+        """Check that those of these settings that the task does not have are at their default values."""
         for key in keys:
             section, name = key.split(".")
             default = getattr(SECTIONS[section], name)
@@ -130,7 +132,7 @@ class RunConfig:
                 raise ConfigError(f"{key}: is for {whose}, not for {self.task}", key, "task")
 
     def _check_light(self) -> None:
-        """Check that light is not implausibly weak, and that an integration time is set only with shot noise."""
+        """Check that light is not too weak, and that the integration time is changed only if there is shot noise."""
         light, default = self.eye.illuminance, EyeConfig.integration_time
         if 0 < light * self.eye.integration_time < LEAST_EXPOSURE:
             raise ConfigError(
@@ -146,7 +148,10 @@ class RunConfig:
             )
 
     def _check_rhabdoms(self) -> None:
-        """Check that rhabdoms guide light behind a pupil, and that their settings are changed only if there are any."""
+        """Check that eyes with rhabdoms have optics and a plausible numerical aperture.
+
+        Also check that settings of rhabdoms are changed only if receptors are rhabdoms.
+        """
         eye, default = self.eye, EyeConfig()
         for name in RHABDOMS if not eye.rhabdoms else ():
             if getattr(eye, name) != getattr(default, name):
@@ -173,7 +178,7 @@ class RunConfig:
             )
 
     def _check_clusters(self) -> None:
-        """Check that at least one gene is open, and no gene that the run does not use."""
+        """Check that at least one gene is open, and that no gene is open that the run does not use."""
         genes = [gene for name, gene in self.genes.items() if self.genome[name].open]
         opened = {
             cluster: [f"genome.{gene.name}.open" for gene in genes if gene.cluster == cluster] for cluster in CLUSTERS
@@ -194,7 +199,10 @@ class RunConfig:
             raise ConfigError("genome: every gene is frozen; open at least one (genome.NAME.open = true)", *keys)
 
     def _check_rungs(self, rollout: int) -> None:
-        """Check that successive halving has whole generations and a first rung of at least one rollout."""
+        """Check the settings of successive halving.
+
+        It requires whole generations, and its first rung must be at least one rollout long.
+        """
         search = self.search
         if search.rungs == 1:
             return
@@ -212,7 +220,7 @@ class RunConfig:
             )
 
     def _check_phases(self) -> None:
-        """Check that every open gene opens within the run, and at least one at its start."""
+        """Check that every open gene opens before the run ends, and that at least one opens at its start."""
         opening = {name: use.opens_at for name, use in self.genome.items() if use.open}
         for name, generation in opening.items():
             if generation >= self.search.generations:
@@ -228,19 +236,19 @@ class RunConfig:
             )
 
     def __repr__(self) -> str:
-        """Return a short description; all settings would be some 150."""
+        """Return a short description, because the run has some 150 settings."""
         search, steps = self.search, self.learning.total_steps
         plan = f"{search.generations} generations x {search.population} candidates x {steps:,} steps"
         return f"<RunConfig {self.task}, seed {self.seed}, {plan}>"
 
     @property
     def genes(self) -> Mapping[str, Gene]:
-        """All genes of this run's animals, by name."""
+        """All genes of the run's animals, by name."""
         return {name: gene for name, gene in self.eye.genes.items() if name in self.genome}
 
     @property
     def choice(self) -> TaskChoice:
-        """Task of the run, with its code if it may run."""
+        """Task of the run, with its code if the user has named it."""
         return TaskChoice(self.task, self.task_sha256, self.code)
 
     @property
@@ -250,7 +258,7 @@ class RunConfig:
 
     @property
     def task_name(self) -> str:
-        """Short name of the task: "detection"; the class of a user task."""
+        """Short name of the task, such as "detection"; for a user task, the name of its class."""
         return self.card.name
 
     def with_code(self, named: str) -> RunConfig:

@@ -1,4 +1,4 @@
-"""Sections of a run's configuration: each setting with its default, valid range and effect."""
+"""Sections of a run's configuration. Each setting is defined with its default, valid range and effect."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ __all__ = [
 
 @dataclass(frozen=True)
 class WorldConfig:
-    """Settings of the worlds of a run."""
+    """Settings of the worlds in which animals are trained and evaluated."""
 
     mazes: int = setting(1, Interval(1, 32), "number of mazes in the task maze; an episode begins in any of them")
     unseen: bool = setting(
@@ -40,17 +40,17 @@ class WorldConfig:
 
     @property
     def training(self) -> dict[str, Any]:
-        """Arguments of `sim.make_vec_env` for training."""
+        """Arguments of `sim.make_vec_env` that define the worlds in training."""
         return {"mazes": self.mazes, "world_seed": 0, "course": self.course}
 
     @property
     def evaluation(self) -> dict[str, Any]:
-        """Arguments of `sim.make_vec_env` for the evaluation of fitness."""
+        """Arguments of `sim.make_vec_env` that define the worlds in which fitness is evaluated."""
         return {"mazes": self.mazes, "world_seed": int(self.unseen), "course": self.evaluation_course}
 
     @property
     def vary(self) -> dict[str, tuple[float, float]] | None:
-        """Argument `vary` of `sim.make_vec_env`; None if episodes do not vary."""
+        """Value of the argument `vary` of `sim.make_vec_env`; None if the light is the same in all episodes."""
         return {"light": (self.least_light, 1.0)} if self.least_light < 1 else None
 
 
@@ -83,7 +83,7 @@ class SearchConfig:
 
 @dataclass(frozen=True)
 class LearningConfig:
-    """Settings of PPO, for each candidate."""
+    """Settings of the training of each candidate by PPO."""
 
     total_steps: int = setting(1_000_000, Interval(1, 10**10), "agent steps to train for")
     n_envs: int = setting(128, Interval(1, 65_536), "worlds simulated in parallel")

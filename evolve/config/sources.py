@@ -26,7 +26,7 @@ __all__ = [
 ]
 
 Tree = dict[str, Any]
-SCALES = ("laptop", "paper")  # scales of presets that have several; the first is the default
+SCALES = ("laptop", "paper")  # names of the scales of presets that have several scales; the first is the default
 
 
 def preset_names() -> list[str]:
@@ -36,7 +36,10 @@ def preset_names() -> list[str]:
 
 
 def preset_about(name: str) -> dict[str, Any]:
-    """Return a preset's name, task (None: any), scales and purpose, which is the first sentence of its file."""
+    """Return the name, task, scales and purpose of a preset.
+
+    The task is None if the preset can be used with any task. The purpose is the first sentence of the preset's file.
+    """
     text = (resources.files("evolve") / "presets" / f"{name}.toml").read_text(encoding="utf-8")
     tree = tomllib.loads(text)
     remarks = " ".join(line.removeprefix("# ") for line in takewhile(lambda line: line[:1] == "#", text.split("\n")))
@@ -46,7 +49,7 @@ def preset_about(name: str) -> dict[str, Any]:
 
 
 def preset_sources(name: str | None, scale: str | None) -> list[Source]:
-    """Return a preset's settings, followed by the settings of its scale, which override them; [] without a preset.
+    """Return the sources of a preset: its settings, then those of its scale, which override them; [] for None.
 
     Raises:
         ConfigError: the preset or the scale is unknown.
@@ -70,7 +73,7 @@ def preset_sources(name: str | None, scale: str | None) -> list[Source]:
 
 
 def task_defaults(task: Any) -> Source:
-    """Return the default settings of a task from evolve/config/tasks/TASK.toml, if the file exists."""
+    """Return the default settings of a task from evolve/config/tasks/TASK.toml; none if the file is missing."""
     file = resources.files("evolve") / "config" / "tasks" / f"{task}.toml"
     known = isinstance(task, str) and task in TASKS
     return Source("", tomllib.loads(file.read_text(encoding="utf-8")) if known and file.is_file() else {})
@@ -80,7 +83,8 @@ def read_toml(path: Path) -> Source:
     """Read a TOML file.
 
     Raises:
-        ConfigError: the file cannot be read; one line that names the file and, if known, the line.
+        ConfigError: the file cannot be read or parsed. The message is one line that names the file and, if known, the
+            line in it.
     """
     try:
         return parsed_toml(path.read_bytes(), str(path))
@@ -89,7 +93,9 @@ def read_toml(path: Path) -> Source:
 
 
 def parsed_toml(text: bytes | str, name: str) -> Source:
-    """Parse TOML text, which messages call `name`.
+    """Parse TOML text.
+
+    name: name of the text in error messages
 
     Raises:
         ConfigError: the text is not valid TOML; see `read_toml`.
@@ -110,7 +116,9 @@ def _first_line(error: Exception) -> str:
 
 
 def read_assignment(text: str) -> Source:
-    """Return {"search": {"population": 8}} for "search.population=8"; the value is TOML, and a bare word is text.
+    """Return the source {"search": {"population": 8}} for the text "search.population=8".
+
+    The value is parsed as TOML. A word without quotation marks is accepted as text.
 
     Raises:
         ConfigError: the text has another form.

@@ -1,4 +1,4 @@
-"""Square eyes: one gene for both sides, which takes equal settings of height and width."""
+"""Square eyes, which have one gene for both sides. Equal settings of height and width apply to this gene."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ __all__ = ["no_such_side", "with_square_eyes"]
 
 
 def with_square_eyes(source: Source, eye: EyeConfig) -> Source:
-    """Return `source` with equal settings of height and width moved to the gene of a square eye.
+    """Return the source; for square eyes, equal settings of height and width are moved to the gene for both sides.
 
-    A task or a preset may be written for one row of receptors. If a user selects square eyes instead, the task's
-    height is ignored, and the preset's width applies to both sides.
+    A task or a preset may be written for eyes with one row of receptors. If a user selects square eyes instead, the
+    task's settings of height and width are ignored, and the preset's width applies to both sides.
     """
     genes = source.tree.get("genome", {})
     if eye.square and not source.name:

@@ -1,4 +1,4 @@
-"""Properties of a task that are known without executing it; used by settings, lint, tables and titles."""
+"""Properties of a task that are known without executing its code. Settings, warnings, tables and titles use them."""
 
 from __future__ import annotations
 
@@ -11,7 +11,8 @@ from sim.worlds.catalog import TASKS
 
 __all__ = ["CARDS", "OF_COURSES", "OF_SLIDING_AGENTS", "TaskCard", "card_of", "tasks_with"]
 
-# Settings that only some tasks have. A sliding agent has a speed, a turning rate and contact with walls.
+# Settings that only some tasks have. OF_SLIDING_AGENTS are for tasks whose agent has a speed, a turning rate and
+# contact with walls.
 OF_SLIDING_AGENTS = ("world.least_light", "learning.first_speed", "learning.contact_ramp", "learning.least_return")
 OF_MAZES = ("world.mazes", "world.unseen")
 OF_COURSES = ("world.course", "world.evaluation_course")
@@ -22,11 +23,13 @@ OPTIONAL_GENES = (TILT,)  # genes that only some tasks have
 class TaskCard:
     """Properties of a task.
 
-    name: name in directories and tables · title: name in headings
-    aim: completes "Eyes and brains evolved ..."
-    settings: settings of this task that some tasks lack · genes: genes of this task that some tasks lack
-    grey: whether all wavelengths are reflected equally in its world; None: unknown
-    has_file: whether it is a class in a user's file
+    name: name of the task in directories and tables
+    title: name of the task in headings
+    aim: end of the sentence "Eyes and brains evolved ..."
+    settings: settings that this task has and some other tasks do not have
+    genes: genes that this task has and some other tasks do not have
+    grey: whether all surfaces of its world reflect all wavelengths equally; None: unknown
+    has_file: whether the task is a class in a user's file
     """
 
     name: str
@@ -60,7 +63,7 @@ CARDS = {
 
 
 def card_of(task: Any) -> TaskCard | None:
-    """Return the card of a built-in task, given its name, or of a user task "FILE.py:CLASS"; None for other values."""
+    """Return the card of a built-in task or of a user task "FILE.py:CLASS"; None if `task` is neither."""
     if not isinstance(task, str):
         return None
     if LABEL.fullmatch(task) is not None:

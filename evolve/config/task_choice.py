@@ -15,11 +15,11 @@ __all__ = ["TaskChoice"]
 
 @dataclass(frozen=True)
 class TaskChoice:
-    """A task, and the code that may run.
+    """A task, and its code if the code may be executed.
 
-    label: value in config.toml: a built-in task's name, or FILE.py:CLASS
-    sha256: hash of the file, "" if there is none
-    code: code of a user task that the user has named; code that is not named must not run
+    label: name of the task in config.toml: the name of a built-in task, or FILE.py:CLASS
+    sha256: hash of the file; "" for a built-in task
+    code: code of the user task, if the user has named it; code that the user has not named must not be executed
     """
 
     label: str
@@ -28,7 +28,7 @@ class TaskChoice:
 
     @classmethod
     def named(cls, said: str) -> TaskChoice:
-        """Return the task that a command names; a file is read but not executed.
+        """Return the task that a command names. The file of a user task is read but not executed.
 
         Raises:
             ConfigError: the file or class does not exist, or the file is not valid Python.
@@ -40,7 +40,7 @@ class TaskChoice:
 
     @property
     def settings(self) -> dict[str, str]:
-        """Return the task's entries in config.toml."""
+        """Entries of the task in config.toml."""
         return {"task": self.label, **({"task_sha256": self.sha256} if self.sha256 else {})}
 
     @property
@@ -75,7 +75,7 @@ class TaskChoice:
         return self.code
 
     def read(self, named: str) -> TaskCode:
-        """Return the code of this task, which the user names as "FILE.py:CLASS".
+        """Read the code of this task from the file that the user names as "FILE.py:CLASS".
 
         Raises:
             ConfigError: this task has no code, the class has another name, or the file has changed.

@@ -23,9 +23,11 @@ LARGEST_FILE = 2_000_000  # bytes
 
 @dataclass(frozen=True)
 class TaskCode:
-    """Contents of FILE.py:CLASS.
+    """Code of a user task "FILE.py:CLASS".
 
-    name: name of the class · file: path of the file · text: text of the whole file
+    name: name of the class
+    file: path of the file
+    text: text of the whole file
     """
 
     name: str
@@ -34,7 +36,7 @@ class TaskCode:
 
     @property
     def label(self) -> str:
-        """Name in a run's config, which does not contain the folder of the file."""
+        """Name of the task in a run's config, without the folder of the file."""
         return f"{self.file.name}:{self.name}"
 
     @property
@@ -43,10 +45,10 @@ class TaskCode:
 
     @classmethod
     def read(cls, named: str) -> TaskCode:
-        """Read "FILE.py:CLASS"; the file is parsed but not executed.
+        """Read the code of "FILE.py:CLASS". The file is parsed but not executed.
 
         Raises:
-            ConfigError: the file or class does not exist, or the file is not valid Python; one line.
+            ConfigError: the file or class does not exist, or the file is not valid Python. The message is one line.
         """
         place, _, name = named.partition(".py:") if ".py:" in named else (named.removesuffix(".py"), "", "")
         file = Path(f"{place}.py")
@@ -67,7 +69,7 @@ class TaskCode:
 
 
 def names_code(said: Any) -> bool:
-    """Return whether the name of a task denotes a Python file."""
+    """Return whether the name of a task refers to a Python file."""
     return isinstance(said, str) and (said.endswith(".py") or ".py:" in said)
 
 

@@ -1,12 +1,12 @@
-"""Development of a genome, a vector of numbers, into an animal.
+"""Genomes, which are vectors of numbers, and their development into animals.
 
 genes         GENES: quantities that evolution can change
 genotype      Genotype: encoding of gene values in a genome
-phenotype     Phenotype: the animal; develop
+phenotype     Phenotype: eyes and brain of an animal; develop: the phenotype of a genome
 phenotype_on_record  checks of a phenotype that was read from a file
 eye_config    EyeConfig: settings shared by all eyes of a run
 anatomy       space constraints of eyes and receptors
-relief_genes  genes of a relief
-interval      ranges of values
+relief_genes  genes of a pupil's relief
+interval      Interval: valid range of a value
 plain_values  checks of values that were read from a file
 """

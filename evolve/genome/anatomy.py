@@ -1,9 +1,9 @@
-"""Space constraints of eyes and receptors; overlaps are repaired by the smallest sufficient change of genes.
+"""Space constraints of eyes and receptors, and repair of gene values for which they would overlap.
 
-Eyes sit on the equator of a head of radius `eye.head_radius`, and an eye has the width of its retina. The angle between
-neighbours is placement range / (eyes - 1). All retinas are `eye.sensor_width` wide and filled with receptors, which are
-at least `eye.receptor_width` wide. If `eye.receptor_pitch` is above 0, the width of a retina is instead the number of
-receptors times this pitch.
+Eyes sit on the equator of a head of radius `eye.head_radius`, and an eye is as wide as its retina. The angle between
+neighbouring eyes is placement range / (eyes - 1). All retinas are `eye.sensor_width` wide and filled with receptors,
+which are at least `eye.receptor_width` wide. If `eye.receptor_pitch` is above 0, the width of a retina is instead the
+number of receptors along its width times this pitch. A repair changes genes as little as possible.
 """
 
 from __future__ import annotations
@@ -24,22 +24,26 @@ SLACK = 1e-9  # tolerance for rounding, so that eyes in contact do not count as 
 
 
 def retina_width(receptors: float, sizes: EyeConfig) -> float:
-    """Return the width of a retina with this number of receptors [m], which is also the eye's width on the head."""
+    """Return the width of a retina with this number of receptors along its width [m]. The eye has the same width."""
     return receptors * sizes.receptor_pitch if sizes.receptor_pitch > 0 else sizes.sensor_width
 
 
 def sides(values: Values) -> tuple[int, int]:
-    """Return an eye's numbers of receptors (height, width)."""
+    """Return the numbers of receptors along the height and along the width of an eye."""
     height, width = (SIDE, SIDE) if SIDE in values else SIDES
     return int(values[height]), int(values[width])
 
 
 def fitted(values: Values, uses: Uses, sizes: EyeConfig) -> Values:
-    """Return `values` after repair of overlaps; genes stay within their searched ranges.
+    """Return the gene values after the repair of overlaps; genes stay within their searched ranges.
 
-    Too narrow receptors are reduced in number, and rhabdoms are narrowed to the width of a receptor. Eyes that overlap
-    are spread. If the searched range of their placement is too small, the number of eyes is reduced. If the width of an
-    eye depends on its receptors, eyes and receptors are reduced in the same proportion instead.
+    If receptors are too narrow, their number is reduced. Rhabdoms are narrowed to the width of a receptor. If eyes
+    overlap, they are spread over a larger part of the head. If the searched range of their placement is too small for
+    this, the number of eyes is reduced. If the width of an eye depends on the number of its receptors, the numbers of
+    eyes and of receptors are instead reduced in the same proportion.
+
+    values: value of each gene, by name
+    uses: searched range of each gene, by name
     """
     fits, width = dict(values), _width_gene(uses)
     fits[width] = min(values[width], float(_most_receptors(sizes)))
@@ -57,12 +61,16 @@ def fitted(values: Values, uses: Uses, sizes: EyeConfig) -> Values:
 
 
 def _thinned(asked: Pair, least: Pair, range_deg: float, sizes: EyeConfig) -> Pair:
-    """Return the numbers of eyes and receptors that fit, are at least `least`, and are most similar to `asked`.
+    """Return the numbers of eyes and receptors that fit, are at least `least`, and are closest to `asked`.
 
-    Similarity is the sum of squared logarithms of ratios, which halves both numbers rather than quartering one. If the
-    repair always reduced the same number, evolution would drift towards the other; the choice between eyes and
-    receptors is left to selection. The required space depends on the gaps between eyes, which are one fewer than the
-    eyes. The ratio uses the mean of the counts of eyes and gaps, which preserves their proportion to receptors best.
+    The distance between two pairs of numbers is the sum of the squared logarithms of their ratios. With this distance,
+    the repair halves both numbers rather than dividing one of them by four. If the repair always reduced the same
+    number, evolution would drift towards animals in which the other number is large. Selection, not the repair, should
+    choose between eyes and receptors.
+
+    The required space depends on the gaps between eyes, of which there is one fewer than eyes. The ratio of the numbers
+    of eyes is therefore computed from the mean of both counts, eyes - 0.5. This preserves the proportion of eyes to
+    receptors best.
     """
     (eyes, receptors), (fewest_eyes, fewest) = asked, least
     counts = range(int(fewest), int(receptors) + 1)
@@ -76,7 +84,7 @@ def _ratio(one: float, other: float) -> float:
 
 
 def contradiction(uses: Uses, sizes: EyeConfig) -> Contradiction | None:
-    """Return a message and the settings that cause it if no genome fits; None if every genome can be repaired."""
+    """Return None if every genome can be repaired; else a message and the names of the contradicting settings."""
     return _crowded_retina(uses, sizes) or _crowded_head(uses, sizes)
 
 

@@ -11,11 +11,11 @@ from evolve.genome.interval import Interval
 
 __all__ = ["AUTO", "EyeConfig", "setting"]
 
-AUTO = "auto"  # value instead of a number, which is then chosen on use
+AUTO = "auto"  # value of a setting whose number is chosen automatically
 
 
 def setting(default: Any, valid: Interval | None, meaning: str) -> Any:
-    """Return a dataclass field with a valid range and a meaning."""
+    """Return a dataclass field whose metadata contain the valid range and the meaning of the setting."""
     return field(default=default, metadata={"valid": valid, "meaning": meaning})
 
 
@@ -84,5 +84,5 @@ class EyeConfig:
 
     @property
     def genes(self) -> Mapping[str, Gene]:
-        """All genes of animals with these eyes, by name."""
+        """All genes of animals that have these eyes, by name."""
         return gene_table(self.relief_points, self.relief_symmetric, self.square, self.rhabdoms)

@@ -1,4 +1,4 @@
-"""The genes: quantities that evolution can change, with their units, ranges and default use in a run."""
+"""The genes: quantities that evolution can change, with their units, valid ranges and default use in a run."""
 
 from __future__ import annotations
 
@@ -35,12 +35,13 @@ __all__ = [
 
 Cluster = Literal["morphological", "optical", "neural", "spectral"]
 CLUSTERS: tuple[Cluster, ...] = ("morphological", "optical", "neural", "spectral")
-FAMILIES = ("doe", "lambda_max")  # prefixes of the names of genes of one kind
-RELIEF_POINTS = Interval(4, 9)  # points along one side of a relief; its genes' names have one digit for each side
-SIDE = "resolution"  # gene of a square eye, which replaces SIDES
+FAMILIES = ("doe", "lambda_max")  # prefixes of genes of the same kind: heights of the relief, and peaks of pigments
+# Number of points along one side of a relief. The names of its genes have one digit for the row and one for the column.
+RELIEF_POINTS = Interval(4, 9)
+SIDE = "resolution"  # gene of square eyes, which replaces the two genes SIDES
 SIDES = ("resolution_height", "resolution_width")
 RHABDOM = "rhabdom_diameter_um"  # gene of eyes whose receptors are rhabdoms
-TILT = "elevation_deg"  # gene in user tasks; in built-in tasks eyes look along the floor
+TILT = "elevation_deg"  # gene that exists only in user tasks; in built-in tasks eyes look along the floor
 REAL: Literal["real"] = "real"
 INTEGER: Literal["integer"] = "integer"
 APERTURE_SHAPES = ("circle", "annulus", "slit", "triangle", "square", "pentagon", "hexagon")
@@ -50,9 +51,11 @@ LAMBDA_MAX: Mapping[str, float] = {f"lambda_max_{i}_nm": peak for i, peak in enu
 
 @dataclass(frozen=True)
 class GeneConfig:
-    """Use of one gene in a run: an open gene evolves over [low, high] from `start`; a frozen gene stays at `start`.
+    """Use of one gene in a run.
 
-    opens_at: first generation that varies the gene, which stays at `start` until then
+    The search varies an open gene within [low, high], beginning at `start`. A frozen gene has the value `start`.
+
+    opens_at: first generation in which the search varies the gene; before it, the gene has the value `start`
     """
 
     open: bool
@@ -76,26 +79,29 @@ class Gene:
 
     @property
     def mutation(self) -> str:
-        """Kind of mutation by the optimizer "mutation"; other optimizers sample a distribution that they adapt."""
+        """Kind of mutation that the optimizer "mutation" applies.
+
+        Other optimizers sample a distribution that they adapt.
+        """
         return "Gaussian" if self.kind == "real" else "±1"
 
     def decode(self, u: float, use: GeneConfig) -> float:
-        """Return the gene's value at u in [0, 1]; all integers have equal shares of [0, 1]."""
+        """Return the gene's value at the coordinate u in [0, 1]; all values of an integer gene have equal shares."""
         if self.kind == "real":
             return use.low + u * (use.high - use.low)
         return min(use.low + float(np.floor(u * (use.high - use.low + 1))), use.high)
 
     def encode(self, value: float, use: GeneConfig) -> float:
-        """Return the inverse of `decode`; for an integer, the middle of its share of [0, 1]."""
+        """Return the coordinate u of a value, the inverse of `decode`; for an integer, the middle of its share."""
         if self.kind == "real":
             return (value - use.low) / (use.high - use.low)
         return (value - use.low + 0.5) / (use.high - use.low + 1)
 
     def mutated(self, u: float, sigma: float, normal: float, step: int, use: GeneConfig) -> float:
-        """Return u after one mutation.
+        """Return the coordinate u after one mutation.
 
-        A real gene moves by `normal` times sigma and is reflected at the ends; an integer moves by `step` and is
-        clipped to its range.
+        The coordinate of a real gene changes by `normal` times sigma and is reflected at 0 and 1. The value of an
+        integer gene changes by `step` and is clipped to its range.
         """
         if self.kind == "integer":
             value = self.decode(u, use) + step
@@ -110,8 +116,8 @@ def gene_table(
 ) -> Mapping[str, Gene]:
     """Return all genes by name, in the order of the genome.
 
-    The relief has relief_points² genes, or the genes of an eighth if it is symmetric. Square eyes have one gene for
-    both sides, and rhabdoms one for their diameter.
+    The relief has relief_points² genes. If it is symmetric, it has only the genes of an eighth of its area. Square eyes
+    have one gene for both sides. Rhabdoms add a gene for their diameter.
     """
     relief = set(representatives(relief_points, relief_symmetric))
     absent = (*(SIDES if square else (SIDE,)), *(() if rhabdoms else (RHABDOM,)))
@@ -146,17 +152,17 @@ def _optics(relief_points: int) -> list[Gene]:
     shapes = ", ".join(f"{number} {name}" for number, name in enumerate(APERTURE_SHAPES))
     last = len(APERTURE_SHAPES) - 1
     return [
-        # Below 0.01 (a radius of 1 µm in a 200 µm eye) the pupil is about as narrow as the wavelength or narrower.
+        # Below 0.01 (a radius of 1 µm in an eye 200 µm wide), the pupil would be as narrow as the wavelength of light.
         gene("relative_aperture", REAL, (0.01, 1), (0.01, 1, 0.5), "", "pupil diameter / retina width"),
         *(
             gene(f"doe_{i}{j}", REAL, (0, 1), (0, 1, 0.5), "relief height", f"relief control point ({i}, {j})")
             for i, j in places
         ),
         gene("refractive_index", REAL, (1, 2), (1, 2, 1.5), "", "index of the relief's material, at 588 nm"),
-        # Glasses have values from 1/90 to 1/20; a material with 0 has no dispersion.
+        # Glasses have values from 1/90 to 1/20. A material with the value 0 has no dispersion.
         _held(gene("dispersion", REAL, (0, 0.1), (0, 0.05, 0), "1 / Abbe number", "fall of the index with wavelength")),
         _held(gene("aperture_shape", INTEGER, (0, last), (0, last, 0), "", f"pupil: {shapes}")),
-        # Thinner rhabdoms guide almost no red light, and wider ones have a hundred modes.
+        # Rhabdoms thinner than 0.8 µm guide almost no red light, and those wider than 10 µm have a hundred modes.
         _held(gene(RHABDOM, REAL, (0.8, 10), (1, 6, 2), "µm", "diameter of rhabdoms, at most a receptor's width")),
     ]
 
@@ -173,7 +179,8 @@ def _brain() -> list[Gene]:
 def _spectra() -> list[Gene]:
     """Return the genes for the number of receptor types and for the peak sensitivity of each.
 
-    Known pigments have peaks from 357 to 620 nm. The limits of 330 and 700 nm come from the template in `optics`.
+    Known pigments have peaks from 357 to 620 nm. The template of pigment spectra in `optics` is limited to peaks from
+    330 to 700 nm.
     """
     gene, most = partial(_gene, "spectral"), len(LAMBDA_MAX)
     return [
@@ -194,13 +201,13 @@ def _gene(
     unit: str,
     meaning: str,
 ) -> Gene:
-    """Return a gene that is open by default; `search` is (low, high, start)."""
+    """Return a gene that is open by default; `search` is (low, high, start) of its default use."""
     low, high, start = map(float, search)
     return Gene(name, cluster, kind, Interval(*valid), GeneConfig(True, low, high, start), unit, meaning)
 
 
 def _held(gene: Gene) -> Gene:
-    """Return the gene frozen by default."""
+    """Return a copy of the gene that is frozen by default."""
     return replace(gene, default=replace(gene.default, open=False))
 
 
@@ -209,16 +216,16 @@ ALL_GENES: Mapping[str, Gene] = _all_genes(int(RELIEF_POINTS.high))  # genes of 
 
 
 def group_members(name: str) -> tuple[str, ...]:
-    """Return the genes of a cluster or family, or the gene of this name; () for an unknown name."""
+    """Return the names of the genes in a cluster or family, or the gene of this name; () for an unknown name."""
     return tuple(gene for gene in ALL_GENES if name in (gene, *groups_of(gene)))
 
 
 def groups_of(name: str) -> tuple[str, ...]:
-    """Return the groups of a gene, the smallest first; () for an unknown name."""
+    """Return the family and the cluster of a gene, the smaller group first; () for an unknown name."""
     if name not in ALL_GENES:
         return ()
     families = tuple(family for family in FAMILIES if name.startswith(f"{family}_"))
     return (*families, ALL_GENES[name].cluster)
 
 
-INHERITED = "genes"  # value instead of a receptor set's name: receptors follow from the spectral genes
+INHERITED = "genes"  # value of the setting `eye.receptors` if each animal's spectral genes determine its receptors

@@ -16,7 +16,7 @@ __all__ = ["CLUSTERS", "GENES", "Gene", "GeneConfig", "Genotype", "group_members
 
 @dataclass(frozen=True)
 class Genotype:
-    """Encoding of one run: the open genes, their order in the genome, and their ranges.
+    """Encoding of gene values in one run: the open genes, their order in the genome, and their ranges.
 
     A gene that opens in a later generation has a place in the genome from the first generation, with its start value.
     """
@@ -33,24 +33,24 @@ class Genotype:
 
     @property
     def start(self) -> NDArray[np.float64]:
-        """Genome of the first animal, (dimension,)."""
+        """Genome with the start values of all genes, (dimension,)."""
         uses = self.uses
         return np.array([gene.encode(uses[gene.name].start, uses[gene.name]) for gene in self.open_genes])
 
     @cached_property
     def phases(self) -> tuple[int, ...]:
-        """Generations in which genes open, in ascending order."""
+        """Generations in which at least one gene opens, in ascending order."""
         return tuple(sorted({self.uses[gene.name].opens_at for gene in self.open_genes}))
 
     def varied(self, generation: int) -> NDArray[np.intp]:
-        """Return the indices in the genome of the genes that are varied in a generation."""
+        """Return the genome indices of the genes that the search varies in a generation."""
         return np.array([i for i, g in enumerate(self.open_genes) if self.uses[g.name].opens_at <= generation], np.intp)
 
     def decode(self, genome: NDArray[np.float64]) -> dict[str, float]:
-        """Return the values of all genes, open or frozen; coordinates outside [0, 1] are clipped.
+        """Return the values of all genes, both open and frozen. Coordinates outside [0, 1] are clipped.
 
         Raises:
-            ValueError: `genome` has another length than `dimension`, or is not finite.
+            ValueError: the length of `genome` is not `dimension`, or a coordinate is not finite.
         """
         genome = np.asarray(genome, dtype=np.float64)
         if genome.shape != (self.dimension,) or not np.all(np.isfinite(genome)):

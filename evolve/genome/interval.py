@@ -1,4 +1,4 @@
-"""Valid ranges of values, which error messages quote."""
+"""Valid ranges of values, and their text in error messages."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ __all__ = ["Interval"]
 
 @dataclass(frozen=True)
 class Interval:
-    """The numbers from `low` to `high`; `open_low` excludes `low` itself."""
+    """The numbers from `low` to `high`. `low` itself is excluded if `open_low` is True."""
 
     low: float
     high: float = math.inf

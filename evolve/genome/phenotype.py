@@ -1,4 +1,4 @@
-"""Development of gene values into the simulated animal."""
+"""Development of a genome into the simulated animal, its phenotype."""
 
 from __future__ import annotations
 
@@ -25,14 +25,15 @@ __all__ = ["FORMER_ENCODER", "Phenotype", "develop", "repaired"]
 
 ANNULUS_INNER = 0.5  # inner radius of an annulus, in pupil radii
 SLIT_ASPECT = 4.0  # height of an upright slit / its width
-# The encoder is proportional to the brain, so that a small brain does not get a large encoder. With 64 neurons encoders
-# are 16 wide; wider ones take longer and learnt no faster (docs/measurements/learning.md).
+# The width of the encoders (the first layers, one per eye) is proportional to that of the brain, so that a small brain
+# does not get large encoders. A brain of 64 neurons has encoders of 16. Wider encoders take longer to compute, and did
+# not learn faster (docs/measurements/learning.md).
 NEURONS_PER_FEATURE = 4
-FORMER_ENCODER = 16  # width in records without this field, for any number of neurons
+FORMER_ENCODER = 16  # width of the encoders of animals whose record does not state it
 
 
 class Settings(Protocol):
-    """Settings of a run that shape its animals."""
+    """Settings of a run that affect the development of its animals."""
 
     @property
     def genome(self) -> Mapping[str, GeneConfig]: ...
@@ -42,16 +43,18 @@ class Settings(Protocol):
 
 @dataclass(frozen=True)
 class Phenotype:
-    """An animal: its eyes and its brain.
+    """The eyes and the brain of an animal.
 
-    With optics off (a perfect lens), `relative_aperture`, `relief` and `refractive_index` are all None.
-    `relief` holds N x N heights in [0, 1], row-major (y, x). For N = 4 they are control points of a bicubic B-spline
+    If optics is off (eyes have a perfect lens), `relative_aperture`, `relief` and `refractive_index` are all None.
+    `relief` contains N x N heights in [0, 1], row-major (y, x). For N = 4 they are control points of a bicubic B-spline
     patch; for larger N they are heights at cell centres, interpolated by a cubic spline.
     `aperture_shape` is an index into APERTURE_SHAPES, and `dispersion` the inverse of the relief's Abbe number.
-    `elevation_deg` is the elevation of the eyes; None in built-in tasks, in which eyes look along the floor.
-    `rhabdom_diameter_um` is the diameter of the receptors; None: receptors are squares that absorb all incident light.
-    `encoder` is the width of the first layers, one per eye.
-    `lambda_max_nm` are the peaks of the receptor types' pigments; None: the animal has the receptors of its run.
+    `elevation_deg` is the elevation of the eyes. It is None in built-in tasks, in which eyes look along the floor.
+    `rhabdom_diameter_um` is the diameter of the rhabdoms. If it is None, receptors are squares that absorb all incident
+    light.
+    `encoder` is the width of the brain's first layers, of which there is one for each eye.
+    `lambda_max_nm` are the wavelengths at which the pigments of the receptor types absorb most. If it is None, the
+    setting `eye.receptors` of the run determines the receptors.
     """
 
     n_eyes: int
@@ -72,7 +75,7 @@ class Phenotype:
     rhabdom_diameter_um: float | None = None
 
     def waveguide(self, eye: EyeConfig) -> optics.Waveguide | None:
-        """Return the waveguide of each receptor, limited to the receptor's width; None for squares."""
+        """Return the waveguide that each receptor forms, at most as wide as the receptor; None for square receptors."""
         import optics
 
         if self.rhabdom_diameter_um is None:
@@ -87,7 +90,7 @@ class Phenotype:
         )
 
     def pupil(self, eye: EyeConfig) -> optics.Pupil | None:
-        """Return the pupil of each eye; None for a perfect lens."""
+        """Return the pupil of the eyes; None for a perfect lens."""
         import optics
 
         if self.relative_aperture is None or self.relief is None or self.refractive_index is None:
@@ -127,19 +130,19 @@ class Phenotype:
 
     @classmethod
     def from_json(cls, record: Mapping[str, Any]) -> Phenotype:
-        """Return the phenotype that `to_json` described.
+        """Return the phenotype from the return value of `to_json`.
 
         Raises:
-            ValueError: a field is unknown, of another type, or outside the range of its genes.
+            ValueError: a field is unknown, has another type, or lies outside the range of its gene.
             TypeError: a field is missing.
         """
         return cls(**checked_fields(record, [f.name for f in fields(cls)]))
 
 
 def develop(genome: NDArray[np.float64], config: Settings) -> Phenotype:
-    """Return the phenotype of a genome under a run's config, with overlaps repaired.
+    """Return the phenotype of a genome with the settings of a run. Overlaps are repaired.
 
-    Every genome of the right length has a phenotype.
+    Every genome with the right number of finite coordinates has a phenotype.
     """
     values = fitted(Genotype(config.genome).decode(genome), config.genome, config.eye)
     seen_through = config.eye.optics
@@ -166,7 +169,7 @@ def develop(genome: NDArray[np.float64], config: Settings) -> Phenotype:
 
 
 def repaired(genome: NDArray[np.float64], config: Settings) -> tuple[str, ...]:
-    """Return the genes whose values were changed to repair overlaps; () for a genome without overlaps."""
+    """Return the names of the genes whose values the repair of overlaps changes; () for a genome without overlaps."""
     asked = Genotype(config.genome).decode(genome)
     fits = fitted(asked, config.genome, config.eye)
     return tuple(name for name, value in asked.items() if fits[name] != value)

@@ -1,6 +1,6 @@
 """Checks of a phenotype that was read from a file: the type of each field, and the range of its gene.
 
-The sizes of an animal's arrays follow from these fields, so they are checked before the animal is built.
+These fields determine the sizes of an animal's arrays. They are therefore checked before the animal is built.
 """
 
 from __future__ import annotations
@@ -17,14 +17,14 @@ __all__ = ["checked_fields"]
 
 SIDES = ("resolution_height", "resolution_width")
 SEEN_THROUGH = ("relative_aperture", "relief", "refractive_index")
-LARGEST_COUNT = 4096  # limit of counts without a gene
+LARGEST_COUNT = 4096  # largest allowed count in a field that has no gene
 
 
 def checked_fields(record: Any, names: Iterable[str]) -> dict[str, Any]:
     """Return the fields of a phenotype, converted to the types of `Phenotype`.
 
     Raises:
-        ValueError: a field is unknown, has another type, or lies outside its range; the message names it.
+        ValueError: a field is unknown, has another type, or lies outside its range. The message names the field.
     """
     if not isinstance(record, Mapping):
         raise ValueError("phenotype: must be a table of its fields")
@@ -57,7 +57,7 @@ def _checked(name: str, value: Any) -> Any:
 
 
 def _of_gene(gene: str, key: str, value: Any) -> float | int:
-    """Return a gene's value after a check; without such a gene, the value is a count."""
+    """Return a value after checking it against the range of its gene. A field without a gene must be a count."""
     valid = ALL_GENES[gene].range if gene in ALL_GENES else Interval(1, LARGEST_COUNT)
     if gene not in ALL_GENES or ALL_GENES[gene].kind == "integer":
         return whole_number(value, key, int(valid.low), int(valid.high))

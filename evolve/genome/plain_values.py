@@ -1,4 +1,4 @@
-"""Checks of values from an untrusted file: their type and range, with one-line messages."""
+"""Checks of the type and range of values from an untrusted file. Error messages have one line."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from evolve.genome.interval import Interval
 __all__ = ["listed", "parsed", "real", "whole_number"]
 
 SHOWN = 40  # maximum number of characters of a value in a message
-ROUNDING = 1e-9  # tolerance for numbers computed from the ends of a range, as a fraction of its width
+ROUNDING = 1e-9  # tolerance for rounding errors of numbers at the ends of a range, as a fraction of its width
 
 
 def parsed(text: str | bytes) -> Any:
     """Parse standard JSON, which excludes NaN and Infinity.
 
     Raises:
-        ValueError: the text is not JSON, or numbers or brackets exceed the parser's limits.
+        ValueError: the text is not JSON, or exceeds the parser's limits on digits or nested brackets.
     """
     try:
         return json.loads(text, parse_constant=_refused)
@@ -37,7 +37,7 @@ def whole_number(value: Any, name: str, low: int, high: int) -> int:
 
 
 def real(value: Any, name: str, valid: Interval) -> float:
-    """Return `value` as a float if it is a number within the range, up to rounding.
+    """Return `value` as a float if it is a number within the range; rounding errors at its ends are allowed.
 
     Raises:
         ValueError: the value has another type or lies outside the range.
@@ -50,7 +50,7 @@ def real(value: Any, name: str, valid: Interval) -> float:
 
 
 def listed(value: Any, name: str, least: int, most: int) -> list[Any]:
-    """Return `value` if it is a list of allowed length.
+    """Return `value` if it is a list with `least` to `most` entries.
 
     Raises:
         ValueError: the value has another type, or the list is too short or too long.

@@ -1,4 +1,4 @@
-"""Genes of a relief, and conversion of a surface to a larger number of genes."""
+"""Genes of a pupil's relief, and conversion of its surface to a larger number of genes."""
 
 from __future__ import annotations
 
@@ -10,19 +10,21 @@ from numpy.typing import NDArray
 __all__ = ["PATCH", "doe_names", "refined", "representatives"]
 
 Floats = NDArray[np.float64]
-PATCH = 4  # genes along a side of a bicubic B-spline patch; larger numbers are heights that a cubic spline interpolates
+# Number of genes along a side of a bicubic B-spline patch. If a relief has more, its genes are heights that a cubic
+# spline interpolates.
+PATCH = 4
 
 
 def doe_names(points: int) -> list[str]:
-    """Return the names of a relief's points x points genes, row-major (y, x)."""
+    """Return the names of the points x points genes of a relief, row-major (y, x)."""
     return [f"doe_{i}{j}" for i in range(points) for j in range(points)]
 
 
 def representatives(points: int, symmetric: bool) -> list[str]:
-    """Return, for each gene in `doe_names`, the name of the gene that gives its height.
+    """Return the name of the gene that determines each height of the relief, in the order of `doe_names`.
 
-    A symmetric relief is invariant under reflection and rotation by 90°, so that an eighth of the heights determines
-    it. Only the genes of this eighth exist, and they represent themselves.
+    A symmetric relief does not change under reflection and rotation by 90°, so an eighth of its heights determines all
+    of them. Only the genes of this eighth exist. Without symmetry, each height has its own gene.
     """
     if not symmetric:
         return doe_names(points)
@@ -33,7 +35,8 @@ def representatives(points: int, symmetric: bool) -> list[str]:
 def refined(relief: Floats, points: int) -> Floats:
     """Return the surface of a 4 x 4 patch as points x points heights at cell centres, (points²,).
 
-    The conversion is exact: the patch is a single bicubic polynomial, which the spline through its heights reproduces.
+    The conversion is exact, because the patch is a single bicubic polynomial. The cubic spline through its heights
+    therefore reproduces it.
 
     Raises:
         ValueError: the relief has neither 4 x 4 nor points x points heights.
@@ -48,7 +51,10 @@ def refined(relief: Floats, points: int) -> Floats:
 
 
 def _basis(t: Floats) -> Floats:
-    """Return the four uniform cubic B-splines over one knot interval, (t, 4); Piegl & Tiller, The NURBS Book, ch. 2."""
+    """Return the values of the four uniform cubic B-splines in one knot interval, (t, 4).
+
+    Source: Piegl & Tiller, The NURBS Book, ch. 2.
+    """
     s = 1 - t
     middle = (3 * t**3 - 6 * t**2 + 4) / 6
     return np.column_stack([s**3 / 6, middle, (3 * s**3 - 6 * s**2 + 4) / 6, t**3 / 6])

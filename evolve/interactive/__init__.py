@@ -1,9 +1,9 @@
-"""Runs from Python and in notebooks, with the code and the record of the command `evolve`.
+"""Runs from Python and in notebooks. They use the same code and the same files as the command `evolve`.
 
-run_from_python  evolve.run and evolve.resume: complete runs
-opened_run       evolve.Run: an opened run, for analysis and resumption
-callbacks        a user's functions as a watcher
-table            candidates as a table
+run_from_python  evolve.run: start and complete a run; evolve.resume: complete an interrupted run
+opened_run       evolve.Run: an opened run directory, to analyse or resume the run
+callbacks        calls of a user's functions after each candidate
+table            table of a run's candidates
 eye_picture      figure of an animal's eyes
 summary          display of runs and animals in notebooks
 """

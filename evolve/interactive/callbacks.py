@@ -1,4 +1,4 @@
-"""A user's functions, called after each evaluated candidate."""
+"""Calls of a user's functions after each evaluated candidate."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ Callback = Callable[[Run, Candidate], Any]
 
 @dataclass(frozen=True)
 class CallbackWatcher:
-    """Watcher that calls functions with each candidate after it has been evaluated and recorded."""
+    """Watcher that calls a user's functions with each candidate, after the candidate is evaluated and recorded."""
 
     run: Run
     callbacks: Sequence[Callback]
@@ -37,7 +37,9 @@ class CallbackWatcher:
 
 @dataclass(frozen=True)
 class Callbacks:
-    """Watchers of a run from Python: the callbacks and, with `progress`, a progress bar or lines on stderr.
+    """Watchers of a run that was started from Python.
+
+    They are the callbacks and, if `progress` is True, a progress bar or lines on stderr.
 
     Raises:
         ConfigError: the callbacks are not a list of functions.
@@ -52,10 +54,10 @@ class Callbacks:
             raise ConfigError(f"callbacks = {quoted(given)}: must be a list of functions of a run and a candidate")
 
     def carry_on(self, run: Run) -> None:
-        """Carry a locked run to its end; an exception in a callback ends it, and the run can be resumed.
+        """Continue a locked run to its end. If a callback raises an exception, the run stops and can be resumed.
 
         Raises:
-            RunError: the record cannot be written, or this search proposes other candidates than those on record.
+            RunError: the record cannot be written, or the search proposes other candidates than those on record.
             ExecutorError: no candidate can be evaluated.
         """
         with voices(patient=True):

@@ -22,7 +22,8 @@ __all__ = ["eye_picture"]
 def eye_picture(phenotype: Phenotype, config: EyeConfig) -> Figure:
     """Draw the fields of view around the head, the relief of the pupil [µm], and the PSF in white daylight.
 
-    The PSF has a logarithmic scale and the outline of a receptor. A perfect lens has neither relief nor PSF.
+    The PSF is drawn on a logarithmic scale, with the outline of a receptor. For a perfect lens, only the fields of view
+    are drawn.
     """
     eye = phenotype.eyes(config).eye()
     figure, panels = pyplot.subplots(1, 1 if eye.pupil is None else 3, squeeze=False, layout="constrained")
@@ -35,7 +36,7 @@ def eye_picture(phenotype: Phenotype, config: EyeConfig) -> Figure:
 
 
 def _head(axes: Axes, phenotype: Phenotype, config: EyeConfig) -> None:
-    """Draw the fields of view from above, with the heading upwards."""
+    """Draw the fields of view, seen from above. The animal's heading points upwards."""
     half = phenotype.fov_deg / 2
     for azimuth in np.degrees(phenotype.eyes(config).azimuths()):
         towards = 90 + azimuth

@@ -1,4 +1,4 @@
-"""`evolve.Run`: a run directory opened in Python, for analysis and resumption."""
+"""`evolve.Run`: a run directory opened in Python, to analyse or resume the run."""
 
 from __future__ import annotations
 
@@ -30,21 +30,21 @@ __all__ = ["OpenedCandidate", "OpenedRun"]
 
 @dataclass(frozen=True, repr=False)
 class OpenedCandidate(Candidate):
-    """A candidate of an opened run, with the settings shared by all eyes of the run."""
+    """A candidate of an opened run, with the settings that all eyes of the run have in common."""
 
     eye: EyeConfig = field(default_factory=EyeConfig)
 
     @classmethod
     def of_run(cls, candidate: Candidate, run: Run) -> OpenedCandidate:
-        """Return the candidate with its run's settings of eyes."""
+        """Return the candidate, with the eye settings of its run added."""
         return cls(**{f.name: getattr(candidate, f.name) for f in fields(Candidate)}, eye=run.config.eye)
 
     def to_line(self) -> str:
-        """Return the candidate's line of a record."""
+        """Return the line of the record that describes the candidate."""
         return Candidate(**{f.name: getattr(self, f.name) for f in fields(Candidate)}).to_line()
 
     def show_eye(self) -> Figure:
-        """Draw the fields of view of the eyes on the head, and the relief and PSF of their pupil."""
+        """Return a figure of the eyes' fields of view around the head, and of the relief and PSF of the pupil."""
         from evolve.interactive.eye_picture import eye_picture
 
         return eye_picture(self.phenotype, self.eye)
@@ -54,30 +54,31 @@ class OpenedCandidate(Candidate):
 
 
 class OpenedRun(Run):
-    """A run directory: its config, its candidates, and tables and figures of them."""
+    """A run directory: its configuration, its candidates, and tables and figures of the candidates."""
 
     @property
     def best(self) -> OpenedCandidate | None:
-        """Candidate of highest fitness, the earliest of equal ones; None before a candidate has succeeded."""
+        """Candidate with the highest fitness, the earliest if several have it; None if none has succeeded."""
         best = super().best
         return None if best is None else OpenedCandidate.of_run(best, self)
 
     def candidate(self, candidate_id: int | None = None) -> OpenedCandidate:
-        """Return the candidate with this id; None: the best.
+        """Return the candidate with this id; if the id is None, the best candidate.
 
         Raises:
-            RunError: the candidate has not been evaluated, or no candidate has succeeded.
+            RunError: the candidate has not been evaluated, or, for None, no candidate has succeeded.
         """
         return OpenedCandidate.of_run(super().candidate(candidate_id), self)
 
     def frozen(self, task: Task, candidate_id: int | None = None) -> Frozen:
-        """Return a candidate (None: the best) as an animal with a fixed policy, for the `others` of another task.
+        """Return a candidate as an animal with a fixed policy, which can be listed in the `others` of another task.
 
-        task: task with the body of the run's task; it receives the candidate's eyes
+        task: task of this animal, with the same body as the run's task; it receives the candidate's eyes
+        candidate_id: id of the candidate; None: the best candidate
 
         Raises:
             RunError: the candidate does not exist, or its policy is missing or damaged.
-            ValueError: the eyes that the task places differ from the candidate's.
+            ValueError: the eyes that the task places differ from those of the candidate.
         """
         from evolve.learning.animal_task import with_phenotype
         from evolve.learning.policy import load_policy
@@ -93,12 +94,13 @@ class OpenedRun(Run):
         return Frozen(with_phenotype(task, candidate.phenotype, self.config), policy)
 
     def resume(self, callbacks: Sequence[Callback] = (), progress: bool = True) -> None:
-        """Carry an interrupted run to its end; a finished run stays unchanged. See `evolve.run` for the arguments.
+        """Continue an interrupted run to its end. A finished run stays unchanged. See `evolve.run` for the arguments.
 
         Raises:
             LockedError: another process works on the run.
             RunError: the run has a former format.
-            ConfigError: the user task has not been named or fails at its start, or callbacks are not functions.
+            ConfigError: the user task was not named when the run was opened, or fails at its start; or callbacks are
+                not functions.
         """
         watchers = Callbacks(callbacks, progress)
         with resuming(self) as unfinished:
@@ -106,18 +108,20 @@ class OpenedRun(Run):
                 watchers.carry_on(self)
 
     def to_dataframe(self) -> pd.DataFrame:
-        """Return a table with a row per candidate: its outcome, and the values of all genes that it expresses."""
+        """Return a table with one row per candidate: its outcome, and the values of all genes that it expresses."""
         return candidate_table(self.candidates)
 
     def drift(self, searches: int = 200) -> pd.DataFrame:
-        """Return a comparison of the last generations with searches with random fitness.
+        """Return a table that compares the last generations of the run with simulated searches with random fitness.
 
-        Each open gene, the acuity and the number of receptors have a row with the mean of the run, the median and the
-        95 % range of the searches with random fitness, and the p-value of the run's mean.
+        There is a row for each open gene, for the acuity, and for the number of receptors. It contains the mean of the
+        run, the median and the 95 % range of the searches with random fitness, and the p-value of the run's mean.
+
+        searches: number of searches with random fitness
 
         Raises:
             RunError: no generation is complete yet.
-            ValueError: there are fewer than two searches.
+            ValueError: `searches` is below 2.
         """
         from evolve.interactive.table import drift_table
         from evolve.report.gene_drift import drift_of
@@ -127,7 +131,9 @@ class OpenedRun(Run):
     def plot_fitness(self, axes: Axes | None = None) -> Axes:
         """Plot fitness over the generations: all candidates, the median of each generation, and the best so far.
 
-        Return the axes, which are new if none are given.
+        Return the axes.
+
+        axes: axes to draw on; None: new ones
         """
         from matplotlib import pyplot
         from matplotlib.ticker import MaxNLocator
@@ -146,7 +152,7 @@ class OpenedRun(Run):
         return axes
 
     def report(self) -> Path:
-        """Write the report, one HTML page, and return its path.
+        """Write the report, which is one HTML page, and return its path.
 
         Raises:
             RunError: the best candidate's policy is missing or damaged.

@@ -1,4 +1,4 @@
-"""`evolve.run` and `evolve.resume`, which carry a run to its end."""
+"""`evolve.run`, which starts and completes a run, and `evolve.resume`, which completes an interrupted one."""
 
 from __future__ import annotations
 
@@ -31,23 +31,24 @@ def run(
     callbacks: Sequence[Callback] = (),
     progress: bool = True,
 ) -> OpenedRun:
-    """Evolve, as the command `evolve run` does, and return the finished run.
+    """Start a run, as the command `evolve run` does, and return it when it has finished.
 
-    The record does not depend on the way in which a run was started: `evolve status`, `resume` and `report` can also
-    be used.
+    A run that was started from Python has the same files as one that was started with the command. `evolve status`,
+    `evolve resume` and `evolve report` can therefore be used with both.
 
-    task: task to evolve for, or "FILE.py:CLASS" of a user task; may be missing if the preset names a task
+    task: task for which eyes evolve: a name, or "FILE.py:CLASS" of a user task; None: the task that the preset names
     preset: settings to start from: "quick" (minutes), "paper" (a day), or an experiment
-    settings: settings by dotted name, {"search.generations": 2, "seed": 1}; they override all others
-    config: TOML file of settings, which override the preset's
+    settings: settings by dotted name, such as {"search.generations": 2, "seed": 1}; they override all other settings
+    config: TOML file with settings, which override those of the preset
     scale: size of an experiment: "laptop" or "paper"
-    start_from: "RUN:ID", an animal of another run
-    out: run directory; runs/TASK-PRESET-N if None
-    callbacks: each called as callback(run, candidate) after every evaluated candidate; an exception ends the run
+    start_from: "RUN:ID" of an animal of another run, whose genes are the start values
+    out: run directory; None: runs/TASK-PRESET-N
+    callbacks: functions that are called as callback(run, candidate) after every evaluated candidate; an exception ends
+        the run
     progress: whether to print the progress to stderr
 
     Raises:
-        ConfigError: a setting or an argument is invalid; one line.
+        ConfigError: a setting or an argument is invalid; the message is one line.
         RunError: the directory is not empty, or cannot be written.
         BackendError: Dr.Jit cannot find a usable LLVM.
     """
@@ -67,18 +68,19 @@ def resume(
     callbacks: Sequence[Callback] = (),
     progress: bool = True,
 ) -> OpenedRun:
-    """Carry an interrupted run to its end, as the command `evolve resume` does, and return it.
+    """Continue an interrupted run to its end, as the command `evolve resume` does, and return it.
 
     A finished run stays unchanged.
 
-    directory: run directory, started by the command or from Python
-    task: "FILE.py:CLASS" if the run evolves a user task; its code runs only if you name it
-    callbacks: each called as callback(run, candidate) after every evaluated candidate; an exception ends the run
+    directory: directory of a run that was started with the command or from Python
+    task: "FILE.py:CLASS" if the run has a user task, whose code runs only if you name it here; else None
+    callbacks: functions that are called as callback(run, candidate) after every evaluated candidate; an exception ends
+        the run
     progress: whether to print the progress to stderr
 
     Raises:
-        ConfigError: an argument or the config is invalid, or the user task has not been named, has changed or fails;
-            one line.
+        ConfigError: an argument or the configuration is invalid, or the user task has not been named, has changed or
+            fails; the message is one line.
         RunError: the run does not exist or has a former format, or its record is damaged or cannot be written.
         LockedError: another process works on the run.
         BackendError: Dr.Jit cannot find a usable LLVM.
@@ -102,7 +104,11 @@ RIGHT: Mapping[str, tuple[Any, str]] = {
 
 
 def _check(**given: Any) -> None:
-    """Check the types of arguments; a wrong type gives a ConfigError."""
+    """Check the types of arguments, by name.
+
+    Raises:
+        ConfigError: an argument has the wrong type.
+    """
     for name, value in given.items():
         kinds, right = RIGHT[name]
         if not isinstance(value, kinds):
@@ -110,9 +116,10 @@ def _check(**given: Any) -> None:
 
 
 def _toml(value: Any) -> str:
-    """Return a setting in the form of `--set`; JSON and TOML write numbers, texts, true and false in the same way.
+    """Return the value of a setting as TOML text, as in the option `--set`.
 
-    NumPy's values are converted to Python's.
+    The text is written as JSON, because JSON and TOML write numbers, texts, true and false in the same way. NumPy
+    values are converted to Python values.
     """
     try:
         return json.dumps(value.tolist() if isinstance(value, (np.generic, np.ndarray)) else value)

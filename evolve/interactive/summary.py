@@ -1,4 +1,4 @@
-"""Display of runs and animals in notebooks, with all text escaped."""
+"""Display of runs and animals in notebooks, as HTML in which all text is escaped."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from evolve.store.directory import Run
 
 __all__ = ["animal_as_html", "run_as_html"]
 
-SHOWN = 12  # number of latest generations
+SHOWN = 12  # number of generations shown, the latest ones
 
 
 def run_as_html(run: Run) -> Html:
-    """Return a run's summary with its latest generations."""
+    """Return a summary of a run and of its latest generations."""
     facts = {
         "task": run.config.task,
         "candidates": f"{len(run.candidates)} of {run.config.candidates} evaluated",
@@ -29,7 +29,7 @@ def run_as_html(run: Run) -> Html:
 
 
 def animal_as_html(candidate: Candidate) -> Html:
-    """Return a candidate's outcome and its phenotype."""
+    """Return a summary of a candidate's outcome and phenotype."""
     animal = candidate.phenotype
     height, width = animal.resolution
     facts = {

@@ -1,4 +1,4 @@
-"""A run's candidates as a table."""
+"""Tables of a run's candidates, and of the comparison with searches with random fitness."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ OUTCOME = ("generation", "index", "fitness", "success_rate", "steps", "seconds",
 
 
 def candidate_table(candidates: Sequence[Candidate]) -> pd.DataFrame:
-    """Return a table with a row per candidate, indexed by id.
+    """Return a table with one row per candidate, indexed by its id.
 
-    Columns are the outcome, the acuity [cycles/degree], and the values of all genes that the animal expresses. A failed
-    candidate has a fitness of NaN and the reason in `failure`.
+    The columns are the outcome, the acuity [cycles/degree], and the values of all genes that the animal expresses. For
+    a failed candidate, the fitness is NaN and `failure` contains the reason.
     """
     import pandas as pd
 
@@ -31,7 +31,11 @@ def candidate_table(candidates: Sequence[Candidate]) -> pd.DataFrame:
 
 
 def drift_table(drift: Drift) -> pd.DataFrame:
-    """Return a table with a row per quantity: its mean at the end of the run, and in searches with random fitness."""
+    """Return a table with one row per quantity, which compares a run with searches with random fitness.
+
+    The columns are the mean in the run's last generations, the median and the 95 % range of the mean in the searches,
+    and the p-value of the run's mean.
+    """
     import pandas as pd
 
     rows = [(one.mean, one.median, one.low, one.high, one.p) for one in drift.moved]

@@ -1,20 +1,20 @@
 """Training run and evaluation of one animal.
 
 fitness           evaluate: training run and fitness of a candidate
-animal_task       task with an animal in it
+animal_task       a run's task with one animal in it
 training_envs     environments for training, selection and test
-task_module       execution of a user task's code
+task_module       execution of the code of a user task
 task_trial        short trial of a user task before a run
-ppo               PPO with early stopping
-policy            actor and critic, with storage
+ppo               PPO training, which stops early if returns no longer improve
+policy            policy of an animal (actor and critic), and its storage in files
 observed          entries of an observation other than the eyes' signals
 eye_features      encoder of each eye
 per_eye_layers    linear layers with separate weights per eye
-schedule          decrease of step size and passes during training
-training_rewards  rewards in the learner's units, with reduced costs at the start
+schedule          decrease of Adam's step size and of the passes over the samples during training
+training_rewards  scaling of rewards for the learner, with reduced costs at the start
 rollout_buffer    rollout buffer that stores each frame once
-adam              optimiser
-tensor_file       tensors from a run's files
+adam              Adam optimizer on a single vector of all weights
+tensor_file       reading of tensors from a run's files
 checkpoint        state of a training run, stored in a file
-training_rung     rung of a training run
+training_rung     rung of a training run under successive halving
 """

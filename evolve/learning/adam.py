@@ -1,6 +1,6 @@
-"""Adam on a single vector of all weights, with a few operations per step instead of a few per tensor.
+"""Adam on a single vector of all weights. A step needs a few operations in total, not a few for each tensor.
 
-torch.optim needs ten times the number of calls, and its first use imports torch's compiler, which takes seconds in
+torch.optim would need ten times as many calls. Its first use also imports torch's compiler, which takes seconds in
 every worker process.
 """
 
@@ -12,14 +12,15 @@ from typing import Any
 import torch
 from torch import Tensor, nn
 
-BETAS = (0.9, 0.999)  # decay of the running means of gradient and squared gradient
-EPSILON = 1e-5  # value of SB3's PPO
+BETAS = (0.9, 0.999)  # decay per step of the running means of the gradient and of its square
+EPSILON = 1e-5  # the value that stable-baselines3 uses in PPO
 
 
 class Adam:
     """Adam (Kingma and Ba 2015, algorithm 1), with the interface that stable-baselines3 needs.
 
-    Parameters and gradients are views of two vectors, so all changes of them must be made in place.
+    All parameters are views of one vector, and all gradients are views of another. They must therefore be changed in
+    place.
     """
 
     def __init__(self, parameters: Iterable[nn.Parameter], lr: float) -> None:
@@ -43,7 +44,7 @@ class Adam:
 
     @torch.no_grad()
     def step(self) -> None:
-        """Move all parameters along their gradients."""
+        """Update all parameters with their gradients."""
         self.steps += 1
         decay_mean, decay_square = BETAS
         self.mean.lerp_(self.gradient, 1 - decay_mean)

@@ -23,12 +23,13 @@ __all__ = ["animal_task", "azimuths", "with_phenotype"]
 def animal_task(
     phenotype: Phenotype, config: RunConfig, mode: str = "evaluation", eyes: Eyes | None = None
 ) -> BatchTask:
-    """Return this animal's task for arrays of worlds; training and evaluation may have different layouts.
+    """Return the run's task with this animal in it, for arrays of worlds.
 
+    mode: "training" or "evaluation", which may have different layouts of worlds
     eyes: eyes that replace the animal's own
 
     Raises:
-        ConfigError: a user task has not been named, or its module cannot be executed.
+        ConfigError: the user task has not been named when the run was opened, or its module cannot be executed.
         ValueError: the eyes that the task places differ from the animal's.
     """
     if (code := config.choice.named_code) is not None:
@@ -45,7 +46,7 @@ def animal_task(
 def azimuths(phenotype: Phenotype, config: RunConfig) -> np.ndarray:
     """Return the azimuths of the animal's eyes [rad], (eye,), in the frame of their body, site or camera.
 
-    No world is built.
+    For a built-in task, no world is built.
 
     Raises:
         ConfigError: see `animal_task`.
@@ -59,7 +60,8 @@ def azimuths(phenotype: Phenotype, config: RunConfig) -> np.ndarray:
 def with_phenotype(task: UserTask, phenotype: Phenotype, config: RunConfig, eyes: Eyes | None = None) -> UserTask:
     """Return a user task with this animal in it.
 
-    The eyes have the fidelity of the run or, if that is "auto", of the task.
+    The eyes are rendered with the run's setting `eye.rays_per_receptor`. If this setting is "auto", the task's own
+    fidelity is used.
 
     eyes: eyes that replace the animal's own
 

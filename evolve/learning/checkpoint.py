@@ -1,4 +1,4 @@
-"""State of a training run, from which it can continue in new worlds: tensors and numbers."""
+"""Checkpoint: the state of a training run, from which training can continue in new worlds."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ __all__ = ["Checkpoint", "load_checkpoint", "save_checkpoint"]
 class Checkpoint:
     """State of a training run.
 
-    steps: number of steps so far
-    curve: (steps, mean return of the evaluation episodes) so far
-    unit: unit of rewards
+    steps: number of training steps so far
+    curve: (steps, mean return of the evaluation episodes) at each evaluation so far
+    unit: unit of rewards, by which the learner's rewards are divided
     now: current values of all tensors that learning changes
-    best: their values at the best evaluation
+    best: values of the same tensors at the evaluation with the highest mean return
     adam: state of the optimizer: mean, square, steps
     """
 
@@ -39,7 +39,7 @@ class Checkpoint:
 
 
 def save_checkpoint(checkpoint: Checkpoint, path: Path) -> None:
-    """Write a checkpoint as safetensors, completely or not at all; values other than tensors go to the metadata."""
+    """Write a checkpoint as safetensors, completely or not at all. Numbers are stored in its metadata."""
     parts = {"now": checkpoint.now, "best": checkpoint.best, "adam": checkpoint.adam}
     tensors = {
         f"{part}/{name}": value.detach().clone().contiguous()

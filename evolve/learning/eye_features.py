@@ -1,11 +1,13 @@
-"""Encoder of the eyes' signals for actor and critic: an MLP per eye over a memory of frames.
+"""Encoder of the eyes' signals for actor and critic: a multilayer perceptron per eye over a memory of frames.
 
-Each eye has its own weights, and one encoder serves all its frames in memory. Each frame passes signals -> w -> w -> w,
-then the frames together `memory` x w -> w. The eyes' features are joined with the other entries of the observation:
+Each eye has its own weights. The same encoder is applied to each frame in memory: three layers of width w map the
+signals of a frame to its code of w numbers. One further layer then maps the codes of all frames, `memory` x w numbers,
+to the w features of the eye. The features of all eyes are joined with the other entries of the observation:
 proprioception and the previous action.
-Units are leaky rectifiers; tanh needed a third more samples to learn detection, at ten times the cost per unit.
-Receptors adapt: the first layer subtracts the running mean of the signals and divides by their running spread. Both are
-measured during learning.
+
+Units are leaky rectifiers. With tanh, the agent needed a third more samples to learn detection, and each unit took ten
+times longer to compute. The receptors adapt: the first layer subtracts the running mean of the signals, and divides by
+their running spread. Mean and spread are measured during learning.
 """
 
 from __future__ import annotations
@@ -24,13 +26,13 @@ from evolve.learning.per_eye_layers import DARK, AdaptedLinear, MemoryLinear, Pe
 
 __all__ = ["UNITS", "EyeFeatures"]
 
-ENCODER_LAYERS = 3  # two hidden layers and the code of one frame
-FARTHEST = 10.0  # limit of normalised proprioception, in spreads from the mean
-UNITS = nn.LeakyReLU  # units of all hidden layers; leaky, so that every unit keeps a gradient
+ENCODER_LAYERS = 3  # two hidden layers, and a layer that returns the code of a frame
+FARTHEST = 10.0  # limit of normalised proprioception; 1 is one spread from the mean
+UNITS = nn.LeakyReLU  # units of all hidden layers; the gradient of a leaky unit is never 0
 
 
 class Felt(nn.Module):
-    """Proprioception in any units, normalised element by element by its running mean and spread (Welford 1962)."""
+    """Normalisation of proprioception: each element by its own running mean and spread (Welford 1962)."""
 
     def __init__(self, size: int) -> None:
         super().__init__()
@@ -53,13 +55,15 @@ class Felt(nn.Module):
 
 
 class EyeFeatures(BaseFeaturesExtractor):
-    """Features of an observation: `width` per eye, which is also the width of each layer, then the other entries.
+    """Features of an observation: `width` numbers for each eye, followed by the observation's other entries.
 
-    Two forms are accepted. Environments give stacked frames: `eyes` (sample, memory, eye, channel, height, width).
-    Rollouts store each frame once: `frames` (memory - 1 + step, segment, eye, channel, height, width) and `age`
-    (step, segment), the steps since the episode's first frame; samples are (step, segment) flattened.
-    Both give the same features. As in sim's environments, the first frame of an episode replaces the missing frames
-    before it.
+    All layers are `width` wide, too. An observation may have one of two forms, which give the same features.
+    Environments return stacked frames: `eyes` (sample, memory, eye, channel, height, width). Rollout buffers store each
+    frame once: `frames` (memory - 1 + step, segment, eye, channel, height, width) and `age` (step, segment), the number
+    of steps since the first frame of the episode. Samples are then (step, segment) flattened.
+
+    At the start of an episode, the memory is not yet full. As in sim's environments, the first frame of the episode
+    fills the missing places.
     """
 
     def __init__(self, observation_space: spaces.Dict, width: int) -> None:
@@ -90,7 +94,7 @@ class EyeFeatures(BaseFeaturesExtractor):
         return torch.cat([features, *(known[name] for name in self.beside)], dim=1)
 
     def _less_mean(self, observation: Mapping[str, Tensor]) -> dict[str, Tensor]:
-        """Return the normalised entries after normalisation."""
+        """Return the entries that a policy normalises, in normalised form."""
         if self.felt is None:
             return {}
         joined = self.felt(torch.cat([observation[name] for name in self.normalised], dim=-1))
@@ -106,18 +110,24 @@ class EyeFeatures(BaseFeaturesExtractor):
         return frames.reshape(-1, self.n_eyes, self.n_receptors).permute(1, 2, 0)
 
     def adapt(self, frames: Tensor, beside: Mapping[str, Tensor] | None = None) -> None:
-        """Adapt the receptors to more frames (..., eye, channel, height, width), and the normalisation to more entries
-        (..., number)."""
+        """Update the running means and spreads with further observations.
+
+        frames: frames, (..., eye, channel, height, width), for the receptors
+        beside: other entries of the observations by name, (..., number), for their normalisation
+        """
         self.encoder[0].adapt(self._signals(frames))
         if self.felt is not None and beside is not None:
             felt = torch.cat([beside[name] for name in self.normalised], dim=-1)
             self.felt.adapt(felt.reshape(-1, felt.shape[-1]))
 
     def _at_each_step(self, codes: Tensor, age: Tensor) -> Tensor:
-        """Return features (eye, feature, sample) of codes (eye, code, memory - 1 + step, segment)."""
+        """Return the features at each step, (eye, feature, sample), from codes (eye, code, memory - 1 + step, segment).
+
+        age: steps since the first frame of the episode, (step, segment)
+        """
         layer, unit = self.temporal
         features = layer.slide(codes)
-        young = (age < self.memory - 1).flatten().nonzero()[:, 0]  # samples with missing frames
+        young = (age < self.memory - 1).flatten().nonzero()[:, 0]  # samples whose memory is not yet full
         if len(young):
             step, segment = young // age.shape[1], young % age.shape[1]
             first = self.memory - 1 + step - age.flatten()[young]

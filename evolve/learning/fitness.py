@@ -1,4 +1,4 @@
-"""Fitness of a candidate: its mean return over the evaluation episodes after a training run."""
+"""Training and evaluation of a candidate. Its fitness is its mean return in the evaluation episodes after training."""
 
 from __future__ import annotations
 
@@ -32,12 +32,13 @@ def evaluate(
 ) -> Evaluation:
     """Train one candidate, write its policy, and measure its fitness.
 
-    The same arguments give the same outcome on one machine. Divergence gives a failed Evaluation, not an exception.
+    On one machine, the same arguments give the same outcome. If learning diverges, a failed Evaluation is returned.
 
     seed: seed of the policy's initial weights, of all worlds and of all random numbers in learning
     policy_path: path of the trained policy (safetensors), which is not written if learning diverged
-    progress: called with (steps trained, steps planned) after every rollout
-    rung: rung to train to, with the checkpoints before it (`evolve.search.successive_halving`); None: train to the end
+    progress: function that is called with (steps trained, steps planned) after every rollout
+    rung: rung at whose end training stops, with the checkpoints of earlier rungs (`evolve.search.successive_halving`);
+        None: train to the end
     """
     began, failures = time.perf_counter(), Counter[str]()
     try:
@@ -68,14 +69,17 @@ def _live_until(
     failures: Counter[str],
     progress: Progress | None,
 ) -> tuple[Training, Episodes]:
-    """Train through all rungs up to this one, from the latest existing checkpoint; count failures since then."""
+    """Train to the end of this rung, starting from the latest existing checkpoint, and play the evaluation episodes.
+
+    Failures of episodes since this checkpoint are counted in `failures`.
+    """
     begun, first = None, 0
     for earlier in reversed(range(rung.number)):
         if begun is None and (begun := load_checkpoint(rung.checkpoints[earlier])) is not None:
             first = earlier + 1
     for number in range(first, rung.number + 1):
         learning = replace(config.learning, total_steps=rung.ends[number])
-        # A rung is not divided into rungs itself, whose budgets could be less than one rollout.
+        # `rungs=1`: the rung must not be divided further, because its parts could be shorter than a rollout.
         life = replace(config, learning=learning, search=replace(config.search, rungs=1))
         entropy = [seed, number] if number else seed  # the first rung starts like an undivided training run
         training, episodes = _live(phenotype, life, entropy, failures, progress, begun)
@@ -92,10 +96,12 @@ def _live(
     progress: Progress | None,
     begun: Checkpoint | None = None,
 ) -> tuple[Training, Episodes]:
-    """Train, then play the evaluation episodes, whose start poses and object positions are new.
+    """Train, then play the evaluation episodes, which have new start poses and object positions.
 
-    Mazes are the same for all candidates of all runs. Failures of episodes are counted in `failures`, also if learning
-    diverges.
+    The mazes of the evaluation are the same for all candidates of all runs. Failures of episodes are counted in
+    `failures`, even if learning diverges.
+
+    entropy: seed of all random numbers · begun: checkpoint from which to continue
     """
     weights, *seeds = (int(s) for s in np.random.SeedSequence(entropy).generate_state(3))
     places = worlds_of(phenotype, config, *seeds)

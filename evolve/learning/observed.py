@@ -20,7 +20,7 @@ class Entry:
     """An entry of an observation.
 
     name: key in the observation · size: number of elements
-    low, high: limits of each element; a policy normalises entries without limits
+    low, high: limits of each element; if both are infinite, a policy normalises the entry
     """
 
     name: str
@@ -38,13 +38,13 @@ class Entry:
         return spaces.Box(self.low, self.high, (self.size,), np.float32)
 
     def record(self) -> list[Any]:
-        """Return the entry as JSON values; None: no limit."""
+        """Return the entry as JSON values; an infinite limit becomes None."""
         limits = (None if math.isinf(limit) else limit for limit in (self.low, self.high))
         return [self.name, self.size, *limits]
 
     @classmethod
     def from_record(cls, stored: Sequence[Any]) -> Entry:
-        """Return the entry that `record` described.
+        """Return the entry from the values that `record` returned.
 
         Raises:
             TypeError: the stored value is not a list.
@@ -60,12 +60,12 @@ CONTACT = Entry("contact", 1, 0.0, 1.0)
 
 
 def known_beside_eyes(space: spaces.Dict) -> dict[str, int]:
-    """Return the entries other than "eyes" with their sizes, in the order in which policies receive them."""
+    """Return the sizes of the entries other than "eyes" by name, in the order in which policies receive them."""
     return {name: math.prod(part.shape or (1,)) for name, part in sorted(space.spaces.items()) if name != EYES}
 
 
 def entries_of(space: spaces.Dict) -> tuple[Entry, ...]:
-    """Return the entries other than the eyes' signals and the previous action, in the same order."""
+    """Return the entries other than the eyes' signals and the previous action, in the order of `known_beside_eyes`."""
     sizes = known_beside_eyes(space)
     limits = {name: part for name, part in space.spaces.items() if isinstance(part, spaces.Box)}
     return tuple(

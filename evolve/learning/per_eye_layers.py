@@ -1,7 +1,8 @@
 """Linear layers with separate weights for each eye: a plain layer, one with adaptation, and one over memory.
 
-Samples are on the last axis, so that W x is one batched matrix product (GEMM) without a copy. With the small number of
-outputs, x Wᵀ took three times longer, forward and backward.
+The last axis of the inputs x contains the samples. A layer W x is then one batched matrix product (GEMM) without a
+copy. With samples on the first axis, the product x Wᵀ took three times longer, both forward and backward, because
+layers have few outputs.
 """
 
 from __future__ import annotations
@@ -14,8 +15,8 @@ from torch import Tensor, nn
 
 __all__ = ["CONTRAST", "AdaptedLinear", "MemoryLinear", "PerEyeLinear"]
 
-DARK = 1e-6  # lower limit of the spread of signals, which keeps weights finite if all signals are equal
-CONTRAST = 0.4  # scale of normalised signals, chosen for 675 inputs per unit; 1 learnt no faster
+DARK = 1e-6  # lower limit of the spread of signals, so that weights remain finite if all signals are equal
+CONTRAST = 0.4  # spread of normalised signals, chosen for 675 inputs per unit; with 1, learning was not faster
 
 
 class PerEyeLinear(nn.Module):
@@ -33,11 +34,12 @@ class PerEyeLinear(nn.Module):
 
 
 class AdaptedLinear(PerEyeLinear):
-    """Linear layer on signals that are normalised by each receptor's running mean and their eye's spread.
+    """Linear layer on signals from which a running mean is subtracted, and which are divided by a running spread.
 
-    Signals of one scene change little over time, and behind a small pupil they are small. Without normalisation, their
-    means would saturate the units, and their changes would have almost no effect. The normalisation is folded into
-    weight and bias, so that it takes no time.
+    Each receptor has its own mean, and each eye its own spread. Within a scene, signals vary little around their means,
+    and behind a small pupil all signals are small. Without normalisation, the means would saturate the units, and the
+    variations would have almost no effect. The normalisation is applied to weight and bias, so that it takes almost no
+    time.
     """
 
     def __init__(self, n_eyes: int, inputs: int, outputs: int) -> None:
@@ -52,7 +54,10 @@ class AdaptedLinear(PerEyeLinear):
 
     @torch.no_grad()
     def adapt(self, x: Tensor) -> None:
-        """Update mean and spread with signals (eye, inputs, sample) (Chan, Golub and LeVeque 1983, eq. 2.1)."""
+        """Update means and spreads with further signals, (eye, inputs, sample).
+
+        The update follows Chan, Golub and LeVeque (1983), eq. 2.1.
+        """
         share = x.shape[2] / (self.seen + x.shape[2])
         deviation = x - self.mean
         step = deviation.mean(dim=2, keepdim=True)
@@ -73,18 +78,20 @@ class MemoryLinear(PerEyeLinear):
         return super().forward(codes.flatten(1, 2))
 
     def slide(self, codes: Tensor) -> Tensor:
-        """Apply the layer to the last `memory` frames at each step.
+        """Apply the layer at each step to the codes of the last `memory` frames.
 
-        (eye, code, memory - 1 + step, segment) -> (eye, outputs, sample), with samples (step, segment) flattened.
+        codes: (eye, code, memory - 1 + step, segment)
+
+        The result is (eye, outputs, sample), with samples (step, segment) flattened.
         """
         return _Slide.apply(codes, self.weight.unflatten(2, (-1, self.memory)), self.bias)
 
 
 class _Slide(torch.autograd.Function):
-    """Sum of W[lag] codes[lag : lag + steps] over lags.
+    """Sum of the terms W[lag] codes[lag : lag + steps] over all lags, with its gradient.
 
-    Each term is a matrix product (GEMM) on the stored codes. Copies of all windows of frames took four times longer,
-    forward and backward.
+    Each term is a matrix product (GEMM) on the stored codes. A version that copied the window of frames of each step
+    took four times longer, both forward and backward.
     """
 
     @staticmethod
@@ -110,7 +117,7 @@ class _Slide(torch.autograd.Function):
 
 
 def _slices(codes: Tensor, memory: int) -> list[Tensor]:
-    """Return a view (eye, code, sample) of codes (eye, code, frame, segment) for each lag."""
+    """Return, for each lag, a view (eye, code, sample) of codes (eye, code, frame, segment)."""
     segments, frames = codes.shape[3], codes.flatten(2)
     samples = frames.shape[2] - (memory - 1) * segments
     return [frames[:, :, lag * segments :][:, :, :samples] for lag in range(memory)]

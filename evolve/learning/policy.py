@@ -1,6 +1,6 @@
-"""Policy of an agent: an actor and a critic on the features of its eyes.
+"""Policy of an animal: an actor and a critic, whose inputs are the features of its eyes.
 
-A policy is stored as safetensors, with its shape in the metadata. The file contains no code.
+A policy is stored in a safetensors file, with its shape in the metadata. The file contains no code.
 """
 
 from __future__ import annotations
@@ -29,21 +29,22 @@ from evolve.learning.observed import CONTACT, Entry, entries_of, known_beside_ey
 from evolve.learning.tensor_file import read_tensors
 from evolve.store.atomic_files import write_whole
 
-FEELS = "feels"  # proprioception of a `sim.Task`
-LARGEST_COUNT = 4096  # limit of every number in a policy's shape; genes allow 512
-MOST_SIGNALS = 2**24  # limit of the signals in a policy's memory; genes allow half of it
-FIRST_SPREAD = 0.5  # standard deviation of an untrained policy's actions; with 1, a third of them would be clipped
+FEELS = "feels"  # name of the proprioception of a `sim.Task` in observations
+LARGEST_COUNT = 4096  # upper limit of each number in the shape of a policy in a file; genes allow at most 512
+MOST_SIGNALS = 2**24  # upper limit of the signals in a policy's memory; genes allow at most half of it
+FIRST_SPREAD = 0.5  # standard deviation of an untrained policy's actions; with 1, a third would be clipped
 
 
 class TrainingDiverged(FloatingPointError):
-    """Learning produced numbers that are not finite; the message names them."""
+    """Learning produced numbers that are not finite; the message states which."""
 
 
 @dataclass(frozen=True)
 class Brain:
     """Size of a brain.
 
-    Actor and critic have `layers` hidden layers of `neurons` each, and all layers of the encoders are `encoder` wide.
+    neurons, layers: the actor and the critic have `layers` hidden layers of `neurons` units each · encoder: width of
+        all layers of the eyes' encoders
     """
 
     neurons: int
@@ -57,7 +58,7 @@ class PolicyConfig:
 
     eyes: shape of the observation's `eyes` (memory, eye, channel, height, width)
     neurons, layers, encoder: see `Brain`
-    actions: numbers in an action
+    actions: number of elements of an action
     beside: entries of the observation other than the eyes' signals and the previous action
     """
 
@@ -85,8 +86,9 @@ class PolicyConfig:
     def record(self) -> dict[str, Any]:
         """Return the shape as JSON values.
 
-        Policies are hashed, so equal shapes must give equal bytes. A policy of a built-in task is therefore written
-        with the entries of former versions, which had no list of other entries.
+        The record of a run contains a hash of each policy file. A policy must therefore be written with the same bytes
+        by all versions. Former versions had no list of other entries, so their form is used for shapes that they could
+        describe.
         """
         values = {name: value for name, value in asdict(self).items() if name != "beside"}
         if self.beside == (CONTACT,) and self.actions == 2:
@@ -99,7 +101,7 @@ class PolicyConfig:
 
     @classmethod
     def from_record(cls, stored: Mapping[str, Any]) -> PolicyConfig:
-        """Return the shape that `record` described.
+        """Return the shape from the values that `record` returned.
 
         Raises:
             KeyError: an entry is missing.
@@ -128,8 +130,9 @@ def _entries(stored: Mapping[str, Any]) -> tuple[Entry, ...]:
 class _Within(torch.autograd.Function):
     """Means of actions whose gradients never move them beyond the bounds -1 and 1.
 
-    Actions beyond the bounds are clipped. With a mean far outside, exploration has no effect, so that no gradient would
-    return the mean (Hausknecht and Stone 2016, section 5.2, "zeroing gradients").
+    Actions beyond the bounds are clipped. If the mean is far outside, all actions are clipped to the same value.
+    Exploration then has no effect, and no gradient would move the mean back (Hausknecht and Stone 2016, section 5.2,
+    "zeroing gradients").
     """
 
     @staticmethod
@@ -145,9 +148,11 @@ class _Within(torch.autograd.Function):
 
 
 class EyePolicy(MultiInputActorCriticPolicy):
-    """SB3's actor-critic on EyeFeatures of width `encoder`; actor and critic have `layers` hidden layers of `neurons`.
+    """Actor and critic of stable-baselines3 (SB3), whose inputs are EyeFeatures.
 
-    first_actions: mean and standard deviation of each number of the untrained policy's actions; None: 0, FIRST_SPREAD
+    neurons, layers, encoder: see `Brain`
+    first_actions: mean and standard deviation of each element of the untrained policy's actions; None: 0 and
+        FIRST_SPREAD
     """
 
     def __init__(
@@ -190,7 +195,7 @@ class EyePolicy(MultiInputActorCriticPolicy):
 
 
 def build_policy(config: PolicyConfig, learning_rate: float = 1e-3) -> EyePolicy:
-    """Return an untrained policy with weights from torch's random state."""
+    """Return an untrained policy; its random weights depend on torch's global random state."""
     action_space = spaces.Box(-1.0, 1.0, (config.actions,), np.float32)
     shape: dict[str, Any] = {"neurons": config.neurons, "layers": config.layers, "encoder": config.encoder}
     return EyePolicy(config.observation_space(), action_space, lambda _: learning_rate, **shape)
@@ -199,7 +204,7 @@ def build_policy(config: PolicyConfig, learning_rate: float = 1e-3) -> EyePolicy
 def save_policy(policy: EyePolicy, path: Path | str) -> None:
     """Write the policy's tensors as safetensors with its shape in the metadata, completely or not at all."""
     tensors = {name: tensor.detach().clone() for name, tensor in learnt(policy).items()}
-    # A single entry, because safetensors writes several in random order and the same policy must give the same bytes.
+    # One entry only: safetensors writes several entries in random order, but equal policies must give equal bytes.
     metadata = {"config": json.dumps({**policy.config.record(), "units": UNITS.__name__})}
     write_whole(Path(path), safetensors.torch.save(tensors, metadata))
 
@@ -207,12 +212,12 @@ def save_policy(policy: EyePolicy, path: Path | str) -> None:
 def load_policy(path: Path | str) -> EyePolicy:
     """Build the policy in a file; nothing in the file is executed.
 
-    Torch is set to one thread, as in learning. Several threads would change the order of sums, and episodes would not
-    be reproducible.
+    Torch is set to one thread, as in learning. With several threads, the order of sums would vary, so that episodes
+    would not be reproducible.
 
     Raises:
-        ValueError: the file is not a policy written by `save_policy`, for example a pickle or a truncated file; one
-            line that names the file.
+        ValueError: the file was not written by `save_policy`; for example, it is a pickle, or truncated. The message is
+            one line and names the file.
         StrangeFileError: the path is a link, FIFO or directory.
     """
     try:
@@ -237,7 +242,7 @@ def load_policy(path: Path | str) -> EyePolicy:
 
 
 def learnt(policy: EyePolicy) -> dict[str, Tensor]:
-    """Return all tensors that learning changes, by name: weights, and the means and spreads of adaptation."""
+    """Return all tensors that learning changes, by name: weights, and running means and spreads of inputs."""
     return {**dict(policy.named_parameters()), **dict(policy.named_buffers())}
 
 

@@ -1,4 +1,4 @@
-"""PPO (stable-baselines3) on batched worlds, until returns stop improving or all steps are used.
+"""PPO of stable-baselines3 (SB3) on batched worlds. Training ends early if returns no longer improve.
 
 `evolve.config.settings.LearningConfig` defines the settings and their ranges.
 """
@@ -26,10 +26,11 @@ from evolve.learning.schedule import first_step_size, schedule
 from evolve.learning.training_rewards import RewardsInUnits, ramped_share
 from sim.tasks.batch_task import BatchTask
 
-UNIT_RATE = 0.2  # share of the (logarithmic) difference to the returns' spread by which the unit changes per rollout
-SPEED = "speed"  # command to which `learning.first_speed` applies
+# Per rollout, the logarithm of the rewards' unit moves by this share towards the logarithm of the returns' spread.
+UNIT_RATE = 0.2
+SPEED = "speed"  # name of the command whose first values follow from `learning.first_speed`
 VERDICTS = {True: 1, False: -1, None: 0}
-FLAT = 1e-6  # minimum spread of returns, for returns that are all equal
+FLAT = 1e-6  # lower limit of the returns' spread, so that it is never 0
 
 Progress = Callable[[int, int], None]  # (steps trained, steps planned)
 
@@ -39,9 +40,9 @@ class Training:
     """Result of a training run.
 
     policy: policy at the best evaluation
-    steps: number of environment steps, in whole rollouts
+    steps: number of agent steps, in whole rollouts
     curve: (steps, mean return of the evaluation episodes), every `eval_interval` steps
-    end: state at the end, from which training can continue
+    end: state at the end of training, from which it can continue
     """
 
     policy: EyePolicy
@@ -54,7 +55,7 @@ class Training:
 class Episodes:
     """Results of one complete episode in each world.
 
-    returns (world,) · verdicts (world,): +1 solved, -1 not solved, 0 undecided, see `BatchTask.solved`
+    returns (world,): sum of rewards · verdicts (world,): +1 solved, -1 not solved, 0 undecided, see `BatchTask.solved`
     """
 
     returns: np.ndarray
@@ -67,10 +68,11 @@ class Episodes:
 
 
 class AdaptingPPO(PPO):
-    """PPO with normalisation of signals and rewards, which stops at the first rollout or update that is not finite.
+    """PPO with normalised signals and rewards. It stops if numbers of a rollout or an update are not finite.
 
-    Rewards are divided by the spread of the discounted returns. Early contact with walls gives costs about a hundred
-    times larger than any later rewards, which would otherwise dominate the critic.
+    Rewards are divided by their unit, which follows the spread of the discounted returns. At the start of training,
+    agents often touch walls, and the costs of contact are about a hundred times larger than all later rewards. Without
+    normalisation, these costs would dominate the critic.
     """
 
     rollout_buffer: FrameRolloutBuffer
@@ -79,7 +81,7 @@ class AdaptingPPO(PPO):
     def __init__(self, worlds: VecEnv, brain: Brain, config: LearningConfig, seed: int) -> None:
         self.config, self.task = config, batch_task_of(worlds)
         torch.set_num_threads(1)
-        seed = int(np.random.SeedSequence(seed).generate_state(1)[0])  # SB3 takes 32 bits
+        seed = int(np.random.SeedSequence(seed).generate_state(1)[0])  # SB3 requires seeds of 32 bits
         super().__init__(
             EyePolicy,
             RewardsInUnits(worlds),
@@ -99,10 +101,10 @@ class AdaptingPPO(PPO):
         self.set_logger(Logger(None, []))
 
     def _update_learning_rate(self, optimizers: Adam) -> None:
-        """Set the step size and the passes of the next update.
+        """Set the step size and the number of passes of the next update.
 
-        Both depend on the steps so far and not, as in SB3, on the share of the planned steps. A training run is
-        therefore independent of its planned length.
+        In SB3, both would depend on the share of the planned steps. Here they depend on the number of steps so far, so
+        that the course of training is independent of its planned length.
         """
         self.n_epochs, share = schedule(self.config, self.num_timesteps)
         optimizers.param_groups[0]["lr"] = self.learning_rate * share
@@ -120,12 +122,12 @@ class AdaptingPPO(PPO):
         for name in ("rewards", "values", "log_probs"):
             _require_finite(name, getattr(self.rollout_buffer, name), self.num_timesteps)
         super().train()
-        # SB3 clips the gradient of an overflowing loss to zero, so that the weights stay finite without any learning.
+        # If the loss overflows, SB3 clips the gradient to zero. The weights then remain finite, but nothing is learnt.
         _require_finite("loss", np.asarray(self.logger.name_to_value["train/value_loss"]), self.num_timesteps)
         for name, parameter in self.policy.named_parameters():
             _require_finite(f"policy's {name}", parameter.detach().numpy(), self.num_timesteps)
-        # Adaptation follows the update, which compares the policy with its state during the rollout. Every eighth frame
-        # is enough, because neighbouring frames are similar.
+        # The normalisation must not change before the update, which compares the policy with the policy of the rollout.
+        # Every eighth frame is enough, because successive frames are similar.
         self._adapt(self.rollout_buffer.new_frames[:, ::8], self.rollout_buffer.beside)
         self._adapt_unit()
 
@@ -136,11 +138,11 @@ class AdaptingPPO(PPO):
 
     @torch.no_grad()
     def _adapt_unit(self) -> None:
-        """Adapt the unit of rewards to the spread of returns, and rescale the critic so that its predictions stay the
-        same (Pop-Art: van Hasselt et al. 2016, eq. 5).
+        """Adapt the unit of rewards to the spread of returns (Pop-Art: van Hasselt et al. 2016, eq. 5).
 
-        A rollout without rewards does not change the unit. Its returns are the critic's own discounted predictions, so
-        that the unit would shrink without limit.
+        The critic is rescaled, so that its predictions remain the same in the rewards' original units. A rollout
+        without rewards does not change the unit: its returns are only the critic's own discounted predictions, so that
+        the unit would shrink without limit.
         """
         if not self.env.paid:
             return
@@ -153,13 +155,16 @@ class AdaptingPPO(PPO):
             parameter.div_(change)
 
     def checkpoint(self, curve: list[tuple[int, float]], best: dict[str, torch.Tensor]) -> Checkpoint:
-        """Return the state of training; the caller supplies learning curve and best policy."""
+        """Return the state of training.
+
+        curve: learning curve so far · best: tensors of the policy at the best evaluation
+        """
         now = {name: tensor.detach().clone() for name, tensor in learnt(self.policy).items()}
         adam = self.policy.optimizer.state_dict()
         return Checkpoint(self.num_timesteps, tuple(curve), float(self.env.unit), now, best, adam)
 
     def restore(self, begun: Checkpoint) -> None:
-        """Continue from a checkpoint; worlds and random numbers are new."""
+        """Restore the state in a checkpoint. Training continues with new worlds and new random numbers."""
         self.num_timesteps = begun.steps
         self.env.unit = begun.unit
         set_learnt(self.policy, begun.now)
@@ -172,7 +177,7 @@ def _require_finite(name: str, values: np.ndarray, steps: int) -> None:
 
 
 class _Report(BaseCallback):
-    """Callback that reports the steps after every rollout."""
+    """Callback that reports the number of steps after every rollout."""
 
     def __init__(self, progress: Progress, planned: int) -> None:
         super().__init__()
@@ -187,7 +192,7 @@ class _Report(BaseCallback):
 
 @dataclass(frozen=True)
 class Worlds:
-    """Environments for training, and for its evaluations."""
+    """Environments for training, and for the evaluations during training."""
 
     training: VecEnv
     evaluation: VecEnv
@@ -201,13 +206,13 @@ def train(
     progress: Progress | None = None,
     begun: Checkpoint | None = None,
 ) -> Training:
-    """Train a policy; on one machine, the same arguments give the same policy, bit for bit.
+    """Train a policy. On one machine, the same arguments give the same policy, bit for bit.
 
-    After every `eval_interval` steps the policy plays one episode in each of the evaluation worlds. Training ends after
-    `patience` evaluations without a better mean return, or after `total_steps`. The returned policy is the one with the
-    best mean return (the earliest of equal ones).
+    After every `eval_interval` steps, the policy plays one episode in each of the evaluation worlds. Training ends
+    after `patience` evaluations without a better mean return, or after `total_steps`. The policy at the evaluation with
+    the highest mean return is returned; if several are equal, the earliest of them.
 
-    begun: checkpoint from which to continue; its steps count
+    begun: checkpoint from which to continue; its steps count towards `total_steps`
 
     Raises:
         TrainingDiverged: rewards, loss, weights or actions are not finite.
@@ -232,13 +237,13 @@ def train(
 
 
 def stuck(curve: list[tuple[int, float]], patience: int) -> bool:
-    """Return whether none of the last `patience` evaluations exceeded the best one before them."""
+    """Return whether none of the last `patience` evaluations exceeded the best earlier evaluation."""
     returns = [value for _, value in curve]
     return len(returns) > patience and max(returns[-patience:]) <= max(returns[:-patience])
 
 
 def play(policy: EyePolicy, worlds: VecEnv, seed: int) -> Episodes:
-    """Play one episode in each world after a reset with this seed; the policy acts without exploration."""
+    """Reset all worlds with this seed, and play one episode in each; the policy acts without exploration."""
     worlds.seed(seed)
     observation = worlds.reset()
     returns = np.zeros(worlds.num_envs)
@@ -264,9 +269,9 @@ def batch_task_of(worlds: VecEnv) -> BatchTask:
 
 
 def first_actions(task: BatchTask, config: LearningConfig) -> list[tuple[float, float]]:
-    """Return mean and standard deviation of each number of the untrained policy's actions.
+    """Return the mean and standard deviation of each element of the untrained policy's actions.
 
-    Those of a speed follow from `learning.first_speed`.
+    For the command SPEED, both follow from the setting `learning.first_speed`.
     """
     speed = (2 * config.first_speed - 1, config.first_speed)
     return [speed if command.name == SPEED else (0.0, FIRST_SPREAD) for command in task.commands()]

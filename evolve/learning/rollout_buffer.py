@@ -1,8 +1,9 @@
-"""Rollout buffer for a learner with memory: each frame is stored once, and encoded once per mini-batch.
+"""Rollout buffer for a learner with memory. Each frame is stored once, and encoded once per mini-batch.
 
-SB3's buffer stores stacked observations with `memory` copies of each frame, and PPO then encodes every copy. That takes
-221 MB for 64 worlds x 64 steps of 2 x 15 x 15 receptors with 10 frames. Here a mini-batch is a set of segments, which
-are consecutive steps of one world whose windows of memory overlap.
+The observations of an agent with memory are stacks of the last frames. The buffer of stable-baselines3 (SB3) stores
+these stacks, and thus `memory` copies of each frame, and PPO encodes every copy. For 64 worlds x 64 steps of 2 x 15 x
+15 receptors with 10 frames, this takes 221 MB. In this buffer, a mini-batch consists of segments. A segment is a
+sequence of consecutive steps of one world, whose stacks share most of their frames.
 """
 
 from __future__ import annotations
@@ -19,13 +20,16 @@ from torch import Tensor
 
 from evolve.learning.observed import known_beside_eyes
 
-SEGMENT_STEPS = 8  # maximum; longer segments share more frames, shorter ones mix better (docs/measurements/learning.md)
+# Maximum number of steps in a segment. In longer segments, more frames are shared; shorter segments make mini-batches
+# more varied (docs/measurements/learning.md).
+SEGMENT_STEPS = 8
 
 
 class FrameRolloutBuffer(RolloutBuffer):
-    """Rollout buffer that yields unstacked observations for `evolve.learning.eye_features`.
+    """Rollout buffer that yields observations without stacks, for `evolve.learning.eye_features`.
 
-    As in the environment's stack, the first frame of an episode replaces the missing frames before it.
+    At the start of an episode, the memory is not yet full. As in the environments, the first frame of the episode fills
+    the missing places.
     """
 
     observation_space: spaces.Dict
@@ -60,7 +64,8 @@ class FrameRolloutBuffer(RolloutBuffer):
     ) -> None:
         step, remembered = self.pos, self.memory - 1
         if step == 0:
-            # Frames before the rollout are stored as stacked, repetitions included, so their age exceeds any window.
+            # The first stack is stored as it is, with its repeated frames. Its age is that of a full memory, so that
+            # `EyeFeatures` does not fill missing places again.
             self.frames[:, :remembered] = obs["eyes"][:, :-1]
             self.age[:, 0] = remembered
         else:
@@ -78,7 +83,7 @@ class FrameRolloutBuffer(RolloutBuffer):
 
     @property
     def new_frames(self) -> np.ndarray:
-        """Frames of this rollout's steps, (world, step, eye, channel, height, width)."""
+        """New frame of each step of this rollout, (world, step, eye, channel, height, width)."""
         return self.frames[:, self.memory - 1 :]
 
     def get(self, batch_size: int | None = None) -> Iterator[DictRolloutBufferSamples]:
@@ -93,7 +98,10 @@ class FrameRolloutBuffer(RolloutBuffer):
             yield self._segments(worlds[chosen], starts[chosen])
 
     def _segments(self, worlds: np.ndarray, starts: np.ndarray) -> DictRolloutBufferSamples:
-        """Return the samples of segments, (step, segment) flattened; worlds and starts are (segment,)."""
+        """Return the samples of some segments, with (step, segment) flattened.
+
+        worlds, starts: world and first step of each segment, (segment,)
+        """
         steps = starts + np.arange(self.segment_steps)[:, None]
         frames = starts + np.arange(self.memory - 1 + self.segment_steps)[:, None]
 

@@ -1,4 +1,4 @@
-"""Schedule of a training run: Adam's step size, and the passes over the samples of an update."""
+"""Schedule of a training run: Adam's step size, and the number of passes over the samples of an update."""
 
 from __future__ import annotations
 
@@ -11,24 +11,29 @@ __all__ = ["first_step_size", "mean_passes", "schedule"]
 # Number of units in a hidden layer up to which the configured step size is used
 # (docs/concepts/learning.md#learning-rate-of-large-networks).
 UNITS_AT_FULL_STEP = 64
-SMALL_STEP = 0.5  # share of the initial step size below which the passes decrease (docs/validation/fewer_epochs.md)
+# Once the step size has fallen to this share of its initial value, the passes decrease
+# (docs/validation/fewer_epochs.md).
+SMALL_STEP = 0.5
 
 
 def first_step_size(asked: float, neurons: int) -> float:
-    """Return Adam's initial step size.
+    """Return Adam's initial step size for a brain with `neurons` units in each hidden layer.
 
-    The effect of a step on a layer's output grows with the number of units that the layer sums. In large brains the
-    step size therefore decreases as one over the root of that number.
+    A layer sums over the units of the previous layer, so the effect of a step on its output grows with their number.
+    Above UNITS_AT_FULL_STEP units, the step size is therefore proportional to one over the root of this number.
+
+    asked: configured step size
     """
     return asked * min(1.0, math.sqrt(UNITS_AT_FULL_STEP / neurons))
 
 
 def schedule(config: LearningConfig, steps: int) -> tuple[int, float]:
-    """Return the passes over the samples of the update after `steps`, and the step size as a share of the initial one.
+    """Return the number of passes over the samples in the update after `steps`, and the share of the initial step size.
 
-    The change of weights is roughly proportional to passes times step size, which falls as 1/steps after
-    `decay_after`. First the step size falls to half. Then the number of passes falls, which also saves time. After the
-    passes have reached `least_epochs`, the step size falls again.
+    The change of the weights in an update is roughly proportional to the number of passes times the step size. After
+    `decay_after` steps, this product falls as 1/steps. First, the step size falls to half its initial value. Then the
+    number of passes falls instead, which also saves time. After the number of passes has reached `least_epochs`, the
+    step size falls again.
     """
     left = min(1.0, config.decay_after / steps)
     passes = max(min(config.least_epochs, config.n_epochs), math.ceil(config.n_epochs * min(1.0, left / SMALL_STEP)))
@@ -36,9 +41,9 @@ def schedule(config: LearningConfig, steps: int) -> tuple[int, float]:
 
 
 def mean_passes(config: LearningConfig, begin: int, end: int) -> float:
-    """Return the mean number of passes over the updates between two numbers of steps.
+    """Return the mean number of passes in the updates between the steps `begin` and `end`.
 
-    Without an update between them, the passes of the next update are returned.
+    If there is no update between them, the number of passes in the next update is returned.
     """
     rollout = config.n_envs * config.n_steps
     passes = [schedule(config, steps)[0] for steps in range(begin + rollout, max(end, begin + rollout) + 1, rollout)]

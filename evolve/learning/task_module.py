@@ -1,4 +1,4 @@
-"""Execution of a user task's code; no other module executes a run's code."""
+"""Execution of the code of a user task. No other module executes code that belongs to a run."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ __all__ = ["executed_task"]
 
 @lru_cache(maxsize=4)
 def executed_task(code: TaskCode) -> Task | BatchTask:
-    """Execute the code and return the task; later changes of the file have no effect.
+    """Execute the code of a user task, and return the task. Later changes of its file have no effect on this process.
 
     Raises:
         ConfigError: the code cannot be executed, the class does not derive from `sim.Task` or `sim.BatchTask` or
             requires arguments, its model cannot be compiled, or one of its settings is invalid. The message is one line
-            and names file and line of an error in the user's code.
+            and names the file and the line of an error in the user's code.
     """
     module = _executed(code)
     cls = getattr(module, code.name, None)
@@ -41,23 +41,23 @@ def executed_task(code: TaskCode) -> Task | BatchTask:
 
 
 def _executed(code: TaskCode) -> ModuleType:
-    """Execute the code as a module with a unique name, which pickle and dataclasses can find."""
+    """Execute the code as a module. It has a unique name in `sys.modules`, where pickle and dataclasses look it up."""
     name = f"rhabdom_task_{code.sha256[:16]}"
     module = ModuleType(name)
     module.__file__ = str(code.file)
     sys.modules[name] = module
     if str(code.file.parent) not in sys.path:
-        sys.path.append(str(code.file.parent))  # last, so that files in this folder shadow no other module
+        sys.path.append(str(code.file.parent))  # at the end, so that its files do not shadow modules
     try:
         exec(compile(code.text, str(code.file), "exec"), module.__dict__)
-    except (Exception, SystemExit) as error:  # sys.exit would end this process without a message
+    except (Exception, SystemExit) as error:  # sys.exit in the code would end this process
         del sys.modules[name]
         raise ConfigError(f"{code.file.name}: {_told(error, code)}", "task") from error
     return module
 
 
 def _told(error: BaseException, code: TaskCode) -> str:
-    """Return the message of an error, with the line of the user's file that caused it, if there is one."""
+    """Return the message of an error. If the user's file caused the error, the message starts with the line number."""
     lines = [frame.lineno for frame in traceback.extract_tb(error.__traceback__) if frame.filename == str(code.file)]
     said = " ".join(f"{type(error).__name__}: {error}".split())
     return f"line {lines[-1]}: {said}" if lines else said

@@ -1,4 +1,4 @@
-"""Short trial of a user task before a run starts, because a failure there would affect every animal."""
+"""Short trial of a user task before a run starts. A failure in the task would affect every animal of the run."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ WORLDS, ACTIONS = 2, 4
 
 
 def try_task(config: RunConfig) -> None:
-    """Let the first animal take a few random actions; do nothing for a built-in task.
+    """Build the user task with the run's first animal, and take a few random actions; skip built-in tasks.
 
     Raises:
-        ConfigError: the task's module, model, eyes or methods fail; one line.
+        ConfigError: the task's module, model, eyes or methods fail; the message is one line.
     """
     if config.choice.named_code is None:
         return
-    from evolve.learning.animal_task import animal_task  # takes seconds to load, and built-in tasks are not tried
+    from evolve.learning.animal_task import animal_task  # loading takes seconds, and built-in tasks do not need it
     from sim.envs.prepared_task import PreparedTask
 
     animal = develop(Genotype(config.genome).start, config)
@@ -46,7 +46,7 @@ def try_task(config: RunConfig) -> None:
 
 
 def _failure(worlds: EyesVecEnv) -> str | None:
-    """Return the message of the first method that fails, or None."""
+    """Return the message of the first failure of the task's methods; None if there is none."""
     random = np.random.default_rng(0)
     worlds.reset()
     for _ in range(ACTIONS):

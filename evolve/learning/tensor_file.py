@@ -1,4 +1,4 @@
-"""Tensors from a run's files (safetensors); nothing in a file is executed."""
+"""Reading of tensors from a run's safetensors files; nothing in a file is executed."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ if TYPE_CHECKING:
 
 __all__ = ["read_tensors"]
 
-LENGTH_BYTES = 8  # bytes of the header's length, at the start of a file
+LENGTH_BYTES = 8  # size of the number at the start of a file, which is the length of its header [bytes]
 
 
 def read_tensors(path: Path) -> tuple[dict[str, str], dict[str, Tensor]]:
-    """Return the metadata and tensors of a file, by name.
+    """Return the metadata and the tensors of a file, each by name.
 
     Raises:
         StrangeFileError: the path is not a regular file.
         OSError: the file cannot be read.
-        SafetensorError: the file is not in the format safetensors.
+        SafetensorError: the file is not a safetensors file.
         ValueError: the header is not JSON.
     """
     content = read(path)

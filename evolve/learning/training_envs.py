@@ -1,4 +1,4 @@
-"""Environments of an animal: for training, for selection during training, and for the test of its fitness."""
+"""Environments of one animal: for training, for selection of its best policy, and for the test of its fitness."""
 
 from __future__ import annotations
 
@@ -17,7 +17,12 @@ __all__ = ["TrainingEnvs", "worlds_of"]
 class TrainingEnvs:
     """Environments for training, selection and test, all with the same light.
 
-    The first two trace only the rays that learning needs, because their noise averages out.
+    training: environments in which the policy is trained
+    selection: environments of the evaluations during training, which select the best policy
+    test: environments of the final evaluation, which gives the fitness
+
+    The light is computed in the same way in all three. The first two are rendered with at most
+    `learning.rays_per_receptor` rays for each receptor, because the noise of rendering averages out in learning.
     """
 
     training: EyesVecEnv
@@ -26,10 +31,12 @@ class TrainingEnvs:
 
 
 def worlds_of(phenotype: Phenotype, config: RunConfig, learning: int, evaluation: int) -> TrainingEnvs:
-    """Return environments with one seed for training and another for evaluation.
+    """Return the environments of an animal.
+
+    learning: seed of the environments for training · evaluation: seed of the environments for selection and test
 
     Raises:
-        ConfigError: a user task has not been named or fails at its start.
+        ConfigError: the user task has not been named when the run was opened, or it fails at its start.
     """
     memory, wanted, episodes = phenotype.memory_frames, config.learning, config.evaluation.episodes
     fine = PreparedTask(animal_task(phenotype, config))

@@ -1,4 +1,4 @@
-"""Rewards for learning: in the learner's units, and with reduced costs at the start."""
+"""Scaling of rewards for the learner, with reduced costs at the start of training."""
 
 from __future__ import annotations
 
@@ -10,12 +10,15 @@ from stable_baselines3.common.vec_env.base_vec_env import VecEnvStepReturn
 
 __all__ = ["RewardsInUnits", "ramped_share", "terms_of"]
 
-FIRST_SHARE = 0.1  # initial share of the cost of contact; with a third, agents learnt to turn on the spot
+FIRST_SHARE = 0.1  # share of the cost of contact at the start; with a third, agents learnt to turn on the spot
 
 
 class RewardsInUnits(VecEnvWrapper):
-    """Worlds with rewards in units that the learner sets, and with partial weights of some terms.
+    """Worlds whose rewards are divided by a unit, and in which some terms of the reward have reduced weights.
 
+    The learner sets `unit` and `shares`.
+
+    unit: unit of rewards
     shares: weights of reward terms, by name; other terms have the weight 1
     paid: whether a reward differed from 0 since `paid` was last set to False
     """
@@ -41,10 +44,13 @@ class RewardsInUnits(VecEnvWrapper):
 
 
 def ramped_share(steps: int, ramp: int) -> float:
-    """Return the share of a term's full cost after `steps`.
+    """Return the share of its full cost that a reward term has after `steps`.
 
-    It is FIRST_SHARE for the first third of the ramp and then rises exponentially to 1. With the full cost of contact
-    from the start, agents learn to stand still, which costs nothing, before they can steer, and never learn to steer.
+    The share is FIRST_SHARE for the first third of the ramp, and then rises exponentially to 1. If contact has its full
+    cost from the start, agents learn to stand still before they can steer, because standing still costs nothing. They
+    then never learn to steer.
+
+    ramp: number of steps after which the share is 1
     """
     if steps >= ramp:
         return 1.0
@@ -52,6 +58,6 @@ def ramped_share(steps: int, ramp: int) -> float:
 
 
 def terms_of(info: dict[str, Any]) -> dict[str, float]:
-    """Return the terms of a step's reward, by name."""
+    """Return the terms of the reward of one step, by name, from its `info`."""
     terms: dict[str, float] = info["reward_terms"]
     return terms

@@ -10,10 +10,11 @@ __all__ = ["TrainingRung"]
 
 @dataclass(frozen=True)
 class TrainingRung:
-    """A training run from its start to the end of one of its rungs.
+    """A training run from its start to the end of one of its rungs (the parts into which it is divided).
 
-    ends: number of steps at the end of each rung up to this one, ascending
-    checkpoints: path of the checkpoint at each of these ends; training is repeated from the latest existing one
+    ends: number of training steps at the end of each rung up to this rung, in ascending order
+    checkpoints: path of the checkpoint at the end of each of these rungs; training continues from the latest checkpoint
+        that exists
     """
 
     ends: tuple[int, ...]
@@ -21,5 +22,5 @@ class TrainingRung:
 
     @property
     def number(self) -> int:
-        """Number of this rung, counted from 0; `rung` in a record."""
+        """Number of this rung, counted from 0; it is the value `rung` in a record."""
         return len(self.ends) - 1

@@ -1,19 +1,19 @@
 """Reports, replays, comparisons and EXR files.
 
 write            report of a run: one HTML file
-doing            progress messages
+doing            progress messages while files are written
 page             sections of the report
 tables           tables of the report
-lineup           first and best animal, with the best of each generation between them
+lineup           cards of the first and the best animal, with a slider through the generations between them
 agent_figure     drawing of an animal's head and eyes
 figures          figures of a whole run
 eye_figures      figures of one eye's optics
 picture_sheet    rendered images of an episode, on a page
-views            images of one moment behind a perfect lens and behind the evolved optics
-player           episode that a page plays
-picture          signals as images
+views            images at one time of an episode, behind a perfect lens and behind the evolved optics
+player           player of an episode on a page
+picture          conversion of signals to images
 hints            explanations of terms in the report
-svg              figures that follow the page's theme
+svg              conversion of figures to SVG in the page's theme
 theme            colours of the report
 markup           pieces of HTML
 comparison       comparison of several runs
@@ -22,7 +22,7 @@ moving_picture   episode as a GIF or video
 replay           replay of an episode
 exr_export       radiance and signals of an agent, as EXR files
 rerun_recording  recording of an episode for rerun
-rerun_bodies     bodies of a task's model, for rerun
+rerun_bodies     bodies of a task's model and the eyes, for rerun
 rerun_layout     layout in which rerun opens a recording
 rerun_stream     writer of recordings for rerun
 """

@@ -1,4 +1,4 @@
-"""Drawing of an animal: its head and eyes from the front and above, with horizontal fields of view."""
+"""Drawing of an animal: its head and eyes, seen from the front and above, and the horizontal fields of view."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ __all__ = ["agent_figure"]
 RADIUS = 48.0  # radius of the head, in units of the drawing
 REACH = 2.8  # length of the drawn fields of view, in head radii
 ELEVATION = math.radians(42)  # elevation of the viewpoint in front of the animal
-AHEAD = math.radians(205)  # azimuth of the heading in the drawing: the viewpoint is slightly to one side
+AHEAD = math.radians(205)  # direction of the heading in the drawing; the viewpoint is slightly to one side of it
 LARGEST_EYE = math.radians(24)  # maximum half angle of an eye's disk on the head
 
 
 def agent_figure(eyes: sim.Eyes, name: str, placed: Sequence[float] | np.ndarray) -> Html:
-    """Return a drawing of the head from the front and above, with eyes as disks that do not overlap.
+    """Return a drawing of the head, seen from the front and above; eyes are disks that do not overlap.
 
     name: prefix of the ids in the drawing, unique on the page
     placed: azimuths of the eyes [rad]
@@ -43,13 +43,16 @@ def agent_figure(eyes: sim.Eyes, name: str, placed: Sequence[float] | np.ndarray
 
 
 def _closest(azimuths: Sequence[float]) -> float:
-    """Return the smallest angle between neighbouring directions around the head; 0 if all directions are equal."""
+    """Return the smallest angle between two different azimuths; 0 if all azimuths are equal."""
     around = np.unique(np.round(np.mod(azimuths, 2 * math.pi), 6))
     return float(np.diff([*around, around[0] + 2 * math.pi]).min()) if len(around) > 1 else 0.0
 
 
 def _projected(points: np.ndarray) -> np.ndarray:
-    """Project points (n, 3) in head radii (x ahead, y left, z up) to (n, 2) in units of the drawing."""
+    """Project points to the drawing.
+
+    points: (n, 3), x ahead, y to the left and z up, in radii of the head; the result is (n, 2), in units of the drawing
+    """
     x, y, z = points.T
     turned = AHEAD - math.pi
     depth = x * math.cos(turned) + y * math.sin(turned)  # towards the viewpoint
@@ -59,7 +62,7 @@ def _projected(points: np.ndarray) -> np.ndarray:
 
 
 def _faces(azimuth: float) -> bool:
-    """Return whether an eye on the head's equator is on the visible side."""
+    """Return whether an eye at this azimuth is on the visible side of the head."""
     return math.cos(azimuth - (AHEAD - math.pi)) > 0
 
 

@@ -20,9 +20,10 @@ OF_THE_BEST = ("best candidate", "fitness", "95 % interval", "success rate", "ac
 
 
 def run_summary(run: Run) -> dict[str, Any]:
-    """Return one run as JSON values.
+    """Return the summary of one run as JSON values.
 
-    Values of the best candidate are None before a candidate has succeeded; its interval is None for a single episode.
+    Before a candidate has succeeded, values that describe the best candidate are None. The interval of its fitness is
+    also None if it has played a single episode.
     """
     best = run.best
     interval = None if best is None else bootstrap_interval(best.returns)
@@ -47,9 +48,9 @@ def run_summary(run: Run) -> dict[str, Any]:
 
 
 def differing_settings(runs: Sequence[Run]) -> dict[str, list[Any]]:
-    """Return the settings in which the runs' configs differ, by dotted name, with a value for each run.
+    """Return the settings in which the runs differ, by dotted name, with the value of each run.
 
-    The value is None for a run without the setting.
+    If a run lacks a setting, the value is None.
     """
     flat = [dict(_flat(asdict(run.config))) for run in runs]
     names = list(dict.fromkeys(name for settings in flat for name in settings))
@@ -68,7 +69,10 @@ def comparison_lines(runs: Sequence[Run]) -> list[str]:
 
 
 def write_page(runs: Sequence[Run], path: Path) -> None:
-    """Write an HTML page with the best fitness over the generations and the table, completely or not at all."""
+    """Write an HTML page with the comparison: a figure of the best fitness over the generations, and a table.
+
+    The file is written completely or not at all.
+    """
     columns = [_column(run_summary(run)) for run in runs]
     rows = [[name, *(column[name] for column in columns)] for name in list(columns[0])[1:]]
     rows += [[name, *(_shown(v) for v in row)] for name, row in differing_settings(runs).items()]
@@ -84,7 +88,7 @@ def write_page(runs: Sequence[Run], path: Path) -> None:
 
 
 def _column(one: Mapping[str, Any]) -> dict[str, str]:
-    """Return a summary's values as text, by row name."""
+    """Return the values of a summary as text, by name of the table's row."""
     column = {
         "run": one["run"],
         "task": one["task"],
@@ -114,7 +118,7 @@ def _flat(tree: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]
 
 
 def _shown(value: Any) -> str:
-    """Return a value in the form of `--set`."""
+    """Return a value as text, in the form in which `--set` accepts it."""
     if isinstance(value, bool):
         return str(value).lower()
     return "-" if value is None else f"{value:g}" if isinstance(value, float) else str(value)

@@ -1,4 +1,4 @@
-"""Radiance and signals of an agent's eyes, as a sequence of spectral EXR files."""
+"""Export of the radiance and the signals of an animal's eyes, as a sequence of spectral EXR files."""
 
 from __future__ import annotations
 
@@ -20,13 +20,15 @@ __all__ = ["export_episode", "export_run"]
 def export_run(
     run: Run, candidate_id: int | None = None, seed: int = 0, out: Path | None = None, doing: Doing = in_silence
 ) -> list[Path]:
-    """Record an episode (default: of the best candidate), write EXR files, and return their paths.
+    """Record an episode, write EXR files, and return their paths.
 
+    candidate_id: id of the candidate that plays; None: the best candidate
+    seed: seed of the episode
     out: folder of the files; None for `exr/` in the run directory
-    doing: called with the current step and the share done, [0, 1]
+    doing: function that is called with the current step and the completed share of the work, in [0, 1]
 
     Raises:
-        RunError: the candidate does not exist, or has no policy.
+        RunError: the candidate does not exist, or it has no policy.
     """
     if out is not None:
         out.parent.mkdir(parents=True, exist_ok=True)
@@ -37,9 +39,9 @@ def export_run(
 def export_episode(episode: Episode, directory: Path, doing: Doing = in_silence) -> list[Path]:
     """Write one file for each time at which radiance was recorded, and return the paths.
 
-    Each eye has a part with the spectral radiance in front of it and a part with its receptors' signals
-    (`left.spectral`, `left.receptors`, ...). File names contain candidate, episode seed and time, so that exports of
-    other episodes do not overwrite each other.
+    A file has two parts for each eye: the spectral radiance in front of the eye (`left.spectral`) and the signals of
+    its receptors (`left.receptors`). File names contain the candidate, the seed of the episode and the time, so that
+    exports of different episodes do not overwrite each other.
     """
     folder(directory)
     files = []
@@ -70,7 +72,7 @@ def _views(episode: Episode, frame: int) -> list[sim.View]:
 
 
 def _attributes(episode: Episode, t: int, eye: int) -> dict[str, Any]:
-    """Return the metadata of a view: task, candidate, time and direction."""
+    """Return the metadata of a view, such as task, candidate, time and direction of the eye."""
     up = float(episode.elevations_deg[eye])
     return {
         "task": episode.task,

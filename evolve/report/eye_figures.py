@@ -26,14 +26,14 @@ from optics.spectra.bands import daylight
 __all__ = ["DECADES", "WhiteLight", "eye_figures", "middle_of_psf", "relief_heights"]
 
 SIZE = (370, 310)
-PIXELS = 161  # maximum number of pixels along a side of an image, enough for its size on the page
-DECADES = 4  # number of decades of the PSF in the image
-SHOWN_POWER = 0.98  # share of the light in the PSF's window that the image contains
+PIXELS = 161  # maximum number of pixels along a side of an image; more would be invisible on the page
+DECADES = 4  # range of the PSF's logarithmic colour scale [powers of ten]
+SHOWN_POWER = 0.98  # share of the PSF's light that lies within the image
 
 
 @dataclass(frozen=True)
 class WhiteLight:
-    """An eye with its PSF per band and in white daylight."""
+    """An eye with its PSF in each band (`psf`) and in white daylight (`white`)."""
 
     eye: optics.Eye
     psf: optics.PSFResult
@@ -51,7 +51,7 @@ class WhiteLight:
 
 
 def eye_figures(phenotype: Phenotype, config: EyeConfig) -> Html:
-    """Return figures with captions; for a perfect lens a sentence instead."""
+    """Return the figures with their captions. For a perfect lens, return a sentence instead."""
     eye = phenotype.eyes(config).eye()
     if eye.pupil is None:
         return html("<p>Optics are off in this run: every eye has a perfect lens, which neither blurs nor dims.</p>\n")
@@ -67,7 +67,7 @@ def eye_figures(phenotype: Phenotype, config: EyeConfig) -> Html:
 
 
 def _or_why_not(name: str, draw: Callable[[WhiteLight], Html], light: WhiteLight) -> Html:
-    """Return a figure, or one line if the PSF cannot be computed accurately enough for it."""
+    """Return a figure; if the PSF cannot be computed accurately enough, return a line that says so."""
     try:
         return draw(light)
     except optics.AccuracyError as error:
@@ -88,7 +88,7 @@ def _pupil(eye: optics.Eye, phenotype: Phenotype) -> Html:
     with drawing(*SIZE) as drawn:
         axes = drawn.subplots()
         extent = (-radius, radius, -radius, radius)
-        # A circular rim is drawn exactly; other shapes are masked pixel by pixel.
+        # The rim of a circular aperture is drawn exactly; other apertures are masked pixel by pixel.
         seen = 1e6 * (heights if _is_round(pupil) else np.where(inside, heights, np.nan))
         picture = axes.imshow(seen, extent=extent, origin="lower", interpolation="none", vmin=low, vmax=high)
         picture.set_clip_path(Circle((0, 0), radius, transform=axes.transData))
@@ -113,7 +113,10 @@ def _is_round(pupil: optics.Pupil | None) -> bool:
 
 
 def relief_heights(pupil: optics.Pupil) -> tuple[np.ndarray, np.ndarray]:
-    """Return the relief [m] over the pupil's square, (y, x) with row 0 at y = -a, and the mask of the aperture."""
+    """Return the heights of the relief [m] and the mask of the aperture, both (y, x).
+
+    They cover the square around the pupil, and row 0 is at the lowest y.
+    """
     types = precision("float64")
     centres = (np.arange(PIXELS) + 0.5) / PIXELS * 2 - 1
     x, y = (plane.ravel() for plane in np.meshgrid(centres, centres))
@@ -126,7 +129,7 @@ def relief_heights(pupil: optics.Pupil) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _psf(light: WhiteLight) -> Html:
-    """Return the figure of the polychromatic PSF, logarithmic, with the outline of a receptor."""
+    """Return the figure of the PSF in white daylight on a logarithmic scale, with the outline of a receptor."""
     picture, half = middle_of_psf(light)
     edge, pitch = 1e6 * half, 1e6 * light.eye.receptor_pitch
     peak = picture.max()
@@ -156,7 +159,10 @@ def _psf(light: WhiteLight) -> Html:
 
 
 def middle_of_psf(light: WhiteLight) -> tuple[np.ndarray, float]:
-    """Return the central part of the PSF with most of the light, averaged to at most PIXELS, and its half width [m]."""
+    """Return the central part of the PSF, with most of its light (SHOWN_POWER), and the half width of this part [m].
+
+    The PSF is averaged to at most PIXELS along a side.
+    """
     image, dx = light.white.psf[0], light.white.dx
     middle = image.shape[0] // 2
     ring = np.maximum(*np.abs(np.indices(image.shape) - middle))
@@ -172,7 +178,7 @@ def middle_of_psf(light: WhiteLight) -> tuple[np.ndarray, float]:
 
 
 def _cuts(light: WhiteLight) -> Html:
-    """Return the figure of each band's PSF along x through the axis."""
+    """Return the figure of the PSF in several bands, along the line y = 0 through the optical axis."""
     psf = light.psf
     _, half = middle_of_psf(light)
     inside = np.abs(psf.x) <= half
@@ -194,7 +200,7 @@ def _cuts(light: WhiteLight) -> Html:
 
 
 def _mtf(light: WhiteLight) -> Html:
-    """Return the figure of contrast over spatial frequency, with the diffraction limit of the aperture."""
+    """Return the figure of the MTF (contrast over spatial frequency), with the diffraction limit of the aperture."""
     eye, scale = light.eye, light.per_degree
     cutoff = light.psf.cutoff
     nyquist = 1 / (2 * eye.receptor_pitch)
@@ -232,9 +238,10 @@ def _mtf(light: WhiteLight) -> Html:
 
 
 def diffraction_limit(light: WhiteLight, frequency: np.ndarray) -> np.ndarray:
-    """Return the MTF of a circular aperture of the same width without aberrations in white daylight, (frequency,).
+    """Return the MTF in white daylight of a circular aperture of the same width without aberrations, (frequency,).
 
-    Each band has the limit (2/π)(arccos s - s √(1 - s²)) with s = f / cutoff (Goodman, §6.3.3), weighted by its light.
+    In each band, the MTF is (2/π)(arccos s - s √(1 - s²)) with s = f / cutoff (Goodman, §6.3.3). The bands are weighted
+    by their light.
     """
     weights = light.eye.spectral_bands.weights.mean(axis=0) * daylight(light.psf.wavelengths)
     s = np.clip(frequency / light.psf.cutoff[:, None], 0, 1)

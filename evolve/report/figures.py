@@ -1,4 +1,4 @@
-"""Figures of a whole run: fitness, success and genes over the generations, learning curves."""
+"""Figures of a whole run: fitness, success and genes over the generations, descent, and learning curves."""
 
 from __future__ import annotations
 
@@ -28,12 +28,12 @@ __all__ = [
 ]
 
 SIZE = (370, 260)
-DASHES = ("-", "--", ":", "-.")  # line styles if there are more lines than colours
+DASHES = ("-", "--", ":", "-.")  # line styles; the second is used if there are more lines than colours, and so on
 Generations = Sequence[int] | NDArray[np.int64]
 
 
 def fitness_figure(rows: Sequence[GenerationStatistics], candidates: Sequence[Candidate]) -> Html:
-    """Draw every candidate's fitness as a dot, the spread and median of each population, and the best so far."""
+    """Draw the fitness of each candidate, the spread and median of each population, and the best so far."""
     with drawing(*SIZE) as figure:
         axes = figure.subplots()
         _candidates(axes, candidates, [c.fitness for c in candidates])
@@ -49,7 +49,10 @@ def fitness_figure(rows: Sequence[GenerationStatistics], candidates: Sequence[Ca
 
 
 def comparison_figure(curves: Mapping[str, Sequence[GenerationStatistics]]) -> Html:
-    """Draw the best fitness so far of several runs, by name."""
+    """Draw the best fitness so far over the generations, with one line for each run.
+
+    curves: statistics of each generation, by name of the run
+    """
     with drawing(460, 300) as figure:
         axes = figure.subplots()
         for place, (name, rows) in enumerate(curves.items()):
@@ -65,9 +68,9 @@ def comparison_figure(curves: Mapping[str, Sequence[GenerationStatistics]]) -> H
 
 
 def genealogy_figure(candidates: Sequence[Candidate], best: Candidate) -> Html:
-    """Draw every candidate at its generation and fitness, with a line to the nearest of its parents.
+    """Draw each candidate as a dot at its generation and fitness, connected with the nearest of its parents.
 
-    The best candidate's line of descent has the accent colour.
+    The line of descent of the best candidate has the accent colour.
     """
     known = {candidate.id: candidate for candidate in candidates}
     population = max(candidate.index for candidate in candidates) + 1
@@ -92,7 +95,7 @@ def genealogy_figure(candidates: Sequence[Candidate], best: Candidate) -> Html:
 
 
 def _links(axes: Axes, candidates: Sequence[Candidate], place: Callable[[Candidate], tuple[float, float]]) -> None:
-    """Add a link over each candidate's dot that leads to its row of the table."""
+    """Add invisible links over the candidates' dots, which lead to the candidates' rows in the table."""
     good = [candidate for candidate in candidates if succeeded(candidate)]
     x, y = np.transpose([place(candidate) for candidate in good])
     dots = axes.scatter(x, y, s=90, color=ACCENT, alpha=0.0)
@@ -111,7 +114,7 @@ def vision_figure(name: str, label: str, generations: Sequence[int], values: Seq
 
 
 def success_figure(candidates: Sequence[Candidate]) -> Html:
-    """Draw the share of solved evaluation episodes over the generations."""
+    """Draw the share of evaluation episodes that were solved, over the generations."""
     with drawing(*SIZE) as figure:
         axes = figure.subplots()
         _candidates(axes, candidates, [100 * c.success_rate for c in candidates])
@@ -126,7 +129,10 @@ def success_figure(candidates: Sequence[Candidate]) -> Html:
 
 
 def learning_figure(candidates: Sequence[Candidate], best: Candidate) -> Html:
-    """Draw the mean evaluation return during each candidate's training, the best one in the accent colour."""
+    """Draw the learning curves: mean return in evaluations over the steps of training, for each candidate.
+
+    The curve of the best candidate has the accent colour.
+    """
     with drawing(*SIZE) as figure:
         axes = figure.subplots()
         faint = float(np.clip(8 / len(candidates), 0.08, 0.4))
@@ -147,7 +153,10 @@ def learning_figure(candidates: Sequence[Candidate], best: Candidate) -> Html:
 def gene_figure(
     name: str, label: str, path: Trajectory, limits: tuple[float, float] | None, whole: bool = False
 ) -> Html:
-    """Draw one gene over the generations on its searched range; with `whole`, ticks are integers."""
+    """Draw the values of one gene over the generations.
+
+    limits: range of the vertical axis; None: the range of the values · whole: whether its ticks are integers
+    """
     with drawing(250, 165, font=10.5) as figure:
         axes = figure.subplots()
         _trajectory(axes, path)
@@ -161,7 +170,10 @@ def gene_figure(
 
 
 def relief_figure(paths: dict[str, Trajectory]) -> Html:
-    """Draw the relief's genes in panels that follow their positions over the pupil (row 0 at y = -a, at the bottom)."""
+    """Draw the relief's genes over the generations, in panels arranged as the genes are over the pupil.
+
+    paths: trajectory of each gene by its name, doe_ROWCOLUMN; row 0 is at the lowest y, and therefore at the bottom
+    """
     with drawing(440, 340) as figure:
         rows = sorted({name[-2] for name in paths}, reverse=True)
         columns = sorted({name[-1] for name in paths})
@@ -189,7 +201,10 @@ def _trajectory(axes: Axes, path: Trajectory, marker_size: float = 3) -> None:
 
 
 def _spread(axes: Axes, x: Generations, low: ArrayLike, median: ArrayLike, high: ArrayLike) -> None:
-    """Draw the 10-90 % band of the population (bars for a single generation, which has no width) and the median."""
+    """Draw the median of each population, and a band between its 10 % and 90 % quantiles.
+
+    A single generation has a bar instead, because a band would have no width.
+    """
     if len(x) == 1:
         axes.vlines(x, low, high, color=MUTED, alpha=0.4, lw=6)
     axes.fill_between(x, low, high, color=MUTED, alpha=0.18, lw=0)
@@ -197,7 +212,10 @@ def _spread(axes: Axes, x: Generations, low: ArrayLike, median: ArrayLike, high:
 
 
 def _candidates(axes: Axes, candidates: Sequence[Candidate], values: Sequence[float]) -> None:
-    """Draw a dot per candidate, with generations spread horizontally, and a cross at the bottom for a failed one."""
+    """Draw a dot for each successful candidate, and a cross at the bottom for each failed one.
+
+    The candidates of a generation are spread horizontally.
+    """
     generations = np.array([c.generation for c in candidates], float)
     population = max(c.index for c in candidates) + 1
     x = generations + 0.5 * (np.array([c.index for c in candidates]) / max(population - 1, 1) - 0.5)
@@ -208,7 +226,7 @@ def _candidates(axes: Axes, candidates: Sequence[Candidate], values: Sequence[fl
 
 
 def _confidence(axes: Axes, candidates: Sequence[Candidate]) -> None:
-    """Draw the 95 % bootstrap interval of the best candidate's fitness, from its episodes' returns."""
+    """Draw the 95 % bootstrap interval of the best fitness so far, from the returns of the candidate's episodes."""
     best = [(generation, champion) for generation, champion in champions(candidates) if champion.returns]
     if best:
         low, high = zip(*(bootstrap_interval(champion.returns) for _, champion in best), strict=True)

@@ -1,4 +1,7 @@
-"""Selection or drift: comparison of the final gene values of runs with searches with random fitness."""
+"""Test for selection: comparison of final gene values between runs and searches with random fitness.
+
+If the values in the runs are within the range of these searches, the genes may have changed by chance (drift).
+"""
 
 from __future__ import annotations
 
@@ -19,17 +22,19 @@ from evolve.store.directory import Run, RunError
 
 __all__ = ["Drift", "QuantityDrift", "drift_of"]
 
-SEARCHES = 200
-ALLOWED_TO_DIFFER = ("seed", "workers")
+SEARCHES = 200  # default number of searches with random fitness
+ALLOWED_TO_DIFFER = ("seed", "workers")  # settings in which the runs of a comparison may differ
 
 
 @dataclass(frozen=True)
 class QuantityDrift:
-    """One quantity at the end of runs and of searches with random fitness, as means over candidates.
+    """One quantity at the end of runs and at the end of searches with random fitness.
 
-    runs: mean of each run
-    low, median, high: of the searches; the central 95 % lie between low and high
-    p: two-sided p-value of the runs' mean
+    The value of a run or a search is a mean over its candidates.
+
+    runs: value of each run
+    low, median, high: quantiles of the values of the searches; 95 % of the values lie between low and high
+    p: two-sided p-value of the mean of the runs, see `evolve.search.null_model.p_value`
     """
 
     quantity: str
@@ -46,7 +51,12 @@ class QuantityDrift:
 
 @dataclass(frozen=True)
 class Drift:
-    """The comparison: number of runs, generations (numbered from 0), number of searches, and quantities."""
+    """Comparison of runs with searches with random fitness.
+
+    of: number of runs · searches: number of searches
+    generations: generations over which means are taken, counted from 0
+    moved: quantities, with their values
+    """
 
     of: int
     generations: range
@@ -79,11 +89,14 @@ class Drift:
 def drift_of(runs: Sequence[Run], searches: int = SEARCHES, done: Callable[[float], None] = lambda _: None) -> Drift:
     """Compare runs that differ only in their seeds with searches with random fitness (`evolve.search.null_model`).
 
-    Quantities are the open genes, acuity [cycles/degree] and number of receptors, at the last generations that all runs
-    have completed.
+    The quantities are the genes that the search varies, the acuity [cycles/degree] and the number of receptors. Means
+    are taken over the last generations that all runs have completed.
+
+    searches: number of searches · done: function that is called with the share of completed searches
 
     Raises:
-        RunError: the settings differ in more than seeds, a run is named twice, or a run has no complete generation.
+        RunError: the runs differ in settings other than their seeds, two runs have the same seed, or a run has no
+            complete generation.
         ValueError: there are fewer than two searches.
     """
     if searches < 2:
@@ -113,7 +126,7 @@ def _require_alike(runs: Sequence[Run]) -> None:
 
 
 def _complete(run: Run) -> int:
-    """Return the number of complete generations."""
+    """Return the number of generations that are complete, counted from the start of the run."""
     known = [successive_halving.complete(run, generation) for generation in range(run.config.search.generations)]
     done = [*known, False].index(False)
     if not done:
@@ -132,7 +145,7 @@ def _open(name: str, config: RunConfig) -> bool:
 
 
 def _end(run: Run, quantity: str, generations: range) -> float:
-    """Return the mean over successful candidates; NaN if none has the quantity."""
+    """Return the mean of a quantity over the successful candidates of these generations; NaN if none of them has it."""
     alive = [c for c in run.candidates if c.generation in generations and succeeded(c)]
     values: Floats = np.array([_measured(c.phenotype, run.config)[quantity] for c in alive])
     finite = values[np.isfinite(values)]

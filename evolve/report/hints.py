@@ -1,4 +1,4 @@
-"""Explanations of terms in a report, shown when the pointer or the keyboard focus is on a term."""
+"""Explanations of terms in a report. They are shown when the pointer or the keyboard focus is on a term."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from evolve.report.markup import Html, html
 
 __all__ = ["MEANINGS", "hint"]
 
-# Each term is also in docs/glossary.md; these sentences assume no other definitions.
+# docs/glossary.md also explains these terms. The sentences here must be understandable without any other definition.
 MEANINGS = {
     "fitness": "mean return of an animal's evaluation episodes after training; higher is better",
     "candidate": "one genome of the run with the animal that develops from it, trained and evaluated",

@@ -1,4 +1,4 @@
-"""The first animal and the best one, with a slider through the best animals of the generations between them."""
+"""Cards of the first and the best animal, with a slider through the best animals of the generations between them."""
 
 from __future__ import annotations
 
@@ -11,11 +11,14 @@ from evolve.store.directory import Run
 
 __all__ = ["lineup"]
 
-MOST = 60  # maximum number of animals on a page, evenly spread over the generations
+MOST = 60  # maximum number of animals on a page; if there are more, a selection is spread evenly over them
 
 
 def lineup(run: Run) -> Html:
-    """Return two cards side by side; lineup.js lets the reader select the right one."""
+    """Return two cards side by side: on the left the first animal, on the right the one that the slider selects.
+
+    The script lineup.js shows the card of the selected generation.
+    """
     best = _thinned(champions(run.candidates))
     if not best:
         return Html()
@@ -33,7 +36,10 @@ def lineup(run: Run) -> Html:
 
 
 def _whose(generation: int) -> str:
-    """Return the heading of the earliest animal; all candidates of earlier generations may have failed."""
+    """Return the heading of the first animal.
+
+    Its generation is not 0 if all candidates of the earlier generations have failed.
+    """
     return f"Generation {generation}’s best, the first to succeed" if generation else "The first generation’s best"
 
 

@@ -1,7 +1,8 @@
-"""Safe HTML: text is added to a page only through `html`, which escapes everything except Html objects.
+"""Safe HTML. All text is added to a page through `html`, which escapes everything except Html objects.
 
-`html` fills a template that is a constant in the code, so any other string is escaped. The browser accepts only scripts
-and styles whose hashes are in the page's policy.
+The template of `html` is a constant in the code; all other strings are inserted into it, and are escaped. As a second
+protection, each page has a content security policy with the hashes of its scripts and styles. The browser ignores all
+other scripts and styles.
 """
 
 from __future__ import annotations
@@ -41,10 +42,10 @@ _SLOT = "{}"
 
 @dataclass(frozen=True)
 class Html:
-    """A piece of a page; outside this module and `svg`, it is created only by `html` and functions that use it.
+    """A piece of a page. Modules other than this one and `svg` must not create it directly, but with `html`.
 
     markup: the HTML text
-    rules: CSS declarations of its elements, by the value of their attribute `data-look`
+    rules: CSS declarations for elements of this piece, by the value of the elements' attribute `data-look`
     """
 
     markup: str = ""
@@ -58,7 +59,7 @@ class Html:
 
 
 def html(template: str, *pieces: object) -> Html:
-    """Fill the placeholders "{}" of a template in order: Html unchanged, everything else as escaped text.
+    """Fill the placeholders "{}" of a template in order: with Html objects unchanged, with others as escaped text.
 
     Raises:
         ValueError: the number of pieces differs from the number of placeholders.
@@ -78,9 +79,10 @@ def joined(pieces: Iterable[Html]) -> Html:
 
 
 def style(declarations: str) -> Html:
-    """Return CSS declarations of one element, such as "width:5px", as an attribute.
+    """Return an attribute that gives an element some CSS declarations, such as "width:5px".
 
-    The page's policy does not allow the attribute `style`.
+    The page's policy does not allow the attribute `style`. The attribute `data-look` refers to a rule in the page's
+    style sheet instead.
 
     Raises:
         ValueError: the text contains more than declarations.
@@ -92,14 +94,14 @@ def style(declarations: str) -> Html:
 
 
 def key(kind: str) -> Html:
-    """Return a legend's line in the colour of a CSS class."""
+    """Return a short line for a legend, in the colour of the CSS class `kind`."""
     return html('<span class="key {}" aria-hidden="true"></span>', kind)
 
 
 def rounded(value: float, digits: int = 3) -> str:
     """Return a number with `digits` significant digits, a typographic minus sign and no exponent.
 
-    NaN and infinity give an en dash.
+    For NaN and infinity, the result is an en dash.
     """
     if not math.isfinite(value):
         return "–"
@@ -111,7 +113,10 @@ def rounded(value: float, digits: int = 3) -> str:
 
 
 def duration(seconds: float) -> str:
-    """Return a time in seconds below two minutes, minutes below two hours, hours below two days, then days."""
+    """Return a duration as text.
+
+    The unit is seconds below two minutes, minutes below two hours, hours below two days, and days from then on.
+    """
     for unit, name in ((86400, "days"), (3600, "h"), (60, "min")):
         if seconds >= 2 * unit:
             return f"{rounded(seconds / unit, 2)} {name}"
@@ -119,7 +124,7 @@ def duration(seconds: float) -> str:
 
 
 def exact(value: float) -> str:
-    """Return a setting or an integer without rounding."""
+    """Return a setting or an integer as text, without rounding to a few digits."""
     return f"{value:g}".replace("-", "−")
 
 
@@ -130,7 +135,10 @@ def table(
     highlight: int | None = None,
     ids: Sequence[str] = (),
 ) -> Html:
-    """Return a table that can scroll sideways, with the row `highlight` emphasised; `ids` are the ids of its rows."""
+    """Return a table that can be scrolled sideways.
+
+    name: id of the table · highlight: number of the row that is emphasised; None: no row · ids: id of each row
+    """
     head = joined(html('<th scope="col">{}</th>', cell) for cell in header)
     body = joined(
         html(
@@ -165,7 +173,10 @@ def contents(page: Html) -> Html:
 
 
 def json_script(value: Any, kind: str) -> Html:
-    """Return JSON data for a script; "<" is escaped, so that the data cannot end the element."""
+    """Return an element that contains JSON data for a script. "<" is escaped, so that the data cannot end the element.
+
+    kind: CSS class of the element
+    """
     encoded = json.dumps(value, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
     return html('<script type="application/json" class="{}">{}</script>', kind, Html(encoded))
 
@@ -176,7 +187,12 @@ def asset(name: str) -> str:
 
 
 def document(title: str, body: Html, scripts: Sequence[str] = ()) -> bytes:
-    """Return a complete, self-contained page whose policy forbids loading, applying or running anything else."""
+    """Return a complete, self-contained page.
+
+    The content security policy of the page forbids all other files, styles and scripts.
+
+    scripts: names of the files with scripts
+    """
     from evolve.report.theme import CSS
 
     looks = "".join(f'[data-look="{name}"]{{{rule}}}\n' for name, rule in sorted(body.rules.items()))
@@ -194,7 +210,7 @@ def document(title: str, body: Html, scripts: Sequence[str] = ()) -> bytes:
 
 
 def _policy(styles: Sequence[str], scripts: Sequence[str]) -> str:
-    """Return the content security policy: nothing from other files, and only these styles and scripts."""
+    """Return a content security policy that allows these styles and scripts, and nothing from other files."""
     return (
         f"default-src 'none'; img-src data:; base-uri 'none'; form-action 'none'; "
         f"style-src {_hashes(styles)}; script-src {_hashes(scripts)}"
@@ -207,6 +223,9 @@ def _hashes(contents: Sequence[str]) -> str:
 
 
 def _escaped(value: object) -> str:
-    """Return text escaped for elements and quoted attributes, with invalid characters of UTF-8 or HTML replaced."""
+    """Return text that is escaped for elements and quoted attributes.
+
+    Characters that UTF-8 or HTML does not allow are replaced.
+    """
     whole = str(value).encode("utf-8", "replace").decode()
     return escape(whole.translate(_CONTROLS), quote=True)

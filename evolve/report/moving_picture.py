@@ -1,4 +1,4 @@
-"""An episode as a GIF or video: the world from above with the agent's path, next to its eyes' signals."""
+"""Export of an episode as a GIF or a video, with the world from above next to the signals of the animal's eyes."""
 
 from __future__ import annotations
 
@@ -21,17 +21,17 @@ from sim.worlds.ground_plan import GroundPlan
 
 __all__ = ["require_ffmpeg", "write_gif", "write_mp4"]
 
-HEIGHT, ASIDE, GAP = 320, 150, 10  # height, maximum width of the eyes' column, and gap, in pixels
-SMOOTH = 2  # scale of the drawing before it is reduced, for smooth edges
-SPEED = 2.0  # relative to real time
-LONGEST = 150  # maximum number of frames, because noise hardly compresses
-FIELD = "#c9e0ef"  # fields of view
+HEIGHT, ASIDE, GAP = 320, 150, 10  # height, maximum width of the column with the eyes, and gap before it [pixels]
+SMOOTH = 2  # factor by which the drawing is larger before it is reduced, so that edges are smooth
+SPEED = 2.0  # speed relative to real time
+LONGEST = 150  # maximum number of frames in a GIF, which limits its size, because noise hardly compresses
+FIELD = "#c9e0ef"  # colour of fields of view
 OWN = (INK, MUTED, PAPER, PANEL, ACCENT, VERMILLION, GREEN, FIELD)
 LEVELS = (0, 51, 102, 153, 204, 255)  # values of red, green and blue for the eyes' signals
 
 
 def write_gif(episode: Episode, path: Path) -> Path:
-    """Write an episode as a repeating GIF, completely or not at all, and return its path."""
+    """Write an episode as a GIF that repeats, completely or not at all, and return its path."""
     stride = max(1, -(-len(episode) // LONGEST))
     palette = _palette()
     first, *rest = (picture.quantize(palette=palette, dither=Image.Dither.NONE) for picture in _frames(episode, stride))
@@ -65,7 +65,7 @@ def write_mp4(episode: Episode, path: Path) -> Path:
     """
     frames = _frames(episode, stride=1)
     first = next(frames)
-    # Colours are stored for squares of four pixels, so width and height must be even.
+    # H.264 stores one colour for each square of four pixels, so width and height must be even.
     width, height = (2 * (n // 2) for n in first.size)
     with unfinished(path) as neighbour:
         film = require_ffmpeg().write_frames(
@@ -75,7 +75,7 @@ def write_mp4(episode: Episode, path: Path) -> Path:
             quality=8,
             codec="libx264",
             macro_block_size=2,
-            output_params=["-f", "mp4", "-movflags", "+faststart"],  # a temporary file has no format ending
+            output_params=["-f", "mp4", "-movflags", "+faststart"],  # the temporary file's name does not end in .mp4
         )
         film.send(None)
         for picture in chain([first], frames):
@@ -85,13 +85,13 @@ def write_mp4(episode: Episode, path: Path) -> Path:
 
 
 def _frames(episode: Episode, stride: int) -> Iterator[Image.Image]:
-    """Return the frames at every stride-th time."""
+    """Return the frames of an episode, at every `stride`-th time step."""
     eyes = display(episode.signals, episode.gain)
     return (_frame(_world(episode, time), eyes[time]) for time in range(0, len(episode), stride))
 
 
 def _palette() -> Image.Image:
-    """Return the palette of all frames: the drawing's colours and a colour cube."""
+    """Return the palette of the GIF: the colours of the drawing, and a cube of colours for the eyes' signals."""
     own = [int(name[i : i + 2], 16) for name in OWN for i in (1, 3, 5)]
     cube = [level for colour in product(LEVELS, repeat=3) for level in colour]
     palette = Image.new("P", (1, 1))
@@ -100,7 +100,10 @@ def _palette() -> Image.Image:
 
 
 def _world(episode: Episode, time: int) -> Image.Image:
-    """Return the world from above at one time; without a ground plan, the latest rendered image, or nothing."""
+    """Return an image of the world at one time: from above, if the task has a ground plan.
+
+    Otherwise, the latest rendered image is returned; without rendered images, an image of width 0.
+    """
     plan, pictures = episode.plan, episode.pictures
     if plan is None:
         if pictures is None:
@@ -116,7 +119,7 @@ def _world(episode: Episode, time: int) -> Image.Image:
 
 
 def _frame(world: Image.Image, seen: np.ndarray) -> Image.Image:
-    """Return one frame: the world on the left, and the eyes one below the other on the right."""
+    """Return one frame, with the world on the left, and the signals of all eyes in a column on the right."""
     width = world.width
     room = (HEIGHT - GAP * (len(seen) - 1)) / len(seen)
     size = min(ASIDE / seen.shape[2], room / seen.shape[1])
@@ -130,7 +133,10 @@ def _frame(world: Image.Image, seen: np.ndarray) -> Image.Image:
 
 
 def _draw_world(draw: ImageDraw.ImageDraw, episode: Episode, plan: GroundPlan, time: int, scale: float) -> None:
-    """Draw walls, objects, path so far, fields of view and the agent, in pixels of the large drawing."""
+    """Draw walls, objects, the path so far, fields of view and the agent.
+
+    scale: pixels of the enlarged drawing per metre
+    """
 
     def place(x: float, y: float) -> tuple[float, float]:
         return (x - plan.bounds[0]) * scale, (plan.bounds[3] - y) * scale

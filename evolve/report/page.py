@@ -1,4 +1,4 @@
-"""The report's page: its sections, and the captions of its figures."""
+"""The page of a report: its sections, and the captions of its figures."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ VISION = {
 
 
 def header(run: Run) -> Html:
-    """Return the title, the aim of the run, and a sentence on the best candidate."""
+    """Return the header: title, aim of the run, and a sentence on the best candidate."""
     card = run.config.card
     return html(
         '<header><p class="kicker">rhabdom · evolution report · {}</p>\n<h1>{}</h1>\n'
@@ -53,7 +53,7 @@ def header(run: Run) -> Html:
 
 
 def _best_in_a_sentence(run: Run) -> Html:
-    """Return a sentence on the best candidate and its success."""
+    """Return a sentence on the best candidate's eyes and its success."""
     if (best := run.best) is None:
         return Html()
     animal = best.phenotype
@@ -113,7 +113,7 @@ def fitness_section(run: Run) -> Html:
 
 
 def genes_section(run: Run) -> Html:
-    """Return the section with every open gene over the generations, by cluster, and the acuity."""
+    """Return the section with the genes that the search varies, by cluster, and the acuity, over the generations."""
     if not run.candidates:
         return Html()
     parts = [
@@ -171,7 +171,7 @@ def _relief(run: Run, genes: list[Gene]) -> Html:
 
 
 def vision_section(run: Run, doing: Doing) -> Html:
-    """Return the section with image quality and contrast of the best eyes so far, over the generations."""
+    """Return the section with image quality and contrast of the best eyes so far in each generation."""
     best = champions(run.candidates)
     if not best:
         return Html()
@@ -223,7 +223,7 @@ def episode_section(run: Run, episode: Episode) -> Html:
 
 
 def _makers(run: Run, episode: Episode | None) -> Iterator[tuple[str, Callable[[Doing], Html]]]:
-    """Yield the page's sections in order, each as a progress message and a function that makes it."""
+    """Yield, for each section of the page in order, a progress message and a function that returns the section."""
     if (best := run.best) is not None and episode is not None:
         yield "the episode's player", lambda doing: episode_section(run, episode)
         yield "the first animal and the best", lambda doing: animals_section(run)
@@ -240,14 +240,18 @@ def _makers(run: Run, episode: Episode | None) -> Iterator[tuple[str, Callable[[
 
 
 def _within(doing: Doing, done: int, of: int, what: str, share: float) -> None:
-    """Report the progress within a section as a share of all sections."""
+    """Report progress within a section as a share of the whole page.
+
+    done: number of completed sections · of: number of all sections · share: completed share of the current section
+    """
     doing(what, (done + share) / of)
 
 
 def render(run: Run, episode: Episode | None, doing: Doing = in_silence) -> bytes:
-    """Return the whole page; `episode` is None if no candidate has succeeded.
+    """Return the whole page.
 
-    doing: called with the current step and the share done, [0, 1]
+    episode: an episode of the best candidate; None if no candidate has succeeded
+    doing: function that is called with the current step and the completed share of the work, in [0, 1]
     """
     makers = list(_makers(run, episode))
     parts = []

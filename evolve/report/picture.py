@@ -1,4 +1,4 @@
-"""Signals of receptors as images: sRGB encoding, PNG files and sheets of many frames."""
+"""Conversion of signals to images: sRGB encoding, PNG files, and sheets that contain many frames."""
 
 from __future__ import annotations
 
@@ -15,10 +15,12 @@ SHEET_WIDTH = 4096  # maximum width of a sheet in pixels, which every browser ca
 
 
 def display(signals: NDArray[np.floating], gain: float = 1.0) -> NDArray[np.uint8]:
-    """Return signals (..., channel, y, x) as sRGB pixels (..., y, x, 3), with channels as linear red, green and blue.
+    """Return signals (..., channel, y, x) as sRGB pixels (..., y, x, 3).
 
-    Fewer than three channels appear as grey (their mean); of more than three, the first three are used.
-    IEC 61966-2-1:1999.
+    The first three channels are used as linear red, green and blue. If there are fewer, their mean is shown as grey.
+    The encoding follows IEC 61966-2-1:1999.
+
+    gain: factor by which signals are multiplied; 1 is then white
     """
     linear = np.moveaxis(np.asarray(signals, dtype=np.float64), -3, -1)
     linear = linear[..., :3] if linear.shape[-1] >= 3 else linear.mean(axis=-1, keepdims=True).repeat(3, axis=-1)
@@ -28,9 +30,9 @@ def display(signals: NDArray[np.floating], gain: float = 1.0) -> NDArray[np.uint
 
 
 def png(pixels: NDArray[np.uint8]) -> bytes:
-    """Return an 8-bit RGB PNG of pixels (y, x, 3) (PNG specification, 3rd ed., sections 5 and 11).
+    """Return the contents of an 8-bit RGB PNG file with the pixels (y, x, 3).
 
-    The same pixels give the same bytes.
+    The same pixels give the same bytes. Source: PNG specification, 3rd ed., sections 5 and 11.
     """
     height, width, _ = pixels.shape
     rows = np.concatenate([np.zeros((height, 1), np.uint8), pixels.reshape(height, 3 * width)], axis=1)
@@ -43,14 +45,14 @@ def png(pixels: NDArray[np.uint8]) -> bytes:
 
 
 def data_uri(pixels: NDArray[np.uint8]) -> str:
-    """Return the PNG of pixels (y, x, 3) as a data URI for an attribute `src`."""
+    """Return pixels (y, x, 3) as a data URI that contains a PNG, for an attribute `src`."""
     return "data:image/png;base64," + base64.b64encode(png(pixels)).decode("ascii")
 
 
 def film_sheet(frames: NDArray[np.uint8]) -> tuple[NDArray[np.uint8], int]:
-    """Return frames (time, eye, y, x, 3) on one sheet (y, x, 3), and the number of frames in a row.
+    """Return a sheet (y, x, 3) that contains all frames (time, eye, y, x, 3), and the number of frames in a row.
 
-    A frame contains all eyes side by side; frames fill the sheet row by row.
+    A frame contains all eyes side by side. The frames fill the sheet row by row.
     """
     time, eyes, height, width, _ = frames.shape
     columns = max(1, min(time, SHEET_WIDTH // (eyes * width)))

@@ -1,4 +1,4 @@
-"""Rendered images of an episode on a page: their figure, and their data for the player."""
+"""Rendered images of an episode on a page: the figure that shows them, and the data for the player."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from evolve.report.picture import SHEET_WIDTH
 __all__ = ["figure_of_pictures", "film_of_pictures"]
 
 WIDTH = 320  # width of an image on a page, in pixels
-QUALITY = 80  # quality of JPEG, whose artefacts are invisible at this size
+QUALITY = 80  # quality of JPEG; artefacts are invisible at this size of the images
 
 
 def figure_of_pictures(pictures: Pictures) -> Html:
@@ -34,7 +34,10 @@ def figure_of_pictures(pictures: Pictures) -> Html:
 
 
 def film_of_pictures(pictures: Pictures, kept: np.ndarray) -> dict[str, Any]:
-    """Return the images' part of the data for player.js, for the selected frames."""
+    """Return the part of the data for player.js that contains the images.
+
+    kept: time steps that the player shows
+    """
     size = _size(pictures)
     columns = max(1, min(len(pictures.pixels), SHEET_WIDTH // size[1]))
     shown = np.searchsorted(pictures.times, kept, side="right") - 1
@@ -45,13 +48,13 @@ def film_of_pictures(pictures: Pictures, kept: np.ndarray) -> dict[str, Any]:
 
 
 def _size(pictures: Pictures) -> tuple[int, int]:
-    """Return the size of the images on a page (height, width) [pixels]."""
+    """Return the size of the images on a page, (height, width) [pixels]."""
     height, width = pictures.pixels.shape[1:3]
     return round(WIDTH * height / width), WIDTH
 
 
 def _sheet(pictures: np.ndarray, size: tuple[int, int], columns: int) -> Image.Image:
-    """Return all images on one sheet, filled row by row."""
+    """Return a sheet that contains all images, row by row."""
     height, width = size
     sheet = Image.new("RGB", (columns * width, -(-len(pictures) // columns) * height))
     for number, picture in enumerate(pictures):

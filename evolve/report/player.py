@@ -1,4 +1,4 @@
-"""Player of a recorded episode: trajectory from above, signals of each eye, and accumulated reward."""
+"""Player of a recorded episode on a page, with the path from above, the signals of each eye, and the reward so far."""
 
 from __future__ import annotations
 
@@ -16,9 +16,10 @@ from sim.worlds.ground_plan import GroundPlan
 
 __all__ = ["episode_sentence", "player", "write_player"]
 
-LARGEST_FILM = 1_500_000  # maximum bytes of pixels per sheet, which limits the page's size; noise hardly compresses
+# Maximum size of the pixels on a sheet [bytes]. It limits the size of the page, because noise hardly compresses.
+LARGEST_FILM = 1_500_000
 EVENTS = ("goal", "adversary")  # reward terms that player.js marks when they differ from 0
-TERM_COLOURS = ("accent", "green", "vermillion", "purple")  # the same as in player.js
+TERM_COLOURS = ("accent", "green", "vermillion", "purple")  # player.js uses the same colours
 
 
 def write_player(episode: Episode, path: Path) -> Path:
@@ -33,7 +34,7 @@ def write_player(episode: Episode, path: Path) -> Path:
 
 
 def episode_sentence(episode: Episode) -> str:
-    """Return one sentence with the outcome of the episode."""
+    """Return one or two sentences with the outcome of the episode."""
     total = rounded(float(episode.reward.sum(dtype=np.float64)), 4)
     terms = ", ".join(f"{name} {rounded(float(term.sum()))}" for name, term in episode.reward_terms.items())
     parts = f" ({terms})" if terms else ""
@@ -42,7 +43,7 @@ def episode_sentence(episode: Episode) -> str:
 
 
 def player(episode: Episode) -> Html:
-    """Return the player's element; its page needs player.js."""
+    """Return the player as an element; its page must include the script player.js."""
     film = json_script(_film(episode), "film")
     left, right = _world(episode) + _controls(episode), _sights(episode) + _score(episode)
     return html(
@@ -54,7 +55,7 @@ def player(episode: Episode) -> Html:
 
 
 def _world(episode: Episode) -> Html:
-    """Return the view from above, or rendered images."""
+    """Return the figure of the world: from above, if the task has a ground plan, otherwise rendered images."""
     if episode.plan is not None:
         return _from_above(episode.plan)
     return Html() if episode.pictures is None else figure_of_pictures(episode.pictures)
@@ -82,7 +83,7 @@ def _from_above(plan: GroundPlan) -> Html:
 
 
 def _sights(episode: Episode) -> Html:
-    """Return a pair of canvases per eye: its signals, and its signals behind a perfect lens."""
+    """Return a pair of canvases for each eye, which show its signals and the signals behind a perfect lens."""
     eyes, gain = episode.eyes, episode.gain
     height, width = eyes.resolution
     room = 140 if eyes.n_eyes <= 2 else 88 if eyes.n_eyes <= 6 else 60
@@ -124,7 +125,7 @@ def _controls(episode: Episode) -> Html:
 
 
 def _score(episode: Episode) -> Html:
-    """Return the figure of cumulated reward by term."""
+    """Return the figure of the reward so far, by term."""
     names = [*episode.reward_terms, "total"]
     colours = [TERM_COLOURS[i % len(TERM_COLOURS)] for i in range(len(names) - 1)] + ["ink"]
     cells = joined(
@@ -141,7 +142,7 @@ def _score(episode: Episode) -> Html:
 
 
 def _film(episode: Episode) -> dict[str, Any]:
-    """Return the data for player.js, for the selected frames."""
+    """Return the data for player.js, at the time steps that the player shows."""
     kept, eyes = _kept(episode), episode.eyes
     terms = {name: np.cumsum(term, dtype=np.float64)[kept] for name, term in episode.reward_terms.items()}
     seen, columns = film_sheet(display(episode.signals[kept], episode.gain))
@@ -159,7 +160,10 @@ def _film(episode: Episode) -> dict[str, Any]:
 
 
 def _film_of_world(episode: Episode, kept: np.ndarray) -> dict[str, Any]:
-    """Return the world's part of the data: positions [m], angles [rad] and commands, or rendered images."""
+    """Return the part of the data that describes the world: positions [m], angles [rad] and commands.
+
+    Without a ground plan, it contains rendered images and commands.
+    """
     plan, commands = episode.plan, _commands(episode, kept)
     if plan is None:
         return commands | ({} if episode.pictures is None else film_of_pictures(episode.pictures, kept))
@@ -181,7 +185,11 @@ def _film_of_world(episode: Episode, kept: np.ndarray) -> dict[str, Any]:
 
 
 def _commands(episode: Episode, kept: np.ndarray) -> dict[str, Any]:
-    """Return speed [m/s] and turn [°], which player.js writes as a sentence, or the numbers of other actions."""
+    """Return the commands at the time steps that the player shows.
+
+    The commands speed [m/s] and turn [°] are returned by name, because player.js writes them as a sentence. Other
+    actions are returned as plain numbers.
+    """
     action = episode.action[kept]
     found = {
         command.name: command.quantity(numbers) for command, numbers in zip(episode.commands, action.T, strict=True)
@@ -192,9 +200,10 @@ def _commands(episode: Episode, kept: np.ndarray) -> dict[str, Any]:
 
 
 def _kept(episode: Episode) -> np.ndarray:
-    """Return the frames to show: all, or fewer if the number of receptors would make the page too large.
+    """Return the time steps that the player shows.
 
-    The last action is always included, because it gives the whole return and the end of the episode.
+    These are all steps, or fewer if the page would become too large because of many receptors. The last step is always
+    included, because it shows the whole return and the end of the episode.
     """
     pixels = episode.signals[0, :, 0].size * 3
     stride, last = max(1, -(-len(episode) * pixels // LARGEST_FILM)), len(episode) - 1
@@ -202,7 +211,7 @@ def _kept(episode: Episode) -> np.ndarray:
 
 
 def _events(episode: Episode, kept: np.ndarray) -> list[tuple[int, str]]:
-    """Return (frame, "goal" or "adversary") for each object reached since the frame before."""
+    """Return (frame, "goal" or "adversary") for each object that was reached, with the first frame after this."""
     found = [
         (int(np.searchsorted(kept, time)), name)
         for name in EVENTS
@@ -212,5 +221,5 @@ def _events(episode: Episode, kept: np.ndarray) -> list[tuple[int, str]]:
 
 
 def _rounded(values: np.ndarray, decimals: int = 3) -> Any:
-    """Return nested lists of rounded numbers; a millimetre is invisible in the drawing."""
+    """Return nested lists of rounded numbers; in the drawing, a millimetre is invisible."""
     return np.round(np.asarray(values, dtype=np.float64), decimals).tolist()

@@ -1,4 +1,4 @@
-"""Replay of an episode: a table in the terminal, and a page that plays it."""
+"""Replay of an episode: a page that plays it, further files, and a table of its outcome for the terminal."""
 
 from __future__ import annotations
 
@@ -24,16 +24,16 @@ BESIDE: Mapping[str, Callable[[Any, Path], Path]] = {"rrd": write_recording, "gi
 def write_replay(
     run: Run, candidate_id: int | None = None, seed: int = 0, also: Collection[str] = (), out: Path | None = None
 ) -> tuple[Episode, list[Path]]:
-    """Record an episode (default: of the best candidate), and write a page that plays it.
+    """Record an episode, write a page that plays it, and return the episode and the paths of all files.
 
-    Return the episode and the paths of the files.
-
-    also: additional files, of BESIDE: "rrd", a recording for rerun, and "gif" and "mp4"
-    out: path of the page; None for the run directory
+    candidate_id: id of the candidate that plays; None: the best candidate
+    seed: seed of the episode
+    also: formats of additional files next to the page: "rrd" (a recording for rerun), "gif" and "mp4"
+    out: path of the page; None: a name in the run directory
 
     Raises:
-        RunError: the candidate does not exist, or has no policy.
-        ConfigError: rerun or ffmpeg is needed but not installed, or `out` has the ending of one of the other files.
+        RunError: the candidate does not exist, or it has no policy.
+        ConfigError: rerun or ffmpeg is needed but not installed, or `out` has the ending of an additional file.
         StrangeFileError: `out` is not a regular file, for example a directory.
     """
     if out is not None:
@@ -48,7 +48,7 @@ def write_replay(
 
 
 def _require_page(out: Path) -> None:
-    """Check the path of the page, before an episode is played."""
+    """Check the path of the page. The check comes first, because playing an episode takes time."""
     require_file_name(out)
     if (form := out.suffix.lower().removeprefix(".")) in BESIDE:
         page = out.with_suffix(".html")
@@ -58,13 +58,13 @@ def _require_page(out: Path) -> None:
 def write_page(run: Run, episode: Episode, out: Path | None = None) -> Path:
     """Write the page that plays an episode of a run, to `out` or into the run directory, and return its path."""
     path = out or run.path / f"replay_candidate{episode.candidate_id:06d}_seed{episode.seed}.html"
-    if out is not None:  # the run directory is not created again if it was deleted meanwhile
+    if out is not None:  # a run directory that was deleted meanwhile must not reappear
         path.parent.mkdir(parents=True, exist_ok=True)
     return write_player(episode, path)
 
 
 def episode_facts(episode: Episode) -> dict[str, Any]:
-    """Return the outcome of an episode: return, its terms, and the objects that were reached."""
+    """Return the outcome of an episode by name, such as its return, the terms of the return, and counts of events."""
     return {
         "task": episode.task,
         "candidate": episode.candidate_id,

@@ -1,4 +1,4 @@
-"""Layout in which rerun opens a recording: the world, numbers over time, and the images of each eye."""
+"""Layout in which rerun shows a recording: the world, numbers over time, and the images of each eye."""
 
 from __future__ import annotations
 
@@ -9,11 +9,13 @@ from evolve.report.rerun_bodies import EYES
 
 __all__ = ["layout"]
 
-ACROSS = 4  # number of eyes side by side
+ACROSS = 4  # maximum number of eyes side by side
 
 
 def layout(rr: Any, episode: Episode) -> Any:
-    """Return a blueprint for `rerun_recording`'s entities; without it the viewer superimposes the images of all eyes.
+    """Return a blueprint (rerun's description of a layout) for the entities that `rerun_recording` logs.
+
+    Without a blueprint, the viewer would superimpose the images of all eyes.
 
     rr: the package rerun
     """

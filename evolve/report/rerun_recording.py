@@ -1,11 +1,15 @@
-"""Recording of an episode for the viewer rerun (`rerun FILE.rrd`); needs the extra `rerun`.
+"""Recording of an episode for the viewer rerun, which opens it with `rerun FILE.rrd`. It needs the extra `rerun`.
 
-Timelines: `action` counts actions, `time` is the world's time [s].
-Entities: `world` contains `bodies`, the animal's `path` and its `eyes`, each a camera with an image of its signals.
-`signals` contains the signals as numbers (channel, y, x), and `perfect_lens` the signals of the same receptors behind a
-perfect lens. `scene` contains the signals of a finer grid behind a perfect lens. `action`, `reward` with its terms, and
-other entries of the observation, such as `contact` or `feels`, are numbers over time. `outcome` is the outcome of the
-episode.
+A recording has two timelines: `action` is the number of the action, `time` is the time in the world [s]. It has the
+following entities.
+
+`world` contains `bodies`, the animal's `path` and its `eyes`. Each eye is a camera with an image of its signals.
+
+`signals` contains the same signals as numbers, (channel, y, x). `perfect_lens` contains images of the signals of the
+same receptors behind a perfect lens. `scene` contains images of the scene in front of each eye, on a finer grid.
+
+`action`, `reward` with its terms, and other entries of the observation, such as `contact` or `feels`, are numbers over
+time. `outcome` is the outcome of the episode.
 """
 
 from __future__ import annotations
@@ -39,11 +43,11 @@ def write_recording(episode: Episode, path: Path) -> Path:
     stream = rr.RecordingStream("rhabdom", recording_id=name, send_properties=False)
     opens_with = layout(rr, episode)
     strict = rr.strict_mode()
-    rr.set_strict_mode(True)  # by default it only warns about arguments that it does not accept, and omits them
+    rr.set_strict_mode(True)  # otherwise, rerun omits invalid arguments with only a warning
     try:
         with unfinished(path) as neighbour:
             stream.save(neighbour, default_blueprint=opens_with)
-            stream.set_log_time_enabled(False)  # the time of writing is unrelated to the episode
+            stream.set_log_time_enabled(False)  # rerun would add timelines for the time of writing
             stream.set_log_tick_enabled(False)
             _write(RerunStream(rr, stream, episode.seconds), episode)
             stream.flush()
@@ -64,7 +68,7 @@ def _write(to: RerunStream, episode: Episode) -> None:
 
 
 def _look(to: RerunStream, episode: Episode) -> None:
-    """Log the signals of each eye, those behind a perfect lens, and the scene before each action."""
+    """Log, before each action, the signals of each eye, those behind a perfect lens, and the scene if recorded."""
     rr, weights = to.rr, episode.eyes.eye().spectral_bands.weights
     gain = episode.gain
     scenes = {int(t): frame for frame, t in enumerate(episode.radiance_frames)}
@@ -80,7 +84,7 @@ def _look(to: RerunStream, episode: Episode) -> None:
 
 def _count(to: RerunStream, episode: Episode) -> None:
     """Log numbers over time: rewards by term, commands, and other entries of the observation."""
-    numbers: dict[tuple[str, ...], np.ndarray] = {("reward",): episode.reward}  # no term has its name
+    numbers: dict[tuple[str, ...], np.ndarray] = {("reward",): episode.reward}  # its terms are below it
     numbers |= {("reward", name): term for name, term in episode.reward_terms.items()}
     commands = zip(episode.commands, episode.action.T, strict=True)
     numbers |= {("action", command.name): commanded for command, commanded in commands}

@@ -1,4 +1,4 @@
-"""Writer of recordings for rerun."""
+"""RerunStream: writer of a recording for rerun."""
 
 from __future__ import annotations
 
@@ -31,11 +31,12 @@ def require_rerun() -> Any:
 
 @dataclass(frozen=True)
 class RerunStream:
-    """Stream of a recording.
+    """Writer of a recording.
 
-    rr: the package · stream: rr.RecordingStream · seconds: duration of one action
+    rr: the package rerun · stream: an rr.RecordingStream · seconds: duration of one action [s]
 
-    Entities are specified by their parts, ("world", "goal"), because names may contain any characters.
+    An entity is specified by the parts of its path, such as ("world", "goal"), because names may contain any
+    characters.
     """
 
     rr: Any
@@ -43,23 +44,26 @@ class RerunStream:
     seconds: float
 
     def always(self, entity: tuple[str, ...], *what: Any) -> None:
-        """Log constant data."""
+        """Log data of an entity that do not change over time."""
         self.stream.log(list(entity), *what, static=True)
 
     def log(self, t: int, entity: tuple[str, ...], what: Any) -> None:
-        """Log the state before action t."""
+        """Log data of an entity before action t."""
         self.stream.set_time("action", sequence=t)
         self.stream.set_time("time", duration=t * self.seconds)
         self.stream.log(list(entity), what)
 
     def columns(self, entity: tuple[str, ...], n: int, columns: Any) -> None:
-        """Log the states before each of n actions."""
+        """Log data of an entity before each of n actions.
+
+        columns: the data, as rerun's columns
+        """
         actions, rr = np.arange(n), self.rr
         times = [rr.TimeColumn("action", sequence=actions), rr.TimeColumn("time", duration=actions * self.seconds)]
         rr.send_columns(rr.new_entity_path(list(entity)), times, columns, recording=self.stream)
 
     def camera(self, entity: tuple[str, ...], eyes: sim.Eyes) -> None:
-        """Log an entity as a camera for one of these eyes, which looks along z with x to the right and y down."""
+        """Log an entity as a camera with the field of view of these eyes. It looks along z, with x right and y down."""
         height, width = eyes.resolution
         focal_length = width / (2 * math.tan(math.radians(eyes.fov_deg) / 2))  # in receptors
         axes = self.rr.ViewCoordinates.RDF
@@ -71,6 +75,8 @@ class RerunStream:
 
 
 def camera_frames(rotations: np.ndarray) -> np.ndarray:
-    """Return right-handed camera frames, columns (right, down, ahead), of eyes' frames (..., 3, 3), columns
-    (right, up, ahead)."""
+    """Return the frames of eyes as right-handed frames of cameras, (..., 3, 3).
+
+    The columns of an eye's frame are (right, up, ahead), those of a camera's frame (right, down, ahead).
+    """
     return rotations * np.array([1, -1, 1])

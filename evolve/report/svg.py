@@ -1,6 +1,6 @@
-"""Matplotlib figures as inline SVG that follows the page's theme.
+"""Conversion of Matplotlib figures to SVG elements, which follow the page's light or dark theme.
 
-Without pyplot and its state, the same figure gives the same bytes.
+The module does not use pyplot, which has a global state. The same figure therefore gives the same bytes.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from evolve.report.theme import INK, LINE, MUTED, VARIABLES
 __all__ = ["drawing", "inline", "label"]
 
 _STYLE = {
-    "svg.fonttype": "none",  # text elements are small and selectable, in the reader's font
+    "svg.fonttype": "none",  # text as text elements, which are small, and which readers can select
     "axes.spines.top": False,
     "axes.spines.right": False,
     "axes.edgecolor": LINE,
@@ -49,7 +49,7 @@ _STYLE = {
 
 @contextmanager
 def drawing(width: float, height: float, font: float = 11.0) -> Iterator[Figure]:
-    """Create a figure of `width` x `height` SVG units; within the context, Matplotlib uses the report's style."""
+    """Create a figure of `width` x `height` SVG units. Within the context, Matplotlib uses the style of the report."""
     sizes = {"font.size": font, "axes.titlesize": font, "axes.labelsize": font, "legend.fontsize": font}
     ticks = {"xtick.labelsize": font - 1, "ytick.labelsize": font - 1}
     with matplotlib.rc_context({**_STYLE, **sizes, **ticks}):
@@ -57,15 +57,20 @@ def drawing(width: float, height: float, font: float = 11.0) -> Iterator[Figure]
 
 
 def label(name: str) -> str:
-    """Return an untrusted name as a label: never parsed as a formula, and without unprintable characters."""
+    """Return an untrusted name as a label for Matplotlib.
+
+    "$" is escaped, so that the name is not parsed as a formula, and unprintable characters are replaced.
+    """
     plain = "".join(letter if letter.isprintable() else "\ufffd" for letter in name)
     return plain.replace("$", r"\$")
 
 
 def inline(figure: Figure, name: str, alt: str) -> Html:
-    """Return the figure as an <svg> element; `name` makes its ids unique on the page.
+    """Return a figure as an <svg> element.
 
-    Its styles are moved to the page's style sheet, because of the page's policy.
+    The page's policy does not allow styles in elements, so these are moved to the page's style sheet.
+
+    name: prefix of the ids in the element, unique on the page · alt: description of the figure for screen readers
     """
     buffer = io.StringIO()
     with matplotlib.rc_context({"svg.hashsalt": name, "svg.fonttype": "none"}):
@@ -73,7 +78,7 @@ def inline(figure: Figure, name: str, alt: str) -> Html:
         FigureCanvasSVG(figure).print_svg(buffer, metadata=nothing)
     text = buffer.getvalue()
     text = text[text.index("<svg") :]
-    # The only rule in Matplotlib's style element is in style.css.
+    # Matplotlib's style element is removed; its only rule is in style.css.
     text = re.sub(r"<metadata>.*?</metadata>\s*|<!--.*?-->\s*|<style.*?</style>\s*", "", text, flags=re.DOTALL)
     view_box = re.search(r'viewBox="[^"]*"', text)
     assert view_box is not None
@@ -84,13 +89,16 @@ def inline(figure: Figure, name: str, alt: str) -> Html:
 
 
 def _with_looks(text: str) -> Html:
-    """Replace attributes `style` by `data-look`; quotes in the figure's text are escaped, so text never matches."""
+    """Replace the attributes `style` by `data-look`. The figure's text cannot match, because its quotes are escaped."""
     pieces = re.split(r' style="([^"]*)"', text)
     return joined(html(" {}", style(unescape(piece))) if at % 2 else Html(piece) for at, piece in enumerate(pieces))
 
 
 def _with_own_ids(text: str, name: str) -> str:
-    """Prefix referenced ids with the figure's name and remove all other ids; links to other targets stay unchanged."""
+    """Prefix ids that are referenced in the figure with its name, and remove other ids.
+
+    Links to targets outside the figure remain unchanged.
+    """
     used = set(re.findall(r'(?:url\(#|href="#)([^")]+)', text)) & set(re.findall(r' id="([^"]+)"', text))
     text = re.sub(r' id="([^"]+)"', lambda m: f' id="{name}-{m[1]}"' if m[1] in used else "", text)
     return re.sub(

@@ -1,4 +1,4 @@
-"""Tables of the report: headline numbers, genes of the best candidate, all candidates, failures, facts of the run."""
+"""Tables of the report: main results, genes of the best candidate, all candidates, failures, and facts of the run."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ __all__ = ["all_candidates", "best_genes", "episode_failures", "failures", "head
 
 
 def headline(run: Run) -> Html:
-    """Return the most important numbers of the run."""
+    """Return the main results of the run."""
     failed = sum(not succeeded(c) for c in run.candidates)
     generations = len({c.generation for c in run.candidates})
     seconds = sum(c.seconds for c in run.candidates)
@@ -66,7 +66,7 @@ def best_genes(run: Run, best: Candidate) -> Html:
 
 
 def _gene_row(run: Run, names: list[str], values: dict[str, float]) -> list[str | Html]:
-    """Return the table row of one gene, or of the genes in one row of the relief."""
+    """Return a row of the table: for one gene, or for all genes in one row of the relief."""
     genes, uses = [ALL_GENES[name] for name in names], [run.config.genome[name] for name in names]
     name, meaning = names[0], genes[0].meaning
     if len(names) > 1:
@@ -78,7 +78,7 @@ def _gene_row(run: Run, names: list[str], values: dict[str, float]) -> list[str 
 
 
 def all_candidates(run: Run) -> Html:
-    """Return a table with one row per candidate, sorted by id, with the best one emphasised."""
+    """Return a table with a row for each candidate, sorted by id; the row of the best candidate is emphasised."""
     header = [
         *("no.", "gener\u00adation", "fitness", "lowest", "highest", "solved [%]"),
         *("eyes", "placement [°]", "fov [°]", "receptors (h × w)", "acuity [cpd]"),
@@ -112,7 +112,7 @@ def _traits(phenotype: Phenotype) -> list[str]:
 
 
 def failures(run: Run) -> Html:
-    """Return the table of failed candidates with the reasons; "" if no candidate failed."""
+    """Return the table of failed candidates with the reasons; empty if no candidate has failed."""
     failed = [c for c in run.candidates if not succeeded(c)]
     if not failed:
         return Html()
@@ -121,7 +121,7 @@ def failures(run: Run) -> Html:
 
 
 def episode_failures(run: Run) -> Html:
-    """Return the table of failures that ended single episodes, with their numbers; "" if there are none."""
+    """Return the table of failures that ended single episodes, with their numbers; empty if there are none."""
     found = episode_failures_of(run.candidates)
     if not found:
         return Html()
@@ -134,7 +134,7 @@ def episode_failures(run: Run) -> Html:
 
 
 def run_facts(run: Run) -> Html:
-    """Return the facts of the run: settings, seeds and software."""
+    """Return facts of the run, such as its settings, its seeds and the versions of the software."""
     versions = recorded(run.path)
     commit = versions.pop("commit", "") or "not recorded"
     software = ", ".join(f"{name} {version}" for name, version in versions.items()) or "not recorded"

@@ -1,8 +1,8 @@
-"""Colours of the report: one accent and colours after the palette of Okabe & Ito.
+"""Colours of the report, after the palette of Okabe and Ito, which colour-blind readers can distinguish.
 
-Colour-blind readers can distinguish the colours of this palette. All are dark enough for text on paper (contrast of at
-least 4.5, WCAG 2.2, 1.4.3). Every colour has a light and a dark value. Figures are drawn with the light values; `svg`
-converts these to CSS variables, so that figures follow the page's theme.
+Every colour has a value for light pages and a value for dark pages. All are suitable for text on paper: their contrast
+is at least 4.5 (WCAG 2.2, 1.4.3). Figures are drawn with the light values. The module `svg` replaces these by CSS
+variables, so that figures follow the page's theme.
 """
 
 from __future__ import annotations
@@ -24,10 +24,10 @@ __all__ = [
 ]
 
 INK, MUTED, LINE, PAPER, PANEL = "#1d2329", "#5c6670", "#d8dde2", "#fefefe", "#f5f6f8"
-WALL = "#59636d"  # walls of a ground plan; on dark pages with the minimum contrast for visibility (3)
+WALL = "#59636d"  # walls of a ground plan; on dark pages, the contrast is the minimum for visibility (3)
 ACCENT, VERMILLION, GREEN, PURPLE = "#0072b2", "#b34f00", "#007a59", "#a8467f"
 
-LINES = (PURPLE, ACCENT, GREEN, VERMILLION, INK, MUTED)  # colours of a figure's lines, in this order
+LINES = (PURPLE, ACCENT, GREEN, VERMILLION, INK, MUTED)  # colours of the lines in a figure, in this order
 
 _DARK = {
     "ink": (INK, "#e4e7ea"),

@@ -1,4 +1,4 @@
-"""Images at one time of an episode: the scene in front of each eye, and signals behind a perfect and its own lens."""
+"""Images at one time of an episode: the scene, and each eye's signals behind a perfect lens and its own optics."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from evolve.report.picture import data_uri, display
 
 __all__ = ["through_optics", "what_it_sees"]
 
-WIDTH = 120  # width of one image in CSS pixels if there are few eyes
-MOST_EYES = 6
+WIDTH = 120  # length of the longer side of an image [CSS pixels]
+MOST_EYES = 6  # maximum number of eyes that are shown
 
 
 def what_it_sees(episode: Episode) -> Html:
-    """Return the images with their caption."""
+    """Return the images of each eye with their caption."""
     frame = _busiest(episode)
     time = int(episode.radiance_frames[frame])
     lens, names, gain = episode.eyes.eye(), episode.eyes.names(), episode.gain
@@ -39,9 +39,10 @@ def what_it_sees(episode: Episode) -> Html:
 
 
 def _busiest(episode: Episode) -> int:
-    """Return the recorded frame with the largest variance along the horizon, in which the eyes see most detail.
+    """Return the frame with recorded radiance in which the eyes see most detail.
 
-    Variance in the vertical direction is ignored, because every frame shows the sky above the floor.
+    Detail is measured as the variance of radiance in the horizontal direction. Variance in the vertical direction is
+    ignored, because every frame shows the sky above the floor.
     """
     return int(np.argmax(episode.radiance.mean(axis=2).var(axis=-1).mean(axis=(1, 2))))
 
@@ -67,13 +68,13 @@ def _row(episode: Episode, eye: int, name: str, frame: int, lens: optics.Eye) ->
 
 
 def through_optics(eye: optics.Eye, radiance: np.ndarray) -> np.ndarray:
-    """Return noise-free signals (channel, h, w) of the radiance (band, y, x) in front of an eye.
+    """Return the noise-free signals (channel, h, w) of an eye in front of a scene with the radiance (band, y, x).
 
-    Beyond the image's edge the scene continues with the values at the edge, as far as the eye's kernel extends (at most
-    the width of the image).
+    Beyond the edges of the image, the values at the edges are used, as far as the kernel of the eye extends, but at
+    most over the width of the image.
     """
     samples = radiance.shape[-1] // eye.resolution[1]
     reach = min(max(eye.kernel(samples).shape[1:]) // 2, radiance.shape[-1])
-    # Cells may be wider than a rhabdom's receptive field, so that their centres would not represent it.
+    # A cell of the image may be wider than a rhabdom's receptive field. Its centre would then not represent the field.
     sight = eye.sight(samples, light_from="centres" if eye.waveguide is None else "cells")
     return eye.see(np.pad(radiance, ((0, 0), (reach, reach), (reach, reach)), mode="edge"), samples, sight=sight)

@@ -1,4 +1,4 @@
-"""Report of a run: one self-contained HTML file."""
+"""Report of a run, as one self-contained HTML file."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ FILE = "report.html"
 
 
 def write(run: Run, episode: Episode | None = None, out: Path | None = None, doing: Doing = in_silence) -> Path:
-    """Write `report.html` of a run, completely or not at all.
+    """Write the report of a run, completely or not at all, and return its path.
 
     With the same versions of the libraries, the same run gives the same bytes.
 
-    episode: an episode of the best candidate; None: it is played now
-    out: path of the file; None for `report.html` in the run directory
-    doing: called with the current step and the share done, [0, 1]
+    episode: an episode of the best candidate; None: an episode is played now
+    out: path of the file; None: `report.html` in the run directory
+    doing: function that is called with the current step and the completed share of the work, in [0, 1]
 
     Raises:
         ValueError: the best candidate's policy is missing or damaged.
@@ -33,13 +33,13 @@ def write(run: Run, episode: Episode | None = None, out: Path | None = None, doi
     from evolve.report.page import render
     from evolve.store.atomic_files import require_file_name, write_whole
 
-    if out is not None:  # checked before an episode is played
+    if out is not None:  # checked first, because playing an episode takes time
         require_file_name(out)
     if episode is None and run.best is not None:
         doing("the best agent plays an episode", 0.0)
         episode = record(run)
     path = out or run.path / FILE
-    if out is not None:  # the run directory is not created again if it was deleted meanwhile
+    if out is not None:  # a run directory that was deleted meanwhile must not reappear
         path.parent.mkdir(parents=True, exist_ok=True)
     write_whole(path, render(run, episode, doing))
     return path

@@ -1,4 +1,4 @@
-"""Start of a run: its settings are assembled and checked, then its directory is created."""
+"""Start of a run: its settings are collected from all sources and checked, then its directory is created."""
 
 from __future__ import annotations
 
@@ -25,12 +25,13 @@ RunT = TypeVar("RunT", bound=Run)
 class RunRequest:
     """The choices from which the settings of a new run are assembled.
 
-    task: name, or "FILE.py:CLASS" for a user task; None if the preset or the file names one
-    preset: settings to start from
-    config: TOML file, which overrides the preset
+    task: name of a built-in task, or "FILE.py:CLASS" for a user task; None if the preset or the TOML file names the
+        task
+    preset: name of the preset from which the settings start
+    config: TOML file, whose settings override the preset
     assignments: single settings, "KEY=VALUE", which override the file
-    scale: size of an experiment
-    start_from: "RUN:ID", an animal of another run
+    scale: size of a preset that comes in several sizes, see `assemble`
+    start_from: "RUN:ID", an animal of another run, whose genes become the start values
     """
 
     task: str | None = None
@@ -43,10 +44,11 @@ class RunRequest:
 
 @dataclass(frozen=True)
 class PreparedRun:
-    """A run that can start; nothing has been written yet.
+    """Checked settings of a run, which is ready to start. Nothing has been written yet.
 
-    preset: name of the preset, which is part of the directory's name
-    origin: animal whose genes are the start values, "RUN:ID"; None without such an animal
+    config: settings of the run
+    preset: name of the preset, which becomes part of the name of the run directory
+    origin: "RUN:ID", the animal whose genes are the start values; None without such an animal
     """
 
     config: RunConfig
@@ -54,15 +56,15 @@ class PreparedRun:
     origin: str | None
 
     def directory(self, out: Path | str | None = None) -> Path:
-        """Return the directory that `create` would use now."""
+        """Return the run directory that `create` would use if it were called now."""
         return next_directory(self.config.task_name, self.preset) if out is None else Path(out)
 
     @contextmanager
     def create(self, kind: type[RunT], out: Path | str | None = None) -> Iterator[RunT]:
         """Create the run and hold its lock within the context.
 
-        kind: class of the run
-        out: run directory; runs/TASK-PRESET-N if None
+        kind: class of the returned object, `Run` or a subclass
+        out: run directory; None: runs/TASK-PRESET-N, with the first free number N
 
         Raises:
             RunError: the directory is not empty, or cannot be written.
@@ -77,12 +79,12 @@ class PreparedRun:
 
 
 def prepare_run(request: RunRequest) -> PreparedRun:
-    """Assemble the settings of a run and check that it can start on this machine; nothing is written.
+    """Collect the settings of a run, and check that the run can start on this machine. Nothing is written.
 
     Raises:
-        ConfigError: a setting is invalid, the optimizer is unknown, or the user task fails; one line.
+        ConfigError: a setting is invalid, the optimizer is unknown, or the user task fails; the message is one line.
         RunError: the animal to start from does not exist.
-        BackendError: Dr.Jit cannot find a usable LLVM.
+        BackendError: Dr.Jit cannot find a usable LLVM library.
     """
     starts = starts_from(request.start_from) if request.start_from else None
     config = assemble(request.task, request.preset, request.config, request.assignments, starts, request.scale)

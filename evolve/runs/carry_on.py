@@ -1,4 +1,4 @@
-"""Continuation of a run to its end: an executor evaluates its candidates, and watchers show the progress."""
+"""Evaluation of all candidates that are missing in a run, by an executor; watchers show the progress."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class Workers(Executor, Protocol):
 
 
 def local_workers(config: RunConfig) -> LocalExecutor:
-    """Return an executor with processes on this machine; the setting `workers` is their number."""
+    """Return an executor with processes on this machine; the setting `workers` is the number of processes."""
     return LocalExecutor(evaluate_candidate, config.workers, prepare_device)
 
 
@@ -34,12 +34,13 @@ def carry_on(
     watched: Callable[[Run, int], AbstractContextManager[Watcher]],
     workers: Callable[[RunConfig], AbstractContextManager[Workers]] = local_workers,
 ) -> None:
-    """Evaluate all candidates that the record of a run lacks; the caller holds its lock.
+    """Evaluate all candidates that are missing in the record of a run. The caller must hold the lock of the run.
 
-    After an exception, the record is intact and the run can be resumed.
+    After an exception, the record is intact, and the run can be resumed.
 
-    watched: function of the run and the number of workers that makes the watcher; entered after the executor
-    workers: function that makes the executor
+    watched: function that returns the watcher, from the run and the number of workers; it is called after the executor
+        has started
+    workers: function that returns the executor, from the settings of the run
 
     Raises:
         RunError: the record cannot be written, or this search proposes other candidates than those on record.

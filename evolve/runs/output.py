@@ -1,8 +1,8 @@
-"""Output on a terminal: everything that commands print passes through a Voice, whatever its source.
+"""Safe output of text on a terminal. Commands print all text through a Voice.
 
-Escape sequences in untrusted messages, settings and directory names are printed as text, so that they have no effect.
-Characters that the terminal's encoding lacks are printed as numbers. A run continues if a reader such as `head` closes
-its pipe.
+Messages, settings and names of directories may come from an untrusted source. Escape sequences in them are printed as
+visible text, so that they have no effect on the terminal. Characters that the terminal's encoding lacks are spelt out
+("sigma"), or printed as numbers. If a reader such as `head` closes the pipe, a run continues.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ _SPELLINGS = {"σ": "sigma", "λ": "lambda", "±": "+-", "×": "x", "°": " deg"
 
 
 def printable(text: str) -> str:
-    """Return the text with control characters escaped as in Python: "\\x1b[31m"."""
+    """Return the text with control characters escaped as in Python, for example "\\x1b[31m"."""
     if text.isascii() and text.replace("\n", "").isprintable():
         return text
     return "".join(
@@ -33,7 +33,7 @@ def printable(text: str) -> str:
 
 
 def spelled(text: str, stream: TextIO) -> str:
-    """Return the text in characters of a stream's encoding, for example "sigma" instead of σ."""
+    """Return the text in characters that the stream's encoding contains, for example "sigma" instead of σ."""
     encoding = stream.encoding or "utf-8"
     try:
         text.encode(encoding)
@@ -55,10 +55,12 @@ def _named(letter: str) -> str:
 
 
 class Voice:
-    """A text stream for output.
+    """A text stream that writes to another stream, with control characters escaped.
 
-    patient: whether to continue without output after the reader has gone; if not, BrokenPipeError ends the command
-    obeyed: whether control characters are passed on, for a progress bar, which uses escape sequences
+    stream: the stream that receives the text
+    patient: if the reader has closed the pipe, whether to continue without output; False: BrokenPipeError ends the
+        command
+    obeyed: whether control characters are written unchanged; True for a progress bar, which needs them
     """
 
     def __init__(self, stream: TextIO, patient: bool, obeyed: bool = False) -> None:
@@ -76,14 +78,14 @@ class Voice:
         try:
             speak()
         except OSError as error:
-            if error.errno not in (errno.EPIPE, errno.EIO):  # a closed pipe or terminal
+            if error.errno not in (errno.EPIPE, errno.EIO):  # other errors than a closed pipe or terminal
                 raise
             self._fall_silent()
             if not self.patient:
                 raise BrokenPipeError(error.errno, error.strerror) from error
 
     def _fall_silent(self) -> None:
-        """Discard all further output, including the contents of the buffer."""
+        """Redirect the stream to the null device, which discards the buffer and all further output."""
         nowhere = os.open(os.devnull, os.O_WRONLY)
         os.dup2(nowhere, self.stream.fileno())
         os.close(nowhere)
@@ -94,7 +96,10 @@ class Voice:
 
 @contextmanager
 def voices(patient: bool) -> Iterator[None]:
-    """Replace stdout and stderr by Voices within the context."""
+    """Replace stdout and stderr by Voices within the context.
+
+    patient: see `Voice`
+    """
     before = sys.stdout, sys.stderr
     sys.stdout, sys.stderr = (cast(TextIO, Voice(stream, patient)) for stream in before)
     try:
@@ -105,5 +110,5 @@ def voices(patient: bool) -> Iterator[None]:
 
 
 def as_it_is(stream: TextIO) -> TextIO:
-    """Return the same stream for output that may contain control characters."""
+    """Return a stream that writes to the same place, but does not escape control characters."""
     return cast(TextIO, Voice(stream.stream, stream.patient, obeyed=True)) if isinstance(stream, Voice) else stream

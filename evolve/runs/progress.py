@@ -1,4 +1,4 @@
-"""Progress of a run: a bar on a terminal, a line per candidate in other outputs, or JSON."""
+"""Display of a run's progress: a bar on a terminal, one line per candidate in other outputs, or lines of JSON."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ EVENT_S = 1.0  # minimum time between two events of one candidate's training
 
 
 class Tally:
-    """Counts of evaluations and steps since the start of this process; candidates in training count by their steps."""
+    """Counts of evaluations and training steps, from which pace and remaining time are computed."""
 
     def __init__(self, run: Run, workers: int = 1) -> None:
         self._run, self._workers = run, workers
@@ -44,18 +44,18 @@ class Tally:
 
     @property
     def done(self) -> float:
-        """Number of evaluations so far; candidates in training count as fractions."""
+        """Number of evaluations so far, including fractions for candidates that are being trained."""
         parts = (min(steps / planned, 1.0) for steps, planned in self._in_training.values() if planned)
         return len(self._run.in_order_of_finish) + sum(parts)
 
     @property
     def planned(self) -> int:
-        """Total number of evaluations: of every candidate, after every rung that it reaches."""
+        """Total number of evaluations in the run; a candidate is evaluated after every rung that it reaches."""
         return evaluations(self._run.config.search)
 
     @property
     def seconds(self) -> float:
-        """Time since the run was started or continued [s]."""
+        """Time since this process started or resumed the run [s]."""
         return max(time.monotonic() - self._began, 1e-9)
 
     @property
@@ -64,12 +64,12 @@ class Tally:
 
     @property
     def utilisation(self) -> float:
-        """Share of the workers' time that was spent on completed candidates."""
+        """Share of the workers' time that was spent on evaluations which are now complete."""
         return self._busy / (self._workers * self.seconds)
 
     @property
     def seconds_left(self) -> float | None:
-        """Predicted time left at the pace so far [s]; None without any progress."""
+        """Predicted remaining time at the pace so far [s]; None before there is any progress."""
         since = self.done - self._known_before
         if since <= 0:
             return None
@@ -77,7 +77,7 @@ class Tally:
 
     @property
     def median(self) -> float | None:
-        """Median fitness of the latest generation."""
+        """Median fitness of the latest generation; None if no candidate of it has succeeded."""
         if not self._run.candidates:
             return None
         latest = self._run.generation(max(candidate.generation for candidate in self._run.candidates))
@@ -85,7 +85,7 @@ class Tally:
         return statistics.median(fitness) if fitness else None
 
     def summary(self) -> str:
-        """Return generation, best and median fitness, pace and time left as text."""
+        """Return the generation, best and median fitness, pace and remaining time as text."""
         run = self._run
         search = run.config.search
         reached = Place.from_id(len(run.candidates), search.population).generation + 1
@@ -100,7 +100,7 @@ class Tally:
         return ", ".join(parts)
 
     def closing(self) -> str:
-        """Return the pace and the utilisation of the workers as text."""
+        """Return the duration, the pace and the utilisation of the workers as text, for the end of a run."""
         return (
             f"{clock(self.seconds)} at {self.steps_per_second:,.0f} steps/s; "
             f"the {self._workers} workers were busy {self.utilisation:.0%} of the time"
@@ -108,7 +108,7 @@ class Tally:
 
 
 class _Watcher:
-    """Base class of watchers; a context manager."""
+    """Base class of watchers, which follow a run and show its progress; a context manager."""
 
     def __init__(self, run: Run, out: TextIO, workers: int) -> None:
         self.run, self.out, self.tally = run, out, Tally(run, workers)
@@ -179,7 +179,7 @@ class Events(_Watcher):
 
 
 class Bar(_Watcher):
-    """Watcher that draws a progress bar on a terminal, with failures above it."""
+    """Watcher that draws a progress bar on a terminal, and prints failures above the bar."""
 
     def __init__(self, run: Run, out: TextIO, workers: int) -> None:
         from rich.console import Console
@@ -216,7 +216,7 @@ class Bar(_Watcher):
 
 
 class Watchers:
-    """Several watchers combined."""
+    """Watcher that passes each report on to several watchers."""
 
     def __init__(self, watchers: Sequence[Any]) -> None:
         self._watchers = watchers
@@ -231,14 +231,14 @@ class Watchers:
 
 
 def watcher(run: Run, out: TextIO = sys.stderr, workers: int = 1, as_json: bool = False) -> Bar | Events | Lines:
-    """Return the watcher for an output: a bar on a terminal, else lines; JSON with `as_json`."""
+    """Return the watcher for an output: Events if `as_json` is true, else Bar on a terminal, and Lines elsewhere."""
     if as_json:
         return Events(run, out, workers)
     return Bar(run, out, workers) if out.isatty() else Lines(run, out, workers)
 
 
 def clock(seconds: float) -> str:
-    """Return a time as 1:02:03, or 2:03 below an hour."""
+    """Return a duration as text, in the form 1:02:03, or 2:03 for less than an hour."""
     minutes, rest = divmod(round(seconds), 60)
     hours, minutes = divmod(minutes, 60)
     return f"{hours}:{minutes:02}:{rest:02}" if hours else f"{minutes}:{rest:02}"

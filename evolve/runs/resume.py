@@ -1,4 +1,4 @@
-"""Resumption of an interrupted run: all steps between opening it and training the next candidate."""
+"""Preparation of an interrupted run, after it has been opened and before the next candidate is trained."""
 
 from __future__ import annotations
 
@@ -23,17 +23,18 @@ def _ignore(note: str) -> None:
 def resuming(run: Run, note: Callable[[str], Any] = _ignore) -> Iterator[bool]:
     """Repair a run, hold its lock within the context, and yield whether candidates remain to be evaluated.
 
-    If candidates remain, the run has been checked and this start has been recorded. Otherwise, only obsolete
+    If candidates remain, the run has also been checked, and versions.json contains this start. Otherwise, obsolete
     checkpoints have been removed.
 
-    note: called with each remark on lost policies or lines, and on settings or software that have changed
+    note: function that is called with each remark for the user: on lost policies, on lost lines of the record, and on
+        settings or software that have changed
 
     Raises:
-        LockedError: another process works on the run.
+        LockedError: another process is working on the run.
         RunError: the record is damaged or cannot be written, config.toml has changed since the run was opened, or the
             run has a former format.
-        ConfigError: the user task has not been named, or fails.
-        BackendError: Dr.Jit cannot find a usable LLVM.
+        ConfigError: the user task has not been named when the run was opened, or the task fails.
+        BackendError: Dr.Jit cannot find a usable LLVM library.
     """
     device.make_ready()
     with run.lock():
@@ -53,7 +54,7 @@ def resuming(run: Run, note: Callable[[str], Any] = _ignore) -> Iterator[bool]:
 
 
 def _changes(run: Run) -> Iterator[str]:
-    """Yield notes on settings and software that have changed since the run started and may change its numbers."""
+    """Yield notes on changed settings and on changed software, both of which may change the numbers of the run."""
     if altered(run.path):
         yield (
             f"config.toml has changed since the last start. Candidates from {len(run.candidates)} on are "

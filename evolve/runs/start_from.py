@@ -1,4 +1,4 @@
-"""Start from an animal of another run: `--from RUN:ID`."""
+"""Start of a run from an animal of another run (`--from RUN:ID`)."""
 
 from __future__ import annotations
 
@@ -14,14 +14,16 @@ from evolve.store.directory import Run
 
 __all__ = ["starts_from"]
 
-LENGTHS = ("sensor_width", "receptor_pitch", "relief_height")  # settings that are the units of optical genes
+LENGTHS = ("sensor_width", "receptor_pitch", "relief_height")  # lengths in units of which optical genes are given
 
 
 def starts_from(text: str) -> Source:
-    """Return the genes of the animal RUN:ID as start values; RUN alone stands for the run's best animal.
+    """Return the genes of an animal as start values of a new run, with the settings that they depend on.
 
-    RUN is a run directory. If the animal has optics, the settings that are the units of its genes are returned as well,
-    because with other units the same genes would describe another lens.
+    Some genes are relative to settings: a relief's heights are fractions of `eye.relief_height`, for example. With
+    other settings, the same genes would describe another lens. These settings are therefore returned as well.
+
+    text: "RUN:ID", a run directory and a candidate; "RUN" stands for the best candidate of the run
 
     Raises:
         RunError: the run or the candidate does not exist, or no candidate has succeeded.
@@ -30,7 +32,7 @@ def starts_from(text: str) -> Source:
     run = Run.open(path)
     candidate = run.candidate(candidate_id)
     values = gene_values(candidate.phenotype)
-    values.pop(SIDE, None)  # height and width have the same value, and also exist in runs with eyes that are not square
+    values.pop(SIDE, None)  # height and width repeat its value, and also fit runs with eyes that are not square
     genome = {name: {"start": _exact(name, value)} for name, value in values.items() if not math.isnan(value)}
     tree: dict[str, Any] = {"genome": genome, "eye": {}}
     if candidate.phenotype.relief is not None:
@@ -47,7 +49,7 @@ def starts_from(text: str) -> Source:
 
 
 def _parsed(text: str) -> tuple[Path, int | None]:
-    """Return run directory and candidate; a path may also contain colons."""
+    """Return the run directory and the candidate of "RUN:ID" or "RUN", where RUN may contain colons, too."""
     head, colon, tail = text.rpartition(":")
     if colon and tail.isdecimal():
         return Path(head), int(tail)

@@ -1,13 +1,13 @@
 """The search over generations.
 
-ask_tell            the search in its simplest form, as an introduction
-loop                main loop: proposals, evaluations, record and optimizer
-search              Search: proposals, phases and seeds
+ask_tell            minimal example of a search, as an introduction
+loop                main loop of a run, from proposals to recorded candidates
+search              Search: proposals of candidates in several phases, and seeds of their training
 optimizers          CMA-ES and other optimizers
-null_model          search with random fitness
-same_search         check that a search repeats the candidates on record
+null_model          searches with random fitness, for comparison with runs
+same_search         check that a rebuilt search proposes the candidates on record
 successive_halving  selection of the candidates that continue after a rung
-job                 jobs for executors
+job                 Job: a candidate for an executor to evaluate
 local_executor      executor with processes on this machine
 worker              worker process of the local executor
 dask_executor       executor on a Dask cluster

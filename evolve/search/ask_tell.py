@@ -1,7 +1,8 @@
-"""The search in its simplest form: CMA-ES proposes genomes, which are evaluated, and receives their fitness.
+"""The search in its simplest form: CMA-ES proposes genomes, then receives the fitness of each.
 
-`evolve.search.loop` does the same with animals that are trained first. It adds several workers, phases in which genes
-open, and exact continuation of a killed run. A test checks that both give the same results.
+`evolve.search.loop` runs the same search on animals, which are trained before their fitness is measured. That loop also
+supports several workers, further genes that begin to vary in later generations, and exact continuation of a killed run.
+A test checks that this example and the loop propose the same genomes.
 
     python -m evolve.search.ask_tell
 """
@@ -25,7 +26,10 @@ Floats = NDArray[np.float64]
 def ask_tell(
     fitness: Callable[[Floats], float], start: Floats, search: SearchConfig, seed: int
 ) -> Iterator[tuple[list[Floats], list[float]]]:
-    """Yield the genomes (dimension,) in [0, 1] of each generation, and their fitness, which the search maximises."""
+    """Yield the genomes of each generation, and their fitness, which the search maximises.
+
+    Each genome is (dimension,), with coordinates in [0, 1].
+    """
     optimizer = build_optimizer(Space(genes=(), start=start, seed=(seed,)), search)
     for generation in range(search.generations):
         ids = generation_ids(generation, search.population)

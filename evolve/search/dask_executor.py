@@ -1,4 +1,4 @@
-"""Executor on a Dask cluster, from processes on this machine to SLURM and Kubernetes (docs/cluster.md)."""
+"""Executor that evaluates candidates on a Dask cluster, for example under SLURM or Kubernetes (docs/cluster.md)."""
 
 from __future__ import annotations
 
@@ -28,7 +28,10 @@ REPLY_S = 10.0  # time limit for a worker to send its result
 
 @dataclass(frozen=True)
 class _Trial:
-    """A submitted job."""
+    """A submitted job.
+
+    counter: the scheduler's variable that counts the attempts
+    """
 
     job: Job
     counter: Any
@@ -37,14 +40,16 @@ class _Trial:
 
 @dataclass
 class DaskExecutor:
-    """Workers of a Dask scheduler, with one candidate each at a time; a context manager that cancels pending jobs.
+    """Workers of a Dask scheduler. Each worker evaluates one candidate at a time.
 
-    A candidate whose worker dies is evaluated again, up to `ATTEMPTS` times in total. After the scheduler has been
-    unreachable, pending jobs are submitted again.
+    The executor is a context manager. A candidate whose worker dies is evaluated again, up to `ATTEMPTS` times in
+    total. If the connection to the scheduler was lost, all unfinished jobs are submitted again after reconnecting.
 
     scheduler: the scheduler, or its address
-    function: "module:name" of the evaluating function, with the arguments of `evolve.learning.fitness.evaluate`
-    patience_s: maximum time to wait for workers, and for an unreachable scheduler
+    function: "module:name" of the function that evaluates a candidate; it takes the arguments of
+        `evolve.learning.fitness.evaluate`
+    patience_s: maximum time to wait for the first worker, and for an unreachable scheduler [s]
+    count: number of workers at the start
 
     Raises:
         ExecutorError: Dask is not installed, the scheduler does not answer, or no worker can evaluate candidates.
@@ -76,17 +81,17 @@ class DaskExecutor:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        with contextlib.suppress(Exception):  # a connection that is already closed causes no loss
+        with contextlib.suppress(Exception):  # closing fails if the connection is already lost
             self._client.close()
 
     def run(self, jobs: Iterable[Job], progress: Progress | None = None) -> Iterator[tuple[Job, Evaluation]]:
-        """Evaluate all jobs and yield each as soon as it is complete, in any order.
+        """Evaluate all jobs, and yield each with its outcome as soon as it is complete.
 
-        A deque of jobs may be extended meanwhile.
+        If `jobs` is a deque, the caller may append further jobs between results.
 
         Raises:
             ExecutorError: no worker can evaluate candidates, a worker's machine lacks resources such as disk space, the
-                run's settings cannot be used there, or the scheduler stays unreachable.
+                run's settings cannot be used there, or the scheduler remains unreachable.
         """
         waiting = jobs if isinstance(jobs, deque) else deque(jobs)
         under_way: dict[Any, _Trial] = {}
@@ -114,7 +119,10 @@ class DaskExecutor:
             self._withdraw(under_way)
 
     def _trial(self, job: Job) -> _Trial:
-        """Return a job with a counter of its attempts, stored by the scheduler because workers may die silently."""
+        """Return a job with a new counter of its attempts.
+
+        The scheduler stores the counter, because a worker that is killed cannot report the attempt.
+        """
         from distributed import Variable
 
         name = f"{self._name}-{job.id}-{uuid.uuid4().hex[:6]}"
@@ -127,22 +135,25 @@ class DaskExecutor:
         return self._client.submit(dask_worker.evaluate, trial.order, key=key, pure=False, retries=0)
 
     def _died_too_few_times(self, trial: _Trial, future: Any) -> bool:
-        """Return whether the scheduler has given up a candidate before the last attempt."""
+        """Return whether the scheduler gave up a job because its workers died, although attempts remain."""
         from distributed import KilledWorker
 
         killed = future.status == "error" and isinstance(future.exception(), KilledWorker)
         return killed and int(trial.counter.get()) < ATTEMPTS
 
     def _done(self, under_way: dict[Any, _Trial]) -> list[Any]:
-        """Return the completed futures, after a short wait for the first one."""
+        """Wait up to LISTEN_S for a first result, and return all futures that are no longer pending."""
         from distributed import wait
 
-        with contextlib.suppress(Exception):  # none is complete, or the connection is lost, which `run` handles
+        with contextlib.suppress(Exception):  # no result within LISTEN_S, or a lost connection, which `run` handles
             wait(list(under_way), timeout=LISTEN_S, return_when="FIRST_COMPLETED")
         return [future for future in under_way if future.status != "pending"]
 
     def _outcome(self, trial: _Trial, future: Any) -> Evaluation | None:
-        """Return the evaluation of a candidate and write its policy; None if the worker with the result has died."""
+        """Return the evaluation of a candidate, and write its policy and checkpoint.
+
+        The result is None if the worker that stores it does not send it in time, for example because it has died.
+        """
         from distributed import KilledWorker
 
         if future.status == "error":
@@ -156,7 +167,8 @@ class DaskExecutor:
             outcome, policy, checkpoint = dask_worker.decode(future.result(timeout=REPLY_S))
         except TimeoutError:
             return None
-        future.release()  # otherwise Dask would repeat the evaluation if its worker died
+        # If the worker that stores a result dies, Dask repeats the evaluation, unless the result has been released.
+        future.release()
         trial.counter.delete()
         if policy:
             write_whole(trial.job.policy_path, policy)
@@ -184,10 +196,10 @@ class DaskExecutor:
         return client
 
     def _reconnect(self) -> None:
-        """Wait for an unreachable scheduler."""
+        """Wait until the scheduler can be reached again, for at most `patience_s`."""
         deadline = time.monotonic() + self.patience_s
         while self._client.status != "running":
-            if self._client.status == "connecting":  # the client is reconnecting itself
+            if self._client.status == "connecting":  # Dask's client is already trying to reconnect
                 time.sleep(LISTEN_S)
             else:
                 try:
@@ -198,6 +210,6 @@ class DaskExecutor:
                 raise ExecutorError(f"{self._address}: the scheduler has been unreachable for {self.patience_s:g} s")
 
     def _withdraw(self, under_way: dict[Any, _Trial]) -> None:
-        """Cancel pending jobs; workers stop at their next progress report."""
+        """Cancel unfinished jobs; a worker stops its evaluation at its next progress report."""
         with contextlib.suppress(Exception):  # an unreachable scheduler has no jobs to cancel
             self._client.cancel(list(under_way), force=True)

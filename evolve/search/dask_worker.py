@@ -1,7 +1,8 @@
-"""Evaluation of a candidate in a Dask worker; job and result are plain text and bytes.
+"""Evaluation of a candidate in a Dask worker. Jobs and results are sent as text and bytes.
 
-Worker and sender share only the scheduler, without files or state. A worker evaluates one candidate at a time, for any
-number of threads, so that the order of its sums equals that of a local worker.
+A worker and the sender of its jobs share no files and no state; they only connect to the same scheduler. A worker
+process evaluates one candidate at a time, even if Dask gives it several threads. Sums are therefore computed in the
+same order as in a local worker.
 """
 
 from __future__ import annotations
@@ -36,22 +37,22 @@ _prepared = False
 
 
 class UnfitWorker(RuntimeError):
-    """A worker cannot evaluate candidates, or would give different numbers; the message is one line with the reason."""
+    """A worker cannot evaluate candidates, or its numbers would differ; the message states the reason in one line."""
 
 
 class _Unwanted(Exception):
-    """The sender of this candidate has gone or cancelled it."""
+    """The sender of a job has disconnected, or has cancelled the job."""
 
 
 @dataclass(frozen=True)
 class Order:
     """A job as text.
 
-    function: "module:name" of the evaluating function
+    function: "module:name" of the function that evaluates the candidate
     counter: name of the scheduler's variable that counts the attempts
-    topic: topic of progress reports
-    ends: steps at the ends of the rungs up to the last one to train; () if training is not divided into rungs
-    begun: (rung, checkpoint) of a training run that has started
+    topic: Dask topic on which the worker reports its progress
+    ends: number of training steps at the end of each rung, up to the last rung of this job; () without rungs
+    begun: (rung, checkpoint) from which training continues; None: training starts from the beginning
     software: versions of the sender's software
     code: file and text of a user task; None for a built-in task
     """
@@ -70,7 +71,11 @@ class Order:
 
 
 def encode(job: Job, toml: str, function: str, counter: str, topic: str) -> Order:
-    """Return a job as text; `toml` is its config, and `counter` and `topic` are names on the scheduler."""
+    """Return a job as text.
+
+    toml: config of the run
+    function, counter, topic: see `Order`
+    """
     phenotype = json.dumps(job.phenotype.to_json())
     task = job.config.choice.named_code
     code = None if task is None else (str(task.file), task.text)
@@ -82,9 +87,9 @@ def encode(job: Job, toml: str, function: str, counter: str, topic: str) -> Orde
 
 
 def evaluate(order: Order) -> Reply:
-    """Evaluate a candidate and return its Evaluation as JSON, its policy, and its checkpoint.
+    """Evaluate a candidate, and return its Evaluation as JSON, its policy, and its checkpoint.
 
-    Policy and checkpoint are empty if there are none.
+    The bytes of the policy or the checkpoint are empty if the candidate has none.
     """
     from distributed import Variable, get_worker
 
@@ -146,7 +151,7 @@ def _content(path: Path) -> bytes:
 
 
 def _prepare(order: Order) -> None:
-    """Check once in each process that the software equals the sender's and that a device works."""
+    """Check that the software has the sender's versions, and prepare Dr.Jit at the first call in this process."""
     global _prepared
     here = _software()
     differing = [name for name, there in order.software.items() if there and here[name] and here[name] != there]
@@ -163,7 +168,7 @@ def _prepare(order: Order) -> None:
 
 @lru_cache
 def _software() -> Mapping[str, str]:
-    """Return the software at the first call; asking git for every candidate would take milliseconds each time."""
+    """Return the versions of the software. They are cached, because reading the commit from git takes milliseconds."""
     return present()
 
 

@@ -1,4 +1,4 @@
-"""Jobs for executors, and the type of progress callbacks."""
+"""Job: a candidate for an executor to evaluate, and the type of progress callbacks."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ Progress = Callable[[int, int, int], None]  # (candidate id, steps trained, step
 
 
 class ExecutorError(RuntimeError):
-    """No worker can evaluate candidates; the message is one line with the reason."""
+    """No worker can evaluate candidates; the message states the reason in one line."""
 
 
 @dataclass(frozen=True)
 class Job:
     """One candidate to evaluate: its id, and the arguments of `evolve.learning.fitness.evaluate`.
 
-    rung: last rung to train; None: training is not divided into rungs
+    rung: rung at whose end training stops; None: training is not divided into rungs
     """
 
     id: int

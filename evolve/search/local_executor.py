@@ -21,9 +21,10 @@ from evolve.store.evaluation import Evaluation
 
 __all__ = ["ExecutorError", "Job", "LocalExecutor", "Progress", "cores"]
 
-# Several processes share the cores, so each uses one thread; numerical libraries read these variables on import.
+# Several processes share the cores, so each process uses one thread. Numerical libraries read these variables when they
+# are imported.
 ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")
-STOPPING_S = 5.0
+STOPPING_S = 5.0  # time after which a process that does not end is killed
 KILLED = "by SIGKILL"
 OUT_OF_MEMORY = (
     f"the worker of candidate {{}} was killed {ATTEMPTS} times (SIGKILL), probably because memory ran out; use fewer "
@@ -33,7 +34,7 @@ OUT_OF_MEMORY = (
 
 @dataclass
 class _Worker:
-    """A process, this end of its pipe, and its current job."""
+    """A worker process, the executor's end of its pipe, and the current job; None: the worker is idle."""
 
     process: Any
     connection: Connection
@@ -42,15 +43,18 @@ class _Worker:
 
 @dataclass
 class LocalExecutor:
-    """Worker processes that call `evaluate(*job.arguments, progress=...)`; a context manager that ends them.
+    """Worker processes on this machine. Each process evaluates one candidate at a time.
 
-    An exception in `evaluate` counts as a failure of the candidate, except OSError and ConfigError, which end the run.
-    A worker that dies is replaced, and its candidate is evaluated again, up to `ATTEMPTS` times in total. The candidate
-    then counts as failed, unless each worker was killed (SIGKILL). Systems do that when memory runs out, and it ends
-    the run.
+    The executor is a context manager, which ends its processes on exit. If `evaluate` raises an exception, the
+    candidate counts as failed; the exceptions OSError, MemoryError and ConfigError end the run instead. A worker that
+    dies is replaced, and its candidate is evaluated again, up to `ATTEMPTS` times in total. After the last attempt, the
+    candidate counts as failed. If every attempt was ended by SIGKILL, however, the run ends, because operating systems
+    kill processes in this way when memory runs out.
 
-    count: number of workers; 0: one per core that this process may use
-    prepare: called once in each new worker; an exception there ends the run, because no candidate could be evaluated
+    evaluate: function that is called as `evaluate(*job.arguments, progress=...)`
+    count: number of workers; 0: one for each core that this process may use
+    prepare: function that is called once in each new worker; an exception in it ends the run, because no worker could
+        evaluate candidates
     """
 
     evaluate: Callable[..., Evaluation]
@@ -76,9 +80,9 @@ class LocalExecutor:
         self._workers.clear()
 
     def run(self, jobs: Iterable[Job], progress: Progress | None = None) -> Iterator[tuple[Job, Evaluation]]:
-        """Evaluate all jobs and yield each as soon as it is complete, in any order.
+        """Evaluate all jobs, and yield each with its outcome as soon as it is complete.
 
-        A deque of jobs may be extended meanwhile.
+        If `jobs` is a deque, the caller may append further jobs between results.
 
         Raises:
             ExecutorError: a worker cannot be prepared, the machine lacks resources such as disk space or memory, or the
@@ -118,7 +122,7 @@ class LocalExecutor:
             try:
                 worker.connection.send(worker.job.arguments)
             except (BrokenPipeError, ConnectionResetError):
-                continue  # the process has died, which `_messages` will report
+                continue  # the process has died; `_messages` reports this next
 
     def _hire(self) -> _Worker:
         context = multiprocessing.get_context("spawn")
@@ -141,7 +145,7 @@ class LocalExecutor:
                 yield worker, Message("died")
 
     def _bury(self, worker: _Worker) -> str:
-        """Remove a worker whose pipe is closed, and return the cause of its death."""
+        """Remove a worker whose pipe is closed, and return how its process ended."""
         self._workers.remove(worker)
         _end(worker)
         code = worker.process.exitcode
@@ -154,7 +158,7 @@ def cores() -> int:
 
 
 def _end(worker: _Worker) -> None:
-    """Wait for a process to end, and kill it if it does not."""
+    """Wait for a process to end; after STOPPING_S, kill it."""
     worker.process.join(STOPPING_S)
     if worker.process.is_alive():
         worker.process.kill()
@@ -181,7 +185,7 @@ def _environment(variables: Mapping[str, str]) -> Iterator[None]:
 def _without_main() -> Iterator[None]:
     """Prevent multiprocessing from executing the caller's script again in a child.
 
-    Workers do not need the script, and a script that starts a run would start another run in each of them.
+    Workers do not need the script. If the script starts a run, each worker would start another run.
     """
     main = sys.modules["__main__"]
     hidden: dict[str, Any] = {name: vars(main).pop(name) for name in ("__file__", "__spec__") if name in vars(main)}
@@ -194,8 +198,9 @@ def _without_main() -> Iterator[None]:
 
 @contextmanager
 def _interrupts_held() -> Iterator[None]:
-    """Block Ctrl-C within the context; a child inherits the block, so that only the parent receives Ctrl-C."""
-    # multiprocessing starts its own helper with the first child, and would then unblock interrupts too early.
+    """Block Ctrl-C within the context. A child process inherits the block, so that only the parent receives Ctrl-C."""
+    # With the first child, multiprocessing also starts its resource tracker, and unblocks interrupts after that. The
+    # tracker is therefore started before the interrupts are blocked.
     resource_tracker.ensure_running()
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:

@@ -1,9 +1,11 @@
-"""Main loop: propose candidates, evaluate them unless they are on record, record them, and report their fitness.
+"""Main loop of a run: propose candidates, evaluate and record them, and report their fitness to the optimizer.
 
-A continued run executes the same loop from its start. Candidates on record are not evaluated again, but their fitness
-is reported to the optimizer, which restores the state of the search. In the mode generation by generation, the history
-follows from the seed alone. In the steady state, fitness is reported in the order in which candidates finish, so the
-history also depends on the order of the record.
+A continued run executes the same loop from its start. Candidates that are already on record are not evaluated again,
+but their fitness is reported to the optimizer, which restores the state of the search.
+
+The loop has two modes. Generation by generation, the optimizer receives the fitness of a whole generation at once, so
+all candidates follow from the seed alone. In the steady state (`search.steady_state`), fitness is reported in the order
+in which candidates finish. The candidates then also depend on this order, which the record stores.
 """
 
 from __future__ import annotations
@@ -31,7 +33,7 @@ class Executor(Protocol):
     """Protocol of objects that evaluate candidates."""
 
     def run(self, jobs: deque[Job], progress: Progress | None = None) -> Iterator[tuple[Job, Evaluation]]:
-        """Start all jobs in order, and yield each once, as soon as it is complete.
+        """Start the jobs in order, and yield each job with its outcome once, as soon as it is complete.
 
         The caller may append to `jobs` between results.
         """
@@ -48,11 +50,11 @@ class Watcher(Protocol):
 
 
 def evolve(run: Run, executor: Executor, watcher: Watcher) -> None:
-    """Carry a locked run to its end.
+    """Evaluate all candidates that a locked run still lacks.
 
     Raises:
         RunError: the record cannot be written, or this search proposes other candidates than those on record.
-        ConfigError: the search cannot start.
+        ConfigError: the optimizer is unknown, or cannot be used here.
         ExecutorError: no candidate can be evaluated.
     """
     search = Search(run.config)
@@ -63,7 +65,7 @@ def evolve(run: Run, executor: Executor, watcher: Watcher) -> None:
 
 
 def _by_generations(run: Run, search: Search, executor: Executor, watcher: Watcher) -> None:
-    """Report the fitness of a generation in the order of its candidates, after all its rungs are complete."""
+    """Evaluate one generation after the other, and report the fitness of each after all its rungs are complete."""
     same = SameSearch(run)
     for generation in range(run.config.search.generations):
         proposals = {proposal.id: proposal for proposal in search.propose_generation()}
@@ -80,7 +82,7 @@ def _by_generations(run: Run, search: Search, executor: Executor, watcher: Watch
 
 
 def _steadily(run: Run, search: Search, executor: Executor, watcher: Watcher) -> None:
-    """Keep one population in evaluation: after each candidate, report its fitness and propose the next one."""
+    """Keep as many candidates in evaluation as a population has; replace each finished candidate by a new proposal."""
     under_way: dict[int, Proposal] = {}
 
     def refill() -> list[Proposal]:
@@ -127,9 +129,9 @@ def _write_down(run: Run, proposal: Proposal, job: Job, outcome: Evaluation, wat
 
 
 def _after(before: Candidate, candidate: Candidate) -> Candidate:
-    """Return a candidate after a later rung, with the sums over all rungs.
+    """Return a candidate after a later rung, with seconds and episode failures summed over all its rungs.
 
-    If the later rung failed, steps and learning curve come from the earlier rungs.
+    If training failed in the later rung, steps and learning curve are those of the rung before.
     """
     if candidate.failure is not None:
         candidate = replace(candidate, steps=before.steps, curve=before.curve)

@@ -1,7 +1,8 @@
 """Null model of a search: the same search with random fitness.
 
-A gene that starts near one end of its range can only move away from it, and selection by random fitness also moves
-genes. A result is evidence of selection only if it lies outside the range of the null model.
+The values of genes can change without any selection for them. A gene that starts near one end of its range can only
+move away from this end, and selection by random fitness also moves genes. The final values of a run are therefore
+evidence of selection only if they lie outside the range of the null model.
 """
 
 from __future__ import annotations
@@ -23,25 +24,27 @@ __all__ = ["FIRST_SEED", "LAST", "SEVERAL", "NullModel", "last_generations", "nu
 
 Floats = NDArray[np.float64]
 Measure: TypeAlias = "Callable[[Phenotype], Mapping[str, float]]"
-LAST = 3  # number of last generations whose mean is the end of a search
-FIRST_SEED = 10_000  # above the usual seeds of runs
-SEVERAL = 20_000  # number of random groups of searches for a comparison with the mean of several runs
-TIE = 1e-5  # relative difference up to which means count as equal, because of summation order and rounded records
+LAST = 3  # number of last generations over which the final value of a quantity is averaged
+FIRST_SEED = 10_000  # seed of the first search; larger than the usual seeds of runs
+SEVERAL = 20_000  # number of random groups of searches with which the mean of several runs is compared
+# Relative difference up to which two means count as equal. They differ by the order of sums and by rounded records.
+TIE = 1e-5
 
 
 @dataclass(frozen=True)
 class NullModel:
     """Results of searches with random fitness.
 
-    means: mean of each quantity over the candidates of a generation that have it, (search, generation); NaN if none has
-    counts: number of candidates that have it, (search, generation)
+    means: mean of each quantity over the candidates of a generation that have this quantity, (search, generation); NaN
+        if no candidate has it
+    counts: number of candidates that have the quantity, (search, generation)
     """
 
     means: Mapping[str, Floats]
     counts: Mapping[str, NDArray[np.int64]]
 
     def ends(self, quantity: str, generations: range) -> Floats:
-        """Return the mean over all candidates of these generations, (search,).
+        """Return the mean of a quantity over all candidates of these generations, (search,).
 
         Searches in which no candidate has the quantity are omitted.
         """
@@ -55,11 +58,13 @@ class NullModel:
 def null_model(
     config: RunConfig, measure: Measure, generations: int, searches: int, done: Callable[[float], None] = lambda _: None
 ) -> NullModel:
-    """Run the first generations of searches with these settings, random fitness and other seeds.
+    """Run searches with these settings, but with random fitness and other seeds.
 
-    generations, searches: number of generations of each search, and of searches
-    measure: quantities of an untrained animal, the same for all animals; NaN for quantities that it lacks
-    done: called with the share of completed searches
+    generations: number of generations of each search
+    searches: number of searches
+    measure: function that returns quantities of an untrained animal. It returns the same names for all animals, with
+        NaN for quantities that an animal lacks.
+    done: function that is called with the share of completed searches
     """
     found = []
     for i in range(searches):
@@ -84,7 +89,10 @@ def _search(config: RunConfig, measure: Measure, generations: int) -> dict[str, 
 
 
 def _proposals(config: RunConfig, generations: int) -> Iterator[list[Proposal]]:
-    """Yield one generation after the other; in the steady state, fitness is reported after each candidate."""
+    """Yield the proposals of one generation after the other, and report a random fitness for each proposal.
+
+    In the steady state, a fitness is reported before each new proposal, as in a run.
+    """
     search, chance = Search(config), np.random.default_rng(config.seed)
     if not config.search.steady_state:
         for _ in range(generations):
@@ -104,18 +112,24 @@ def _proposals(config: RunConfig, generations: int) -> Iterator[list[Proposal]]:
 
 
 def last_generations(config: RunConfig, generations: int) -> list[range]:
-    """Return the last LAST generations of each phase of a search, or all generations of a shorter phase."""
+    """Return the last LAST generations of each phase, or all generations of a shorter phase.
+
+    A phase consists of the generations between two changes of the set of genes that vary.
+    """
     starts = sorted({use.opens_at for use in config.genome.values() if use.open and use.opens_at < generations})
     ends = [*starts[1:], generations]
     return [range(max(start, end - LAST), end) for start, end in zip(starts, ends, strict=True)]
 
 
 def p_value(values: Sequence[float], ends: Floats) -> float:
-    """Return the two-sided p-value of the ends of one or several runs under the null model.
+    """Return the two-sided p-value of the final values of one or several runs under the null model.
 
-    For one run, its end counts as an additional sample of the null model (Davison and Hinkley 1997, §4.2), so that p is
-    at least 2 / (searches + 1). For several runs, their mean is compared with means of random groups of searches of the
-    same number, with the same lower limit of p.
+    The value of a single run counts as an additional sample of the null model (Davison and Hinkley 1997, §4.2).
+    Therefore, p is at least 2 / (searches + 1). For several runs, their mean is compared with the means of random
+    groups of searches; the number of searches in a group equals the number of runs. The lower limit of p is the same.
+
+    values: final value of a quantity in each run
+    ends: final values of the quantity in the searches, from `NullModel.ends`
     """
     asked = float(np.mean(values))
     several = np.random.default_rng(0).choice(ends, (SEVERAL, len(values))).mean(axis=1)

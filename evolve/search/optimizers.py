@@ -1,7 +1,8 @@
-"""Optimizers, which propose genomes one by one and receive their fitness in any order.
+"""Optimizers, which propose genomes one by one and accept their fitness in any order.
 
-The state of an optimizer follows from its seed, its proposals and the fitness values in their order, so a run can
-continue without stored state. Only this module imports nevergrad.
+The state of an optimizer follows from its seed and from the sequence of its proposals and of the fitness values that it
+has received. A run can therefore be continued by repeating this sequence, and no state needs to be stored. Only this
+module imports nevergrad.
 """
 
 from __future__ import annotations
@@ -27,7 +28,12 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Space:
-    """Search space in coordinates [0, 1]: `genes` with their uses, start value `start`, and seed of random numbers."""
+    """Search space, in which each coordinate is in [0, 1].
+
+    genes: the genes that vary, each with its settings
+    start: genome from which the search starts, (dimension,)
+    seed: seed of random numbers
+    """
 
     genes: Sequence[tuple[Gene, GeneConfig]]
     start: Floats
@@ -58,10 +64,11 @@ def build_optimizer(space: Space, search: SearchConfig) -> Optimizer:
 
 
 class Mutation:
-    """Optimizer that mutates each gene of a parent: Gaussian steps for real genes, -1, 0 or +1 for integers.
+    """Optimizer that mutates every gene of a parent. A real gene changes by a Gaussian step, an integer by -1, 0 or +1.
 
-    Parents are the fittest candidates among the last two populations with known fitness; their number is a quarter of
-    a population. Because older candidates are excluded, a high fitness by chance has no permanent effect.
+    The parent is drawn at random from the fittest candidates of the last two populations with known fitness. The number
+    of these candidates is a quarter of a population. Older candidates are excluded, so that a fitness that was high by
+    chance has no permanent effect.
     """
 
     def __init__(self, space: Space, search: SearchConfig) -> None:
@@ -91,7 +98,7 @@ class Mutation:
 
 
 class Named:
-    """Any optimizer of nevergrad; `sigma` is its step size, if it has one."""
+    """Any optimizer of nevergrad. The setting `search.sigma` is its step size, if it has one."""
 
     def __init__(self, space: Space, search: SearchConfig) -> None:
         self._dimension = space.start.size
@@ -134,13 +141,13 @@ class Named:
 
 
 class CMA(Named):
-    """CMA-ES (Hansen and Ostermeier 2001), implemented by pycma through nevergrad, with initial step size `sigma`.
+    """CMA-ES (Hansen and Ostermeier 2001), implemented by pycma, which is called through nevergrad.
 
-    The parents of a candidate are the better half of the last population with known fitness, whose mean is the centre
-    of the distribution.
+    The initial step size is `search.sigma`. CMA-ES samples candidates around the mean of the better half of the last
+    population with known fitness. This better half is recorded as the parents of each candidate.
 
-    nevergrad has an option for noisy functions, but its CMA-ES uses the option only to recommend a single best genome.
-    Here the best candidate is taken from the record instead.
+    nevergrad has an option for noisy functions, but its CMA-ES uses this option only to recommend a single best genome.
+    The option is not set, because the best candidate is taken from the record.
     """
 
     def __init__(self, space: Space, search: SearchConfig) -> None:
@@ -153,12 +160,13 @@ class CMA(Named):
         from nevergrad.optimization.optimizerlib import ParametrizedCMA
 
         def scaled(scale: float) -> Any:
-            # If samples are reflected at a bound, negative weights shrink the covariance across it to zero. The
-            # remaining steps then count as very long, and the step size grows without limit.
+            # `CMA_active` gives negative weights to the worse half. Samples are reflected at the bounds. Near a bound,
+            # negative weights therefore shrink the covariance in the direction across the bound to zero. The remaining
+            # steps then count as very long, so that the step size grows without limit.
             configured = ParametrizedCMA(scale=scale, popsize=search.population, inopts={"CMA_active": search.active})
             return configured(_array(space, 1.0), num_workers=search.population)
 
-        # nevergrad reduces the step size in bounded spaces by an internal factor, which is compensated here.
+        # nevergrad multiplies the step size by an internal factor in bounded spaces. The division compensates for it.
         return scaled(search.sigma / scaled(1.0).es.sigma)
 
     def tell(self, candidate_id: int, fitness: float) -> None:
@@ -173,11 +181,11 @@ class CMA(Named):
 
 
 def _array(space: Space, sigma: float) -> Any:
-    """Return nevergrad's array of coordinates in [0, 1]."""
+    """Return nevergrad's description of the search space: an array of coordinates in [0, 1]."""
     from nevergrad import p
 
-    # CMA-ES needs at least two dimensions to adapt a covariance; with one, nevergrad would use an optional package.
-    # A single open gene therefore gets an additional coordinate, which is ignored.
+    # CMA-ES needs at least two dimensions to adapt a covariance. With one dimension, nevergrad would require an
+    # optional package. If only one gene varies, an additional coordinate is therefore added and ignored.
     padded = np.append(space.start, 0.5) if space.start.size == 1 else space.start
     array = p.Array(init=padded, lower=0.0, upper=1.0).set_mutation(sigma=sigma)
     array.random_state.seed(np.random.SeedSequence(list(space.seed)).generate_state(4))
@@ -188,9 +196,11 @@ def _array(space: Space, sigma: float) -> Any:
 def _quiet() -> Iterator[None]:
     """Suppress two warnings that have no consequences here.
 
-    In small populations pycma injects mirrored samples. nevergrad reflects samples at the bounds, so that pycma does
-    not recognise the injected ones and warns; it still receives the samples that were evaluated. nevergrad warns about
-    optimizers that learn only from complete populations.
+    In small populations, pycma adds mirrored samples, which it calls injected solutions. nevergrad reflects them at the
+    bounds. pycma then no longer recognises them, and warns. This is harmless, because pycma receives the samples that
+    were evaluated.
+
+    nevergrad warns that some optimizers learn only from complete populations.
     """
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", message="orphanated injected solution")

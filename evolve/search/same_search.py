@@ -1,9 +1,9 @@
-"""Check that a rebuilt search proposes the candidates on record; a different search cannot continue a run.
+"""Check that a rebuilt search proposes the candidates on record. Only such a search can continue a run.
 
-A search is rebuilt by repeating all proposals and fitness values, so it must give the same genomes. On the processor
-that started the run they are equal bit for bit. Another processor rounds differently, which can have a larger effect:
-pycma identifies its solutions by their bits. It treats a solution whose last bit differs as an injected one, and
-shortens it if it is long.
+To continue a run, its search is rebuilt: all proposals are repeated, and the recorded fitness is reported again. On the
+processor that started the run, the proposed genomes equal those on record bit for bit. Another processor rounds
+differently, and the difference can grow, because pycma recognises its own solutions by their bits. If the last bit of a
+solution differs, pycma treats the solution as injected from outside, and shortens its step if the step is long.
 """
 
 from __future__ import annotations
@@ -19,9 +19,10 @@ from evolve.store.versions import present, recorded
 
 __all__ = ["SameSearch"]
 
-# Tolerances of a coordinate in [0, 1], with margins for longer runs: 500 and 5 times the largest observed differences.
-# Seventeen records of a processor with AVX-512 were repeated on one without. The differences were at most 2e-12, and
-# 4e-3 if a solution was treated as injected (tests/experiments/test_records.py).
+# Largest differences of a coordinate in [0, 1] that are accepted. Seventeen records of a processor with AVX-512 were
+# repeated on a processor without it (tests/experiments/test_records.py). The differences were at most 2e-12; if pycma
+# treated a solution as injected, they were at most 4e-3. The tolerances are 500 and 5 times as large, as a margin for
+# longer runs.
 ROUNDING, TAKEN_FOR_ANOTHERS = 1e-9, 0.02
 LIBRARIES = ("nevergrad", "cma", "numpy")
 
@@ -29,8 +30,8 @@ LIBRARIES = ("nevergrad", "cma", "numpy")
 class SameSearch:
     """Comparison of a search's proposals with a run's record.
 
-    The first generation follows from the settings alone and may differ only by rounding. With other libraries than at
-    the start of the run, the same tolerance applies to all generations.
+    The first generation follows from the settings alone, so it may differ only by rounding. Later generations have the
+    wider tolerance, but only if the versions of the optimizer's libraries are the same as at the start of the run.
     """
 
     def __init__(self, run: Run) -> None:
@@ -41,7 +42,7 @@ class SameSearch:
         """Check that a proposal equals the candidate on record.
 
         Raises:
-            RunError: the search proposes another candidate than the one on record.
+            RunError: the search proposes a different candidate.
         """
         allowed = TAKEN_FOR_ANOTHERS if self._same_libraries and candidate.generation > 0 else ROUNDING
         if proposal is not None and np.abs(proposal.vector - candidate.vector).max() <= allowed:
@@ -56,10 +57,12 @@ class SameSearch:
         )
 
     def require_complete(self, generation: int, missing: Collection[int]) -> None:
-        """Check, before any training, that a generation with later generations on record is complete.
+        """Check, before any training, that no candidate of a generation is missing if later generations are on record.
+
+        missing: ids of candidates that still have to be evaluated
 
         Raises:
-            RunError: candidates of a generation are missing although later ones are on record.
+            RunError: candidates of this generation are missing although later generations are on record.
         """
         if missing and any(candidate.generation > generation for candidate in self._run.candidates):
             raise RunError(

@@ -17,20 +17,22 @@ __all__ = ["Scheduler"]
 
 ADDRESS = re.compile(r"(?:(?P<protocol>tcp|tls)://)?(?P<host>\[[0-9A-Fa-f:.%\w]+\]|[^\s:/\[\]]+):(?P<port>\d{1,5})")
 ANSWER_S = 5.0  # time limit for an answer, enough for a scheduler that is just starting
-RETRY_S = 0.25
+RETRY_S = 0.25  # interval between attempts to connect
 
 
 @dataclass(frozen=True)
 class Scheduler:
-    """A scheduler's address: "tls://host:8786", or "tcp://host:8786" in a trusted network.
+    """A Dask scheduler: its address, and the certificates for encrypted connections to it.
 
-    ca_file: certificates of the authorities for scheduler and workers
-    certificate, key: certificate and key of this process
+    address: "tls://host:8786", or "tcp://host:8786" in a trusted network
+    ca_file: certificates of the authorities that signed the certificates of scheduler and workers
+    certificate, key: certificate and private key of this process
 
-    All three are PEM files; without them, Dask's own settings apply (distributed.comm.tls).
+    The last three are PEM files. Without them, Dask's own settings (distributed.comm.tls) apply.
 
     Raises:
-        ConfigError: the address is malformed, or certificates are missing, invalid or unused.
+        ConfigError: the address is malformed, certificates are missing or invalid, or certificates are given for an
+            address without encryption.
     """
 
     address: str
@@ -55,7 +57,7 @@ class Scheduler:
         return self.address.startswith("tls://")
 
     def _require_certificates(self) -> None:
-        """Check the certificates early, because Dask reports errors in them later and with long messages."""
+        """Check the certificates here, because Dask would report errors in them only later, in long messages."""
         for file in (self.ca_file, self.certificate, self.key):
             if not Path(str(file)).is_file():
                 raise ConfigError(f"{file}: no such file: must be a PEM file")
@@ -73,7 +75,7 @@ class Scheduler:
         """Check that the scheduler answers, before a run starts.
 
         Raises:
-            ConfigError: see `security`.
+            ConfigError: the address requires certificates, but there are none.
             ExecutorError: the scheduler does not answer within seconds, or Dask is not installed.
         """
         self.security()
@@ -93,7 +95,7 @@ class Scheduler:
             time.sleep(RETRY_S)
 
     def security(self) -> Any:
-        """Return Dask's `Security`; None for Dask's own settings.
+        """Return Dask's `Security` with the certificates of this object; None if Dask's own settings apply.
 
         Raises:
             ConfigError: the address requires certificates, and there are none.

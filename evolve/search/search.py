@@ -1,7 +1,8 @@
-"""The search, which proposes candidates and receives their fitness, through the phases in which genes open.
+"""The search, which proposes candidates and receives their fitness.
 
-Its state follows from the seed and the fitness values received so far. A run continues by repeating all proposals and
-fitness values; no state is stored.
+A gene may begin to vary only in a later generation (its setting `opens_at`). The generations between two such changes
+are a phase. The state of the search follows from the seed and from the fitness values received so far. A run is
+continued by repeating all proposals and reporting all recorded fitness values again; no state is stored.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from evolve.search.optimizers import Optimizer, Space, build_optimizer
 
 __all__ = ["Proposal", "Search", "training_seed"]
 
-LOWEST = -1e9  # fitness of a failure while no candidate has succeeded, below any mean return
+LOWEST = -1e9  # fitness of failed candidates before any candidate has succeeded; lower than any mean return
 
 
 @dataclass(frozen=True)
@@ -29,8 +30,8 @@ class Proposal:
 
     place: place of the candidate in the search
     genome: (dimension,) in [0, 1]
-    parents: ids of its parents; in a later phase, before the optimizer names any, the candidate around which the phase
-        started
+    parents: ids of its parents. At the start of a later phase, the new optimizer has no parents yet; the parent is then
+        the candidate from which the phase started.
     """
 
     place: Place
@@ -50,8 +51,9 @@ class Proposal:
 class Search:
     """Search that proposes one candidate after the other.
 
-    When further genes open in a later generation, a new optimizer starts from the best genome so far, over the genes
-    that are open then. Each optimizer receives the fitness of the candidates that it proposed.
+    In each generation in which further genes begin to vary, a new optimizer starts from the best genome so far. It
+    varies all genes that may vary from then on. Each optimizer receives the fitness of the candidates that it has
+    proposed.
 
     Raises:
         ConfigError: the optimizer is unknown.
@@ -98,8 +100,8 @@ class Search:
     def tell(self, fitness: Sequence[tuple[int, float]]) -> None:
         """Receive (candidate id, fitness) of proposed candidates.
 
-        A failed candidate has the fitness -inf, which counts as the lowest fitness so far, or as a constant below all
-        possible values if no candidate has succeeded.
+        A failed candidate has the fitness -inf. The optimizer receives the lowest fitness so far instead, or LOWEST if
+        no candidate has succeeded.
 
         Raises:
             ValueError: a candidate was not proposed, or its fitness has been received already.
@@ -117,7 +119,7 @@ class Search:
                 self._best, self._fittest, self._fittest_id = value, proposal.vector, candidate_id
 
     def _begin_phase(self, generation: int) -> None:
-        """Start a new optimizer over the genes that are open in this generation, around the best genome so far."""
+        """Start a new optimizer at the best genome so far; it varies the genes that may vary in this generation."""
         self._base = self._fittest
         self._origin = () if self._fittest_id is None else (self._fittest_id,)
         self._varied = self._genotype.varied(generation)

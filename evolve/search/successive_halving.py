@@ -1,11 +1,13 @@
 """Successive halving within a generation (Jamieson and Talwalkar 2016, algorithm 1).
 
-A training run is divided into rungs. All candidates of a generation are trained through the first rung. After each rung
-the better candidates continue to the next one, and the last rung completes the training run. Each rung continues from
-the previous one's checkpoint in new worlds, whose seeds follow from candidate and rung. The result depends only on
-seeds and checkpoint, so a run that was killed within a rung repeats this rung and gives the same result.
+A training run is divided into parts, called rungs. All candidates of a generation are trained through the first rung.
+After each rung, only the better candidates continue to the next rung. The last rung completes the training run. Each
+rung starts from the checkpoint of the previous rung, in new worlds whose seeds follow from the candidate and the rung.
+The result of a rung therefore depends only on its seeds and its checkpoint. If a run is killed within a rung, the rung
+is repeated, with the same result.
 
-`search.rungs` is the number of rungs, and `rung` in a line of the record is the rung after which the line was written.
+The setting `search.rungs` is the number of rungs. A candidate has one line in the record for each rung; `rung` is the
+number of the rung after which the line was written.
 """
 
 from __future__ import annotations
@@ -31,12 +33,12 @@ __all__ = [
 
 
 def budgets(search: SearchConfig, learning: LearningConfig) -> tuple[int, ...]:
-    """Return the total steps at the end of each rung, (rung,); the last is a complete training run."""
+    """Return the total training steps of a candidate at the end of each rung, (rung,)."""
     return tuple(math.ceil(learning.total_steps * search.promoted**after) for after in range(search.rungs - 1, -1, -1))
 
 
 def sizes(search: SearchConfig) -> tuple[int, ...]:
-    """Return the numbers of candidates of a generation that are trained through each rung, (rung,), if none fails."""
+    """Return the number of candidates of a generation in each rung, (rung,), if no candidate fails."""
     return tuple(max(1, math.ceil(search.population * search.promoted**rung)) for rung in range(search.rungs))
 
 
@@ -50,9 +52,10 @@ def steps(config: RunConfig) -> int:
 
 
 def trained_steps(learning: LearningConfig, begin: int, end: int) -> int:
-    """Return the total steps of training from `begin` to `end`, rounded up to whole rollouts.
+    """Return the total steps at which training from `begin` to `end` stops, as training consists of whole rollouts.
 
-    A rollout has n_envs x n_steps steps, and evaluations follow every `eval_interval`.
+    A rollout has n_envs x n_steps steps. The steps between two evaluations (`eval_interval`) are rounded up to whole
+    rollouts.
     """
     rollout, trained = learning.n_envs * learning.n_steps, begin
     while trained < end:
@@ -61,14 +64,15 @@ def trained_steps(learning: LearningConfig, begin: int, end: int) -> int:
 
 
 def evaluations(search: SearchConfig) -> int:
-    """Return the number of evaluations in the whole run: of every candidate, after every rung that it reaches."""
+    """Return the number of evaluations in the whole run; a candidate is evaluated after every rung that it reaches."""
     return search.generations * sum(sizes(search))
 
 
 def promoted(search: SearchConfig, rung: int, fitness: Sequence[tuple[int, float]]) -> set[int]:
     """Return the ids that continue after a rung, given (id, fitness) of all candidates that reached it.
 
-    The fittest continue, with the lower id first at equal fitness; failed candidates (-inf) never continue.
+    The fittest candidates continue; of candidates with equal fitness, the lower id has priority. Failed candidates
+    (-inf) never continue.
     """
     if rung + 1 >= search.rungs:
         return set()
@@ -77,9 +81,9 @@ def promoted(search: SearchConfig, rung: int, fitness: Sequence[tuple[int, float
 
 
 def reaching(run: Run, generation: int, rung: int) -> set[int]:
-    """Return the ids of a generation that reach a rung; {} until the previous rung is complete.
+    """Return the ids of the candidates of a generation that reach a rung.
 
-    All candidates reach the first rung.
+    All candidates reach the first rung. For a later rung, the set is empty until the previous rung is complete.
     """
     ids = set(generation_ids(generation, run.config.search.population))
     for earlier in range(rung):
@@ -92,18 +96,18 @@ def reaching(run: Run, generation: int, rung: int) -> set[int]:
 
 
 def complete(run: Run, generation: int) -> bool:
-    """Return whether all candidates of a generation have been evaluated, after every rung that they reach."""
+    """Return whether all candidates of a generation have been evaluated after every rung that they reach."""
     return _complete(run, generation, _evaluated(run))
 
 
 def finished(run: Run) -> bool:
-    """Return whether all candidates of a run have been evaluated."""
+    """Return whether all candidates of a run have been evaluated after every rung that they reach."""
     evaluated = _evaluated(run)
     return all(_complete(run, generation, evaluated) for generation in range(run.config.search.generations))
 
 
 def _evaluated(run: Run) -> list[set[int]]:
-    """Return the ids of all candidates that have been evaluated after each rung."""
+    """Return, for each rung, the ids of all candidates that have been evaluated after it."""
     return [run.evaluated_at(rung) for rung in range(run.config.search.rungs)]
 
 

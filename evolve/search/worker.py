@@ -1,4 +1,4 @@
-"""Worker process, which evaluates one candidate after another until its pipe closes or its parent ends."""
+"""Worker process, which evaluates one candidate after another until its pipe is closed or its parent process ends."""
 
 from __future__ import annotations
 
@@ -24,17 +24,18 @@ from evolve.store.evaluation import Evaluation
 
 __all__ = ["Message", "evaluate_candidate", "evaluated", "prepare_device", "refusal", "work"]
 
-M_TRIM_THRESHOLD, M_MMAP_THRESHOLD = -1, -3  # names of settings in glibc's malloc.h
-LARGEST_THRESHOLD = 2**25  # bytes of an array, the maximum that glibc accepts
-KEPT = 2**30  # bytes, more than the arrays of a training run need at once
-NO_MEMORY = ("allocate memory", "out of memory", "bad_alloc", "bad allocation")  # in PyTorch's and Dr.Jit's errors
+M_TRIM_THRESHOLD, M_MMAP_THRESHOLD = -1, -3  # numbers of two settings, from glibc's malloc.h
+LARGEST_THRESHOLD = 2**25  # size from which arrays get new pages [bytes]; the maximum that glibc accepts
+KEPT = 2**30  # freed memory that glibc keeps [bytes]; more than a training run's arrays need at the same time
+NO_MEMORY = ("allocate memory", "out of memory", "bad_alloc", "bad allocation")  # in messages of PyTorch and Dr.Jit
 
 
 @dataclass(frozen=True)
 class Message:
     """Message from a worker to its executor.
 
-    The content is steps trained, an evaluation, or the reason why the worker cannot work; "died" means a closed pipe.
+    kind: "progress": content is (steps trained, steps planned) · "done": content is the Evaluation · "unfit": content
+        is the reason why the worker cannot evaluate candidates · "died": the pipe is closed, and there is no content
     """
 
     kind: Literal["progress", "done", "unfit", "died"]
@@ -42,7 +43,7 @@ class Message:
 
 
 def work(connection: Connection, evaluate: Callable[..., Evaluation], prepare: Callable[[], None] | None) -> None:
-    """Body of a worker process."""
+    """Evaluate the candidates that arrive through the pipe, and send a message for each result; run in the process."""
     threading.Thread(target=_die_with_parent, daemon=True).start()
     try:
         if prepare is not None:
@@ -67,9 +68,9 @@ def work(connection: Connection, evaluate: Callable[..., Evaluation], prepare: C
 
 
 def prepare_device() -> None:
-    """Prepare Dr.Jit for one of several workers: a tested LLVM library or a GPU, and one thread.
+    """Prepare Dr.Jit for one of several workers: find a usable LLVM library or a GPU, and use one thread.
 
-    Freed memory is kept for later arrays.
+    Also configure glibc so that freed memory is kept for later arrays.
 
     Raises:
         BackendError: Dr.Jit cannot work here.
@@ -84,10 +85,11 @@ def prepare_device() -> None:
 
 
 def _keep_freed_memory() -> None:
-    """Keep freed memory until a candidate is complete.
+    """Make glibc keep freed memory until the evaluation of a candidate is complete.
 
-    By default, glibc maps new pages for each array of some 100 kB or more, which the system sets to zero. That takes a
-    tenth of the time of an update with many eyes. On other systems nothing is changed.
+    By default, glibc requests new pages from the system for each array of about 100 kB or more, and the system fills
+    these pages with zeros. With many eyes, this takes a tenth of the time of an update of the policy. On systems other
+    than Linux, this function does nothing.
     """
     allocator = getattr(ctypes.CDLL(None), "mallopt", None) if sys.platform == "linux" else None
     if allocator is not None:
@@ -104,24 +106,24 @@ def evaluate_candidate(
     *,
     progress: Callable[[int, int], None],
 ) -> Evaluation:
-    """Call `evolve.learning.fitness.evaluate`, whose libraries are imported only in workers."""
+    """Call `evolve.learning.fitness.evaluate`. It is imported here, so that only workers load its libraries."""
     from evolve.learning.fitness import evaluate
     from sim.scene.mirror import MirrorWarning
 
     with warnings.catch_warnings():
         warnings.simplefilter(
             "ignore", MirrorWarning
-        )  # equal for all candidates, and already shown at the start of the run
+        )  # the warning is the same for all candidates, and was shown at the start of the run
         return evaluate(phenotype, config, seed, policy_path, progress, rung)
 
 
 def evaluated(
     evaluate: Callable[..., Evaluation], arguments: tuple[Any, ...], progress: Callable[[int, int], None]
 ) -> Evaluation:
-    """Return the candidate's evaluation; most errors in it count as a failure of the candidate.
+    """Return the candidate's evaluation. After most kinds of exception in it, the candidate counts as failed.
 
-    Errors that do not depend on the animal are raised instead: a full disk, insufficient memory, and invalid settings,
-    which are the same for all candidates.
+    Errors that do not depend on the animal are passed on to the caller: a full disk, insufficient memory, and invalid
+    settings.
 
     Raises:
         OSError: a file cannot be written, for example the policy.
@@ -142,7 +144,7 @@ def evaluated(
 
 
 def refusal(error: OSError | MemoryError) -> str:
-    """Return a message on missing resources and the remedy."""
+    """Return a message that states which resource is missing, and the remedy."""
     if isinstance(error, OSError):
         return f"{error}; correct this"
     reason = " ".join(str(error).split())[:200]
@@ -152,10 +154,11 @@ def refusal(error: OSError | MemoryError) -> str:
 def _give_back_memory() -> None:
     """Return freed memory to the system after a candidate.
 
-    glibc keeps some 10 MB per candidate in gaps that arrays of other sizes do not fill. Dr.Jit keeps the kernels for
-    every shape of eye; it reloads kernels from disk when they are needed again.
+    Without this, memory would grow with every candidate. glibc keeps about 10 MB per candidate, in gaps that are too
+    small for the next arrays. Dr.Jit keeps the kernels of every shape of eye in memory; after they have been freed, it
+    reloads them from disk if they are needed again.
     """
-    gc.collect()  # first collect frozen functions, which hold kernels
+    gc.collect()  # must come first: it frees frozen functions, which refer to kernels
     if (drjit := sys.modules.get("drjit")) is not None and multiprocessing.parent_process() is not None:
         drjit.flush_kernel_cache()
         drjit.flush_malloc_cache()
@@ -165,13 +168,13 @@ def _give_back_memory() -> None:
 
 
 def _one_line(error: Exception) -> str:
-    """Return an error as one line, "ValueError: message (file.py:12)"."""
+    """Return an error as one line, such as "ValueError: message (file.py:12)"."""
     where = traceback.extract_tb(error.__traceback__)[-1]
     return f"{type(error).__name__}: {error} ({Path(where.filename).name}:{where.lineno})"
 
 
 def _die_with_parent() -> None:
-    """End this process when its parent ends, because a killed parent cannot stop its workers."""
+    """End this process when its parent process ends, because a parent that is killed cannot stop its workers."""
     parent = multiprocessing.parent_process()
     if parent is not None:
         wait([parent.sentinel])

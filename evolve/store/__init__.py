@@ -1,13 +1,13 @@
-"""The run directory, which stores results and contains no logic of the search.
+"""The run directory: storage of a run's settings and results, without any logic of the search.
 
-directory     Run: a run directory
-record        Record: the file candidates.jsonl
+directory     Run: a run directory with its config, record and other files
+record        Record: the file candidates.jsonl, with one line per evaluated candidate and rung
 candidate     Candidate: one line of the record
 evaluation    Evaluation: outcome of a candidate's training and evaluation
 shipped_run   copy_shipped_run: the run that ships with rhabdom
-policies      comparison of policy files with the record
-lock          lock that admits one process at a time
-regular_files access to a run's files, which refuses links and FIFOs
+policies      checks that the policy files are those of the record
+lock          lock of a run, which only one process at a time can hold
+regular_files access to a run's files; links and FIFOs are refused
 atomic_files  files that are written completely or not at all
-versions      versions of the software of a run
+versions      versions of the software at each start of a run
 """

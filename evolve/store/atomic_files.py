@@ -11,19 +11,19 @@ from pathlib import Path
 
 from evolve.store.regular_files import created, folder, require_regular, sync_folder
 
-UNFINISHED = ".unfinished"
+UNFINISHED = ".unfinished"  # ending of temporary files
 POLICIES, TRAININGS = "policies", "trainings"  # folders of a run
 
 
 def sweep(folder: Path) -> None:
-    """Remove unfinished files of killed processes; files of living processes, such as a replay, stay."""
+    """Remove unfinished files of killed processes. Files of running processes, such as a replay, are left alone."""
     for path in folder.glob(f".*{UNFINISHED}"):
         if not _lives(path.name.removesuffix(UNFINISHED).rpartition(".")[2]):
             path.unlink(missing_ok=True)
 
 
 def _lives(process: str) -> bool:
-    """Return whether a process with this number exists, other than this one."""
+    """Return whether another process with this id is running."""
     if not process.isdecimal() or int(process) == os.getpid():
         return False
     try:
@@ -36,10 +36,10 @@ def _lives(process: str) -> bool:
 
 
 def write_whole(path: Path, content: bytes) -> None:
-    """Write a file atomically: readers, also after a crash of the machine, find either the old or the new content.
+    """Write a file atomically. Readers find either the old or the new content, even after a crash of the machine.
 
-    A run's folder of policies or trainings is created if it is missing, but not the run directory, so that a deleted
-    run is not created again.
+    If the folder `policies` or `trainings` of a run is missing, it is created. The run directory itself is not created,
+    so that a run that was deleted meanwhile does not reappear.
 
     Raises:
         StrangeFileError: the path is a link, FIFO, device or directory.
@@ -50,7 +50,7 @@ def write_whole(path: Path, content: bytes) -> None:
 
 
 def require_file_name(path: Path) -> None:
-    """Check that a path can be written as a file: it is neither "." nor "/", nor the path of another kind of entry.
+    """Check that a file can be written at a path, which must not be "." or "/", or the path of anything but a file.
 
     Raises:
         StrangeFileError: the path is a link, FIFO, device or directory.
@@ -60,7 +60,10 @@ def require_file_name(path: Path) -> None:
 
 @contextmanager
 def unfinished(path: Path) -> Iterator[Path]:
-    """Create an empty file next to `path` for writing; at the end it is synchronised and renamed to `path`.
+    """Create an empty file next to `path` for writing.
+
+    At the end of the context, the file is synchronised with the disk and renamed to `path`. After an exception, it is
+    removed.
 
     Raises:
         StrangeFileError: the path is a link, FIFO, device or directory.
@@ -78,7 +81,7 @@ def unfinished(path: Path) -> Iterator[Path]:
         neighbour.replace(path)
         sync_folder(path.parent)
     except BaseException as error:
-        with contextlib.suppress(OSError):  # the first error is the one that is reported
+        with contextlib.suppress(OSError):  # the original error is reported instead
             neighbour.unlink(missing_ok=True)
         if isinstance(error, OSError):
             # Some libraries raise an OSError without an error number.

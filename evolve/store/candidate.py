@@ -23,11 +23,15 @@ __all__ = ["Candidate"]
 
 @dataclass(frozen=True)
 class Candidate:
-    """A genome, its phenotype, and the outcome of training and evaluation; `Evaluation` describes the shared fields.
+    """A genome, its phenotype, and the outcome of training and evaluation.
 
-    parents: ids of the candidates from which the search made it; () if there are none
-    rung: rung after which it was evaluated, counted from 0; steps and seconds include all earlier rungs
-    policy: SHA-256 of the file of its trained policy; None if it has no policy, or in records of former versions
+    `Evaluation` describes the fields that both classes have.
+
+    id, generation, index: see `Place`
+    seed: seed of training and evaluation
+    parents: ids of the candidates from which the search derived the genome; () if there are none
+    rung: rung after which the candidate was evaluated, counted from 0; steps and seconds include all earlier rungs
+    policy: SHA-256 of the file of the trained policy; None if there is no policy, and in records of former versions
     """
 
     id: int
@@ -49,7 +53,7 @@ class Candidate:
     episode_failures: tuple[tuple[str, int], ...] = ()
 
     def __repr__(self) -> str:
-        """Return a short description, because a record holds thousands of candidates."""
+        """Return a short description, because a record may contain thousands of candidates."""
         outcome = f"failed: {self.failure}" if self.failure is not None else f"fitness {self.fitness:.4g}"
         return f"<Candidate {self.id}, generation {self.generation}, {outcome}>"
 
@@ -75,14 +79,14 @@ class Candidate:
         outcome: Evaluation,
         parents: tuple[int, ...] = (),
     ) -> Candidate:
-        """Return the candidate at `place` with its outcome; a fitness that is not finite is a failure."""
+        """Return the candidate at `place` with its outcome. If its fitness is not finite, it counts as failed."""
         if outcome.failure is None and not math.isfinite(outcome.fitness):
             outcome = Evaluation.failed(f"fitness is {outcome.fitness}", outcome.seconds)
         found = {f.name: getattr(outcome, f.name) for f in fields(Evaluation)}
         return cls(**vars(place), genome=genome, phenotype=phenotype, seed=seed, **found, parents=parents)
 
     def to_line(self) -> str:
-        """Return one line of JSON, from which numbers can be restored bit for bit; NaN and infinity become null."""
+        """Return the candidate as a line of JSON. Numbers can be restored bit for bit; NaN and infinity become null."""
         record = {KEYS.get(name, name): value for name, value in vars(self).items()}
         record["phenotype"] = self.phenotype.to_json()
         if not self.episode_failures:
@@ -91,14 +95,14 @@ class Candidate:
 
     @classmethod
     def from_line(cls, line: str) -> Candidate:
-        """Return the candidate that `to_line` wrote.
+        """Return the candidate from a line that `to_line` returned.
 
         Raises:
-            ValueError: the line is invalid; the message names the reason.
+            ValueError: the line is invalid; the message states the reason.
         """
         record = parsed(line)
         if isinstance(record, dict):
-            # The first runs wrote none of these fields, and an empty list of failures is never written.
+            # Records of the first versions lack these fields, and an empty list of failures is never written.
             record = {"parents": [], "rung": 0, "policy": None, "mishaps": [], **record}
         names = [KEYS.get(f.name, f.name) for f in fields(cls)]
         if not isinstance(record, dict) or sorted(record) != sorted(names):
@@ -129,7 +133,7 @@ class Candidate:
         return candidate
 
     def _require_success(self) -> None:
-        """Check that a candidate that has not failed has a fitness and returns."""
+        """Check that the candidate has a fitness and returns, unless it has failed."""
         if self.failure is not None:
             return
         if not math.isfinite(self.fitness):
@@ -138,10 +142,10 @@ class Candidate:
             raise ValueError("returns, success_rate: must be numbers if failure is null")
 
 
-KEYS = {"episode_failures": "mishaps"}  # fields with another name in records
+KEYS = {"episode_failures": "mishaps"}  # name of a field -> its name in records, if it differs
 _ANY = Interval(-1e300, 1e300)
-_LONGEST = 1_000_000  # maximum number of entries of a list
-# Maximum values: ids and generations are limited by the settings' ranges, seeds by random generators.
+_LONGEST = 1_000_000  # maximum number of entries of a list in a record
+# Maximum values in a record. The ranges of the settings limit ids and generations; random generators limit seeds.
 _COUNTS = {"id": 10**9, "generation": 10**5, "index": 10**4, "seed": 2**64 - 1, "steps": 10**12, "rung": 9}
 
 
@@ -168,21 +172,24 @@ def _episode_failure(entry: Any) -> tuple[str, int]:
 
 
 def _text(value: Any, name: str) -> str | None:
-    """Return printable text; a file's name in a failure message may contain bytes that are not valid text."""
+    """Return a text or None after a check.
+
+    Failure messages may contain names of files, and thus bytes that are not valid text. These are escaped.
+    """
     if value is not None and not isinstance(value, str):
         raise ValueError(f"{name}: must be text or null")
     return value if value is None else value.encode(errors="backslashreplace").decode()
 
 
 def _checksum(value: Any) -> str | None:
-    """Return the hash of a policy's file after a check; see `evolve.store.policies.digest`."""
+    """Return the hash of a policy's file, as `evolve.store.policies.digest` computes it, after a check of its form."""
     if value is not None and (not isinstance(value, str) or re.fullmatch("[0-9a-f]{64}", value) is None):
         raise ValueError("policy: must be a SHA-256 in 64 lower-case hexadecimal digits, or null")
     return value
 
 
 def _finite(value: Any) -> Any:
-    """Return a value with null instead of infinity and NaN, which JSON lacks."""
+    """Return a value with None in place of infinity and NaN, which JSON cannot represent."""
     if isinstance(value, dict):
         return {key: _finite(entry) for key, entry in value.items()}
     if isinstance(value, list | tuple):

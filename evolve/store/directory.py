@@ -1,11 +1,11 @@
-"""The run directory, which holds the complete state of a run as text and tensors, without code.
+"""The run directory, which contains the complete state of a run as text and tensors, but no code.
 
 config.toml        every setting
 versions.json      versions of the software at each start of the run
 candidates.jsonl   the record: one line per evaluated candidate and rung, in order of completion
 policies/          trained policies
-trainings/         checkpoints of training runs that may continue after a rung
-lock               lock of the process that works on the run
+trainings/         checkpoints of training runs that may still continue with their next rung
+lock               lock that the process working on the run holds
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ __all__ = ["Candidate", "Run", "RunError", "next_directory"]
 
 CONFIG = "config.toml"
 CANDIDATES = "candidates.jsonl"
-PRODUCTS = ("exr", "tensorboard")  # folders of files that are derived from a run
+PRODUCTS = ("exr", "tensorboard")  # folders of exported files
 
 
 @dataclass
@@ -45,14 +45,16 @@ class Run:
     _lock: RunLock | None = None
 
     def __repr__(self) -> str:
-        """Return a short description, because a record is long."""
+        """Return a short description, because a record may be long."""
         best = "" if self.best is None else f", best fitness {self.best.fitness:.4g}"
         evaluated = f"{len(self.candidates)} of {self.config.candidates} candidates evaluated"
         return f"<Run {str(self.path)!r}: {self.config.task}, {evaluated}{best}>"
 
     @classmethod
     def create(cls, path: Path | str, config: RunConfig, origin: str | None = None) -> Self:
-        """Create a run in a directory that does not exist or is empty; `origin` names the animal that it starts from.
+        """Create a run in a directory that does not exist yet, or is empty.
+
+        origin: "RUN:ID", the animal from which the run starts; None without one
 
         Raises:
             RunError: the directory is not empty, or cannot be written.
@@ -61,13 +63,13 @@ class Run:
         path = Path(path)
         try:
             path.mkdir(parents=True, exist_ok=True)
-            _require_no_run(path)  # checked before locking, which creates a file
+            _require_no_run(path)  # checked first, because locking creates a file
             with RunLock(path):
                 _require_no_run(path)
                 folder(path / POLICIES)
                 opened(path / CANDIDATES, "ab", create=True).close()
                 text = to_toml(config)
-                (path / VERSIONS).unlink(missing_ok=True)  # left by an attempt that was killed here
+                (path / VERSIONS).unlink(missing_ok=True)  # may be left by a process that was killed at this point
                 record_start(path, 0, origin, fingerprint(text))
                 write_whole(path / CONFIG, text.encode())
         except OSError as error:
@@ -78,13 +80,14 @@ class Run:
     def open(cls, path: Path | str, task: str | None = None) -> Self:
         """Open a run directory.
 
-        task: FILE.py:CLASS if the run evolves a user task. Its code runs only if it is named here, and is needed to
-            continue the run and to let its animals play.
+        task: "FILE.py:CLASS", if the run has a user task. The code of a user task is executed only if the task is named
+            here. It is needed to continue the run and to let its animals play.
 
         Raises:
-            RunError: the directory holds no run, or its candidates cannot be read; names file and line.
+            RunError: the directory contains no run, or a line of its record is invalid; the message names the file and
+                the line.
             ConfigError: the config is invalid, the named task differs from the run's, or its file has changed.
-            StrangeFileError: a link, FIFO or device has the name of one of the run's files or folders.
+            StrangeFileError: one of the run's files or folders is a link, FIFO or device.
         """
         path = Path(path)
         if not path.is_dir():
@@ -100,13 +103,13 @@ class Run:
 
     @classmethod
     def create_next(cls, config: RunConfig, preset: str, origin: str | None = None) -> Self:
-        """Create a run in the next free directory, also if other processes create runs at the same time.
+        """Create a run in the next free directory, even if other processes create runs at the same time.
 
         Raises:
             RunError: the directory cannot be written.
         """
         path, tried = next_directory(config.task_name, preset), None
-        while path != tried:  # the path of a broken link appears free but cannot be created
+        while path != tried:  # a broken link seems to be free, but cannot be created: stop
             try:
                 path.mkdir(parents=True)  # fails if another process has created it
                 break
@@ -117,7 +120,9 @@ class Run:
         return cls.create(path, config, origin)
 
     def require_present_format(self) -> None:
-        """Check that the run has the present format, because only then is light computed as in its earlier training.
+        """Check that the run has the present format.
+
+        In runs of a former format, light was computed differently, so that they cannot be continued consistently.
 
         Raises:
             RunError: the run has a former format; the message names the version that can continue it.
@@ -130,7 +135,7 @@ class Run:
             )
 
     def lock(self) -> RunLock:
-        """Return the lock for writing to this run, a context manager.
+        """Return the lock of this run, a context manager. A process must hold it to write to the run.
 
         Raises:
             LockedError: another process holds the lock.
@@ -139,7 +144,9 @@ class Run:
         return self._lock
 
     def repair(self) -> None:
-        """Read the record again, and remove an unfinished last line and incomplete files; call it after `lock`.
+        """Read the record again, and remove an unfinished last line and incomplete files.
+
+        The caller must hold the lock.
 
         Raises:
             RunError: the record is damaged or cannot be written, or config.toml has changed since the run was opened.
@@ -159,11 +166,11 @@ class Run:
         self.record.cut_off_unfinished()
 
     def append(self, candidate: Candidate) -> None:
-        """Append a candidate to the record and synchronise the file.
+        """Append a candidate to the record, and synchronise the file with the disk.
 
         Raises:
-            RunError: the candidate is already on record, another process has changed the record, or it cannot be
-                written; earlier lines are intact.
+            RunError: the candidate is already on record, another process has changed the record, or the record cannot
+                be written; earlier lines remain intact.
         """
         if self._lock is not None and not self._lock.stands:
             raise RunError(f"{self.record.path}: was changed by another process; nothing is added")
@@ -174,33 +181,33 @@ class Run:
         return self.path / POLICIES / f"{candidate_id:06d}.safetensors"
 
     def checkpoint_path(self, candidate_id: int, rung: int) -> Path:
-        """Return the path of a candidate's checkpoint after a rung."""
+        """Return the path of a candidate's checkpoint at the end of a rung."""
         return self.path / TRAININGS / f"{candidate_id:06d}-{rung}.safetensors"
 
     def forget_trainings(self, candidate_ids: Iterable[int]) -> None:
-        """Remove the checkpoints of these candidates, whose training does not continue."""
+        """Remove the checkpoints of candidates whose training will not continue."""
         for candidate_id in candidate_ids:
             for path in (self.path / TRAININGS).glob(f"{candidate_id:06d}-*.safetensors"):
                 path.unlink(missing_ok=True)
 
     @property
     def candidates(self) -> tuple[Candidate, ...]:
-        """Evaluated candidates in order of their ids, each after the last rung that it has reached."""
+        """Evaluated candidates in the order of their ids, each as recorded after the last rung that it has reached."""
         return self.record.candidates
 
     @property
     def notice(self) -> str | None:
-        """One line about a skipped line of the record or about lost policies; None if there are neither."""
+        """Message about a skipped line of the record or about lost policies, in one line; None if there is neither."""
         return self.record.notice or lost(self.candidates, self.policy_path)
 
     @property
     def best(self) -> Candidate | None:
-        """Candidate of highest fitness, the earliest of equal ones; None before a candidate has succeeded."""
+        """Candidate with the highest fitness (the earliest of equals); None before a candidate has succeeded."""
         done = [candidate for candidate in self.candidates if candidate.failure is None]
         return max(done, key=lambda candidate: (candidate.fitness, -candidate.id), default=None)
 
     def candidate(self, candidate_id: int | None = None) -> Candidate:
-        """Return the candidate with this id; None: the best.
+        """Return the candidate with this id, or the best candidate if the id is None.
 
         Raises:
             RunError: the candidate has not been evaluated, or no candidate has succeeded.
@@ -220,15 +227,15 @@ class Run:
 
     @property
     def in_order_of_finish(self) -> list[Candidate]:
-        """Candidates in the order of the record, once for each rung."""
+        """Candidates in the order of the record, each once for every rung that it has reached."""
         return list(self.record.lines.values())
 
     def on_record(self, candidate_id: int, rung: int) -> Candidate | None:
-        """Return the candidate after a rung; None if it has not been evaluated there."""
+        """Return the candidate as recorded after a rung; None if it has not been evaluated after this rung."""
         return self.record.lines.get((candidate_id, rung))
 
     def steps_of(self, candidate_id: int) -> int:
-        """Return the number of training steps of a candidate on record."""
+        """Return the number of training steps of a candidate on record; 0 if it has not been evaluated."""
         steps = rung = 0
         while (line := self.on_record(candidate_id, rung)) is not None:
             steps, rung = max(steps, line.steps), rung + 1
@@ -240,9 +247,10 @@ class Run:
 
 
 def _require_no_run(path: Path) -> None:
-    """Check that a directory is empty, or contains only files of a process that was killed while creating a run.
+    """Check that a run can be created in a directory.
 
-    config.toml is written last and marks a complete run.
+    It must be empty, or contain only files of a process that was killed while it created a run. Such a directory has no
+    config.toml, which is written last.
     """
     begun = {RunLock.NAME, VERSIONS, CANDIDATES, POLICIES}
     names = {entry.name for entry in path.iterdir() if not entry.name.endswith(UNFINISHED)}
@@ -255,7 +263,7 @@ def _require_no_run(path: Path) -> None:
 
 
 def _require_plain(path: Path) -> None:
-    """Check, before anything is read, that a run's files are regular files and its folders are folders."""
+    """Check, before a run is read, that its files are regular files and that its folders are folders."""
     for name in (CONFIG, VERSIONS, CANDIDATES, RunLock.NAME):
         require_regular(path / name)
     for name in (POLICIES, TRAININGS, *PRODUCTS):

@@ -1,4 +1,4 @@
-"""Outcome of one candidate."""
+"""Evaluation: the outcome of one candidate's training and evaluation."""
 
 from __future__ import annotations
 
@@ -8,20 +8,22 @@ from dataclasses import dataclass
 
 __all__ = ["Evaluation", "most_frequent", "total_episode_failures"]
 
-KINDS, LONGEST = 4, 300  # maximum number of different failures, and of characters of each
-OTHERS = "others"
+KINDS, LONGEST = 4, 300  # maximum number of different messages that are stored, and of characters in each
+OTHERS = "others"  # message under which all other failures are counted
 
 
 @dataclass(frozen=True)
 class Evaluation:
     """Outcome of one candidate's training run and evaluation episodes.
 
-    fitness: mean of `returns`; -inf if the evaluation failed
-    steps: agent steps trained
-    seconds: wall time
-    curve: (training steps, mean evaluation return), ...
-    failure: message in one line; None if nothing failed
-    episode_failures: (message in one line, number of episodes that it ended), the most frequent first
+    fitness: mean of `returns`; -inf if the candidate failed
+    returns: return of each evaluation episode
+    success_rate: share of the evaluation episodes that were solved
+    steps: number of agent steps in training
+    seconds: wall-clock time of training and evaluation
+    curve: learning curve, (training steps, mean return of the evaluation episodes) at each evaluation
+    failure: message in one line; None if the candidate did not fail
+    episode_failures: (message in one line, number of episodes that ended with it), the most frequent first
     """
 
     fitness: float
@@ -40,18 +42,18 @@ class Evaluation:
 
 
 def most_frequent(failures: Counter[str]) -> tuple[tuple[str, int], ...]:
-    """Return the most frequent failures, up to `KINDS`, followed by the number of all others."""
+    """Return the KINDS most frequent failures with their numbers, followed by the total number of all others."""
     told: Counter[str] = Counter()
     for failure, episodes in failures.items():
         told[_in_one_line(failure)[:LONGEST]] += episodes
-    others = told.pop(OTHERS, 0)  # from earlier calls of this function
+    others = told.pop(OTHERS, 0)  # failures that an earlier call has summarised
     ranked = sorted(told.items(), key=lambda item: (-item[1], item[0]))
     others += sum(episodes for _, episodes in ranked[KINDS:])
     return (*ranked[:KINDS], (OTHERS, others)) if others else tuple(ranked)
 
 
 def total_episode_failures(*mishaps: tuple[tuple[str, int], ...]) -> tuple[tuple[str, int], ...]:
-    """Return the failures of several parts of a training run combined."""
+    """Return the most frequent failures in several parts of a training run together."""
     counts: Counter[str] = Counter()
     for part in mishaps:
         counts.update(dict(part))
@@ -59,5 +61,5 @@ def total_episode_failures(*mishaps: tuple[tuple[str, int], ...]) -> tuple[tuple
 
 
 def _in_one_line(text: str) -> str:
-    told = text.encode(errors="backslashreplace").decode()  # a file's name in it may contain invalid text
+    told = text.encode(errors="backslashreplace").decode()  # names of files may contain invalid characters
     return " ".join(told.split())

@@ -1,4 +1,4 @@
-"""Lock of a run, which lets only one process at a time write to it."""
+"""Lock of a run, which only one process at a time can hold. A process must hold it to write to the run."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from evolve.store.regular_files import StrangeFileError, opened
 
 __all__ = ["LockedError", "RunLock", "holder"]
 
-PATIENCE_S = 0.5  # `holder` in another process takes the lock for an instant
-LONGEST = 400  # maximum bytes of a lock's text, which names a process and its machine
+PATIENCE_S = 0.5  # time to wait for the lock, because `holder` in another process takes it for an instant
+LONGEST = 400  # maximum length of the text in a lock file, which names a process and its machine [bytes]
 
 
 class LockedError(ValueError):
-    """Another process works on the run, or it cannot be written; the message is one line."""
+    """Another process is working on the run, or the run cannot be written; the message is one line."""
 
 
 class RunLock:
-    """Lock of the operating system on the file `lock`; it ends with its process, also if that is killed."""
+    """Lock of the operating system on the file `lock`. It is released when its process ends, even if it is killed."""
 
     NAME = "lock"
 
@@ -58,7 +58,7 @@ class RunLock:
 
     @property
     def stands(self) -> bool:
-        """True if the lock still belongs to the run, whose directory may have been deleted and created again."""
+        """True if the lock file still belongs to the run, which may have been deleted or created again."""
         if self._file is None:
             return False
         try:
@@ -68,7 +68,7 @@ class RunLock:
 
 
 def holder(run: Path) -> str | None:
-    """Return the process that works on a run ("1234 on host"), or None.
+    """Return the process that is working on a run, such as "1234 on host"; None if there is none.
 
     Raises:
         OSError: the lock cannot be read.

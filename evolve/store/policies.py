@@ -1,4 +1,4 @@
-"""Comparison of the files of trained policies with the record."""
+"""Checks that the files of trained policies are those of the record."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from evolve.store.regular_files import read
 
 __all__ = ["digest", "lost", "require_policy"]
 
-SHOWN = 5  # maximum number of ids in a line
+SHOWN = 5  # maximum number of ids in a message
 REMEDY = "restore the file from a copy of the run; only replay, report and export need it"
 
 
@@ -29,7 +29,10 @@ def digest(path: Path) -> str | None:
 
 
 def lost(candidates: Iterable[Candidate], where: Callable[[int], Path]) -> str | None:
-    """Return one line about policies on record whose files are missing; None if all files exist."""
+    """Return a message about policies on record whose files are missing; None if all files exist.
+
+    where: function that returns the path of a candidate's policy
+    """
     gone = [c.id for c in candidates if c.policy is not None and not where(c.id).exists()]
     if not gone:
         return None
@@ -41,9 +44,9 @@ def require_policy(candidate: Candidate, path: Path) -> None:
     """Check that a file is the policy with which a candidate was evaluated.
 
     Raises:
-        RunError: the file is lost or has another content, or the candidate never had a policy.
+        RunError: the file is missing or has a different content, or the candidate never had a policy.
     """
-    if candidate.failure is not None:  # an existing file belongs to an earlier rung
+    if candidate.failure is not None:  # if a file exists, it is the policy of an earlier rung
         raise RunError(f"candidate {candidate.id} has no policy, as it failed: {candidate.failure}")
     found = digest(path)
     if found is None and candidate.policy is None:

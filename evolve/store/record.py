@@ -1,6 +1,6 @@
-"""The record of a run, candidates.jsonl: one line per evaluated candidate and rung, in order of finishing.
+"""The record of a run, candidates.jsonl: one line per evaluated candidate and rung, in the order of completion.
 
-It is read completely and checked line by line; lines are only appended.
+When a record is read, every line is checked. Writing only appends lines.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ Lines = dict[tuple[int, int], Candidate]  # (candidate id, rung) -> the candidat
 
 
 class RunError(ValueError):
-    """An operation on a run directory is impossible; the message is one line with the reason."""
+    """An operation on a run directory is impossible; the message states the reason in one line."""
 
 
 @dataclass
@@ -31,8 +31,8 @@ class Record:
     """The lines of a record on disk.
 
     lines: candidates by (id, rung), in the order of the file
-    candidates: candidates in order of their ids, each after the highest rung that it has reached
-    notice: one line about an unfinished line that was skipped, for example after a power failure
+    candidates: candidates in the order of their ids, each as recorded after the last rung that it has reached
+    notice: message about an unfinished last line that was skipped, for example after a power failure; None without one
     """
 
     path: Path
@@ -43,10 +43,10 @@ class Record:
 
     @classmethod
     def read(cls, path: Path, config: RunConfig) -> Record:
-        """Read a record; each line must agree with `config` and with the lines before it.
+        """Read a record, and check that each line agrees with `config` and with earlier lines.
 
         Raises:
-            RunError: the file cannot be read, or a line is damaged; names file and line.
+            RunError: the file cannot be read, or a line is damaged; the message names the file and the line.
         """
         try:
             content = read(path)
@@ -70,18 +70,18 @@ class Record:
         return cls(path, lines, _furthest(lines), notice, whole_bytes)
 
     def append(self, candidate: Candidate) -> None:
-        """Append a candidate and synchronise the file.
+        """Append a candidate, and synchronise the file with the disk.
 
         Raises:
-            RunError: the candidate is already on record, another process has changed the record, or it cannot be
-                written; earlier lines are intact.
+            RunError: the candidate is already on record, another process has changed the record, or the record cannot
+                be written; earlier lines remain intact.
         """
         if (candidate.id, candidate.rung) in self.lines:
             raise RunError(f"{self.path.parent}: candidate {candidate.id} has been evaluated already")
         line = candidate.to_line().encode()
         try:
             with opened(self.path, "ab") as file:
-                if file.tell() != self._whole_bytes:  # for example if another run was started in the directory
+                if file.tell() != self._whole_bytes:  # another run may have been started in the directory
                     raise RunError(f"{self.path}: was changed by another process; nothing is added")
                 file.write(line)
                 file.flush()
@@ -109,13 +109,13 @@ class Record:
 
 
 def _furthest(lines: Lines) -> tuple[Candidate, ...]:
-    """Return each candidate after the highest rung that it has reached, in order of ids."""
+    """Return each candidate as recorded after the last rung that it has reached, in the order of ids."""
     furthest = {candidate_id: lines[candidate_id, rung] for candidate_id, rung in sorted(lines)}
     return tuple(furthest.values())
 
 
 def _with(candidates: tuple[Candidate, ...], new: Candidate) -> tuple[Candidate, ...]:
-    """Return the result of `_furthest` with one more line, without a pass over all lines."""
+    """Return the candidates after one more line, as `_furthest` would, but without a pass over all lines."""
     at = bisect_left(candidates, new.id, key=lambda candidate: candidate.id)
     known = at < len(candidates) and candidates[at].id == new.id
     if known and candidates[at].rung > new.rung:
@@ -124,12 +124,12 @@ def _with(candidates: tuple[Candidate, ...], new: Candidate) -> tuple[Candidate,
 
 
 def _require_agreement(candidate: Candidate, config: RunConfig, dimension: int, earlier: Lines) -> None:
-    """Check that a line agrees with the run's settings and with earlier lines.
+    """Check that a line of the record agrees with the run's settings and with earlier lines.
 
-    The search itself compares the line with its proposals.
+    A comparison with the search's proposals is not part of this check; see `evolve.search.same_search`.
 
     Raises:
-        ValueError: the line disagrees; the message names the reason.
+        ValueError: the line disagrees; the message states the reason.
     """
     population, rungs = config.search.population, config.search.rungs
     if (candidate.id, candidate.rung) in earlier:

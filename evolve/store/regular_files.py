@@ -1,7 +1,7 @@
-"""Access to the files of a run, which opens only regular files in the run directory.
+"""Access to the files of a run. Only regular files are opened.
 
-A run directory may come from an untrusted source. A link in it could point to any file of the user, which would then be
-overwritten, and opening a FIFO could block forever.
+A run directory may come from an untrusted source. If it contained a link to some other file of the user, writing
+through the link would overwrite that file. Opening a FIFO could block forever.
 """
 
 from __future__ import annotations
@@ -34,15 +34,17 @@ _FLAGS = {"rb": os.O_RDONLY, "r+b": os.O_RDWR, "ab": os.O_WRONLY | os.O_APPEND}
 
 
 class StrangeFileError(OSError):
-    """A run's file or folder is another kind of entry; `strerror` and `filename` describe it."""
+    """A path is not a regular file, or not a folder, as it must be; `strerror` and `filename` give details."""
 
 
 def opened(path: Path, mode: Literal["rb", "r+b", "ab"] = "rb", create: bool = False) -> BinaryIO:
-    """Open a run's file in the mode "rb", "r+b" or "ab"; no mode truncates it, and only `create` makes a missing file.
+    """Open a run's file in the mode "rb", "r+b" or "ab". None of these modes truncates the file.
+
+    create: whether to create the file if it is missing
 
     Raises:
         StrangeFileError: the path is not a regular file, or a file opened for writing has several hard links.
-        OSError: the file does not exist or cannot be opened.
+        OSError: the file does not exist, or cannot be opened.
     """
     require_regular(path)
     flags = _FLAGS[mode] | (os.O_CREAT if create else 0)
@@ -61,7 +63,7 @@ def read(path: Path) -> bytes:
 
 
 def created(path: Path) -> BinaryIO:
-    """Create a file and open it for writing; an existing entry of this name is removed and never written to.
+    """Create a file, and open it for writing. An existing file or link at this path is removed first, not overwritten.
 
     Raises:
         OSError: the file cannot be created.
@@ -71,10 +73,10 @@ def created(path: Path) -> BinaryIO:
 
 
 def folder(path: Path) -> Path:
-    """Return a run's folder, created if it is missing; its parent must exist.
+    """Create a run's folder if it is missing, and return its path. The parent folder must exist.
 
     Raises:
-        StrangeFileError: the path is another kind of entry.
+        StrangeFileError: the path exists, but is not a folder.
         OSError: the folder cannot be created.
     """
     path.mkdir(exist_ok=True)
@@ -83,10 +85,10 @@ def folder(path: Path) -> Path:
 
 
 def require_regular(path: Path) -> None:
-    """Check that a path is a regular file or does not exist, before other code opens it by name.
+    """Check that a path is a regular file or does not exist, before other code opens it by its name.
 
     Raises:
-        StrangeFileError: the path is another kind of entry.
+        StrangeFileError: the path exists, but is not a regular file.
     """
     mode = _mode(path)
     if mode is not None and not stat.S_ISREG(mode):
@@ -97,7 +99,7 @@ def require_folder(path: Path) -> None:
     """Check that a path is a folder or does not exist.
 
     Raises:
-        StrangeFileError: the path is another kind of entry.
+        StrangeFileError: the path exists, but is not a folder.
     """
     mode = _mode(path)
     if mode is not None and not stat.S_ISDIR(mode):
@@ -105,7 +107,7 @@ def require_folder(path: Path) -> None:
 
 
 def sync_folder(path: Path) -> None:
-    """Synchronise a folder's entries with the disk, so that new names of files survive a power failure.
+    """Synchronise a folder with the disk, so that new and renamed files survive a power failure.
 
     Raises:
         OSError: the disk reports an error.
@@ -114,14 +116,19 @@ def sync_folder(path: Path) -> None:
     try:
         os.fsync(descriptor)
     except OSError as error:
-        if error.errno not in (errno.EINVAL, errno.ENOTSUP):  # file systems without this operation
+        if error.errno not in (errno.EINVAL, errno.ENOTSUP):  # other errors than the lack of this operation
             raise
     finally:
         os.close(descriptor)
 
 
 def _descriptor(path: Path, flags: int, alone: bool = False) -> int:
-    """Return the descriptor of an opened file; it is checked after opening, so that it cannot be exchanged between."""
+    """Open a file, check it, and return its descriptor.
+
+    The check follows the opening, so that the file cannot be replaced between the two.
+
+    alone: whether a file with several hard links is refused
+    """
     descriptor = os.open(path, flags | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC, 0o644)
     found = os.fstat(descriptor)
     if stat.S_ISREG(found.st_mode) and (not alone or found.st_nlink == 1):
@@ -134,7 +141,7 @@ def _descriptor(path: Path, flags: int, alone: bool = False) -> int:
 
 
 def _mode(path: Path) -> int | None:
-    """Return the mode of a directory entry without following links; None if it does not exist."""
+    """Return the mode (kind and permissions) of a path, without following links; None if it does not exist."""
     try:
         return path.lstat().st_mode
     except FileNotFoundError:

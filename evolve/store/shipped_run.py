@@ -1,4 +1,4 @@
-"""The run that ships with rhabdom, evolved with the quick preset: its record and the policy of its best animal."""
+"""The run that ships with rhabdom: the record of a run with the preset `quick`, and the policy of its best animal."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from evolve.store.regular_files import read
 
 __all__ = ["copy_shipped_run"]
 
-FOLDER = "demo"  # in evolve/, as a run directory
+FOLDER = "demo"  # run directory within evolve/
 
 
 def copy_shipped_run(directory: Path) -> Run:
-    """Return the shipped run in a directory, copied there unless it exists already.
+    """Copy the shipped run to a directory, unless it is already there, and return it.
 
     Raises:
-        RunError: the directory holds other files.
+        RunError: the directory contains other files.
         OSError: the directory cannot be written.
     """
     files = dict(_files(resources.files("evolve") / FOLDER))
@@ -37,7 +37,7 @@ def copy_shipped_run(directory: Path) -> Run:
 
 
 def _files(folder: Traversable, within: str = "") -> Iterator[tuple[str, bytes]]:
-    """Yield the names and contents of all files below a folder."""
+    """Yield the relative path and the content of each file below a folder."""
     for entry in folder.iterdir():
         if entry.is_dir():
             yield from _files(entry, f"{within}{entry.name}/")

@@ -1,4 +1,4 @@
-"""Versions of software, and fingerprints of settings, at each start of a run."""
+"""Versions of the software and fingerprints of the settings, recorded at each start of a run."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ PACKAGES = (
 
 
 def present() -> dict[str, str]:
-    """Return the present versions of the software that influences a run's numbers."""
+    """Return the installed versions of the software that influences a run's numbers."""
     versions = {"python": platform.python_version(), "machine": platform.machine(), "commit": _commit()}
     versions["device"] = device()
     for package in PACKAGES:
@@ -45,13 +45,13 @@ def present() -> dict[str, str]:
 
 
 def recorded(run: Path) -> dict[str, str]:
-    """Return the versions with which a run was started; {} if they cannot be read."""
+    """Return the versions at the first start of a run; {} if they cannot be read."""
     starts = _starts(run)
     return starts[0]["versions"] if starts else {}
 
 
 def commits(run: Path) -> list[str]:
-    """Return the known commits of rhabdom at the starts of a run, in order and without repetitions."""
+    """Return the known commits of rhabdom at the starts of a run, in order, each once."""
     known = [start["versions"].get("commit") for start in _starts(run)]
     return list(dict.fromkeys(commit for commit in known if commit))
 
@@ -59,8 +59,8 @@ def commits(run: Path) -> list[str]:
 def fingerprint(config: str) -> str:
     """Return the fingerprint of a run's config.toml.
 
-    It ignores text without influence on training and evaluation: comments, the number of workers, and the number of
-    generations.
+    The fingerprint ignores lines that do not influence training and evaluation: comments, the number of workers, and
+    the number of generations.
     """
     left_out = ("workers =", "generations =", "#")
     lines = [line.strip() for line in config.splitlines() if line.strip() and not line.startswith(left_out)]
@@ -80,9 +80,9 @@ def _settings(run: Path) -> str:
 def record_start(run: Path, candidates: int, origin: str | None = None, settings: str | None = None) -> None:
     """Record a start of a run with the present versions.
 
-    candidates: number of evaluated candidates at this start
-    origin: animal from which the run started; None without one
-    settings: fingerprint of the settings; None: of the run's config.toml
+    candidates: number of candidates that have been evaluated before this start
+    origin: "RUN:ID", the animal from which the run starts; None without one
+    settings: fingerprint of the settings; None: it is computed from the run's config.toml
     """
     start: dict[str, Any] = {
         "time": datetime.now(UTC).isoformat(timespec="seconds"),
@@ -96,13 +96,13 @@ def record_start(run: Path, candidates: int, origin: str | None = None, settings
 
 
 def origin(run: Path) -> str | None:
-    """Return the animal from which a run started ("runs/first:12"); None if there is none or it cannot be read."""
+    """Return the animal from which a run started, such as "runs/first:12"; None if no animal is recorded."""
     starts = _starts(run)
     return str(starts[0]["from"]) if starts and "from" in starts[0] else None
 
 
 def _starts(run: Path) -> list[dict[str, Any]]:
-    """Return the earlier starts; a lost or damaged file counts as empty, because it serves only for information."""
+    """Return the recorded starts of a run. A lost or damaged file counts as empty: a run can continue without it."""
     try:
         starts = json.loads(read(run / FILE))
         return [start for start in starts if isinstance(start["versions"], dict)]
@@ -111,7 +111,7 @@ def _starts(run: Path) -> list[dict[str, Any]]:
 
 
 def _commit() -> str:
-    """Return the commit of the running checkout, with "+" if files differ from it; "" outside a checkout."""
+    """Return the git commit of this code, with "+" if files differ from it; "" if the code is not in a checkout."""
     here = Path(__file__).parent
     try:
         described = subprocess.run(

@@ -29,10 +29,10 @@ class Advanced:
 class Animals:
     """All agents of a batch of worlds, and their observations.
 
-    renderers: renderers of every agent's eyes; None for agents without eyes in use.
+    renderers: for each agent, the renderers of its eyes, or None if its eyes are not used.
     memory: number of frames in the observations of learning agents.
     learners: senses of the learning agents.
-    seeing: senses of all agents that see, learners first.
+    seeing: senses of all agents whose eyes are used, learners first.
     """
 
     def __init__(self, simulation: Simulation, renderers: Sequence[AgentRenderers | None], memory: int) -> None:
@@ -50,7 +50,7 @@ class Animals:
                 _require_fit(other, senses)
 
     def seed(self, seed: int) -> None:
-        """Restart all random streams."""
+        """Restart all random streams from this seed."""
         self.simulation.seed(seed)
         for senses in self.seeing:
             senses.restart()
@@ -62,7 +62,10 @@ class Animals:
         return self.remember(_waited(pending), everyone)
 
     def advance(self, actions: Sequence[np.ndarray]) -> Advanced:
-        """Take one action; actions: (world, number) for each learning agent."""
+        """Take one action in all worlds, and launch the rendering of the frames after it.
+
+        actions: one array (world, n_actions) for each learning agent
+        """
         simulation = self.simulation
         everyones = self._everyones(actions)
         failed = simulation.move(np.concatenate(everyones, axis=1) if len(everyones) > 1 else everyones[0])
@@ -81,7 +84,10 @@ class Animals:
         return Advanced(step, pending)
 
     def seen(self, advanced: Advanced) -> list[Arrays]:
-        """Return the frames after the action. Worlds that the task changed after the action are rendered again."""
+        """Return the frames after the action, for each agent in `seeing`.
+
+        Worlds in which the task moved bodies after the action (`Step.changed`) are rendered again first.
+        """
         frames, changed = _waited(advanced.pending), advanced.step.changed
         if len(changed):
             _put(frames, changed, _waited(self.launch(changed)))
@@ -100,8 +106,11 @@ class Animals:
         return [senses.launch(poses, None if everyone else worlds) for senses in self.seeing]
 
     def remember(self, seen: Sequence[Arrays], fresh: np.ndarray) -> list[Arrays]:
-        """Add frames to the memories and return the learners' observations; fresh: worlds whose episode has just
-        begun."""
+        """Add frames to the memories, and return the learners' observations.
+
+        seen: the frames, for each agent in `seeing`
+        fresh: indices of the worlds whose episode has just begun
+        """
         known = [senses.observation(frames, fresh) for senses, frames in zip(self.seeing, seen, strict=True)]
         return known[: len(self.learners)]
 
@@ -111,7 +120,7 @@ class Animals:
         _put(seen, worlds, _waited(pending))
 
     def get_state(self) -> Arrays:
-        """Return everything that the future depends on; each array's first axis is the world."""
+        """Return all arrays on which future steps depend, by name; the first axis of each array is the world."""
         found = self.simulation.get_state()
         for number, senses in enumerate(self.seeing):
             found |= {self._key(number, name): array for name, array in senses.get_state().items()}
@@ -131,8 +140,7 @@ class Animals:
         return [*self.learners, *(senses for _, senses in self._frozen)]
 
     def launch(self, worlds: np.ndarray | None = None) -> Pending:
-        """Launch the rendering of these worlds (None: all). All eyes are launched before the first result is
-        awaited."""
+        """Launch the rendering of these worlds (None: all) for the eyes of all agents, without waiting for results."""
         poses = self.simulation.poses()
         return [senses.launch(poses, worlds) for senses in self.seeing]
 
@@ -161,7 +169,7 @@ def _require_fit(other: Frozen, senses: Senses) -> None:
     """Compare the observation space of a frozen policy, if it has one, with the observations of its task.
 
     Raises:
-        ValueError: they differ.
+        ValueError: the two have different entries, or entries of different shapes.
     """
     learnt = getattr(other.policy, "observation_space", None)
     if learnt is None:

@@ -1,4 +1,4 @@
-"""Factories of environments: they combine world, task, physics and eyes."""
+"""Functions that build environments from a world, a task, physics and eyes."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 AUTO = "auto"
 OF_ENVIRONMENTS = {"task", "n_envs", "seed", "memory", "mode", "least_return", "episode_steps", "render_mode"}
-MOST = 1_000_000  # chosen limit for numbers of worlds and of frames, beyond what memory can hold
+MOST = 1_000_000  # chosen limit for n_envs and for memory, more than any memory can hold
 
 
 def make_vec_env(
@@ -56,33 +56,36 @@ def make_vec_env(
     auxiliary: Sequence[str] = (),
     render_mode: str | None = None,
 ) -> EyesVecEnv:
-    """A batched environment of one task.
+    """Return a batched environment of one task.
 
-    task: one of `sim.TASKS`, or a user-defined `sim.Task`. A user task defines everything except n_envs, seed, memory,
-        episode_steps and render_mode itself. A `sim.Encounter` of animals that are alike learns a single policy, with
-        one row for each animal of each world.
-    eyes: the eyes of every agent; default Eyes()
+    task: one of `sim.TASKS`, a user-defined `sim.Task` or `sim.BatchTask`, or a `sim.Encounter`. With a user task, only
+        n_envs, seed, memory, mode, least_return, episode_steps and render_mode may be passed, because the task itself
+        defines the rest. The animals of an encounter learn a single policy, and therefore must have the same spaces.
+        Arrays then have one row for each animal of each world.
+    eyes: the agent's eyes: one `sim.Eyes`, or several kinds of eyes by name; None: Eyes()
     n_envs: number of worlds
     seed: seed of episodes and noise; None: a random seed
     memory: number of frames in an observation
-    mode: "training", or "evaluation" (objects respawn; rewards have the weights of the fitness)
-    rays_per_receptor: rays traced for each receptor, in direct light; "auto": the fewest rays that the receptors' noise
-        allows, plus light that was reflected twice if it matters, as chosen by `sim.choose_fidelity(world, eyes,
-        bands="own")`
-    fidelity: a complete `sim.Fidelity`, used instead of rays_per_receptor (which also accepts one); "auto": as with
-        rays_per_receptor="auto"
+    mode: "training" or "evaluation". In evaluation, objects that the agent reached reappear elsewhere, and reward terms
+        have the weights of the fitness.
+    rays_per_receptor: number of rays traced for each receptor, in direct light only. "auto": the cheapest fidelity
+        whose error the receptors' noise allows. It includes light that was reflected twice if this light changes
+        signals too much to be ignored. `sim.choose_fidelity(world, eyes, bands="own")` returns this fidelity.
+    fidelity: a complete `sim.Fidelity` instead of rays_per_receptor, or "auto", which has the same meaning as
+        rays_per_receptor="auto". A `sim.Fidelity` may also be passed as rays_per_receptor.
     world_seed, mazes, course: the layout that all worlds share, see `sim.build_world`
     least_return: in training, an episode is truncated once its rewards sum to this value or less; None: never
     episode_steps: number of actions after which an episode is truncated; None: the task's default
     spectra: spectra of materials and lights by name, used instead of their colours: see `sim.build_world`
-    vary: {"light": (low, high)}: each episode has its own light level, uniform in its logarithm; 1 is full daylight and
-        the maximum
+    vary: ranges of quantities that are drawn for each episode, see docs/tasks.md. With {"light": (low, high)}, each
+        episode has its own light level, whose logarithm is distributed uniformly; 1 is full daylight.
     auxiliary: any of "depth", "ids" and "flow": quantities that an observation contains for each receptor in addition
         to its signal, see docs/tasks.md
-    render_mode: "rgb_array": the agent from behind, with the fields of view of its eyes; "eyes": the signals of all
-        eyes, side by side
+    render_mode: content of the images that the environment renders for human viewers. "rgb_array": the agent from
+        behind, with the fields of view of its eyes; "eyes": the signals of all eyes, side by side; None: no images
 
-    Physics uses the same number of threads as Dr.Jit; drjit.set_thread_count limits both.
+    Physics uses the same number of threads as Dr.Jit, but at most one for each world. drjit.set_thread_count limits
+    both.
 
     Raises:
         ValueError: a bad argument.
@@ -114,7 +117,7 @@ def make_vec_env(
 def make_parallel_env(
     encounter: Encounter, seed: int | None = 0, *, memory: int = 1, render_mode: str | None = None
 ) -> EncounterEnv:
-    """Several animals in one world, as a PettingZoo parallel environment; see `sim.Encounter`.
+    """Return a PettingZoo parallel environment of several animals in one world; see `sim.Encounter`.
 
     seed: seed of episodes and noise, until `reset` receives one; None: a random seed
     memory: number of frames in an observation
@@ -161,7 +164,7 @@ def _refuse_for_tasks(given: Mapping[str, Any]) -> None:
 def _fidelity_of(
     rays_per_receptor: float | str | Fidelity, fidelity: Fidelity | str | None, eyes: Eyes | Mapping[str, Eyes]
 ) -> Fidelity | None:
-    """Return the requested fidelity, from either argument; None: to be chosen automatically."""
+    """Return the fidelity that one of the two arguments requests; None if it is to be chosen automatically."""
     chosen = isinstance(fidelity, str) and fidelity == AUTO
     if not (fidelity is None or chosen or isinstance(fidelity, Fidelity)):
         raise ValueError(f"fidelity = {shown(fidelity)}: must be a sim.Fidelity, {AUTO!r} or None")

@@ -1,7 +1,7 @@
 """Auxiliary observations for each receptor: depth, geom id and optic flow of the visible surface.
 
-Animals cannot sense these quantities. They have no noise. They serve training: as targets of auxiliary losses, or as
-additional input of a critic.
+No animal can sense these quantities, and they contain no noise. They are useful only in training, as targets of
+auxiliary losses or as additional inputs of a critic.
 """
 
 from __future__ import annotations
@@ -22,15 +22,16 @@ DEPTH, IDS, FLOW = AUXILIARY
 class Auxiliary:
     """Auxiliary observations of one kind of eyes in all worlds, at the centre of each receptor.
 
-    renderer: renders depth and ids for these eyes.
-    names: the requested quantities, out of AUXILIARY.
+    renderer: renderer of depth and ids for these eyes.
+    names: the requested quantities, a subset of AUXILIARY.
     prefix: prefix of their names in an observation.
     spaces: spaces of the entries in one world's observation, by name:
-        depth: distance along the eye's axis [m], (eye, height, width) float32; 0 if nothing is visible
-        ids: id of the geom, (eye, height, width) int32; -1 if nothing is visible
-        flow: motion on the retina since the last observation, to the right and down [receptors], (eye, 2, height,
-            width) float32; 0 in the first observation of an episode, if nothing is visible, and if the visible point
-            was not in front of the eye at the last observation
+        depth: distance of the visible point along the eye's axis [m], (eye, height, width) float32; 0 if nothing is
+            visible
+        ids: id of the visible geom, (eye, height, width) int32; -1 if nothing is visible
+        flow: motion of the visible point on the retina since the last observation, to the right and down [receptors],
+            (eye, 2, height, width) float32. The flow is 0 in the first observation of an episode, if nothing is
+            visible, and if the visible point was not in front of the eye at the last observation.
     """
 
     def __init__(self, renderer: Labels, names: Sequence[str], prefix: str = "") -> None:
@@ -58,11 +59,14 @@ class Auxiliary:
         return {self._prefix + name: found[name] for name in self._names}
 
     def go_on_from(self, poses: Poses) -> None:
-        """Set the poses of the previous observation."""
+        """Set the poses of the previous observation, from which the next optic flow is computed."""
         self._before = poses
 
     def _flow(self, now: Poses, depth: np.ndarray, ids: np.ndarray) -> np.ndarray:
-        """Optic flow of the points that are visible now: computed backwards in time, with the sign reversed."""
+        """Return the optic flow of the points that are visible now.
+
+        The motion of these points back to the previous poses is computed, and its sign is reversed.
+        """
         before = now if self._before is None else self._before
         frames = self._renderer.eye_frames(now), self._renderer.eye_frames(before)
         return -np.nan_to_num(flow_between(self._renderer.eye, depth, ids, (now, before), frames), nan=0.0)

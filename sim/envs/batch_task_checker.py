@@ -17,24 +17,24 @@ SEED = 0
 def check_batch_task(task: BatchTask, n_envs: int = 4, steps: int = 12) -> None:
     """Play random actions in a few worlds, and compare the task's behaviour with the description of `sim.BatchTask`.
 
-    It is the counterpart of Gymnasium's `check_env` for tasks.
+    Gymnasium's `check_env` does the same for environments.
 
     n_envs: number of worlds, at least 2
     steps: number of actions
 
-    The following are checked:
+    The function checks the following:
 
-    - the settings
-    - shapes, finite numbers and world indices in everything that the methods return
-    - `reset` changes only the worlds that it was given
-    - a world's episode depends neither on its neighbours nor on their number
-    - the same seed repeats an episode
-    - `judge` moves nothing in worlds that it does not name
-    - a stored state can be restored
+    - The task's settings are valid.
+    - All arrays that its methods return have the right shapes, finite numbers and valid indices of worlds.
+    - `reset` changes only the worlds that it was given.
+    - A world's episode depends neither on other worlds nor on their number.
+    - The same seed leads to the same episode.
+    - If `renders_early` is True, `judge` moves bodies only in worlds that it names in `Outcome.changed`.
+    - After a stored state has been restored, the same actions have the same results.
 
     Raises:
         ValueError: one line that states the method, the array, the world, and the correct behaviour.
-        RuntimeError: a method fails.
+        RuntimeError: a method of the task fails.
     """
     if not isinstance(task, BatchTask):
         raise ValueError(f"task = {task!r:.80}: must be a sim.BatchTask")
@@ -54,7 +54,7 @@ def check_batch_task(task: BatchTask, n_envs: int = 4, steps: int = 12) -> None:
 
 
 def _actions(simulation: Simulation, steps: int) -> list[np.ndarray]:
-    """Return the same actions for each world, for any number of worlds."""
+    """Return random actions that are the same in all worlds, and that do not depend on the number of worlds."""
     size = sum(agent.n_actions for agent in simulation.agents)
     random = np.random.default_rng(SEED)
     return [np.tile(random.uniform(-1, 1, size), (simulation.n, 1)).astype(np.float32) for _ in range(steps)]

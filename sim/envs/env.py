@@ -1,4 +1,4 @@
-"""One world as a Gymnasium environment, implemented as a batch of one."""
+"""One world as a Gymnasium environment, implemented as a batch with a single world."""
 
 from __future__ import annotations
 

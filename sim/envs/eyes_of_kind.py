@@ -18,7 +18,7 @@ class EyesOfKind:
 
     simulation: the worlds
     renderer: renderer of the eyes
-    keys: keys of the noise, one for each world
+    keys: keys of the random generators of the noise, one for each world
     memory: number of frames in an observation
     space: space of these signals in one world's observation
     """
@@ -32,12 +32,14 @@ class EyesOfKind:
         self.space = self._space((memory, *frame))
 
     def restart(self, keys: np.ndarray) -> None:
-        """Restart the noise with these keys."""
+        """Restart the random generators of the noise with these keys."""
         self._normals.restart(keys)
 
     def launch(self, poses: Poses, worlds: np.ndarray | None = None) -> PendingFrame:
-        """Launch the rendering of these worlds (None: all), including noise. The noise of other worlds does not
-        advance."""
+        """Launch the rendering of these worlds (None: all), including noise.
+
+        The random generators of the other worlds do not advance.
+        """
         light = self._simulation.light(self._wavelengths)
         if worlds is None:
             seen = self.renderer.launch(poses, light)
@@ -51,7 +53,7 @@ class EyesOfKind:
         return seen.then(lambda signals: noise(signals, normals.wait()))
 
     def get_state(self) -> dict[str, np.ndarray]:
-        """Return everything that future signals depend on, apart from the worlds."""
+        """Return all arrays on which future signals depend, apart from the state of the worlds."""
         return {"remembered": self.memory.frames_held, "noise": self._normals.place}
 
     def set_state(self, remembered: np.ndarray, noise: np.ndarray) -> None:
@@ -63,13 +65,15 @@ class EyesOfKind:
         brightest = self._brightest()
         spread = 0.0 if self._noise is None else self._noise.largest(brightest)
         margin = SIGMAS * spread + ROUNDING * brightest
-        # The signal of a point light has no upper bound: it grows as the distance decreases.
+        # The light from a point light has no upper bound, because it increases as the distance to the light decreases.
         high = 2 * brightest + margin if self.renderer.only_directional else np.inf
         return spaces.Box(-margin if np.isfinite(high) else -np.inf, high, frames, np.float32)
 
     def _brightest(self) -> float:
-        """Signal of a white surface that faces all directional lights at once, under the brightest light that can be
-        drawn."""
+        """Return the signal of a white surface that faces all directional lights at once.
+
+        If light varies, the surface is in the brightest light that can be drawn.
+        """
         variation = self._simulation.variation
         if variation is None or not variation.of_light:
             return self.renderer.brightest

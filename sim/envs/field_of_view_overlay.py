@@ -1,6 +1,7 @@
-"""Overlay that shows the eyes, their fields of view at eye height, and rays of receptors in an image of the world.
+"""Overlay that shows the eyes, their fields of view at eye height, and receptors' viewing directions in an image.
 
-The camera follows the agent, so the fields of view have a fixed place in the image. Only their occlusion changes.
+The camera follows the agent, so the fields of view have a fixed position in the image. Only the parts that obstacles
+hide differ between images.
 """
 
 from __future__ import annotations
@@ -20,24 +21,25 @@ from sim.scene.cameras import Viewpoint
 COLORS = np.array(
     [[0, 158, 115], [230, 159, 0], [86, 180, 233], [204, 121, 167], [240, 228, 66], [0, 114, 178], [213, 94, 0]]
 )
-FILL, RAY, RIM = 0.22, 0.55, 0.95  # opacities
+FILL, RAY, RIM = 0.22, 0.55, 0.95  # opacities of a field's interior, of receptors' directions and of its edges
 FARTHEST = 30.0  # [m] length of a ray that hits nothing
-MOST_RAYS = 15  # drawn for one eye, in addition to the edges of its field
-FAN = 64  # rays that sample the extent of a field
-LINE = 1.2  # [pixels] width
+MOST_RAYS = 15  # largest number of receptors' directions drawn for one eye, in addition to the edges of its field
+FAN = 64  # number of rays across a field that measure the distance to obstacles
+LINE = 1.2  # [pixels] width of the lines
 IRIS, PUPIL = 0.07, 0.045  # [m] radii of the coloured disc and of the black disc in it
 
-Nearness = Callable[[np.ndarray], np.ndarray]  # of pixel indices, row by row: 1 / depth of the visible surface [1/m]
+# Function from pixel indices, counted row by row, to 1 / depth of the surface visible in these pixels [1/m].
+Nearness = Callable[[np.ndarray], np.ndarray]
 
 
 @dataclass(frozen=True)
 class _Level:
-    """The horizontal plane at eye height, at the pixels that show it; all in the agent's frame.
+    """Points of the horizontal plane at eye height, one for each pixel that shows this plane, in the agent's frame.
 
-    pixels: (n,)
-    depth: along the camera's axis [m], (n,)
-    points: (n, 2) [m]
-    pixel: size of a pixel there [m], (n,)
+    pixels: indices of these pixels, counted row by row, (n,)
+    depth: depth of each point along the camera's axis [m], (n,)
+    points: x and y of each point [m], (n, 2)
+    pixel: size of a pixel at the depth of each point [m], (n,)
     """
 
     pixels: np.ndarray
@@ -48,12 +50,13 @@ class _Level:
 
 @dataclass(frozen=True)
 class _Field:
-    """Pixels of one eye's field of view, without occlusion.
+    """Pixels that show one eye's field of view if nothing hides it.
 
     pixels, depth: as in _Level, (n,)
-    opacity, distance: opacity and distance from the eye [m], (n,)
-    ray, share: index of the fan's ray to the right of a pixel, and the pixel's position between it and the next ray,
-        from 0 to 1, (n,)
+    opacity: opacity of the overlay, (n,)
+    distance: distance of the pixel's point from the eye [m], (n,)
+    ray: index of the nearest of the fan's rays to the right of the pixel's point, (n,)
+    share: angular position of the point between this ray, at 0, and the next ray, at 1, (n,)
     """
 
     pixels: np.ndarray
@@ -64,7 +67,10 @@ class _Field:
     share: np.ndarray
 
     def visible(self, reach: np.ndarray) -> np.ndarray:
-        """Return which pixels are not farther away than the reach of the fan's rays [m], (n,) bool."""
+        """Return the mask of the pixels whose points no obstacle hides from the eye, (n,) bool.
+
+        reach: distance to the first obstacle along each of the fan's rays [m]; interpolated between rays
+        """
         end = np.diff(reach).take(self.ray)
         end *= self.share
         end += reach.take(self.ray)
@@ -73,11 +79,11 @@ class _Field:
 
 @dataclass(frozen=True)
 class _Dot:
-    """Pixels of one eye, without occlusion.
+    """Pixels of the disc that marks one eye, if nothing hides it.
 
-    pixels: (n,)
-    iris, pupil: opacities, (n,)
-    depth: depth of the eye [m]
+    pixels: indices of the pixels, (n,)
+    iris, pupil: opacities of the coloured disc and of the black disc in it, (n,)
+    depth: depth of the eye along the camera's axis [m]
     """
 
     pixels: np.ndarray
@@ -89,7 +95,7 @@ class _Dot:
 class FieldsOfView:
     """Overlay of the fields of view of one agent's eyes.
 
-    view: the camera, in the agent's frame, whose origin is on the floor
+    view: viewpoint of the camera in the agent's frame; the origin of this frame is on the floor
     size: size of the images (height, width)
     """
 
@@ -101,7 +107,10 @@ class FieldsOfView:
         self._dots = [_dot(eye + np.array([0, 0, EYE_HEIGHT]), view, size, _radius(eyes)) for eye in places]
 
     def draw(self, picture: np.ndarray, nearness: Nearness, model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
-        """Return the image (y, x, 3) uint8 with the visible part of every eye's field of view; data: current poses."""
+        """Return the image (y, x, 3) uint8 with the visible part of every eye's field of view drawn into it.
+
+        data: MuJoCo's data with the current poses
+        """
         shown = picture.reshape(-1, 3).copy()
         heading = float(data.joint("agent_heading").qpos[0])
         azimuths = self.eyes.azimuths() + heading
@@ -120,7 +129,10 @@ class FieldsOfView:
 
 
 def _draw_dot(shown: np.ndarray, dot: _Dot, nearness: Nearness, color: np.ndarray) -> None:
-    """Draw an eye in place. The agent's own body does not occlude it, so that the eye's position is always visible."""
+    """Draw an eye into the pixels `shown`.
+
+    The agent's own body does not hide the eye, so eyes on the far side of the body are visible, too.
+    """
     free = nearness(dot.pixels) * (dot.depth - 2 * BODY_RADIUS) < 1
     under = shown[dot.pixels].astype(np.float32)
     colored = under + (free * dot.iris)[:, None] * (color - under)
@@ -144,7 +156,7 @@ def _level(view: Viewpoint, size: tuple[int, int]) -> _Level:
 
 
 def _field(level: _Level, eyes: Eyes, azimuth: float, eye: np.ndarray) -> _Field:
-    """Return the field of view of the eye at `eye` (2,) [m]."""
+    """Return the field of view of the eye at the position `eye` (2,) [m], whose axis has this azimuth [rad]."""
     half = np.radians(eyes.fov_deg) / 2
     offset = level.points - eye
     distance = np.linalg.norm(offset, axis=-1)
@@ -170,7 +182,10 @@ def _fan(eyes: Eyes) -> np.ndarray:
 
 
 def _receptor_rays(eyes: Eyes) -> np.ndarray:
-    """Azimuths of receptor columns relative to the eye's axis, positive to the left; a subset if there are many."""
+    """Return the azimuths of receptor columns relative to the eye's axis [rad], positive to the left.
+
+    If there are more than MOST_RAYS columns, only every second, third, ... column is included.
+    """
     columns = eyes.resolution[1]
     shown = np.arange(columns)[:: -(-columns // MOST_RAYS)]
     across = np.tan(np.radians(eyes.fov_deg) / 2)

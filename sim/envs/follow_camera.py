@@ -16,11 +16,11 @@ from sim.scene.mirror import Mirror, mirror
 from sim.worlds.state import WorldState, pose
 from sim.worlds.world import World
 
-# Offsets [m] of the camera from the agent, and of its target ahead of the agent; steep enough to look over a wall
-# behind.
+# Position of the camera relative to the agent, and distance ahead of the agent at which it is aimed [m]. The view is
+# steep enough to look over a wall behind the agent.
 BEHIND, ABOVE, AHEAD = 4.0, 5.0, 3.0
 FOVY_DEG = 50.0
-WAVELENGTHS = np.linspace(430e-9, 660e-9, 8)  # [m] of slow images
+WAVELENGTHS = np.linspace(430e-9, 660e-9, 8)  # [m] of slow images, which Mitsuba traces
 SIZE = (360, 480)  # pixels (height, width)
 
 
@@ -31,7 +31,7 @@ def check_render_mode(render_mode: str | None) -> None:
     """Refuse an unknown render mode.
 
     Raises:
-        ValueError: neither one of RENDER_MODES nor None.
+        ValueError: the mode is neither one of RENDER_MODES nor None.
     """
     if render_mode not in (None, *RENDER_MODES):
         modes = ", ".join(map(repr, RENDER_MODES))
@@ -39,11 +39,11 @@ def check_render_mode(render_mode: str | None) -> None:
 
 
 class FollowCamera:
-    """A camera that follows the agent. It has its own mirror of the world.
+    """A camera that follows the agent. It renders its own copy of the world.
 
-    eyes: eyes that are drawn with their fields of view; None: no eyes
-    samples: None: fast images (`sim.pictures.quick_camera`); a number: rays per pixel, traced by Mitsuba at eight
-        wavelengths, which takes twenty to fifty times as long
+    eyes: eyes that are drawn with their fields of view; None: no eyes are drawn
+    samples: None: fast images (`sim.pictures.quick_camera`). A number: slow images, for which Mitsuba traces this
+        number of rays per pixel at eight wavelengths. They take twenty to fifty times as long.
 
     Raises:
         ValueError: samples below 1.
@@ -59,7 +59,7 @@ class FollowCamera:
         self._fields: dict[tuple[int, int], FieldsOfView] = {}
 
     def picture(self, state: WorldState, index: int = 0, size: tuple[int, int] = SIZE) -> np.ndarray:
-        """Return an sRGB image (height, width, 3) uint8 of one world of a state."""
+        """Return an sRGB image (height, width, 3) uint8 of the world with this index in a state."""
         pose(self._data, self.world, state, index)
         height, width = size
         view = _follow(state, index)
@@ -87,8 +87,10 @@ class FollowCamera:
 
 
 def _sampler(spp: int) -> str:
-    """Return the name of Mitsuba's sampler. Multijitter has less noise, but rounds sample counts that do not fit its
-    grid."""
+    """Return the name of the sampler that Mitsuba uses.
+
+    Multijitter causes less noise, but it rounds numbers of samples that do not fit its grid.
+    """
     return "multijitter" if spp % math.isqrt(spp) == 0 else "independent"
 
 

@@ -11,7 +11,7 @@ from sim.physics.mujoco_worlds import MODELS
 
 
 def checked(state: Any, like: Mapping[str, np.ndarray]) -> Mapping[str, np.ndarray]:
-    """Return a stored state after comparing its entries and their shapes with `like`.
+    """Return a stored state, after checking that it has the same entries and shapes as the current state `like`.
 
     If there is only one world, the entry of its model is optional, because a single world gets its own model only when
     a task changes it.
@@ -31,10 +31,10 @@ def checked(state: Any, like: Mapping[str, np.ndarray]) -> Mapping[str, np.ndarr
 
 
 def chosen_worlds(worlds: Any, n: int) -> np.ndarray:
-    """Return indices of worlds; None: all.
+    """Return these indices of worlds as an array, (k,) int; None: the indices of all n worlds.
 
     Raises:
-        ValueError: not indices of worlds.
+        ValueError: `worlds` contains other values than indices of worlds.
     """
     if worlds is None:
         return np.arange(n)

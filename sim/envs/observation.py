@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-# Bounds of the signals, in standard deviations of their noise: 1 in 1e23 draws exceeds them.
+# Margin between noiseless signals and the bounds of the observation space, in standard deviations of the noise. One in
+# 1e23 draws exceeds it.
 SIGMAS = 10.0
 ROUNDING = 1e-4  # error of float32, as a share of the brightest signal
 
@@ -13,7 +14,7 @@ class Memory:
     """The last `frames` frames of every world, newest last.
 
     In a world that starts a new episode, the first frame fills the whole memory, as if the agent had seen the same
-    frame before. A memory that started with zeros would mean an agent that comes out of darkness.
+    frame before. If the memory started with zeros, the agent would seem to have come out of darkness.
     """
 
     def __init__(self, frames: int) -> None:
@@ -25,7 +26,7 @@ class Memory:
     def remember(self, frame: np.ndarray, fresh: np.ndarray) -> np.ndarray:
         """Add a frame (env, ...); `fresh`: indices of the worlds whose episode has just started.
 
-        Returns a new array (env, memory, ...), which the caller may modify. `frame` itself must not be modified
+        Returns an array (env, memory, ...), which the caller may modify. `frame` itself must not be modified
         afterwards.
         """
         if self.frames == 1:
@@ -59,7 +60,7 @@ class Memory:
         return self._past[-1]
 
     def preview(self, frame: np.ndarray, worlds: np.ndarray) -> np.ndarray:
-        """Return the memory of these worlds with a frame (len(worlds), ...) added, without storing it."""
+        """Return the memory of these worlds as if a frame (len(worlds), ...) were added, without storing the frame."""
         if self.frames == 1:
             return frame[:, None]
         return np.stack([*(past[worlds] for past in self._past[1:]), frame], axis=1)

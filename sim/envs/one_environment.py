@@ -1,4 +1,4 @@
-"""Methods of a stable-baselines3 VecEnv that are the same for all indices, because all worlds share one environment."""
+"""Methods of a stable-baselines3 VecEnv that are the same for all worlds, because the worlds share one environment."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ class OneEnvironment(VecEnv):
     def render(self, mode: str | None = None) -> np.ndarray | None:
         """Return the images of all worlds, tiled.
 
-        Stable-baselines3 delegates modes that it does not support to each environment. Here all of them are this one,
-        so the mode "eyes" is handled directly.
+        Stable-baselines3 passes modes that it does not support on to the individual environments. Here all worlds share
+        this environment, so it handles the mode "eyes" itself.
 
         Raises:
             RuntimeError: before the first reset.

@@ -21,12 +21,12 @@ from sim.tasks.user_tasks import batched
 
 
 class EncounterEnv(ParallelEnv[str, dict[str, np.ndarray], np.ndarray]):
-    """Several animals that act at the same time, each by its own policy, as a PettingZoo parallel environment.
+    """Several animals that act at the same time, each with its own policy, as a PettingZoo parallel environment.
 
-    Each animal's observations and `info` are as in `make_vec_env`.
+    Each animal's observations and `info` are the same as in an environment of `make_vec_env`.
 
     encounter: the animals
-    seed: seed of episodes and noise until `reset` receives one
+    seed: seed of episodes and noise, used until `reset` receives a seed
     memory: number of frames in an observation
     render_mode: "rgb_array", "eyes" or None
     """
@@ -73,7 +73,7 @@ class EncounterEnv(ParallelEnv[str, dict[str, np.ndarray], np.ndarray]):
         """Take one action of every animal. Steps after the end of an episode have no effect.
 
         Raises:
-            ValueError: an action is missing, belongs to an unknown animal, or has another shape.
+            ValueError: an action is missing, belongs to an unknown animal, or has the wrong shape.
             RuntimeError: before the first reset.
         """
         self._require_begun()
@@ -99,7 +99,9 @@ class EncounterEnv(ParallelEnv[str, dict[str, np.ndarray], np.ndarray]):
         return observations, rewards, terminated, truncated, infos
 
     def render(self) -> np.ndarray | list[np.ndarray] | None:
-        """Return an image (y, x, 3) uint8 of the world, or one of each animal's signals, as set by `render_mode`.
+        """Return an image (y, x, 3) uint8 of the world, or a list with an image of each animal's signals.
+
+        `render_mode` selects which of the two; without a mode, None is returned.
 
         Raises:
             RuntimeError: before the first reset, if there is a render mode.

@@ -1,4 +1,4 @@
-"""A task prepared for several environments: its scenes are built and its fidelities chosen only once."""
+"""A task prepared for several environments: its scenes are built, and its fidelities are chosen, only once."""
 
 from __future__ import annotations
 
@@ -22,15 +22,15 @@ from sim.tasks.task_fidelity import fidelities_among
 
 __all__ = ["PreparedTask"]
 
-Fidelities = Mapping[str, Fidelity]  # for each kind of eyes
+Fidelities = Mapping[str, Fidelity]  # fidelity of each kind of an agent's eyes, by name of the kind
 
 
 class PreparedTask:
     """A task, its scenes, and the fidelity of all eyes.
 
     task: the task
-    fidelity: fidelity of the learners' eyes, instead of the task's own
-    fidelities: fidelities of every agent's eyes, by kind; None for agents whose eyes are not used
+    fidelity: fidelity of the learners' eyes, used instead of the fidelity that the task defines
+    fidelities: for each agent, the fidelity of each kind of its eyes, or None if its eyes are not used
 
     Raises:
         ValueError: the task's settings, model or eyes are invalid.
@@ -82,7 +82,7 @@ class PreparedTask:
         return found
 
     def elsewhere(self, task: BatchTask) -> PreparedTask:
-        """Return another layout with the same eyes and the same fidelities."""
+        """Return another task prepared with the same fidelities: `task`, with the same eyes in another layout."""
         found = copy.copy(self)
         found.task = task
         found._scenes = None if self._scenes is None or not isinstance(task, AgentTask) else scenes_for(task)
@@ -105,16 +105,21 @@ class PreparedTask:
         return EyesVecEnv(simulation, renderers, memory, render_mode)
 
     def renderer(self, simulation: Simulation) -> EyeRenderer:
-        """Return the renderer of the first agent's first kind of eyes, for the worlds of a simulation. The simulation's
-        task may be the same task with other eyes."""
+        """Return a renderer of the first kind of the first agent's eyes, for the worlds of a simulation.
+
+        The renderer has the eyes of this prepared task. The simulation may run the same task with other eyes.
+        """
         (first,) = renderers_for(simulation, self.task.agents()[:1], self.fidelities[:1], self._scenes)
         assert first is not None
         return next(iter(first.eyes.values()))
 
 
 def _at_most(fidelity: Fidelity, rays_per_receptor: float) -> Fidelity:
-    """Limit the rays per receptor. Below the number of rays with which adaptive edge sampling starts, all receptors get
-    the same number of rays."""
+    """Return a fidelity with at most this number of rays per receptor.
+
+    If the limit is below the number of rays with which adaptive edge sampling starts, all receptors get the same number
+    of rays.
+    """
     rays = min(fidelity.rays_per_receptor, rays_per_receptor)
     samples = RAYS if fidelity.samples == EDGES and rays < FIRST else fidelity.samples
     return replace(fidelity, rays_per_receptor=rays, samples=samples)

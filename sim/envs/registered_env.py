@@ -1,8 +1,8 @@
-"""Environments that Gymnasium makes by their ids. Gymnasium's `max_episode_steps` sets the length of episodes.
+"""Environments that Gymnasium creates from an id. Gymnasium's `max_episode_steps` sets the length of their episodes.
 
 `gymnasium.make` passes this length only to its wrapper `TimeLimit`. The wrapper can end an episode earlier than the
-environment inside, but not later. The environment inside therefore truncates no episode, unless a course defines its
-own number of actions.
+wrapped environment does, but not later. The wrapped environment therefore truncates no episode, unless a course defines
+its own number of actions.
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ ENDLESS = -1  # Gymnasium's value for episodes without truncation
 
 
 class RegisteredEnv(EyesEnv):
-    """An `EyesEnv` for Gymnasium's `TimeLimit`.
+    """An `EyesEnv` whose episodes are truncated by Gymnasium's wrapper `TimeLimit`.
 
     Raises:
-        ValueError: a bad argument, or `episode_steps`, which Gymnasium calls `max_episode_steps`.
+        ValueError: a bad argument, or the argument `episode_steps`, which Gymnasium calls `max_episode_steps`.
     """
 
     def __init__(self, task: str | Task | type[Task], *args: Any, **options: Any) -> None:
@@ -32,10 +32,10 @@ class RegisteredEnv(EyesEnv):
 
 
 class RegisteredVectorEnv(EyesVectorEnv):
-    """An `EyesVectorEnv` with episodes of the same length.
+    """An `EyesVectorEnv` that truncates its episodes after `max_episode_steps` actions.
 
     Raises:
-        ValueError: a bad argument, or `episode_steps`, which Gymnasium calls `max_episode_steps`.
+        ValueError: a bad argument, or the argument `episode_steps`, which Gymnasium calls `max_episode_steps`.
     """
 
     def __init__(
@@ -49,7 +49,7 @@ def _begun(task: str | Task | type[Task]) -> str | Task:
 
 
 def _steps(asked: int, options: dict[str, Any]) -> int:
-    """Number of actions in an episode: the requested number, limited by that of the course."""
+    """Return the number of actions in an episode: the requested number, but at most that of the course."""
     if "episode_steps" in options:
         raise ValueError(
             f"episode_steps = {options['episode_steps']!r}: must be left out if Gymnasium makes the environment; "

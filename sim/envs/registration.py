@@ -1,7 +1,7 @@
 """Gymnasium ids, one for each task: `gymnasium.make("rhabdom/Detection-v0")`.
 
-`import sim` registers them. Gymnasium imports the module itself if the id is "sim:rhabdom/Detection-v0".
-`gymnasium.make_vec` runs all worlds in one kernel.
+`import sim` registers the ids. With the id "sim:rhabdom/Detection-v0", Gymnasium itself imports `sim` first.
+`gymnasium.make_vec` renders all worlds with one kernel.
 """
 
 from __future__ import annotations
@@ -30,11 +30,12 @@ def register_task(id_: str, task: Task | type[Task], **options: Any) -> None:
     replaced.
 
     id_: id, such as "FindBall-v0"
-    task: the task, or its class; its `episode_steps` is the length of episodes, unless `max_episode_steps` is passed
+    task: the task, or its class; its `episode_steps` is the length of episodes, unless `gymnasium.make` receives
+        `max_episode_steps`
     options: arguments of `sim.make_vec_env`, such as memory
 
     Raises:
-        ValueError: not a task, or one without a valid length of episodes.
+        ValueError: `task` is not a task, or its `episode_steps` is invalid.
     """
     from optics.numerics.arguments import whole
     from sim.tasks.task import Task

@@ -21,10 +21,11 @@ __all__ = ["AgentRenderers", "renderers_for", "scenes_for"]
 
 @dataclass(frozen=True)
 class AgentRenderers:
-    """Renderers of one agent.
+    """Renderers of one agent's eyes.
 
-    eyes: renderers by kind of eyes
-    auxiliary: renderers of depth, ids and flow in the same order, if the agent's observations contain any of these
+    eyes: renderer of each kind of eyes, by name of the kind
+    auxiliary: renderers of depth, ids and flow for the same kinds of eyes, in the same order; empty if the agent's
+        observations contain none of these quantities
     """
 
     eyes: Mapping[str, EyeRenderer]
@@ -32,7 +33,7 @@ class AgentRenderers:
 
 
 def scenes_for(task: AgentTask) -> dict[str, WorldScene]:
-    """Return the task's world as a prepared scene, for each kind of its eyes."""
+    """Return the task's world as a scene prepared for each kind of its eyes, by name of the kind."""
     kinds = task.eyes if isinstance(task.eyes, Mapping) else {EYES: task.eyes}
     return {name: WorldScene(task.world, eyes) for name, eyes in kinds.items() if eyes is not None}
 
@@ -46,7 +47,7 @@ def renderers_for(
     """Return the renderers of all agents; None for agents whose eyes are not used.
 
     agents: agents of the simulation, possibly with other eyes
-    fidelities: fidelities of every agent's eyes, by kind
+    fidelities: for each agent, the fidelity of each kind of its eyes, or None if its eyes are not used
     scenes: scenes of a built-in layout, by kind of eyes; None for other models
     """
     return [
@@ -70,7 +71,7 @@ def _of_agent(
 
 
 def _scene_of_model(simulation: Simulation, kind: EyeKind, fidelity: Fidelity) -> PreparedScene:
-    """Return a model prepared for these eyes; rays are traced by Mitsuba."""
+    """Return the simulation's model, prepared for one kind of eyes. If samples are rays, Mitsuba traces them."""
     task, physics = simulation.task, simulation.physics
     return PreparedScene(
         physics.model,

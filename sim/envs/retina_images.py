@@ -10,7 +10,9 @@ from optics import Eye
 from optics.spectra.receptors import Receptors
 from sim.scene.color import encode_srgb
 
-SIZE = (240, 960)  # pixels that the images of all eyes fill at most, unless one pixel per receptor is already more
+# Largest size (height, width) of the image of all eyes [pixels]. Only an image with one pixel per receptor may be
+# larger.
+SIZE = (240, 960)
 GAP = 4  # pixels between eyes
 BETWEEN = 200  # grey level of the gaps
 
@@ -19,8 +21,9 @@ def side_by_side(signals: np.ndarray, eye: Eye) -> np.ndarray:
     """Return an sRGB image (y, x, 3) uint8 of all eyes' signals (eye, channel, h, w), from left to right.
 
     White in full daylight is shown as white, for any size of the pupil. Receptor types are shown as colours in the
-    order of their peaks: the longest wavelength as red, the shortest as blue, the others in between. A single type is
-    shown as grey. In a mosaic every receptor has the colour of its type.
+    order of their peak wavelengths: the type with the longest wavelength as red, the type with the shortest as blue,
+    and other types as colours in between. A single type is shown as grey. In a mosaic, every receptor has the colour of
+    its type.
     """
     linear = np.einsum("ecyx,cyxk->eyxk", signals / eye.white_signal, _palette(eye))
     pixels = np.rint(255 * encode_srgb(np.clip(linear, 0, 1))).astype(np.uint8)
@@ -48,7 +51,7 @@ def _palette(eye: Eye) -> np.ndarray:
 
 
 def _hues(receptors: Receptors) -> np.ndarray:
-    """Colours (type, 3): from red through green to blue, from the longest to the shortest peak."""
+    """Return the colour of each type (type, 3), from red through green to blue by decreasing peak wavelength."""
     types = receptors.types
     if len(types) == 1:
         return np.ones((1, 3))
@@ -58,7 +61,9 @@ def _hues(receptors: Receptors) -> np.ndarray:
 
 
 def _shares(hues: np.ndarray) -> np.ndarray:
-    """Weights (type, 3) with which equal signals of all types give white. A primary that no type has gets equal parts
-    of all types."""
+    """Return weights (type, 3) with which equal signals of all types give white.
+
+    If no type's colour contains a primary, all types contribute equally to this primary.
+    """
     sums = hues.sum(axis=0)
     return np.where(sums > 0, hues / np.where(sums > 0, sums, 1), 1 / len(hues))

@@ -1,4 +1,4 @@
-"""Observations of one agent in all worlds: noisy signals of its eyes, proprioception, and its last action."""
+"""Observations of one agent in all worlds: noisy signals of its eyes, proprioception, its last action and others."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ Arrays = dict[str, np.ndarray]  # arrays by name; the first axis is the world
 class Senses:
     """Observations of one agent.
 
-    number: index of the agent
+    number: index of the agent in the simulation
     renderers: renderers of its eyes
     memory: number of frames in an observation
     sights: its eyes, by kind
@@ -49,7 +49,7 @@ class Senses:
 
     @property
     def renderer(self) -> EyeRenderer:
-        """Renderer of its first kind of eyes."""
+        """Renderer of the agent's first kind of eyes."""
         return next(iter(self.sights.values())).renderer
 
     def restart(self) -> None:
@@ -62,8 +62,10 @@ class Senses:
         return {name: sight.launch(poses, worlds) for name, sight in self.sights.items()}
 
     def tell(self, poses: Poses, fresh: np.ndarray) -> None:
-        """Update the auxiliary entries of the observation; fresh: worlds whose episode has just begun. If there are
-        any, only these worlds are updated."""
+        """Update the auxiliary entries of the observation.
+
+        fresh: indices of the worlds whose episode has just begun. If there are any, only their entries are updated.
+        """
         for auxiliary in self._auxiliary:
             for name, array in auxiliary.render(poses, fresh).items():
                 if len(fresh) and name in self._told:
@@ -77,16 +79,22 @@ class Senses:
         return bool(self._auxiliary)
 
     def observation(self, seen: Arrays, fresh: np.ndarray) -> Arrays:
-        """Return the observations with new frames of all worlds; fresh: worlds whose episode has just begun."""
+        """Add new frames of all worlds to the memory, and return the observations.
+
+        fresh: indices of the worlds whose episode has just begun
+        """
         remembered = {name: sight.memory.remember(seen[name], fresh) for name, sight in self.sights.items()}
         return {**remembered, **self.other_entries(slice(None))}
 
     def preview(self, seen: Arrays, worlds: np.ndarray) -> Arrays:
-        """Return the frames of these worlds with the new frames (of all worlds) added, without storing them."""
+        """Return the memory of these worlds as if the new frames were added, without storing them.
+
+        seen: new frames of all worlds
+        """
         return {name: sight.memory.preview(seen[name][worlds], worlds) for name, sight in self.sights.items()}
 
     def other_entries(self, worlds: Any) -> Arrays:
-        """Return copies of the entries other than signals of eyes, in these worlds."""
+        """Return copies of all entries of these worlds' observations, except for the signals of eyes."""
         known = {**self._told, "previous_action": self.action, **self._simulation.felt[self._number]}
         return {name: array[worlds].copy() for name, array in known.items()}
 
@@ -104,7 +112,7 @@ class Senses:
         }
 
     def get_state(self) -> Arrays:
-        """Return everything that future observations depend on, apart from the worlds."""
+        """Return all arrays on which future observations depend, apart from the state of the worlds."""
         parts = {
             _part(k, name, what): array
             for k, (name, sight) in enumerate(self.sights.items())
@@ -133,5 +141,5 @@ class Senses:
 
 
 def _part(number: int, kind: str, what: str) -> str:
-    """Name of an entry of one kind of eyes in a state."""
+    """Return the name that an entry of one kind of eyes has in a stored state."""
     return what if number == 0 else f"{kind}.{what}"

@@ -28,18 +28,18 @@ class EyesVecEnv(OneEnvironment):
 
     Observations, rewards, endings and `info` are documented in docs/tasks.md. When an episode ends, its world starts
     the next one automatically. The returned observation is then the first of the new episode, and
-    info["terminal_observation"] is the last of the old one. `reset_infos` describes the beginnings of the episodes. A
-    world's episodes depend only on the seed and on the world's index, not on the number of worlds. In an encounter, the
-    rows of the first animal in all worlds come first, followed by the second animal.
+    info["terminal_observation"] is the last of the old one. `reset_infos` contains the info of each episode's first
+    observation. A world's episodes depend only on the seed and on the world's index, not on the number of worlds. In an
+    encounter, the rows of the first animal in all worlds come first, followed by the rows of the second animal.
 
     simulation: the worlds
     renderers: renderers of every agent's eyes
     memory: number of frames in an observation
     render_mode: "rgb_array", "eyes" or None
-    failures: number of episodes that each reason for failure has ended
+    failures: number of episodes that ended because of a failure, by reason
 
     Raises:
-        ValueError: animals that learn a single policy are not alike.
+        ValueError: animals that learn a single policy have different spaces.
     """
 
     def __init__(
@@ -107,7 +107,7 @@ class EyesVecEnv(OneEnvironment):
         self._commanded = actions
 
     def step_once(self, actions: np.ndarray) -> tuple[Arrays, np.ndarray, np.ndarray, np.ndarray, list[dict[str, Any]]]:
-        """Take one action without restarting ended worlds, as a single environment requires.
+        """Take one action without restarting worlds whose episode ended, as a single environment requires.
 
         Returns observation, reward, terminated, truncated, info.
         """
@@ -124,8 +124,8 @@ class EyesVecEnv(OneEnvironment):
         infos, done = self._infos(step), step.done
         ended = np.flatnonzero(done[: len(self._everyone)])  # an episode ends for all its agents at once
         last = [senses.other_entries(ended) for senses in self._learners] if len(ended) else []
-        # The first frames of new episodes are rendered together with the last frames of all worlds, unless the task has
-        # changed worlds after the action.
+        # The first frames of new episodes are rendered together with the last frames of all worlds, unless the task
+        # moved bodies after the action. Some of the last frames must then be rendered again first.
         early = bool(len(ended)) and not len(step.changed)
         beginning = self._start_episodes(ended) if early else None
         seen = self.animals.seen(advanced)
@@ -137,11 +137,11 @@ class EyesVecEnv(OneEnvironment):
     def get_state(self) -> dict[str, np.ndarray]:
         """Return the state of all worlds as plain arrays whose first axis is the world.
 
-        Everything that follows depends only on this state and on the actions. It does not include values that a task
-        stores in itself.
+        Future steps depend only on this state and on the actions, unless a task stores values in its own attributes.
+        The state does not contain such values.
 
         Raises:
-            RuntimeError: before the first reset, or if the model lets bodies sleep.
+            RuntimeError: before the first reset, or if the model enables MuJoCo's sleeping bodies.
         """
         self._require_begun()
         return self.animals.get_state()
@@ -150,8 +150,8 @@ class EyesVecEnv(OneEnvironment):
         """Restore a stored state in these worlds (None: all); return the observation that belongs to it.
 
         Raises:
-            ValueError: the state is of another task or number of worlds, or an index of `worlds` is out of range.
-            RuntimeError: before the first reset, or if the model lets bodies sleep.
+            ValueError: the state belongs to another task or number of worlds, or an index in `worlds` is out of range.
+            RuntimeError: before the first reset, or if the model enables MuJoCo's sleeping bodies.
         """
         held_state.checked(state, self.get_state())
         chosen = held_state.chosen_worlds(worlds, len(self._everyone))
@@ -227,7 +227,10 @@ class EyesVecEnv(OneEnvironment):
         return infos
 
     def _first_infos(self, worlds: np.ndarray) -> list[dict[str, Any]]:
-        """Infos before the first action of an episode in these worlds, for each learner in turn."""
+        """Return the infos before the first action of an episode in these worlds.
+
+        The first learner's infos in all these worlds come first, followed by the second learner's.
+        """
         simulation = self.simulation
         more = simulation.task.first_info(simulation.physics, worlds) or [{}] * len(worlds)
         return [
@@ -250,7 +253,7 @@ def _rows(observations: Sequence[Arrays]) -> Arrays:
 
 
 def _require_alike(encounter: Encounter, learners: Sequence[Senses]) -> None:
-    """Check that all learners can share one policy."""
+    """Refuse learners whose observations or actions differ in shape, since they cannot share one policy."""
     shapes = [
         {**{name: space.shape for name, space in one.observation_space.items()}, "action": one.action_space.shape}
         for one in learners

@@ -20,7 +20,7 @@ class EyesVectorEnv(VectorEnv[dict[str, np.ndarray], np.ndarray, np.ndarray]):
 
     Worlds restart in the step that ends their episode (`AutoresetMode.SAME_STEP`), as in Gymnasium's `SyncVectorEnv`.
     The returned observation and info are then the first of the new episode. info["final_obs"] and info["final_info"]
-    contain the last of the old episode.
+    contain the last observation and info of the old episode.
 
     task, eyes, memory, mode ...: see `sim.make_vec_env`
 
@@ -78,7 +78,7 @@ class EyesVectorEnv(VectorEnv[dict[str, np.ndarray], np.ndarray, np.ndarray]):
         self._batch.close()
 
     def _together(self, infos: list[dict[str, Any]]) -> dict[str, Any]:
-        """Return one array for each key, with a mask of the worlds that have it."""
+        """Return one array for each key of the infos, with a mask of the worlds whose info has this key."""
         found: dict[str, Any] = {}
         for world, info in enumerate(infos):
             found = self._add_info(found, info, world)

@@ -1,4 +1,4 @@
-"""Images of worlds for human viewers: the model with all agents' eyes, or the signals of these eyes."""
+"""Images of worlds for human viewers: the model with all agents' eyes, or the signals of the learners' eyes."""
 
 from __future__ import annotations
 
@@ -24,15 +24,20 @@ RIMS = 0.15  # length of the drawn edges of fields of view, in units of the mode
 
 
 class WorldPictures:
-    """Images as set by `render_mode`: "rgb_array", "eyes" of the learning agents, or None."""
+    """Images of the type that `render_mode` selects.
+
+    "rgb_array": each world; "eyes": the signals of the learning agents' eyes; None: no images
+    """
 
     def __init__(self, animals: Animals, render_mode: str | None) -> None:
         self._animals, self._mode = animals, render_mode
         self._photographer: Callable[[int], np.ndarray] | None = None
 
     def taken(self) -> list[np.ndarray]:
-        """Return images (y, x, 3) uint8: one of every world, or one of each learner's eyes in every world; none without
-        a mode."""
+        """Return images (y, x, 3) uint8: one of every world, or one of each learner's signals in every world.
+
+        The list is empty without a render mode.
+        """
         if self._mode == "eyes":
             learners = self._animals.learners
             return [picture for senses in learners for picture in _of_all_kinds(senses)]
@@ -61,7 +66,7 @@ class _Follower:
 
 
 class _ModelCameras:
-    """The task's own camera, or one that shows the whole model."""
+    """The camera of the model that the task selects, or a camera that shows the whole model."""
 
     def __init__(self, animals: Animals) -> None:
         self._animals, self._simulation = animals, animals.simulation
@@ -75,8 +80,8 @@ class _ModelCameras:
     def _camera_of(self, world: int, physics: MujocoWorlds) -> QuickCamera:
         """Return the camera of a world: a common one, or one for each world if bodies differ between worlds.
 
-        A world's camera is rebuilt only when the appearance of its bodies changes. New materials of a camera cause all
-        eyes' kernels to be recorded again.
+        A world's camera is rebuilt only when the appearance of its bodies changes, because a new camera creates new
+        materials, and the kernels of all eyes must then be recorded again.
         """
         bodies = physics.bodies
         model = bodies.models[world]
@@ -108,6 +113,6 @@ def _of_all_kinds(senses: Senses) -> list[np.ndarray]:
 
 
 def _overview(model: mujoco.MjModel) -> Viewpoint:
-    """Return a viewpoint from the side and above."""
+    """Return a viewpoint from the side and above, which shows the whole model."""
     centre, extent = np.array(model.stat.center), float(model.stat.extent)
     return Viewpoint.looking_at(centre + extent * np.array([-0.9, -1.6, 1.2]), centre, 45.0)

@@ -9,7 +9,7 @@ import optics
 # Independent errors add in quadrature. An error of half the noise increases the total to √(1 + 1/4) = 1.12 times the
 # noise.
 SHARE_OF_NOISE = 0.5
-# Chosen: an error below this share of white's signal is not reduced by more rays, even if the noise is lower.
+# Chosen: lower limit of the allowed error, as a share of the signal of white. It applies if half of the noise is less.
 LEAST_TOLERANCE = 5e-3
 
 
@@ -20,7 +20,7 @@ def allowed_error(eye: optics.Eye, tolerance: float | None) -> float:
     signal of white behind the eye's pupil.
 
     Raises:
-        ValueError: the tolerance is not positive.
+        ValueError: the tolerance is not positive and finite.
     """
     if tolerance is None:
         return max(SHARE_OF_NOISE * float(eye.noise_sigma), LEAST_TOLERANCE * float(eye.throughput))

@@ -14,11 +14,11 @@ from optics.numerics.autodiff import Array
 class DepthLayers:
     """Distances for which an eye has a PSF, evenly spaced in inverse distance 1/z, in which defocus is linear.
 
-    Light from between two layers is divided between them linearly in 1/z. Light from beyond the first or last layer
-    belongs to that layer.
+    Light from a distance between two layers is divided between the two, linearly in 1/z. Light from beyond the first or
+    last layer is attributed to that layer.
 
     farthest, nearest: distances [m]; farthest may be infinite
-    count: number of layers; a single layer is at the mean inverse distance
+    count: number of layers; a single layer is at the mean of the inverse distances 1/farthest and 1/nearest
     """
 
     farthest: float = math.inf
@@ -43,7 +43,10 @@ class DepthLayers:
         return tuple(1 / v if (v := far + place * (near - far)) > 0 else math.inf for place in places)
 
     def shares(self, vergence: Array) -> list[Array]:
-        """Return each layer's share in light from inverse distance 1/z [1/m], as Dr.Jit arrays that sum to 1."""
+        """Return each layer's share of light, as Dr.Jit arrays that sum to 1.
+
+        vergence: inverse distance 1/z from which the light comes [1/m]
+        """
         if self.count == 1:
             return [1.0]
         far, near = 1 / self.farthest, 1 / self.nearest

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from optics import Eye, Pupil, Waveguide
 
 BODY_RADIUS = 0.2  # [m]
-MOST = 10**6  # chosen limit for all counts; more would exceed any memory
+MOST = 10**6  # chosen limit for all counts; larger numbers would exceed any computer's memory
 EYE_HEIGHT = BODY_RADIUS  # [m] above the floor: the equator of a sphere that stands on it
 
 
@@ -37,15 +37,16 @@ class Eyes:
         the same direction
     optics: optics.Pupil of every eye; None: a perfect lens
     sensor_width: width of the retina [m]
-    noise_sigma: standard deviation of a receptor's noise, in units of its signal
+    noise_sigma: standard deviation of a receptor's noise, in the unit of signals: white in full daylight behind a
+        perfect lens gives 1
     bands: number of spectral bands, 1 to 64
     receptors: receptor types: "rgb" (three channels), "lms" (human cones), "honeybee", "goldfish", peak wavelengths of
         visual pigments [nm] such as (350, 440, 530), or an `optics.Receptors`, which can also describe a mosaic. The
-        attribute of an instance is always an optics.Receptors.
+        attribute is always an optics.Receptors, whatever was passed.
     photon_budget: an optics.PhotonBudget, which defines the amount of light and the integration time of the receptors.
-        The resulting shot noise is added to the noise `noise_sigma`. None: unlimited light, without shot noise.
-    waveguide: an optics.Waveguide: receptors are rhabdoms, which receive light in waveguide modes (only behind a
-        pupil). None: each receptor receives all light that falls on its square.
+        The resulting shot noise is added to the noise of `noise_sigma`. None: unlimited light, without shot noise.
+    waveguide: an optics.Waveguide: receptors are rhabdoms, which receive light in waveguide modes; this requires
+        `optics`. None: each receptor receives all light that falls on its square.
 
     Raises:
         ValueError: a value is outside its range, or the receptors are unknown; the message suggests the nearest name.
@@ -126,8 +127,8 @@ class Eyes:
     def azimuths(self) -> np.ndarray:
         """Return the azimuth of each optical axis [rad], (n_eyes,), from left (+) to right (-).
 
-        The axes are spaced evenly over the placement range: three eyes over 90° look to 45°, 0° and -45°. A single eye
-        looks ahead.
+        The axes are spaced evenly over the placement range: three eyes over a range of 90° look to 45°, 0° and
+        -45°. A single eye looks ahead.
         """
         if self.n_eyes == 1:
             return np.zeros(1)

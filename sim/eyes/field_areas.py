@@ -1,4 +1,4 @@
-"""Rectangles of the visual field for an eye behind a pupil, and the share of each receptor's field in each of them.
+"""Rectangles of the visual field of an eye behind a pupil, and the share of each receptive field in each rectangle.
 
 A receptor's signal is a sum over rectangles. Each term is the mean light in a rectangle times the share of the
 receptive field in that rectangle. The sum is exact if the light is constant within each rectangle. If receptive fields
@@ -15,7 +15,7 @@ import numpy as np
 
 from sim.eyes.receptive_fields import ReceptiveFields
 
-# Chosen: the largest share of all receptors' light that may come from beyond either side of the lattice. This light is
+# Chosen: the largest share of all receptors' light that may come from beyond one side of the lattice. This light is
 # attributed to the rectangles inside the lattice. Behind a lens in focus that is a quarter as wide as the retina, the
 # share beyond a lattice without a rim is 0.012 for 1 x 4 receptors and 0.004 for 15 x 15. These lattices therefore have
 # no rim. A rim would change their errors by less than a tenth.
@@ -26,7 +26,8 @@ BEYOND = 0.015
 class FieldAreas:
     """A lattice of rectangles of the visual field, numbered row by row.
 
-    edges: edges of the lattice's rows, and of its columns, relative to the eye's axis [receptor pitches], y down
+    edges: y of the edges between rows (down), and x of the edges between columns, relative to the eye's axis [receptor
+        pitches]
     """
 
     edges: tuple[np.ndarray, np.ndarray]
@@ -35,8 +36,8 @@ class FieldAreas:
     def from_fields(cls, fields: ReceptiveFields, parts: tuple[float, float], beyond: float = BEYOND) -> FieldAreas:
         """Divide each receptor's square into rows and columns, and add a rim of rectangles around the receptors.
 
-        The rim is wide enough that at most the share `beyond` of the receptors' light comes from beyond the rim, on
-        either side. With half a row per receptor, two receptors share a row. The outermost rows may then extend beyond
+        The rim is so wide that at most the share `beyond` of the receptors' light comes from beyond the rim on each
+        side. If there is half a row per receptor, two receptors share a row. The outermost rows may then extend beyond
         the outermost receptors.
 
         parts: numbers of rows and of columns per receptor
@@ -64,7 +65,7 @@ class FieldAreas:
         return float(x[1] - x[0]), float(y[1] - y[0])
 
     def weights(self, fields: ReceptiveFields, receptors: np.ndarray) -> np.ndarray:
-        """Return the weights of the rectangles' mean light in the signals of some receptors, (plane, receptor,
+        """Return the weight of each rectangle's mean light in the signals of some receptors, (plane, receptor,
         rectangle).
 
         A receptor's weights sum to the power of its field.
@@ -90,15 +91,16 @@ def _within(n: int, per_receptor: float) -> int:
 
 
 def _rim(profile: np.ndarray, line: tuple[int, float], cells: int, beyond: float) -> int:
-    """Return the width of the rim before the first receptor of a line, as a number of rectangles.
+    """Return the width of the rim before the first receptor of a line (a row or a column), as a number of rectangles.
 
-    It is the smallest number with which at most the share `beyond` of the line's light comes from beyond the rim.
+    It is the smallest number for which at most the share `beyond` of the light of the line's receptors comes from
+    beyond the rim.
 
     profile: power of a receptor's field in each of its cells along the line
     line: number of receptors in the line, and rectangles per receptor
     """
     n, per_receptor = line
-    # Share of a field's power in its first cells, as a function of their number.
+    # before[k] is the share of a field's power in its first k cells.
     before = np.concatenate([[0.0], np.cumsum(profile)])
     start = (len(profile) - cells) / 2
     overhang = (_within(n, per_receptor) / per_receptor - n) / 2
@@ -111,7 +113,7 @@ def _rim(profile: np.ndarray, line: tuple[int, float], cells: int, beyond: float
 def _shares(edges: np.ndarray, centre: float, size: int, cells: int) -> np.ndarray:
     """Return the share of each cell of a field that lies between successive edges, (rectangle, cell).
 
-    centre: centre of the field, in units of the edges
+    centre: centre of the field, in the same coordinate as the edges
     """
     places = (edges - centre) * cells + size / 2
     return np.diff(np.clip(places[:, None] - np.arange(size), 0, 1), axis=0)

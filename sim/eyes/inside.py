@@ -6,19 +6,19 @@ import mujoco
 import numpy as np
 
 _TYPES = mujoco.mjtGeom
-# Unit vectors in all directions. They are spaced by the golden angle, so that few of them hit edges of meshes. An
-# opening of a mesh is found if its diameter, seen from the point, is at least 20 degrees.
+# Unit vectors in all directions. They are spaced by the golden angle, so that few of them hit edges of meshes. They
+# find an opening of a mesh if its angular diameter, as seen from the point, is at least 20 degrees.
 _N_WAYS = 64
 _HEIGHTS, _AROUND = 1 - (2 * np.arange(_N_WAYS) + 1) / _N_WAYS, np.arange(_N_WAYS) * np.pi * (3 - np.sqrt(5))
 _WAYS = np.column_stack([np.sqrt(1 - _HEIGHTS**2) * f(_AROUND) for f in (np.cos, np.sin)] + [_HEIGHTS])
-# Offset at which a ray continues behind a crossing, in units of a mesh's radius; far larger than rounding errors.
+# Distance behind a crossing at which a ray continues, in units of a mesh's radius; far above rounding errors.
 _BEYOND = 1e-9
 
 
 def depth_inside(model: mujoco.MjModel, data: mujoco.MjData, geom: int, point: np.ndarray) -> float:
     """Return the depth of a point below the surface of a primitive or a closed mesh [m].
 
-    The depth is 0 for a point outside the geom, and for all other types of geoms. For ellipsoids and meshes the depth
+    The depth is 0 for points outside the geom, and for geoms of all other types. For ellipsoids and meshes the depth
     is approximate.
     """
     p = data.geom_xmat[geom].reshape(3, 3).T @ (point - data.geom_xpos[geom])
@@ -41,7 +41,10 @@ def depth_inside(model: mujoco.MjModel, data: mujoco.MjData, geom: int, point: n
 
 
 def _inside_mesh(model: mujoco.MjModel, data: mujoco.MjData, geom: int, point: np.ndarray) -> float:
-    """Return the distance to the nearest crossing if rays in all directions leave the mesh; otherwise 0."""
+    """Return the distance to the nearest crossing [m] if the point is inside the mesh; otherwise 0.
+
+    From a point inside a closed mesh, rays in all directions cross the mesh an odd number of times.
+    """
     if np.linalg.norm(point - data.geom_xpos[geom]) > model.geom_rbound[geom]:
         return 0.0
     nearest = np.inf

@@ -13,7 +13,7 @@ from optics.numerics.arguments import did_you_mean, finite, items, of_kind, real
 
 EXAMPLE = "sim.Mount('head')"
 MOST_EYES = 10_000  # chosen limit for a fan, more than any animal has
-KINDS = ("site", "camera", "body")  # kinds of objects in which a name is searched, in this order
+KINDS = ("site", "camera", "body")  # kinds of objects among which a name is searched, in this order
 # Axes (ahead, left, up) in the frame of the object that carries the eye, as rows. In the frame of a body or site, x
 # points ahead and z up. MuJoCo's cameras look along -z, with x to the right.
 _AXES = {
@@ -30,11 +30,13 @@ class Mount:
     With all angles 0, the eye looks along +x of a body or site, or in the direction of a camera.
 
     on: name of a site, a camera or a body of the model
-    azimuth_deg: rotation to the left, about the frame's z axis (a camera's up)
+    azimuth_deg: rotation to the left, about the z axis of the object's frame (for a camera: about its upward axis)
     elevation_deg: rotation upwards, applied after the azimuth
     roll_deg: rotation about the eye's optical axis, which turns its top towards its left; applied last
-    offset: offset of the pupil from the origin of the object's frame [m], (ahead, left, up). The angles do not turn it.
-    kind: "site", "camera" or "body", for a name that objects of several kinds have; None: the first kind in this order
+    offset: offset of the pupil from the origin of the object's frame [m], (ahead, left, up). The angles do not rotate
+        the offset.
+    kind: "site", "camera" or "body", for use if objects of several kinds have the same name; None: the first of these
+        kinds with an object of this name
 
     Raises:
         ValueError: `on` is not a name, an angle or offset is not finite, or the kind is unknown.
@@ -60,7 +62,7 @@ class Mount:
             raise ValueError(f"Mount: kind = {shown(self.kind)}: must be one of {', '.join(map(repr, KINDS))}, or None")
 
     def mirrored(self) -> Mount:
-        """Return the mirror image on the other side of the body: left and right exchanged."""
+        """Return the mirror image of the mount on the other side of the body, with left and right exchanged."""
         ahead, left, up = self.offset
         return replace(self, azimuth_deg=-self.azimuth_deg, roll_deg=-self.roll_deg, offset=(ahead, -left, up))
 
@@ -116,11 +118,11 @@ def ring(on: str, n_eyes: int, placement_range_deg: float, radius: float) -> tup
 
     `Eyes` uses the same arrangement on the built-in agent.
 
-    The placement range is the angle from the first to the last eye. With a range of 360 (n - 1) / n, n eyes are evenly
-    spaced around the whole circle.
+    The placement range is the angle from the first to the last eye. With a range of 360 (n - 1) / n degrees, n eyes are
+    evenly spaced around the whole circle.
 
     Raises:
-        ValueError: less than one eye.
+        ValueError: `n_eyes` is less than 1, or another argument is invalid.
     """
     return fan(Mount(on, offset=(finite("radius", radius), 0.0, 0.0)), n_eyes, placement_range_deg)
 
@@ -128,11 +130,11 @@ def ring(on: str, n_eyes: int, placement_range_deg: float, radius: float) -> tup
 def fan(mount: Mount, n_eyes: int, placement_range_deg: float, elevation_deg: float = 0.0) -> tuple[Mount, ...]:
     """Return mounts from left to right, evenly spaced over a range of azimuths.
 
-    Each eye is a copy of `mount`, including its offset, turned about the upward axis of the object that carries it, and
-    then turned upwards by `elevation_deg`. A single eye keeps the azimuth of `mount`.
+    Each eye is a copy of `mount`, including its offset, rotated about the upward axis of the object that carries it,
+    and then rotated upwards by `elevation_deg`. A single eye keeps the azimuth of `mount`.
 
     Raises:
-        ValueError: less than one eye.
+        ValueError: `n_eyes` is less than 1, or another argument is invalid.
     """
     of_kind("mount", mount, Mount, EXAMPLE)
     n_eyes = whole("n_eyes", n_eyes, 1, MOST_EYES)

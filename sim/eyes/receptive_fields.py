@@ -16,7 +16,8 @@ from sim.eyes.depth_layers import ONE_PSF, DepthLayers
 # Chosen: the smallest number of cells across the eye's visual field. validation/sim/receptive_field_sampling.py reports
 # the error that such cells cause.
 MIN_CELLS = 32
-# Chosen: smallest number of cells across a waveguide; largest number along a receptor's side.
+# Chosen: smallest number of cells across a waveguide's diameter, and largest number of cells along a receptor's side.
+# If they contradict each other, the second applies.
 CELLS_ACROSS, MOST_CELLS = 4, 64
 
 
@@ -64,20 +65,23 @@ class ReceptiveFields:
         Raises:
             optics.AccuracyError: see `optics.Eye.kernel`.
         """
-        # A signal is (K ⊗ L)(r) = Σ_v K(r - v) L(v). The weight of light L at v is therefore the kernel K, rotated by
-        # 180° around the receptor at r.
+        # The signal of the receptor at r is the convolution Σ_v K(r - v) L(v). The weights of the light L as a function
+        # of v are therefore the kernel K, rotated by 180° and centred on the receptor.
         kernels = _as_wide([eye.kernel(cells, z)[:, ::-1, ::-1] for z in depth.distances])
         field = _averaged(kernels, cells) if eye.waveguide is None else kernels.astype(np.float64)
         everyone = np.arange(np.prod(eye.resolution))
         return cls(field, _mixture(field, eye.resolution, cells, everyone), eye.resolution, cells)
 
     def drawn_for(self, receptors: np.ndarray) -> ReceptiveFields:
-        """Return the same fields with a mixture of these receptors only."""
+        """Return the same fields with the mixture of only these receptors' fields."""
         return replace(self, density=_mixture(self.field, self.resolution, self.cells, receptors))
 
     @property
     def power(self) -> np.ndarray:
-        """Fraction of the pupil's power inside a field, times the fraction that a waveguide accepts, (plane,)."""
+        """Fraction of the power from the pupil that falls inside a field, (plane,).
+
+        If receptors are waveguides, this is multiplied by the fraction of the power that a waveguide accepts.
+        """
         power: np.ndarray = self.field.sum(axis=(1, 2))
         return power
 
@@ -95,8 +99,8 @@ class ReceptiveFields:
     def draw(self, n: int) -> Draw:
         """Return n low-discrepancy draws from the mixture.
 
-        The row of a draw results from inverting the cumulative distribution of rows, its column from inverting the
-        cumulative distribution within the row.
+        The row of a draw is found by inverting the cumulative distribution of rows. Its column is found by inverting
+        the cumulative distribution within this row.
         """
         density, points = self.density, low_discrepancy(n)
         rows = np.concatenate([[0.0], np.cumsum(density.sum(axis=1))])
@@ -143,7 +147,7 @@ def cells_per_receptor(resolution: tuple[int, int]) -> int:
 
 
 def cells_for(eye: optics.Eye) -> int:
-    """Return the number of cells along a receptor's side, which is larger if a narrow waveguide needs finer cells."""
+    """Return the number of cells along a receptor's side; a narrow waveguide requires a larger number."""
     fewest = cells_per_receptor(eye.resolution)
     if eye.waveguide is None:
         return fewest
@@ -154,7 +158,7 @@ def receptive_fields_of(eye: optics.Eye, depth: DepthLayers = ONE_PSF) -> Recept
     """Return the receptive fields of an eye, tabulated on the finest cells on which its PSF can be computed.
 
     Raises:
-        optics.AccuracyError: a pupil that spreads light too far even for the coarsest cells.
+        optics.AccuracyError: the pupil spreads light too far even for the coarsest cells.
     """
     cells = cells_for(eye)
     while True:
@@ -170,14 +174,15 @@ def receptive_fields_of(eye: optics.Eye, depth: DepthLayers = ONE_PSF) -> Recept
 def low_discrepancy(n: int) -> np.ndarray:
     """Return n low-discrepancy points in the unit square, (n, 2).
 
-    They are the Hammersley set (i/n, and van der Corput's sequence in base 2), shifted to the centres of the strata.
+    They are the Hammersley set, shifted to the centres of the strata. Its coordinates are i/n and van der Corput's
+    sequence in base 2.
     """
     first_dyadic = 2.0 ** -np.ceil(np.log2(max(n, 2)))
     return np.stack([(np.arange(n) + 0.5) / n, van_der_corput(n, 2) + first_dyadic / 2], axis=-1)
 
 
 def bounce_samples(n: int) -> np.ndarray:
-    """Return n more points in the unit square, (n, 2), from the next two bases of Halton's sequence.
+    """Return n points in the unit square, (n, 2), from Halton's sequence in the bases 3 and 5.
 
     Together with the points of `low_discrepancy`, they fill the four-dimensional hypercube evenly.
     """
@@ -215,7 +220,7 @@ def _averaged(kernel: np.ndarray, cells: int) -> np.ndarray:
 
 
 def _mixture(field: np.ndarray, resolution: tuple[int, int], cells: int, receptors: np.ndarray) -> np.ndarray:
-    """Return the probability per cell of the mean of all planes of these receptors' fields."""
+    """Return the probability per cell of the mixture, which is the mean of all planes of these receptors' fields."""
     one = (field / field.sum(axis=(1, 2), keepdims=True)).mean(axis=0)
     total = np.zeros([size + cells * (n - 1) for size, n in zip(one.shape, resolution, strict=True)])
     for i, j in zip(*np.divmod(receptors, resolution[1]), strict=True):

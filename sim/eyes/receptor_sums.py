@@ -2,7 +2,7 @@
 
 Rays are ordered by their height in the visual field, so each row of receptors uses a contiguous range of rays. The
 range becomes shorter as receptive fields become narrower. If light has few spectral components
-(`sim.tracing.closed_form_tracer`), the receptors' weights are multiplied by the weights of the bands in advance.
+(`sim.tracing.closed_form_tracer`), the weights of the bands are multiplied into the receptors' weights in advance.
 """
 
 from __future__ import annotations
@@ -26,7 +26,10 @@ ONE_THREAD = 2**18
 class RowProduct:
     """signal[view, channel, i, j] = sum over rays of radiance[view, ray] W[channel, receptor (i, j), ray].
 
-    stretches: for each row of receptors, the first ray and the weights (ray, channel * width) float32
+    stretches: for each row of receptors, the index of the first ray that it uses, and the weights of its rays (ray,
+        channel * width) float32
+    channels: number of channels
+    width: number of receptors in a row
     """
 
     stretches: tuple[tuple[int, np.ndarray], ...]
@@ -63,19 +66,24 @@ class RowProduct:
 def _views_at_once(weights: np.ndarray) -> int:
     """Return the largest number of views in a product that one thread computes.
 
-    If that number is small, products are large enough for several threads, and the result is BLOCK.
+    If even BLOCK / 8 views are too many for one thread, the result is BLOCK. Such products are large enough for
+    several threads.
     """
     return next((n for n in (BLOCK, BLOCK // 2, BLOCK // 4, BLOCK // 8) if n * weights.size <= ONE_THREAD), BLOCK)
 
 
 # Function that maps spectral components of light, (component, view, ...), to signals, (view, channel, ...):
-# signals_c = sum_b mixing[c, b] sum_k basis[k, b] (light of component k, weighted by band b).
+# signals_c = sum_b mixing[c, b] sum_k basis[k, b] (sum of component k with the receptors' weights in band b).
+# Here mixing[c, b] is the weight of band b in channel c, and basis[k, b] the contribution of component k to band b.
 # Every sum has a fixed order. Rounding is therefore the same for any number of worlds.
 ReceptorSums = Callable[[np.ndarray], np.ndarray]
 
 
 def of_receptors(factors: np.ndarray) -> ReceptorSums:
-    """Return the map to signals from light that is already summed over each receptor; factors (channel, component)."""
+    """Return the map to signals from light that is already summed over each receptor.
+
+    factors: weight of each component in each channel, (channel, component)
+    """
     factors = factors.astype(np.float32)
 
     def signals(light: np.ndarray) -> np.ndarray:
@@ -111,7 +119,7 @@ def of_components(
 def of_bands(products: Sequence[RowProduct], mixing: np.ndarray, basis: np.ndarray) -> ReceptorSums:
     """Return the map to signals from light along rays, with one matrix product per band.
 
-    This is cheaper than `of_components` if the number of components equals the number of bands.
+    This is cheaper than `of_components` if there are fewer bands than pairs of a component and a channel.
     """
     mixing, basis = mixing.astype(np.float32), basis.astype(np.float32)
     every = np.array_equal(basis, np.eye(len(basis)))
@@ -140,8 +148,8 @@ def within_stretches(
 ) -> tuple[scipy.sparse.csr_array, ...]:
     """Return weights (receptor, ray) per band without the first and last rays of each row of receptors.
 
-    The largest number of rays is removed that reduces each receptor's sum of weights by at most `share`. The remaining
-    weights are scaled so that the sum is unchanged.
+    As many rays as possible are omitted, on the condition that each receptor's sum of weights decreases by at most the
+    share `share`. The remaining weights are then scaled so that this sum is unchanged.
     """
     height, width = resolution
     rows: list[list[scipy.sparse.csr_array]] = [[] for _ in weights]

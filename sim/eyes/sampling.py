@@ -1,4 +1,4 @@
-"""Samples of an eye's visual field: rays or rectangular areas, in the requested number.
+"""Samples of an eye's visual field: a requested number of rays or of rectangular areas.
 
 `sim.eyes.sensor` defines the coordinates.
 """
@@ -27,8 +27,8 @@ from sim.eyes.receptive_fields import (
 from sim.eyes.receptor_sums import within_stretches
 from sim.eyes.sensor import BoxSensor, ReceptiveFieldSensor, Sensor
 
-# Chosen: small weights are omitted if their sum changes no signal by more than this share of the receptors' noise. The
-# noise with this error is then at most √(1 + 0.1²) = 1.005 times the noise alone.
+# Chosen: small weights are omitted if this changes no signal by more than this share of the receptors' noise. The noise
+# and this error together are then at most √(1 + 0.1²) = 1.005 times the noise alone.
 NEGLIGIBLE = 0.1
 
 
@@ -52,9 +52,9 @@ class Trial:
 class BoxSampling:
     """Samples of an eye with a perfect lens.
 
-    Every receptor's square is sampled at the same low-discrepancy points; their number is a whole number. The points of
-    each receptor are shifted by a fixed random offset (with wrap-around at the edges of the square), so that the errors
-    of neighbouring receptors are independent.
+    Every receptor's square is sampled at the same low-discrepancy points, whose requested number is rounded to a whole
+    number. The points of each receptor are shifted by its own fixed random offset (with wrap-around at the edges of the
+    square), so that the errors of neighbouring receptors are independent.
     """
 
     eye: optics.Eye
@@ -66,9 +66,9 @@ class BoxSampling:
         return BoxSensor(*self._rays(rays, np.arange(np.prod(self.eye.resolution))), rays)
 
     def areas(self, per_receptor: float, *, in_rows: bool = True) -> BoxSensor:
-        """Return the sensor whose samples divide each receptor's square into this number of rectangles.
+        """Return the sensor whose samples divide each receptor's square into a grid of this number of rectangles.
 
-        With `in_rows`, the rectangles form a grid with at most as many rows as columns. Without it, they form one row.
+        If `in_rows` is True, the grid has at most as many rows as columns; otherwise it has a single row.
         """
         count = max(1, round(per_receptor))
         return BoxSensor(*self._areas(count, in_rows, np.arange(np.prod(self.eye.resolution))))
@@ -96,10 +96,12 @@ class BoxSampling:
         return Trial(*self._rays(rays, receptors), self._means(len(receptors), rays))
 
     def beyond_rim(self, rays: int) -> np.ndarray:
-        """Return directions through a ring of squares of a receptor's size around the field, (square * rays, 3).
+        """Return directions of rays through a ring of squares around the visual field, (square * rays, 3).
 
-        The ring has one square next to every receptor at the rim of the field, and one at each corner. Squares are
-        numbered row by row.
+        The squares have the size of a receptor. One square is next to every receptor at the rim of the field, and one
+        is at each corner. Squares are numbered row by row.
+
+        rays: number of rays through each square
         """
         rows, columns = (side + 2 for side in self.eye.resolution)
         row, column = np.nonzero(beyond_rim_of(self.eye.resolution))
@@ -131,10 +133,10 @@ class BoxSampling:
 class FieldSampling:
     """Samples of an eye behind a pupil: directions drawn from the mixture of all receptors' receptive fields.
 
-    If the requested number leaves a receptor without a ray, more are drawn until every receptor has one.
+    If the requested number leaves a receptor without a ray, more rays are drawn until every receptor has one.
 
-    tolerance: error allowed to a signal, see `sim.eyes.allowed_error`. The lattice of areas is wide enough that a white
-        scene beyond it, on either side, contributes at most this signal.
+    tolerance: allowed error of a signal, see `sim.eyes.allowed_error`. The lattice of areas is so wide that white
+        light from beyond it, on each side, contributes at most this amount to a signal.
     """
 
     eye: optics.Eye
@@ -179,7 +181,8 @@ class FieldSampling:
     def may_share(self, per_receptor: float, *, in_rows: bool = True) -> bool:
         """Return whether areas are at most one receptor wide, or at most half as wide as one receptor's field.
 
-        Wider areas would give the same signal to neighbouring receptors with different fields.
+        The same must be true of their height. Larger areas would give neighbouring receptors with different fields the
+        same signal.
         """
         sides = (1 / n for n in _parts_or_share(per_receptor, in_rows))
         return all(side <= max(1, width / 2) for side, width in zip(sides, self.fields.widths, strict=True))
@@ -201,7 +204,7 @@ class FieldSampling:
         return ReceptiveFieldSensor(directions, _bounce_samples(draw), weights, self.eye.resolution, self.depth)
 
     def _in_rows(self, of: Callable[[np.ndarray], np.ndarray]) -> tuple[scipy.sparse.csr_array, ...]:
-        """Return the weights of all receptors without negligible weights, computed one row of receptors at a time."""
+        """Return the weights of all receptors without negligible ones; `of` returns the weights of one row."""
         height, width = self.eye.resolution
         rows: list[list[scipy.sparse.csr_array]] = []
         for i in range(height):
@@ -220,8 +223,8 @@ def parts_of(count: int, in_rows: bool) -> tuple[int, int]:
 def _parts_or_share(per_receptor: float, in_rows: bool) -> tuple[float, float]:
     """Return the numbers of rows and columns of areas per receptor.
 
-    From 1 area per receptor on, the number of areas is rounded to a whole number. Below 1, both numbers are a
-    receptor's share of a larger area.
+    One or more areas per receptor are rounded to a whole number. If `per_receptor` is below 1, several receptors share
+    an area, so there is less than one column per receptor, and with `in_rows` also less than one row.
     """
     if per_receptor >= 1:
         return parts_of(round(per_receptor), in_rows)
@@ -229,7 +232,7 @@ def _parts_or_share(per_receptor: float, in_rows: bool) -> tuple[float, float]:
 
 
 def _unused(plane: np.ndarray) -> np.ndarray:
-    """Return placeholders for the bounce samples of areas, whose reflected light is read from a table instead."""
+    """Return placeholders for bounce samples. Areas do not use them: their reflected light is read from a table."""
     return np.zeros((len(plane), 2), np.float32)
 
 
@@ -257,7 +260,7 @@ def eye_sampling(eye: optics.Eye, depth: DepthLayers = ONE_PSF) -> EyeSampling:
     """Return the sampling of an eye: `BoxSampling` for a perfect lens, otherwise `FieldSampling`.
 
     Raises:
-        optics.AccuracyError: a pupil that spreads light too far to be computed.
+        optics.AccuracyError: the pupil spreads light too far for the PSF to be computed.
     """
     return BoxSampling(eye) if eye.pupil is None else FieldSampling(eye, receptive_fields_of(eye, depth), depth)
 
@@ -266,7 +269,7 @@ def build_sensor(eye: optics.Eye, rays_per_receptor: float, depth: DepthLayers =
     """Return the sensor of an eye with this number of rays per receptor.
 
     Raises:
-        optics.AccuracyError: a pupil that spreads light too far to be computed.
+        optics.AccuracyError: the pupil spreads light too far for the PSF to be computed.
     """
     return eye_sampling(eye, depth).sensor(rays_per_receptor)
 
@@ -290,5 +293,8 @@ def on_tangent_plane(eye: optics.Eye, plane: np.ndarray) -> np.ndarray:
 
 
 def negligible_share(eye: optics.Eye) -> float:
-    """Return the share of a receptor's weights that can be omitted; a share s changes a signal by at most a² s."""
+    """Return the share of a receptor's weights that can be omitted.
+
+    Omitting a share s changes a signal by at most s times the throughput of the aperture.
+    """
     return min(NEGLIGIBLE * eye.noise_sigma / eye.aperture_throughput, eye.tolerance)

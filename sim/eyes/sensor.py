@@ -29,7 +29,7 @@ class BoxSensor:
     bounce_samples: points in the unit square, one for each ray, that set the direction of reflected light, (ray, 2)
         float32
     rays_per_receptor: number of samples of one receptor; the renderer's kernel sums them
-    depth: a single layer, because a perfect lens blurs no distance
+    depth: a single layer, because a perfect lens is in focus at all distances
     extent: if the samples are areas, their width and height as rectangles of the tangent plane at distance 1;
         `directions` are then the positions of the areas' centres on that plane. None: the samples are rays.
     """
@@ -41,8 +41,10 @@ class BoxSensor:
     extent: tuple[float, float] | None = None
 
     def receptor_radiance(self, sums: np.ndarray) -> np.ndarray:
-        """Return the mean radiance of each receptor, (band, view, receptor), from an equal-shaped array of sums over
-        rays."""
+        """Return the mean radiance of each receptor, (band, view, receptor).
+
+        sums: sums of radiance over the receptor's rays, in an array of the same shape
+        """
         return sums * np.float32(1.0 / self.rays_per_receptor)
 
     def receptor_sums(self, mixing: np.ndarray, basis: np.ndarray) -> ReceptorSums:
@@ -62,16 +64,16 @@ class ReceptiveFieldSensor:
 
         signal_r = sum_p W_b[r, p] radiance_b(p),   W_b[r, p] ∝ RF_{r,b}(p) / q(p),   sum_p W_b[r, p] = power_b
 
-    RF is the PSF, rotated by 180° and convolved with the receptor's square. q is the density of the directions, and
-    power_b is the fraction of the pupil's power inside the kernel. With several depth layers, each layer has its own W,
-    which is applied to the layer's share of the light along a ray.
+    RF is the receptive field, which is the PSF, rotated by 180° and convolved with the receptor's square. q is the
+    density of the directions, and power_b is the fraction of the pupil's power inside the kernel. With several depth
+    layers, each layer has its own W, which is applied to the layer's share of the light along a ray.
 
     If the samples are areas of the visual field instead of rays, W_b[r, p] is the share of the receptive field in area
     p.
 
-    Small weights of rays far above and below a row of receptors are set to 0. Their sum is less than the requested
-    tolerance of the PSF. In scenes that are nowhere brighter than white in full daylight, this changes no signal by
-    more than the share `sim.eyes.sampling.NEGLIGIBLE` of the receptors' noise.
+    Small weights of rays far above and below a row of receptors are set to 0. Their share of each receptor's weights is
+    at most the tolerance of the PSF. In scenes that are nowhere brighter than white in full daylight, this changes no
+    signal by more than the share `sim.eyes.sampling.NEGLIGIBLE` of the receptors' noise.
 
     directions: unit vectors in the eye's frame, (ray, 3) float32
     bounce_samples: points in the unit square, one for each ray, that set the direction of reflected light, (ray, 2)
@@ -88,7 +90,7 @@ class ReceptiveFieldSensor:
     resolution: tuple[int, int]
     depth: DepthLayers = ONE_PSF
     extent: tuple[float, float] | None = None
-    rays_per_receptor: int = 1  # the renderer's kernel sums no rays of this sensor
+    rays_per_receptor: int = 1  # 1, because the renderer's kernel does not sum the rays
 
     def receptor_radiance(self, radiance: np.ndarray) -> np.ndarray:
         """Return the receptors' radiance (band, view, receptor) from radiance along rays (layer * band, view, ray)."""
@@ -120,7 +122,7 @@ class ReceptiveFieldSensor:
 
     @property
     def density(self) -> float:
-        """Share of weights that are not zero."""
+        """Share of the weights that are not zero."""
         return float(np.mean([w.nnz / np.prod(w.shape) for w in self.weights]))
 
 

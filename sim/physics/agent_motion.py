@@ -1,9 +1,9 @@
 """Batched motion of the built-in agents: all worlds advance by one action, on all threads of this process.
 
-The agent is a heavy body on two slide joints driven by velocity actuators. Its heading is set, not simulated. Objects
-are mocap bodies that collide with nothing, so physics does not need their positions. Agents that certainly touch
-nothing during the action move in closed form (`sim.physics.free_motion`). MuJoCo moves the others, among the few geoms
-that they could touch (`sim.physics.local_contacts`).
+The agent is a heavy body on two slide joints, which velocity actuators drive. Its heading is set directly, without
+simulation. Objects are mocap bodies that collide with nothing, so physics does not need their positions. Agents that
+cannot touch anything during the action move in closed form (`sim.physics.free_motion`). MuJoCo simulates all other
+agents, each among only the few geoms that it could touch (`sim.physics.local_contacts`).
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ from sim.physics.mujoco_batch import BatchedStep
 from sim.worlds.state import WorldState
 from sim.worlds.world import MAX_SPEED, World
 
-SUBSTEPS = 10  # number of the model's timesteps per action, as published
-UNSTABLE_SPEED = 10 * MAX_SPEED  # [m/s], more than any actuator can cause
-FEW_GEOMS = 200  # up to this number, testing all geoms is faster than MuJoCo's bounding volume tree
+SUBSTEPS = 10  # number of the model's timesteps per action, as in the published environments
+UNSTABLE_SPEED = 10 * MAX_SPEED  # [m/s], a speed that no actuator can cause
+FEW_GEOMS = 200  # largest number for which testing all geoms is faster than MuJoCo's tree of bounding volumes
 
 
 @dataclass(frozen=True)
@@ -31,8 +31,8 @@ class Motion:
 
     path: positions at the end of each substep [m], (n, substep, 2)
     velocity: velocity at the last substep [m/s], (n, 2)
-    contact: the agent touched something in any substep, (n,) bool
-    unstable: the simulation broke down, so path and velocity are the last valid ones, (n,) bool
+    contact: True if the agent touched something in any substep, (n,) bool
+    unstable: True if the simulation broke down, (n,) bool; the agent then stays in place with velocity 0
     """
 
     path: np.ndarray
@@ -41,7 +41,7 @@ class Motion:
     unstable: np.ndarray
 
     def put(self, worlds: np.ndarray, motion: Motion) -> None:
-        """Set the motion of these worlds in place; only for use while a result is being assembled."""
+        """Overwrite the motion of these worlds. Use this only while a result is being assembled."""
         for name, array in vars(self).items():
             array[worlds] = getattr(motion, name)
 
@@ -62,12 +62,12 @@ class AgentPhysics:
     """Batched physics of the agents in one world's model.
 
     threads: threads of MuJoCo's batched step, see `sim.physics.mujoco_batch`
-    closed_form: if True, agents out of reach of everything move in closed form (`free_motion`), and agents near
-        something are simulated among only those geoms (`local_contacts`). Either attribute is None if the model does
-        not allow it. If False, MuJoCo simulates everything in the whole world.
+    closed_form: if True, agents that cannot reach any obstacle move in closed form (`free_motion`), and agents near
+        obstacles are simulated among only these obstacles (`local_contacts`). Each of these two attributes is None if
+        the model does not allow its method. If False, MuJoCo simulates all agents in the whole world.
 
     Raises:
-        ValueError: a model without the agent's joints, actuators or touch sensor, or with objects that could collide.
+        ValueError: the model lacks the agent's joints, actuators or touch sensor, or an object could collide.
     """
 
     def __init__(self, world: World, threads: int, closed_form: bool = True) -> None:
@@ -86,7 +86,7 @@ class AgentPhysics:
         self.local_contacts = local_contacts_of(world, model, self.free_motion, threads)
 
     def step(self, agents: Agents | WorldState, velocity: np.ndarray) -> Motion:
-        """Take one action: SUBSTEPS substeps with a constant commanded velocity [m/s] (n, 2)."""
+        """Move all agents by one action: SUBSTEPS substeps with a constant commanded velocity [m/s], (n, 2)."""
         if self.free_motion is None:
             return self._simulate(agents, velocity)
         path, speed = self.free_motion(agents.velocity, velocity)
@@ -162,7 +162,7 @@ class AgentPhysics:
     def _motion(self, position: np.ndarray, states: np.ndarray, sensors: np.ndarray) -> Motion:
         path = states[:, :, self._columns.position] + self._columns.origin
         velocity = states[:, -1, self._columns.velocity].copy()
-        # MuJoCo resets a world that broke down, including its clock.
+        # Time after the action. MuJoCo resets a world that broke down, including its clock, which then differs from it.
         due = self._start[0] + self.seconds
         unstable = ~np.isfinite(states[:, -1]).all(axis=-1)  # an earlier state that is not finite resets the clock
         unstable |= np.abs(states[:, -1, 0] - due) > self._model.opt.timestep / 2
@@ -177,8 +177,10 @@ class AgentPhysics:
 
 @dataclass(frozen=True)
 class _Columns:
-    """Entries of MuJoCo's full physics state that contain the agent's position, and the positions at which its slide
-    joints are zero [m]."""
+    """Columns of MuJoCo's full physics state that contain the agent's position, heading and velocity.
+
+    origin: position of the agent at which its slide joints are zero [m], (2,)
+    """
 
     position: slice | list[int]
     heading: int
@@ -200,10 +202,11 @@ class _Columns:
 
 
 def _without_detours(model: mujoco.MjModel) -> mujoco.MjModel:
-    """Return the same model with two of MuJoCo's preparation steps disabled.
+    """Return the same model without two of MuJoCo's preparatory steps: islands and the midphase.
 
-    They save time only with many contacts. Without them, an agent at a wall takes a tenth to a fifth less time, and
-    moves bit-identically.
+    These steps save time only if there are many contacts or, for the midphase, many geoms. Without them, simulating an
+    agent at a wall takes a tenth to a fifth less time, and the results are bit-identical. The midphase remains enabled
+    in models with more than FEW_GEOMS geoms.
     """
     lean = copy.copy(model)
     lean.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_ISLAND
@@ -230,7 +233,7 @@ def _actuator(model: mujoco.MjModel, joint_name: str) -> int:
 
 
 def _columns(wanted: list[int]) -> slice | list[int]:
-    """Return columns of an array, as a slice if they are adjacent, which avoids a copy."""
+    """Return these columns of an array, as a slice if they are adjacent. Indexing with a slice avoids a copy."""
     side_by_side = wanted == list(range(wanted[0], wanted[0] + len(wanted)))
     return slice(wanted[0], wanted[-1] + 1) if side_by_side else wanted
 

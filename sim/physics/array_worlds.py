@@ -1,4 +1,4 @@
-"""Worlds of any MuJoCo model whose state is available as arrays, for batch tasks."""
+"""Worlds of any MuJoCo model, with their states as arrays, for batch tasks."""
 
 from __future__ import annotations
 
@@ -14,7 +14,8 @@ from sim.scene.variation import Drawn
 __all__ = ["ArrayWorlds"]
 
 _ALL = mujoco.mjtState.mjSTATE_INTEGRATION
-# Parts of MuJoCo's state that are separate arrays, with the fields of MjModel that give their sizes.
+# Arrays of a world's state that tasks may write, with the ends of their names in mujoco.mjtState (mjSTATE_QPOS ...).
+# For mocap bodies, the number of values for each body follows.
 _WRITABLE = {"time": "TIME", "qpos": "QPOS", "qvel": "QVEL", "act": "ACT", "ctrl": "CTRL", "userdata": "USERDATA"}
 _MOCAP = {"mocap_pos": ("MOCAP_POS", 3), "mocap_quat": ("MOCAP_QUAT", 4)}
 
@@ -22,7 +23,7 @@ _MOCAP = {"mocap_pos": ("MOCAP_POS", 3), "mocap_quat": ("MOCAP_QUAT", 4)}
 class ArrayWorlds(MujocoWorlds):
     """`n` worlds of one model, as arrays whose first axis is the world.
 
-    qpos, qvel, act, ctrl, mocap_pos, mocap_quat, userdata, time: writable, in `reset` and `act`
+    qpos, qvel, act, ctrl, mocap_pos, mocap_quat, userdata, time: arrays that tasks may write in `reset` and `act`
 
     All other arrays of mjData (`xpos`, `geom_xpos`, `site_xpos`, `sensordata`, `cvel` ...) are read-only. They are
     stacked when they are first read after a step.
@@ -42,7 +43,7 @@ class ArrayWorlds(MujocoWorlds):
         self._stacked: dict[str, np.ndarray] = {}
         self._rows = np.zeros((self.n, mujoco.mj_stateSize(self.model, _ALL)))
         start = 0
-        # MuJoCo lays out a state in this order.
+        # MuJoCo stores the parts of a state in this order.
         for part in (getattr(mujoco.mjtState, name) for name in _parts()):
             if not int(part) & int(_ALL):
                 continue

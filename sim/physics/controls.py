@@ -1,7 +1,7 @@
 """Assignment of a model's controls to its actuators.
 
-MuJoCo counts actuators and controls separately: a servo of position and velocity has two controls, a motor of a ball
-joint three, and a passive motor none.
+MuJoCo counts actuators and controls separately. For example, a servo of position and velocity has two controls, a motor
+of a ball joint has three, and a passive motor has none.
 """
 
 from __future__ import annotations
@@ -18,7 +18,9 @@ def actuator_names(model: mujoco.MjModel) -> list[str]:
 
 
 def controls_of(model: mujoco.MjModel, named: Sequence[str] | None) -> np.ndarray:
-    """Return the indices in `data.ctrl` of these actuators' controls, (k,) int, in the order of the names; None: all.
+    """Return the indices in `data.ctrl` of these actuators' controls, (k,) int, in the order of the names.
+
+    named: names of actuators; None: all controls of the model
 
     Raises:
         KeyError: the model has no such actuator.

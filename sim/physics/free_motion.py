@@ -1,8 +1,9 @@
-"""Motion of agents that touch nothing: linear, with coefficients measured in MuJoCo.
+"""Motion of agents that touch nothing, which is linear, with coefficients measured in MuJoCo.
 
-Far from walls, an agent on slide joints with velocity servos responds linearly to its speed and to the command. One
-action is then a product with a few numbers. They are measured in the model with its contacts disabled, so they include
-its integrator, damping and servo. A model that responds nonlinearly has no such coefficients.
+Far from walls, an agent on slide joints with velocity servos responds linearly to its speed and to the command. Its
+motion during one action is then a weighted sum of both, with constant coefficients. The coefficients are measured in
+the model with contacts disabled, so they include the effects of its integrator, damping and servos. A model that
+responds nonlinearly has no such coefficients.
 """
 
 from __future__ import annotations
@@ -14,7 +15,8 @@ from functools import cached_property
 import mujoco
 import numpy as np
 
-# Largest deviation [m] from superposition in a linear model: rounding, over ten substeps of metres.
+# Largest deviation [m] from superposition at which a model is considered linear. It allows for rounding errors over ten
+# substeps at positions of several metres.
 ROUNDING = 1e-11
 
 # Function that simulates runs with all contacts disabled. Arguments: initial speeds (run, 2) [m/s], commands (run, 2),
@@ -27,11 +29,11 @@ FreeSteps = Callable[[np.ndarray, np.ndarray, np.ndarray], tuple[np.ndarray, np.
 class FreeMotion:
     """Motion of an agent that touches nothing, during one action.
 
-    response: response of path [m] and velocity [m/s] after each substep to a speed of 1 m/s and to a command of 1, per
-        axis: (path | velocity, substep, speed | command, 2)
+    response: path [m] and velocity [m/s] after each substep, caused by an initial speed of 1 m/s without a command, and
+        by a command of 1 without an initial speed, for each axis: (path | velocity, substep, speed | command, 2)
     obstacles: ids of the geoms that could be touched (n,)
     lower, upper: axis-aligned bounding boxes of the obstacles in the horizontal plane (n, 2) [m]
-    reach: least distance of the agent's centre from a box at which it touches nothing [m]
+    reach: smallest distance of the agent's centre from a box at which the agent cannot touch the obstacle [m]
     strongest: largest command that does not saturate the servo
     """
 
@@ -45,7 +47,7 @@ class FreeMotion:
     def __call__(self, velocity: np.ndarray, command: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the path relative to the agents' positions (n, substep, 2) [m], and the velocity at its end (n, 2)
         [m/s]."""
-        # Summed explicitly, since the rounding of a matrix product depends on the number of worlds.
+        # The terms are summed explicitly, since the rounding of a matrix product depends on the number of worlds.
         paths, speeds = self.response
         path = paths[:, 0] * velocity[:, None] + paths[:, 1] * command[:, None]
         speed = speeds[-1, 0] * velocity + speeds[-1, 1] * command
@@ -53,15 +55,19 @@ class FreeMotion:
 
     @cached_property
     def _within(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Limits of x and y between which a centre is within reach of each box [m]."""
+        """Limits of an agent's centre within reach of each box [m]: lower x, lower y, upper x, upper y."""
         return (*(self.lower - self.reach).T.copy(), *(self.upper + self.reach).T.copy())
 
     def obstacles_in_reach(self, position: np.ndarray, path: np.ndarray) -> np.ndarray:
-        """Return the obstacles within reach of agents on `path` from `position` (n, 2) [m], (n, obstacle) bool."""
+        """Return the mask of the obstacles within reach of agents during their motion, (n, obstacle) bool.
+
+        position: positions at the beginning (n, 2) [m]
+        path: positions after each substep, relative to `position` (n, substep, 2) [m]
+        """
         low = position + np.minimum(np.minimum.reduce(path, axis=1), 0.0)
         high = position + np.maximum(np.maximum.reduce(path, axis=1), 0.0)
         x_from, y_from, x_to, y_to = self._within
-        # One axis at a time, so that NumPy's inner loop is over the boxes.
+        # The axes are compared one at a time, so that NumPy's inner loop is over the boxes.
         met: np.ndarray = low[:, :1] < x_to
         met &= high[:, :1] > x_from
         met &= low[:, 1:] < y_to
@@ -69,14 +75,19 @@ class FreeMotion:
         return met
 
     def obeys(self, command: np.ndarray) -> np.ndarray:
-        """Return whether the servos do not saturate, (n,) bool."""
+        """Return whether these commands (n, 2) do not saturate the servos, (n,) bool."""
         obeys: np.ndarray = (np.abs(command) <= self.strongest).all(axis=-1)
         return obeys
 
 
 def free_motion_of(model: mujoco.MjModel, agent: int, run: FreeSteps, strongest: float) -> FreeMotion | None:
-    """Return the free motion of the body `agent` in `model`; None if the motion is not linear, or if an obstacle moves
-    or is infinite."""
+    """Return the free motion of the body `agent` in `model`.
+
+    The result is None if the motion is not linear, or if an obstacle moves or is infinite.
+
+    run: simulation of the model with contacts disabled
+    strongest: largest command
+    """
     obstacles = _obstacles(model, agent)
     if obstacles is None:
         return None
@@ -96,8 +107,11 @@ def free_motion_of(model: mujoco.MjModel, agent: int, run: FreeSteps, strongest:
 
 
 def _obstacles(model: mujoco.MjModel, agent: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, float] | None:
-    """Return all geoms that the agent can touch: their ids, lower and upper corners (n, 2) [m] of axis-aligned boxes
-    around them, and their largest margin [m]. None if one of them moves or is infinite."""
+    """Return all geoms that the agent can touch; None if one of them moves or is infinite.
+
+    The result contains their ids, the lower and the upper corners (n, 2) [m] of axis-aligned boxes around them, and
+    their largest margin [m].
+    """
     mine = model.geom_bodyid == agent
     meets = np.zeros(model.ngeom, bool)
     for geom in np.flatnonzero(mine):

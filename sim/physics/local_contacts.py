@@ -1,9 +1,9 @@
 """Physics among the few geoms that an agent could touch during one action, instead of all geoms of a world.
 
-In every substep MuJoCo updates the poses of all geoms of a model and tests each of them for contacts. The motion of an
-agent at a wall depends only on this wall, and so does every number in MuJoCo's computation. The results are therefore
-bit-identical. The only exception is the order of several contacts in models large enough for MuJoCo to use a tree
-of bounding volumes.
+In every substep, MuJoCo updates the poses of all geoms of a model and tests each of them for contacts. The motion of an
+agent at a wall depends only on this wall. If all other geoms are omitted, every number that MuJoCo uses to compute the
+motion remains the same, and the results are bit-identical. The only exception is the order of several contacts in
+models that are large enough for MuJoCo to use a tree of bounding volumes.
 """
 
 from __future__ import annotations
@@ -17,7 +17,8 @@ from sim.physics.free_motion import FreeMotion
 from sim.physics.mujoco_batch import BatchedStep
 from sim.worlds.world import World
 
-MOST = 1024  # cached models, 50 kB each; a maze has two or three hundred distinct places
+# Largest number of cached models, 50 kB each. A maze has two or three hundred places with different geoms within reach.
+MOST = 1024
 _NOT_OF_A_SHAPE = ("geom_bodyid", "geom_dataid", "geom_matid", "geom_user")
 _SHAPES = [
     getattr(mujoco.mjtGeom, f"mjGEOM_{shape}") for shape in ("SPHERE", "CAPSULE", "ELLIPSOID", "CYLINDER", "BOX")
@@ -25,10 +26,10 @@ _SHAPES = [
 
 
 class LocalContacts:
-    """Models of the agent among some of a world's geoms, built on demand, and their steps.
+    """Small models that contain the agent and only a few of a world's geoms. They are built on demand and cached.
 
-    whole: the world's model that is simulated
-    alone: the model of its agent without the world (`sim.worlds.agent_model`)
+    whole: the world's complete model
+    alone: the model of the world's agent without the world (`sim.worlds.agent_model`)
     free_motion: obstacles of the agent, and the distance at which it may touch them
     threads: number of threads, see `sim.physics.mujoco_batch`
     """
@@ -36,7 +37,7 @@ class LocalContacts:
     def __init__(self, whole: mujoco.MjModel, alone: mujoco.MjModel, free_motion: FreeMotion, threads: int) -> None:
         self._alone = copy.copy(alone)
         self._alone.opt.disableflags = whole.opt.disableflags | mujoco.mjtDisableBit.mjDSBL_MIDPHASE
-        # These fields summarise all geoms of the world's body.
+        # These fields summarise all geoms that belong to MuJoCo's world body.
         for name in ("body_contype", "body_conaffinity", "body_margin"):
             getattr(self._alone, name)[0] = getattr(whole, name)[0]
         self._whole, self._free_motion = whole, free_motion
@@ -46,13 +47,16 @@ class LocalContacts:
         self._step = BatchedStep(self._alone, threads)
 
     def few(self, met: np.ndarray) -> np.ndarray:
-        """Return the obstacles within reach (n, obstacle) bool; none for agents with more obstacles than the small
-        model can contain."""
+        """Return the mask `met` of the obstacles within reach (n, obstacle) bool, limited to what small models can
+        contain.
+
+        It contains no obstacles for agents that have more obstacles within reach than a small model can contain.
+        """
         few: np.ndarray = met & (met.sum(axis=1, keepdims=True) <= len(self._slots))
         return few
 
     def step(self, few: np.ndarray, initial: np.ndarray, control: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Step each agent among these obstacles, (n, obstacle) bool; see `BatchedStep`."""
+        """Step each agent among only the obstacles in `few`, (n, obstacle) bool; see `BatchedStep`."""
         if len(self._models) > MOST:
             self._models.clear()
         keys = [row.tobytes() for row in np.packbits(few, axis=1)]
@@ -60,8 +64,13 @@ class LocalContacts:
         return self._step(models, initial, control)
 
     def strayed(self, position: np.ndarray, path: np.ndarray, few: np.ndarray) -> np.ndarray:
-        """Return whether agents came within reach of obstacles other than `few` (n, obstacle) bool on their path from
-        `position` (n, 2) [m], (n,) bool. An agent that one obstacle deflects can hit the next one."""
+        """Return whether agents came within reach of obstacles other than `few` (n, obstacle) on their path, (n,) bool.
+
+        This happens if one obstacle deflects an agent towards another one.
+
+        position: positions at the beginning (n, 2) [m]
+        path: positions after each substep, relative to `position` (n, substep, 2) [m]
+        """
         strayed: np.ndarray = (self._free_motion.obstacles_in_reach(position, path) & ~few).any(axis=1)
         return strayed
 
@@ -82,11 +91,11 @@ def local_contacts_of(
 ) -> LocalContacts | None:
     """Return the local contacts of a world's agent; None if small models cannot replace the whole model.
 
-    This is so if agents have no free motion or no obstacles, if obstacles belong to other bodies than the world's or
-    are not simple primitives, if more bodies than the agent move, or if the world's model has been changed since it was
-    compiled.
+    Small models cannot replace it if agents have no free motion or no obstacles, if an obstacle is not a simple
+    primitive that is fixed to the world, if bodies other than the agent move, or if the world's model has been changed
+    since it was compiled.
 
-    whole: the world's model that is simulated
+    whole: the world's complete model
     """
     alone = world.alone
     if alone is None or free_motion is None or not len(free_motion.obstacles) or not alone.stands_for(world.model):

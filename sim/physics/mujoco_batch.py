@@ -1,4 +1,4 @@
-"""MuJoCo's batched step for small batches, without repeated checks, and with threads only for large batches."""
+"""MuJoCo's batched step, accelerated for small batches by omitting repeated checks, threads and timers."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ POOLED = 128
 class BatchedStep:
     """Open-loop steps of many worlds whose models differ only in numbers.
 
-    like: a model of the same sizes
-    threads: number of threads for batches of at least POOLED worlds; smaller ones are stepped on the calling thread
+    like: a model with the same sizes of arrays as all models that will be stepped
+    threads: number of threads for batches of at least POOLED worlds; smaller batches are stepped on the calling thread
     """
 
     def __init__(self, like: mujoco.MjModel, threads: int) -> None:
@@ -36,8 +36,12 @@ class BatchedStep:
     def __call__(
         self, models: Sequence[mujoco.MjModel], initial: np.ndarray, control: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Return the states (n, step, ...) and sensors (n, step, ...) after each step from `initial` (n, ...) under
-        `control` (n, step, nu), with one model per world."""
+        """Return the states (n, step, ...) and sensor values (n, step, ...) after each step.
+
+        models: the model of each world
+        initial: states before the first step (n, ...)
+        control: controls in each step (n, step, nu)
+        """
         n, steps = control.shape[:2]
         rollout = self._pooled() if self._threads > 1 and n >= POOLED else self._alone
         data = self._data[: max(rollout.nthread, 1)]
@@ -63,10 +67,10 @@ class BatchedStep:
 
 
 class _ClockStopped:
-    """Context manager that disables MuJoCo's clock, which it reads about twenty times per step for MjData.timer. This
-    takes a fifth of the time of such a small step.
+    """Context manager that disables the clock with which MuJoCo measures the times in MjData.timer.
 
-    The clock belongs to the process. It is disabled while any rollout runs, and restored when the last one has
+    MuJoCo reads this clock about twenty times per step, which takes a fifth of the time of a small model's step. All
+    threads of a process share the clock. It is disabled while any rollout runs, and restored when the last one has
     finished.
     """
 
@@ -89,8 +93,10 @@ class _ClockStopped:
 
 @cache
 def _clock() -> ctypes.c_void_p:
-    """Return MuJoCo's pointer to its clock, mjcb_time (mujoco.set_mjcb_time cannot clear it), or an unused pointer if
-    MuJoCo's library is not in the folder of its package."""
+    """Return mjcb_time, MuJoCo's pointer to its clock, which mujoco.set_mjcb_time cannot clear.
+
+    If MuJoCo's library is not in the folder of its package, an unused pointer is returned.
+    """
     for library in Path(mujoco.__file__).parent.glob("*mujoco*.*"):
         with contextlib.suppress(OSError, ValueError):
             return ctypes.c_void_p.in_dll(ctypes.CDLL(str(library)), "mjcb_time")

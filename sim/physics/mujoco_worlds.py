@@ -17,7 +17,7 @@ from sim.scene.world_models import WorldModels
 
 __all__ = ["MujocoWorlds"]
 
-MODELS = "models"  # entry of a state that contains the models, if each world has its own
+MODELS = "models"  # entry of a stored state that contains the worlds' models, if each world has its own model
 _ALL = mujoco.mjtState.mjSTATE_INTEGRATION
 _UNSTABLE = (mujoco.mjtWarning.mjWARN_BADQPOS, mujoco.mjtWarning.mjWARN_BADQVEL, mujoco.mjtWarning.mjWARN_BADQACC)
 
@@ -25,10 +25,10 @@ _UNSTABLE = (mujoco.mjtWarning.mjWARN_BADQPOS, mujoco.mjtWarning.mjWARN_BADQVEL,
 class MujocoWorlds:
     """`n` worlds of one model; see `sim.physics.physics.Physics`.
 
-    given: the source that the model was compiled from
+    given: the source from which the model was compiled
     substeps: physics steps per action
     datas: mjData of every world
-    bodies: models of the worlds, if these differ
+    bodies: models of the worlds: one that all worlds share, or one for each world
     """
 
     def __init__(
@@ -69,8 +69,9 @@ class MujocoWorlds:
             self.bodies.separate()
             self.datas = [mujoco.MjData(model) for model in self.bodies.models]
             return True
-        # Renderers are built for the model as the first `reset` leaves it, which may change colours or lights of static
-        # objects. If worlds share one model, `self.model` is that model, so that later changes apply to all of them.
+        # Renderers are built for the model after the first `reset`, in which a task may change colours or lights of
+        # static objects. If worlds share one model, `self.model` is that model, so that later changes apply to all
+        # worlds.
         if not self.bodies.varied:
             self.model = copy.copy(self.bodies.models[0]) if self.bodies.own else self.bodies.models[0]
         return False
@@ -88,7 +89,7 @@ class MujocoWorlds:
         return {world: words for world in moving if (words := _broken(self.datas[world])) is not None}
 
     def require_places(self, world: int) -> None:
-        """Reset a world whose poses are not finite, since rendering it would end all worlds."""
+        """Reset a world if its poses are not finite, since an attempt to render it would stop all worlds."""
         data = self.datas[world]
         if not _has_place(data):
             mujoco.mj_resetData(data.model, data)
@@ -128,8 +129,10 @@ class MujocoWorlds:
 
 
 def _broken(data: mujoco.MjData) -> str | None:
-    """Return the reason why a world's physics broke down, or None. By then MuJoCo has reset it, unless the model
-    disables that."""
+    """Return the reason why a world's physics broke down; None if it did not.
+
+    MuJoCo has already reset a world that broke down, unless the model disables automatic resets.
+    """
     warned = data.warning.number
     if warned.any() and any(warned[int(kind)] for kind in _UNSTABLE):
         return (

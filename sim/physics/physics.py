@@ -19,8 +19,8 @@ class Physics(Protocol):
 
     model: model for which renderers are built
     n: number of worlds
-    seconds: duration of one action
-    chance: random streams of the worlds, set when they are seeded
+    seconds: duration of one action [s]
+    chance: random streams of the worlds, set whenever the worlds are seeded
     varied: names of geoms whose size, colour or material differs between worlds, with the materials that they may have
     """
 
@@ -32,7 +32,7 @@ class Physics(Protocol):
 
     @property
     def state(self) -> Any:
-        """Current state of all worlds, in this physics' own type."""
+        """Current state of all worlds, in the type that this kind of physics uses."""
 
     def start_episode(self, world: int, drawn: Mapping[str, Drawn]) -> None:
         """Reset one world before its task starts an episode; drawn: values of the varied quantities."""
@@ -41,26 +41,28 @@ class Physics(Protocol):
         """Compute the poses after the task has started episodes in these worlds."""
 
     def adopt_changed_model(self) -> bool:
-        """Return whether the first episode's start changed the model; each world then gets its own model."""
+        """Give each world its own model if the first episode's start changed the model; return whether it did."""
 
     def watch(self) -> None:
-        """Store the settings that a task must not change during a step."""
+        """Store the settings of the model that a task must not change during a step."""
 
     def check(self, whose: str) -> None:
-        """Compare the settings with those stored by `watch`.
+        """Compare the settings of the model with the settings stored by `watch`.
+
+        whose: beginning of the error message
 
         Raises:
             RuntimeError: the task changed the model that all worlds share.
         """
 
     def step(self, skipped: Collection[int]) -> dict[int, str]:
-        """Advance all worlds by one action, except skipped ones; return reasons of failures, by world."""
+        """Advance all worlds except the skipped ones by one action; return the reasons of failures, by world."""
 
     def poses(self) -> Poses:
         """Return the current poses."""
 
     def get_state(self) -> dict[str, np.ndarray]:
-        """Return everything that the future depends on, as arrays whose first axis is the world.
+        """Return the arrays on which future steps depend, by name; the first axis of each array is the world.
 
         Raises:
             RuntimeError: the model has features whose state MuJoCo does not report.

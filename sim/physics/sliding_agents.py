@@ -71,11 +71,12 @@ class SlidingAgents:
     def place(
         self, worlds: np.ndarray, agents: np.ndarray, headings: np.ndarray, objects: np.ndarray, courses: np.ndarray
     ) -> None:
-        """Start episodes with these positions.
+        """Start episodes in some worlds, with these positions and headings.
 
-        agents: (world, 2) [m]
-        headings: (world,) [rad]
-        objects: (world, k, 2) [m]
+        worlds: indices of the worlds; the other arrays have one row for each of them
+        agents: positions of the agents, (world, 2) [m]
+        headings: headings of the agents, (world,) [rad]
+        objects: positions of the objects, (world, k, 2) [m]
         courses: headings of the objects, (world, k) [rad]
         """
         n, k = len(worlds), len(self.world.objects)
@@ -96,7 +97,7 @@ class SlidingAgents:
         self._state = fresh if n == self.n else others.put(worlds, fresh)
 
     def steer(self, actions: np.ndarray) -> None:
-        """Set the commands of forward speed and change of heading, (n, 2) in [-1, 1], for the next step."""
+        """Set the commands of forward speed and of change in heading, (n, 2) in [-1, 1], for the next step."""
         self._command = actions
 
     def move_objects(self, objects: np.ndarray, courses: np.ndarray) -> None:
@@ -108,7 +109,7 @@ class SlidingAgents:
         self._state = replace(self.state, objects=objects)
 
     def count(self, goals: np.ndarray, adversaries: np.ndarray) -> None:
-        """Increase the numbers of goals and adversaries that each agent has reached, (n,) each."""
+        """Increase the counts of goals and of adversaries that each agent has reached by these numbers, (n,) each."""
         state = self.state
         self._state = replace(
             state,
@@ -117,7 +118,7 @@ class SlidingAgents:
         )
 
     def settle(self, worlds: np.ndarray) -> None:
-        """Do nothing, since no poses remain to be computed."""
+        """Do nothing, since `poses` computes all poses from the state."""
 
     def adopt_changed_model(self) -> bool:
         return False

@@ -1,4 +1,4 @@
-"""Sizes, colours and materials that differ between the built-in worlds. The worlds share one layout."""
+"""Sizes, colours and materials that differ between built-in worlds of one layout."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ __all__ = ["VariedAppearances", "varied_appearances"]
 
 
 class VariedAppearances:
-    """A copy of the model for each world, used only by renderers. Agents move in the shared model.
+    """A copy of the model for each world, which only renderers use. Physics uses the shared model.
 
     models: the models of the worlds
-    varied: names of geoms that differ, with the materials that they may have
+    varied: names of the geoms that differ between worlds, with the materials that they may have
     """
 
     def __init__(self, model: mujoco.MjModel, n: int, variation: Variation) -> None:
@@ -42,7 +42,7 @@ def varied_appearances(model: mujoco.MjModel, n: int, variation: Variation) -> V
     """Return the varied appearances; None if only light varies.
 
     Raises:
-        ValueError: the model has no such object, or it cannot vary.
+        ValueError: the model has no such object, or the object cannot vary.
     """
     if starts := variation.of_things(START):
         raise ValueError(
@@ -52,7 +52,7 @@ def varied_appearances(model: mujoco.MjModel, n: int, variation: Variation) -> V
 
 
 def _weightless(model: mujoco.MjModel, thing: str, name: str) -> int:
-    """Return the id of a geom whose size can vary in a shared layout, since it touches nothing."""
+    """Return the id of the geom `thing`, after checking that its size may vary although all worlds share one layout."""
     geom = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_GEOM, thing)
     if geom < 0:
         known = ", ".join(model.geom(g).name for g in range(model.ngeom) if model.geom(g).name)

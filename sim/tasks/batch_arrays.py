@@ -1,4 +1,7 @@
-"""Checks of arrays that the methods of a batch task return. Messages name the method, the shape and the world."""
+"""Checks of the arrays that the methods of a batch task return.
+
+An error message names the method, and either the wrong shape or the world that has the wrong value.
+"""
 
 from __future__ import annotations
 
@@ -13,12 +16,12 @@ __all__ = ["columns", "mapping", "not_finite", "require_outcome", "rows"]
 
 
 def rows(where: str, returned: Any, n: int, kind: type) -> np.ndarray:
-    """Return one number for each world, (n,).
+    """Return the array `returned` if it has one number for each world, (n,).
 
-    where: source of the array, for the message
+    where: source of the array, for the error message
 
     Raises:
-        ValueError: another shape, or not numbers.
+        ValueError: the array has another shape, or its entries are not numbers.
     """
     array = _array(where, returned, kind)
     if array.shape != (n,):
@@ -27,10 +30,10 @@ def rows(where: str, returned: Any, n: int, kind: type) -> np.ndarray:
 
 
 def columns(where: str, returned: Any, n: int) -> np.ndarray:
-    """Return several numbers for each world, (n, k) float32.
+    """Return the array `returned` as float32 if it has a row of k numbers for each world, (n, k).
 
     Raises:
-        ValueError: another shape, not numbers, or numbers that are not finite.
+        ValueError: the array has another shape, or its entries are not finite numbers.
     """
     array = _array(where, returned, np.float32)
     if array.ndim != 2 or len(array) != n:
@@ -42,10 +45,10 @@ def columns(where: str, returned: Any, n: int) -> np.ndarray:
 
 
 def mapping(where: str, returned: Any) -> Mapping[str, Any]:
-    """Return arrays by name.
+    """Return the object `returned` if it is a mapping from names to arrays.
 
     Raises:
-        ValueError: not a mapping.
+        ValueError: it is not a mapping.
     """
     if not isinstance(returned, Mapping):
         raise ValueError(f"{where} returned {returned!r:.80}: must be arrays by name, such as {{'progress': (n,)}}")
@@ -53,7 +56,7 @@ def mapping(where: str, returned: Any) -> Mapping[str, Any]:
 
 
 def not_finite(where: str, terms: Mapping[str, np.ndarray]) -> dict[int, str]:
-    """Return the worlds in which a term is not finite, with the reason."""
+    """Return an error message for each world in which a term is not finite, by world."""
     found: dict[int, str] = {}
     for name, term in terms.items():
         for world in np.flatnonzero(~np.isfinite(term)).tolist():
@@ -65,7 +68,7 @@ def require_outcome(outcome: Outcome, n: int, learners: int) -> None:
     """Check the arrays of an outcome against the number of worlds.
 
     Raises:
-        ValueError: another shape, a reward that is not finite, or worlds that do not exist.
+        ValueError: an array has another shape, a reward is not finite, or the outcome names worlds that do not exist.
     """
     size = n * learners
     shapes = outcome.terms.terms.shape[1:], outcome.terminated.shape, outcome.success.shape

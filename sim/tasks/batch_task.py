@@ -1,4 +1,4 @@
-"""Tasks on arrays of all worlds: the rules are written once and computed for the whole batch."""
+"""Tasks on arrays of all worlds: each method computes its result for the whole batch at once."""
 
 from __future__ import annotations
 
@@ -27,14 +27,14 @@ __all__ = ["Agent", "BatchTask"]
 
 @dataclass(frozen=True, eq=False)
 class Agent:
-    """One animal of every world, as described to an environment.
+    """Description of an animal for an environment. The animal exists once in every world.
 
     name: name of the animal
     n_actions: number of values in an action
     kinds: kinds of its eyes
-    auxiliary: auxiliary entries of its observation, for each receptor
-    first_action: "previous action" at the beginning of an episode
-    learns: True if its actions come from outside; otherwise `policy` chooses them
+    auxiliary: names of the auxiliary entries of its observation, each with one value for each receptor
+    first_action: value of the observation's "previous action" at the beginning of an episode
+    learns: True if the caller of the environment chooses its actions; False if `policy` does
     policy: policy of an animal that does not learn; None: its actions are zeros
     """
 
@@ -48,19 +48,23 @@ class Agent:
 
 
 class BatchTask(TaskSettings):
-    """A task whose methods receive all worlds at once. Only `model`, `mounts` and `rewards` have no default.
+    """A task whose methods receive all worlds at once.
 
-    The settings are those of `sim.Task`. Arrays have one row for each world. `worlds` is the object that `physics`
-    returns. The default is `sim.ArrayWorlds`, which stacks MuJoCo's arrays (`worlds.qpos`, `worlds.xpos` ...) over
-    worlds. The built-in tasks use `sim.SlidingAgents`. `sim.check_batch_task` tests a task against this description.
+    A subclass must define `model`, `mounts` and `rewards`. The settings are those of `sim.Task` and those listed below.
+    Arrays have one row for each world. The argument `worlds` of the methods is the object that `physics` returns. The
+    default physics is `sim.ArrayWorlds`, which stacks MuJoCo's arrays (`worlds.qpos`, `worlds.xpos` ...) over worlds.
+    The built-in tasks use `sim.SlidingAgents`. `sim.check_batch_task` tests whether a task follows this description.
 
-    renders_early: if True, rendering may begin before an action is judged, which is faster. `rewards`, `terminated`,
-        `succeeded` and `proprioception` must then not move anything, unless `judge` names the worlds in
-        `Outcome.changed`.
-    proprioception_ranges: (lowest, highest) value of each entry of `proprioception`, by name; without one, no limit
-    ramped: terms of the reward that may have less weight at the beginning of training, if this is set in `evolve`
-    counted: titles of rows in tables, by reward term: the number of actions in which the term is not 0
-    compared_light: light in which `evolve` compares eyes, for example "direct"; None: the light of `fidelity`
+    renders_early: if True, rendering may begin before an action is judged, which is faster. In this case,
+        `rewards`, `terminated`, `succeeded` and `proprioception` must not move anything, unless `judge` lists the
+        worlds in which bodies moved in `Outcome.changed`.
+    proprioception_ranges: (lowest, highest) value of each entry of `proprioception`, by name; an entry that is
+        not listed has no limits
+    ramped: terms of the reward whose weight may be reduced at the beginning of training; `evolve` does so if the
+        setting `learning.contact_ramp` is above 0
+    counted: row titles of tables, by reward term; such a row shows the number of actions in which the term is not 0
+    compared_light: setting of the light with which `evolve` compares eyes, for example "direct"; None: the setting in
+        `fidelity`
     """
 
     renders_early: bool = True
@@ -70,14 +74,19 @@ class BatchTask(TaskSettings):
     compared_light: str | None = None
 
     def reset(self, worlds: Any, chosen: np.ndarray, rngs: Sequence[np.random.Generator]) -> None:
-        """Start episodes in the chosen worlds, (k,) int, each with its own generator; default: the state after
-        mj_resetData."""
+        """Start episodes in the chosen worlds, (k,) int.
+
+        The default keeps the state after mj_resetData.
+
+        rngs: random number generator of each chosen world
+        """
 
     def act(self, worlds: Any, actions: np.ndarray) -> Mapping[int, str] | None:
-        """Take actions in [-1, 1], (n, n_actions); default: map each value to the full range of one of the actuators'
-        controls.
+        """Apply actions in [-1, 1], (n, n_actions).
 
-        Returns reasons, by world, if worlds cannot continue.
+        The default maps each value to the full range of one control of the actuators.
+
+        Return the reasons, by world, for which worlds cannot continue, or None.
         """
         mine = controls_of(worlds.model, self.actuators)
         limited = worlds.model.actuator_ctrllimited[mine].astype(bool)
@@ -86,31 +95,34 @@ class BatchTask(TaskSettings):
         return None
 
     def rewards(self, worlds: Any) -> Mapping[str, np.ndarray]:
-        """Return the terms of the last action's reward, by name, (n,) each; the reward is their sum."""
+        """Return the terms of the reward for the last action, by name, (n,) each. The reward is their sum."""
         raise NotImplementedError
 
     def terminated(self, worlds: Any) -> np.ndarray:
-        """Return the worlds whose episode ends here, (n,) bool."""
+        """Return whether the episode of each world ends after this action, (n,) bool."""
         return np.zeros(worlds.n, bool)
 
     def succeeded(self, worlds: Any) -> np.ndarray:
-        """Return the worlds in which the task is accomplished, (n,) bool: `info["is_success"]`."""
+        """Return whether the task is accomplished in each world, (n,) bool. This is `info["is_success"]`."""
         return np.zeros(worlds.n, bool)
 
     def proprioception(self, worlds: Any) -> np.ndarray | Mapping[str, np.ndarray]:
-        """Return the agents' observation other than signals of eyes, (n, k), or several such arrays by name; default:
-        nothing."""
+        """Return the part of the observation that does not come from eyes, (n, k), or several such arrays by name.
+
+        The default is no such part.
+        """
         return {}
 
     def judge(self, worlds: Any, failed: Mapping[int, str]) -> Outcome:
         """Return the outcome of the last action.
 
-        The default combines the other methods. A task that computes everything at once overrides this method.
+        The default calls `rewards`, `terminated` and `succeeded`. A task that computes all three together overrides
+        this method.
 
-        failed: reasons, by world, if worlds could not continue
+        failed: the worlds that could not continue, each with the reason
 
         Raises:
-            ValueError: a method returned arrays of another shape.
+            ValueError: a method returned an array of the wrong shape.
         """
         n, name = worlds.n, type(self).__name__
         terms = {
@@ -132,30 +144,34 @@ class BatchTask(TaskSettings):
         return Outcome(RewardTerms(list(terms), stacked), terminated, success, failure)
 
     def first_info(self, worlds: Any, chosen: np.ndarray) -> Sequence[Mapping[str, Any]] | None:
-        """Return additional entries of `info` at the beginning of an episode, for each chosen world; None: no
-        additions."""
+        """Return additional entries of `info` at the beginning of an episode, for each chosen world; None if there are
+        none."""
         return None
 
     def commands(self) -> tuple[Command, ...]:
-        """Return the meaning of each number in the first agent's action; default: numbered, without units."""
+        """Return the meaning of each number in the first agent's action; by default, a running number as the name."""
         return tuple(Command(str(number)) for number in range(self.agents()[0].n_actions))
 
     def solved(self, before: bool | None, info: Mapping[str, Any]) -> bool | None:
-        """Return whether an episode counts as solved after one more action with this `info`; None: undecided.
+        """Return whether an episode counts as solved, given the `info` of one more action; None: still undecided.
 
-        The default is the result of `succeeded` after the last action.
+        This method is called after every action. By default, an episode is solved if `succeeded` is true after its
+        last action.
 
-        before: the return value before this action
+        before: return value of this method after the previous action
         """
         return bool(info["is_success"])
 
     def azimuths(self) -> np.ndarray:
-        """Directions of the first agent's first kind of eyes [rad], (eye,), in the frame of the object that carries
-        them."""
+        """Return the azimuths of the first agent's eyes of the first kind [rad], (eye,).
+
+        The reference frame is the one of the body that the eyes are mounted on.
+        """
         return np.radians([mount.azimuth_deg for mount in self.agents()[0].kinds[0].mounts])
 
     def ground_plan(self, place: np.ndarray) -> GroundPlan | None:
-        """Return the surroundings of this place (2,) [m] from above; None: images show the task instead."""
+        """Return a plan of the surroundings of this place (2,) [m], seen from above; None if the task has no plan, in
+        which case images of its camera are shown instead."""
         return None
 
     # Only tasks with their own physics, agents or random streams override the following methods.
@@ -165,7 +181,7 @@ class BatchTask(TaskSettings):
         return ArrayWorlds(self.model, self._compiled(), n, threads, self.substeps, variation)
 
     def agents(self) -> tuple[Agent, ...]:
-        """Return the agents in each world, learners first."""
+        """Return the agents in each world. Agents that learn come first."""
         n_actions = self.n_actions(self._compiled())
         label = type(self).__name__ if self.name is None else str(self.name)
         first = np.zeros(n_actions, np.float32)
@@ -173,11 +189,11 @@ class BatchTask(TaskSettings):
         return (Agent(label, n_actions, kinds_of(self), auxiliary, first),)
 
     def streams(self, seed: Any, n: int) -> RandomStreams:
-        """Return the random streams of the worlds."""
+        """Return the random number generators of the worlds."""
         return StreamsByWorld(seed, n, [len(agent.kinds) for agent in self.agents()])
 
     def in_mode(self, mode: str) -> Self:
-        """Return the same task in this mode."""
+        """Return this task in the given mode, "training" or "evaluation"."""
         if self.mode == mode:
             return self
         found = copy.copy(self)
@@ -185,12 +201,14 @@ class BatchTask(TaskSettings):
         return found
 
     def take(self, worlds: Any, actions: np.ndarray, failed: Mapping[int, str]) -> Mapping[int, str]:
-        """Call `act`, and return reasons of worlds that fail now; failed: reasons of worlds that have already
-        failed."""
+        """Call `act`, and return the worlds that fail in this call, each with the reason.
+
+        failed: the worlds that have already failed, each with the reason
+        """
         return self.act(worlds, actions) or {}
 
     def all_proprioception(self, worlds: Any, chosen: np.ndarray) -> list[Mapping[str, np.ndarray]]:
-        """Return `proprioception` of every agent in the chosen worlds, by name."""
+        """Return the proprioception of every agent in the chosen worlds, as arrays by name for each agent."""
         felt, name = self.proprioception(worlds), f"{type(self).__name__}: proprioception"
         known = felt if isinstance(felt, Mapping) else {"feels": felt}
         return [{key: columns(f"{name}: {key!r}", array, worlds.n)[chosen] for key, array in known.items()}]

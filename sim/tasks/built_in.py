@@ -1,5 +1,7 @@
-"""Common parts of the built-in tasks: the sliding agent, its contact sense, its reward, and one random stream per
-purpose."""
+"""Common parts of the built-in tasks: the sliding agent, its contact sense and its reward.
+
+Each world has a separate random number generator for each purpose.
+"""
 
 from __future__ import annotations
 
@@ -27,19 +29,22 @@ from sim.worlds.world import MAX_SPEED, World
 
 __all__ = ["STANDING", "AgentEvents", "AgentTask", "mounts_of_agent"]
 
-OUTSIDE = 1e-6  # height of a pupil above the skin, in units of the radius, so that rounding does not put it below
-STANDING = (-1.0, 0.0)  # "previous action" of an agent that has not moved yet: no speed, no turn
+# Height of a pupil above the agent's skin, as a fraction of the agent's radius. Rounding errors therefore cannot put
+# the pupil below the skin.
+OUTSIDE = 1e-6
+STANDING = (-1.0, 0.0)  # "previous action" at the start of an episode: no speed and no turn
 
 
 @dataclass(frozen=True)
 class AgentEvents:
     """Events during one action, per world.
 
-    progress: [m], as defined by the task, (n,)
-    goal, adversary: reached, (n,) bool
-    adversary_first: an adversary was reached before any goal, (n,) bool
-    reached: objects that were reached, (n, k) bool
-    terminated: (n,) bool
+    progress: progress as the task defines it [m], (n,)
+    goal: whether a goal was reached, (n,) bool
+    adversary: whether an adversary was reached, (n,) bool
+    adversary_first: whether an adversary was reached before any goal, (n,) bool
+    reached: whether each object was reached, (n, k) bool
+    terminated: whether the task ends the episode, (n,) bool
     """
 
     progress: np.ndarray
@@ -51,11 +56,11 @@ class AgentEvents:
 
     @property
     def any(self) -> np.ndarray:
-        """True in worlds in which an object was reached, (n,) bool."""
+        """Array (n,) bool: whether a goal or an adversary was reached in each world."""
         return self.goal | self.adversary
 
     def within(self, worlds: np.ndarray) -> AgentEvents:
-        """Return the same events in these worlds, (n,) bool, and none in the others."""
+        """Return a copy of the events without those of worlds for which `worlds` (n,) is False."""
         return AgentEvents(
             progress=np.where(worlds, self.progress, 0.0),
             goal=self.goal & worlds,
@@ -67,11 +72,11 @@ class AgentEvents:
 
 
 class AgentTask(BatchTask):
-    """A task of an agent that slides among walls, in one of the built-in worlds.
+    """A task in one of the built-in worlds, in which an agent slides over the floor between walls.
 
-    world: layout of the world
-    mode: "training" or "evaluation": the weights of the reward
-    eyes: eyes on the agent's equator; several kinds by name; None: no eyes
+    world: the compiled world
+    mode: "training" or "evaluation", which selects the weights of the reward
+    eyes: eyes on the agent's equator, or a dictionary of several kinds of eyes by name; None: no eyes
     fidelity: fidelity of the eyes, or "auto"
     """
 
@@ -106,14 +111,14 @@ class AgentTask(BatchTask):
         return MODES[self.mode]
 
     def n_actions(self, model: mujoco.MjModel) -> int:
-        """Two: forward speed, and change of heading."""
+        """Return 2. The numbers are the forward speed and the change of heading."""
         return 2
 
     def commands(self) -> tuple[Command, ...]:
         return (Command("speed", "m/s", MAX_SPEED / 2, 1.0), Command("turn", "°", np.degrees(MAX_TURN)))
 
     def solved(self, before: bool | None, info: Mapping[str, Any]) -> bool | None:
-        """Return the result of the first object reached: a goal solves the task, an adversary does not."""
+        """Return True if the first object that the agent reached was a goal, False if it was an adversary."""
         if before is not None:
             return before
         if info.get("adversary_first"):
@@ -137,16 +142,19 @@ class AgentTask(BatchTask):
         return (replace(agent, first_action=np.array(STANDING, np.float32)),)
 
     def act(self, worlds: SlidingAgents, actions: np.ndarray) -> None:
-        """Set forward speed and change of heading, and the motion of the objects."""
+        """Set the agent's forward speed and change of heading, and move the objects."""
         worlds.steer(actions)
         worlds.move_objects(*self.moved(worlds))
 
     def moved(self, worlds: SlidingAgents) -> tuple[np.ndarray, np.ndarray]:
-        """Return objects (n, k, 3) [m] and their headings (n, k) [rad] after the next action; default: unchanged."""
+        """Return the positions (n, k, 3) [m] and headings (n, k) [rad] of the objects after the next action.
+
+        By default, objects do not move.
+        """
         return worlds.state.objects, worlds.state.object_heading
 
     def proprioception(self, worlds: SlidingAgents) -> Mapping[str, np.ndarray]:
-        """Return whether the agent touched a wall during the last action; 0 at the beginning of an episode."""
+        """Return 1 if the agent touched a wall during the last action, else 0; at the start of an episode, return 0."""
         touched = np.zeros(worlds.n, bool) if worlds.motion is None else worlds.motion.contact
         return {"contact": (touched & (worlds.state.steps > 0)).astype(np.float32)[:, None]}
 
@@ -156,7 +164,7 @@ class AgentTask(BatchTask):
         return [{"position": (x, y), "heading": heading} for (x, y), heading in places]
 
     def weighted(self, worlds: SlidingAgents, events: AgentEvents, failed: Mapping[int, str]) -> Outcome:
-        """Return the outcome of an action with these events."""
+        """Return the outcome of an action that caused these events, with the weighted terms of the reward."""
         if failed:
             well = np.ones(worlds.n, bool)
             well[list(failed)] = False
@@ -183,10 +191,13 @@ class AgentTask(BatchTask):
         )
 
     def put_elsewhere(self, worlds: SlidingAgents, events: AgentEvents) -> np.ndarray:
-        """Move reached objects to new positions, if the episode goes on; return the worlds that changed."""
+        """Move each reached object if the episode continues. Return the worlds in which objects were moved.
+
+        By default, no object moves.
+        """
         return NOWHERE
 
 
 def mounts_of_agent(eyes: Eyes) -> tuple[Mount, ...]:
-    """Return the places of these eyes on the agent's equator."""
+    """Return the mounts of these eyes on the agent's equator."""
     return ring("agent", eyes.n_eyes, eyes.placement_range_deg, BODY_RADIUS * (1 + OUTSIDE))

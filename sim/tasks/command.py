@@ -11,10 +11,12 @@ __all__ = ["Command"]
 
 @dataclass(frozen=True)
 class Command:
-    """One number of an action, in [-1, 1].
+    """Meaning of one number of an action. The number lies in [-1, 1].
 
-    name: name in reports
-    unit: unit of the commanded quantity, which is scale * (number + offset)
+    The commanded quantity is scale * (number + offset).
+
+    name: name of the quantity in reports
+    unit: unit of the quantity
     """
 
     name: str
@@ -23,5 +25,5 @@ class Command:
     offset: float = 0.0
 
     def quantity(self, numbers: np.ndarray) -> np.ndarray:
-        """Return the commanded quantity, in `unit`."""
+        """Return the commanded quantity for these numbers, in `unit`."""
         return self.scale * (np.clip(numbers, -1, 1) + self.offset)

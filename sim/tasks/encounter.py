@@ -1,4 +1,4 @@
-"""Several animals in one world, each with its own task: learning animals, and animals with fixed policies."""
+"""Several animals in one world, each with its own task. Some learn; others have fixed policies."""
 
 from __future__ import annotations
 
@@ -16,23 +16,26 @@ from sim.physics.controls import actuator_names
 from sim.tasks.batch_task import BatchTask
 from sim.tasks.task import Task
 
-# Memory, eye, channel, height, width: the axes of eyes' signals, and of no other entry of an observation.
+# Number of axes of the eyes' signals: memory, eye, channel, height and width. No other entry of an observation has
+# five axes.
 FRAMES_AXES = 5
-SAID_BY_ANY = ("spectra", "vary")  # settings of the world that may be set in any one of the animals' tasks
-SHARED = ("substeps", "episode_steps")  # settings of the world that must be equal in all of the animals' tasks
+SAID_BY_ANY = ("spectra", "vary")  # settings of the world that only one animal's task needs to set
+SHARED = ("substeps", "episode_steps")  # settings of the world that must be equal in the tasks of all animals
 
 
 @dataclass(frozen=True, eq=False)
 class Frozen:
-    """An animal that does not learn, in the world of one that does: one of its task's `others`.
+    """An animal that does not learn. The task of a learning animal in the same world lists it in `others`.
 
-    task: task that defines its eyes, actions and endings; its rewards and its own `others` are not used
-    policy: an object with stable-baselines3's `predict` (a learner, or the return value of `evolve.load_policy`), or a
-        function from the observations of all worlds, as in `make_vec_env`, to actions (world, number). None: its
-        actions are zeros, and its eyes are not rendered.
+    task: task that defines the animal's eyes and actions, and when it ends an episode; the rewards and the `others` of
+        this task are not used
+    policy: an object with the method `predict` of stable-baselines3 (a learner, or the return value of
+        `evolve.load_policy`), or a function. The function receives the observations of all worlds, as in
+        `make_vec_env`, and returns the actions (world, number). None: the actions are zeros, and the animal's eyes are
+        not rendered.
 
     Raises:
-        ValueError: arguments of other types.
+        ValueError: an argument has another type.
     """
 
     task: Task
@@ -46,16 +49,18 @@ class Frozen:
 
     @property
     def memory(self) -> int:
-        """Number of frames in the observations that its policy expects."""
+        """Number of frames in the observations that the policy expects."""
         known = getattr(getattr(self.policy, "observation_space", None), "spaces", {})
         shapes = [space.shape for space in known.values()]
         return max((shape[0] for shape in shapes if len(shape) == FRAMES_AXES), default=1)
 
     def actions(self, observation: Mapping[str, np.ndarray], shape: tuple[int, int]) -> np.ndarray:
-        """Return its actions in every world, of this shape (world, number).
+        """Return the animal's actions in every world.
+
+        shape: shape of the actions, (world, number)
 
         Raises:
-            RuntimeError: its policy fails, or returns another shape.
+            RuntimeError: the policy fails, or returns another shape.
         """
         try:
             predict = getattr(self.policy, "predict", None)
@@ -74,11 +79,11 @@ class Frozen:
 class Encounter:
     """Animals in one world that see each other, such as `sim.Encounter(Prey(), Predator())`.
 
-    animals: their tasks. All use one model, in which each animal has its own body, actuators and eyes. The `name` of a
-        task is the name of its animal.
+    animals: tasks of the animals. All tasks use the same model, in which each animal has its own body, actuators and
+        eyes. The `name` of a task is the name of its animal.
 
     Raises:
-        ValueError: no animals, two of the same name, or different models.
+        ValueError: there are no animals, two animals have the same name, or two tasks have different models.
     """
 
     def __init__(self, *animals: Task) -> None:
@@ -93,12 +98,13 @@ class Encounter:
         return tuple(map(name_of, self.animals))
 
     def alone(self, name: str, policies: Mapping[str, Any]) -> Task:
-        """Return the task of one animal, in which the others are frozen, for `make_vec_env` and `make_env`.
+        """Return the task of one learning animal, for `make_vec_env` and `make_env`. The other animals do not learn.
 
-        policies: policies of other animals, by name, see `sim.Frozen`; animals without one do nothing
+        policies: policies of other animals, by name, see `sim.Frozen`; the actions of an animal without a policy are
+            zeros
 
         Raises:
-            ValueError: no animal of this name.
+            ValueError: no animal has this name, or `policies` contains the learning animal.
         """
         for asked in (name, *policies):
             if asked not in self.names:
@@ -112,19 +118,19 @@ class Encounter:
 
 
 def among(task: Task, others: Sequence[Frozen]) -> Task:
-    """Return the same task with these others."""
+    """Return a copy of the task with these animals as its `others`."""
     learner = copy.copy(task)
     learner.others = tuple(others)
     return learner
 
 
 def name_of(task: Task) -> str:
-    """Return the name of an animal."""
+    """Return the name of the animal that has this task."""
     return type(task).__name__ if task.name is None else str(task.name)
 
 
 def split_agents(task: Task | Encounter) -> tuple[tuple[Task, ...], tuple[Frozen, ...]]:
-    """Return the learning animals and the frozen ones.
+    """Return the tasks of the learning animals, and the animals that do not learn.
 
     Raises:
         ValueError: they cannot share a world.
@@ -139,7 +145,7 @@ def split_agents(task: Task | Encounter) -> tuple[tuple[Task, ...], tuple[Frozen
 
 
 def of_world(animals: Sequence[Task], what: str) -> Any:
-    """Return a setting of the world from the first animal that defines it."""
+    """Return the setting `what` of the world from the first task that defines it; None if no task does."""
     return next((said for animal in animals if (said := getattr(animal, what))), None)
 
 
@@ -147,7 +153,7 @@ def require_own_actuators(animals: Sequence[Task], model: mujoco.MjModel) -> Non
     """Check that animals with the default `act` have separate actuators.
 
     Raises:
-        ValueError: two animals drive the same actuator, so that the last one would override the others.
+        ValueError: two animals drive the same actuator, so that one would overwrite the other's control.
     """
     owner: dict[str, str] = {}
     for animal in animals:
@@ -160,9 +166,9 @@ def require_own_actuators(animals: Sequence[Task], model: mujoco.MjModel) -> Non
 
 
 def together(animals: Sequence[Task], where: str) -> tuple[Task, ...]:
-    """Return the animals after checking that they can share a world.
+    """Return the animals' tasks after checking that the animals can share a world.
 
-    where: beginning of the message
+    where: beginning of the error message
 
     Raises:
         ValueError: they cannot share a world.

@@ -15,15 +15,15 @@ if TYPE_CHECKING:
     from sim.tasks.task_settings import TaskSettings
 
 EYES = "eyes"  # name of a single kind
-AUXILIARY = ("depth", "ids", "flow")  # auxiliary entries of an observation, for each receptor, see `sim.Task`
-TAKEN = ("previous_action", "feels", *AUXILIARY)  # names of other entries of an observation
+AUXILIARY = ("depth", "ids", "flow")  # auxiliary entries of an observation, see `sim.Task`
+TAKEN = ("previous_action", "feels", *AUXILIARY)  # names that are reserved for other entries of an observation
 
 
 @dataclass(frozen=True)
 class EyeKind:
-    """One kind of eyes.
+    """Eyes of an animal that have the same optics and retina.
 
-    name: name of the eyes' signals in an observation
+    name: name of their signals in an observation
     eye: optics and retina
     mounts: places of the eyes
     fidelity: fidelity of the eyes, or "auto"
@@ -36,15 +36,15 @@ class EyeKind:
 
 
 def several(task: TaskSettings) -> bool:
-    """Return whether a task defines several kinds of eyes, by name."""
+    """Return whether a task defines several kinds of eyes, in dictionaries by name."""
     return isinstance(task.eye, Mapping) or isinstance(task.mounts, Mapping)
 
 
 def kinds_of(task: TaskSettings) -> tuple[EyeKind, ...]:
-    """Return the kinds of eyes of a task, in its order.
+    """Return the kinds of eyes of a task, in the order of the task's dictionary.
 
     Raises:
-        ValueError: names that do not match, or are invalid.
+        ValueError: `eye`, `mounts` and `fidelity` have different names, or a name or a value is invalid.
     """
     where, eye, mounts, fidelity = type(task).__name__, task.eye, task.mounts, task.fidelity
     if not isinstance(eye, Mapping) and not isinstance(mounts, Mapping):
@@ -79,12 +79,12 @@ def kinds_of(task: TaskSettings) -> tuple[EyeKind, ...]:
 
 
 def auxiliary_of(names: Iterable[str], where: str) -> tuple[str, ...]:
-    """Return the requested names, in the order of AUXILIARY.
+    """Return the requested names of auxiliary entries, in the order of AUXILIARY.
 
-    where: beginning of the message
+    where: beginning of the error message
 
     Raises:
-        ValueError: an unknown name.
+        ValueError: a name is unknown.
     """
     if isinstance(names, str):
         raise ValueError(f"{where} = {names!r}: must be several names, such as ({names!r},)")

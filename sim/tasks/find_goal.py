@@ -1,4 +1,4 @@
-"""Detection, foraging and tracking: reach the goal, avoid the adversaries."""
+"""The tasks detection, foraging and tracking: the agent reaches the goal and avoids the adversaries."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ __all__ = ["FindGoal"]
 
 
 class FindGoal(AgentTask):
-    """Reach the goal and avoid the adversaries.
+    """Task in which the agent reaches the goal and avoids the adversaries.
 
     Progress is the decrease of the distance to the goal. An object is reached if the agent comes within REACH of its
-    centre at any substep. In training, the first event ends the episode, and only this event counts. In evaluation, the
-    object respawns and the episode goes on. In tracking, the objects move.
+    centre at any substep. In training, the first object that is reached ends the episode, and only this object
+    counts. In evaluation, a reached object respawns and the episode continues. In tracking, the objects move.
     """
 
     @cached_property
     def goals(self) -> int:
-        """Number of goals, which are the first objects.
+        """Number of goals. The goals must precede the adversaries in the list of objects.
 
         Raises:
             ValueError: the goals are not the first objects.

@@ -1,4 +1,4 @@
-"""Navigation and maze: move away from the start and reach the goal region."""
+"""The tasks navigation and maze: the agent moves away from the start and reaches the goal region."""
 
 from __future__ import annotations
 
@@ -14,12 +14,15 @@ from sim.worlds.state import wrap_angle
 
 __all__ = ["HEADING_SPREAD", "FindWay"]
 
-HEADING_SPREAD = math.radians(20)  # [rad] largest deviation of an initial heading from the course; chosen
+HEADING_SPREAD = math.radians(20)  # [rad] largest deviation of an initial heading from the course
 
 
 class FindWay(AgentTask):
-    """Progress is the increase of the distance from the start. Reaching the goal region ends the episode, also in
-    evaluation, because no object could respawn."""
+    """Task in which the agent moves away from the start and reaches the goal region.
+
+    Progress is the increase of the distance from the start. Reaching the goal region ends the episode. This is also the
+    case in evaluation, because these tasks have no objects that could respawn.
+    """
 
     def reset(self, worlds: SlidingAgents, chosen: np.ndarray, rngs: Sequence[np.random.Generator]) -> None:
         n = len(chosen)

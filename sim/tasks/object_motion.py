@@ -1,5 +1,7 @@
-"""Motion of the objects in the tracking task: random policies that have full information about objects but none about
-the agent."""
+"""Random motion of the objects in the tracking task.
+
+Each object avoids the other objects, whose positions are known exactly, but does not react to the agent.
+"""
 
 from __future__ import annotations
 
@@ -12,15 +14,15 @@ from sim.worlds.layout import SEPARATION
 from sim.worlds.state import WorldState, wrap_angle
 
 SPEED = 0.5  # [m/s], as published
-TURN = 0.4  # chosen: standard deviation of the change of heading per action [rad]
+TURN = 0.4  # [rad] standard deviation of the change of heading per action
 
 
 def wander(state: WorldState, chance: MotionNoise, bounds: np.ndarray, seconds: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return object positions (n, k, 3) and headings (n, k) one action later.
+    """Return the positions (n, k, 3) [m] and headings (n, k) [rad] of the objects one action later.
 
-    Every object walks at SPEED with a randomly drifting heading. An object does not step out of `bounds` (x_min, y_min,
-    x_max, y_max), or within SEPARATION of the present or next position of another object. It turns to a random heading
-    instead.
+    Every object moves at SPEED, and its heading drifts randomly. A step must not lead out of `bounds` (x_min, y_min,
+    x_max, y_max), nor to a point closer than SEPARATION to the present or next position of another object. An object
+    whose step would violate this stays at its position and turns to a random heading.
     """
     drift, turn = chance.next(state.objects.shape[1])
     heading = wrap_angle(state.object_heading + TURN * drift)
@@ -36,7 +38,7 @@ def wander(state: WorldState, chance: MotionNoise, bounds: np.ndarray, seconds: 
 def _nearest(to_x: np.ndarray, to_y: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
     """Return the squared distance from each object's next position to the nearest present or next position of another
     object [m²], (n, k)."""
-    # The worlds are the last axis, since there are many of them and NumPy's inner loop is over this axis.
+    # The worlds are on the last axis because NumPy's inner loop runs over this axis, and there are many worlds.
     place_x, place_y = (np.ascontiguousarray(np.concatenate(at, axis=1).T) for at in ([x, to_x], [y, to_y]))
     k = x.shape[1]
     squared = (place_x[k:, None] - place_x) ** 2
@@ -48,5 +50,8 @@ def _nearest(to_x: np.ndarray, to_y: np.ndarray, x: np.ndarray, y: np.ndarray) -
 
 @cache
 def _but_itself(k: int) -> np.ndarray:
-    """Return infinity for each of k objects' own two positions and 0 for the others, (k, 2k, 1)."""
+    """Return an array (k, 2k, 1) that is added to squared distances from k objects to 2k positions.
+
+    It is infinite for the two positions of the object itself, and 0 elsewhere.
+    """
     return np.tile(np.diag(np.full(k, np.inf)), 2)[..., None]

@@ -1,4 +1,4 @@
-"""The outcome of one action in all worlds: rewards, endings and changes."""
+"""The outcome of one action in all worlds: rewards, ends of episodes, and worlds that changed."""
 
 from __future__ import annotations
 
@@ -15,12 +15,14 @@ NOWHERE = np.empty(0, int)
 
 
 class RewardTerms:
-    """The named terms of a reward for each row: a single array for all terms, or a dictionary for each row.
+    """The named terms of the reward for each row.
 
-    Rows are worlds. If several agents learn, the first agent of all worlds comes first.
+    If one agent learns, the rows are the worlds. If several agents learn, the rows of the first agent in all worlds
+    come first, then those of the second agent. Terms are stored in one array (term, row), and, if the rows have
+    different terms (`of_rows`), also in a dictionary for each row.
 
     Raises:
-        ValueError: the numbers of terms and names differ.
+        ValueError: the number of terms differs from the number of names.
     """
 
     def __init__(self, names: Sequence[str], terms: np.ndarray) -> None:
@@ -31,7 +33,7 @@ class RewardTerms:
 
     @classmethod
     def of_rows(cls, rows: Sequence[Mapping[str, float]]) -> RewardTerms:
-        """Collect terms that may have other names in each row."""
+        """Return the terms of rows whose terms may have different names."""
         names = list(dict.fromkeys(name for row in rows for name in row))
         found = cls(names, np.array([[row.get(name, 0.0) for row in rows] for name in names]).reshape(-1, len(rows)))
         found._rows = [dict(row) for row in rows]
@@ -49,26 +51,29 @@ class RewardTerms:
         """Terms by name, for each row."""
         if self._rows is not None:
             return self._rows
-        # Built without a Python loop, which takes a third of the time: this happens for every world in every step.
+        # These dictionaries are built for every world in every step. This form takes a third of the time of a loop.
         return list(map(dict, map(zip, repeat(self.names), self.terms.T.tolist())))
 
     def __getitem__(self, name: str) -> np.ndarray:
-        """Return one term, (row,)."""
+        """Return the values of one term, (row,)."""
         return np.asarray(self.terms[self.names.index(name)])
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """The outcome of one action, as returned by a task.
+    """The outcome of one action in all worlds, which a task returns.
 
     terms: terms of the reward
-    terminated, success: (row,) bool
-    failure: reasons, by world, if worlds could not continue; their episodes end
-    over: worlds whose episode ends although no learner's is terminated, (world,) bool; None: none
+    terminated: whether the task ends the episode, (row,) bool
+    success: whether the task is accomplished, (row,) bool
+    failure: the worlds that could not continue, each with the reason; their episodes end
+    over: whether a world's episode ends for another reason than a row that is terminated, such as an animal that does
+        not learn, (world,) bool; None: False in all worlds
     changed: worlds in which the task moved bodies after the action
     info: additional entries of each row's `info`; None: no additions
-    proprioception: entries of the observation besides eyes, by agent and name (world, number); None: call the task's
-        method. Worlds whose numbers are NaN keep the previous ones.
+    proprioception: part of the observation that does not come from eyes, for each agent and by name, (world, number);
+        a world whose numbers are NaN keeps its previous numbers. None: the task's method `all_proprioception` is
+        called.
     """
 
     terms: RewardTerms
@@ -83,15 +88,17 @@ class Outcome:
 
 @dataclass(frozen=True)
 class Step:
-    """One action of all worlds, before any world starts a new episode.
+    """Result of one action in all worlds, before any world starts a new episode.
 
     state: state of the physics after the action
     terms: terms of the reward
     reward: sum of the terms (row,)
-    terminated, truncated, success: (row,) bool
+    terminated: whether the task ended the episode, (row,) bool
+    truncated: whether the episode ended for another reason, such as its number of actions, (row,) bool
+    success: whether the task is accomplished, (row,) bool
     changed: worlds that must be rendered again
-    given_up: truncated because the sum of the episode's rewards is too low, (row,) bool
-    failure: reasons, by world, if worlds could not continue
+    given_up: whether the episode was truncated because the sum of its rewards is too low, (row,) bool
+    failure: the worlds that could not continue, each with the reason
     info: additional entries of each row's `info`, or None
     """
 
@@ -108,10 +115,10 @@ class Step:
 
     @property
     def reward_terms(self) -> dict[str, np.ndarray]:
-        """Terms (row,) by name."""
+        """Terms of the reward by name, (row,) each."""
         return {name: self.terms[name] for name in self.terms.names}
 
     @property
     def done(self) -> np.ndarray:
-        """Rows whose episode has ended, (row,) bool."""
+        """Array (row,) bool: whether the episode of each row has ended."""
         return self.terminated | self.truncated

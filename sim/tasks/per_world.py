@@ -1,4 +1,4 @@
-"""Tasks of one world at a time as a batch task, whose plain Python methods are called world by world."""
+"""A batch task that wraps tasks of one world at a time, and calls their plain Python methods world by world."""
 
 from __future__ import annotations
 
@@ -39,24 +39,24 @@ class _OfWorld:
 
 
 class PerWorld(BatchTask):
-    """A `sim.Task` with its others, or a `sim.Encounter` whose animals all learn.
+    """Batch task of a `sim.Task` and its `others`, or of a `sim.Encounter`, whose animals all learn.
 
     learners: tasks of the learning animals
-    frozen: the other animals
+    frozen: animals that do not learn
     animals: tasks of all animals, learners first
 
     Raises:
-        ValueError: a setting is missing or wrong, or the animals cannot share a world.
+        ValueError: a setting is missing or invalid, or the animals cannot share a world.
     """
 
-    renders_early = False  # a user's methods may move bodies
+    renders_early = False  # because a user's methods may move bodies
 
     def __init__(self, task: Task | Encounter) -> None:
         self.task = task
         self.learners, self.frozen = split_agents(task)
         self.animals = (*self.learners, *(other.task for other in self.frozen))
         self.name = " and ".join(map(name_of, self.animals))
-        self._sizes: dict[int, int] = {}  # sizes of the animals' proprioception, once they are known
+        self._sizes: dict[int, int] = {}  # length of each animal's proprioception, stored at its first call
         self._whose = ["" if len(self.animals) == 1 else f"{name_of(animal)}: " for animal in self.animals]
         self.model = compiled(self.animals[0])
         for animal in self.animals[1:]:
@@ -110,7 +110,7 @@ class PerWorld(BatchTask):
         return found
 
     def judge(self, worlds: MujocoWorlds, failed: Mapping[int, str]) -> Outcome:
-        """Return the outcome of an action. An episode ends for all animals as soon as it ends for one of them."""
+        """Return the outcome of an action. An episode ends for all animals as soon as one of them is terminated."""
         failure, over = dict(failed), np.zeros(worlds.n, bool)
         judged: list[list[_OfWorld]] = []
         felt: list[list[np.ndarray | None]] = [[None] * worlds.n for _ in self.animals]
@@ -146,7 +146,7 @@ class PerWorld(BatchTask):
             raise RuntimeError(_told(error)) from error
 
     def _judged(self, data: mujoco.MjData) -> tuple[list[_OfWorld], bool]:
-        """Return the outcome for every learner, and whether the episode ends."""
+        """Return the outcome for every learner, and whether any animal ends the episode."""
         outcomes, over = [], False
         for animal, whose in zip(self.learners, self._whose, strict=False):
             terms = named_terms(animal, data, whose)
@@ -159,7 +159,7 @@ class PerWorld(BatchTask):
         """Return the proprioception of every animal in a world.
 
         Raises:
-            ValueError: not a row of finite numbers, or another number of them than before.
+            ValueError: a method did not return a row of finite numbers, or the row has another length than before.
         """
         found = []
         for number, (animal, whose) in enumerate(zip(self.animals, self._whose, strict=True)):
@@ -181,7 +181,7 @@ def _in_mode(task: Task, mode: str) -> Task:
 
 
 def _stacked(felt: Sequence[np.ndarray | None]) -> dict[str, np.ndarray]:
-    """Return one row for each world, filled with NaN for worlds without new values."""
+    """Return an array with one row for each world; the rows of worlds without new values are NaN."""
     size = next((len(row) for row in felt if row is not None), 0)
     if not size:
         return {}
@@ -189,7 +189,7 @@ def _stacked(felt: Sequence[np.ndarray | None]) -> dict[str, np.ndarray]:
 
 
 def _told(error: Exception) -> str:
-    """Return the message of an error, with its place in the user's file if it happened there."""
+    """Return the message of an error; if it was raised in the user's file, with the function and line."""
     for frame in traceback.extract_tb(error.__traceback__):
         if frame.filename not in _OURS:
             place = f"{frame.name}, line {frame.lineno} of {Path(frame.filename).name}"

@@ -1,4 +1,4 @@
-"""Random starting positions of the agent and the objects, never within reach of each other."""
+"""Random starting positions of the agent and the objects, which are never within reach of each other."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 
 from sim.worlds.layout import CLEARANCE, SEPARATION
 
-TRIES = 100  # chosen; in the field of detection, none of 20 000 first tries failed
+TRIES = 100  # in the field of the detection task, the first try succeeded in all of 20 000 draws
 
 
 class SpawnPoints:
@@ -14,7 +14,7 @@ class SpawnPoints:
 
     def __init__(self, agents: np.ndarray, objects: np.ndarray) -> None:
         self._agents, self._objects = agents, objects
-        # Computed in advance, since some episode starts in almost every step of a batch.
+        # These are computed in advance because an episode starts in some world in almost every step of a batch.
         self._clear_of_agent = np.array([_apart(objects, place, CLEARANCE) for place in agents])
         self._apart = np.array([_apart(objects, place, SEPARATION) for place in objects])
 
@@ -44,7 +44,12 @@ class SpawnPoints:
 def free_spot(
     rng: np.random.Generator, agent: np.ndarray, others: np.ndarray, object_spawn: np.ndarray
 ) -> np.ndarray | None:
-    """Return the centre (2,) of a cell clear of the agent and of the other objects (k, 2); None if there is none."""
+    """Return the centre (2,) of a random cell that is far enough from the agent and the other objects.
+
+    Return None if no cell is far enough.
+
+    others: positions of the other objects, (k, 2) [m]
+    """
     free = _apart(object_spawn, agent, CLEARANCE)
     for other in others:
         free &= _apart(object_spawn, other, SEPARATION)
@@ -53,7 +58,7 @@ def free_spot(
 
 
 def _apart(spots: np.ndarray, place: np.ndarray, distance: float) -> np.ndarray:
-    """Return whether positions (n, 2) are at least `distance` [m] away from a place (2,), (n,) bool."""
+    """Return whether each position (n, 2) is at least `distance` [m] away from `place` (2,), (n,) bool."""
     x, y = spots[:, 0] - place[0], spots[:, 1] - place[1]
     apart: np.ndarray = x * x + y * y >= distance**2
     return apart

@@ -1,4 +1,7 @@
-"""Random streams of worlds, by two schemes. In both, a world's episodes do not depend on the number of worlds."""
+"""Random number generators ("streams") of the worlds, in two schemes.
+
+In both schemes, the episodes of a world do not depend on the number of worlds.
+"""
 
 from __future__ import annotations
 
@@ -11,15 +14,16 @@ import numpy as np
 
 __all__ = ["MotionNoise", "RandomStreams", "StreamsByPurpose", "StreamsByWorld"]
 
-AHEAD = 64  # actions drawn in advance, because a call per world and action costs more than the numbers
+# Number of actions for which random numbers are drawn in advance. One call per world and action would take longer than
+# drawing the numbers.
+AHEAD = 64
 
 
 class RandomStreams(Protocol):
-    """Protocol of random streams.
+    """Protocol of the random number generators of all worlds.
 
-    entropy: seed of all streams; seeding with it again repeats every episode
-    episodes, variation: generators of each world, for starts of episodes and for varied quantities
-    noise_keys: keys of receptor noise, by agent: (kind of eyes, world) uint64, for `sim.render.receptor_noise`
+    entropy: seed of all generators; using it as the seed again repeats every episode
+    noise_keys: keys of the receptor noise for `sim.render.receptor_noise`, for each agent (kind of eyes, world) uint64
     """
 
     entropy: Any
@@ -27,25 +31,25 @@ class RandomStreams(Protocol):
 
     @property
     def episodes(self) -> list[np.random.Generator]:
-        """Generators for starts of episodes."""
+        """Generators that `reset` uses at the start of episodes, one for each world."""
 
     @property
     def variation(self) -> list[np.random.Generator]:
-        """Generators for quantities that vary between episodes."""
+        """Generators of the quantities that vary between episodes, one for each world."""
 
     def get_state(self) -> dict[str, np.ndarray]:
-        """Return the state of all streams; each array's first axis is the world."""
+        """Return the state of all generators; the first axis of each array is the world."""
 
     def set_state(self, state: Mapping[str, np.ndarray], worlds: np.ndarray) -> None:
-        """Restore what `get_state` returned, for these worlds."""
+        """Restore the state of these worlds from the return value of `get_state`."""
 
 
 class StreamsByPurpose:
-    """One stream for each world and purpose, derived from the seed, the world's index and the purpose alone.
+    """One generator for each world and purpose. The built-in tasks use this scheme.
 
-    The built-in tasks use this scheme.
+    Its seed depends only on the common seed, the index of the world and the purpose.
 
-    motion: numbers for objects that move at random
+    motion: random numbers for objects that move at random
     """
 
     def __init__(self, seed: Any, n: int, kinds: Sequence[int] = (1,)) -> None:
@@ -66,7 +70,7 @@ class StreamsByPurpose:
 
     @cached_property
     def variation(self) -> list[np.random.Generator]:
-        """Generators for quantities that vary between episodes, mainly light."""
+        """Generators of the quantities that vary between episodes, mainly light, one for each world."""
         return [np.random.Generator(np.random.PCG64(child)) for child in self._of_variation]
 
     def get_state(self) -> dict[str, np.ndarray]:
@@ -79,9 +83,9 @@ class StreamsByPurpose:
 
 
 class StreamsByWorld:
-    """One stream for each world, used for all draws of its episodes. User tasks use this scheme.
+    """One generator for each world, which draws all random numbers of its episodes. User tasks use this scheme.
 
-    kinds: numbers of kinds of eyes, by agent
+    kinds: number of kinds of eyes of each agent
     """
 
     def __init__(self, seed: Any, n: int, kinds: Sequence[int] = (1,)) -> None:
@@ -89,7 +93,8 @@ class StreamsByWorld:
         children = [np.random.SeedSequence(self.entropy, spawn_key=(i,)) for i in range(n)]
         self.episodes = self.variation = [np.random.default_rng(child) for child in children]
         drawn = np.array([child.generate_state(sum(kinds), np.uint64) for child in children]).T
-        # The first kinds of all agents get the first keys, so that one more kind does not change another agent's noise.
+        # The first keys go to the first kind of eyes of every agent. If an agent gets a second kind of eyes, the noise
+        # in the first kind of the other agents therefore stays the same.
         more, self.noise_keys = len(kinds), []
         for number, count in enumerate(kinds):
             self.noise_keys.append(np.concatenate([drawn[number : number + 1], drawn[more : more + count - 1]]))
@@ -103,14 +108,17 @@ class StreamsByWorld:
 
 
 class MotionNoise:
-    """Random numbers for moving objects: for each action of each world, from the world's own generator."""
+    """Random numbers for moving objects. Each world draws the numbers for its actions from a separate generator."""
 
     def __init__(self, generators: list[np.random.Generator]) -> None:
         self._generators = generators
         self._drawn = np.empty((0, 2, len(generators), 0))
 
     def next(self, movers: int) -> tuple[np.ndarray, np.ndarray]:
-        """Return numbers for the next action: standard normal, and uniform in [-1, 1), (n, movers) each."""
+        """Return numbers for the next action, one for each moving object: standard normal, and uniform in [-1, 1).
+
+        Both arrays have the shape (n, movers).
+        """
         if not len(self._drawn):
             shape = (AHEAD, movers)
             of_worlds = [(rng.standard_normal(shape), rng.uniform(-1, 1, shape)) for rng in self._generators]
@@ -119,18 +127,22 @@ class MotionNoise:
         return normal, uniform
 
     def get_state(self) -> dict[str, np.ndarray]:
-        """Return the states of the generators, and the numbers drawn in advance, (world, action, 2, mover), aligned to
-        the end."""
+        """Return the states of the generators, and the remaining numbers that were drawn in advance.
+
+        The array of numbers has the shape (world, action, 2, moving object). The numbers fill its last actions, and
+        the actions before are NaN.
+        """
         left, _, n, movers = self._drawn.shape
         ahead = np.full((n, AHEAD, 2, movers), np.nan)
         ahead[:, AHEAD - left :] = np.transpose(self._drawn, (2, 0, 1, 3))
         return {"motion": _states(self._generators), "motion_ahead": ahead}
 
     def set_state(self, state: Mapping[str, np.ndarray], worlds: np.ndarray) -> None:
-        """Restore what `get_state` returned, for these worlds.
+        """Restore the state of these worlds from the return value of `get_state`.
 
         Raises:
-            ValueError: the worlds are only a part of all, and are at another action than the others.
+            ValueError: not all worlds are restored, and the number of remaining numbers differs from that of the other
+                worlds.
         """
         _set_states(self._generators, state["motion"], worlds)
         ahead = np.asarray(state["motion_ahead"])

@@ -11,8 +11,10 @@ __all__ = ["distance_to_nearest", "first_reached"]
 
 
 def distance_to_nearest(state: WorldState, goals: int) -> np.ndarray:
-    """Return the horizontal distance from the agent's centre to the nearest goal [m], (n,); goals are the first
-    objects."""
+    """Return the horizontal distance from the agent's centre to the nearest goal [m], (n,).
+
+    goals: number of goals; they are the first objects
+    """
     x = state.objects[:, :goals, 0] - state.position[:, :1]
     y = state.objects[:, :goals, 1] - state.position[:, 1:]
     nearest: np.ndarray = np.sqrt(np.minimum.reduce(x * x + y * y, axis=1))
@@ -20,14 +22,16 @@ def distance_to_nearest(state: WorldState, goals: int) -> np.ndarray:
 
 
 def first_reached(path: np.ndarray, objects_before: np.ndarray, objects_after: np.ndarray) -> np.ndarray:
-    """Return the first substep at which the agent is within REACH of each object, (n, k); the number of substeps if
-    never.
+    """Return the first substep at which the agent is within REACH of each object, (n, k).
+
+    The result is the number of substeps for an object that the agent does not reach.
 
     path: positions of the agent at the *end* of each substep, (n, substep, 2)
-    objects_before, objects_after: positions (n, k, 3) before and after; the motion between them is linear
+    objects_before: positions of the objects before the action, (n, k, 3)
+    objects_after: positions of the objects after the action, (n, k, 3); the motion between them is linear
     """
     substeps = path.shape[1]
-    # The worlds are the last axis, since there are many of them and NumPy's inner loop is over this axis.
+    # The worlds are on the last axis because NumPy's inner loop runs over this axis, and there are many worlds.
     agent = path.T.copy()[:, :, None]  # (x | y, substep, 1, n)
     place = _on_the_ground(objects_after)
     if objects_after is not objects_before:
@@ -43,5 +47,5 @@ def first_reached(path: np.ndarray, objects_before: np.ndarray, objects_after: n
 
 
 def _on_the_ground(objects: np.ndarray) -> np.ndarray:
-    """Return objects (n, k, 3) as (x | y, 1, k, n)."""
+    """Return the x and y coordinates of objects (n, k, 3) as an array (x | y, 1, k, n)."""
     return objects.T[:2].copy()[:, None]

@@ -14,10 +14,12 @@ __all__ = ["task_of"]
 
 
 def task_of(world: World, mode: str = "training", **settings: Any) -> AgentTask:
-    """Return the task of a built-in world; settings: see `AgentTask`.
+    """Return the task that belongs to a built-in world.
+
+    settings: further arguments of `AgentTask`
 
     Raises:
-        ValueError: the world belongs to no known task.
+        ValueError: the task of the world is unknown.
     """
     if world.task not in TASKS:
         raise ValueError(f"task = {world.task!r}: must be one of {', '.join(map(repr, TASKS))}")

@@ -1,24 +1,25 @@
-"""The reward of an action: four named terms, with separate weights for training and for fitness.
+"""The reward of an action in a built-in task: four named terms, with separate weights for training and for fitness.
 
     reward_t = λ progress_t + w_g goal_t + w_a adversary_t + w_c contact_t
 
-    progress   in metres, with the agent's position x:
+    progress   change of a distance in metres; x_t is the agent's position after action t:
                |x_(t-1) - x_goal| - |x_t - x_goal|   detection, foraging, tracking; x_goal is the position of the
-                                                     nearest goal at the same time
+                                                     nearest goal at time t-1 or t
                |x_t - x_start| - |x_(t-1) - x_start| navigation, maze; straight-line distances
     goal       1 when the goal, or the goal region of a course or maze, is reached
     adversary  1 when an adversary is reached
     contact    1 when the agent touched a wall at any time during the action
 
                 λ      w_g    w_a    w_c
-    training    0.25   1      -1     -1     an event ends the episode
-    evaluation  1.5    10     -10    -2     objects respawn and the episode goes on; only a goal region ends it
+    training    0.25   1      -1     -1     reaching a goal or an adversary ends the episode
+    evaluation  1.5    10     -10    -2     objects respawn and the episode continues; only a goal region ends it
 
 Terms and weights follow the text of Tiwary, Young et al. (2025), "What if Eye...? Computationally Recreating Vision
-Evolution". Fitness is the mean of the evaluation episodes' sums. The code published with the paper gives a metre of
-progress in training the same weight as an action in contact; rhabdom does not. Foraging is not in the paper and has
-the reward of detection. A training run may begin with a smaller w_c (`evolve`, `learning.contact_ramp`). At its end,
-and in the fitness, the weights are those above.
+Evolution". The fitness is the sum of an evaluation episode's rewards, averaged over these episodes. In training, the
+code published with the paper gives a metre of progress the same weight as an action in contact; rhabdom uses the
+weights of the text. Foraging is not in the paper and has the reward of detection. A training run may begin with a w_c
+closer to 0 (setting `learning.contact_ramp` of `evolve`). At the end of training, and in the fitness, the weights are
+those above.
 """
 
 from __future__ import annotations
@@ -35,7 +36,11 @@ TERMS = ("progress", "goal", "adversary", "contact")
 
 @dataclass(frozen=True)
 class RewardWeights:
-    """Weights of the terms: progress per metre, the others per event or per action in contact."""
+    """Weights of the terms.
+
+    The weight of progress is per metre, that of goal and adversary per object reached, and that of contact per action
+    in which the agent touched a wall.
+    """
 
     progress: float
     goal: float
@@ -54,10 +59,10 @@ MODES = {"training": TRAINING, "evaluation": EVALUATION}
 
 
 def check_mode(mode: str) -> None:
-    """Refuse a mode without weights.
+    """Check that a mode is one of MODES.
 
     Raises:
-        ValueError: not one of MODES.
+        ValueError: it is not.
     """
     one_of("mode", mode, MODES)
 
@@ -68,5 +73,5 @@ def reward_terms(
     """Return the terms of the reward in the order of TERMS, (term, n), from the progress [m] and the events."""
     terms = np.array([progress, goal, adversary, contact])
     terms *= weights.column
-    terms += 0.0  # never -0.0
+    terms += 0.0  # converts -0.0 to 0.0
     return terms

@@ -1,4 +1,4 @@
-"""Simulation of a task without rendering: it maps actions to rewards and endings. Environments add the eyes."""
+"""Simulation of a task without rendering: actions lead to rewards and ends of episodes. Environments add the eyes."""
 
 from __future__ import annotations
 
@@ -28,20 +28,20 @@ class Simulation:
     """`n` independent worlds of one task.
 
     task: rules of the task
-    seed: seed of all random streams; None: a random seed
-    threads: threads of the physics
-    least_return: in training, an episode is truncated once its rewards sum to this value or less; None: never
+    seed: seed of all random number generators; None: a random seed
+    threads: number of threads that the physics uses
+    least_return: in training, an episode is truncated when the sum of its rewards falls to this value; None: never
     episode_steps: number of actions after which an episode is truncated; None: the task's default
     physics: physics of the worlds
     agents: agents in each world, learners first
-    rows: number of learners in all worlds
-    steps: actions taken in each world's episode (n,)
+    rows: number of learners in all worlds together
+    steps: number of actions taken in the present episode of each world, (n,)
     varied: current values of the varied quantities in each world, by name
-    taken: the last actions, limited to [-1, 1], with `Agent.first_action` instead of actions that were not finite
-    felt: proprioception, by agent and name (n, k) float32
+    taken: the last actions, limited to [-1, 1]; `Agent.first_action` replaces actions that were not finite
+    felt: the last proprioception of each agent, as arrays (n, k) float32 by name
 
     Raises:
-        ValueError: less than one world, or a least return that is not below 0 or not for training.
+        ValueError: `n` is below 1, `least_return` is not below 0, or it is given although the mode is not training.
     """
 
     def __init__(
@@ -71,7 +71,7 @@ class Simulation:
         self._rehearse()
 
     def _rehearse(self) -> None:
-        """Start one episode to find out the agents' proprioception, and whether the task changes the model."""
+        """Start an episode in one world, to record the proprioception and whether the task changes the model."""
         first = np.zeros(1, int)
         self._start(first)
         while self.physics.adopt_changed_model():
@@ -84,7 +84,7 @@ class Simulation:
 
     @property
     def state(self) -> Any:
-        """Current state of all worlds, in the type of their physics.
+        """Current state of all worlds; the type depends on the physics.
 
         Raises:
             RuntimeError: before the first reset.
@@ -98,7 +98,7 @@ class Simulation:
         self.physics.state = state  # type: ignore[misc]
 
     def seed(self, seed: Any) -> None:
-        """Restart all random streams at the next reset."""
+        """Seed all random number generators again. The next call must be `reset`."""
         self.streams = self.physics.chance = self.task.streams(seed, self.n)
         self.begun = False
 
@@ -125,11 +125,13 @@ class Simulation:
         return " and ".join(agent.name for agent in self.agents)
 
     def step(self, actions: np.ndarray) -> Step:
-        """Take one action in all worlds; actions (n, numbers of all agents) in [-1, 1]."""
+        """Take one action in all worlds; `actions`: values in [-1, 1] of all agents, (n, value)."""
         return self.judge(self.move(actions))
 
     def move(self, actions: np.ndarray) -> dict[int, str]:
-        """First half of a step: move everything. Returns reasons, by world, if worlds could not continue.
+        """Compute the first half of a step: the motion of everything.
+
+        Return the worlds that could not continue, each with the reason.
 
         Raises:
             RuntimeError: before the first reset.
@@ -144,7 +146,7 @@ class Simulation:
         return {**broken, **failed}
 
     def judge(self, failed: Mapping[int, str]) -> Step:
-        """Second half of a step: compute its outcome. The task may move bodies to new positions."""
+        """Compute the second half of a step: its outcome. The task may move bodies to new positions."""
         outcome = self.task.judge(self.physics, failed)
         require_outcome(outcome, self.n, self.learners)
         self._feel(outcome.proprioception or self.task.all_proprioception(self.physics, self._everyone), slice(None))
@@ -173,24 +175,24 @@ class Simulation:
         )
 
     def _any_learner(self, rows: np.ndarray) -> np.ndarray:
-        """Return worlds in which the condition is true for at least one learner."""
+        """Return whether a condition (row,) is true for at least one learner of each world, (n,) bool."""
         return rows if self.learners == 1 else np.asarray(rows.reshape(self.learners, self.n).any(axis=0))
 
     def poses(self) -> Poses:
-        """Return the current poses."""
+        """Return the current poses of the bodies."""
         return self.physics.poses()
 
     def variation_info(self, world: int) -> dict[str, Any]:
-        """Return the varied quantities of a world, for its `info`; empty if none vary."""
+        """Return the entry of `info` with the varied quantities of a world; empty if no quantities vary."""
         varied = {name: _plain(values[world]) for name, values in self.varied.items()}
         return {"varied": varied} if varied else {}
 
     def light(self, wavelengths: np.ndarray) -> np.ndarray | None:
-        """Return the current factors of the lights, (n, band); None: no factors."""
+        """Return the current factors by which lights are multiplied, (n, band); None if no quantities vary."""
         return None if self.variation is None else self.variation.light(self.varied, wavelengths)
 
     def get_state(self) -> dict[str, np.ndarray]:
-        """Return everything that the future of the worlds depends on, as arrays whose first axis is the world."""
+        """Return the complete state of the worlds. The first axis of each array is the world."""
         nothing = np.zeros((self.n, 0), np.float32)
         felt = {key: self.felt[k][name].copy() if name else nothing for key, k, name in self._felt_keys()}
         varied = {f"varied.{name}": array.copy() for name, array in self.varied.items()}
@@ -199,7 +201,7 @@ class Simulation:
         return {**self.physics.get_state(), **self.streams.get_state(), **own}
 
     def set_state(self, state: Mapping[str, np.ndarray], worlds: np.ndarray) -> None:
-        """Restore what `get_state` returned, for these worlds."""
+        """Restore the state of these worlds from the return value of `get_state`."""
         for world in worlds:
             for name, values in self.varied.items():
                 values[world] = state[f"varied.{name}"][world]
@@ -228,8 +230,10 @@ class Simulation:
         self._returns.reshape(self.learners, -1)[:, worlds] = 0.0
 
     def _finite(self, actions: np.ndarray) -> tuple[np.ndarray, dict[int, str]]:
-        """Return actions limited to [-1, 1], and the worlds in which an agent's action was not finite. Such an action
-        is replaced by the agent's first action."""
+        """Return actions limited to [-1, 1], and an error message for each world with an action that was not finite.
+
+        The agent's `first_action` replaces such an action.
+        """
         failed: dict[int, str] = {}
         if not np.isfinite(actions).all():
             actions, first = actions.copy(), 0
@@ -253,8 +257,11 @@ class Simulation:
                     known[name][worlds] = array
 
     def _felt_keys(self) -> list[tuple[str, int, str]]:
-        """Return the name of each entry in the stored state, the agent's index, and the entry's name in its
-        proprioception ("" if it has none)."""
+        """Return three values for each entry of the agents' proprioception.
+
+        They are its name in the stored state, the index of the agent, and its name in the proprioception. An agent
+        without proprioception has one entry with the name "".
+        """
         found = []
         for k, (agent, known) in enumerate(zip(self.agents, self.felt, strict=True)):
             for place, name in enumerate(known or [""]):
@@ -264,10 +271,12 @@ class Simulation:
 
 
 def check_least_return(least_return: float | None, mode: str) -> None:
-    """Refuse a least return that would end every episode at once, or one in episodes that determine the fitness.
+    """Check that `least_return` is negative, and that it is used in training only.
+
+    Otherwise every episode would end at once, or the truncation would change the fitness.
 
     Raises:
-        ValueError: the least return is not negative, or the mode is not training.
+        ValueError: `least_return` is not negative, or the mode is not training.
     """
     if least_return is None:
         return
@@ -280,7 +289,7 @@ def check_least_return(least_return: float | None, mode: str) -> None:
 
 
 def _plain(value: np.ndarray) -> str | float | tuple[float, ...]:
-    """Return a name, a number, or three numbers."""
+    """Return a varied quantity as text, as a number, or as a tuple of numbers."""
     if value.dtype.kind == "U":
         return str(value)
     return tuple(map(float, value)) if value.ndim else float(value)

@@ -1,4 +1,4 @@
-"""User tasks for one world at a time: a robot with eyes, the beginning of an episode, and the reward of a step."""
+"""User tasks for one world at a time: a robot with eyes, the start of an episode, and the reward of a step."""
 
 from __future__ import annotations
 
@@ -16,60 +16,67 @@ if TYPE_CHECKING:
 
 
 class Task(TaskSettings):
-    """A task of one world at a time, in plain Python. Only `model`, `mounts` and `rewards` have no default.
+    """A task of one world at a time, in plain Python. A subclass must define `model`, `mounts` and `rewards`.
 
-    In addition to the settings of `TaskSettings`, there is one more:
+    The settings are those of `TaskSettings`, and this one:
 
     others: animals in the same world that do not learn, see `sim.Frozen`. Each has its own body, actuators and eyes in
-        the same model. An episode begins with the `reset` of every animal, in turn. It ends for all as soon as one
-        animal's `terminated` is true, and is truncated for animals whose own is false.
+        the same model. At the start of an episode, `reset` of every animal is called in turn. As soon as `terminated`
+        of one animal returns True, the episode ends for all animals. It counts as truncated for the other animals.
 
-    If the task evolves (`evolve run FILE.py:CLASS`), every candidate has its own eyes, at the places that `place`
-    returns. The class must then have no required arguments.
+    If eyes evolve for this task (`evolve run FILE.py:CLASS`), every candidate has its own eyes, at the mounts that
+    `place` returns. The class must then have no required arguments.
 
-    A method that fails ends its world's episode. In `reset`, and in `proprioception` during a reset, a failure is a
-    RuntimeError for all worlds, since a world that cannot begin has no episode.
+    If a method raises an exception, the episode of its world ends. If `reset` raises one, or `proprioception` during a
+    reset, a RuntimeError ends the simulation of all worlds, because no episode can start.
 
-    Methods are called for one world at a time, with its mjData after mj_forward. One task serves all worlds, so the
-    memory of an episode must be stored in mjData (for example in `userdata`) and not in the task. A `sim.BatchTask` has
-    the same methods for arrays of all worlds, which is faster.
+    Methods are called for one world at a time, with its mjData after mj_forward. One task object is used for
+    all worlds. Variables of an episode must therefore be stored in mjData (for example in `userdata`), not in the task.
+    A `sim.BatchTask` has the same methods for arrays of all worlds, which is faster.
     """
 
     others: Sequence[Frozen] = ()
 
     def reset(self, data: mujoco.MjData, rng: np.random.Generator) -> None:
-        """Start an episode: change the state after mj_resetData. `data.model` may also be changed, for this episode."""
+        """Change the state after mj_resetData at the start of an episode.
+
+        A change of `data.model` applies to this episode.
+        """
 
     def act(self, data: mujoco.MjData, action: np.ndarray) -> None:
-        """Take an action in [-1, 1], (n_actions,); default: map each value to the full range of one of the actuators'
-        controls."""
+        """Apply an action in [-1, 1], (n_actions,).
+
+        The default maps each value to the full range of one control of the actuators.
+        """
         model, mine = data.model, controls_of(data.model, self.actuators)
         limited = model.actuator_ctrllimited[mine].astype(bool)
         low, high = np.where(limited[:, None], model.actuator_ctrlrange[mine], [-1.0, 1.0]).T
         data.ctrl[mine] = low + (high - low) * (action + 1) / 2
 
     def rewards(self, data: mujoco.MjData) -> Mapping[str, float]:
-        """Return the named terms of the last step's reward; the reward is their sum."""
+        """Return the terms of the reward for the last action, by name. The reward is their sum."""
         raise NotImplementedError
 
     def terminated(self, data: mujoco.MjData) -> bool:
-        """Return whether the episode ends here."""
+        """Return whether the episode ends after this action."""
         return False
 
     def succeeded(self, data: mujoco.MjData) -> bool:
-        """Return whether the task is accomplished: `info["is_success"]`."""
+        """Return whether the task is accomplished. This is `info["is_success"]`."""
         return False
 
     def proprioception(self, data: mujoco.MjData) -> np.ndarray:
-        """Return the animal's observation other than signals of eyes, (k,); default: nothing."""
+        """Return the part of the animal's observation that does not come from eyes, (k,); by default, no values."""
         return np.zeros(0)
 
 
 def named_terms(task: Task, data: mujoco.MjData, whose: str = "") -> dict[str, float]:
-    """Return the named rewards of a task; whose: beginning of the message.
+    """Return the terms of the reward by name, after checking them.
+
+    whose: beginning of the error message
 
     Raises:
-        ValueError: not finite numbers by name.
+        ValueError: the task did not return finite numbers by name.
     """
     terms: Any = task.rewards(data)
     if not isinstance(terms, Mapping):

@@ -1,4 +1,4 @@
-"""Fidelity of the eyes in a task: the task's own, or chosen from a few moments of its episodes."""
+"""Rendering fidelity of the eyes in a task: set by the task, or chosen automatically from a few of its scenes."""
 
 from __future__ import annotations
 
@@ -23,15 +23,17 @@ from sim.tasks.simulation import Simulation
 from sim.tasks.task import Task
 
 AUTO = "auto"
-WORLDS, LATER = 6, 12  # number of evaluated episodes, at their beginnings and after this number of random actions
+# Fidelities are compared in WORLDS episodes, at their start and after LATER random actions.
+WORLDS, LATER = 6, 12
 
 
 def fidelities_of(task: BatchTask | Task) -> dict[str, Fidelity]:
-    """Return the fidelity of each kind of the first agent's eyes: the task's own, or, for "auto", the choice of
-    `sim.choose_model_fidelity`. The result is reproducible.
+    """Return the fidelity of each kind of the first agent's eyes, by the name of the kind.
+
+    If the task's setting is "auto", `sim.choose_model_fidelity` chooses the fidelity. The result is reproducible.
 
     Raises:
-        ValueError: another setting, or the task's model or eyes are invalid.
+        ValueError: `fidelity` is neither a `sim.Fidelity` nor "auto", or the task's model or eyes are invalid.
     """
     batch = PerWorld(task) if isinstance(task, Task) else task
     kinds = batch.agents()[0].kinds
@@ -58,7 +60,9 @@ def fidelities_of(task: BatchTask | Task) -> dict[str, Fidelity]:
 
 
 def fidelities_among(task: BatchTask, number: int) -> dict[str, Fidelity]:
-    """Return the fidelities of one agent's eyes, chosen for its views of the other agents.
+    """Return the fidelities of one agent's eyes, chosen in scenes that contain the other agents.
+
+    number: index of the agent
 
     Raises:
         ValueError: see `fidelities_of`.
@@ -70,7 +74,9 @@ def fidelities_among(task: BatchTask, number: int) -> dict[str, Fidelity]:
 
 
 def resolve_other_fidelities(task: Task) -> Task:
-    """Return the same task with resolved fidelities of its others, so that environments need not choose them again.
+    """Return a copy of the task in which the eyes of its `others` have definite fidelities instead of "auto".
+
+    Environments then need not choose these fidelities again.
 
     Raises:
         ValueError: see `fidelities_of`.
@@ -87,7 +93,10 @@ def resolve_other_fidelities(task: Task) -> Task:
 
 
 def _in_brightest(variation: Variation, eye: optics.Eye) -> float:
-    """Return the error allowed to a signal if lights, and with them errors, are larger in some episodes."""
+    """Return the allowed error of a signal, reduced by the largest factor of the lights.
+
+    Errors are proportional to the light, and some episodes have more light than the model.
+    """
     most = variation.extremes(np.asarray(eye.spectral_bands.wavelengths)).max()
     return allowed_error(eye, None) / max(float(most), 1.0)
 

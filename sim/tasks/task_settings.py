@@ -1,4 +1,4 @@
-"""Settings of every task, for one world at a time or for arrays of all worlds."""
+"""Settings that all tasks have, both tasks for one world at a time and tasks for arrays of all worlds."""
 
 from __future__ import annotations
 
@@ -24,38 +24,40 @@ MOST_STEPS = 10**9
 
 
 class TaskSettings:
-    """Settings that a subclass defines. Only `model` and `mounts` have no default.
+    """Settings that a subclass defines as class attributes. It must define `model` and `mounts`.
 
-    model: an MjModel, or a source that compiles to one (`sim.mirror`)
+    model: an MjModel, or a source from which `sim.mirror` can compile one
     eye: optics and retina of every eye
-    mounts: places of the eyes. For several kinds of eyes, eye and mounts are dictionaries, such as {"wide": ...,
-        "sharp": ...}. An observation then has an array for each kind instead of "eyes".
-    fidelity: fidelity of the eyes, see `sim.ModelRenderer`; "auto": chosen from a few moments of the task's episodes,
-        see `sim.choose_model_fidelity`. For several kinds of eyes: a common value, or a dictionary.
+    mounts: places of the eyes. If an animal has several kinds of eyes, `eye` and `mounts` are dictionaries, such as
+        {"wide": ..., "sharp": ...}. An observation then has an array for each kind instead of "eyes".
+    fidelity: rendering fidelity of the eyes, see `sim.ModelRenderer`; "auto": `sim.choose_model_fidelity` chooses it
+        from a few scenes of the task's episodes. For several kinds of eyes, a common value or a dictionary.
     substeps: physics steps per action
     episode_steps: number of actions after which an episode is truncated
     spectra: spectra of materials and lights, by name, which replace their colours
-    vary: ranges (low, high), by name, from which values are drawn for each episode and world, before `reset`:
-        "light": a factor of all lights, uniform in its logarithm.
-        "color_temperature": colour temperature of white [K], uniform in its reciprocal.
-        "GEOM.size": a factor of a geom's size, uniform in its logarithm. MuJoCo's compiler computes mass and inertia.
-        "GEOM.color": a colour between two colours (red, green, blue), each component independently. It multiplies a
-        texture.
-        "GEOM.material": one of two or more of the model's materials, by name: its texture, colour and glow. The geom
-        must not have its own rgba.
-        "JOINT.start": initial position of a hinge [rad] or a slide [m]. "BODY.start": initial position of a mocap body,
-        or of a body with a free joint, between two points (x, y, z) [m].
-        All values except "light" and "color_temperature" are set in each world's own `data.model`, or in its data.
-        Worlds also have their own models if the first `reset` changes `data.model`. Otherwise they share one.
-    auxiliary: any of "depth", "ids" and "flow": quantities that an observation contains for each receptor in addition
-        to its signal. They are the distance of the surface at the receptor's centre, its geom, and its motion since the
-        last observation; see docs/tasks.md. Evolving eyes have none.
-    camera: name of the camera for images of the task; None: one that shows the whole model
-    actuators: names of the actuators that an action drives; None: all
-    name: name of the animal among others; None: the name of the class
-    failure_reward: reward of a step in which the world fails, as the term "failure". If rewards are costs, the default
-        of 0 is better than any normal episode, so set a value below the cost of an episode.
-    mode: "training" or "evaluation", as set when the environment was made; methods may use it
+    vary: ranges (low, high) of quantities, by name. Values are drawn for each episode and world before `reset`:
+        "light": factor of all lights, with a uniformly distributed logarithm.
+        "color_temperature": colour temperature of white [K], with a uniformly distributed reciprocal.
+        "GEOM.size": factor of a geom's size, with a uniformly distributed logarithm. MuJoCo's compiler recomputes mass
+        and inertia.
+        "GEOM.color": colour of a geom. Red, green and blue are drawn independently between those of two colours. The
+        colour multiplies a texture.
+        "GEOM.material": one of two or more materials of the model, given by their names, with its texture, colour and
+        emission. The geom must not have an rgba of its own.
+        "JOINT.start": initial position of a hinge [rad] or a slide [m].
+        "BODY.start": initial position between two points (x, y, z) [m], of a mocap body or a body with a free joint.
+        Except for "light" and "color_temperature", values are set in `data.model`, of which each world then has a copy,
+        or in the world's data. Each world also has a copy of the model if the first `reset` changes `data.model`.
+        Otherwise all worlds share one model.
+    auxiliary: any of "depth", "ids" and "flow", which an observation then contains for each receptor in addition to its
+        signal. They describe the surface seen at the centre of the receptor: its distance, its geom, and its motion
+        since the last observation; see docs/tasks.md. Evolving eyes have no auxiliary entries.
+    camera: name of the camera for images of the task; None: a camera that shows the whole model
+    actuators: names of the actuators that an action drives; None: all actuators
+    name: name of the animal, if there are several; None: the name of the class
+    failure_reward: reward of a step in which the world fails, as the term "failure". If rewards are negative costs, the
+        default of 0 is better than any normal episode. In this case, set a value below the return of an episode.
+    mode: "training" or "evaluation", which is set when the environment is made; methods may use it
     """
 
     model: mujoco.MjModel | mujoco.MjSpec | str | Path
@@ -74,25 +76,32 @@ class TaskSettings:
     mode: str = "training"
 
     def __init_subclass__(cls) -> None:
-        """Support subclasses that define `proprioception` under its old name, `feels`."""
+        """Support subclasses that use the old name of the method `proprioception`, which is `feels`."""
         super().__init_subclass__()
         if "feels" in vars(cls) and "proprioception" not in vars(cls):
             warn_renamed(f"{cls.__name__}.feels", "proprioception")
             cls.proprioception = vars(cls)["feels"]  # type: ignore[attr-defined]
 
     def n_actions(self, model: mujoco.MjModel) -> int:
-        """Number of values in an action; default: the number of its actuators' controls, which is one for most
-        actuators."""
+        """Return the number of values in an action.
+
+        The default is the number of controls of the task's actuators. Most actuators have one control.
+        """
         return len(controls_of(model, self.actuators))
 
     def place(self, n_eyes: int, placement_range_deg: float, elevation_deg: float) -> Sequence[Mount]:
-        """Return the places of an evolving animal's eyes; default: the first of `mounts`, fanned out, see `sim.fan`."""
+        """Return the mounts of the eyes of an evolving animal.
+
+        The default spreads the eyes in a fan around the first of `mounts`, see `sim.fan`.
+        """
         assert not isinstance(self.mounts, Mapping)
         return fan(self.mounts[0], n_eyes, placement_range_deg, elevation_deg)
 
 
 def compiled(task: TaskSettings, model: mujoco.MjModel | None = None) -> mujoco.MjModel:
-    """Return the model of a task after checking its other settings; model: the model, if it has already been compiled.
+    """Return the compiled model of a task after checking the task's other settings.
+
+    model: the compiled model; None: compile it
 
     Raises:
         ValueError: a setting is missing or invalid.

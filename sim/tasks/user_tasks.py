@@ -1,4 +1,4 @@
-"""Preparation of user tasks: as arrays of worlds, and with evolved eyes."""
+"""Preparation of user tasks: conversion to a batch task, and replacement of the eyes by evolved ones."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ UserTask = TypeVar("UserTask", bound=TaskSettings)
 
 
 def batched(task: Task | BatchTask | Encounter) -> BatchTask:
-    """Return a user task as a task on arrays of worlds.
+    """Return a user task as a `BatchTask`.
 
     Raises:
-        ValueError: a learner has no rewards, or a setting is invalid, see `PerWorld`.
+        ValueError: the task of a learner does not define rewards, or a setting is invalid, see `PerWorld`.
     """
     if isinstance(task, BatchTask):
         require_rewards(task)
@@ -35,7 +35,7 @@ def batched(task: Task | BatchTask | Encounter) -> BatchTask:
 
 
 def require_rewards(task: Task | BatchTask) -> None:
-    """Check that a task that is learnt defines rewards.
+    """Check that the task of a learner defines rewards.
 
     Raises:
         ValueError: it does not.
@@ -47,11 +47,11 @@ def require_rewards(task: Task | BatchTask) -> None:
 
 
 def with_evolved_eyes(task: UserTask, eyes: Eyes, elevation_deg: float = 0.0) -> UserTask:
-    """Return the same task for an animal with these eyes, at the places that the task's `place` returns.
+    """Return a copy of the task for an animal with these eyes, at the mounts that the task's `place` returns.
 
     Raises:
-        ValueError: the task returns another number of eyes, has no mounts or several kinds of eyes, or its `place`
-            fails.
+        ValueError: `place` fails or returns another number of mounts, or the task has no mounts or several kinds of
+            eyes.
     """
     name, animal = type(task).__name__, copy.copy(task)
     if several(task):

@@ -1,16 +1,16 @@
-"""The worlds of the tasks, as MuJoCo models.
+"""The worlds of the built-in tasks, as MuJoCo models.
 
-catalog      TASKS: names of the tasks, and the goals of the agent
-world        build_world, World
+catalog      TASKS: the name of each task and the aim of its agent
+world        build_world; World: a compiled world
 detection    an open field with a goal and adversaries, also for tracking
-foraging     the same field, for ultraviolet receptors
-navigation   courses between walls: the drawings
-course       Course: a course without detours back to its start
+foraging     the field of detection, with objects that differ in ultraviolet reflectance only
+navigation   the built-in courses between walls
+course       Course: a course on which the distance from the start need not decrease
 maze         random mazes
 striped_walls  walls of cells as boxes with stripes
-layout       cells, walls, a floor
+layout       grid cells, walls and the floor
 materials    reflectances, stripes, daylight
-agent_model  a world's agent without its world
-ground_plan  GroundPlan: a world from above
+agent_model  model of an agent without the walls and objects of its world
+ground_plan  GroundPlan: plan of a world from above
 state        WorldState: state of a batch of worlds
 """

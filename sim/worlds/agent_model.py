@@ -1,4 +1,7 @@
-"""A world's agent without its world, for physics of the few objects near it (`sim.physics.local_contacts`)."""
+"""Model of an agent without the walls and objects of its world.
+
+`sim.physics.local_contacts` uses it to simulate contacts with the few walls near the agent.
+"""
 
 from __future__ import annotations
 
@@ -8,15 +11,15 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-ROOM = 4  # number of geoms around an agent: the corner of two walls, and one or two more in reach
+ROOM = 4  # number of walls that may be near an agent: two that form a corner, and one or two others within reach
 
 
 @dataclass(frozen=True)
 class AgentModel:
-    """An agent without its world.
+    """Model of an agent without the walls and objects of its world.
 
-    model: the agent among ROOM boxes that touch nothing, without objects, walls, lights, cameras or textures
-    whole: fingerprint of the world's model that contains this agent
+    model: the agent and ROOM boxes that do not collide, without objects, walls, lights, cameras or textures
+    whole: hash of the complete model of the world, from which the agent was extracted
     """
 
     model: mujoco.MjModel
@@ -28,8 +31,7 @@ class AgentModel:
         return cls(_alone(spec.copy()), _fingerprint(whole))
 
     def stands_for(self, model: mujoco.MjModel) -> bool:
-        """Return whether this is the agent of that model. It is not if any number of the model has changed since it was
-        compiled."""
+        """Return whether the agent was extracted from this model, and the model has not been changed since then."""
         return self.whole == _fingerprint(model)
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from types import MappingProxyType
 
-# Name -> goal of the agent: "evolve to ...".
+# Name of each task, and the aim of its agent, which completes "evolve to ...".
 TASKS: Mapping[str, str] = MappingProxyType(
     {
         "navigation": "follow a course between striped walls to its end",

@@ -1,8 +1,8 @@
-"""A course: a path through a grid of cells that an agent can follow by always increasing its distance from the start.
+"""A course: a path through a grid of cells on which an agent's distance from the start increases almost everywhere.
 
-Navigation rewards distance from the start. If the path leads back towards the start, this reward has a local optimum
-that no agent ever leaves (docs/concepts/physics.md). On a course the distance never has to decrease by more than
-MOST_FALL.
+Navigation rewards an increase of the distance from the start. If the path leads back towards the start, this reward
+has a local optimum that no agent ever leaves (docs/concepts/physics.md). On a course the distance never has to
+decrease by more than MOST_FALL.
 """
 
 from __future__ import annotations
@@ -19,25 +19,26 @@ from sim.worlds.layout import CELL, cell_centers
 
 Cell = tuple[int, int]  # row, column
 
-# [m] largest necessary decrease of the distance from the start, from any position that an agent has reached.
+# [m] largest allowed decrease of the distance from the start on the way from any reachable position to the goal.
 MOST_FALL = 1.5
 GOAL_COLUMNS = 3  # the goal consists of the free cells in the last columns before the outer wall
-LOOK_AHEAD = 3  # number of cells along the shortest path that define its direction
-MOST_STEPS = 10**9  # limit for the actions of an episode
+LOOK_AHEAD = 3  # number of cells of the shortest path from which its direction is computed
+MOST_STEPS = 10**9  # largest allowed number of actions in an episode
 _WALL, _FREE, _START, _TRAINING_START = "#.Ss"
 
 
 @dataclass(frozen=True)
 class Course:
-    """Walls and starting positions as a drawing, with a line per row of cells, north at the top.
+    """Walls and starting positions, given as a drawing. Each line is a row of cells, with north at the top.
 
-    drawing: "#": a wall; ".": free; "S": free, and a start; "s": free, and a start in training only
+    drawing: "#": wall; ".": free cell; "S": free cell in which episodes may start; "s": free cell in which episodes may
+        start in training only
     episode_steps: number of actions after which an episode is truncated; None: the task's default
 
     Raises:
-        ValueError: lines of different lengths, another character, an open border, no start, a start in the goal, a
-            start without a path to the goal, a start from which the distance has to decrease by more than MOST_FALL, or
-            episode_steps that are not a whole number above 0.
+        ValueError: the lines differ in length, contain another character or have a free cell in the border; there is no
+            start; a start lies in the goal, has no path to it, or has only paths on which the distance from the start
+            decreases by more than MOST_FALL; or episode_steps is not a whole number above 0.
     """
 
     drawing: str
@@ -90,12 +91,12 @@ class Course:
 
     @property
     def starts(self) -> list[Cell]:
-        """Starting cells in evaluation."""
+        """Cells in which evaluation episodes may start."""
         return _cells(self.signs == _START)
 
     @property
     def training_starts(self) -> list[Cell]:
-        """Starting cells in training."""
+        """Cells in which training episodes may start."""
         return _cells(np.isin(self.signs, (_START, _TRAINING_START)))
 
     @cached_property
@@ -120,21 +121,26 @@ class Course:
         return way
 
     def heading(self, cell: Cell) -> float:
-        """Return the direction of the shortest path from a cell [rad]."""
+        """Return the direction of the shortest path to the goal from a cell [rad], counterclockwise from east."""
         ahead = cell
         for _ in range(LOOK_AHEAD):
             ahead = min([ahead, *self._next_to(ahead)], key=lambda other: float(self.way[other]))
         return float(np.arctan2(ahead[0] - cell[0], ahead[1] - cell[1]))
 
     def fall(self, start: Cell) -> tuple[float, Cell]:
-        """Return the largest decrease of the distance from a start that is necessary on the way from some cell ahead of
-        it to the goal [m], on the easiest path, and that cell."""
+        """Return the largest necessary decrease of the distance from a start [m], and the cell before this decrease.
+
+        An agent may be in any cell ahead of the start. From each such cell, it takes the path to the goal on which the
+        distance from the start decreases least. The result is the largest of these decreases.
+        """
         ease = self._ease(start)
         return max((_apart(start, cell) - float(ease[cell]), cell) for cell in self._ahead(start))
 
     def _ease(self, start: Cell) -> np.ndarray:
-        """Return, for each cell, the least distance from the start along the path to the goal that maximises it [m],
-        (row, column)."""
+        """Return the smallest distance from the start on the best path from each cell to the goal [m], (row, column).
+
+        The best path is the one on which this smallest distance is largest.
+        """
         ease = np.full(self.walls.shape, -1.0)
         queue = [(-_apart(start, cell), cell) for cell in _cells(self.goal)]
         for negative, cell in queue:
@@ -150,7 +156,7 @@ class Course:
         return ease
 
     def _ahead(self, start: Cell) -> set[Cell]:
-        """Return the cells on paths from the start that approach the goal with every cell."""
+        """Return the cells on all paths from the start on which every step shortens the remaining path to the goal."""
         seen, waiting = {start}, [start]
         while waiting:
             cell = waiting.pop()
@@ -161,7 +167,7 @@ class Course:
         return seen
 
     def _next_to(self, cell: Cell) -> Iterator[Cell]:
-        """Yield the free cells that an agent can enter next, also diagonally, but not around a wall's corner."""
+        """Yield the free cells that an agent can enter next. A diagonal step must not cut the corner of a wall."""
         row, column = cell
         for r in (row - 1, row, row + 1):
             for c in (column - 1, column, column + 1):

@@ -11,22 +11,23 @@ from sim.worlds.layout import CELL, Layout, Starts, add_floor, add_wall, cell_ce
 FIELD = (9, 11)  # free cells (rows, columns), as published
 OBJECT_RADIUS = 0.5  # [m], as published
 OBJECTS = ("goal", "adversary_0", "adversary_1")
-STRIPES = 6  # across the visible side of an object
-# Edges between an adversary's bands [deg from the top]. To the eyes, they are about as far apart as a goal's edges, and
-# light from above gives both kinds of objects the same brightness (computed by validation/sim/equal_brightness.py).
+STRIPES = 6  # number of stripes on the visible half of an object
+# Edges between an adversary's bands [deg from the top]. Seen by an agent, they are about as far apart as the edges
+# between a goal's stripes. In light from above, both kinds of objects have the same mean brightness, as computed by
+# validation/sim/equal_brightness.py.
 BAND_EDGES_DEG = (23.2, 47.8, 77.1, 107.0, 138.0, 170.0)
-OBJECT_MARGIN = 2  # cells between the wall and the nearest place of an object
+OBJECT_MARGIN = 2  # number of cells between the walls and the cells in which objects may be placed
 
 
 def add_layout(spec: mujoco.MjSpec, rng: np.random.Generator) -> Layout:
-    """Add field and objects.
+    """Add the field and the objects.
 
-    A goal has stripes along meridians (vertical). An adversary has stripes of about the same width along parallels
-    (horizontal), that is, turned by 90°.
+    A goal has vertical stripes, which follow meridians. An adversary has horizontal stripes of about the same width,
+    which follow parallels.
 
-    A goal has 12 sectors of 30° around the vertical axis; a viewer sees 6 of them. The edges of an adversary's bands
-    of latitude compensate for the light from above. A single receptor that sees the whole object therefore cannot
-    distinguish them by brightness.
+    A goal's stripes are 12 sectors of 30° around the vertical axis, of which a viewer sees 6. The edges of an
+    adversary's stripes are placed such that light from above gives it the same brightness as a goal. A single receptor
+    that sees the whole object therefore cannot distinguish a goal from an adversary by brightness.
     """
     materials.add_texture(spec, "upright_stripes", materials.stripes((8, 1536), 2 * STRIPES, axis=1))
     materials.add_texture(
@@ -38,8 +39,10 @@ def add_layout(spec: mujoco.MjSpec, rng: np.random.Generator) -> Layout:
 
 
 def furnished_field(spec: mujoco.MjSpec) -> Layout:
-    """Add the field, and the objects in the materials "goal" and "adversary". The agent starts in the outermost ring of
-    cells, the objects in the middle of the field."""
+    """Add the field, and the objects with the materials "goal" and "adversary".
+
+    The agent starts in the outermost ring of cells. The objects are placed in the middle of the field.
+    """
     _add_field(spec)
     _add_objects(spec)
     rows, columns = (a.ravel() for a in np.indices(FIELD))

@@ -1,9 +1,9 @@
 """Foraging: the field of detection, with objects of the same pattern that differ only in reflectance below 400 nm.
 
 All objects are yellow, like many flowers. The goal also reflects ultraviolet, like many flowers that bees visit. The
-default RGB-like receptors absorb no light below 400 nm. To them, both kinds are identical under any light and for any
-number of bands. (If the spectra differed in the visible, too, they could only be metamers for one light and one number
-of bands.)
+default RGB-like receptors absorb no light below 400 nm. To them, goal and adversary are identical under any light
+and for any number of spectral bands. (If the spectra also differed in the visible range, they could be metamers for
+only one light and one number of bands.)
 """
 
 from __future__ import annotations
@@ -18,16 +18,19 @@ from sim.worlds import materials
 from sim.worlds.detection import STRIPES, furnished_field
 from sim.worlds.layout import Layout
 
-DARK, BRIGHT = 0.05, 0.8  # reflectance of yellow at either end of the visible range
-EDGE_NM, WIDTH_NM = 510.0, 15.0  # position and width of the rise
+DARK, BRIGHT = 0.05, 0.8  # reflectance of the yellow at the blue and at the red end of the visible range
+EDGE_NM, WIDTH_NM = 510.0, 15.0  # position and width of the rise from DARK to BRIGHT
 ULTRAVIOLET = {"goal": 0.6, "adversary": DARK}  # reflectance in the ultraviolet
-FULL_NM, NONE_NM = 350.0, 400.0  # below the first, ultraviolet reflectance; above the second, the yellow alone
+# Below FULL_NM, the spectrum is the ultraviolet reflectance; above NONE_NM, it is the yellow; in between, a mixture.
+FULL_NM, NONE_NM = 350.0, 400.0
 STEP_NM = 5.0
 
 
 def petal(ultraviolet: float) -> Spectrum:
-    """Return a yellow spectrum with this reflectance in the ultraviolet. It is smooth, and identical for all values
-    from 400 nm on."""
+    """Return a yellow spectrum with this reflectance in the ultraviolet. It is smooth.
+
+    At 400 nm and above, it does not depend on this reflectance.
+    """
     nm = np.arange(LIMITS_NM[0], LIMITS_NM[1] + STEP_NM / 2, STEP_NM)
     yellow = DARK + (BRIGHT - DARK) / (1 + np.exp((EDGE_NM - nm) / WIDTH_NM))
     way = np.clip((nm - FULL_NM) / (NONE_NM - FULL_NM), 0, 1)
@@ -36,7 +39,7 @@ def petal(ultraviolet: float) -> Spectrum:
 
 
 def add_layout(spec: mujoco.MjSpec, rng: np.random.Generator) -> Layout:
-    """Add field and objects, all with upright stripes."""
+    """Add the field and the objects, which all have vertical stripes."""
     spectra = {kind: petal(share) for kind, share in ULTRAVIOLET.items()}
     materials.add_texture(spec, "upright_stripes", materials.stripes((8, 512), 2 * STRIPES, axis=1))
     for kind, spectrum in spectra.items():

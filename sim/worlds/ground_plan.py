@@ -17,10 +17,11 @@ __all__ = ["GroundPlan"]
 class GroundPlan:
     """Ground plan of a world. Lengths are in [m].
 
-    walls: (n, 4): centre x, y and half sides along x, y
+    walls: centre (x, y) and half side lengths along x and y of each wall, (n, 4)
     bounds: x_min, y_min, x_max, y_max of all walls
-    goal_region: x_min, y_min, x_max, y_max of the goal in navigation or a maze, or None
-    object_names, object_radius: (object,)
+    goal_region: x_min, y_min, x_max, y_max of the goal region in navigation or a maze; None in other tasks
+    object_names: names of the objects, (object,)
+    object_radius: radii of the objects, (object,)
     object_bodies: ids of the objects' bodies in the model
     body_radius: radius of the agent
     """
@@ -35,7 +36,7 @@ class GroundPlan:
 
     @classmethod
     def from_world(cls, world: World, place: np.ndarray) -> GroundPlan:
-        """Return the plan of a world; with several mazes, only the one around this place (2,) [m]."""
+        """Return the plan of a world; if the world has several mazes, only of the one around `place` (2,) [m]."""
         model = world.model
         walls = np.array([_footprint(model, i) for i in range(model.ngeom) if model.geom(i).name.startswith("wall")])
         region = world.goal_region
@@ -56,8 +57,10 @@ class GroundPlan:
 def _maze_around(
     walls: np.ndarray, region: np.ndarray | None, mazes: int, y: float
 ) -> tuple[np.ndarray, np.ndarray | None]:
-    """Return the walls and goal of the maze around y [m]. The mazes lie north of each other and have the same
-    height."""
+    """Return the walls and the goal region of the maze that contains the coordinate y [m].
+
+    The mazes are arranged from south to north and have the same extent along y.
+    """
     south, north = (walls[:, 1] - walls[:, 3]).min(), (walls[:, 1] + walls[:, 3]).max()
     height = (north - south) / mazes
     low = south + height * int(np.clip((y - south) // height, 0, mazes - 1))
@@ -69,8 +72,10 @@ def _maze_around(
 
 
 def _footprint(model: mujoco.MjModel, geom: int) -> tuple[float, float, float, float]:
-    """Return the ground plan of a box that is turned by a multiple of 90°; its half sides are |R| times the
-    box's own."""
+    """Return the centre (x, y) and the half side lengths along x and y of a box that is turned by a multiple of 90°.
+
+    With the rotation matrix R, the half side lengths are |R| times those in the frame of the box.
+    """
     rotation = np.empty(9)
     mujoco.mju_quat2Mat(rotation, model.geom_quat[geom])
     half = np.abs(rotation.reshape(3, 3)) @ model.geom_size[geom]

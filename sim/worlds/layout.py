@@ -1,4 +1,4 @@
-"""Elements of task worlds: a grid of cells, walls, a floor."""
+"""Elements of the built-in worlds: a grid of cells, walls and a floor."""
 
 from __future__ import annotations
 
@@ -11,14 +11,18 @@ import numpy as np
 from optics.spectra.spectrum import Spectrum
 
 CELL = 2.0  # [m] side of a grid cell
-WALL_HEIGHT = 1.0  # [m], the height of the objects; a receptor row of 11° sees only wall up to 8 m away
+# [m] height of walls, equal to the height of the objects. A row of receptors with a vertical field of view of 11° does
+# not see over a wall that is at most 8 m away.
+WALL_HEIGHT = 1.0
 
-REACH = 1.0  # [m] from the agent's centre to an object's: an object that is closer is reached, as published
-SEPARATION = 2 * REACH  # [m] between objects: no position is within reach of two
-CLEARANCE = REACH + 0.5  # [m] between the agent's start and an object; the first action from rest covers 0.44 m
+# [m] An object is reached if its centre is closer than this to the agent's centre, as published.
+REACH = 1.0
+SEPARATION = 2 * REACH  # [m] minimum distance between objects, so that an agent cannot be within reach of two
+# [m] minimum distance between the agent's start and an object. The first action from rest covers 0.44 m.
+CLEARANCE = REACH + 0.5
 
-# Collision filter: the agent's contype matches the walls' conaffinity, and there are no other matches. MuJoCo therefore
-# tests only pairs of the agent and a wall.
+# Collision filter: the agent's contype matches the walls' conaffinity. No other pairs match, so MuJoCo tests only
+# collisions between the agent and a wall.
 WALL_CONAFFINITY = 1
 
 
@@ -26,8 +30,8 @@ WALL_CONAFFINITY = 1
 class Starts:
     """Starting positions of agents.
 
-    position: (n, 2) [m]
-    heading: initial heading [rad], (n,); None: random
+    position: positions [m], (n, 2)
+    heading: initial heading at each position [rad], (n,); None: random
     """
 
     position: np.ndarray
@@ -36,15 +40,15 @@ class Starts:
 
 @dataclass(frozen=True)
 class Layout:
-    """Additions of a task to a world: mocap sphere bodies and starting positions.
+    """Objects, starting positions and goal region that a task adds to a world.
 
     objects: names of mocap sphere bodies
     starts: starting positions of the agent
     object_spawn: possible positions of objects, (m, 2) [m]
-    goal_region: (x_min, y_min, x_max, y_max) [m] or None
-    spectra: reflectances of materials, by name, for materials that need more than a colour
-    training_starts: starting positions of the agent in training, if they differ
-    episode_steps: number of actions after which an episode is truncated; None: the default
+    goal_region: (x_min, y_min, x_max, y_max) [m]; None: no goal region
+    spectra: reflectances by material name, for materials that a colour does not describe sufficiently
+    training_starts: starting positions of the agent in training; None: `starts`
+    episode_steps: number of actions after which an episode is truncated; None: the task's default
     """
 
     objects: tuple[str, ...]
@@ -57,8 +61,12 @@ class Layout:
 
 
 def cell_centers(columns: np.ndarray, rows: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
-    """Return the centres (n, 2) [m] of grid cells. The grid of `shape` (rows, columns) is centred on the origin, with
-    row 0 at the smallest y."""
+    """Return the centres of grid cells [m], (n, 2).
+
+    The grid is centred on the origin, and row 0 has the smallest y.
+
+    shape: size of the grid (rows, columns)
+    """
     x = (np.asarray(columns) - (shape[1] - 1) / 2) * CELL
     y = (np.asarray(rows) - (shape[0] - 1) / 2) * CELL
     return np.stack([x, y], axis=-1).astype(float)
@@ -67,7 +75,8 @@ def cell_centers(columns: np.ndarray, rows: np.ndarray, shape: tuple[int, int]) 
 def add_wall(spec: mujoco.MjSpec, name: str, center: np.ndarray, size: tuple[float, float], material: str) -> None:
     """Add a wall: a box of `size` (length along x, along y) [m] that stands on the floor.
 
-    The geom's own x axis runs along the wall, because MuJoCo counts a uniform texture's repeats along this axis.
+    The geom's own x axis runs along the wall, because MuJoCo counts the repeats of a texture with
+    `texuniform` along this axis.
     """
     along_y = size[1] > size[0]
     length, width = (size[1], size[0]) if along_y else size
@@ -85,7 +94,7 @@ def add_wall(spec: mujoco.MjSpec, name: str, center: np.ndarray, size: tuple[flo
 
 
 def add_floor(spec: mujoco.MjSpec, size: tuple[float, float]) -> None:
-    """Add the floor, `size` [m] along x and y. It is only visible: nothing falls."""
+    """Add the floor, of this size along x and y [m]. It is visible but does not collide with anything."""
     spec.worldbody.add_geom(
         name="floor",
         type=mujoco.mjtGeom.mjGEOM_PLANE,

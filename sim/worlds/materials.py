@@ -1,7 +1,7 @@
-"""Materials of worlds: reflectances, striped textures and daylight, added to an MjSpec.
+"""Materials of the built-in worlds: functions that add reflectances, striped textures and daylight to an MjSpec.
 
-MuJoCo's colours are display-referred (sRGB). Reflectances are therefore encoded here and decoded by the mirror
-(`sim.scene.color`). The MjModel contains the textures and is the only source of these data.
+MuJoCo's colours are display-referred (sRGB). This module therefore encodes reflectances as sRGB, and the mirror decodes
+them (`sim.scene.color`). The MjModel contains the textures and is the only source of reflectances for the mirror.
 """
 
 from __future__ import annotations
@@ -15,25 +15,29 @@ import numpy as np
 from optics.spectra.spectrum import Spectrum, daylight
 from sim.scene.color import encode_srgb, preview
 
-# Chosen.
+# The values of these reflectances are free choices.
 WHITE = 0.9  # reflectance of a light stripe
 BLACK = 0.05  # reflectance of a dark stripe
 GREY = 0.5  # reflectance of a plain wall, about midway between the stripes
 FLOOR = 0.04  # reflectance of the floor
 BODY = 0.3  # reflectance of the agent's body
 
-# Directional lights from three sides: every wall is lit, and no two walls equally, so that a wall's brightness
-# indicates its direction; (azimuth [deg] and elevation [deg] of the source, level). There is no sky, since a constant
-# environment would be the main source of noise in a render.
+# Directional lights: (azimuth [deg] of the source, elevation [deg] of the source, level). They come from three sides
+# and light every wall. Walls that face different directions have different brightness, so that the brightness of a wall
+# indicates its direction. There is no sky, because a constant environment light would be the main source of noise in a
+# rendering.
 LIGHTS = ((20.0, 40.0, 0.9), (140.0, 40.0, 0.6), (260.0, 40.0, 0.45))
 
 
 def stripes(shape: tuple[int, int], edges: int | Sequence[float], axis: int) -> np.ndarray:
-    """Return an image of stripes, alternately light and dark along `axis` (0: rows, 1: columns), (height, width, 3)
-    uint8, display-referred. The first stripe is light.
+    """Return an image of alternately light and dark stripes, (height, width, 3) uint8, display-referred.
 
-    edges: edges between stripes, as fractions of the axis in (0, 1); or the number of stripes of equal width. A texel
-        crossed by an edge has the mean reflectance of its area.
+    The first stripe is light. A texel that contains an edge between stripes has the mean reflectance of its area.
+
+    shape: height and width of the image
+    edges: positions of the edges between stripes, as fractions of the axis in (0, 1); or the number of stripes, which
+        then have equal width
+    axis: axis along which light and dark stripes alternate (0: rows, 1: columns)
     """
     n = shape[axis]
     inner = np.arange(1, edges) / edges if isinstance(edges, int) else np.asarray(edges, float)
@@ -52,7 +56,7 @@ def add_plain(spec: mujoco.MjSpec, name: str, reflectance: float) -> None:
 
 
 def add_texture(spec: mujoco.MjSpec, name: str, image: np.ndarray) -> None:
-    """Add a 2-D texture from an image (height, width, 3), uint8, display-referred, row 0 on top."""
+    """Add a 2-D texture from a display-referred image (height, width, 3) uint8, whose row 0 is at the top."""
     height, width, channels = image.shape
     texture = spec.add_texture(
         name=name, type=mujoco.mjtTexture.mjTEXTURE_2D, width=width, height=height, nchannel=channels
@@ -68,8 +72,10 @@ def add_textured(
     uniform: bool = False,
     color: Sequence[float] = (1.0, 1.0, 1.0),
 ) -> None:
-    """Add a matte material with a 2-D texture, repeated over the geom (or, if `uniform`, per 2 m of it) and multiplied
-    by a display-referred colour."""
+    """Add a matte material with a 2-D texture that is multiplied by a display-referred colour.
+
+    repeat: number of repeats of the texture along each axis, over the whole geom or, if `uniform` is True, over 2 m
+    """
     material = spec.add_material(
         name=name, texrepeat=list(repeat), texuniform=uniform, specular=0, shininess=0, rgba=[*color, 1.0]
     )
@@ -77,7 +83,7 @@ def add_textured(
 
 
 def display_color(reflectance: Spectrum) -> tuple[float, float, float]:
-    """Return the display-referred colour (sRGB) of a reflectance in daylight, for renderers without spectra."""
+    """Return the display-referred colour (sRGB) of a reflectance in daylight, for renderers that do not use spectra."""
     nm = np.arange(380.0, 781.0, 5.0)
     radiance = reflectance.at(nm * 1e-9) * daylight(nm * 1e-9)
     r, g, b = encode_srgb(np.clip(preview(radiance[:, None, None], nm)[0, 0], 0, 1)).tolist()

@@ -8,7 +8,9 @@ import numpy as np
 from sim.worlds.layout import CELL, Layout, Starts, add_floor, cell_centers
 from sim.worlds.striped_walls import add_striped_walls
 
-MAZE = (13, 39)  # cells (rows, columns), odd: rooms at odd coordinates, with walls or openings between them
+# Number of cells (rows, columns). Both are odd: cells with two odd coordinates are rooms, and a cell between two
+# adjacent rooms is either a wall or an opening.
+MAZE = (13, 39)
 START_COLUMNS = 4  # the agent starts in the free cells west of this column
 GOAL_COLUMNS = 3  # the goal consists of the free cells in the last columns before the outer wall
 
@@ -16,8 +18,10 @@ _NEIGHBORS = ((0, 2), (0, -2), (2, 0), (-2, 0))
 
 
 def add_layout(spec: mujoco.MjSpec, rng: np.random.Generator, mazes: int = 1) -> Layout:
-    """Add mazes drawn by `rng`, next to each other from south to north and not connected. An agent starts in any of
-    them, so that what it learns applies to all."""
+    """Add random mazes drawn by `rng`, which lie next to each other from south to north and are not connected.
+
+    An episode starts in any of the mazes, so that an agent learns a behaviour that works in all of them.
+    """
     walls = np.concatenate([draw_maze(MAZE, rng) for _ in range(mazes)])
     shape = walls.shape
     add_floor(spec, (shape[1] * CELL, shape[0] * CELL))
@@ -38,8 +42,8 @@ def add_layout(spec: mujoco.MjSpec, rng: np.random.Generator, mazes: int = 1) ->
 def draw_maze(shape: tuple[int, int], rng: np.random.Generator) -> np.ndarray:
     """Return the walls of a maze without dead ends, boolean (row, column).
 
-    A depth-first walk connects all rooms into a tree. Every dead end then gets a second opening, so that an agent that
-    follows a corridor never has to turn back.
+    A depth-first walk connects all rooms into a tree. Every dead end then gets a second opening. An agent that
+    follows a corridor therefore never has to turn back.
     """
     walls = np.ones(shape, dtype=bool)
     walls[1, 1] = False

@@ -1,4 +1,4 @@
-"""Navigation: a course between striped walls, from its west end to its east end, with islands in between."""
+"""Navigation: a course between striped walls, which leads from west to east around islands of walls."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from sim.worlds.course import GOAL_COLUMNS, Course
 from sim.worlds.layout import CELL, Layout, Starts, add_floor
 from sim.worlds.striped_walls import add_striped_walls
 
-# Diagonal paths are wide enough that an agent has 2 m of free play between the corners of their walls. Paths split and
-# join again. The shortest path is 90 m.
+# Diagonal paths are wide: an agent between the corners of their walls can still move 2 m sideways. Paths split and join
+# again. The shortest path is 90 m long.
 SHORT = Course(
     """
     ###########################################
@@ -34,7 +34,7 @@ SHORT = Course(
     ###########################################
     """
 )
-# Twice as long, for half the number of actions: only a fast agent gets far.
+# This course is twice as long as SHORT, and an episode has half as many actions. Only a fast agent gets far.
 LONG = Course(
     """
     ##################################################################################
@@ -57,10 +57,10 @@ DRAWN: Mapping[str, Course] = MappingProxyType(dict(zip(COURSES, (SHORT, LONG), 
 
 
 def course_named(course: str | Course) -> Course:
-    """Return a course, or the built-in course of this name.
+    """Return the built-in course of this name; return a `Course` unchanged.
 
     Raises:
-        ValueError: no such course.
+        ValueError: there is no course of this name.
     """
     if isinstance(course, Course):
         return course
@@ -76,7 +76,7 @@ def add_layout(spec: mujoco.MjSpec, rng: np.random.Generator, course: Course) ->
     """Add the walls of a course, with stripes drawn by `rng`."""
     rows, columns = course.walls.shape
     add_floor(spec, (columns * CELL, rows * CELL))
-    # A wall without an adjacent free cell is never visible.
+    # Wall cells without an adjacent free cell are never visible, so they are left out.
     near = scipy.ndimage.binary_dilation(~course.walls, np.ones((3, 3)))
     add_striped_walls(spec, course.walls & near, rng)
     right, top = columns * CELL / 2 - CELL, rows * CELL / 2 - CELL

@@ -1,5 +1,7 @@
-"""State of a batch of worlds as plain arrays. Physics advances it, eyes are rendered from it, and recorders
-store it."""
+"""State of a batch of worlds as plain arrays.
+
+Physics computes the next state, renderers render the eyes for a state, and recorders store it.
+"""
 
 from __future__ import annotations
 
@@ -16,15 +18,15 @@ from sim.worlds.world import World
 class WorldState:
     """All worlds of a batch at one instant; the first axis is the world.
 
-    position: agent [m], (n, 2)
-    heading: agent [rad], in [-π, π), (n,)
-    velocity: agent [m/s], (n, 2)
+    position: position of the agent [m], (n, 2)
+    heading: heading of the agent [rad], in [-π, π), (n,)
+    velocity: velocity of the agent [m/s], (n, 2)
     objects: centres of the objects, in the order of World.objects [m], (n, k, 3)
     object_heading: direction in which each object moves [rad], (n, k)
     start: the agent's starting position in this episode [m], (n, 2)
-    steps: actions taken in this episode, (n,) int
-    goals_reached: in this episode, (n,) int
-    adversaries_reached: in this episode, (n,) int
+    steps: number of actions taken in this episode, (n,) int
+    goals_reached: number of goals reached in this episode, (n,) int
+    adversaries_reached: number of adversaries reached in this episode, (n,) int
     """
 
     position: np.ndarray
@@ -44,31 +46,31 @@ class WorldState:
 
     @property
     def all_finite(self) -> bool:
-        """True if every number in every world is certainly finite; also False if the sum of their squares overflows."""
+        """True if every number in every world is finite and the sum of their squares does not overflow."""
         # NaN and infinity propagate through sums, and testing one sum is cheaper than testing every term.
         numbers = (self.heading, self.position, self.velocity, self.objects, self.object_heading)
         return math.isfinite(sum(np.vdot(array, array) for array in numbers))
 
     @property
     def finite(self) -> np.ndarray:
-        """Worlds in which every number is finite, (n,) bool."""
+        """Array (n,) bool: whether all numbers of each world are finite."""
         total = self.heading + self.position.sum(axis=1) + self.velocity.sum(axis=1)
         total += self.objects.sum(axis=(1, 2)) + self.object_heading.sum(axis=1)
         finite: np.ndarray = np.isfinite(total)
         return finite
 
     def repaired(self) -> WorldState:
-        """Return the same worlds with 0 instead of numbers that are not finite."""
+        """Return a copy in which 0 replaces all numbers that are not finite."""
         return WorldState(**{name: np.nan_to_num(array, posinf=0.0, neginf=0.0) for name, array in vars(self).items()})
 
     def take(self, worlds: np.ndarray) -> WorldState:
-        """Return copies of only these worlds."""
+        """Return a batch with copies of these worlds only."""
         return WorldState(**{name: array[worlds] for name, array in vars(self).items()})
 
     def put(self, worlds: np.ndarray, other: WorldState) -> WorldState:
-        """Return a new batch in which `other`'s worlds replace these worlds."""
+        """Return a new batch in which the worlds of `other` replace the worlds with these indices."""
         arrays = {name: array.copy() for name, array in vars(self).items()}
-        # Usually there is one, and a slice is faster.
+        # Usually only one world is replaced, and assigning to a slice is then faster.
         places = slice(worlds[0], worlds[0] + 1) if len(worlds) == 1 else worlds
         for name, array in arrays.items():
             array[places] = getattr(other, name)
@@ -76,17 +78,20 @@ class WorldState:
 
 
 def concatenate(states: list[WorldState]) -> WorldState:
-    """Return one batch of several."""
+    """Return one batch that contains the worlds of several batches."""
     return WorldState(**{name: np.concatenate([getattr(s, name) for s in states]) for name in vars(states[0])})
 
 
 def wrap_angle(angle: np.ndarray) -> np.ndarray:
-    """Return the same angle in [-π, π)."""
+    """Return the equivalent angle in [-π, π)."""
     return (angle + np.pi) % (2 * np.pi) - np.pi
 
 
 def pose(data: mujoco.MjData, world: World, state: WorldState, index: int = 0) -> None:
-    """Set MuJoCo's data to one world of a state."""
+    """Set MuJoCo's data to the state of one world.
+
+    index: index of this world in `state`
+    """
     data.joint("agent_x").qpos[0], data.joint("agent_y").qpos[0] = state.position[index]
     data.joint("agent_heading").qpos[0] = state.heading[index]
     for name, centre in zip(world.objects, state.objects[index], strict=True):

@@ -1,4 +1,4 @@
-"""Walls of grid cells as boxes with stripes, whose frequency changes from box to box."""
+"""Walls of grid cells, built from boxes with stripes. The frequency of the stripes differs between boxes."""
 
 from __future__ import annotations
 
@@ -8,15 +8,19 @@ import numpy as np
 from sim.worlds import materials
 from sim.worlds.layout import CELL, add_wall, cell_centers
 
-LONGEST_WALL = 4  # cells in one box: a new stripe frequency at least every 8 m
+# Maximum number of cells in one box. A new stripe frequency therefore begins at least every 8 m.
+LONGEST_WALL = 4
 
-# Stripe periods along a wall [m]. A box's end faces, which are one cell long, have as many stripes as its whole sides,
-# since MuJoCo repeats a texture equally often on all faces.
+# Stripe periods along a wall [m]. The end faces of a box are one cell long. They have as many stripes as its long
+# sides, because MuJoCo repeats a texture equally often on all faces.
 STRIPE_PERIODS = (4.0, 2.0, 1.0, 2 / 3)
 
 
 def add_striped_walls(spec: mujoco.MjSpec, walls: np.ndarray, rng: np.random.Generator) -> None:
-    """Add the walls, boolean (row, column), each box with a stripe frequency drawn by `rng`."""
+    """Add the walls of a grid as boxes, each with a stripe frequency drawn by `rng`.
+
+    walls: cells that are walls, boolean (row, column)
+    """
     materials.add_texture(spec, "stripes", materials.stripes((8, 256), 2, axis=1))
     for i, period in enumerate(STRIPE_PERIODS):
         materials.add_textured(spec, f"stripes_{i}", "stripes", repeat=(2 / period, 1), uniform=True)
@@ -27,9 +31,10 @@ def add_striped_walls(spec: mujoco.MjSpec, walls: np.ndarray, rng: np.random.Gen
 
 
 def merge_walls(walls: np.ndarray, longest: int) -> list[tuple[int, int, int, int]]:
-    """Cover wall cells by disjoint straight runs of at most `longest` cells: (row, column, rows, columns) each.
+    """Return disjoint straight runs of at most `longest` cells that together cover all wall cells.
 
-    The algorithm is greedy: of the two runs that start in the first uncovered cell, it uses the longer one.
+    Each run is (row, column, number of rows, number of columns). The algorithm is greedy: in the first uncovered cell,
+    a run along the row and a run along the column could start, and it uses the longer one.
     """
     left = walls.copy()
     runs = []

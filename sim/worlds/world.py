@@ -1,7 +1,7 @@
 """A task's world as a MuJoCo model, with the starting positions of agent and objects.
 
-`build_world` compiles a world. Parts that all worlds share are added here; the others are in `sim.worlds.detection`,
-`.foraging`, `.maze` and `.navigation`.
+`build_world` compiles a world. This module adds the parts that all worlds have in common. The modules
+`sim.worlds.detection`, `.foraging`, `.maze` and `.navigation` add the other parts.
 """
 
 from __future__ import annotations
@@ -22,18 +22,18 @@ from sim.worlds.catalog import TASKS
 from sim.worlds.course import Course
 from sim.worlds.layout import WALL_CONAFFINITY, Layout, Starts
 
-MOST_SEED = 2**128  # chosen limit: the size of NumPy's own random seeds
-MOST_MAZES = 100_000  # chosen limit, beyond what memory can hold
+MOST_SEED = 2**128  # largest allowed seed; the seeds that NumPy draws have 128 bits
+MOST_MAZES = 100_000  # largest allowed number of mazes; fewer already exhaust the memory
 _FIELDS = {"detection": detection.add_layout, "foraging": foraging.add_layout, "tracking": detection.add_layout}
 
 TIMESTEP = 0.02  # [s], as published
-# Time constant [s] of the agent's speed, and speed reached per commanded speed. With these values the distance per
-# action is that of the published environment (tests/sim/worlds/test_world.py).
+# Time constant [s] of the agent's speed, and ratio of the final speed to the commanded speed. With these values the
+# agent moves as far in an action as in the published environment (tests/sim/worlds/test_world.py).
 TIME_CONSTANT, SPEED_GAIN = 0.35, 0.99
 MAX_SPEED = 10.0  # [m/s] commanded, as published
 
-# The agent can move MAX_SPEED * TIMESTEP = 0.2 m in one substep. Its whiskers feel a wall at this distance, so that the
-# skin, and the eyes in it, never pass through a wall. See `_add_agent` for the contact's stiffness.
+# The agent can move MAX_SPEED * TIMESTEP = 0.2 m in one substep. Its whiskers touch a wall at this distance from the
+# skin. The skin, and the eyes in it, therefore never pass through a wall. `_add_agent` sets the contact's stiffness.
 WHISKER_LENGTH = MAX_SPEED * TIMESTEP  # [m]
 
 
@@ -41,18 +41,20 @@ WHISKER_LENGTH = MAX_SPEED * TIMESTEP  # [m]
 class World:
     """A compiled world.
 
-    model: static geoms; body "agent" with slide joints agent_x, agent_y and hinge agent_heading, actuators agent_x,
-        agent_y (commanded velocity [m/s], world axes), sensor agent_touch (> 0: wall contact); mocap bodies for the
-        objects; cameras eye_0 ... on the agent if it was built with eyes
-    objects: mocap sphere bodies: ("goal", "adversary_0", "adversary_1"), or () in navigation and mazes
-    starts: starting positions of the agent, in centres of cells
-    object_spawn: possible positions of objects, in centres of cells, (m, 2) [m]
-    goal_region: in navigation and mazes: (x_min, y_min, x_max, y_max) [m]
+    model: MuJoCo model. It contains static geoms and mocap bodies for the objects. The body "agent" has the slide
+        joints agent_x and agent_y, the hinge agent_heading, the actuators agent_x and agent_y (commanded velocity [m/s]
+        along the world's axes) and the sensor agent_touch (above 0 in contact with a wall). If the world was built with
+        eyes, the agent has cameras eye_0 ...
+    objects: names of the objects' bodies: ("goal", "adversary_0", "adversary_1"), or () in navigation and mazes
+    starts: starting positions of the agent, at the centres of cells
+    object_spawn: possible positions of objects, at the centres of cells, (m, 2) [m]
+    goal_region: goal region in navigation and mazes, (x_min, y_min, x_max, y_max) [m]; None in other tasks
     spectra: measured spectra of materials and lights, by name, which the renderers use instead of their colours
-    alone: the model's agent without its world; None: agents near obstacles are simulated in the whole model
-    training_starts: starting positions of the agent in training; None: the same
-    episode_steps: number of actions after which an episode is truncated; None: the default
-    mazes: number of mazes, which lie north of each other; 1 in other tasks
+    alone: model of the agent without the rest of the world, for fast simulation near walls; None: agents near walls are
+        simulated in the whole model
+    training_starts: starting positions of the agent in training; None: `starts`
+    episode_steps: number of actions after which an episode is truncated; None: the task's default
+    mazes: number of mazes, which are arranged from south to north; 1 in other tasks
     """
 
     task: str
@@ -69,7 +71,7 @@ class World:
 
     @property
     def agent_spawn(self) -> np.ndarray:
-        """All possible starting positions of an agent, (n, 2) [m]."""
+        """All possible starting positions of the agent, in training or evaluation, (n, 2) [m]."""
         if self.training_starts is None:
             return self.starts.position
         return np.unique(np.concatenate([self.starts.position, self.training_starts.position]), axis=0)
@@ -87,16 +89,18 @@ def build_world(
     """Build the world of a task.
 
     task: one of `sim.TASKS`
-    seed: seed of mazes, and of the stripes of walls; the field of the other tasks is always the same
+    seed: seed of the mazes and of the stripes on walls in mazes and courses; the world of the other tasks does not
+        depend on it
     mazes: number of different mazes in the task "maze"; an episode starts in any of them
-    course: course of navigation: "short", "long" (twice as long, for half the actions) or a `sim.Course`
-    eyes: if not None, the agent has cameras eye_0 ..., left to right
-    spectra: spectra of materials and lights, by name ("wall", "floor", "light_0" ...), which add to the task's own or
-        replace them: `optics.Spectrum`, or names accepted by `optics.reflectance` and `optics.illuminant`
+    course: course of navigation: "short", "long" (twice as long, with half as many actions) or a `sim.Course`
+    eyes: eyes for which the agent gets cameras eye_0 ..., from left to right; None: no cameras
+    spectra: spectra of materials and lights, by name ("wall", "floor", "light_0" ...). They add to the spectra that the
+        task defines, or replace them. Each is an `optics.Spectrum`, or a name that `optics.reflectance` or
+        `optics.illuminant` accepts.
 
     Raises:
-        ValueError: an unknown task or course, a negative seed, mazes or a course for another task, or spectra for names
-            that do not exist.
+        ValueError: the task or the course is unknown, the seed is negative, `mazes` or `course` is given for another
+            task, or `spectra` contains a name that does not exist.
     """
     if not isinstance(task, str) or task not in TASKS:
         raise ValueError(f"unknown task {shown(task)}: must be one of {', '.join(TASKS)}{did_you_mean(task, TASKS)}")
@@ -140,7 +144,7 @@ def _empty_world() -> mujoco.MjSpec:
     spec.modelname = "rhabdom"
     spec.option.timestep = TIMESTEP
     spec.option.gravity = [0, 0, 0]  # the agent moves in a plane
-    # MuJoCo 4.0.0's sparse Newton Hessian is wrong (fixed in 4.0.1).
+    # The dense solver is used because MuJoCo 4.0.0 computes a wrong sparse Newton Hessian (fixed in 4.0.1).
     spec.option.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
     spec.visual.map.znear = 1e-4
     materials.add_daylight(spec)
@@ -151,14 +155,15 @@ def _empty_world() -> mujoco.MjSpec:
 
 
 def _add_agent(spec: mujoco.MjSpec, start: np.ndarray, eyes: Eyes | None) -> None:
-    """Add the agent: slide joints in world axes, then the heading (set by the simulation, without an actuator).
+    """Add the agent, with slide joints along the world's axes and a hinge for the heading.
 
-    The contact is frictionless, and stiff for discrete steps. Damping 1/dt stops the approach within the substep in
-    which the wall is felt. Stiffness 0.2/dt² pushes back one fifth of the depth per substep, without a bounce.
+    The hinge has no actuator; the simulation sets the heading. The contact is frictionless. Its damping and stiffness
+    are chosen for discrete substeps of length dt. The damping 1/dt stops the approach in the substep in which the
+    agent touches a wall. The stiffness 0.2/dt² reduces the penetration by one fifth per substep, without a bounce.
     """
     body = spec.worldbody.add_body(name="agent", pos=[float(start[0]), float(start[1]), EYE_HEIGHT])
     slide, hinge = mujoco.mjtJoint.mjJNT_SLIDE, mujoco.mjtJoint.mjJNT_HINGE
-    # With ref, qpos is the position in the world, and qpos0 is the start.
+    # Because of `ref`, qpos is the position in the world, and qpos0 is the starting position.
     body.add_joint(name="agent_x", type=slide, axis=[1, 0, 0], ref=float(start[0]))
     body.add_joint(name="agent_y", type=slide, axis=[0, 1, 0], ref=float(start[1]))
     body.add_joint(name="agent_heading", type=hinge, axis=[0, 0, 1])

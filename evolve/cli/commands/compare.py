@@ -1,4 +1,4 @@
-"""`evolve compare`: runs side by side."""
+"""`evolve compare`: a comparison of several runs."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ __all__ = ["compare"]
 
 
 def compare(arguments: Namespace) -> int:
-    """Print runs side by side."""
+    """Print a comparison of several runs; with --html, also write it as a page."""
     runs = [Run.open(directory) for directory in arguments.directories]
     if arguments.json:
         found = {"runs": [run_summary(run) for run in runs], "settings": differing_settings(runs)}

@@ -1,4 +1,4 @@
-"""`evolve demo`: a finished run that ships with rhabdom."""
+"""`evolve demo`: a finished run that is part of rhabdom."""
 
 from __future__ import annotations
 

@@ -13,7 +13,7 @@ __all__ = ["drift"]
 
 
 def drift(arguments: Namespace) -> int:
-    """Print which genes moved further than chance explains."""
+    """Print how far each gene moved in the runs, compared with searches with random fitness."""
     runs = [Run.open(directory) for directory in arguments.directories]
     said = "searches with random fitness"
     with Waiting(1).of_one_step(said) as wait:

@@ -24,7 +24,7 @@ def tasks(arguments: Namespace) -> int:
 
 
 def presets(arguments: Namespace) -> int:
-    """Print the presets with their task, if they set one, their scales and their purpose."""
+    """Print the presets with their task (if they set one), their scales and their purpose."""
     found = [preset_about(name) for name in preset_names()]
     if arguments.json:
         print(json.dumps(found, indent=1))
@@ -35,7 +35,7 @@ def presets(arguments: Namespace) -> int:
 
 
 def genes(arguments: Namespace) -> int:
-    """Print the genes with their range, their default search interval and start value, and their effect."""
+    """Print the genes with their valid range, default search range, start value and meaning."""
     ordered = [gene for cluster in CLUSTERS for gene in GENES.values() if gene.cluster == cluster]
     if arguments.json:
         print(json.dumps([_record(gene) for gene in ordered], indent=1))

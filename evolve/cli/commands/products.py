@@ -1,4 +1,7 @@
-"""`evolve replay`, `report` and `export`: files that are written from a run, one by one or all at once."""
+"""`evolve replay`, `evolve report` and `evolve export`: files with the results of a run.
+
+The function `finished_products` writes the report and the EXR files at the end of a run, and a replay on request.
+"""
 
 from __future__ import annotations
 
@@ -19,20 +22,20 @@ __all__ = ["REPORT", "Products", "export", "finished_products", "open_page", "re
 
 @dataclass(frozen=True)
 class Products:
-    """Files written from a finished run; `replay` is None unless a replay was requested."""
+    """Paths of the files with the results of a finished run. `replay` is None unless a replay was requested."""
 
     report: Path
     frames: list[Path]
     replay: Path | None = None
 
     def record(self, run: Run) -> dict[str, Any]:
-        """Return the files as JSON values."""
+        """Return the paths of the files as JSON values."""
         replay = {} if self.replay is None else {"replay": str(self.replay)}
         exr = [str(frame) for frame in self.frames]
         return {"directory": str(run.path), "report": str(self.report), **replay, "exr": exr}
 
     def lines(self, run: Run) -> list[str]:
-        """Return the files as lines of text."""
+        """Return the paths of the files as lines of text."""
         return [
             f"run directory: {run.path}",
             f"report: {self.report}",
@@ -42,11 +45,12 @@ class Products:
 
 
 def finished_products(run: Run, shown: bool, replay: bool = False) -> Products:
-    """Write EXR files and report of the best animal's episode and, with `replay`, a page that plays the episode.
+    """Write the report of a run, and the EXR files of an episode of its best animal.
 
     The report is written last, so its existence shows that all files are complete.
 
     shown: whether to show a progress bar
+    replay: whether to also write a page that plays the episode
     """
     with Waiting(3 + replay, shown) as wait:
         wait.step("the best agent plays an episode")
@@ -56,7 +60,8 @@ def finished_products(run: Run, shown: bool, replay: bool = False) -> Products:
         from evolve.report.write import write
 
         best, played = recorder.record(run), None
-        (run.path / REPORT).unlink(missing_ok=True)  # a former report is kept if no episode can be played
+        # The former report is deleted only now, so that it is kept if no episode can be played.
+        (run.path / REPORT).unlink(missing_ok=True)
         if replay:
             wait.step("writing the replay")
             played = write_page(run, best)
@@ -67,7 +72,7 @@ def finished_products(run: Run, shown: bool, replay: bool = False) -> Products:
 
 
 def replay(arguments: Namespace) -> int:
-    """Let an agent play one episode again; print a table, and write a page that plays the episode."""
+    """Simulate an episode of an agent, print a table of it, and write a page that plays the episode."""
     run = _open(arguments)
     with _waiting(arguments, "an episode is played and written"):
         from evolve.report.replay import BESIDE, episode_facts, episode_table, write_replay
@@ -96,7 +101,7 @@ def report(arguments: Namespace) -> int:
 
 
 def export(arguments: Namespace) -> int:
-    """Write the radiance in front of an agent's eyes, one EXR file per frame."""
+    """Write the spectral radiance in front of an agent's eyes during an episode, as one EXR file per exported frame."""
     run = _open(arguments)
     with _waiting(arguments, "EXR files are written") as wait:
         from evolve.report.exr_export import export_run
@@ -116,13 +121,13 @@ def open_page(page: Path, arguments: Namespace) -> None:
 
 
 def _waiting(arguments: Namespace, text: str) -> Waiting:
-    """Return a wait of one step, which takes at most half a minute."""
+    """Return a progress bar for one step, which takes at most half a minute."""
     wait = Waiting(1, shown=not (arguments.json or arguments.quiet))
     return wait.of_one_step(text)
 
 
 def _open(arguments: Namespace) -> Run:
-    """Open the run, and check that this machine can compute eyes."""
+    """Open the run, and check that eyes can be computed on this machine."""
     run = Run.open(arguments.directory, arguments.task)
     device.make_ready()
     return run

@@ -30,7 +30,7 @@ __all__ = ["resume", "start"]
 
 
 def start(arguments: Namespace) -> int:
-    """Start a run and carry it to its end."""
+    """Start a run and continue it to its end; with --dry-run, print its plan only."""
     scheduler = _scheduler(arguments)
     if arguments.tensorboard:
         require_tensorboard()
@@ -39,7 +39,7 @@ def start(arguments: Namespace) -> int:
         return _show(RunPlan.from_config(prepared.config, prepared.directory(arguments.out)), arguments.json)
     notes = (
         [] if arguments.json or arguments.quiet else lint(prepared.config)
-    )  # builds the world, which takes time; the run directory does not exist yet
+    )  # may build the task's world, which takes time, so this is done before the run directory exists
     with prepared.create(Run, arguments.out) as run:
         if not arguments.json:
             for note in notes:
@@ -49,7 +49,7 @@ def start(arguments: Namespace) -> int:
 
 
 def resume(arguments: Namespace) -> int:
-    """Carry an interrupted run to its end."""
+    """Continue an interrupted run to its end."""
     scheduler = _scheduler(arguments)
     if arguments.tensorboard:
         require_tensorboard()
@@ -63,7 +63,7 @@ def resume(arguments: Namespace) -> int:
 
 
 def _request(arguments: Namespace) -> RunRequest:
-    """Return the settings from the command line."""
+    """Return the request for a run that the command line describes."""
     flags = [f"{name}={value}" for name in ("seed", "workers") if (value := getattr(arguments, name)) is not None]
     return RunRequest(
         arguments.task,
@@ -84,7 +84,7 @@ def _silence(text: str) -> None:
 
 
 def _show(plan: RunPlan, as_json: bool) -> int:
-    """Print the plan with the measured pace of this machine; start nothing."""
+    """Print the plan of a run, with the measured pace of this machine, without starting the run."""
     if not as_json:
         print("measuring this machine's pace ...", file=sys.stderr, flush=True)
     plan = plan.measured()
@@ -93,7 +93,7 @@ def _show(plan: RunPlan, as_json: bool) -> int:
 
 
 class _Shown:
-    """Watchers of the command: progress in the selected form, and TensorBoard's files if requested."""
+    """Watchers of a run: one shows progress in the selected form, and one writes TensorBoard's files if requested."""
 
     def __init__(self, arguments: Namespace) -> None:
         self._arguments = arguments
@@ -110,7 +110,10 @@ class _Shown:
 
 
 def _carry_on(run: Run, arguments: Namespace, scheduler: Scheduler | None) -> int:
-    """Carry a locked run to its end; after Ctrl-C, print how to continue. The record is already complete on disk."""
+    """Continue a locked run to its end.
+
+    After Ctrl-C, print how to continue. The files need no further writing, because the record is always complete.
+    """
     shown = _Shown(arguments)
     try:
         carry_on(run, shown.watched, _workers(scheduler))
@@ -128,7 +131,10 @@ def _carry_on(run: Run, arguments: Namespace, scheduler: Scheduler | None) -> in
 
 
 def _already_finished(run: Run, arguments: Namespace) -> int:
-    """Write the missing files of a run that was killed after its last evaluation; do nothing if they are complete."""
+    """Write the report and EXR files of a finished run if they are missing.
+
+    They are missing if the run was killed after its last evaluation.
+    """
     page, frames = run.path / REPORT, sorted((run.path / "exr").glob("*.exr"))
     if not page.is_file() or not frames:
         return _finish(run, arguments)
@@ -147,12 +153,12 @@ def _watcher(run: Run, workers: int, arguments: Namespace) -> Bar | Events | Lin
 
 
 def _workers(scheduler: Scheduler | None) -> Callable[[RunConfig], AbstractContextManager[Workers]]:
-    """Return Dask's workers if there is a scheduler, else processes of this machine."""
+    """Return a function that starts the workers: those of Dask if there is a scheduler, else local processes."""
     return local_workers if scheduler is None else lambda config: DaskExecutor(scheduler)
 
 
 def _scheduler(arguments: Namespace) -> Scheduler | None:
-    """Return the scheduler of Dask after a check that it is reachable; None for local processes."""
+    """Return Dask's scheduler after checking that it is reachable; None if the workers are local processes."""
     files = arguments.tls_ca_file, arguments.tls_cert, arguments.tls_key
     wanted = arguments.scheduler is not None
     if (arguments.executor == "dask") != wanted or (any(files) and not wanted):
@@ -168,7 +174,7 @@ def _scheduler(arguments: Namespace) -> Scheduler | None:
 
 
 def _finish(run: Run, arguments: Namespace) -> int:
-    """Write report and EXR files and print their paths; return 1 if no candidate could be evaluated."""
+    """Write the report and the EXR files, and print their paths; return 1 if no candidate could be evaluated."""
     failures = [candidate for candidate in run.candidates if candidate.failure]
     if run.best is None:
         print(f"evolve: every candidate failed; the last one: {failures[-1].failure}", file=sys.stderr)
@@ -187,7 +193,7 @@ def _finished_event(run: Run, best: Candidate, made: Products) -> dict[str, Any]
 
 
 def _outcome(run: Run, best: Candidate, failures: list[Candidate]) -> list[str]:
-    """Return lines with the best candidate and with the numbers of failed candidates, episodes and repaired genomes."""
+    """Return lines about the best candidate, failed candidates, failed episodes and repaired genomes."""
     lines = [f"best: candidate {best.id}, fitness {best.fitness:.4g}, success rate {best.success_rate:.0%}"]
     if failures:
         lines.append(

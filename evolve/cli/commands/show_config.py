@@ -1,4 +1,4 @@
-"""`evolve config`: all settings of a run that has not started, and the range of each."""
+"""`evolve config`: the settings of a run that has not started, and their valid ranges."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ KINDS = {"int": "integer", "float": "number", "bool": "boolean", "str": "string"
 
 
 def config(arguments: Namespace) -> int:
-    """Print settings as TOML, or their schema as JSON."""
+    """Print all settings of a run as TOML, or the schema of the settings as JSON."""
     if arguments.what == "schema":
         print(json.dumps(schema(), indent=1))
         return 0
@@ -33,7 +33,7 @@ def config(arguments: Namespace) -> int:
 def schema() -> dict[str, Any]:
     """Return the JSON schema (draft 2020-12) of a run's config.toml and of files for `--config`.
 
-    It describes single settings; `evolve config show` also checks dependencies between settings.
+    The schema describes each setting separately. `evolve config show` also checks dependencies between settings.
     """
     top = {f.name: _setting(f) for f in fields(RunConfig) if f.name in ("seed", "workers", "task_sha256")}
     task = {"anyOf": [{"enum": list(TASKS)}, {"type": "string", "pattern": f"^{LABEL.pattern}$"}]}
@@ -59,7 +59,7 @@ def _setting(definition: Field[Any]) -> dict[str, Any]:
 
 
 def _limits(valid: Interval) -> dict[str, float]:
-    """Return a range in the form of JSON schema; an unbounded range has no maximum."""
+    """Return a range as keywords of a JSON schema. An unbounded range has no maximum."""
     least = {"exclusiveMinimum" if valid.open_low else "minimum": valid.low}
     return least | ({"maximum": valid.high} if math.isfinite(valid.high) else {})
 

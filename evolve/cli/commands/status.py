@@ -1,4 +1,7 @@
-"""`evolve status` and `evolve list`: states of runs, read only from their records, once or repeatedly."""
+"""`evolve status` and `evolve list`: states of runs.
+
+The states are read from the files in the run directories. The runs themselves are not affected.
+"""
 
 from __future__ import annotations
 
@@ -21,12 +24,12 @@ from evolve.store.lock import holder
 
 __all__ = ["listing", "standing", "standing_lines", "status"]
 
-WATCH_S = 2.0  # interval between two readings
-SHOWN = 12  # number of latest generations
+WATCH_S = 2.0  # [s] interval between two readings
+SHOWN = 12  # number of generations shown, the latest ones
 
 
 def status(arguments: Namespace) -> int:
-    """Print the state of a run; with --watch, print it after each change until no process works on the run."""
+    """Print the state of a run; with --watch, print it again after each change until no process works on the run."""
     now = standing(Run.open(arguments.directory))
     if not arguments.watch:
         _show(arguments, now)
@@ -43,8 +46,8 @@ def status(arguments: Namespace) -> int:
 
 
 def listing(arguments: Namespace) -> int:
-    """Print the runs in a directory, one line each, the latest last; for an unreadable run, print the reason."""
-    # Unlike os.path.exists, pathlib raises for an unreadable folder, which cannot be a run of this user.
+    """Print one line for each run in a directory, the latest last. For an unreadable run, print the reason."""
+    # os.path.exists returns False for an unreadable folder, which cannot be a run of this user. pathlib would raise.
     folders = [path for path in arguments.directory.iterdir() if os.path.exists(path / "config.toml")]
     found = [_standing_or_reason(path) for path in sorted(folders, key=lambda path: path.stat().st_mtime)]
     if arguments.json:
@@ -74,7 +77,10 @@ def _in_one_line(one: dict[str, Any]) -> str:
 
 
 def _show(arguments: Namespace, now: dict[str, Any]) -> None:
-    """Print a state as text or indented JSON; with --watch, JSON takes one line and a terminal is cleared first."""
+    """Print a state as text or as indented JSON.
+
+    With --watch, JSON is printed on one line, and a terminal is cleared before text is printed.
+    """
     if arguments.json:
         print(json.dumps(now, indent=None if arguments.watch else 2, allow_nan=False, default=vars), flush=True)
         return

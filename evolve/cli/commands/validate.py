@@ -23,7 +23,8 @@ CHECKOUT = Path(__file__).resolve().parents[3]
 class _Proof:
     """A validation script.
 
-    module: module that runs it · old: its former name with a code, such as "B0_planner", or ""
+    module: name of the script's module
+    old: former name with a code, such as "B0_planner"; "" if there is none
     """
 
     module: str
@@ -48,7 +49,7 @@ def doctor(arguments: Namespace) -> int:
 
 
 def validate(arguments: Namespace) -> int:
-    """Run all or the named scripts of `validation`, which assert and draw; return 1 if any fails."""
+    """Run all scripts of `validation`, or those named, which check results and draw figures; return 1 if any fails."""
     listed = CHECKOUT / "validation" / "proofs.toml"
     if not listed.is_file():
         print("evolve: error: validate needs a checkout of rhabdom: its scripts are not installed", file=sys.stderr)
@@ -64,7 +65,7 @@ def validate(arguments: Namespace) -> int:
 
 
 def _found(name: str, proofs: Mapping[str, _Proof]) -> _Proof:
-    """Return the script of a name or of a former code; for a code, print the current name.
+    """Return the script with this name or former code. If a code is given, print the current name.
 
     Raises:
         ConfigError: the name is unknown.
@@ -75,7 +76,7 @@ def _found(name: str, proofs: Mapping[str, _Proof]) -> _Proof:
         if proof.old and name in (proof.old, proof.old.partition("_")[0]):
             print(f"{name} is now called {proof.name}", file=sys.stderr)
             return proof
-    from evolve.config.checks import ConfigError  # not at the top: the doctor works on every system
+    from evolve.config.checks import ConfigError  # imported on use: `doctor` must work everywhere
     from optics.numerics.arguments import did_you_mean
 
     raise ConfigError(
@@ -84,7 +85,7 @@ def _found(name: str, proofs: Mapping[str, _Proof]) -> _Proof:
 
 
 def _run(proofs: list[_Proof]) -> int:
-    """Run scripts one after another; return 1 if any fails."""
+    """Run the scripts one after another; return 1 if any fails."""
     from evolve.runs.progress import clock
 
     if len(proofs) > 1:
