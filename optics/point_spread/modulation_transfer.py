@@ -17,6 +17,7 @@ from optics.numerics.field import Field
 from optics.numerics.fourier import dft2
 from optics.numerics.grid import Grid
 from optics.numerics.precision import precision
+from optics.numerics.read_only import ReadOnlyArrays, read_only
 from optics.numerics.scattered_sum import ScatteredSum, sums_at
 from optics.point_spread.mixture import flat
 
@@ -34,7 +35,7 @@ AT_A_TIME = 2**17  # choice: frequencies that are summed at once; with 64 cells 
 
 
 @dataclass(frozen=True, eq=False)
-class MTF:
+class MTF(ReadOnlyArrays):
     """Modulation transfer function on a square grid of spatial frequencies, zero frequency at n//2.
 
     tensor: contrast as a Dr.Jit tensor (wavelength, fy, fx), which is 1 at zero frequency; mtf: the same in NumPy.
@@ -76,7 +77,7 @@ class MTF:
 
     @cached_property
     def mtf(self) -> np.ndarray:
-        return np.asarray(self.tensor.numpy())
+        return read_only(np.asarray(self.tensor.numpy()))
 
     def first(self, count: int) -> MTF:
         """Return the MTF of the first `count` wavelengths.

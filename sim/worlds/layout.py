@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import mujoco
 import numpy as np
 
+from optics.numerics.read_only import ReadOnlyArrays
 from optics.spectra.spectrum import Spectrum
 
 CELL = 2.0  # [m] side of a grid cell
@@ -23,7 +24,7 @@ WALL_CONAFFINITY = 1
 
 
 @dataclass(frozen=True)
-class Starts:
+class Starts(ReadOnlyArrays):
     """Starting positions of agents.
 
     position: (n, 2) [m]
@@ -35,7 +36,7 @@ class Starts:
 
 
 @dataclass(frozen=True)
-class Layout:
+class Layout(ReadOnlyArrays):
     """Additions of a task to a world: mocap sphere bodies and starting positions.
 
     objects: names of mocap sphere bodies
