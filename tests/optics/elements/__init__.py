@@ -14,4 +14,5 @@ square_samples: test_relief.py, methods/test_even_pupils.py
 transmittance: test_transmittance.py
 wavefront: test_wavefront.py
 wavefront_slopes: test_pupil.py
+zernike_order: test_zernike_order.py
 """
