@@ -77,6 +77,7 @@ _CONTENTS = {
     "mean_human_mtf": "elements.human_eye",
     "medium": "elements.refractive_index",
     "mtf": "point_spread.contrast",
+    "phase_pupil": "elements.phase_pupil",
     "plan": "point_spread.psf",
     "propagate": "propagation.propagate",
     "propagate_through": "propagation.system",

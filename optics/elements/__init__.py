@@ -2,6 +2,7 @@
 
 source            PointSource
 pupil             Pupil: aperture, relief, ideal lens
+phase_pupil       pupils with the same phase at every wavelength
 relief            Relief, HeightMap, BSplineRelief
 pixel_relief      PixelRelief: stepped reliefs
 fine_detail       spatial frequencies that samples contain

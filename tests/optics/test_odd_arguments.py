@@ -64,6 +64,7 @@ ELEMENTS = {
     "WavefrontMap": {"samples": np.zeros((4, 4)), "radius": 1.0},
     "Zernike": {"coefficients_um": [0, 0, 0, 0.1], "radius": 1e-3},
     "medium": {"name": "water"},
+    "phase_pupil": {"aperture_radius": 2e-5, "phase": np.ones((4, 4)), "pixels": False, "mask": None},
 }
 SPECTRA = {
     "Cornu": {"a": 1.5, "b_um": 0.01, "c_um": 0.1},

@@ -4,6 +4,7 @@ beam: methods/test_textbook.py
 exit_pupil: test_exit_pupil.py
 fine_detail: test_fine_detail.py, eye/test_scattered_light.py
 human_eye: test_human_eye.py
+phase_pupil: test_phase_pupil.py
 pixel_relief: test_pixel_relief.py
 pupil: test_pupil.py
 ray_field: point_spread/test_vector_focus.py

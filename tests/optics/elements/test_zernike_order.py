@@ -2,11 +2,13 @@
 
 import math
 
+import drjit as dr
 import numpy as np
 import pytest
 
 import optics
 from optics.elements.zernike_order import fringe_mode, noll_mode, osa_mode
+from tests.optics.device_types import Float64
 from validation.reference import noll_index
 
 # R. J. Noll, J. Opt. Soc. Am. 66, 207 (1976), table I: polynomials in polar coordinates, by number.
@@ -131,9 +133,6 @@ def test_bad_numbers_are_refused(make, given, says):
 
 @pytest.mark.parametrize("make", ["from_noll", "from_fringe"])
 def test_coefficients_carry_derivatives(make):
-    import drjit as dr
-    from drjit.llvm.ad import Float64
-
     coefficient = Float64(0.1)
     dr.enable_grad(coefficient)
     wavefront = getattr(optics.Zernike, make)({4: coefficient})
