@@ -24,6 +24,7 @@ _CONTENTS = {
     "AppositionEye": "ommatidia.mosaic",
     "BSplineRelief": "elements.relief",
     "BackendError": "numerics.backend",
+    "Bitmap": "apertures.bitmap",
     "Circle": "apertures.circular",
     "Combined": "apertures.combined",
     "Cornu": "elements.refractive_index",

@@ -24,6 +24,7 @@ SOURCE = {"source_distance": math.inf, "source_angle": (0.0, 0.0), "centre": (0.
 
 # Valid calls, small enough that hundreds of variants take seconds.
 SHAPES = {
+    "Bitmap": {"image": np.eye(3)},
     "Annulus": {"inner": 0.3},
     "Disk": {"radius": 0.3, "centre": (0.0, 0.1)},
     "Oblong": {"width": 0.3, "height": 0.2, "centre": (0.0, 0.0), "rotation_deg": 0.0},
