@@ -109,6 +109,13 @@ PICTURES = {
     "plan": dict(pupil=LENS, wavelength=550e-9, **PICTURE, **SOURCE),
     "psf": dict(pupil=LENS, wavelengths=[550e-9], field=False, **PICTURE, **SOURCE),
     "psf_batch": dict(pupils=[LENS], wavelengths=[550e-9], source_distances=[math.inf], **PICTURE),
+    "through_focus": {
+        "pupil": LENS,
+        "sensor_distances": [240e-6],
+        "wavelengths": [550e-9],
+        "dx": 5e-7,
+        "shape": (9, 9),
+    },
     "vector_focus": {
         "pupil": WIDE,
         "wavelength": 550e-9,
@@ -165,7 +172,17 @@ def test_any_argument(name):
 def test_nothing_of_the_face_is_forgotten():
     """Omitted names are results of optics itself, or take the same arguments as names that are tested here."""
     made = {"AccuracyError", "BackendError", "MTF", "Mode", "PSFBatch", "PSFResult", "Plan", "PropagationResult"}
-    made |= {"ExitPupil", "SpectralBands", "StackResult", "VectorFocus", "WhitePSF", "Relief", "Circle", "Combined"}
+    made |= {
+        "ExitPupil",
+        "SpectralBands",
+        "StackResult",
+        "VectorFocus",
+        "WhitePSF",
+        "ThroughFocus",
+        "Relief",
+        "Circle",
+        "Combined",
+    }
     like_others = {
         "difference",
         "intersection",
