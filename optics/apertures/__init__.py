@@ -5,6 +5,7 @@ circular       Circle, Annulus
 rings          Rings: zone plates
 polygonal      Polygon, Slit
 shapes         Disk, Oblong, Spider: parts of combined openings
+bitmap         Bitmap: openings drawn as images
 combined       union, difference, intersection; hexagonal segments
 boundary       edge of a combination
 pixelated      any shape tiled by square pixels

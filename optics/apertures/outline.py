@@ -7,6 +7,8 @@ from functools import cached_property
 
 import numpy as np
 
+from optics.numerics.read_only import ReadOnlyArrays, read_only
+
 __all__ = ["Outline"]
 
 TURN = 2 * np.pi
@@ -17,7 +19,7 @@ def _none(*shape: int) -> np.ndarray:
 
 
 @dataclass(frozen=True, eq=False)
-class Outline:
+class Outline(ReadOnlyArrays):
     """Outline made of straight segments and arcs, with the even-odd rule.
 
     A point is inside if a ray from it crosses an odd number of segments and arcs.
@@ -132,7 +134,7 @@ class Outline:
             for side in (-1, 1)
             if len(cy)
         ]
-        return np.concatenate([self.segments[:, :, 1].ravel(), *corners, *tops])
+        return read_only(np.concatenate([self.segments[:, :, 1].ravel(), *corners, *tops]))
 
     @cached_property
     def tangent(self) -> np.ndarray:
@@ -141,7 +143,7 @@ class Outline:
         Near such a height the position of a crossing changes like a square root.
         """
         _, cy, radius, _, _ = self.arcs.T
-        return np.unique(np.concatenate([cy - radius, cy + radius]))
+        return read_only(np.unique(np.concatenate([cy - radius, cy + radius])))
 
     def near(self, x: np.ndarray, y: np.ndarray, half: float) -> np.ndarray:
         """Return a mask of the squares that the edge may cut. They have the half side `half` and the centres (x, y).

@@ -2,11 +2,13 @@
 
 source            PointSource
 pupil             Pupil: aperture, relief, ideal lens
+phase_pupil       pupils with the same phase at every wavelength
 relief            Relief, HeightMap, BSplineRelief
 pixel_relief      PixelRelief: stepped reliefs
 fine_detail       spatial frequencies that samples contain
 square_samples    checks of the samples of reliefs, masks and wavefronts
 wavefront         Zernike, WavefrontMap
+zernike_order     numberings of Zernike polynomials: OSA, Noll, Fringe
 transmittance     GaussianMask, MaskMap
 human_eye         HumanEye, mean_human_mtf: published models
 exit_pupil        read_exit_pupil: lenses from other programs

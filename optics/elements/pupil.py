@@ -201,7 +201,7 @@ class Pupil:
 
     def index_step(self, wavelength: float) -> Scalar:
         """Return the relief's index n(λ) minus the index in front of the pupil, which surrounds the relief."""
-        return self.n.at(wavelength) - self.index_before(wavelength)
+        return self.n.step(wavelength, self.index_before(wavelength))
 
     def bends(self, wavelength: float) -> bool:
         """Return whether the relief changes the path, or derivatives of its index are requested."""

@@ -36,6 +36,10 @@ class Dispersion(ABC):
             raise ValueError(f"n = {value:g} at wavelength {wavelength:g} m: must be at most {LARGEST:g} ({hint})")
         return n
 
+    def step(self, wavelength: float, before: float) -> Scalar:
+        """Return n minus the index of the medium in front, `before`, at a vacuum wavelength [m]."""
+        return self.at(wavelength) - before
+
     @property
     def is_differentiable(self) -> bool:
         """True if the curve carries derivatives."""

@@ -17,13 +17,13 @@ import numpy as np
 
 from optics.elements.relief import HeightMap
 from optics.elements.square_samples import square_samples
+from optics.elements.zernike_order import HIGHEST, fringe_mode, noll_mode, numbered, osa_mode
 from optics.numerics.arguments import finite, positive, reals, shown
 from optics.numerics.autodiff import Array, is_differentiable, number, plain
 from optics.numerics.precision import Precision, opaque
 
 __all__ = ["HIGHEST", "Aberration", "WavefrontMap", "Zernike", "mode"]
 
-HIGHEST = 30  # choice: highest radial order
 UM = 1e-6
 
 
@@ -111,6 +111,30 @@ class Zernike(Aberration):
         else:
             named = _of_vector(given)
         object.__setattr__(self, "modes", named)
+
+    @classmethod
+    def from_noll(cls, coefficients_um: Any, radius: float | None = None) -> Zernike:
+        """Return the wavefront for Noll's numbering, {number: [µm]} or a row [µm] from number 1 (piston) on.
+
+        Noll's polynomials have the normalisation of OSA, a variance of 1. Astronomy and poppy use them.
+
+        Raises:
+            ValueError: a number outside 1 to 496, or see `Zernike`.
+        """
+        return cls(numbered(coefficients_um, noll_mode), radius)
+
+    @classmethod
+    def from_fringe(cls, coefficients_um: Any, radius: float | None = None) -> Zernike:
+        """Return the wavefront for the Fringe numbering, {number: [µm]} or a row [µm] from number 1 (piston) on.
+
+        Fringe polynomials are 1 at the rim, R_n^|m|(ρ) cos mθ and R_n^|m|(ρ) sin |m|θ. Their coefficients are therefore
+        divided by √((2 - δ_m0)(n + 1)). Interferometers and programs for lens design use them.
+
+        Raises:
+            ValueError: a number outside 1 to 36, or see `Zernike`.
+        """
+        named = numbered(coefficients_um, fringe_mode)
+        return cls({key: value / _norm(*key) for key, value in named.items()}, radius)
 
     def ahead(self, x: Array, y: Array, types: Precision) -> Array:
         total = types.Float64(0)
@@ -269,6 +293,5 @@ def _of_vector(given: Any) -> dict[tuple[int, int], float]:
         raise ValueError("coefficients_um holds NaN or infinity: must be finite [µm]")
     modes = {}
     for j, value in enumerate(vector):
-        n = math.ceil((math.sqrt(9 + 8 * j) - 3) / 2 - 1e-12)
-        modes[n, 2 * j - n * (n + 2)] = number(value)
+        modes[osa_mode(j)] = number(value)
     return modes

@@ -13,6 +13,7 @@ import numpy as np
 
 from optics.apertures.aperture import EDGE_REACH
 from optics.numerics.grid import Grid
+from optics.numerics.read_only import ReadOnlyArrays, read_only
 
 __all__ = ["Slopes"]
 
@@ -50,7 +51,7 @@ def _total(points: np.ndarray, to: list[np.ndarray], bend: tuple[float, float]) 
 
 
 @dataclass(frozen=True, eq=False)
-class Slopes:
+class Slopes(ReadOnlyArrays):
     """Gradient of the optical path on a grid that covers the disk and its soft edge."""
 
     grid: Grid
@@ -60,7 +61,7 @@ class Slopes:
 
     @cached_property
     def distance_from_axis(self) -> np.ndarray:
-        return np.hypot(self.grid.x[None, :], self.grid.y[:, None])
+        return read_only(np.hypot(self.grid.x[None, :], self.grid.y[:, None]))
 
     @cached_property
     def _squared(self) -> np.ndarray:

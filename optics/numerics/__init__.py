@@ -17,6 +17,7 @@ matrices        matrix products of Dr.Jit tensors
 precision       float32 and float64 in Dr.Jit
 quadrature      Gauss-Legendre nodes, and the number of nodes that a wave needs
 radial_profile  rotationally symmetric images, computed along one radius
+read_only       read-only arrays of results
 renamed         deprecated names that warn once
 scattered_sum   Fourier sums over scattered points
 """

@@ -10,6 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from optics.numerics.arguments import finite, in_range, of_kind, positive, shown, vacuum_wavelength, whole
+from optics.numerics.read_only import read_only
 from optics.ommatidia.ommatidium import Ommatidium
 
 __all__ = ["AppositionEye", "hexagonal_directions"]
@@ -61,7 +62,7 @@ class AppositionEye:
     @cached_property
     def directions(self) -> np.ndarray:
         """Viewing directions (ommatidium, 2): angles [rad] along x and y."""
-        return hexagonal_directions(self.rings, self.interommatidial_deg)
+        return read_only(hexagonal_directions(self.rings, self.interommatidial_deg))
 
     def field(self, wavelength: float = 500e-9) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return directions x, y [rad] relative to the ommatidium's axis, flat, and their weights, which sum to 1."""

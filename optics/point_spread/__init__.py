@@ -17,5 +17,6 @@ modulation_transfer  MTF: contrast at any frequency
 contrast       mtf, image_quality
 mixture        sums over wavelengths
 white          white_psf: light of a lamp, weighted by receptors
+through_focus  through_focus: PSFs at several distances of the sensor
 concentration  strehl_ratio, encircled_energy
 """

@@ -25,6 +25,7 @@ from optics.numerics.arguments import (
 from optics.numerics.autodiff import Array, Scalar, number
 from optics.numerics.grid import Grid, OnWindow
 from optics.numerics.precision import Precision, padded_for_packets, precision
+from optics.numerics.read_only import read_only
 from optics.point_spread.pictures import pictures
 from optics.point_spread.population import population_pictures
 from optics.point_spread.population_members import Member
@@ -86,7 +87,7 @@ class PSFBatch(OnWindow):
 
     @cached_property
     def psf(self) -> np.ndarray:
-        return np.asarray(self.tensor.numpy())
+        return read_only(np.asarray(self.tensor.numpy()))
 
     @property
     def plan(self) -> Plan:

@@ -116,9 +116,8 @@ def _transformed(seen: PSFResult, light: Array, error: np.ndarray) -> MTF:
     values, arrives = types.Float(flat(seen.tensor)), types.Float(light)
     held = dr.block_reduce(dr.ReduceOp.Add, values, height * width) * seen.dx**2
     whole = dr.repeat(dr.maximum(arrives, held), height * width)
-    return MTF.from_shares(
-        types.Tensor(values * seen.dx**2 / whole, (waves, height, width)), seen.dx, seen.cutoff, error
-    )
+    shares = types.Tensor(values * seen.dx**2 / whole, (waves, height, width))
+    return MTF.from_shares(shares, seen.window, seen.cutoff, error)
 
 
 def _arriving(result: PSFResult, arriving: Any) -> tuple[Array, np.ndarray]:

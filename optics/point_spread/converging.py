@@ -19,6 +19,7 @@ from optics.numerics.accuracy import AccuracyError, Plan
 from optics.numerics.autodiff import number
 from optics.numerics.field import Field
 from optics.numerics.grid import Grid
+from optics.numerics.read_only import ReadOnlyArrays, read_only
 from optics.point_spread.pictures import PSFPicture, pictures
 from optics.point_spread.request import Request
 from optics.point_spread.spot_check import spot_check
@@ -34,7 +35,7 @@ SINGLE = 1e-4  # choice: smallest tolerance for which float32 is sufficient
 
 
 @dataclass(frozen=True, eq=False)
-class Converging:
+class Converging(ReadOnlyArrays):
     """Light behind a pupil.
 
     jones: Jones vectors of the parts of the light that do not interfere with each other, (part, 2).
@@ -163,7 +164,7 @@ class Converging:
 
 
 @dataclass(frozen=True, eq=False)
-class VectorFocus:
+class VectorFocus(ReadOnlyArrays):
     """The electric field about an image.
 
     intensity: |Ex|², |Ey|², |Ez|² divided by the pupil's area, (3, y, x) [1/m²]. These are the excitations of molecules
@@ -197,8 +198,7 @@ class VectorFocus:
     @cached_property
     def psf(self) -> np.ndarray:
         """Intensity of all components, (y, x) [1/m²]."""
-        total: np.ndarray = self.intensity.sum(axis=0)
-        return total
+        return read_only(self.intensity.sum(axis=0))
 
     @property
     def grid(self) -> Grid:

@@ -5,6 +5,7 @@ If the PSF carries derivatives, contrasts are Dr.Jit arrays that carry derivativ
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -17,6 +18,7 @@ from optics.numerics.field import Field
 from optics.numerics.fourier import dft2
 from optics.numerics.grid import Grid
 from optics.numerics.precision import precision
+from optics.numerics.read_only import ReadOnlyArrays, read_only
 from optics.numerics.scattered_sum import ScatteredSum, sums_at
 from optics.point_spread.mixture import flat
 
@@ -34,7 +36,7 @@ AT_A_TIME = 2**17  # choice: frequencies that are summed at once; with 64 cells 
 
 
 @dataclass(frozen=True, eq=False)
-class MTF:
+class MTF(ReadOnlyArrays):
     """Modulation transfer function on a square grid of spatial frequencies, zero frequency at n//2.
 
     tensor: contrast as a Dr.Jit tensor (wavelength, fy, fx), which is 1 at zero frequency; mtf: the same in NumPy.
@@ -42,6 +44,7 @@ class MTF:
     cutoff: highest frequency [1/m] that a pupil of this size transmits, 2 sin θ / λ, (wavelength,).
     predicted_error: predicted error of any contrast, at the grid's frequencies and between them, (wavelength,).
     shares: fraction of all arriving light in each sample of the PSF, as a Dr.Jit tensor (wavelength, y, x).
+    centre: position (x, y) [m] of sample n//2 of the PSF.
     """
 
     tensor: Array
@@ -50,25 +53,21 @@ class MTF:
     cutoff: np.ndarray
     predicted_error: np.ndarray
     shares: Array
+    centre: tuple[float, float] = (0.0, 0.0)
 
     @classmethod
-    def from_shares(cls, shares: Array, dx: float, cutoff: np.ndarray, error: np.ndarray) -> MTF:
-        """Return the MTF of samples that are dx [m] apart."""
+    def from_shares(cls, shares: Array, window: Grid, cutoff: np.ndarray, error: np.ndarray) -> MTF:
+        """Return the MTF of samples on a window of the sensor."""
         import drjit as dr
 
-        types = precision("float64")
-        waves, (height, width) = shares.shape[0], shares.shape[1:]
-        side = max(height, width)
-        pitch, cells = 1 / (side * dx), dr.arange(types.Index, height * width)
+        types, side = precision("float64"), max(window.shape)
         at_zero = dr.arange(types.Index, side * side) == (side // 2) * side + side // 2
-        planes, nothing = [], dr.zeros(types.Float, height * width)
-        for index in range(waves):
-            plane = dr.gather(types.Float, shares.array, cells + index * height * width)
-            otf = dft2(Field(plane, nothing, Grid((height, width), dx), types), side, (side, side), -1, pitch)
-            planes.append(dr.select(at_zero, 1, dr.sqrt(dr.maximum(otf.intensity, 1e-300))))
-        tensor = types.Tensor(planes[0] if waves == 1 else dr.concat(planes), (waves, side, side))
-        f = Grid.square(side, pitch).x
-        return cls(tensor, f, f, cutoff, error, shares)
+        planes = [
+            dr.select(at_zero, 1, dr.sqrt(dr.maximum(otf.intensity, 1e-300))) for otf in _transforms(shares, window.dx)
+        ]
+        tensor = types.Tensor(planes[0] if len(planes) == 1 else dr.concat(planes), (len(planes), side, side))
+        f = Grid.square(side, 1 / (side * window.dx)).x
+        return cls(tensor, f, f, cutoff, error, shares, window.centre)
 
     def __repr__(self) -> str:
         planes = f"{self.tensor.shape[0]} wavelengths or types, to {self.fx[-1]:.3g} cycles per metre"
@@ -76,7 +75,25 @@ class MTF:
 
     @cached_property
     def mtf(self) -> np.ndarray:
-        return np.asarray(self.tensor.numpy())
+        return read_only(np.asarray(self.tensor.numpy()))
+
+    @cached_property
+    def phase(self) -> np.ndarray:
+        """Phase of the optical transfer function ∫ PSF(x, y) exp(-2πi (fx x + fy y)) dx dy [rad], from -π to π.
+
+        It has the shape of `mtf`, without derivatives. An image at the position (x, y) on the sensor has the phase -2π
+        (fx x + fy y). A phase of π is a reversal of contrast. Where the contrast is c, an error e of the contrasts
+        changes the phase by at most about e/c.
+        """
+        turns = np.add.outer(self.fy * self.centre[1], self.fx * self.centre[0])
+        there = np.exp(-2j * np.pi * turns)
+        planes = [otf.numpy() * there for otf in _transforms(self.shares, self._dx)]
+        return read_only(np.angle(np.stack(planes)))
+
+    @property
+    def _dx(self) -> float:
+        """Pitch of the PSF's samples [m]; 1 for a single sample, whose only frequency is 0."""
+        return 1 / (self.fx.size * float(self.fx[1] - self.fx[0])) if self.fx.size > 1 else 1.0
 
     def first(self, count: int) -> MTF:
         """Return the MTF of the first `count` wavelengths.
@@ -86,7 +103,7 @@ class MTF:
         """
         count = whole("count", count, 1, self.tensor.shape[0])
         tensor, shares = (_first(part, count) for part in (self.tensor, self.shares))
-        return MTF(tensor, self.fx, self.fy, self.cutoff[:count], self.predicted_error[:count], shares)
+        return MTF(tensor, self.fx, self.fy, self.cutoff[:count], self.predicted_error[:count], shares, self.centre)
 
     def profile(self, frequencies: np.ndarray) -> np.ndarray | Array:
         """Return the mean over all orientations at radial `frequencies` [1/m], (wavelength, frequency).
@@ -136,14 +153,26 @@ class MTF:
         import drjit as dr
 
         types, waves = precision("float64"), self.shares.shape[0]
-        dx = 1 / (self.fx.size * (self.fx[1] - self.fx[0]))
-        turns = np.array([np.outer(f, part).ravel() * dx for part in (np.cos(angle), np.sin(angle))])
+        turns = np.array([np.outer(f, part).ravel() * self._dx for part in (np.cos(angle), np.sin(angle))])
         told = (np.abs(turns) <= 0.5 * (1 + 1e-9)).all(axis=0)
         p, q = np.where(told, turns, 0)
         sums = ScatteredSum(p, q, self.shares.shape[1:], DIGITS)
         re, im = sums_at(sums, types.Float(flat(self.shares)))
         contrast = dr.sqrt(dr.maximum(re * re + im * im, 1e-300)) * types.Float(np.tile(told, waves))
         return dr.block_reduce(dr.ReduceOp.Add, contrast, angle.size)
+
+
+def _transforms(shares: Array, dx: float) -> Iterator[Field]:
+    """Yield the transform of the samples at each wavelength; the origin is sample n//2."""
+    import drjit as dr
+
+    types, (waves, height, width) = precision("float64"), shares.shape
+    side, cells = max(height, width), dr.arange(types.Index, height * width)
+    nothing = dr.zeros(types.Float, height * width)
+    for index in range(waves):
+        plane = dr.gather(types.Float, shares.array, cells + index * height * width)
+        field = Field(plane, nothing, Grid((height, width), dx), types)
+        yield dft2(field, side, (side, side), -1, 1 / (side * dx))
 
 
 def _first(tensor: Array, count: int) -> Array:

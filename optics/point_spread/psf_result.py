@@ -22,6 +22,7 @@ from optics.numerics.arguments import reals, shown
 from optics.numerics.autodiff import Array, Scalar, number, to_user
 from optics.numerics.grid import Grid, OnWindow
 from optics.numerics.precision import precision
+from optics.numerics.read_only import ReadOnlyArrays, read_only
 from optics.numerics.renamed import renamed
 from optics.point_spread.mixture import mixed
 from optics.point_spread.pictures import pictures
@@ -38,7 +39,7 @@ OF_CELLS = ("pinhole", "geometric", "perfect_lens")  # methods whose samples are
 
 
 @dataclass(frozen=True, eq=False)
-class PSFResult(OnWindow):
+class PSFResult(ReadOnlyArrays, OnWindow):
     """A PSF on a grid of positions on the sensor. Sample n//2 is at `centre` (x, y) [m], and y increases with the row.
 
     tensor: the PSF as a Dr.Jit tensor (wavelength, y, x) that carries the derivatives of the parameters.
@@ -68,7 +69,7 @@ class PSFResult(OnWindow):
         if self.field_parts is None:
             return None
         re, im = (np.asarray(part.numpy()) for part in self.field_parts)
-        return re + 1j * im
+        return read_only(re + 1j * im)
 
     def __repr__(self) -> str:
         """Return a short description that omits the requests, because these contain grids of slopes."""
@@ -78,7 +79,7 @@ class PSFResult(OnWindow):
 
     @cached_property
     def psf(self) -> np.ndarray:
-        return self.tensor if isinstance(self.tensor, np.ndarray) else np.asarray(self.tensor.numpy())
+        return read_only(self.tensor if isinstance(self.tensor, np.ndarray) else np.asarray(self.tensor.numpy()))
 
     @property
     def plan(self) -> Plan:

@@ -16,6 +16,7 @@ from optics.numerics.arguments import flag, in_range, reals, shown, whole
 from optics.numerics.autodiff import Array, plain, to_user
 from optics.numerics.grid import Grid, OnWindow
 from optics.numerics.precision import padded_for_packets, precision
+from optics.numerics.read_only import ReadOnlyArrays, read_only
 from optics.point_spread.concentration import encircled_energy, strehl_ratio
 from optics.point_spread.contrast import combined_mtf
 from optics.point_spread.mixture import mixed
@@ -35,7 +36,7 @@ OF_PICTURES = 0.5  # choice: part of the tolerance that the PSFs may use; the re
 
 
 @dataclass(frozen=True, eq=False)
-class WhitePSF(OnWindow):
+class WhitePSF(ReadOnlyArrays, OnWindow):
     """PSFs in white light, one for each type of receptor: Σ_λ w(λ) PSF_λ with weights that sum to 1.
 
     waves: the monochromatic PSFs (wavelength, y, x) of the sum.
@@ -73,7 +74,7 @@ class WhitePSF(OnWindow):
     @cached_property
     def psf(self) -> np.ndarray:
         """PSFs [1/m²], (type, y, x)."""
-        return np.asarray(self.tensor.numpy())
+        return read_only(np.asarray(self.tensor.numpy()))
 
     @property
     def predicted_error(self) -> np.ndarray:

@@ -24,6 +24,7 @@ from optics.numerics.arguments import complexes, finite, in_range, shown, vacuum
 from optics.numerics.fourier import fourier_sum, kept_indices, periodic_spectrum, periodic_sum, predicted_seconds
 from optics.numerics.grid import Grid, OnWindow
 from optics.numerics.precision import Precision, precision
+from optics.numerics.read_only import ReadOnlyArrays
 from optics.propagation.transfer_function import EVERYTHING, Passage, TransferFunction, evanescent
 from optics.propagation.transform_sampling import TransformSampling, blur_left, blurred_back, most_spare, sampling
 
@@ -47,7 +48,7 @@ ONE = np.ones(1)  # weight of a sum without weights
 
 
 @dataclass(frozen=True, eq=False)
-class PropagationResult(OnWindow):
+class PropagationResult(ReadOnlyArrays, OnWindow):
     """A propagated field.
 
     u: complex field (…, y, x) at the pitch dx [m]. Sample n//2 is the centre.

@@ -16,6 +16,7 @@ from optics.numerics.accuracy import FLOAT_NOISE, AccuracyError, Plan
 from optics.numerics.arguments import complexes, in_range, of_kind, positive, shape_2d, shown, vacuum_wavelength
 from optics.numerics.grid import Grid, OnWindow
 from optics.numerics.precision import precision
+from optics.numerics.read_only import ReadOnlyArrays
 from optics.propagation.planes import PlaneField, PupilSampling, StepSettings, Stop
 
 __all__ = ["FreeSpace", "StackResult", "SystemStep", "propagate_through"]
@@ -56,7 +57,7 @@ class SystemStep:
 
 
 @dataclass(frozen=True, eq=False)
-class StackResult(OnWindow):
+class StackResult(ReadOnlyArrays, OnWindow):
     """A field behind a system.
 
     u: complex field (y, x) at the pitch dx [m]. Sample n//2 is the centre.

@@ -10,6 +10,7 @@ import numpy as np
 
 from optics.numerics.arguments import flag, shown, whole
 from optics.numerics.interpolation import linear_weights
+from optics.numerics.read_only import ReadOnlyArrays
 from optics.numerics.renamed import renamed
 from optics.spectra.pigment import pigment_absorptance
 from optics.spectra.receptors import Receptors, receptors_of
@@ -22,7 +23,7 @@ CATCHES_FIRST = 1e4  # choice: weight of quantum catches relative to means in th
 
 
 @dataclass(frozen=True)
-class SpectralBands:
+class SpectralBands(ReadOnlyArrays):
     """Bands of light and their weights for each receptor channel.
 
     wavelengths: centres of the bands [m], (band,).

@@ -49,8 +49,8 @@ class Animals:
             if senses is not None:
                 _require_fit(other, senses)
 
-    def seed(self, seed: int) -> None:
-        """Restart all random streams from this seed."""
+    def seed(self, seed: int | tuple[int, ...]) -> None:
+        """Restart all random streams, from one seed or from a seed for each world."""
         self.simulation.seed(seed)
         for senses in self.seeing:
             senses.restart()

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from optics.numerics.arguments import shown
 from sim.envs import held_state
 from sim.envs.animals import Advanced, Animals
 from sim.envs.one_environment import OneEnvironment
@@ -99,6 +100,22 @@ class EyesVecEnv(OneEnvironment):
         observations = self.animals.reset()
         self.reset_infos = self._first_infos(self._everyone)
         return _rows(observations)
+
+    def seed_worlds(self, seeds: Sequence[int | None]) -> None:
+        """Seed each world with its own number at the next reset. Its episodes are then those of a single environment
+        with this seed. None: the world continues its own random numbers.
+
+        Raises:
+            ValueError: another number of seeds, or a seed that is not a whole number from 0 on.
+        """
+        own = self.simulation.streams.episodes
+        if len(seeds) != len(own):
+            raise ValueError(f"seed has {len(seeds)} numbers: must have one for each of {len(own)} worlds")
+        for world, seed in enumerate(seeds):
+            if seed is not None and (isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0):
+                raise ValueError(f"seed[{world}] = {shown(seed)}: must be a whole number, at least 0, or None")
+        drawn = (int(rng.integers(2**63)) if seed is None else int(seed) for seed, rng in zip(seeds, own, strict=True))
+        self.animals.seed(tuple(drawn))
 
     def step_async(self, actions: np.ndarray) -> None:
         actions = np.asarray(actions, np.float32)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -21,6 +22,9 @@ class EyesVectorEnv(VectorEnv[dict[str, np.ndarray], np.ndarray, np.ndarray]):
     Worlds restart in the step that ends their episode (`AutoresetMode.SAME_STEP`), as in Gymnasium's `SyncVectorEnv`.
     The returned observation and info are then the first of the new episode. info["final_obs"] and info["final_info"]
     contain the last observation and info of the old episode.
+
+    `reset` accepts one seed or, as Gymnasium's `SyncVectorEnv`, a list with a seed for each world. With a list, world i
+    has the episodes of a single environment with seed i of the list; None continues the world's own random numbers.
 
     task, eyes, memory, mode ...: see `sim.make_vec_env`
 
@@ -47,13 +51,13 @@ class EyesVectorEnv(VectorEnv[dict[str, np.ndarray], np.ndarray, np.ndarray]):
         self.action_space = batch_space(self.single_action_space, num_envs)
 
     def reset(
-        self, *, seed: int | list[int | None] | None = None, options: dict[str, Any] | None = None
+        self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
         if options:
             raise ValueError(f"reset: options = {options!r}: must be left out, reset has no options")
-        if isinstance(seed, list):
-            raise ValueError("reset: seed: must be one number; every world derives its own random streams from it")
-        if seed is not None:
+        if isinstance(seed, Sequence | np.ndarray):
+            self._batch.seed_worlds(seed)
+        elif seed is not None:
             self._batch.seed(seed)
         return self._batch.reset(), self._together(self._batch.reset_infos)
 

@@ -16,12 +16,13 @@ from functools import cached_property
 import numpy as np
 import scipy.sparse
 
+from optics.numerics.read_only import ReadOnlyArrays
 from sim.eyes.depth_layers import ONE_PSF, DepthLayers
 from sim.eyes.receptor_sums import ReceptorSums, RowProduct, of_bands, of_components, of_receptors
 
 
 @dataclass(frozen=True)
-class BoxSensor:
+class BoxSensor(ReadOnlyArrays):
     """Sensor of an eye with a perfect lens: a receptor's signal is the mean of the light over the receptor's square.
 
     directions: unit vectors in the eye's frame (x right, y up, z optical axis), (ray, 3) float32; ray = receptor *
@@ -56,7 +57,7 @@ class BoxSensor:
 
 
 @dataclass(frozen=True)
-class ReceptiveFieldSensor:
+class ReceptiveFieldSensor(ReadOnlyArrays):
     """Sensor of an eye behind a pupil, whose receptors and bands all use the same set of directions.
 
     The directions are drawn from the mixture of all receptive fields. A receptor's signal is a weighted sum

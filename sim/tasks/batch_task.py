@@ -189,7 +189,10 @@ class BatchTask(TaskSettings):
         return (Agent(label, n_actions, kinds_of(self), auxiliary, first),)
 
     def streams(self, seed: Any, n: int) -> RandomStreams:
-        """Return the random number generators of the worlds."""
+        """Return the random streams of the worlds.
+
+        seed: one seed for all worlds, None, or a tuple with a seed for each world
+        """
         return StreamsByWorld(seed, n, [len(agent.kinds) for agent in self.agents()])
 
     def in_mode(self, mode: str) -> Self:

@@ -53,11 +53,10 @@ class StreamsByPurpose:
     """
 
     def __init__(self, seed: Any, n: int, kinds: Sequence[int] = (1,)) -> None:
-        root = np.random.SeedSequence(seed)
-        self.entropy = root.entropy
+        self.entropy, roots = _roots(seed, n)
 
         def children(*purpose: int) -> list[np.random.SeedSequence]:
-            return [np.random.SeedSequence(root.entropy, spawn_key=(i, *purpose)) for i in range(n)]
+            return [np.random.SeedSequence(entropy, spawn_key=(i, *purpose)) for entropy, i in roots]
 
         self.episodes, motion = (
             [np.random.Generator(np.random.PCG64(child)) for child in children(purpose)] for purpose in (0, 1)
@@ -89,8 +88,8 @@ class StreamsByWorld:
     """
 
     def __init__(self, seed: Any, n: int, kinds: Sequence[int] = (1,)) -> None:
-        self.entropy = np.random.SeedSequence(seed).entropy
-        children = [np.random.SeedSequence(self.entropy, spawn_key=(i,)) for i in range(n)]
+        self.entropy, roots = _roots(seed, n)
+        children = [np.random.SeedSequence(entropy, spawn_key=(i,)) for entropy, i in roots]
         self.episodes = self.variation = [np.random.default_rng(child) for child in children]
         drawn = np.array([child.generate_state(sum(kinds), np.uint64) for child in children]).T
         # The first keys go to the first kind of eyes of every agent. If an agent gets a second kind of eyes, the noise
@@ -153,6 +152,18 @@ class MotionNoise:
         if left != len(self._drawn):
             raise ValueError("state: objects are at another action than elsewhere: must be set for all worlds at once")
         self._drawn[:, :, worlds] = np.transpose(ahead[worlds, AHEAD - left :], (1, 2, 0, 3))
+
+
+def _roots(seed: Any, n: int) -> tuple[Any, list[tuple[Any, int]]]:
+    """Return the entropy of all streams, and for each world the entropy and the index from which its streams derive.
+
+    seed: one seed, which the worlds share with different indices; or a tuple with a seed for each world, whose streams
+        are those of the first world of a batch with this seed
+    """
+    if isinstance(seed, tuple):
+        return seed, [(own, 0) for own in seed]
+    entropy = np.random.SeedSequence(seed).entropy
+    return entropy, [(entropy, i) for i in range(n)]
 
 
 def _states(generators: Sequence[np.random.Generator]) -> np.ndarray:

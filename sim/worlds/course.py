@@ -15,6 +15,7 @@ from functools import cached_property
 import numpy as np
 
 from optics.numerics.arguments import of_kind, whole
+from optics.numerics.read_only import read_only
 from sim.worlds.layout import CELL, cell_centers
 
 Cell = tuple[int, int]  # row, column
@@ -81,13 +82,12 @@ class Course:
     @cached_property
     def signs(self) -> np.ndarray:
         """Characters of the drawing, (row, column), row 0 in the south."""
-        return np.array([list(line) for line in reversed(self.drawing.split())])
+        return read_only(np.array([list(line) for line in reversed(self.drawing.split())]))
 
     @cached_property
     def walls(self) -> np.ndarray:
         """Cells that are walls, boolean (row, column)."""
-        walls: np.ndarray = self.signs == _WALL
-        return walls
+        return read_only(self.signs == _WALL)
 
     @property
     def starts(self) -> list[Cell]:
@@ -104,7 +104,7 @@ class Course:
         """Cells of the goal, boolean (row, column)."""
         goal = ~self.walls
         goal[:, : -1 - GOAL_COLUMNS] = False
-        return goal
+        return read_only(goal)
 
     @cached_property
     def way(self) -> np.ndarray:
@@ -118,7 +118,7 @@ class Course:
                 if longer < way[other] - 1e-9:
                     way[other] = longer
                     heapq.heappush(queue, (longer, other))
-        return way
+        return read_only(way)
 
     def heading(self, cell: Cell) -> float:
         """Return the direction of the shortest path to the goal from a cell [rad], counterclockwise from east."""

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import mujoco
 import numpy as np
 
+from optics.numerics.read_only import ReadOnlyArrays
 from optics.spectra.spectrum import Spectrum
 
 CELL = 2.0  # [m] side of a grid cell
@@ -27,7 +28,7 @@ WALL_CONAFFINITY = 1
 
 
 @dataclass(frozen=True)
-class Starts:
+class Starts(ReadOnlyArrays):
     """Starting positions of agents.
 
     position: positions [m], (n, 2)
@@ -39,7 +40,7 @@ class Starts:
 
 
 @dataclass(frozen=True)
-class Layout:
+class Layout(ReadOnlyArrays):
     """Objects, starting positions and goal region that a task adds to a world.
 
     objects: names of mocap sphere bodies

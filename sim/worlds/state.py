@@ -11,11 +11,12 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
+from optics.numerics.read_only import ReadOnlyArrays
 from sim.worlds.world import World
 
 
 @dataclass(frozen=True)
-class WorldState:
+class WorldState(ReadOnlyArrays):
     """All worlds of a batch at one instant; the first axis is the world.
 
     position: position of the agent [m], (n, 2)

@@ -13,6 +13,7 @@ import mujoco
 import numpy as np
 
 from optics.numerics.arguments import did_you_mean, of_kind, shown, whole
+from optics.numerics.read_only import ReadOnlyArrays
 from optics.spectra.spectrum import Spectrum
 from sim.eyes.eyes import BODY_RADIUS, EYE_HEIGHT, Eyes, camera_rotations, eye_positions
 from sim.scene.spectra import resolve
@@ -38,7 +39,7 @@ WHISKER_LENGTH = MAX_SPEED * TIMESTEP  # [m]
 
 
 @dataclass(frozen=True)
-class World:
+class World(ReadOnlyArrays):
     """A compiled world.
 
     model: MuJoCo model. It contains static geoms and mocap bodies for the objects. The body "agent" has the slide

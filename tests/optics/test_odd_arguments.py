@@ -24,6 +24,7 @@ SOURCE = {"source_distance": math.inf, "source_angle": (0.0, 0.0), "centre": (0.
 
 # Valid calls, small enough that hundreds of variants take seconds.
 SHAPES = {
+    "Bitmap": {"image": np.eye(3)},
     "Annulus": {"inner": 0.3},
     "Disk": {"radius": 0.3, "centre": (0.0, 0.1)},
     "Oblong": {"width": 0.3, "height": 0.2, "centre": (0.0, 0.0), "rotation_deg": 0.0},
@@ -64,6 +65,7 @@ ELEMENTS = {
     "WavefrontMap": {"samples": np.zeros((4, 4)), "radius": 1.0},
     "Zernike": {"coefficients_um": [0, 0, 0, 0.1], "radius": 1e-3},
     "medium": {"name": "water"},
+    "phase_pupil": {"aperture_radius": 2e-5, "phase": np.ones((4, 4)), "pixels": False, "mask": None},
 }
 SPECTRA = {
     "Cornu": {"a": 1.5, "b_um": 0.01, "c_um": 0.1},
@@ -107,6 +109,13 @@ PICTURES = {
     "plan": dict(pupil=LENS, wavelength=550e-9, **PICTURE, **SOURCE),
     "psf": dict(pupil=LENS, wavelengths=[550e-9], field=False, **PICTURE, **SOURCE),
     "psf_batch": dict(pupils=[LENS], wavelengths=[550e-9], source_distances=[math.inf], **PICTURE),
+    "through_focus": {
+        "pupil": LENS,
+        "sensor_distances": [240e-6],
+        "wavelengths": [550e-9],
+        "dx": 5e-7,
+        "shape": (9, 9),
+    },
     "vector_focus": {
         "pupil": WIDE,
         "wavelength": 550e-9,
@@ -163,7 +172,17 @@ def test_any_argument(name):
 def test_nothing_of_the_face_is_forgotten():
     """Omitted names are results of optics itself, or take the same arguments as names that are tested here."""
     made = {"AccuracyError", "BackendError", "MTF", "Mode", "PSFBatch", "PSFResult", "Plan", "PropagationResult"}
-    made |= {"ExitPupil", "SpectralBands", "StackResult", "VectorFocus", "WhitePSF", "Relief", "Circle", "Combined"}
+    made |= {
+        "ExitPupil",
+        "SpectralBands",
+        "StackResult",
+        "VectorFocus",
+        "WhitePSF",
+        "ThroughFocus",
+        "Relief",
+        "Circle",
+        "Combined",
+    }
     like_others = {
         "difference",
         "intersection",

@@ -1,6 +1,7 @@
 """Tests that fail when a module of optics/apertures is broken.
 
 aperture: test_aperture.py
+bitmap: test_bitmap.py
 boundary: test_combined.py, test_nearly_touching.py
 circular: test_aperture.py
 combined: test_combined.py

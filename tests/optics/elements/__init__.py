@@ -4,6 +4,7 @@ beam: methods/test_textbook.py
 exit_pupil: test_exit_pupil.py
 fine_detail: test_fine_detail.py, eye/test_scattered_light.py
 human_eye: test_human_eye.py
+phase_pupil: test_phase_pupil.py
 pixel_relief: test_pixel_relief.py
 pupil: test_pupil.py
 ray_field: point_spread/test_vector_focus.py
@@ -14,4 +15,5 @@ square_samples: test_relief.py, methods/test_even_pupils.py
 transmittance: test_transmittance.py
 wavefront: test_wavefront.py
 wavefront_slopes: test_pupil.py
+zernike_order: test_zernike_order.py
 """

@@ -17,6 +17,7 @@ matrices: test_fourier.py
 precision: test_precision.py
 quadrature: test_quadrature.py
 radial_profile: test_radial_profile.py
+read_only: optics/test_read_only.py, sim/envs/test_handed_out.py
 renamed: test_renamed.py
 scattered_sum: test_scattered_sum.py
 """

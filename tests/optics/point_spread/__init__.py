@@ -16,6 +16,7 @@ psf: test_psf.py, test_field.py, test_derivatives.py, test_robustness.py
 request: test_request.py, test_psf.py
 psf_result: test_psf.py, test_measure_errors.py
 spot_check: test_spot_check.py
+through_focus: test_through_focus.py
 vector_focus: test_vector_focus.py, test_foci.py
 white: test_white.py
 """

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 import optics
+from optics.numerics.grid import Grid
 from optics.numerics.precision import precision
 from optics.point_spread import modulation_transfer
 from optics.point_spread.modulation_transfer import MTF
@@ -48,10 +49,10 @@ def test_as_many_orientations_as_the_picture_needs():
     f = np.linspace(0.3, 0.5, 11) / dx
     fine, few = (radial_means(shares[0], dx, f, n) for n in (4096, 64))
     assert np.abs(few - fine).max() > 0.03
-    found = MTF.from_shares(tensor, dx, np.array([1e6]), np.array([2e-3])).profile(f)[0]
+    found = MTF.from_shares(tensor, Grid((81, 81), dx), np.array([1e6]), np.array([2e-3])).profile(f)[0]
     assert np.abs(found - fine).max() < 1e-3
     with pytest.raises(optics.AccuracyError, match="a mean over 1024 orientations has"):
-        MTF.from_shares(tensor, dx, np.array([1e6]), np.array([1e-6])).profile(f)
+        MTF.from_shares(tensor, Grid((81, 81), dx), np.array([1e6]), np.array([1e-6])).profile(f)
 
 
 def test_many_frequencies_are_summed_some_at_a_time(monkeypatch):
@@ -98,3 +99,82 @@ def test_quality_says_what_its_steps_may_miss():
     missed = abs(value - exact)
     assert missed > 1e-5
     assert missed < error - optics.mtf(result, tolerance=0.05).predicted_error[0]
+
+
+def turned(first, second):
+    """Return the largest angle between phases [rad]."""
+    return np.abs(np.angle(np.exp(1j * (first - second)))).max()
+
+
+@pytest.mark.parametrize("shape", [(24, 31), (41, 40)])
+def test_the_phase_is_that_of_the_fourier_sum_over_positions_on_the_sensor(shape):
+    """The window lies off the axis, and coma makes the PSF lopsided. The opposite sign is wrong by radians."""
+    rng = np.random.default_rng(shape)
+    centre = tuple(rng.uniform(-3e-6, 3e-6, 2).tolist())
+    lens = optics.Pupil(1e-3, thin_lens_focal_length=4e-3, wavefront=optics.Zernike({(3, 1): 0.08, (3, -1): 0.05}))
+    result = optics.psf(lens, [500e-9, WAVELENGTH], dx=0.5e-6, shape=shape, centre=centre, tolerance=1e-4)
+    transfer = optics.mtf(result, tolerance=1)
+    assert transfer.phase.shape == transfer.mtf.shape
+    rows, columns = (
+        np.exp(-2j * np.pi * np.outer(f, at)) for f, at in ((transfer.fy, result.y), (transfer.fx, result.x))
+    )
+    otf = rows @ result.psf.astype(float) @ columns.T
+    bright = transfer.mtf > 0.01  # elsewhere, rounding of the float32 PSF turns the phase by more than 1e-4
+    assert bright.mean() > 0.2
+    assert turned(transfer.phase[bright], np.angle(otf)[bright]) < 1e-4
+    assert turned(transfer.phase[bright], np.angle(otf.conj())[bright]) > 1
+
+
+def test_finer_and_wider_samples_leave_the_phase():
+    """`mtf` recomputes coarse or narrow windows, whose sample n//2 then lies elsewhere."""
+    how = {"wavelengths": [WAVELENGTH], "centre": (2e-6, -1e-6), "tolerance": 1e-4}
+    lens = optics.Pupil(1e-3, thin_lens_focal_length=4e-3, wavefront=optics.Zernike({(3, 1): 0.05}))
+    coarse = optics.mtf(optics.psf(lens, dx=2e-6, shape=(30, 30), **how), tolerance=0.02)
+    fine = optics.mtf(optics.psf(lens, dx=0.5e-6, shape=(240, 240), **how), tolerance=0.02)
+    at = slice(coarse.fx.size // 2, coarse.fx.size // 2 + 8)
+    f = coarse.fx[at]
+    near = np.array([np.abs(fine.fx - each).argmin() for each in f])
+    slope = -2 * np.pi * 2e-6  # of an image at the centre of the window; coma turns the phase by less
+    assert np.abs(fine.fx[near] - f).max() * abs(slope) < 0.2
+    difference = coarse.phase[0, coarse.fy.size // 2, at] - fine.phase[0, fine.fy.size // 2, near]
+    assert turned(difference, slope * (f - fine.fx[near])) < 0.1
+
+
+def test_a_shift_turns_the_phase_and_defocus_reverses_contrast():
+    """The source's direction moves the image to z tan θ (a paraxial estimate). Far out of focus, geometric optics gives
+    the OTF 2 J1(a)/a with a = 2π f R dz/z, which is negative between its zeros at a = 3.83 and 7.02 (Goodman,
+    Introduction to Fourier Optics, §6.4.4)."""
+    slow = optics.Pupil(1e-3, thin_lens_focal_length=40e-3)
+    angle = 1.5e-4
+    aside = optics.mtf(
+        optics.psf(slow, [WAVELENGTH], source_angle=(angle, 0), dx=4e-6, shape=(65, 65), tolerance=1e-4), tolerance=0.1
+    )
+    half, some = aside.fx.size // 2, aside.fx.size // 8
+    right = -2 * np.pi * aside.fx[half : half + some] * 40e-3 * np.tan(angle)
+    assert turned(aside.phase[0, half, half : half + some], right) < 0.02
+    blurred = optics.mtf(
+        optics.psf(slow, [WAVELENGTH], 44e-3, dx=5e-6, shape=(181, 181), tolerance=1e-3), tolerance=0.1
+    )
+    a = 2 * np.pi * np.abs(blurred.fx) * 1e-3 * 4e-3 / 40e-3
+    phase = np.abs(blurred.phase[0, blurred.fy.size // 2])
+    positive, negative = a < 3.4, (a > 4.4) & (a < 6.6)
+    assert positive.sum() > 3
+    assert negative.sum() > 3
+    assert phase[positive].max() < 0.1
+    assert phase[negative].min() > np.pi - 0.1
+
+
+def test_the_phase_in_white_light_and_of_one_sample():
+    lens = optics.Pupil(1e-3, thin_lens_focal_length=4e-3, wavefront=optics.Zernike({(3, 1): 0.05}))
+    white = optics.white_psf(lens, waves=17, dx=0.5e-6, shape=(41, 41), tolerance=0.05)
+    transfer = white.mtf(0.2)
+    rows, columns = (
+        np.exp(-2j * np.pi * np.outer(f, at)) for f, at in ((transfer.fy, white.y), (transfer.fx, white.x))
+    )
+    if transfer.fx.size == 41:
+        otf, bright = rows @ white.psf.astype(float) @ columns.T, transfer.mtf > 0.05
+        assert turned(transfer.phase[bright], np.angle(otf)[bright]) < 1e-3
+    assert transfer.phase.shape == transfer.mtf.shape
+    single = optics.mtf(optics.Eye(None, resolution=(3, 3)).psf(), tolerance=1)
+    assert single.phase.shape == single.mtf.shape == (4, 1, 1)
+    assert not single.phase.any()

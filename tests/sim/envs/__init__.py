@@ -5,7 +5,7 @@ parallel_env: test_parallel_env.py, test_pictures.py
 auxiliary: test_auxiliary.py
 one_environment: test_vec_env.py, test_pictures.py
 env: test_env.py
-vec_env: test_vec_env.py, test_env.py, test_light_levels.py
+vec_env: test_vec_env.py, test_env.py, test_light_levels.py, test_handed_out.py
 vector_env: test_vector_env.py
 registered_env: test_vector_env.py
 registration: test_env.py, test_vector_env.py, worlds/test_catalog.py

@@ -184,8 +184,6 @@ def test_what_is_not_done_is_refused():
     env = EyesVectorEnv(2, task=Face())
     with pytest.raises(ValueError, match=r"reset: options = .*: must be left out"):
         env.reset(options={"light": 2})
-    with pytest.raises(ValueError, match="reset: seed: must be one number"):
-        env.reset(seed=[1, 2])
     with pytest.raises(ValueError, match=r"reset: options = .*: must be left out"):
         sim.make_env(Face()).reset(options={"light": 2})
 
@@ -197,3 +195,65 @@ def test_gymnasium_finds_it_by_the_name_of_the_module():
     )
     found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert "RegisteredVectorEnv" in found.stdout
+
+
+@pytest.mark.parametrize(
+    ("task", "options"),
+    [
+        (Leaving(), {"memory": 2}),
+        ("tracking", {"vary": {"light": (0.1, 1.0)}, "episode_steps": 3, **OPTIONS}),
+        ("maze", {"mazes": 3, "episode_steps": 3, **OPTIONS}),
+    ],
+)
+def test_a_list_of_seeds_gives_every_world_the_episodes_of_its_seed(task, options):
+    """Gymnasium's own vector of single environments is the reference: equal to the last bit, also after a restart."""
+    rng = np.random.default_rng()
+    seeds = rng.integers(10**6, size=3).tolist()
+    seeds[2] = seeds[0]
+    env = EyesVectorEnv(3, task=task, **options)
+    single = SyncVectorEnv([lambda: sim.make_env(task, **options)] * 3, autoreset_mode=AutoresetMode.SAME_STEP)
+    for given in (seeds, seeds[::-1]):
+        here, there = env.reset(seed=given)[0], single.reset(seed=given)[0]
+        ends = 0
+        for _ in range(7):
+            for name, array in there.items():
+                np.testing.assert_array_equal(here[name], array, f"{name}, seeds {given}")
+            actions = np.tile(rng.uniform(-1, 1, env.single_action_space.shape).astype(np.float32), (3, 1))
+            here, reward, *ended, _ = env.step(actions)
+            there, expected, *endings, _ = single.step(actions)
+            np.testing.assert_allclose(reward, expected, rtol=1e-6)  # float32 here
+            np.testing.assert_array_equal(ended, endings)
+            ends += np.any(ended)
+        assert ends
+        np.testing.assert_array_equal(here["eyes"][0], here["eyes"][2])  # equal seeds
+        assert not np.array_equal(here["eyes"][0], here["eyes"][1])
+
+
+def test_none_continues_a_worlds_own_random_numbers():
+    def starts(*resets):
+        env = EyesVectorEnv(2, task="detection", **OPTIONS)
+        return [env.reset(seed=seed)[0]["eyes"] for seed in resets]
+
+    first, second = starts([3, 4], [5, None])
+    again = starts([3, 4], [5, None])
+    np.testing.assert_array_equal(second, again[1])  # the same history gives the same episodes
+    assert not np.array_equal(first[1], second[1])
+    np.testing.assert_array_equal(second[0], starts([5, 6])[0][0])
+    other = starts([3, 8], [5, None])
+    np.testing.assert_array_equal(second[0], other[1][0])
+    assert not np.array_equal(second[1], other[1][1])
+
+
+@pytest.mark.parametrize(
+    ("seed", "says"),
+    [
+        ([1], r"seed has 1 numbers: must have one for each of 2 worlds"),
+        ([1, -1], r"seed\[1\] = -1: must be a whole number, at least 0, or None"),
+        ([1, 2.5], r"seed\[1\] = 2.5: must be"),
+        ([True, 2], r"seed\[0\] = True: must be"),
+    ],
+)
+def test_bad_lists_of_seeds_are_refused(seed, says):
+    env = EyesVectorEnv(2, task=Face())
+    with pytest.raises(ValueError, match=says):
+        env.reset(seed=seed)

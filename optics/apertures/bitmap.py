@@ -1,0 +1,74 @@
+"""Openings drawn as images of zeros and ones."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from optics.apertures.outline import Outline
+from optics.numerics.arguments import reals
+from optics.numerics.read_only import ReadOnlyArrays
+
+__all__ = ["Bitmap"]
+
+MOST = 512  # choice: largest number of pixels along a side
+MOST_EDGES = 4000  # choice: an outline of this many straight edges takes about five seconds
+
+
+@dataclass(frozen=True, eq=False)
+class Bitmap(ReadOnlyArrays):
+    """A shape made of the open pixels of a square image: `union(Bitmap(image))` is the aperture.
+
+    The pixels fill the pupil's square [-R, R]², and their edges are exact. Parts outside the pupil's circle are closed.
+
+    image: (n, n), (y, x), 1 (or True) where light passes, 0 (or False) elsewhere; rows grow with y.
+
+    Raises:
+        ValueError: not square, more than 512 pixels along a side, more than 4,000 edges, or other values.
+    """
+
+    image: Any
+
+    def __post_init__(self) -> None:
+        image = reals("image", self.image)
+        if image.ndim != 2 or image.shape[0] != image.shape[1] or not 1 <= len(image) <= MOST:
+            raise ValueError(f"image has shape {image.shape}: must be square (n, n), n from 1 to {MOST}")
+        if not np.isin(image, (0, 1)).all():
+            other = float(image[~np.isin(image, (0, 1))][0])
+            raise ValueError(f"image holds {other:g}: must be 0 or 1; amplitudes in between are a MaskMap")
+        object.__setattr__(self, "image", image == 1)
+        super().__post_init__()
+        edges = len(self.outline.segments)
+        if edges > MOST_EDGES:
+            raise ValueError(f"image has {edges} straight edges: must be at most {MOST_EDGES}; draw it more coarsely")
+
+    def contains(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        n = len(self.image)
+        column, row = (np.floor((np.asarray(at, dtype=np.float64) + 1) * (n / 2)).astype(int) for at in (x, y))
+        inside = (row >= 0) & (row < n) & (column >= 0) & (column < n)
+        return np.asarray(inside & self.image[np.clip(row, 0, n - 1), np.clip(column, 0, n - 1)])
+
+    @cached_property
+    def outline(self) -> Outline:
+        """Straight edges between open and closed pixels."""
+        along_x = _runs(self.image)
+        along_y = _runs(self.image.T)[:, :, ::-1]
+        return Outline(np.concatenate([along_x, along_y]))
+
+
+def _runs(image: np.ndarray) -> np.ndarray:
+    """Return the edges between rows as segments (n, 2, 2) of two ends (x, y), joined where they continue."""
+    n = len(image)
+    # Between rows, (n + 1, n): 1 if only the row at larger y is open, -1 if only the other one is.
+    changes = np.diff(np.pad(image, ((1, 1), (0, 0))).astype(int), axis=0)
+    found = []
+    for line, change in enumerate(changes):
+        starts = np.flatnonzero(np.diff(change, prepend=0, append=0))
+        for first, last in itertools.pairwise(starts):
+            if change[first]:
+                found.append([[first, line], [last, line]])
+    return np.array(found, dtype=np.float64).reshape(-1, 2, 2) * (2 / n) - 1

@@ -1,0 +1,30 @@
+"""Read-only arrays. Results share the arrays that they store with later results, so nobody may write into them.
+
+Arrays that a function computes and does not store belong to the caller, who may write into them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import fields
+from typing import Any
+
+import numpy as np
+
+__all__ = ["ReadOnlyArrays", "read_only"]
+
+
+def read_only(array: np.ndarray) -> np.ndarray:
+    """Return a view of an array that cannot be written into. The array itself remains as it is."""
+    view = array.view()
+    view.flags.writeable = False
+    return view
+
+
+class ReadOnlyArrays:
+    """Mixin for frozen dataclasses: the NumPy arrays in their fields are read-only; `array.copy()` is writable."""
+
+    def __post_init__(self: Any) -> None:
+        for field in fields(self):
+            value = getattr(self, field.name, None)
+            if isinstance(value, np.ndarray):
+                object.__setattr__(self, field.name, read_only(value))
