@@ -76,6 +76,20 @@ def box(half_size: np.ndarray) -> Triangles:
     return join(parts)
 
 
+def strip(half_sides: np.ndarray) -> Triangles:
+    """Return a level rectangle as pieces along its longer side, each about as long as its distance from the middle:
+    (u, v) = ((x/sx + 1)/2, (y/sy + 1)/2)."""
+    short, long = np.sort(half_sides)
+    ahead = np.geomspace(short, long, int(np.ceil(np.log2(long / short))) + 1)
+    along = np.repeat(np.concatenate([-ahead[::-1], ahead]), 2)
+    across = np.tile([-short, short], len(ahead) * 2)
+    level = [along, across] if half_sides[0] > half_sides[1] else [-across, along]
+    first = np.arange(0, len(along) - 2, 2)
+    faces = [np.column_stack([first, first + 2, first + 3]), np.column_stack([first, first + 3, first + 1])]
+    uv = (np.column_stack(level) / half_sides + 1) / 2
+    return Triangles(np.column_stack([*level, np.zeros(len(along))]), np.concatenate(faces), uv)
+
+
 def ellipsoid(semi_axes: np.ndarray) -> Triangles:
     """Return an ellipsoid: u = azimuth / 2π, v = polar angle / π from +z, both of the unit sphere before scaling."""
     return _revolved(*_arc(0, np.pi), scale=semi_axes, v=np.linspace(0, 1, STACKS + 1))
