@@ -14,8 +14,16 @@ KINDS = {
     _TYPES.mjGEOM_CYLINDER: "cylinder",
     _TYPES.mjGEOM_BOX: "box",
 }
+PLANE = "plane"
 
 
 def kind_of(model: mujoco.MjModel, geom: int) -> str | None:
     """Return the name of a geom's primitive; None for meshes and for textures that need triangles."""
+    if surfaces.geom_type(model, geom) == _TYPES.mjGEOM_PLANE:
+        return PLANE
     return None if shapes.is_textured(model, geom) else KINDS.get(surfaces.geom_type(model, geom))
+
+
+def is_resizable(model: mujoco.MjModel, geom: int) -> bool:
+    """Return whether the sizes of a moving geom may differ between worlds."""
+    return kind_of(model, geom) not in (None, PLANE)

@@ -23,7 +23,7 @@ from sim.scene.band_error import lights_in_bands
 from sim.scene.merged_parts import PlacedPart, merged
 from sim.scene.mirror import VISIBLE_GROUPS, MirrorWarning
 from sim.scene.model_snapshot import ModelSnapshot
-from sim.scene.primitive_geoms import kind_of
+from sim.scene.primitive_geoms import is_resizable
 from sim.scene.rays import names_of
 from sim.scene.spectra import of_geom, resolve
 from sim.scene.variant import Description, MitsubaObject, default_variant
@@ -108,15 +108,14 @@ class ModelScene:
         reachable = [g for g in range(model.ngeom) if model.geom_group[g] in groups and shapes.has_shape(model, g)]
         hidden = [g for g in reachable if g not in self._seen]
         moving = np.array([look.geom for look in self.moving], int)
-        meshes = [look.geom for look in self.moving if kind_of(look.model, look.geom) is None]
-        return ModelSnapshot(model, self.geoms, hidden, moving, np.setdiff1d(moving, meshes), self.varied)
+        fixed = [look.geom for look in self.moving if not is_resizable(look.model, look.geom)]
+        return ModelSnapshot(model, self.geoms, hidden, moving, np.setdiff1d(moving, fixed), self.varied)
 
     @cached_property
     def movers(self) -> Movers:
         """The moving geoms."""
         with in_variant(self.variant):
-            meshes = [look for look in self.moving if kind_of(look.model, look.geom) is None]
-            return Movers(self.model, self.moving, {look: self._mesh(look, self.bsdfs[look]) for look in meshes})
+            return Movers(self.model, self.moving, next(iter(self.bsdfs.values())))
 
     @cached_property
     def paint(self) -> Paint:
@@ -149,12 +148,6 @@ class ModelScene:
         if radiance is None:
             return None
         return mi.load_dict({"type": "twosided", "inside": {"type": "diffuse", "reflectance": radiance}})
-
-    def _mesh(self, look: Appearance, bsdf: MitsubaObject) -> MitsubaObject:
-        """Return the Mitsuba scene of a geom in its own frame."""
-        parts = enumerate(shapes.parts(look.model, look.geom))
-        built = {f"part_{k}": shapes.build(part, np.eye(4), f"part_{k}", bsdf, None) for k, part in parts}
-        return mi.load_dict({"type": "scene", **built}, optimize=False)
 
     @cached_property
     def told_apart(self) -> tuple[MitsubaObject, np.ndarray]:

@@ -30,10 +30,10 @@ from sim.tracing.world_rows import WorldRows
 
 @dataclass(frozen=True)
 class Scenes:
-    """Mitsuba scenes. still: static geoms and the sky · meshes: moving meshes, each in its own frame"""
+    """Mitsuba scenes. still: static geoms and the sky · meshes: moving meshes (`MeshAtlas`), or None"""
 
     still: MitsubaObject
-    meshes: list[MitsubaObject]
+    meshes: MitsubaObject | None
 
 
 @dataclass(frozen=True)
@@ -133,7 +133,7 @@ class ModelTracer:
         self._scene, self._bands, self.light = scene, lighting.spectra(scene.wavelengths), light
         self.why, self.basis = why, np.eye(len(scene.wavelengths))
         self._glows = len(scene.glows) > 0
-        self.scene = Scenes(scene.still, scene.movers.meshes)
+        self.scene = Scenes(scene.still, scene.movers.atlas.scene)
         shapes = scene.still.shapes()
         self._any_still = len(shapes) > 0
         # Never empty: the recording collects the BSDFs' textures only if a BSDF is among the inputs.
