@@ -11,6 +11,7 @@ surfaces       colours and textures
 bsdfs          materials as BSDFs
 spectra        measured spectra that replace colours
 lights         lights as emitters with daylight's spectrum
+shadowless     lights that cast no shadow
 sky            the skybox as light from infinity
 pose_snapshot  a copy of all poses at one moment
 cameras        cameras as sensors

@@ -120,7 +120,7 @@ class Mirror:
                     self._move(geom, parts, pose)
             for emitter in self._emitters:
                 if emitter.light >= 0:
-                    self._move_light(emitter.name, lights.pose(data, emitter.light))
+                    self._move_light(emitter, lights.pose(data, emitter.light))
             self._params.update()
 
     def bsdf(self, geom: str | int) -> MitsubaObject:
@@ -161,9 +161,7 @@ class Mirror:
         if rays.described(integrator)["type"] == "direct":
             self._tell_of_glass()
         with in_variant(self.variant):
-            if any(e.name == lights.HEADLIGHT for e in self._emitters):
-                self._move_light(lights.HEADLIGHT, lights.aimed(view.position, -view.rotation[:, 2]))
-                self._params.update()
+            self._aim_headlight(view)
             taken = self._camera(view, width, height)
             return taken.radiance(integrator, spp, asked, seed, sampler)
 
@@ -218,7 +216,7 @@ class Mirror:
                 bsdf = self._bsdf(geom, part.mirrors)
                 description[name] = shapes.build(part, self._poses[geom], name, bsdf, self._glow(geom))
         for emitter in self._emitters:
-            description[emitter.name] = emitter.description
+            description[emitter.name] = emitter.described
         return mi.load_dict(description)
 
     def _glow(self, geom: int) -> Description | None:
@@ -247,8 +245,15 @@ class Mirror:
             for key, value in part.placement(pose).items():
                 self._params[f"geom_{geom}_{k}.{key}"] = value
 
-    def _move_light(self, name: str, to_world: MitsubaObject) -> None:
-        matrix = np.array(to_world.matrix)
+    def _aim_headlight(self, view: Viewpoint) -> None:
+        """Turn the headlight, if there is one, into the camera's direction."""
+        for emitter in self._emitters:
+            if emitter.name == lights.HEADLIGHT:
+                self._move_light(emitter, lights.aimed(view.position, -view.rotation[:, 2]))
+                self._params.update()
+
+    def _move_light(self, emitter: lights.Emitter, to_world: MitsubaObject) -> None:
+        matrix, name = np.array(to_world.matrix), emitter.parameters
         if (key := f"{name}.position") in self._params:  # a point light, which has no direction
             place = matrix[:3, 3].astype(np.float32)
             if not np.array_equal(place, np.array(self._params[key]).ravel()):

@@ -119,6 +119,8 @@ def _checked(model: mujoco.MjModel, light: ModelLight) -> DirectionalLight:
     keeps_its_way = int(model.light_mode[light.light]) in _KEEP_THEIR_WAY
     if not keeps_its_way or model.body_weldid[body] != 0 or model.body_mocapid[model.body_rootid[body]] >= 0:
         raise NoClosedForm(f"light {name} moves")
+    if not light.casts_shadow:
+        raise NoClosedForm(f"light {name} casts no shadow")
     if light.direction[2] <= 0:
         raise NoClosedForm(f"light {name} shines from below")
     return DirectionalLight(light.direction, light.level)

@@ -15,6 +15,7 @@ cube: test_cube_textures.py
 surfaces: test_textures.py, test_mirror_light.py
 bsdfs: test_bsdfs.py
 lights: test_lights.py, test_mirror_light.py
+shadowless: test_shadowless.py
 sky: test_sky.py
 spectra: test_spectra.py
 device_arrays: test_frozen_kernels.py
