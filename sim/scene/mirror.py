@@ -17,7 +17,7 @@ import mujoco
 import numpy as np
 
 from optics.spectra.spectrum import Spectrum
-from sim.scene import bsdfs, cameras, inventory, lights, rays, shapes, source, surfaces
+from sim.scene import bsdfs, cameras, coincident, inventory, lights, rays, shapes, source, surfaces
 from sim.scene.cameras import Viewpoint
 from sim.scene.pose_snapshot import PoseSnapshot
 from sim.scene.spectra import of_geom, resolve
@@ -91,7 +91,8 @@ class Mirror:
             raise ValueError("mirror: the model has no visible geom of a kind that can be mirrored")
         data = _reference_pose(model) if data is None else _checked(model, data)
         self._places = PoseSnapshot.from_data(data)
-        self._parts = {int(g): shapes.parts(model, g) for g in self.geoms}
+        together = coincident.coincidences(data, self.geoms.tolist())
+        self._parts = {int(g): shapes.parts(model, g, together.lift(g)) for g in self.geoms}
         self._poses = {g: shapes.pose(data, g) for g in self._parts}
         self._bsdfs: dict[Any, MitsubaObject] = {}
         with in_variant(variant):
@@ -103,6 +104,8 @@ class Mirror:
         left_out = inventory.left_out(model, visible, groups) + left_out
         if left_out:
             warnings.warn(f"not mirrored: {'; '.join(left_out)}", MirrorWarning, stacklevel=3)
+        if message := together.message(model):
+            warnings.warn(message, MirrorWarning, stacklevel=3)
 
     def sync(self, data: mujoco.MjData) -> None:
         """Move everything, including cameras, to the poses in `data` (after mj_forward or mj_step). A scene in which

@@ -8,7 +8,6 @@ distant ellipsoids.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import mitsuba as mi
@@ -125,36 +124,50 @@ def plane_sides(model: mujoco.MjModel, geom: int) -> np.ndarray:
     return np.where(size > 0, size, INFINITY * max(1.0, model.stat.extent))
 
 
-def parts(model: mujoco.MjModel, geom: int) -> list[Part]:
-    """Return the shapes that make up a geom."""
+def parts(model: mujoco.MjModel, geom: int, lift: float = 0.0) -> list[Part]:
+    """Return the shapes that make up a geom.
+
+    lift: distance by which the surface is moved outwards [m]
+    """
     kind, size = surfaces.geom_type(model, geom), model.geom_size[geom]
     if kind == _TYPES.mjGEOM_SPHERE and not _is_cubic(model, geom):
-        return [Part("sphere", _placed(size[0], size[0], size[0]))]
+        return [Part("sphere", _placed(size[0] + lift, size[0] + lift, size[0] + lift))]
     if kind == _TYPES.mjGEOM_PLANE:
-        return [_plane(plane_sides(model, geom))]
+        return [_plane(plane_sides(model, geom), lift)]
     if not is_textured(model, geom) and kind in (_TYPES.mjGEOM_CYLINDER, _TYPES.mjGEOM_CAPSULE):
-        return _exact_cylinder(kind, size[0], size[1])
-    triangles = _triangles(model, geom)
+        return _exact_cylinder(kind, *(size + lifted_size(kind, lift))[:2])
+    triangles = _triangles(model, geom).lifted(lift)
     if kind != _TYPES.mjGEOM_BOX or bsdfs.mirror_share(model, geom) == 0:
         return [Part(triangles=triangles)]
     top = (triangles.vertices[triangles.faces][..., 2] > size[2] * (1 - 1e-9)).all(axis=1)
     return [Part(triangles=triangles.only(~top), mirrors=False), Part(triangles=triangles.only(top))]
 
 
-def _triangles(model: mujoco.MjModel, geom: int) -> Triangles:
+def lifted_size(kind: mujoco.mjtGeom, lift: float) -> np.ndarray:
+    """Return the increase of MuJoCo's sizes of a primitive (3,) if its surface is moved outwards."""
+    return lift * np.array([1, kind != _TYPES.mjGEOM_CAPSULE, 1])
+
+
+def untextured(model: mujoco.MjModel, geom: int) -> Triangles:
+    """Return a geom as triangles, without MuJoCo's texture coordinates."""
     kind, size = surfaces.geom_type(model, geom), half_sizes(model, geom)
+    if kind == _TYPES.mjGEOM_PLANE:
+        return tessellation.strip(plane_sides(model, geom))
     if kind in (_TYPES.mjGEOM_MESH, _TYPES.mjGEOM_SDF):
-        triangles = tessellation.mesh(model, model.geom_dataid[geom])
-    elif kind == _TYPES.mjGEOM_HFIELD:
-        triangles = tessellation.height_field(model, model.geom_dataid[geom])
-    elif kind == _TYPES.mjGEOM_BOX:
-        triangles = tessellation.box(size)
-    elif kind == _TYPES.mjGEOM_CYLINDER:
-        triangles = tessellation.cylinder(size[0], size[2])
-    elif kind == _TYPES.mjGEOM_CAPSULE:
-        triangles = tessellation.capsule(size[0], size[2])
-    else:
-        triangles = tessellation.ellipsoid(size)
+        return tessellation.mesh(model, model.geom_dataid[geom])
+    if kind == _TYPES.mjGEOM_HFIELD:
+        return tessellation.height_field(model, model.geom_dataid[geom])
+    if kind == _TYPES.mjGEOM_BOX:
+        return tessellation.box(size)
+    if kind == _TYPES.mjGEOM_CYLINDER:
+        return tessellation.cylinder(size[0], size[2])
+    if kind == _TYPES.mjGEOM_CAPSULE:
+        return tessellation.capsule(size[0], size[2])
+    return tessellation.ellipsoid(size)
+
+
+def _triangles(model: mujoco.MjModel, geom: int) -> Triangles:
+    size, triangles = half_sizes(model, geom), untextured(model, geom)
     if not is_textured(model, geom):
         return triangles
     if _is_cubic(model, geom):
@@ -185,11 +198,11 @@ def half_sizes(model: mujoco.MjModel, geom: int) -> np.ndarray:
     return np.asarray(size, float)
 
 
-def _plane(sides: np.ndarray) -> Part:
+def _plane(sides: np.ndarray, height: float) -> Part:
     """Return a plane with these half sides; its texture coordinates are those of Mitsuba's rectangle."""
     if sides.max() > LONG * sides.min():
-        return Part(triangles=tessellation.strip(sides))
-    return Part("rectangle", _scaled([*sides, 1.0]))
+        return Part(triangles=tessellation.strip(sides).lifted(height))
+    return Part("rectangle", _placed(sides[0], sides[1], 1.0, z=height))
 
 
 def _exact_cylinder(kind: mujoco.mjtGeom, radius: float, half_length: float) -> list[Part]:
@@ -200,10 +213,6 @@ def _exact_cylinder(kind: mujoco.mjtGeom, radius: float, half_length: float) -> 
     top = Part("disk", _placed(radius, radius, 1.0, z=half_length))
     bottom = Part("disk", _placed(radius, -radius, -1.0, z=-half_length))
     return [side, top, bottom]
-
-
-def _scaled(scales: Sequence[float] | np.ndarray) -> np.ndarray:
-    return np.diag([*scales, 1.0])
 
 
 def _placed(sx: float, sy: float, sz: float, z: float = 0.0) -> np.ndarray:

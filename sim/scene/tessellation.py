@@ -14,6 +14,8 @@ import numpy as np
 # Chord error of a tessellated unit circle: (π/SLICES)²/2 = 3e-4 of the radius, below the required 1e-3 of depths.
 SLICES = 128
 STACKS = 64
+# Largest number of moves of a point when faces are moved outwards, and the largest share that a face may lack.
+ROUNDS, ENOUGH = 100, 0.1
 
 
 @dataclass(frozen=True)
@@ -34,6 +36,29 @@ class Triangles:
     def repeated(self, repeat: np.ndarray) -> Triangles:
         """Return the same triangles with the texture repeated (u, v) times."""
         return self if self.uv is None else replace(self, uv=self.uv * repeat)
+
+    def lifted(self, distance: float) -> Triangles:
+        """Return the same triangles with all faces moved outwards by about a distance, or more, without gaps."""
+        if distance == 0:
+            return self
+        _, place = np.unique(self.vertices, axis=0, return_inverse=True)
+        at = place.reshape(-1)[self.faces]  # (m, 3), numbers of distinct points
+        corners = self.vertices[self.faces]
+        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
+        # Each point repeatedly moves along the normal of the face that lacks most (Motzkin and Schoenberg 1954).
+        moved = np.zeros((len(self.vertices), 3))
+        for _ in range(ROUNDS):
+            lacks = (normals**2).sum(axis=1)[:, None] - np.einsum("mki,mi->mk", moved[at], normals)
+            most, count, step = np.zeros(len(moved)), np.zeros(len(moved)), np.zeros_like(moved)
+            np.maximum.at(most, at, lacks)
+            if most.max() < ENOUGH:
+                break
+            chosen = (lacks > ENOUGH) & (lacks > most[at] - 1e-9)
+            np.add.at(count, at[chosen], 1)
+            np.add.at(step, at[chosen], (lacks[..., None] * normals[:, None])[chosen])
+            moved += step / np.maximum(count, 1)[:, None]
+        return replace(self, vertices=self.vertices + distance * moved[place.reshape(-1)])
 
     def only(self, which: np.ndarray) -> Triangles:
         """Return the same triangles with only some of the faces, selected by a mask (m,)."""

@@ -6,7 +6,7 @@ rebuilt. On a GPU, meshes are intersected in a separate kernel.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -20,7 +20,7 @@ from sim.scene import shapes
 from sim.scene.appearances import Appearance
 from sim.scene.device_arrays import whole_numbers
 from sim.scene.poses import Poses
-from sim.scene.primitive_geoms import PLANE, kind_of
+from sim.scene.primitive_geoms import PLANE, REACH, kind_of
 from sim.scene.variant import MitsubaObject, computed, on_gpu
 from sim.tracing.mesh_atlas import MeshAtlas
 from sim.tracing.primitives import PRIMITIVES, Primitive
@@ -31,15 +31,6 @@ _TYPES = mujoco.mjtGeom
 # and one of its sizes. The sizes of a mesh are the centre of its cell in the atlas.
 ROWS = 4
 MESH = "mesh"
-# Largest distance of a geom's surface from its origin [m] as a function of the half sizes (..., 3), for each kind.
-_REACH: dict[mujoco.mjtGeom, Callable[[np.ndarray], np.ndarray]] = {
-    _TYPES.mjGEOM_SPHERE: lambda size: size[..., 0],
-    _TYPES.mjGEOM_ELLIPSOID: lambda size: size.max(axis=-1),
-    _TYPES.mjGEOM_CAPSULE: lambda size: size[..., 0] + size[..., 1],
-    _TYPES.mjGEOM_CYLINDER: lambda size: np.hypot(size[..., 0], size[..., 1]),
-    _TYPES.mjGEOM_BOX: lambda size: np.linalg.norm(size, axis=-1),
-    _TYPES.mjGEOM_PLANE: lambda size: np.hypot(size[..., 0], size[..., 1]),
-}
 
 
 @dataclass(frozen=True)
@@ -85,11 +76,13 @@ class Movers:
     """The moving geoms of a model, primitives first, by kind. A geom with drawn materials has a mover per appearance.
 
     looks: appearance of each mover · geoms: geom id of each mover, (mover,)
-    atlas: all other movers
+    atlas: all other movers · lifts: distances by which surfaces are moved outwards [m], by geom
     ends: number of the first mover of each kind, for the kernel
     """
 
-    def __init__(self, model: mujoco.MjModel, looks: Sequence[Appearance], bsdf: MitsubaObject) -> None:
+    def __init__(
+        self, model: mujoco.MjModel, looks: Sequence[Appearance], lifts: Mapping[int, float], bsdf: MitsubaObject
+    ) -> None:
         kinds = [*PRIMITIVES, MESH]
         by_kind = [[look for look in looks if (kind_of(look.model, look.geom) or MESH) == kind] for kind in kinds]
         self._ends = np.cumsum([0, *map(len, by_kind)])
@@ -102,7 +95,12 @@ class Movers:
         planes = [shapes.plane_sides(model, geom) for geom in self.geoms[self._of_kind(PLANE)]]
         self._sizes[self._of_kind(PLANE), :2] = np.reshape(planes, (-1, 2))
         reach = self._mesh_reach = model.geom_rbound[self.geoms[self._of_kind(MESH)]]
-        parts = [shapes.parts(look.model, look.geom) for look in by_kind[-1]]
+        lift = np.array([lifts.get(geom, 0.0) for geom in self.geoms.tolist()])
+        self._grown = np.array([shapes.lifted_size(*pair) for pair in zip(self._types, lift, strict=True)]).reshape(
+            -1, 3
+        )
+        self._raised = np.where(self._types == _TYPES.mjGEOM_PLANE, lift, 0)[:, None]
+        parts = [shapes.parts(look.model, look.geom, lifts.get(look.geom, 0.0)) for look in by_kind[-1]]
         self.atlas = MeshAtlas.from_parts(parts, reach, bsdf)
         self._sizes[self._of_kind(MESH)] = self.atlas.cells
         self._known: tuple[bytes, np.ndarray, np.ndarray] | None = None  # extents of the last poses
@@ -133,11 +131,13 @@ class Movers:
             absent = self._absent(poses)
             if absent is not None:
                 reach = np.where(absent, 0, reach)
+            turns = poses.geom_turns(self.geoms)
+            places = places + self._raised * turns[..., 2]
             rows[:, 0, :3] = centre = places.mean(axis=1)
             rows[:, 0, 3] = (np.linalg.norm(places - centre[:, None], axis=-1) + reach).max(axis=1)
             each = rows[:, 1:].reshape(poses.n, len(self), ROWS, 4)
             each[:, :, 0, :3], each[:, :, 0, 3] = places, reach
-            each[:, :, 1:, :3] = np.swapaxes(poses.geom_turns(self.geoms), -1, -2)
+            each[:, :, 1:, :3] = np.swapaxes(turns, -1, -2)
             each[:, :, 1:, 3] = sizes
             if absent is not None:
                 each[:, :, 0, :3] += np.where(absent, np.nan, 0)[..., None]  # NaN: rays miss it
@@ -168,10 +168,11 @@ class Movers:
     def _with_reach(self, sizes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         balls = self._types == _TYPES.mjGEOM_SPHERE
         sizes[:, balls] = sizes[:, balls, :1]
+        sizes = sizes + self._grown
         fixed = slice(self._of_kind(PLANE).start, None)  # planes and meshes, which come last
         sizes[:, fixed] = self._sizes[fixed]
         reach = np.zeros(sizes.shape[:2])
-        for kind, how_far in _REACH.items():
+        for kind, how_far in REACH.items():
             mine = self._types == kind
             reach[:, mine] = how_far(sizes[:, mine])
         reach[:, self._of_kind(MESH)] = self._mesh_reach

@@ -172,8 +172,8 @@ def test_any_number_of_meshes_is_met_where_mujoco_meets_them(n):
 
 
 def test_kernels_do_not_grow_with_the_number_of_meshes():
-    """With one scene per mesh, the kernel of 40 meshes has ten times as many operations as that of two, and the kernel
-    of 128 takes minutes to compile.
+    """Kernels with one scene per mesh have ten times as many operations for 40 meshes as for two, and take minutes to
+    compile for 128.
     """
     sizes = []
     for n in (2, 40):
