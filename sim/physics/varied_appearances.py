@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import mujoco
 
-from sim.scene.primitive_geoms import kind_of
+from sim.scene.primitive_geoms import is_resizable
 from sim.scene.variation import SIZE, START, Drawn, Variation
 from sim.scene.world_models import WorldModels
 
@@ -59,8 +59,8 @@ def _weightless(model: mujoco.MjModel, thing: str, name: str) -> int:
         raise ValueError(f"vary: {name}: the model has no geom {thing!r}; it has {known}")
     if model.geom_contype[geom] or model.geom_conaffinity[geom]:
         raise ValueError(f"vary: {name}: agents touch {thing!r}, which all worlds share: its size must not vary")
-    if kind_of(model, geom) is None:
+    if not is_resizable(model, geom):
         raise ValueError(
-            f"vary: {name}: {thing!r} has a texture or is a mesh: only plain primitives may differ in size"
+            f"vary: {name}: {thing!r} has a texture, or is a mesh or plane: only plain primitives may differ in size"
         )
     return int(geom)

@@ -21,6 +21,7 @@ from sim.pictures.merged_mirror import MergedMirror
 from sim.scene.cameras import Viewpoint
 from sim.scene.device_arrays import aligned, floats, whole_numbers
 from sim.scene.frozen_kernels import garbage_kept
+from sim.scene.lights import Emitter
 from sim.scene.variant import MitsubaObject, variant
 
 # Four wavelengths fill one mi.Spectrum. All sets on a grid of 5 nm with distances of at least 25 nm were compared.
@@ -82,7 +83,9 @@ class CameraRays:
         with variant(mirror.variant):
             scene = mirror.scene
             self._lights = list(scene.emitters())
-            self._suns = {k: light.id() for k, light in enumerate(self._lights) if _is_sun(light)}
+            lamps = [mirror.lamps.get(light.id()) for light in self._lights]
+            self._suns = {k: lamp.name for k, lamp in enumerate(lamps) if lamp is not None and _is_sun(lamp)}
+            self._shadowless = {k for k, lamp in enumerate(lamps) if lamp is not None and not lamp.casts_shadow}
             self._glows = any(not _is_delta(light) for light in self._lights)
             self._matt = all(_is_matt(shape.bsdf()) for shape in scene.shapes())
             weights = np.array(
@@ -150,7 +153,8 @@ class CameraRays:
             else:
                 value = bsdf.eval(mi.BSDFContext(), si, si.to_local(towards), reaches)
                 reaches = reaches & (dr.max(value) > 0)
-            reaches = reaches & ~scene.ray_test(shadow, COHERENT, reaches)
+            if k not in self._shadowless:
+                reaches = reaches & ~scene.ray_test(shadow, COHERENT, reaches)
             total += dr.select(reaches, value * weight, 0)
         return total
 
@@ -226,8 +230,8 @@ def _is_delta(light: MitsubaObject) -> bool:
     return bool(int(light.flags()) & (int(mi.EmitterFlags.DeltaPosition) | int(mi.EmitterFlags.DeltaDirection)))
 
 
-def _is_sun(light: MitsubaObject) -> bool:
-    return bool(light.class_name() == "DirectionalEmitter")
+def _is_sun(lamp: Emitter) -> bool:
+    return bool(lamp.description["type"] == "directional")
 
 
 def _sun_weight(light: MitsubaObject) -> np.ndarray:

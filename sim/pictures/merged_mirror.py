@@ -53,17 +53,19 @@ class MergedMirror(Mirror):
 
     def face(self, view: Viewpoint) -> None:
         """Turn the headlight, if there is one, into the camera's direction."""
-        if any(emitter.name == lights.HEADLIGHT for emitter in self._emitters):
-            with in_variant(self.variant):
-                self._move_light(lights.HEADLIGHT, lights.aimed(view.position, -view.rotation[:, 2]))
-                self._params.update()
+        with in_variant(self.variant):
+            self._aim_headlight(view)
+
+    @property
+    def lamps(self) -> dict[str, lights.Emitter]:
+        """Lights of the model, by the names of their emitters."""
+        return {emitter.name: emitter for emitter in self._emitters}
 
     def towards(self, name: str, view: Viewpoint) -> np.ndarray:
         """Return the unit vector (3,) towards a directional light; the headlight shines along the camera's axis."""
         if name == lights.HEADLIGHT:
             return view.rotation[:, 2]
-        (light,) = (emitter.light for emitter in self._emitters if emitter.name == name)
-        direction = -self._places.light_xdir[light]
+        direction = -self._places.light_xdir[self.lamps[name].light]
         return np.asarray(direction / np.linalg.norm(direction))
 
     def surrounds(self, point: np.ndarray) -> bool:
@@ -87,7 +89,7 @@ class MergedMirror(Mirror):
                     still.append((name, part, self._poses[geom], bsdf))
         description: Description = {"type": "scene", **moving, **merged(still, "still")}
         for emitter in self._emitters:
-            description[emitter.name] = emitter.description
+            description[emitter.name] = emitter.described
         return mi.load_dict(description, optimize=False)
 
 

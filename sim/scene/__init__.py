@@ -8,9 +8,11 @@ merged_parts   shapes that share a material, merged into one
 tessellation   geoms as triangles with MuJoCo's texture coordinates
 cube           triangles under cube textures
 surfaces       colours and textures
+coincident     geoms in the same place
 bsdfs          materials as BSDFs
 spectra        measured spectra that replace colours
 lights         lights as emitters with daylight's spectrum
+shadowless     lights that cast no shadow
 sky            the skybox as light from infinity
 pose_snapshot  a copy of all poses at one moment
 cameras        cameras as sensors

@@ -23,6 +23,7 @@ from optics.numerics.autodiff import Array
 from optics.spectra.spectrum import Spectrum, daylight
 from sim.scene import sky, surfaces
 from sim.scene.color import decode_srgb
+from sim.scene.shadowless import INNER, shadowless
 from sim.scene.spectra import HEADLIGHT, Spectra, described, in_daylight
 from sim.scene.variant import Description, MitsubaObject
 
@@ -36,11 +37,26 @@ _UNMIRRORED = {"intensity": 0.0, "bulbradius": 0.02, "range": 10.0, "softness": 
 
 @dataclass(frozen=True)
 class Emitter:
-    """A description of a light for Mitsuba. Its position and direction follow the data."""
+    """A light. Its position and direction follow the data.
+
+    light: id in the model; -1: not one of its lights (the camera's headlight, the sky)
+    description: of the light for Mitsuba, with shadows · casts_shadow: False for the headlight, as in MuJoCo
+    """
 
     name: str
-    light: int  # id in the model; -1: not one of its lights (the camera's headlight, the sky)
+    light: int
     description: Description
+    casts_shadow: bool = True
+
+    @property
+    def described(self) -> Description:
+        """Description for a scene of the variant in force; without shadows if the light casts none."""
+        return self.description if self.casts_shadow else shadowless(self.description)
+
+    @property
+    def parameters(self) -> str:
+        """Name of the light among the parameters of a scene."""
+        return self.name if self.casts_shadow else f"{self.name}.{INNER}"
 
 
 def emission(rgb: np.ndarray, scale: float, measured: Spectrum | None = None) -> Description:
@@ -104,14 +120,16 @@ def emitters(model: mujoco.MjModel, data: mujoco.MjData, spectra: Spectra) -> tu
             continue
         left_out += _left_out(model, light)
         if model.light_type[light] != _TYPES.mjLIGHT_IMAGE and np.any(model.light_diffuse[light] > 0):
-            found.append(Emitter(f"light_{light}", light, _describe(model, data, light, spectra)))
+            shadow = bool(model.light_castshadow[light])
+            found.append(Emitter(f"light_{light}", light, _describe(model, data, light, spectra), shadow))
     headlight = model.vis.headlight
     if headlight.active:
         if np.any(headlight.ambient > 0):
             left_out.append("ambient part of the headlight")
         if np.any(headlight.diffuse > 0):
             spectrum = emission(headlight.diffuse, math.pi, spectra.get(HEADLIGHT))
-            found.append(Emitter(HEADLIGHT, -1, {"type": "directional", "irradiance": spectrum}))
+            lamp = {"type": "directional", "irradiance": spectrum}
+            found.append(Emitter(HEADLIGHT, -1, lamp, casts_shadow=False))
     heaven = sky.description(model, white())
     if heaven is not None:
         found.append(Emitter("sky", -1, heaven))
@@ -142,8 +160,6 @@ def _left_out(model: mujoco.MjModel, light: int) -> list[str]:
         words.append(f"ambient part of {name!r}")
     if not np.any(model.light_diffuse[light] > 0) and np.any(model.light_specular[light] > 0):
         words.append(f"{name!r}, which makes highlights only")
-    if not model.light_castshadow[light]:
-        words.append(f"absent shadows of {name!r}")
     if model.light_type[light] != _TYPES.mjLIGHT_DIRECTIONAL and np.any(model.light_attenuation[light, :2] > 0):
         words.append(f"attenuation of {name!r} (mirrored with 1/r², equal at the model's center)")
     for field, unset in _UNMIRRORED.items():

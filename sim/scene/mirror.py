@@ -17,7 +17,7 @@ import mujoco
 import numpy as np
 
 from optics.spectra.spectrum import Spectrum
-from sim.scene import bsdfs, cameras, inventory, lights, rays, shapes, source, surfaces
+from sim.scene import bsdfs, cameras, coincident, inventory, lights, rays, shapes, source, surfaces
 from sim.scene.cameras import Viewpoint
 from sim.scene.pose_snapshot import PoseSnapshot
 from sim.scene.spectra import of_geom, resolve
@@ -91,7 +91,8 @@ class Mirror:
             raise ValueError("mirror: the model has no visible geom of a kind that can be mirrored")
         data = _reference_pose(model) if data is None else _checked(model, data)
         self._places = PoseSnapshot.from_data(data)
-        self._parts = {int(g): shapes.parts(model, g) for g in self.geoms}
+        together = coincident.coincidences(data, self.geoms.tolist())
+        self._parts = {int(g): shapes.parts(model, g, together.lift(g)) for g in self.geoms}
         self._poses = {g: shapes.pose(data, g) for g in self._parts}
         self._bsdfs: dict[Any, MitsubaObject] = {}
         with in_variant(variant):
@@ -103,6 +104,8 @@ class Mirror:
         left_out = inventory.left_out(model, visible, groups) + left_out
         if left_out:
             warnings.warn(f"not mirrored: {'; '.join(left_out)}", MirrorWarning, stacklevel=3)
+        if message := together.message(model):
+            warnings.warn(message, MirrorWarning, stacklevel=3)
 
     def sync(self, data: mujoco.MjData) -> None:
         """Move everything, including cameras, to the poses in `data` (after mj_forward or mj_step). A scene in which
@@ -120,7 +123,7 @@ class Mirror:
                     self._move(geom, parts, pose)
             for emitter in self._emitters:
                 if emitter.light >= 0:
-                    self._move_light(emitter.name, lights.pose(data, emitter.light))
+                    self._move_light(emitter, lights.pose(data, emitter.light))
             self._params.update()
 
     def bsdf(self, geom: str | int) -> MitsubaObject:
@@ -161,9 +164,7 @@ class Mirror:
         if rays.described(integrator)["type"] == "direct":
             self._tell_of_glass()
         with in_variant(self.variant):
-            if any(e.name == lights.HEADLIGHT for e in self._emitters):
-                self._move_light(lights.HEADLIGHT, lights.aimed(view.position, -view.rotation[:, 2]))
-                self._params.update()
+            self._aim_headlight(view)
             taken = self._camera(view, width, height)
             return taken.radiance(integrator, spp, asked, seed, sampler)
 
@@ -218,7 +219,7 @@ class Mirror:
                 bsdf = self._bsdf(geom, part.mirrors)
                 description[name] = shapes.build(part, self._poses[geom], name, bsdf, self._glow(geom))
         for emitter in self._emitters:
-            description[emitter.name] = emitter.description
+            description[emitter.name] = emitter.described
         return mi.load_dict(description)
 
     def _glow(self, geom: int) -> Description | None:
@@ -247,8 +248,15 @@ class Mirror:
             for key, value in part.placement(pose).items():
                 self._params[f"geom_{geom}_{k}.{key}"] = value
 
-    def _move_light(self, name: str, to_world: MitsubaObject) -> None:
-        matrix = np.array(to_world.matrix)
+    def _aim_headlight(self, view: Viewpoint) -> None:
+        """Turn the headlight, if there is one, into the camera's direction."""
+        for emitter in self._emitters:
+            if emitter.name == lights.HEADLIGHT:
+                self._move_light(emitter, lights.aimed(view.position, -view.rotation[:, 2]))
+                self._params.update()
+
+    def _move_light(self, emitter: lights.Emitter, to_world: MitsubaObject) -> None:
+        matrix, name = np.array(to_world.matrix), emitter.parameters
         if (key := f"{name}.position") in self._params:  # a point light, which has no direction
             place = matrix[:3, 3].astype(np.float32)
             if not np.array_equal(place, np.array(self._params[key]).ravel()):

@@ -31,6 +31,7 @@ OTHERS = (  # other fields of mjModel that appearances depend on
     "mat_texrepeat",
     "mat_texuniform",
     "light_type",
+    "light_castshadow",
     "light_attenuation",
     "light_cutoff",
     "light_exponent",

@@ -1,13 +1,13 @@
 """Geoms as Mitsuba shapes.
 
 Planes and spheres, and capsules and cylinders without a texture, are exact (rectangle, sphere, cylinder, disk). Geoms
-for which Mitsuba's texture coordinates differ from MuJoCo's are tessellated. Ellipsoids are tessellated, too, because
-Mitsuba intersects its own ellipsoids in float32, with wrong hit points on small, flat or distant ellipsoids.
+for which Mitsuba's texture coordinates differ from MuJoCo's are tessellated, and so are long planes. Ellipsoids are
+tessellated, too, because Mitsuba intersects its own ellipsoids in float32, with wrong hit points on small, flat or
+distant ellipsoids.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import mitsuba as mi
@@ -33,8 +33,11 @@ _ASSETS = (_TYPES.mjGEOM_MESH, _TYPES.mjGEOM_SDF, _TYPES.mjGEOM_HFIELD)
 
 # Half side of an infinite plane in units of the model's extent. An eye one extent above the plane sees its edge 1e-4
 # rad below the horizon, and float32 is accurate to 1e-3 of an extent for texture and shadows on it. (Hits on triangles
-# of this size would be wrong; Mitsuba intersects its rectangle in closed form.)
+# of this size would be wrong; see also LONG.)
 INFINITY = 1e4
+# Largest ratio of a plane's sides for which it is a single rectangle. Embree's hit points on a rectangle err by 1e-7
+# long² / short, which is 4 m for an infinite plane that is 2 m wide. Longer planes are strips of triangles.
+LONG = 30
 
 
 @dataclass(frozen=True)
@@ -104,51 +107,67 @@ def uv_transform(model: mujoco.MjModel, geom: int) -> np.ndarray | None:
     if kind == _TYPES.mjGEOM_SPHERE:
         # Both codes use u = azimuth / 2π, v = polar angle / π from +z.
         return np.diag([*surfaces.texture_repeat(model, geom, size[[0, 0]]), 1.0])
-    # MuJoCo: u = (x/sx + 1)/2, v = 1 - (y/sy + 1)/2, and (x, -y) repeat/2 + 1/2 along an infinite axis; Mitsuba's v
-    # points upwards.
+    # MuJoCo: u = (x/sx + 1)/2, v = 1 - (y/sy + 1)/2, and (x, -y) repeat/2 + 1/2 along an infinite axis. If one axis is
+    # infinite, MuJoCo also adds 1/2 along the other. Mitsuba's v points upwards.
+    bounded = size[:2] > 0
     repeat = surfaces.texture_repeat(model, geom, size)
-    per_length = model.mat_texrepeat[model.geom_matid[geom]] * _half_sides(model, geom)
-    scale = np.where(size[:2] > 0, repeat, per_length) * [1, -1]
-    offset = np.where(size[:2] > 0, [0.0, repeat[1]], 0.5 - scale / 2)
+    per_length = model.mat_texrepeat[model.geom_matid[geom]] * plane_sides(model, geom)
+    scale = np.where(bounded, repeat, per_length) * [1, -1]
+    shift = 0.0 if bounded.all() else 0.5
+    offset = shift + np.where(bounded, [0.0, repeat[1]], -scale / 2)
     return np.array([[scale[0], 0, offset[0]], [0, scale[1], offset[1]], [0, 0, 1.0]])
 
 
-def _half_sides(model: mujoco.MjModel, geom: int) -> np.ndarray:
+def plane_sides(model: mujoco.MjModel, geom: int) -> np.ndarray:
     """Return the half sides of a plane [m], (2,)."""
     size = model.geom_size[geom, :2]
     return np.where(size > 0, size, INFINITY * max(1.0, model.stat.extent))
 
 
-def parts(model: mujoco.MjModel, geom: int) -> list[Part]:
-    """Return the shapes that make up a geom."""
+def parts(model: mujoco.MjModel, geom: int, lift: float = 0.0) -> list[Part]:
+    """Return the shapes that make up a geom.
+
+    lift: distance by which the surface is moved outwards [m]
+    """
     kind, size = surfaces.geom_type(model, geom), model.geom_size[geom]
     if kind == _TYPES.mjGEOM_SPHERE and not _is_cubic(model, geom):
-        return [Part("sphere", _placed(size[0], size[0], size[0]))]
+        return [Part("sphere", _placed(size[0] + lift, size[0] + lift, size[0] + lift))]
     if kind == _TYPES.mjGEOM_PLANE:
-        return [Part("rectangle", _scaled([*_half_sides(model, geom), 1.0]))]
+        return [_plane(plane_sides(model, geom), lift)]
     if not is_textured(model, geom) and kind in (_TYPES.mjGEOM_CYLINDER, _TYPES.mjGEOM_CAPSULE):
-        return _exact_cylinder(kind, size[0], size[1])
-    triangles = _triangles(model, geom)
+        return _exact_cylinder(kind, *(size + lifted_size(kind, lift))[:2])
+    triangles = _triangles(model, geom).lifted(lift)
     if kind != _TYPES.mjGEOM_BOX or bsdfs.mirror_share(model, geom) == 0:
         return [Part(triangles=triangles)]
     top = (triangles.vertices[triangles.faces][..., 2] > size[2] * (1 - 1e-9)).all(axis=1)
     return [Part(triangles=triangles.only(~top), mirrors=False), Part(triangles=triangles.only(top))]
 
 
-def _triangles(model: mujoco.MjModel, geom: int) -> Triangles:
+def lifted_size(kind: mujoco.mjtGeom, lift: float) -> np.ndarray:
+    """Return the increase of MuJoCo's sizes of a primitive (3,) if its surface is moved outwards."""
+    return lift * np.array([1, kind != _TYPES.mjGEOM_CAPSULE, 1])
+
+
+def untextured(model: mujoco.MjModel, geom: int) -> Triangles:
+    """Return a geom as triangles, without MuJoCo's texture coordinates."""
     kind, size = surfaces.geom_type(model, geom), half_sizes(model, geom)
+    if kind == _TYPES.mjGEOM_PLANE:
+        return tessellation.strip(plane_sides(model, geom))
     if kind in (_TYPES.mjGEOM_MESH, _TYPES.mjGEOM_SDF):
-        triangles = tessellation.mesh(model, model.geom_dataid[geom])
-    elif kind == _TYPES.mjGEOM_HFIELD:
-        triangles = tessellation.height_field(model, model.geom_dataid[geom])
-    elif kind == _TYPES.mjGEOM_BOX:
-        triangles = tessellation.box(size)
-    elif kind == _TYPES.mjGEOM_CYLINDER:
-        triangles = tessellation.cylinder(size[0], size[2])
-    elif kind == _TYPES.mjGEOM_CAPSULE:
-        triangles = tessellation.capsule(size[0], size[2])
-    else:
-        triangles = tessellation.ellipsoid(size)
+        return tessellation.mesh(model, model.geom_dataid[geom])
+    if kind == _TYPES.mjGEOM_HFIELD:
+        return tessellation.height_field(model, model.geom_dataid[geom])
+    if kind == _TYPES.mjGEOM_BOX:
+        return tessellation.box(size)
+    if kind == _TYPES.mjGEOM_CYLINDER:
+        return tessellation.cylinder(size[0], size[2])
+    if kind == _TYPES.mjGEOM_CAPSULE:
+        return tessellation.capsule(size[0], size[2])
+    return tessellation.ellipsoid(size)
+
+
+def _triangles(model: mujoco.MjModel, geom: int) -> Triangles:
+    size, triangles = half_sizes(model, geom), untextured(model, geom)
     if not is_textured(model, geom):
         return triangles
     if _is_cubic(model, geom):
@@ -179,6 +198,13 @@ def half_sizes(model: mujoco.MjModel, geom: int) -> np.ndarray:
     return np.asarray(size, float)
 
 
+def _plane(sides: np.ndarray, height: float) -> Part:
+    """Return a plane with these half sides; its texture coordinates are those of Mitsuba's rectangle."""
+    if sides.max() > LONG * sides.min():
+        return Part(triangles=tessellation.strip(sides).lifted(height))
+    return Part("rectangle", _placed(sides[0], sides[1], 1.0, z=height))
+
+
 def _exact_cylinder(kind: mujoco.mjtGeom, radius: float, half_length: float) -> list[Part]:
     side = Part("cylinder", _placed(radius, radius, 2 * half_length, z=-half_length))
     if kind == _TYPES.mjGEOM_CAPSULE:
@@ -187,10 +213,6 @@ def _exact_cylinder(kind: mujoco.mjtGeom, radius: float, half_length: float) -> 
     top = Part("disk", _placed(radius, radius, 1.0, z=half_length))
     bottom = Part("disk", _placed(radius, -radius, -1.0, z=-half_length))
     return [side, top, bottom]
-
-
-def _scaled(scales: Sequence[float] | np.ndarray) -> np.ndarray:
-    return np.diag([*scales, 1.0])
 
 
 def _placed(sx: float, sy: float, sz: float, z: float = 0.0) -> np.ndarray:

@@ -14,6 +14,8 @@ import numpy as np
 # Chord error of a tessellated unit circle: (π/SLICES)²/2 = 3e-4 of the radius, below the required 1e-3 of depths.
 SLICES = 128
 STACKS = 64
+# Largest number of moves of a point when faces are moved outwards, and the largest share that a face may lack.
+ROUNDS, ENOUGH = 100, 0.1
 
 
 @dataclass(frozen=True)
@@ -34,6 +36,29 @@ class Triangles:
     def repeated(self, repeat: np.ndarray) -> Triangles:
         """Return the same triangles with the texture repeated (u, v) times."""
         return self if self.uv is None else replace(self, uv=self.uv * repeat)
+
+    def lifted(self, distance: float) -> Triangles:
+        """Return the same triangles with all faces moved outwards by about a distance, or more, without gaps."""
+        if distance == 0:
+            return self
+        _, place = np.unique(self.vertices, axis=0, return_inverse=True)
+        at = place.reshape(-1)[self.faces]  # (m, 3), numbers of distinct points
+        corners = self.vertices[self.faces]
+        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
+        # Each point repeatedly moves along the normal of the face that lacks most (Motzkin and Schoenberg 1954).
+        moved = np.zeros((len(self.vertices), 3))
+        for _ in range(ROUNDS):
+            lacks = (normals**2).sum(axis=1)[:, None] - np.einsum("mki,mi->mk", moved[at], normals)
+            most, count, step = np.zeros(len(moved)), np.zeros(len(moved)), np.zeros_like(moved)
+            np.maximum.at(most, at, lacks)
+            if most.max() < ENOUGH:
+                break
+            chosen = (lacks > ENOUGH) & (lacks > most[at] - 1e-9)
+            np.add.at(count, at[chosen], 1)
+            np.add.at(step, at[chosen], (lacks[..., None] * normals[:, None])[chosen])
+            moved += step / np.maximum(count, 1)[:, None]
+        return replace(self, vertices=self.vertices + distance * moved[place.reshape(-1)])
 
     def only(self, which: np.ndarray) -> Triangles:
         """Return the same triangles with only some of the faces, selected by a mask (m,)."""
@@ -74,6 +99,20 @@ def box(half_size: np.ndarray) -> Triangles:
             uv = np.column_stack([(corners[:, u_axis] + 1) / 2, (1 - corners[:, v_axis]) / 2])
             parts.append(Triangles(corners * half_size, faces, uv=uv))
     return join(parts)
+
+
+def strip(half_sides: np.ndarray) -> Triangles:
+    """Return a level rectangle as pieces along its longer side, each about as long as its distance from the middle:
+    (u, v) = ((x/sx + 1)/2, (y/sy + 1)/2)."""
+    short, long = np.sort(half_sides)
+    ahead = np.geomspace(short, long, int(np.ceil(np.log2(long / short))) + 1)
+    along = np.repeat(np.concatenate([-ahead[::-1], ahead]), 2)
+    across = np.tile([-short, short], len(ahead) * 2)
+    level = [along, across] if half_sides[0] > half_sides[1] else [-across, along]
+    first = np.arange(0, len(along) - 2, 2)
+    faces = [np.column_stack([first, first + 2, first + 3]), np.column_stack([first, first + 3, first + 1])]
+    uv = (np.column_stack(level) / half_sides + 1) / 2
+    return Triangles(np.column_stack([*level, np.zeros(len(along))]), np.concatenate(faces), uv)
 
 
 def ellipsoid(semi_axes: np.ndarray) -> Triangles:

@@ -20,7 +20,7 @@ from sim.scene import source, surfaces
 from sim.scene import variation as of_worlds
 from sim.scene.appearances import in_material, material_of
 from sim.scene.model_settings import ModelSettings
-from sim.scene.primitive_geoms import kind_of as primitive_of
+from sim.scene.primitive_geoms import is_resizable
 from sim.scene.variation import COLOR, MATERIAL, OF_THINGS, SIZE, START, Variation
 
 Drawn = Mapping[str, of_worlds.Drawn]
@@ -140,7 +140,7 @@ class WorldModels:
         for geom, name in self._sizes.items():
             drawn = self._materials.get(geom, ("", {}))[1].values()
             looks = [in_material(model, geom, material).model for material in drawn] or [model]
-            if any(primitive_of(look, geom) is None for look in looks):
+            if not all(is_resizable(look, geom) for look in looks):
                 raise ValueError(
                     f"vary: {name}: must be a sphere, capsule, cylinder, ellipsoid or box without a texture"
                 )

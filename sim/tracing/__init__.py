@@ -15,6 +15,7 @@ model_tracer         ModelTracer: rays through models with any shapes
 model_scene          static and moving geoms of any model
 model_lights         lights of any model
 movers               intersections of rays with moving geoms
+mesh_atlas           moving meshes in one scene
 primitives           intersections of rays with MuJoCo's primitives
 paint                colours that differ between worlds
 world_rows           rows of floats that differ between worlds

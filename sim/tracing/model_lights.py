@@ -34,6 +34,7 @@ class ModelLight:
     level: irradiance per band (band,) on a surface that faces the light; for points and spots, at a distance of 1 m
     cutoff, exponent: for a spot, the cosine of its half angle, and the exponent of its falloff to the side
     direction: unit vector (3,) towards a directional light in the model's reference pose; None for other lights
+    casts_shadow: whether obstacles block it
     """
 
     light: int
@@ -42,6 +43,7 @@ class ModelLight:
     cutoff: float = -1.0
     exponent: float = 0.0
     direction: np.ndarray | None = None
+    casts_shadow: bool = True
 
 
 def model_lights(
@@ -65,7 +67,7 @@ def model_lights(
         if kind == _SPOT:
             cutoff = math.cos(math.radians(emitter.description["cutoff_angle"]))
             exponent = float(model.light_exponent[emitter.light])
-        found.append(ModelLight(emitter.light, kind, level, cutoff, exponent, towards))
+        found.append(ModelLight(emitter.light, kind, level, cutoff, exponent, towards, emitter.casts_shadow))
     return found, left_out
 
 

@@ -20,10 +20,11 @@ from optics.spectra.spectrum import Spectrum
 from sim.scene import bsdfs, inventory, lights, shapes, sky, surfaces
 from sim.scene.appearances import Appearance, Varied, appearances_of, in_white, varied_geoms
 from sim.scene.band_error import lights_in_bands
+from sim.scene.coincident import coincidences
 from sim.scene.merged_parts import PlacedPart, merged
 from sim.scene.mirror import VISIBLE_GROUPS, MirrorWarning
 from sim.scene.model_snapshot import ModelSnapshot
-from sim.scene.primitive_geoms import kind_of
+from sim.scene.primitive_geoms import is_resizable
 from sim.scene.rays import names_of
 from sim.scene.spectra import of_geom, resolve
 from sim.scene.variant import Description, MitsubaObject, default_variant
@@ -48,6 +49,7 @@ class ModelScene:
     glows: BSDFs whose reflectance is the radiance of a glowing geom, by appearance; such geoms count as movers
     varied: geoms whose size or colour differs between worlds, with the ids of the materials that each may have; they
         count as movers, although they may be static
+    coincidences: geoms in the same place in the model's reference pose
     as_built: snapshot of the model, with which worlds are compared
 
     Raises:
@@ -69,6 +71,9 @@ class ModelScene:
         self.geoms = [g for g in self._seen if shapes.has_shape(model, g)]
         if not self.geoms:
             raise ValueError("the model has no visible geom of a kind that can be mirrored")
+        data = mujoco.MjData(model)
+        mujoco.mj_forward(model, data)
+        self.coincidences = coincidences(data, self.geoms)
         with in_variant(self.variant):
             self.varied = varied_geoms(model, self.geoms, varied, self.spectra)
             drawn = {geom: materials for geom, materials in self.varied.items() if materials}
@@ -98,7 +103,8 @@ class ModelScene:
         of_sky = ["light of the sky on surfaces"] if light == DIRECT and self.has_sky else []
         missing = [*self._unlit, *of_sky, *inventory.left_out(model, self._seen, self._groups)]
         missing += _not_matt(model, self.looks, light)
-        for words in (*([f"eyes do not see: {'; '.join(missing)}"] if missing else []), *self._off):
+        told = [f"eyes do not see: {'; '.join(missing)}"] if missing else []
+        for words in (*told, *filter(None, [self.coincidences.message(model)]), *self._off):
             warnings.warn(words, MirrorWarning, stacklevel=_outside())
 
     @cached_property
@@ -108,15 +114,14 @@ class ModelScene:
         reachable = [g for g in range(model.ngeom) if model.geom_group[g] in groups and shapes.has_shape(model, g)]
         hidden = [g for g in reachable if g not in self._seen]
         moving = np.array([look.geom for look in self.moving], int)
-        meshes = [look.geom for look in self.moving if kind_of(look.model, look.geom) is None]
-        return ModelSnapshot(model, self.geoms, hidden, moving, np.setdiff1d(moving, meshes), self.varied)
+        fixed = [look.geom for look in self.moving if not is_resizable(look.model, look.geom)]
+        return ModelSnapshot(model, self.geoms, hidden, moving, np.setdiff1d(moving, fixed), self.varied)
 
     @cached_property
     def movers(self) -> Movers:
         """The moving geoms."""
         with in_variant(self.variant):
-            meshes = [look for look in self.moving if kind_of(look.model, look.geom) is None]
-            return Movers(self.model, self.moving, {look: self._mesh(look, self.bsdfs[look]) for look in meshes})
+            return Movers(self.model, self.moving, self.coincidences.lifts, next(iter(self.bsdfs.values())))
 
     @cached_property
     def paint(self) -> Paint:
@@ -150,12 +155,6 @@ class ModelScene:
             return None
         return mi.load_dict({"type": "twosided", "inside": {"type": "diffuse", "reflectance": radiance}})
 
-    def _mesh(self, look: Appearance, bsdf: MitsubaObject) -> MitsubaObject:
-        """Return the Mitsuba scene of a geom in its own frame."""
-        parts = enumerate(shapes.parts(look.model, look.geom))
-        built = {f"part_{k}": shapes.build(part, np.eye(4), f"part_{k}", bsdf, None) for k, part in parts}
-        return mi.load_dict({"type": "scene", **built}, optimize=False)
-
     @cached_property
     def told_apart(self) -> tuple[MitsubaObject, np.ndarray]:
         """Mitsuba scene in which every static geom has its own shapes, and a table from the shapes' ids in Mitsuba to
@@ -175,7 +174,7 @@ class ModelScene:
         return [
             (f"geom_{g}_{k}", part, shapes.pose(data, g), bsdf)
             for g, bsdf in ((look.geom, bsdf) for look, bsdf in self.bsdfs.items() if look not in self.moving)
-            for k, part in enumerate(shapes.parts(self.model, g))
+            for k, part in enumerate(shapes.parts(self.model, g, self.coincidences.lift(g)))
         ]
 
 

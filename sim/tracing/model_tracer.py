@@ -30,10 +30,10 @@ from sim.tracing.world_rows import WorldRows
 
 @dataclass(frozen=True)
 class Scenes:
-    """Mitsuba scenes. still: static geoms and the sky · meshes: moving meshes, each in its own frame"""
+    """Mitsuba scenes. still: static geoms and the sky · meshes: moving meshes (`MeshAtlas`), or None"""
 
     still: MitsubaObject
-    meshes: list[MitsubaObject]
+    meshes: MitsubaObject | None
 
 
 @dataclass(frozen=True)
@@ -133,7 +133,7 @@ class ModelTracer:
         self._scene, self._bands, self.light = scene, lighting.spectra(scene.wavelengths), light
         self.why, self.basis = why, np.eye(len(scene.wavelengths))
         self._glows = len(scene.glows) > 0
-        self.scene = Scenes(scene.still, scene.movers.meshes)
+        self.scene = Scenes(scene.still, scene.movers.atlas.scene)
         shapes = scene.still.shapes()
         self._any_still = len(shapes) > 0
         # Never empty: the recording collects the BSDFs' textures only if a BSDF is among the inputs.
@@ -171,7 +171,7 @@ class ModelTracer:
         """Return the light along each ray, per band, and the distance to the visible surface [m]. The samples of a ray,
         two points on the unit square, determine its bounce rays (`lighting.spawn_bounce_ray`)."""
         met = self._met(seen.ray, there)
-        arrives = self._irradiance(met, seen.axis, there, shadow_of_headlight=False)
+        arrives = self._irradiance(met, seen.axis, there)
         if self.light == lighting.BOUNCE:
             reflected = self._returned(met, seen.axis, there, samples)
             arrives = [e + dr.pi * more for e, more in zip(arrives, reflected, strict=True)]
@@ -183,7 +183,7 @@ class ModelTracer:
         the sky or of a glowing geom, and light of lamps, sky and glowing geoms that a second surface reflects."""
         bounce_ray = lighting.spawn_bounce_ray(met.point, met.normal, mi.Point2f(samples.x, samples.y))
         second = self._met(bounce_ray, there, met.seen)
-        arrives = self._irradiance(second, axis, there, shadow_of_headlight=True)
+        arrives = self._irradiance(second, axis, there)
         if self._scene.has_sky or self._glows:
             further = lighting.spawn_bounce_ray(second.point, second.normal, mi.Point2f(samples.z, samples.w))
             last = self._met(further, there, second.seen)
@@ -238,9 +238,7 @@ class ModelTracer:
         shape: Array = dr.reinterpret_array(mi.UInt32, si.shape) if any_still else mi.UInt32(0)
         return dr.select(hit.which < movers, hit.which, movers + dr.select(si.is_valid(), shape, 0))
 
-    def _irradiance(
-        self, met: _SurfaceHit, axis: Array, there: Surroundings, *, shadow_of_headlight: bool
-    ) -> list[Array]:
+    def _irradiance(self, met: _SurfaceHit, axis: Array, there: Surroundings) -> list[Array]:
         """Return the irradiance of surfaces by lamps, as spectra of LANES bands each."""
         start = lighting.clear_of(met.point, met.normal)
         total = [mi.Spectrum(0) for _ in self._bands]
@@ -248,7 +246,7 @@ class ModelTracer:
             towards, far, share = self._scene.lights.towards(k, met.point, axis, there.lights)
             cosine = dr.dot(met.normal, towards)
             shines = met.seen & (cosine > 0) & (share > 0)
-            if light.light >= 0 or shadow_of_headlight:  # an eye cannot see the shadows of its own headlight
+            if light.casts_shadow:
                 shines &= ~self._shadowed(mi.Ray3f(start, towards), far, shines, there)
             arrives = dr.select(shines, cosine * share, 0)
             chunks = np.pad(light.level, (0, -len(light.level) % lighting.LANES)).reshape(-1, lighting.LANES)

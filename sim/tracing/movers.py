@@ -1,12 +1,12 @@
 """Intersections of rays with moving geoms in the renderer's kernel: primitives in closed form, meshes by Mitsuba.
 
-Each mesh has its own scene in the geom's frame, and rays are transformed to this frame. When a mesh moves, its scene is
-not rebuilt. On a GPU, each mesh is intersected in a separate kernel.
+Rays are transformed to the frame of each geom. When a mesh moves, its Mitsuba scene (`sim.tracing.mesh_atlas`) is not
+rebuilt. On a GPU, meshes are intersected in a separate kernel.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,33 +16,27 @@ import mujoco
 import numpy as np
 
 from optics.numerics.autodiff import Array
+from sim.scene import shapes
 from sim.scene.appearances import Appearance
 from sim.scene.device_arrays import whole_numbers
 from sim.scene.poses import Poses
-from sim.scene.primitive_geoms import kind_of
+from sim.scene.primitive_geoms import PLANE, REACH, kind_of
 from sim.scene.variant import MitsubaObject, computed, on_gpu
+from sim.tracing.mesh_atlas import MeshAtlas
 from sim.tracing.primitives import PRIMITIVES, Primitive
 from sim.tracing.world_rows import WorldRows
 
 _TYPES = mujoco.mjtGeom
 # Rows of four floats for each mover: a sphere around its origin; then, three times, an axis of its frame in the world
-# and one of its sizes.
+# and one of its sizes. The sizes of a mesh are the centre of its cell in the atlas.
 ROWS = 4
-MESHES = 32  # largest number of meshes; on a CPU all of them are scenes in one kernel
-# Largest distance of a geom's surface from its origin [m] as a function of the half sizes (..., 3), for each kind.
-_REACH: dict[mujoco.mjtGeom, Callable[[np.ndarray], np.ndarray]] = {
-    _TYPES.mjGEOM_SPHERE: lambda size: size[..., 0],
-    _TYPES.mjGEOM_ELLIPSOID: lambda size: size.max(axis=-1),
-    _TYPES.mjGEOM_CAPSULE: lambda size: size[..., 0] + size[..., 1],
-    _TYPES.mjGEOM_CYLINDER: lambda size: np.hypot(size[..., 0], size[..., 1]),
-    _TYPES.mjGEOM_BOX: lambda size: np.linalg.norm(size, axis=-1),
-}
+MESH = "mesh"
 
 
 @dataclass(frozen=True)
 class Hit:
     """First hit of a ray. t: distance [m], infinite without a hit · which: number of the mover · normal: unit vector in
-    the world · uv: texture coordinates of meshes."""
+    the world · uv: texture coordinates of meshes and planes."""
 
     t: Array
     which: Array
@@ -52,10 +46,15 @@ class Hit:
 
 @dataclass(frozen=True)
 class _Frame:
-    """A mover's frame. axes: its axes in the world (3 Vector3f) · origin: its origin in the world (Vector3f)."""
+    """A mover's frame. axes: its axes in the world (3 Vector3f) · origin: its origin in the world (Vector3f)
+
+    size: its half sizes · reach: largest distance of its surface from its origin
+    """
 
     axes: tuple[Array, Array, Array]
     origin: Array
+    size: Array
+    reach: Array
 
     def taken(self, v: Array) -> Array:
         """Return a direction of the world in the mover's frame."""
@@ -76,44 +75,48 @@ class MoverRows(WorldRows):
 class Movers:
     """The moving geoms of a model, primitives first, by kind. A geom with drawn materials has a mover per appearance.
 
-    looks: appearance of each mover · geoms: geom id of each mover, (mover,) · n_primitives: number of primitives
-    resizable: ids of geoms whose sizes may differ between worlds: geoms that are primitives in all their appearances
-    meshes: Mitsuba scenes of the other movers
+    looks: appearance of each mover · geoms: geom id of each mover, (mover,)
+    atlas: all other movers · lifts: distances by which surfaces are moved outwards [m], by geom
     ends: number of the first mover of each kind, for the kernel
-
-    Raises:
-        ValueError: more than MESHES meshes.
     """
 
     def __init__(
-        self, model: mujoco.MjModel, looks: Sequence[Appearance], meshes: dict[Appearance, MitsubaObject]
+        self, model: mujoco.MjModel, looks: Sequence[Appearance], lifts: Mapping[int, float], bsdf: MitsubaObject
     ) -> None:
-        if len(meshes) > MESHES:
-            raise ValueError(f"the model has {len(meshes)} moving meshes: must be at most {MESHES}; hide some by group")
-        closed = [look for look in looks if look not in meshes]
-        by_kind = {name: [each for each in closed if kind_of(each.model, each.geom) == name] for name in PRIMITIVES}
-        primitives = [look for group in by_kind.values() for look in group]
-        self.looks, self.n_primitives = [*primitives, *meshes], len(primitives)
+        kinds = [*PRIMITIVES, MESH]
+        by_kind = [[look for look in looks if (kind_of(look.model, look.geom) or MESH) == kind] for kind in kinds]
+        self._ends = np.cumsum([0, *map(len, by_kind)])
+        self.ends = whole_numbers(self._ends)
+        self.looks = [look for group in by_kind for look in group]
         self.geoms = np.array([look.geom for look in self.looks], int)
-        self.resizable = np.setdiff1d(self.geoms[: self.n_primitives], self.geoms[self.n_primitives :])
         self._materials = np.array([look.material for look in self.looks], int)
         self._drawn, self._as_built = np.array([look.drawn for look in self.looks], bool), model.geom_matid[None].copy()
-        self.meshes = list(meshes.values())
-        self._sizes = model.geom_size[self.geoms].copy()
-        self._types = model.geom_type[self.geoms]
-        # Reach of meshes from their origins [m]; a plane is infinite.
-        self._mesh_reach = np.where(self._types == _TYPES.mjGEOM_PLANE, np.inf, model.geom_rbound[self.geoms])
+        self._sizes, self._types = model.geom_size[self.geoms].copy(), model.geom_type[self.geoms]
+        planes = [shapes.plane_sides(model, geom) for geom in self.geoms[self._of_kind(PLANE)]]
+        self._sizes[self._of_kind(PLANE), :2] = np.reshape(planes, (-1, 2))
+        reach = self._mesh_reach = model.geom_rbound[self.geoms[self._of_kind(MESH)]]
+        lift = np.array([lifts.get(geom, 0.0) for geom in self.geoms.tolist()])
+        self._grown = np.array([shapes.lifted_size(*pair) for pair in zip(self._types, lift, strict=True)]).reshape(
+            -1, 3
+        )
+        self._raised = np.where(self._types == _TYPES.mjGEOM_PLANE, lift, 0)[:, None]
+        parts = [shapes.parts(look.model, look.geom, lifts.get(look.geom, 0.0)) for look in by_kind[-1]]
+        self.atlas = MeshAtlas.from_parts(parts, reach, bsdf)
+        self._sizes[self._of_kind(MESH)] = self.atlas.cells
         self._known: tuple[bytes, np.ndarray, np.ndarray] | None = None  # extents of the last poses
-        self._ends = np.cumsum([0, *(len(group) for group in by_kind.values())])
-        self.ends = whole_numbers(self._ends)
+
+    def _of_kind(self, kind: str) -> slice:
+        """Return the numbers of the movers of a kind."""
+        i = [*PRIMITIVES, MESH].index(kind)
+        return slice(int(self._ends[i]), int(self._ends[i + 1]))
 
     def __len__(self) -> int:
         return len(self.geoms)
 
     @property
     def apart(self) -> bool:
-        """True if each mesh is intersected in its own kernel, which no branch can contain: see `computed`."""
-        return bool(self.meshes) and on_gpu()
+        """True if movers are intersected in their own kernel, which no branch can contain: see `computed`."""
+        return self.atlas.scene is not None and on_gpu()
 
     @property
     def n_rows(self) -> int:
@@ -128,11 +131,13 @@ class Movers:
             absent = self._absent(poses)
             if absent is not None:
                 reach = np.where(absent, 0, reach)
+            turns = poses.geom_turns(self.geoms)
+            places = places + self._raised * turns[..., 2]
             rows[:, 0, :3] = centre = places.mean(axis=1)
             rows[:, 0, 3] = (np.linalg.norm(places - centre[:, None], axis=-1) + reach).max(axis=1)
             each = rows[:, 1:].reshape(poses.n, len(self), ROWS, 4)
             each[:, :, 0, :3], each[:, :, 0, 3] = places, reach
-            each[:, :, 1:, :3] = np.swapaxes(poses.geom_turns(self.geoms), -1, -2)
+            each[:, :, 1:, :3] = np.swapaxes(turns, -1, -2)
             each[:, :, 1:, 3] = sizes
             if absent is not None:
                 each[:, :, 0, :3] += np.where(absent, np.nan, 0)[..., None]  # NaN: rays miss it
@@ -163,10 +168,14 @@ class Movers:
     def _with_reach(self, sizes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         balls = self._types == _TYPES.mjGEOM_SPHERE
         sizes[:, balls] = sizes[:, balls, :1]
-        reach = np.broadcast_to(self._mesh_reach, sizes.shape[:2]).copy()
-        for kind, how_far in _REACH.items():
-            mine = self._types[: self.n_primitives] == kind
-            reach[:, : self.n_primitives][:, mine] = how_far(sizes[:, : self.n_primitives][:, mine])
+        sizes = sizes + self._grown
+        fixed = slice(self._of_kind(PLANE).start, None)  # planes and meshes, which come last
+        sizes[:, fixed] = self._sizes[fixed]
+        reach = np.zeros(sizes.shape[:2])
+        for kind, how_far in REACH.items():
+            mine = self._types == kind
+            reach[:, mine] = how_far(sizes[:, mine])
+        reach[:, self._of_kind(MESH)] = self._mesh_reach
         return sizes, reach
 
     def nearest(self, ray: Array, farthest: Array, there: MoverRows) -> Hit:
@@ -176,7 +185,9 @@ class Movers:
             return Hit(*none)
         if self.apart:
             computed(ray, farthest, there.fours, there.first)
-            return Hit(*self._nearest(ray, farthest, there))
+            found = self._nearest(ray, farthest, there)
+            computed(found)
+            return Hit(*found)
         near = _may_meet(ray, there, 0)
         found = dr.if_stmt((), near, lambda: self._nearest(ray, farthest, there), lambda: none)
         return Hit(*found)
@@ -185,92 +196,90 @@ class Movers:
         """Return whether any mover blocks a ray at a distance less than `farthest`."""
         if self.apart:
             computed(ray, farthest, there.fours, there.first)
-            return self._block(ray, farthest, there)
+            blocked = self._block(ray, farthest, there)
+            computed(blocked)
+            return blocked
         near = _may_meet(ray, there, 0) & (farthest > 0)
         return dr.if_stmt((), near, lambda: self._block(ray, farthest, there), lambda: mi.Bool(False))
 
     def _nearest(self, ray: Array, farthest: Array, there: MoverRows) -> tuple[Array, ...]:
         t, which = farthest, mi.UInt32(len(self))
-        for i, primitive in self._kinds():
+        for i, hit in self._kinds():
 
-            def step(k: Array, t: Array, which: Array, hit: Callable[..., Array] = primitive.hit) -> tuple[Array, ...]:
+            def step(k: Array, t: Array, which: Array, hit: Callable[..., Array] = hit) -> tuple[Array, ...]:
                 found = _met(hit, ray, there, k)
                 nearer = found < t
                 return k + 1, dr.select(nearer, found, t), dr.select(nearer, k, which)
 
             _, t, which = _loop(i, there, step, t, which)
-        uv = mi.Point2f(0)
-        normal = self._normals(ray(dr.select(which < len(self), t, 0)), which, there)
-        for m, scene in enumerate(self.meshes):
-            computed(t, which, normal, uv)
-            k = self.n_primitives + m
-            frame, _ = _frame(there, mi.UInt32(k))
-            si = scene.ray_intersect(_local_ray(ray, frame), mi.RayFlags.All, True, self._is_there(k, frame))
-            nearer = si.is_valid() & (si.t < t)
-            t, which = dr.select(nearer, si.t, t), dr.select(nearer, k, which)
-            normal = dr.select(nearer, frame.given(mi.Vector3f(si.sh_frame.n)), normal)
-            uv = dr.select(nearer, si.uv, uv)
-        if self.apart:
-            computed(t, which, normal, uv)
+        normal, uv = self._surface(ray, t, which, there)
         return t, which, normal, uv
 
     def _block(self, ray: Array, farthest: Array, there: MoverRows) -> Array:
         blocked = mi.Bool(False)
-        for i, primitive in self._kinds():
+        for i, hit in self._kinds():
 
-            def step(k: Array, blocked: Array, hit: Callable[..., Array] = primitive.hit) -> tuple[Array, ...]:
+            def step(k: Array, blocked: Array, hit: Callable[..., Array] = hit) -> tuple[Array, ...]:
                 return k + 1, blocked | (_met(hit, ray, there, k) < farthest)
 
             _, blocked = _loop(i, there, step, blocked)
-        for m, scene in enumerate(self.meshes):
-            computed(blocked)
-            k = self.n_primitives + m
-            frame, _ = _frame(there, mi.UInt32(k))
-            local = _local_ray(ray, frame)
-            local.maxt = farthest
-            blocked |= scene.ray_test(local, ~blocked & self._is_there(k, frame))
-        if self.apart:
-            computed(blocked)
         return blocked
 
-    def _is_there(self, k: int, frame: _Frame) -> Array | bool:
-        """Return whether a world shows mover k. The origin of an absent mover is NaN, for which Embree's and OptiX's
-        results are undefined."""
-        return ~dr.isnan(frame.origin.x) if self._drawn[k] else True
+    def _kinds(self) -> list[tuple[int, Callable[..., Array]]]:
+        """Return the kinds of movers that occur, as their numbers and intersections."""
+        hits = [*(_of_primitive(primitive) for primitive in PRIMITIVES.values()), self._mesh_hit]
+        return [(i, hit) for i, hit in enumerate(hits) if self._ends[i] < self._ends[i + 1]]
 
-    def _kinds(self) -> list[tuple[int, Primitive]]:
-        """Return the kinds of primitives that occur, with their numbers."""
-        return [(i, p) for i, p in enumerate(PRIMITIVES.values()) if self._ends[i] < self._ends[i + 1]]
+    def _mesh_hit(self, o: Array, d: Array, frame: _Frame) -> Array:
+        return self.atlas.hit(o, d, frame.size, frame.reach)
 
-    def _normals(self, point: Array, which: Array, there: MoverRows) -> Array:
-        """Return the normals of primitives at points on them."""
-        k = dr.minimum(which, max(self.n_primitives - 1, 0))
-        frame, size = _frame(there, k)
-        local = frame.taken(point - frame.origin)
-        normal = mi.Vector3f(0, 0, 1)
-        for i, primitive in self._kinds():
-            mine = (k >= dr.gather(mi.UInt32, there.ends, i)) & (k < dr.gather(mi.UInt32, there.ends, i + 1))
-            normal = dr.select(mine, primitive.normal(local, size), normal)
-        return dr.normalize(frame.given(normal))
+    def _surface(self, ray: Array, t: Array, which: Array, there: MoverRows) -> tuple[Array, Array]:
+        """Return the normals in the world and the texture coordinates of hits."""
+        k = dr.minimum(which, len(self) - 1)
+        frame = _frame(there, k)
+        o, d = frame.taken(ray.o - frame.origin), frame.taken(ray.d)
+        local = frame.taken(ray(dr.select(which < len(self), t, 0)) - frame.origin)
+        normal, uv = mi.Vector3f(0, 0, 1), mi.Point2f(0)
+        for i, (kind, primitive) in enumerate(PRIMITIVES.items()):
+            if self._ends[i] < self._ends[i + 1]:
+                mine = self._is_kind(i, which, there)
+                normal = dr.select(mine, primitive.normal(local, frame.size), normal)
+                if kind == PLANE:
+                    on_plane = mi.Point2f(local.x / frame.size.x, local.y / frame.size.y)
+                    uv = dr.select(mine, dr.fma(on_plane, 0.5, 0.5), uv)
+        if self.atlas.scene is not None:
+            mine = self._is_kind(len(PRIMITIVES), which, there)
+            of_mesh = self.atlas.surface(o, d, frame.size, frame.reach, mine)
+            normal, uv = dr.select(mine, of_mesh[0], normal), dr.select(mine, of_mesh[1], uv)
+        return dr.normalize(frame.given(normal)), uv
+
+    @staticmethod
+    def _is_kind(i: int, which: Array, there: MoverRows) -> Array:
+        return (which >= dr.gather(mi.UInt32, there.ends, i)) & (which < dr.gather(mi.UInt32, there.ends, i + 1))
+
+
+def _of_primitive(primitive: Primitive) -> Callable[..., Array]:
+    return lambda o, d, frame: primitive.hit(o, d, frame.size)
 
 
 def _met(hit: Callable[..., Array], ray: Array, there: MoverRows, k: Array) -> Array:
     """Return the distance to mover k along a ray [m]. A branch skips the intersection if a ray misses the sphere around
-    the mover, as most rays and their neighbours do."""
+    the mover, as most rays and their neighbours do. The origin of an absent mover is NaN, so all rays miss it."""
 
     def within() -> Array:
-        frame, size = _frame(there, k)
-        return hit(frame.taken(ray.o - frame.origin), frame.taken(ray.d), size)
+        frame = _frame(there, k)
+        return hit(frame.taken(ray.o - frame.origin), frame.taken(ray.d), frame)
 
     found: Array = dr.if_stmt((), _may_meet(ray, there, 1 + k * ROWS), within, lambda: mi.Float(dr.inf))
     return found
 
 
-def _frame(there: MoverRows, k: Array) -> tuple[_Frame, Array]:
-    """Return the frame of a mover, and its half sizes."""
+def _frame(there: MoverRows, k: Array) -> _Frame:
+    """Return the frame of a mover."""
+    x, y, z, reach = there.four(1 + k * ROWS)
     fours = [list(there.four(1 + k * ROWS + i)) for i in range(1, ROWS)]
     a, b, c = (mi.Vector3f(*four[:3]) for four in fours)
-    return _Frame((a, b, c), there.point(1 + k * ROWS)), mi.Vector3f(*(four[3] for four in fours))
+    return _Frame((a, b, c), mi.Vector3f(x, y, z), mi.Vector3f(*(four[3] for four in fours)), reach)
 
 
 def _may_meet(ray: Array, there: MoverRows, row: Array | int) -> Array:
@@ -288,7 +297,3 @@ def _loop(kind: int, there: MoverRows, step: Callable[..., Any], *state: Array) 
     start = dr.gather(mi.UInt32, there.ends, kind)
     found: tuple[Array, ...] = dr.while_loop((start, *state), lambda k, *_: k < end, step, label="movers")
     return found
-
-
-def _local_ray(ray: Array, frame: _Frame) -> Array:
-    return mi.Ray3f(mi.Point3f(frame.taken(ray.o - frame.origin)), frame.taken(ray.d))

@@ -1,8 +1,9 @@
 """Intersections of rays with MuJoCo's primitives, in the geom's own frame, from outside.
 
-Only the outer sides of faces are visible. As in MuJoCo's rendering, an eye inside a body looks out of it. Distances are
-multiples of the direction's length, and infinite for a miss. Roots are computed relative to the point at which the ray
-is nearest to the geom's centre or axis, so that hits of small or distant geoms are accurate in float32.
+Only the outer sides of faces are visible, except for planes. As in MuJoCo's rendering, an eye inside a body looks out
+of it. Distances are multiples of the direction's length, and infinite for a miss. Roots are computed relative to the
+point at which the ray is nearest to the geom's centre or axis, so that hits of small or distant geoms are accurate in
+float32.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ import drjit as dr
 import mitsuba as mi
 
 from optics.numerics.autodiff import Array
+from sim.scene.primitive_geoms import PLANE
 
 TINY = 1e-20
 # If the component of a unit direction across a surface is smaller, the ray counts as parallel to it and misses it.
@@ -110,10 +112,23 @@ def _box_normal(p: Array, size: Array) -> Array:
     return mi.Vector3f(dr.select(x, q.x, 0), dr.select(y, q.y, 0), dr.select(x | y, 0, q.z))
 
 
+def _plane_hit(o: Array, d: Array, size: Array) -> Array:
+    """Return the distance to a plane; both of its sides are visible."""
+    t = -o.z / dr.select(dr.abs(d.z) < PARALLEL, PARALLEL, d.z)
+    x, y = dr.fma(d.x, t, o.x), dr.fma(d.y, t, o.y)
+    on_plane = (t > 0) & (dr.abs(d.z) >= PARALLEL) & (dr.abs(x) <= size.x) & (dr.abs(y) <= size.y)
+    return dr.select(on_plane, t, dr.inf)
+
+
+def _plane_normal(p: Array, size: Array) -> Array:
+    return mi.Vector3f(0, 0, 1)
+
+
 # Primitives by name. Movers are sorted by kind in this order. Spheres are ellipsoids.
 PRIMITIVES = {
     "ellipsoid": Primitive(_ellipsoid_hit, _ellipsoid_normal),
     "capsule": Primitive(_capsule_hit, _capsule_normal),
     "cylinder": Primitive(_cylinder_hit, _cylinder_normal),
     "box": Primitive(_box_hit, _box_normal),
+    PLANE: Primitive(_plane_hit, _plane_normal),
 }

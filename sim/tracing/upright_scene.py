@@ -70,6 +70,10 @@ def upright_scene(scene: ModelScene, stand: LevelStand) -> UprightScene:
     for geom, materials in scene.varied.items():
         what = "materials" if materials else "sizes or colours"
         raise NoClosedForm(f"{what} of geom {model.geom(geom).name!r} differ between worlds")
+    same = _alike(scene)
+    for first, last in scene.coincidences.pairs:
+        if same[first] is not same[last]:
+            raise NoClosedForm(f"geoms {_name(model, first)} and {_name(model, last)} are in the same place")
     moving = [look.geom for look in scene.moving]
     walls = walls_of(model, [g for g in scene.geoms if g not in moving], stand.heights)
     for geom in moving:
@@ -81,7 +85,6 @@ def upright_scene(scene: ModelScene, stand: LevelStand) -> UprightScene:
     mujoco.mj_forward(model, data)
     _refuse_what_eyes_would_see(model, data, stand, own)
     seen = [geom for geom in moving if geom not in own]
-    same = _alike(scene)
     bodies = [*seen, *own]
     return UprightScene(
         model,
@@ -119,6 +122,8 @@ def _checked(model: mujoco.MjModel, light: ModelLight) -> DirectionalLight:
     keeps_its_way = int(model.light_mode[light.light]) in _KEEP_THEIR_WAY
     if not keeps_its_way or model.body_weldid[body] != 0 or model.body_mocapid[model.body_rootid[body]] >= 0:
         raise NoClosedForm(f"light {name} moves")
+    if not light.casts_shadow:
+        raise NoClosedForm(f"light {name} casts no shadow")
     if light.direction[2] <= 0:
         raise NoClosedForm(f"light {name} shines from below")
     return DirectionalLight(light.direction, light.level)

@@ -92,15 +92,13 @@ def walls_of(model: mujoco.MjModel, geoms: Sequence[int], eyes: np.ndarray) -> W
 
 
 def _rectangle(model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> np.ndarray:
-    """Return Mitsuba's rectangle of a plane: the points (u, v) = (0, 0), (1, 0), (0, 1) in the world, (3, 3)."""
-    (part,) = shapes.parts(model, geom)
-    assert part.local is not None
-    corners = np.array([[-1, -1, 0, 1], [1, -1, 0, 1], [-1, 1, 0, 1]], float)
+    """Return the points of a plane with Mitsuba's (u, v) = (0, 0), (1, 0), (0, 1) in the world, (3, 3)."""
+    corners = np.array([[-1, -1], [1, -1], [-1, 1]]) * shapes.plane_sides(model, geom)
     pose = shapes.pose(data, geom)
-    points = corners @ (pose @ part.local).T
+    points = corners @ pose[:3, :2].T + pose[:3, 3]
     if np.abs(pose[:3, 2] - [0, 0, 1]).max() > ALIGNED or np.abs(np.abs(pose[:2, :2]).max(axis=0) - 1).max() > ALIGNED:
         raise NoClosedForm(f"plane {model.geom(geom).name!r} is not level, or turned")
-    return points[:, :3]
+    return np.asarray(points)
 
 
 def _floor_uv(corners: np.ndarray) -> np.ndarray:

@@ -14,7 +14,9 @@ tessellation: test_mirror.py, test_cube_textures.py
 cube: test_cube_textures.py
 surfaces: test_textures.py, test_mirror_light.py
 bsdfs: test_bsdfs.py
+coincident: test_coincident.py
 lights: test_lights.py, test_mirror_light.py
+shadowless: test_shadowless.py
 sky: test_sky.py
 spectra: test_spectra.py
 device_arrays: test_frozen_kernels.py

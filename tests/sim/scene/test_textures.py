@@ -3,7 +3,8 @@
 The texture's grey value codes u in one model and v in another. A white texture gives the light, so that a ratio of
 radiances gives the coordinate. The tests detect these errors, each tried separately: a box's u and v swapped or u
 mirrored, u mirrored around an axis, a plane's v upwards, image upside down, a capsule's caps swapped, uniform repeats
-ignored, sRGB not decoded.
+ignored, sRGB not decoded, a plane that is infinite along one axis shifted by half a repeat along the other, and such
+planes and long ones as a single rectangle, whose hit points have errors of metres.
 """
 
 from functools import cache
@@ -46,6 +47,17 @@ CASES = {
     "hfield": (GEOM.mjGEOM_HFIELD, [0.9, 0.7, 0.5], [1, 0, 0, 0.3], (0.6, 0.8), False),
     "hfield-uniform": (GEOM.mjGEOM_HFIELD, [0.9, 0.7, 0.5], [1, 0, 0, 0.3], (0.6, 0.8), True),
 }
+
+
+def _half_infinite(rng):
+    """Return a plane that is infinite along one axis, as a case."""
+    size = [*rng.permutation([rng.uniform(0.5, 1.2), 0.0]).tolist(), 0.1]
+    repeat = tuple(rng.uniform(0.2, 0.6, 2).tolist())
+    return GEOM.mjGEOM_PLANE, size, [1, 0, 0, rng.uniform(-0.5, 0.5)], repeat, bool(rng.integers(2))
+
+
+CASES |= {f"plane-half-infinite-{seed}": _half_infinite(np.random.default_rng(seed)) for seed in range(5)}
+CASES["plane-long"] = (GEOM.mjGEOM_PLANE, [0.9, 9000, 0.1], [1, 0, 0, 0.2], (0.9, 4500), False)
 ANGULAR = (GEOM.mjGEOM_PLANE, GEOM.mjGEOM_BOX, GEOM.mjGEOM_MESH, GEOM.mjGEOM_HFIELD)
 WITH_FORMULA = [case for case in CASES if not case.startswith("mesh")]
 QUAD = np.array([[-0.8, -0.8, 0], [0.8, -0.8, 0], [0.8, 0.8, 0], [-0.8, 0.8, 0.05]])
@@ -149,8 +161,11 @@ def formula(case, points):
     x, y, z = np.moveaxis(points, -1, 0)
     azimuth = np.arctan2(y, x) / (2 * np.pi) % 1
     scale = np.array(repeat, float) * (size[:2] if uniform and kind != GEOM.mjGEOM_SPHERE else 1)
-    if kind == GEOM.mjGEOM_PLANE and size[0] == 0:
-        return np.stack([x / 2 * repeat[0] + 0.5, -y / 2 * repeat[1] + 0.5], -1)
+    if kind == GEOM.mjGEOM_PLANE and 0 in size[:2]:
+        # Along an infinite axis, repeats are counted from the origin; along the other one, as on finite planes.
+        u = x / 2 * repeat[0] if size[0] == 0 else (x / size[0] + 1) / 2 * scale[0]
+        v = -y / 2 * repeat[1] if size[1] == 0 else (1 - y / size[1]) / 2 * scale[1]
+        return np.stack([u + 0.5, v + 0.5], -1)
     if kind == GEOM.mjGEOM_PLANE:
         uv = [(x / size[0] + 1) / 2, (1 - y / size[1]) / 2]
     elif kind == GEOM.mjGEOM_BOX:
@@ -200,7 +215,7 @@ def assert_same_place(uv, expected):
 @pytest.mark.parametrize("case", WITH_FORMULA)
 def test_textures_lie_where_the_formulas_say(case):
     uv, points = coordinates(case)
-    assert_same_place(uv, formula(case, points))
+    assert_same_place(uv, formula(case, points) % 1)
 
 
 def test_mesh_interpolates_its_texture_coordinates():

@@ -33,5 +33,6 @@ model_lights: render/test_model_renderer.py, render/test_model_lamps.py
 model_tracer: render/test_model_renderer.py, render/test_model_light.py
 primitives: test_movers.py
 movers: test_movers.py
+mesh_atlas: test_movers.py
 world_rows: test_movers.py
 """

@@ -1,0 +1,142 @@
+"""Visible geoms in the same place. As in MuJoCo, the one that is defined last is visible there.
+
+Rounding would decide which of two surfaces in the same place a ray hits. The surface of the later geom is therefore
+moved outwards by a few rounding steps of float32, everywhere where geoms are rendered. Coincidence is decided once, in
+the given pose. Planes are moved to their front, and seen from behind, the earlier of two planes is visible.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+from sim.scene import shapes, surfaces
+
+_TYPES = mujoco.mjtGeom
+_ASSETS = (_TYPES.mjGEOM_MESH, _TYPES.mjGEOM_SDF)
+_CURVED = (_TYPES.mjGEOM_SPHERE, _TYPES.mjGEOM_ELLIPSOID, _TYPES.mjGEOM_CAPSULE, _TYPES.mjGEOM_CYLINDER)
+POINTS = 120  # points on each geom that are compared with other geoms
+# Surfaces that are closer than APART count as coincident, and LIFT separates them. Both are in units of `_scale`. At a
+# distance of 20 times the size of a geom, rounding errors are a tenth of LIFT, and a third for Mitsuba's cylinder.
+APART, LIFT = 5e-6, 5e-5
+MOST = 1e-3  # largest lift, as a share of the size of a geom
+ALIGNED = 0.999  # smallest cosine between the normals of coincident surfaces
+
+
+@dataclass(frozen=True)
+class Coincidences:
+    """Geoms in the same place. pairs: ids, the geom that is defined later comes second
+    lifts: distances by which surfaces are moved outwards [m], by geom; others are not moved
+    """
+
+    pairs: tuple[tuple[int, int], ...]
+    lifts: dict[int, float]
+
+    def lift(self, geom: int) -> float:
+        """Return the distance by which the surface of a geom is moved outwards [m]."""
+        return self.lifts.get(geom, 0.0)
+
+    def message(self, model: mujoco.MjModel) -> str | None:
+        """Return a warning if geoms of different groups coincide, such as collision and visual geoms; None if not."""
+        found = [pair for pair in self.pairs if len(set(model.geom_group[list(pair)])) > 1]
+        if not found:
+            return None
+        first, last = found[0]
+        names = [model.geom(geom).name or str(geom) for geom in (first, last)]
+        groups = [int(model.geom_group[geom]) for geom in (first, last)]
+        more = f", and {len(found) - 1} more pairs," if len(found) > 1 else ""
+        return (
+            f"geoms {names[0]!r} (group {groups[0]}) and {names[1]!r} (group {groups[1]}){more} are in the same place, "
+            f"where the one defined last is visible: to show a single group, pass groups, such as groups=({groups[1]},)"
+        )
+
+
+def coincidences(data: mujoco.MjData, geoms: Sequence[int]) -> Coincidences:
+    """Return which of these geoms are in the same place in this pose."""
+    model, pairs, lifts = data.model, [], dict[int, float]()
+    near = list(_near(data, sorted(int(geom) for geom in geoms)))
+    samples = {geom: _points(data, geom) for geom in {geom for pair in near for geom in pair}}
+    for first, last in near:
+        scale = _scale(data, first, last)
+        apart = APART * scale
+        if _touches(data, *samples[first], last, apart) or _touches(data, *samples[last], first, apart):
+            pairs.append((first, last))
+            most = MOST * float(model.geom_rbound[last]) or np.inf
+            lifts[last] = min(max(lifts.get(last, 0.0), lifts.get(first, 0.0) + LIFT * scale), most)
+    return Coincidences(tuple(pairs), lifts)
+
+
+def _near(data: mujoco.MjData, geoms: Sequence[int]) -> Iterator[tuple[int, int]]:
+    """Generate pairs of geoms whose bounding boxes overlap, in the order of the second geom."""
+    model, turns = data.model, data.geom_xmat[geoms].reshape(-1, 3, 3)
+    box = model.geom_aabb[geoms]
+    middle = data.geom_xpos[geoms] + np.einsum("gij,gj->gi", turns, box[:, :3])
+    half = np.einsum("gij,gj->gi", np.abs(turns), box[:, 3:]) * (1 + 1e-4)
+    for j, last in enumerate(geoms):
+        near = (np.abs(middle[:j] - middle[j]) <= half[:j] + half[j]).all(axis=1)
+        yield from ((geoms[int(i)], last) for i in np.flatnonzero(near))
+
+
+def _scale(data: mujoco.MjData, first: int, last: int) -> float:
+    """Return the length [m] to which rounding errors of two geoms are proportional."""
+    model = data.model
+    sizes = [float(model.geom_rbound[geom]) or np.inf for geom in (first, last)]  # a plane has no bound
+    size = min(*sizes, float(model.stat.extent) if np.isinf(sizes).all() else np.inf)
+    return 3 * size + 0.1 * float(np.linalg.norm(data.geom_xpos[last]))
+
+
+def _points(data: mujoco.MjData, geom: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return points on the surface of a geom, away from edges, and outward normals, in the world, (n, 3) each."""
+    model, rng = data.model, np.random.default_rng(geom)
+    triangles, kind = shapes.untextured(model, geom), surfaces.geom_type(model, geom)
+    if kind in _CURVED:
+        assert triangles.normals is not None
+        chosen = rng.integers(len(triangles.vertices), size=POINTS)
+        points, normals = triangles.vertices[chosen].copy(), triangles.normals[chosen]
+        upright, level = np.abs(normals[:, 2]) > 1 - 1e-9, np.abs(normals[:, 2]) < 1e-9
+        shrunk = rng.uniform(0.05, 0.95, POINTS)
+        if kind != _TYPES.mjGEOM_ELLIPSOID and kind != _TYPES.mjGEOM_SPHERE:
+            points[level, 2] *= shrunk[level]  # along the side
+        if kind == _TYPES.mjGEOM_CYLINDER:
+            points[upright, :2] *= shrunk[upright, None]  # on an end
+    else:
+        corners = triangles.vertices[triangles.faces]
+        cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        area = np.linalg.norm(cross, axis=1)
+        chosen = rng.choice(len(area), POINTS, p=area / area.sum())
+        points = np.einsum("nk,nki->ni", rng.dirichlet((1, 1, 1), POINTS), corners[chosen])
+        normals = cross[chosen] / area[chosen, None]
+    turn = data.geom_xmat[geom].reshape(3, 3)
+    return points @ turn.T + data.geom_xpos[geom], normals @ turn.T
+
+
+def _touches(data: mujoco.MjData, points: np.ndarray, normals: np.ndarray, geom: int, apart: float) -> bool:
+    """Return whether any of the points is closer than `apart` to the surface of a geom with the same normal."""
+    model, turn = data.model, data.geom_xmat[geom].reshape(3, 3)
+    kind, box = surfaces.geom_type(model, geom), model.geom_aabb[geom]
+    local = (points - data.geom_xpos[geom]) @ turn
+    near = (np.abs(local - box[:3]) <= box[3:] + apart).all(axis=1)
+    if kind == _TYPES.mjGEOM_PLANE:
+        near &= (np.abs(local[:, 2]) <= apart) & (normals @ turn[:, 2] > ALIGNED)
+    above = 10 * apart
+    for k in np.flatnonzero(near):
+        found = np.zeros(3)
+        distance = _cast(data, geom, kind, points[k] + above * normals[k], -normals[k], found)
+        if abs(distance - above) <= apart and found @ normals[k] > ALIGNED:
+            return True
+    return False
+
+
+def _cast(
+    data: mujoco.MjData, geom: int, kind: mujoco.mjtGeom, start: np.ndarray, direction: np.ndarray, normal: np.ndarray
+) -> float:
+    """Return the distance of a geom along a ray; writes the normal there to `normal`."""
+    if kind in _ASSETS:
+        return float(mujoco.mj_rayMesh(data.model, data, geom, start, direction, normal))
+    if kind == _TYPES.mjGEOM_HFIELD:
+        return float(mujoco.mj_rayHfield(data.model, data, geom, start, direction, normal))
+    place, turn, size = data.geom_xpos[geom], data.geom_xmat[geom], data.model.geom_size[geom]
+    return float(mujoco.mju_rayGeom(place, turn, size, start, direction, kind, normal))

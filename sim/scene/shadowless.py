@@ -1,0 +1,61 @@
+"""Lights that cast no shadow, as emitters for all of Mitsuba's integrators.
+
+Mitsuba's integrators test the path from a surface to the point of an emitter that was sampled. Such a light places this
+point right above the surface, so that nothing can be in between.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+
+import drjit as dr
+import mitsuba as mi
+
+from sim.scene.variant import Description
+
+INNER = "light"  # name of the light with shadows among the parameters
+# Distance of the sampled point from a surface, relative to 1 m or the coordinates if they are larger: a tenth of the
+# distance at which Mitsuba's shadow rays start, and 100 steps of float32.
+_CLOSE = 1e-5
+
+
+def shadowless(light: Description) -> Description:
+    """Return the emitter that shines like a directional light, point or spot, but through all obstacles."""
+    _register(str(mi.variant()))
+    return {"type": "shadowless", INNER: light}
+
+
+@cache
+def _register(variant: str) -> None:
+    """Make the emitter known to the variant in force. Mitsuba's classes exist only after a variant is set."""
+
+    class Shadowless(mi.Emitter):
+        """An emitter that delegates to another one, and moves the sampled point."""
+
+        def __init__(self, props):  # type: ignore[no-untyped-def]
+            super().__init__(props)
+            self.light = props[INNER]
+            self.m_flags = self.light.flags()
+
+        def sample_direction(self, it, sample, active=True):  # type: ignore[no-untyped-def]
+            found, weight = self.light.sample_direction(it, sample, active)
+            step = _CLOSE * (1 + dr.max(dr.abs(it.p)))
+            found.p = mi.Point3f(it.spawn_ray(found.d).o + found.d * step)
+            return found, weight
+
+        def pdf_direction(self, it, ds, active=True):  # type: ignore[no-untyped-def]
+            return self.light.pdf_direction(it, ds, active)
+
+        def eval_direction(self, it, ds, active=True):  # type: ignore[no-untyped-def]
+            return self.light.eval_direction(it, ds, active)
+
+        def eval(self, si, active=True):  # type: ignore[no-untyped-def]
+            return self.light.eval(si, active)
+
+        def traverse(self, callback):  # type: ignore[no-untyped-def]
+            callback.put(INNER, self.light, mi.ParamFlags.NonDifferentiable)
+
+        def bbox(self):  # type: ignore[no-untyped-def]
+            return self.light.bbox()
+
+    mi.register_emitter("shadowless", Shadowless)

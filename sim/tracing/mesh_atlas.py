@@ -1,0 +1,77 @@
+"""All moving meshes in one Mitsuba scene, in which a kernel intersects each of them separately.
+
+Every mesh is scaled to a ball of radius 1 in a cell of its own. A ray that is followed only inside this ball cannot hit
+another mesh. A kernel therefore needs one scene and one loop for any number of meshes, and moving a mesh does not
+change the scene. With one scene per mesh, kernels of 128 meshes take minutes to compile.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+from optics.numerics.autodiff import Array
+from sim.scene.merged_parts import PlacedPart, merged
+from sim.scene.shapes import Part
+from sim.scene.variant import MitsubaObject
+
+# Distance between centres of cells, and radius of the ball in which a ray is followed. Its surface lies between a mesh
+# and its neighbours, so that rounding moves no mesh out of its ball.
+PITCH, BALL = 2.5, 1.1
+
+
+@dataclass(frozen=True)
+class MeshAtlas:
+    """Moving meshes in one scene. cells: centre of each mesh's cell, (mesh, 3) · scene: None without meshes."""
+
+    cells: np.ndarray
+    scene: MitsubaObject | None
+
+    @staticmethod
+    def from_parts(parts: Sequence[Sequence[Part]], reach: np.ndarray, bsdf: MitsubaObject) -> MeshAtlas:
+        """Return the atlas of meshes with these parts.
+
+        reach: largest distance of each mesh's surface from its origin [m], (mesh,)
+        bsdf: any BSDF; light on movers is computed with their own
+        """
+        if not len(parts):
+            return MeshAtlas(np.zeros((0, 3)), None)
+        side = int(np.ceil(np.cbrt(len(parts))))
+        steps = np.stack(np.unravel_index(np.arange(len(parts)), (side,) * 3), axis=1)
+        cells = PITCH * (steps - (side - 1) / 2)
+        placed: list[PlacedPart] = []
+        for m, (cell, radius) in enumerate(zip(cells, reach, strict=True)):
+            pose = np.diag([1 / radius, 1 / radius, 1 / radius, 1.0])
+            pose[:3, 3] = cell
+            placed += [(f"mesh_{m}_{k}", part, pose, bsdf) for k, part in enumerate(parts[m])]
+        return MeshAtlas(cells, mi.load_dict({"type": "scene", **merged(placed, "meshes")}, optimize=False))
+
+    def hit(self, o: Array, d: Array, cell: Array, reach: Array) -> Array:
+        """Return the distance from o to a mesh in direction d [m], in the mesh's frame; infinite for a miss."""
+        ray, start = _within(o, d, cell, reach)
+        assert self.scene is not None
+        found = self.scene.ray_intersect_preliminary(ray)
+        return dr.select(found.is_valid(), (start + found.t) * reach, dr.inf)
+
+    def surface(self, o: Array, d: Array, cell: Array, reach: Array, active: Array) -> tuple[Array, Array]:
+        """Return the normal in the mesh's frame, and the texture coordinates, at the same hits."""
+        ray, _ = _within(o, d, cell, reach)
+        assert self.scene is not None
+        si = self.scene.ray_intersect(ray, mi.RayFlags.All, True, active)
+        return mi.Vector3f(si.sh_frame.n), si.uv
+
+
+def _within(o: Array, d: Array, cell: Array, reach: Array) -> tuple[Array, Array]:
+    """Return the part of a ray inside the ball of a cell, and the distance to its start, in radii of the mesh."""
+    centre = o / reach
+    nearest = -dr.dot(centre, d)
+    aside = dr.fma(d, nearest, centre)
+    half = dr.sqrt(dr.maximum(BALL * BALL - dr.squared_norm(aside), 0))
+    start = dr.maximum(nearest - half, 0)
+    ray = mi.Ray3f(mi.Point3f(dr.fma(d, start - nearest, aside) + cell), d)
+    ray.maxt = nearest + half - start
+    return ray, start
