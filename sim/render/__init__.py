@@ -21,6 +21,7 @@ world_fidelity      choose_fidelity: fidelity of a built-in world
 fidelity_stages     choice of bands, depth layers and light for a built-in world
 sample_choice       choice of rays or areas for a built-in world, and of their number
 fidelity_trials     trials that measure the errors of fidelities in a built-in world
+populations         views and receptors over which the errors of trials are taken
 random_views        random views for the trials
 model_fidelity      choose_model_fidelity: fidelity of any other model, from trials at given poses
 memory_budget       check of the memory that rendering needs

@@ -1,16 +1,14 @@
 """Trials of sampling methods in views of a world, before any kernel is recorded.
 
 A trial renders some of an eye's receptors and compares their signals with signals from many more rays. Errors are taken
-over two populations: all receptors in views from any place, and receptors that see an object in views with an object
-nearby. The second is separate because objects decide how an episode ends. Most receptors see floor and walls, and would
-hide errors at objects. All draws have fixed seeds, so the same world and eyes give the same result.
+over the populations in `sim.render.populations`. All draws have fixed seeds, so the same world and eyes give the same
+result.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import replace
 
 import drjit as dr
 import mitsuba as mi
@@ -20,7 +18,8 @@ from optics.numerics.autodiff import Array
 from sim.eyes.depth_layers import DepthLayers
 from sim.eyes.eyes import BODY_RADIUS
 from sim.eyes.sampling import BoxSampling, EyeSampling, Trial
-from sim.render.random_views import RandomViews, near_views, on_objects, random_views
+from sim.render.populations import Population, everywhere, near_objects
+from sim.render.random_views import RandomViews
 from sim.render.ray_kernel import SECOND
 from sim.render.world_scene import WorldScene
 from sim.scene.device_arrays import floats
@@ -32,7 +31,6 @@ from sim.tracing.areas.patch import Area
 from sim.tracing.eye_ray import EyeRay
 
 # Chosen: the cost of a trial, and how much finer than the trial its reference ("truth") is.
-RECEPTORS = 24  # largest number of receptors
 RAYS = 2**19  # largest number of rays in one trial, unless that leaves too few views
 TRUE_RAYS = 2**21  # largest number of rays in a reference for areas
 VIEWS = (12, 96)  # smallest and largest number of views in one trial
@@ -40,20 +38,6 @@ FINER = 8  # smallest ratio of the reference's rays to the trial's
 TRUE = 4096  # smallest number of rays of a reference behind a pupil
 TRUE_AREA = (1024, 8192)  # smallest and largest number of rays per receptor in a reference for areas
 WEIGHTS = 2**23  # largest number of weights of a reference, unless it would then not be finer than the trial
-ON_OBJECT = 0.02  # share of a receptor's field: a receptor sees an object that fills more than this share
-
-
-@dataclass(frozen=True)
-class Population:
-    """Views, and the receptors in each view that count, (view, receptor)."""
-
-    views: RandomViews
-    counted: np.ndarray
-
-    def rms(self, error: np.ndarray) -> float:
-        """Return the root mean square of an error (view, channel, receptor) in the first views; 0 if none counts."""
-        counted = np.broadcast_to(self.counted[: len(error), None], error.shape)
-        return float(np.sqrt(np.mean(error[counted] ** 2))) if counted.any() else 0.0
 
 
 class FidelityTrials:
@@ -61,33 +45,17 @@ class FidelityTrials:
 
     def __init__(self, scene: WorldScene) -> None:
         self._scene, self._eyes, self._eye = scene, scene.eyes, scene.eye
-        self._views = random_views(scene.world, scene.eyes, VIEWS[1])
-        receptors = np.random.default_rng(0).permutation(int(np.prod(scene.eyes.resolution)))
-        self._receptors = np.sort(receptors[:RECEPTORS])
+        self._everywhere = everywhere(scene, VIEWS[1])
+        self._views, self._receptors = self._everywhere.views, self._everywhere.receptors
         self._known: dict[DepthLayers, list[Population]] = {}
 
-    @cached_property
-    def _everywhere(self) -> Population:
-        return Population(self._views, np.ones((len(self._views), len(self._receptors)), bool))
-
     def _populations(self, sampling: EyeSampling) -> list[Population]:
-        if sampling.depth not in self._known:
-            self._known[sampling.depth] = self._drawn(sampling)
-        return self._known[sampling.depth]
-
-    def _drawn(self, sampling: EyeSampling) -> list[Population]:
         if not self._scene.world.objects:
             return [self._everywhere]
-        near = near_views(self._scene.world, self._eyes, VIEWS[1])
-        trial = sampling.trial(TRUE / np.prod(self._eyes.resolution), self._receptors)
-        hits = on_objects(
-            near,
-            *near.in_agents(self._eyes, trial.directions),
-            np.array([self._scene.model.geom_size[geom, 0] for geom in _objects(self._scene)]),
-        )
-        weights = trial.weights.sum(axis=0)
-        shares = np.einsum("rp,vp->vr", weights, hits) / weights.sum(axis=-1)
-        return [self._everywhere, Population(near, shares > ON_OBJECT)]
+        if sampling.depth not in self._known:
+            near = near_objects(self._scene, sampling, VIEWS[1], TRUE)
+            self._known[sampling.depth] = [self._everywhere, near]
+        return self._known[sampling.depth]
 
     def errors(self, sampling: EyeSampling, light: str = lighting.DIRECT) -> Callable[[float], float]:
         """Return a function from rays per receptor to the signals' root mean square error, the larger of the two
@@ -108,14 +76,16 @@ class FidelityTrials:
             finer = max(2 * rays_per_receptor, min(max(FINER * rays_per_receptor, least), most))
             level = int(np.ceil(np.log(finer) / np.log(4) - 1e-9))
             if level not in truths:
-                true = sampling.trial(4.0**level, self._receptors)
-                truths[level] = [self._signals(true, sampling.depth, light, p.views) for p in populations]
-            trial = sampling.trial(rays_per_receptor, self._receptors)
-            size = len(trial.directions) * len(truths[level][0])  # at most the reference's views
-            return max(
-                population.rms(self._signals(trial, sampling.depth, light, population.views, size) - truth)
-                for population, truth in zip(populations, truths[level], strict=True)
-            )
+                truths[level] = [
+                    self._signals(sampling.trial(4.0**level, p.receptors), sampling.depth, light, p.views)
+                    for p in populations
+                ]
+            errors = []
+            for p, truth in zip(populations, truths[level], strict=True):
+                trial = sampling.trial(rays_per_receptor, p.receptors)
+                size = len(trial.directions) * len(truth)  # at most the reference's views
+                errors.append(p.rms(self._signals(trial, sampling.depth, light, p.views, size) - truth))
+            return max(errors)
 
         return error
 
@@ -131,17 +101,19 @@ class FidelityTrials:
     def area_errors(self, sampling: EyeSampling, light: str) -> Callable[[float], float]:
         """Return a function from areas per receptor to the same error, which here includes the noise of the
         reference."""
-        true = self._truth(sampling)
         populations = self._populations(sampling)
-        truths = [self._signals(true, sampling.depth, light, p.views, TRUE_RAYS) for p in populations]
+        truths = [
+            self._signals(self._truth(sampling, p.receptors), sampling.depth, light, p.views, TRUE_RAYS)
+            for p in populations
+        ]
 
         def error(areas: float) -> float:
-            trial = self._scene.area_trial(sampling, areas, self._receptors)
-            found = (
-                (p, self._signals(trial, sampling.depth, light, p.views.take(len(t)), TRUE_RAYS) - t)
-                for p, t in zip(populations, truths, strict=True)
-            )
-            return max(population.rms(error) for population, error in found)
+            errors = []
+            for p, truth in zip(populations, truths, strict=True):
+                trial = self._scene.area_trial(sampling, areas, p.receptors)
+                views = p.views.take(len(truth))
+                errors.append(p.rms(self._signals(trial, sampling.depth, light, views, TRUE_RAYS) - truth))
+            return max(errors)
 
         return error
 
@@ -154,15 +126,15 @@ class FidelityTrials:
         n = len(self._scene.area_trial(sampling, per_receptor, self._receptors[:1]).directions)
         return n / float(np.prod(self._eyes.resolution)) if self._eye.pupil else float(n)
 
-    def _truth(self, sampling: EyeSampling) -> Trial:
+    def _truth(self, sampling: EyeSampling, receptors: np.ndarray) -> Trial:
         """Return the reference's rays for areas. Behind a pupil, the rays are drawn for these receptors only."""
         of_a_view = TRUE_RAYS // (VIEWS[1] // 2)
         if isinstance(sampling, BoxSampling):
-            return sampling.trial(int(np.clip(of_a_view // len(self._receptors), *TRUE_AREA)), self._receptors)
-        planes = sampling.depth.count * self._eye.bands * len(self._receptors)
+            return sampling.trial(int(np.clip(of_a_view // len(receptors), *TRUE_AREA)), receptors)
+        planes = sampling.depth.count * self._eye.bands * len(receptors)
         rays = min(of_a_view, max(WEIGHTS // planes, TRUE))
-        own = replace(sampling, fields=sampling.fields.drawn_for(self._receptors))
-        return own.trial(rays / np.prod(self._eyes.resolution), self._receptors)
+        own = replace(sampling, fields=sampling.fields.drawn_for(receptors))
+        return own.trial(rays / np.prod(self._eyes.resolution), receptors)
 
     def reflected_more_often(self, sampling: EyeSampling) -> float:
         """Return the root mean square of the signals by light that is reflected more than twice, with areas."""
@@ -178,9 +150,9 @@ class FidelityTrials:
         Raises:
             ValueError: light that is reflected twice cannot be followed.
         """
-        trial = sampling.trial(TRUE / np.prod(self._eyes.resolution), self._receptors)
         found = []
         for p in self._populations(sampling):
+            trial = sampling.trial(TRUE / np.prod(self._eyes.resolution), p.receptors)
             direct, both = (self._signals(trial, sampling.depth, light, p.views) for light in lighting.LEVELS[:2])
             found.append((p.rms(both - direct), p.rms(direct)))
         return max(found)
@@ -278,12 +250,6 @@ class FidelityTrials:
             z = t * cosine
             dr.eval(components, z)
             return components, z
-
-
-def _objects(scene: WorldScene) -> list[int]:
-    """Return the ids of the objects' geoms."""
-    bodies = [scene.model.body(name).id for name in scene.world.objects]
-    return [int(np.flatnonzero(scene.model.geom_bodyid == body)[0]) for body in bodies]
 
 
 def _in_fours(trial: Trial) -> np.ndarray:

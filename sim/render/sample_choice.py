@@ -25,11 +25,13 @@ SHARED_AREAS = (4 / 9, 1 / 4, 1 / 9)  # areas per receptor if areas are shared: 
 # among receptors.
 PERFECT_LENS_AREA, PUPIL_AREA = 3, 1.6
 PUPIL_AREA_IN_ALL_LIGHT = 2  # cost of an area with all light, in rays with a bounce
-HARDLY_MORE = 1.1  # times the smallest error: a smaller error is not worth several times the samples
+HARDLY_MORE = 1.1  # ratio to the smallest error: a smaller error is not worth several times the cost
 
 
 def fewest_samples(trials: FidelityTrials, sampling: EyeSampling, light: Level, allowed: Allowed) -> Samples:
-    """Return the cheapest samples whose error is allowed, or the most accurate samples if there are none.
+    """Return the cheapest samples whose error is allowed, together with the error by light that they leave out.
+
+    If there are none, they are the cheapest samples whose error is close to the smallest error.
 
     light: the light that rays would follow
     """
@@ -39,21 +41,31 @@ def fewest_samples(trials: FidelityTrials, sampling: EyeSampling, light: Level, 
     shared = tuple(number for number in SHARED_AREAS if trials.may_share(sampling, number))
     of_pupil = PUPIL_AREA_IN_ALL_LIGHT if light.level == BOUNCE else PUPIL_AREA
 
-    def cost(number: float) -> float:
-        return (PERFECT_LENS_AREA if perfect else of_pupil) * trials.areas_seen(sampling, number)
+    def cost(areas: float) -> float:
+        return (PERFECT_LENS_AREA if perfect else of_pupil) * trials.areas_seen(sampling, areas)
+
+    left_out = light.predicted_error or 0
+    # What the light that is left out leaves of the allowed error. If it leaves nothing, no number of rays is enough.
+    left = math.sqrt(max(allowed.without_light**2 - left_out**2, (1e-6 * allowed.without_light) ** 2))
 
     def rays(most: float = math.inf) -> Samples:
-        return Samples(RAYS, light, *_fewest(errors, tuple(n for n in numbers if n <= most), allowed.error, RAYS))
+        tried = tuple(number for number in numbers if number <= most)
+        return Samples(RAYS, light, *_fewest(errors, tried, left, RAYS))
 
     if (few := rays(max(FEW_RAYS, cost(min(shared, default=1))))).enough:
         return few
     areas = _areas(trials, sampling, light, shared, allowed)
     if areas is None:
         return rays()
-    if not areas.enough:
-        return min(areas, rays(), key=lambda samples: (not samples.enough, samples.error))
-    cheaper = rays(cost(areas.number))
-    return cheaper if cheaper.enough else areas
+    if areas.enough:
+        cheaper = rays(cost(areas.number))
+        return cheaper if cheaper.enough else areas
+    if areas.error <= left_out:  # no number of rays is as accurate
+        return areas
+    if (many := rays()).enough:
+        return many
+    accurate = [found for found in (areas, many) if found.error <= HARDLY_MORE * min(areas.error, many.error)]
+    return min(accurate, key=lambda found: cost(found.number) if found is areas else found.number)
 
 
 def _areas(

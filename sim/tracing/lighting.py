@@ -38,11 +38,13 @@ def spectra(wavelengths: np.ndarray) -> list[Array]:
     return [mi.Spectrum(*map(float, chunk)) for chunk in padded.reshape(-1, LANES)]
 
 
-def spawn_bounce_ray(point: Array, normal: Array, bounce_sample: Array) -> Array:
+def spawn_bounce_ray(point: Array, normal: Array, bounce_sample: Array, clearance: float = 1) -> Array:
     """Return a ray that leaves a surface in the direction to which a sample (2,) on the unit square is mapped.
 
     The directions of uniform samples are distributed as Lambert's cosine. If L is the radiance along the ray, the
     surface reflects ρ L, averaged over samples.
+
+    clearance: see `clear_of`
     """
     local = mi.warp.square_to_cosine_hemisphere(bounce_sample)
     # mi.Frame3f(normal) is not used: the normals of walls are level up to rounding errors, which would decide the
@@ -51,12 +53,16 @@ def spawn_bounce_ray(point: Array, normal: Array, bounce_sample: Array) -> Array
     beside = dr.select(dr.abs(normal.z) < 0.9, mi.Vector3f(0, 0, 1), mi.Vector3f(1, 0, 0))
     s = dr.normalize(dr.cross(beside, mi.Vector3f(normal)))
     direction = mi.Frame3f(s, dr.cross(mi.Vector3f(normal), s), normal).to_world(local)
-    return mi.Ray3f(clear_of(point, normal), direction)
+    return mi.Ray3f(clear_of(point, normal, clearance), direction)
 
 
-def clear_of(point: Array, normal: Array) -> Array:
-    """Return a point in front of the surface, at the distance at which Mitsuba's own shadow rays start."""
-    offset = (1 + dr.max(dr.abs(point))) * mi.math.RayEpsilon
+def clear_of(point: Array, normal: Array, clearance: float = 1) -> Array:
+    """Return a point in front of the surface.
+
+    clearance: ratio of its distance from the surface to the distance at which Mitsuba's own shadow rays start. The
+        latter is 9e-5 of one metre plus the largest coordinate
+    """
+    offset = (1 + dr.max(dr.abs(point))) * (mi.math.RayEpsilon * clearance)
     return mi.Point3f(dr.fma(normal, offset, point))
 
 

@@ -124,6 +124,14 @@ def normal_and_uv(spheres: Spheres, centres: list[Array], which: Array, point: A
     return mi.Normal3f(normal), mi.Point2f(dr.select(u < 0, u + 1, u), v)
 
 
+def surface_point(spheres: Spheres, centres: list[Array], which: Array, normal: Array) -> Array:
+    """Return the point of sphere `which` at which the surface has this normal."""
+    point = mi.Point3f(0)
+    for k, centre in enumerate(centres):
+        point = dr.select(which == k, centre + normal * float(spheres.radii[k]), point)
+    return mi.Point3f(point)
+
+
 def _quadratic(ray: Array, centre: Array, radius: float) -> tuple[Array, Array]:
     """Return half the linear and the constant coefficient of |o + t d - centre|² = radius² (|d| = 1)."""
     from_centre = ray.o - centre

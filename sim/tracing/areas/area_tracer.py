@@ -82,20 +82,19 @@ class AreaTracer:
         self._walls = walls
         self._columns = Columns(walls, rays.footprints)
         self._illumination = Illumination(rays, bodies.radii)
-        seen = slice(n_seen)
         self._reflected = None
         if rays.light != lighting.DIRECT:
-            self._reflected = LightTable(rays, bodies.radii[seen], world.heights[seen])
+            self._reflected = LightTable(rays, bodies.radii, world.heights)
         rows = np.concatenate([rays.faces[:, :4], rays.faces[:, 8:10]], axis=1)
         spheres = [place[:2] for _, place in rays.sphere_textures]
         places = np.unique(np.concatenate([rows[:, 4:], np.reshape(spheres, (-1, 2))]), axis=0)
         self._stripes = Stripes(rays.components.reflectance, places)
         self._sphere_textures = [
-            SphereTexture(Texture(*map(mi.Float, place[:2].astype(float))), to_texels[0], frame)
+            SphereTexture(self._stripes.texture(*place[:2]), to_texels[0], frame)
             for (to_texels, place), frame in zip(rays.sphere_textures[:n_seen], bodies.frames, strict=False)
         ]
         *self._floor_column, first, columns = map(float, rows[-1])
-        self._floor_texture = Texture(mi.Float(first), mi.Float(columns))
+        self._floor_texture = self._stripes.texture(first, columns)
         self.inputs = AreaTables(
             floats(_in_eights(rows[:-1])),
             self._columns.face_ends,
@@ -160,7 +159,10 @@ class AreaTracer:
     def body_light(self, place: Array, bodies: list[Array], inputs: AreaTables) -> list[Array]:
         """Return rows of the table of illuminated bodies. place: row within a world's table · bodies: centres of the
         bodies in this world."""
-        return self._illumination.bodies.table(place, bodies, inputs.around)
+        assert self._reflected
+        assert inputs.reflected
+        reflected = partial(self._reflected.on_body, tables=inputs.reflected)
+        return self._illumination.bodies.table(place, bodies, inputs.around, reflected)
 
     def _wall(self, area: Area, piece: Piece, now: FrameState, depth: DepthLayers) -> list[Array]:
         patch = piece.patch(area, self._walls.floor, self._columns.top)
@@ -224,7 +226,7 @@ class AreaTracer:
         sphere's light times its own share follows, per component. Parts of the sphere that nearer spheres hide are left
         out."""
         view = SphereView(area, now.bodies[k], self._radii[k])
-        light = BodyLight.on_patch(self._illumination, self._reflected, k, view.whole().patch, now)
+        light = BodyLight.on_patch(self._illumination, k, view.whole().patch, now)
         sphere = _LitSphere(k, view, light, now, depth)
 
         def add(number: Array, hidden: list[Array], total: list[Array]) -> tuple[Array, ...]:

@@ -7,9 +7,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import mitsuba as mi
+
 from optics.numerics.autodiff import Array
 from sim.tracing.areas.illumination import FrameState, Illumination
-from sim.tracing.areas.light_table import LightTable, sum_of
+from sim.tracing.areas.light_table import sum_of
 from sim.tracing.areas.patch import Patch
 
 
@@ -29,14 +31,12 @@ class BodyLight:
     change: list[Array]
 
     @classmethod
-    def on_patch(
-        cls, illumination: Illumination, reflected: LightTable | None, body: int, patch: Patch, now: FrameState
-    ) -> BodyLight:
+    def on_patch(cls, illumination: Illumination, body: int, patch: Patch, now: FrameState) -> BodyLight:
         """Return the light on a patch that stands for the visible part of a body; body: its number."""
         lit = illumination.visibility(patch, now, body)
-        if reflected is None or now.inputs.reflected is None:
+        if not now.body_light:
             return cls(illumination, lit, [], [])
-        around = reflected.on_body(body, now.bodies[body], now.inputs.reflected)
+        around = illumination.bodies.reflected_around(mi.UInt32(body), now.world, now.body_light)
         free = [sum_of(fours, patch.normal) for fours in around]
         left = illumination.past_bodies(patch, free, now, body)
         return cls(illumination, lit, around, [a - b for a, b in zip(left, free, strict=True)])

@@ -1,16 +1,18 @@
-"""The share of each light that reaches the moving bodies, as a whole and on each side of them.
+"""The light on the moving bodies: the share of each light that reaches them, and the reflected light around them.
 
-These shares do not depend on the eye. They are computed once per world, in a table that all areas of the world read.
+It does not depend on the eye. It is computed once per world, in a table that all areas of the world read.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import drjit as dr
 import mitsuba as mi
 
 from optics.numerics.autodiff import Array
+from sim.tracing.areas.light_baking import FOURS
 from sim.tracing.areas.light_nodes import corners
 from sim.tracing.areas.patch import Patch
 from sim.tracing.areas.shadows import WallShadows, lit_past_sphere
@@ -22,28 +24,35 @@ SIDES = 3
 WHOLE = SIDES * SIDES  # number of the place that stands for the whole body
 PLACES = WHOLE + 1
 
+Reflected = Callable[[Array, Array, Array], list[Array]]
+
 
 class IlluminatedBodies:
     """Computation and lookup of the light on the moving bodies of all worlds.
+
+    A row of the table contains the shares of the lights at a place, in fours. The first rows of each body also contain
+    the harmonics of the reflected light around it, one four per component.
 
     shadows: shadows of walls · directions: directions towards the lights · radii: radii of the bodies [m]
     """
 
     def __init__(self, shadows: WallShadows, directions: list[list[float]], radii: list[float]) -> None:
         self._shadows, self._directions, self._radii = shadows, directions, radii
+        self._fours = -(-len(directions) // 4)  # of shares in a row
 
     @property
     def nodes_per_body_set(self) -> int:
         """Number of rows of a world's table."""
         return PLACES * len(self._radii)
 
-    def table(self, place: Array, bodies: list[Array], walls_around: Array | None) -> list[Array]:
-        """Return the share of each light that reaches a place on a body of a world, in fours.
+    def table(self, place: Array, bodies: list[Array], walls_around: Array | None, reflected: Reflected) -> list[Array]:
+        """Return the share of each light that reaches a place on a body of a world, in fours, and then the harmonics.
 
         Walls block the light at all places. Other bodies block it only at places on a side, not at the place of the
         whole body.
 
         place: row of a world's table · bodies: centres of the world's bodies · walls_around: see `WallShadows`
+        reflected: function from a body's number, the number of a four, and the body's centre to harmonics
         """
         k, side = place // PLACES, place % PLACES
         radius, whole = select(k, self._radii), side == WHOLE
@@ -58,7 +67,14 @@ class IlluminatedBodies:
             lit = [share * dr.select(free, 1, more) for share, more in zip(lit, past, strict=True)]
         nothing = [mi.Float(0)] * (-len(lit) % 4)
         lights = [*lit, *nothing]
-        return [dr.ravel(mi.Vector4f(*lights[i : i + 4])) for i in range(0, len(lights), 4)]
+        shares = [mi.Vector4f(*lights[i : i + 4]) for i in range(0, len(lights), 4)]
+        harmonics = reflected(k, dr.minimum(side, FOURS - 1), select(k, bodies))
+        return [dr.ravel(four) for four in (*shares, *harmonics)]
+
+    def reflected_around(self, k: Array, world: Array, table: list[Array]) -> list[list[Array]]:
+        """Return the harmonics of the reflected light around the k-th body of a world, in fours, per component."""
+        first = (world * len(self._radii) + k) * PLACES
+        return [[dr.gather(mi.Vector4f, rows, first + i) for i in range(FOURS)] for rows in table[self._fours :]]
 
     def on_whole(self, k: Array, world: Array, table: list[Array]) -> list[Array]:
         """Return the share of each light that reaches the k-th body of a world."""
@@ -75,7 +91,7 @@ class IlluminatedBodies:
         return found
 
     def _row(self, row: Array, table: list[Array]) -> list[Array]:
-        fours = [dr.gather(mi.Vector4f, shares, row) for shares in table]
+        fours = [dr.gather(mi.Vector4f, shares, row) for shares in table[: self._fours]]
         return [fours[i // 4][i % 4] for i in range(len(self._directions))]
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from optics.numerics.autodiff import Array
 from sim.tracing.areas.branches import only_where
 from sim.tracing.areas.illuminated_bodies import IlluminatedBodies, select
-from sim.tracing.areas.light_table import LightTables
+from sim.tracing.areas.light_table import LightTables, sum_of
 from sim.tracing.areas.patch import Patch
 from sim.tracing.areas.shadows import WallShadows, lit_past_sphere
 from sim.tracing.areas.stripes import StripeTables
@@ -99,7 +99,7 @@ class Illumination:
         self, patch: Patch, arriving: list[Array], now: FrameState, itself: int = ITSELF_NONE
     ) -> list[Array]:
         """Return the reflected light on a patch, per component, after correction for bodies: light that they hide is
-        subtracted, and light that they reflect is added. The hidden light is assumed to be as bright as the average."""
+        subtracted, and light that they reflect is added."""
 
         def past(k: Array, arriving: list[Array]) -> list[Array]:
             radius = select(k, self._radii)
@@ -124,15 +124,23 @@ class Illumination:
 
     def _exchanged(self, patch: Patch, arriving: list[Array], k: Array, now: FrameState) -> list[Array]:
         """Return the light from a body minus the light that it hides, both by the form factor of a sphere. If the
-        patch's horizon crosses the sphere, Snyder's (1996) form factor applies."""
+        patch's horizon crosses the sphere, Snyder's (1996) form factor applies.
+
+        The body hides light that would arrive on its far side, as seen from the patch. This light is as bright as the
+        irradiance of that side, but no more of it is hidden than arrives at the patch.
+        """
         way, radius = select(k, now.bodies) - patch.point, select(k, self._radii)
         distance = dr.maximum(dr.norm(way), radius)
         height = dr.dot(patch.normal, way)
         rising = dr.square(dr.maximum(height + radius, 0)) / (4 * radius)
         factor = dr.select(height > radius, height, rising) * dr.square(radius) / (distance * distance * distance)
         sent, lost = self._sent(k, -way / distance, radius / distance, now), self._shadow(k, patch, now)
-        exchanged = zip(sent, arriving, lost, strict=True)
-        return [factor * (mine - hidden) - dark for mine, hidden, dark in exchanged]
+        far_side = way / distance
+        hidden = [
+            factor * sum_of(fours, far_side) for fours in self.bodies.reflected_around(k, now.world, now.body_light)
+        ]
+        exchanged = zip(sent, hidden, arriving, lost, strict=True)
+        return [factor * mine - dr.clip(dark, 0, all_) - shadow for mine, dark, all_, shadow in exchanged]
 
     def _shadow(self, k: Array, patch: Patch, now: FrameState) -> list[Array]:
         """Return the light, per component, that a patch does not receive because of the shadows of a body on the floor.

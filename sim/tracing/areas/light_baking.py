@@ -17,9 +17,9 @@ from sim.tracing import lighting
 from sim.tracing.areas.light_nodes import BODY_SPACING, MARGIN, SIDES, SPACING, LightNodes, NodeLight, NodeTables
 from sim.tracing.closed_form_tracer import ClosedForm, Irradiance
 
-# Chosen. In navigation, half the density of nodes doubles the error. Four times the rays, or twice the density of
-# bodies' places, change it by a fiftieth.
+# Chosen. In navigation, half the density of nodes doubles the error. Four times the rays change it by a fiftieth.
 RAYS = 256  # rays from a node
+BODY_RAYS = 128  # rays from each place on a body's surface; all of them together determine its harmonics
 NORMALS = 96  # normals of a body's surface, to which sixteen harmonics are fitted
 FOURS = 4  # groups of four floats: sixteen harmonics
 # Largest number of reflections; each further one adds at most the previous light times the surfaces' reflectance.
@@ -43,7 +43,7 @@ class Baking:
     def ingredients(self) -> list[np.ndarray]:
         """All arrays that the tables depend on."""
         walls, components = self._tracer.walls, self._tracer.components
-        settings = [SPACING, BODY_SPACING, RAYS, NORMALS, MARGIN]
+        settings = [SPACING, BODY_SPACING, RAYS, BODY_RAYS, NORMALS, MARGIN]
         lights = [light.direction for light in self._tracer.lights]
         surfaces = [walls.lower, walls.upper, walls.top, walls.floor_lower, walls.floor_upper, self._tracer.faces]
         light = [components.reflectance, components.levels, *lights, self._orders]
@@ -84,7 +84,7 @@ class Baking:
         y, x = (a.ravel() for a in np.meshgrid(places, places, indexing="ij"))
         points = self._nodes.grid.corners[:, None] + np.stack([x, y], axis=-1)
         points = np.dstack([points, np.full(points.shape[:2], self._nodes.floor)]).reshape(-1, 3)
-        return self._gathered(points, np.tile([0.0, 0, 1], (len(points), 1)))
+        return self._gathered(points, np.tile([0.0, 0, 1], (len(points), 1)), RAYS)
 
     def _on_walls(self) -> np.ndarray:
         """Return the light on walls, (node, component), in order of cell, side, z and place along the wall; 0 without a
@@ -106,33 +106,34 @@ class Baking:
             points[..., 1 - axis] = grid.corners[mine, 1 - axis, None] + along
             points[..., 2] = z
             normal = np.array([-side[0], -side[1], 0.0])
-            found = self._gathered(points.reshape(-1, 3), np.tile(normal, (mine.sum() * n, 1)))
+            found = self._gathered(points.reshape(-1, 3), np.tile(normal, (mine.sum() * n, 1)), RAYS)
             light[mine, s] = found.reshape(mine.sum(), n, -1)
         return light.reshape(-1, light.shape[-1])
 
     def _on_body(self, radius: float, height: float) -> np.ndarray:
         """Return harmonics (place, FOURS * 4, component) of the light on a body's surface, ordered by cell, y and x."""
-        offsets = np.linspace(0, self._nodes.grid.side, self._nodes.places)
+        margin = self._nodes.body_margin(radius)
+        offsets = np.linspace(margin, self._nodes.grid.side - margin, self._nodes.places)
         y, x = (a.ravel() for a in np.meshgrid(offsets, offsets, indexing="ij"))
         centres = (self._nodes.grid.corners[:, None] + np.stack([x, y], axis=-1)).reshape(-1, 2)
         centres = np.column_stack([centres, np.full(len(centres), height)])
         normals = _evenly(NORMALS)
         points = (centres[:, None] + radius * normals).reshape(-1, 3)
         turned, owners = np.tile(normals, (len(centres), 1)), np.repeat(centres, NORMALS, axis=0)
-        light = self._gathered(points, turned, (radius, owners)).reshape(len(centres), NORMALS, -1)
+        light = self._gathered(points, turned, BODY_RAYS, (radius, owners)).reshape(len(centres), NORMALS, -1)
         fit = np.linalg.pinv(np.stack(spherical_harmonics(*normals.T), axis=-1))
         fours = np.zeros((len(centres), 4 * FOURS, light.shape[-1]), np.float32)
         fours[:, : len(fit)] = np.einsum("hn,cnk->chk", fit, light)
         return fours
 
     def _gathered(
-        self, points: np.ndarray, normals: np.ndarray, shade: tuple[float, np.ndarray] | None = None
+        self, points: np.ndarray, normals: np.ndarray, rays: int, shade: tuple[float, np.ndarray] | None = None
     ) -> np.ndarray:
         """Return the irradiance of points (n, 3) by light that walls and floor reflect, (n, component).
 
+        rays: number of rays from each point
         shade: radius of a body that casts a shadow, and its centre for each point
         """
-        rays = RAYS
         samples = mi.Point2f(*(floats(np.tile(c, max(LANES // rays, 1))) for c in low_discrepancy(rays).T))
         dr.eval(samples)
         step, found = max(LANES // rays, 1), []

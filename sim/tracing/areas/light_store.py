@@ -14,7 +14,7 @@ import numpy as np
 
 from sim.tracing.areas.light_baking import Baking
 
-VERSION = 1  # version of the tables, to be increased when the same ingredients give other tables
+VERSION = 2  # version of the tables, to be increased when the same ingredients give other tables
 KEPT = 200  # largest number of files; the oldest are deleted first
 
 

@@ -16,6 +16,7 @@ import numpy as np
 from optics.numerics.autodiff import Array
 from sim.scene.device_arrays import floats
 from sim.tracing.areas import light_store
+from sim.tracing.areas.illuminated_bodies import select
 from sim.tracing.areas.light_baking import FOURS, Baking, spherical_harmonics
 from sim.tracing.areas.light_nodes import LightNodes, NodeLight, NodeTables, corners
 from sim.tracing.closed_form_tracer import ClosedForm
@@ -23,17 +24,17 @@ from sim.tracing.closed_form_tracer import ClosedForm
 
 @dataclass(frozen=True)
 class LightTables(NodeTables):
-    """Reflected light at the nodes and on bodies. bodies: harmonics of the light on each kind of body, one array per
+    """Reflected light at the nodes and on bodies. bodies: harmonics of the light on all kinds of bodies, one array per
     component."""
 
-    bodies: list[list[Array]]
+    bodies: list[Array]
 
 
 class LightTable(NodeLight):
     """Lookup of reflected light on floor, walls and bodies of one world.
 
     tracer: tracer of rays through the same world, whose components of light the tables have
-    radii, heights: radii of the visible bodies, and heights of their centres [m]
+    radii, heights: radii of the bodies, and heights of their centres [m]
 
     tables: for the kernel
 
@@ -44,23 +45,25 @@ class LightTable(NodeLight):
     def __init__(self, tracer: ClosedForm, radii: np.ndarray, heights: np.ndarray) -> None:
         kinds = [(float(r), float(h)) for r, h in zip(radii, heights, strict=True)]
         known = sorted(set(kinds))
-        self._kinds = [known.index(kind) for kind in kinds]
-        super().__init__(LightNodes.from_walls(tracer.walls), len(tracer.basis))
-        self.tables = _tables(light_store.stored(Baking(tracer, self._nodes, known)), self._nodes, len(known))
+        self._kinds = [mi.UInt32(known.index(kind)) for kind in kinds]
+        nodes = LightNodes.from_walls(tracer.walls)
+        super().__init__(nodes, len(tracer.basis))
+        self.tables = _tables(light_store.stored(Baking(tracer, nodes, known)), nodes, len(known))
+        self._margins = [nodes.body_margin(radius) for radius, _ in kinds]
+        self._body_nodes = int(nodes.grid.free.sum()) * nodes.places**2
 
-    def on_body(self, body: int, centre: Array, tables: LightTables) -> list[list[Array]]:
-        """Return harmonics of the light that arrives on a body, per component, for `sum_of`."""
+    def on_body(self, body: Array, four: Array, centre: Array, tables: LightTables) -> list[Array]:
+        """Return four harmonics of the light that arrives on a body, per component (Vector4f). All FOURS of them
+        together are the coefficients for `sum_of`.
+
+        body, four: number of the body, and of the four · centre: of the body
+        """
         cell, x, y = self._nodes.grid.locate(centre, tables.cells)
-        n, found = self._nodes.places, []
-        for table in tables.bodies[self._kinds[body]]:
-            rows = list(corners(cell * (n * n), (x, n), (y, n)))
-            found.append(
-                [
-                    sum((dr.gather(mi.Vector4f, table, i * FOURS + four) * w for i, w in rows), mi.Vector4f(0))
-                    for four in range(FOURS)
-                ]
-            )
-        return found
+        n, margin = self._nodes.places, mi.Float(select(body, self._margins) / self._nodes.grid.side)
+        x, y = ((share - margin) / (1 - 2 * margin) for share in (x, y))
+        first = select(body, self._kinds) * self._body_nodes
+        rows = [((first + i) * FOURS + four, w) for i, w in corners(cell * (n * n), (x, n), (y, n))]
+        return [sum((dr.gather(mi.Vector4f, table, i) * w for i, w in rows), mi.Vector4f(0)) for table in tables.bodies]
 
 
 def _tables(baked: dict[str, np.ndarray], nodes: LightNodes, kinds: int) -> LightTables:
@@ -70,8 +73,11 @@ def _tables(baked: dict[str, np.ndarray], nodes: LightNodes, kinds: int) -> Ligh
         count = sum(key.startswith(f"{name}_") for key in baked)
         return [floats(baked[f"{name}_{k}"]) for k in range(count)]
 
-    bodies = [of(f"bounced_body_{kind}") for kind in range(kinds)]
-    return LightTables(floats(nodes.cells), of("bounced_floor"), of("bounced_walls"), bodies)
+    floor = of("bounced_floor")
+    bodies = [
+        floats(np.concatenate([baked[f"bounced_body_{kind}_{k}"] for kind in range(kinds)])) for k in range(len(floor))
+    ]
+    return LightTables(floats(nodes.cells), floor, of("bounced_walls"), bodies)
 
 
 def sum_of(fours: list[Array], normal: Array) -> Array:

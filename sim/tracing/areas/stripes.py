@@ -7,6 +7,7 @@ texture from its mean is integrated. Such integrals repeat with the texture and 
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -19,17 +20,22 @@ from sim.scene.device_arrays import floats
 
 # Smallest length of a stretch [texels]. An integral of 100 texels is accurate to 4e-6, a mean over this length to 1e-4.
 LEAST = 0.1
-# Smallest side of a parallelogram, as a share of the texture's columns. The second integral is about 10⁻² of the
-# columns squared. With this side, it is accurate enough for a mean with an error of 1e-3.
-LEAST_SIDE = 1 / 256
+# Chosen: largest error of a mean over a parallelogram that rounding may cause. It limits how short the sides may be.
+ROUNDING = 1e-3
+HALF_ULP = 2.0**-24  # largest relative error of a number that is rounded to float32
 
 
 @dataclass(frozen=True)
 class Texture:
-    """The place of a texture in the kernel's tables. first: its first texel · columns: number of its columns."""
+    """The place of a texture in the kernel's tables.
+
+    first: its first texel · columns: number of its columns
+    least_side: shorter sides of parallelograms are treated as this long [texels], see `Stripes.texture`
+    """
 
     first: Array
     columns: Array
+    least_side: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -55,6 +61,7 @@ class Stripes:
 
     def __init__(self, reflectance: np.ndarray, places: np.ndarray) -> None:
         self.components = reflectance.shape[1]
+        self._least_sides: dict[int, float] = {}
         rows, means = np.zeros((len(reflectance), self.components, 4)), np.zeros_like(reflectance)
         for first, columns in places.astype(int):
             own = reflectance[first : first + columns]
@@ -64,9 +71,15 @@ class Stripes:
             once = _integral_up_to((here + beyond) / 2)
             once -= (once + (2 * here + beyond) / 6).mean(axis=0)  # so that the second integral repeats, too
             twice = _integral_up_to(once + (2 * here + beyond) / 6)
+            twice -= (twice.max(axis=0) + twice.min(axis=0)) / 2  # a constant cancels, but smaller values round less
+            self._least_sides[first] = _least_side(float(np.abs(twice).max()))
             rows[first : first + columns] = np.stack([twice, once, here, beyond], axis=-1)
         count = range(self.components)
         self.tables = StripeTables([floats(rows[:, k]) for k in count], [floats(means[:, k]) for k in count])
+
+    def texture(self, first: float, columns: float) -> Texture:
+        """Return a texture for `mean_over`, given its first texel and its number of columns."""
+        return Texture(mi.Float(first), mi.Float(columns), self._least_sides[int(first)])
 
     def mean(self, texture: Texture, ends: list[Array], spread: Array | float, tables: StripeTables) -> list[Array]:
         """Return the mean reflectance, per component, over consecutive stretches of equal weight.
@@ -78,7 +91,7 @@ class Stripes:
         for one, other in pairwise(ends):
             reach = dr.maximum(dr.abs(other - one) + spread, LEAST)
             middle = (one + other) / 2
-            upper, lower = (self._once(texture, middle + sign * reach / 2, tables) for sign in (1, -1))
+            upper, lower = (self._once(texture, middle, sign * reach / 2, tables) for sign in (1, -1))
             share = dr.rcp(reach * (len(ends) - 1))
             found = [dr.fma(u - v, share, f) for f, u, v in zip(found, upper, lower, strict=True)]
         return found
@@ -90,33 +103,51 @@ class Stripes:
 
         middle: column of its middle · sides: number of columns that each side spans, of any sign
         """
-        one, other = (dr.maximum(dr.abs(side), LEAST_SIDE * texture.columns) for side in sides)
+        one: Array = dr.maximum(dr.abs(sides[0]), texture.least_side)
+        other: Array = dr.maximum(dr.abs(sides[1]), texture.least_side)
         outer, inner, scale = (one + other) / 2, (one - other) / 2, dr.rcp(one * other)
         found = self._mean(texture, tables)
         for place, sign in ((outer, 1), (inner, -1), (-inner, -1), (-outer, 1)):
-            twice = self._twice(texture, middle + place, tables)
+            twice = self._twice(texture, middle, place, tables)
             found = [dr.fma(value, sign * scale, sum_) for value, sum_ in zip(twice, found, strict=True)]
         return found
 
     def _mean(self, texture: Texture, tables: StripeTables) -> list[Array]:
         return [dr.gather(mi.Float, tables.means[k], mi.UInt32(texture.first)) for k in range(self.components)]
 
-    def _once(self, texture: Texture, x: Array, tables: StripeTables) -> list[Array]:
-        """Return the integral of the deviation from the mean, up to x."""
-        rows, past = self._rows(texture, x, tables)
+    def _once(self, texture: Texture, middle: Array, beyond: Array, tables: StripeTables) -> list[Array]:
+        """Return the integral of the deviation from the mean, up to middle + beyond."""
+        rows, past = self._rows(texture, middle, beyond, tables)
         return [dr.fma(dr.fma((row.w - row.z) / 2, past, row.z), past, row.y) for row in rows]
 
-    def _twice(self, texture: Texture, x: Array, tables: StripeTables) -> list[Array]:
-        """Return the second integral of the deviation from the mean, up to x."""
-        rows, past = self._rows(texture, x, tables)
+    def _twice(self, texture: Texture, middle: Array, beyond: Array, tables: StripeTables) -> list[Array]:
+        """Return the second integral of the deviation from the mean, up to middle + beyond."""
+        rows, past = self._rows(texture, middle, beyond, tables)
         return [dr.fma(dr.fma(dr.fma((row.w - row.z) / 6, past, row.z / 2), past, row.y), past, row.x) for row in rows]
 
-    def _rows(self, texture: Texture, x: Array, tables: StripeTables) -> tuple[list[Array], Array]:
-        """Return the rows of the texel below x, per component, and the distance of x from the texel's centre."""
-        x = x - texture.columns * dr.floor(x / texture.columns)
-        whole = dr.clip(dr.floor(x), 0, texture.columns - 1)
-        index = mi.UInt32(texture.first + whole)
-        return [dr.gather(mi.Vector4f, tables.rows[k], index) for k in range(self.components)], x - whole
+    def _rows(self, texture: Texture, middle: Array, beyond: Array, tables: StripeTables) -> tuple[list[Array], Array]:
+        """Return the rows of the texel below middle + beyond, per component, and the distance from its centre.
+
+        The whole texels of the middle are split off first. The sum with a short distance is then not rounded to the
+        precision of a large column number, whose errors would not cancel in differences.
+        """
+        whole = dr.floor(middle)
+        past = (middle - whole) + beyond
+        steps = dr.floor(past)
+        column = whole + steps
+        column = dr.clip(column - texture.columns * dr.floor(column / texture.columns), 0, texture.columns - 1)
+        index = mi.UInt32(texture.first + column)
+        return [dr.gather(mi.Vector4f, tables.rows[k], index) for k in range(self.components)], past - steps
+
+
+def _least_side(largest: float) -> float:
+    """Return the shortest side of parallelograms [texels] at which rounding of the second integral, whose largest value
+    is given, causes an error of at most ROUNDING. Textures are linear between texels, so one texel is short enough.
+
+    A mean is a sum of four values, divided by the product of the sides. Each value is rounded twice: in the table, and
+    after the polynomial within a texel is added.
+    """
+    return max(1.0, math.sqrt(8 * HALF_ULP * largest / ROUNDING))
 
 
 def _integral_up_to(steps: np.ndarray) -> np.ndarray:

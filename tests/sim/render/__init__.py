@@ -16,6 +16,7 @@ world_fidelity: test_fidelity.py, eyes/test_depth_layers.py
 fidelity_stages: test_fidelity.py, eyes/test_depth_layers.py
 sample_choice: test_sample_choice.py, test_fidelity.py
 random_views: test_fidelity.py
+populations: test_sample_choice.py, test_fidelity.py
 fidelity_trials: test_fidelity.py, eyes/test_depth_layers.py
 prepared_scene: test_batched_renderer.py, test_fidelity.py
 memory_budget: test_memory_budget.py, test_sample_choice.py

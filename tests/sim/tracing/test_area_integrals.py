@@ -90,10 +90,10 @@ def test_textures_are_averaged():
     rng = np.random.default_rng(2)
     texels = np.concatenate([rng.random((512, 2)), np.repeat(rng.random((8, 2)), 32, axis=0)])
     places = np.array([[0, 512], [512, 256]])
-    pattern = stripes.Stripes(texels, places)
     n = 200
     which = rng.integers(2, size=n)
-    middle, one, other = rng.uniform(-900, 900, n), rng.uniform(3, 700, n), rng.uniform(3, 300, n)
+    # From sides of one texel, the width of the narrowest ramp in a texture, to longer than a whole texture.
+    middle, one, other = rng.uniform(-900, 900, n), *(np.exp(rng.uniform(0, np.log(700), (2, n))))
 
     def look(x):
         first, columns = places[which].T
@@ -101,10 +101,14 @@ def test_textures_are_averaged():
         a, b = (texels[first + (whole + i) % columns] for i in (0, 1))
         return a + (b - a) * (x - whole)[..., None]
 
-    across = (np.arange(400) + 0.5) / 400 - 0.5
-    line = np.mean([look(middle + one * a) for a in (np.arange(20_000) + 0.5) / 20_000 - 0.5], axis=0)
-    both = np.mean([look(middle + one * a + other * b) for a in across for b in across[::4]], axis=0)
+    def steps(count):
+        return (np.arange(count) + 0.5) / count - 0.5
+
+    line = np.mean([look(middle + one * a) for a in steps(20_000)], axis=0)
+    longer, shorter = np.maximum(one, other), np.minimum(one, other)
+    both = np.mean([look(middle + longer * a + shorter * b) for a in steps(1500) for b in steps(30)], axis=0)
     with variant():
+        pattern = stripes.Stripes(texels, places)
         floats = [mi.Float(np.ascontiguousarray(x, np.float32)) for x in (middle, one, other, *places[which].T)]
         inputs = pattern.tables
         x, w, h, *texture = floats
@@ -113,3 +117,24 @@ def test_textures_are_averaged():
         found_both = np.transpose(pattern.mean_over(texture, x, (w, h), inputs))
     np.testing.assert_allclose(found_line, line, atol=2e-3)
     np.testing.assert_allclose(found_both, both, atol=3e-3)
+
+
+def test_short_sides_of_long_textures():
+    """Rounding of the second integral limits how short the sides may be. If half of a texture's 8,192 columns are
+    bright, means over single texels would be wrong by more than 0.1. With the least side, the error is at most
+    `stripes.ROUNDING`. Built-in stripes of 128 of 1,536 texels are averaged over single texels.
+    """
+    halves, built_in = (np.repeat(np.tile([0.1, 0.9], n), width)[:, None] for n, width in ((1, 4096), (6, 128)))
+    middle = np.random.default_rng(3).uniform(200, 3900, 500)  # far from the edge
+    with variant():
+        pattern = stripes.Stripes(halves, np.array([[0, len(halves)]]))
+        texture = pattern.texture(0, len(halves))
+        errors = [
+            np.abs(
+                pattern.mean_over(which, mi.Float(middle), (mi.Float(1),) * 2, pattern.tables)[0].numpy() - 0.1
+            ).max()
+            for which in (texture, stripes.Texture(texture.first, texture.columns))
+        ]
+        assert errors[0] <= stripes.ROUNDING
+        assert errors[1] > 0.1
+        assert stripes.Stripes(built_in, np.array([[0, len(built_in)]])).texture(0, 1536).least_side == 1

@@ -92,7 +92,7 @@ def sums_off_by_a_stripe(monkeypatch):
     monkeypatch.setattr(
         stripes.Stripes,
         "_rows",
-        lambda self, texture, x, inputs: right(self, texture, x + texture.columns / 12, inputs),
+        lambda self, texture, x, beyond, inputs: right(self, texture, x + texture.columns / 12, beyond, inputs),
     )
 
 

@@ -11,6 +11,7 @@ from sim.render.world_scene import WorldScene
 from sim.scene.variant import variant
 from sim.tracing.areas.body_light import BodyLight
 from sim.tracing.areas.illumination import FrameState, Illumination
+from sim.tracing.areas.light_baking import FOURS
 from sim.tracing.areas.light_table import sum_of
 from sim.tracing.areas.patch import Patch
 from sim.worlds.world import build_world
@@ -44,7 +45,11 @@ def patch_of(tracer, now, side):
 def by_itself(tracer, patch, now):
     """Return the light per component and world: direct light, and light reflected by walls, floor and other bodies."""
     straight = tracer._illumination.arriving(patch.normal, tracer._illumination.visibility(patch, now, 0))
-    free = [sum_of(fours, patch.normal) for fours in tracer._reflected.on_body(0, now.bodies[0], now.inputs.reflected)]
+    fours = [
+        tracer._reflected.on_body(mi.UInt32(0), mi.UInt32(four), now.bodies[0], now.inputs.reflected)
+        for four in range(FOURS)
+    ]
+    free = [sum_of(list(component), patch.normal) for component in zip(*fours, strict=True)]
     reflected = tracer._illumination.past_bodies(patch, free, now, 0)
     return np.array([np.array(a + b) for a, b in zip(straight, reflected, strict=True)])
 
@@ -55,7 +60,7 @@ def on(light, patch):
 
 def light_at(tracer, now, side):
     patch = patch_of(tracer, now, side)
-    return BodyLight.on_patch(tracer._illumination, tracer._reflected, 0, patch, now), patch
+    return BodyLight.on_patch(tracer._illumination, 0, patch, now), patch
 
 
 @pytest.mark.parametrize("side", SIDES)
@@ -91,7 +96,7 @@ def test_slopes_nearby_have_their_own_light(scene):
 def test_light_that_is_not_followed_is_not_there(scene):
     with variant():
         tracer, all_ = scene.areas("direct"), scene.areas("all")
-        now = moment(all_, bodies_of(scene))
+        now = dataclasses.replace(moment(all_, bodies_of(scene)), body_light=[])
         light, patch = light_at(tracer, now, SIDES[1])
         straight = tracer._illumination.arriving(patch.normal, tracer._illumination.visibility(patch, now, 0))
         np.testing.assert_array_equal(on(light, patch), [np.array(component) for component in straight])

@@ -10,10 +10,14 @@ import numpy as np
 import pytest
 
 import sim
+from sim.eyes.eyes import BODY_RADIUS
+from sim.eyes.sampling import BoxSampling
+from sim.render.fidelity_trials import FidelityTrials
 from sim.render.world_scene import WorldScene
 from sim.scene.variant import variant
 from sim.tasks.registry import task_of
 from sim.tasks.simulation import Simulation
+from sim.tracing import closed_form_tracer
 from sim.tracing.closed_form_tracer import components_of, reflected_components_of
 from sim.tracing.reflectance_atlas import bake
 from sim.tracing.wall_intersection import Cells
@@ -52,8 +56,12 @@ def radiances(world, state):
         *(("maze", seed, 1) for seed in range(8)),
     ],
 )
-def test_every_ray_sees_what_mitsuba_sees(task, seed, mazes):
-    """All rays agree to float32, except for the few that graze an edge of a stripe, a wall or a shadow."""
+def test_every_ray_sees_what_mitsuba_sees(monkeypatch, task, seed, mazes):
+    """All rays agree to float32, except for the few that graze an edge of a stripe, a wall or a shadow.
+
+    Shadow rays start at Mitsuba's distance here. Otherwise, the edges of shadows would differ by millimetres.
+    """
+    monkeypatch.setattr(closed_form_tracer, "CLEARANCE", 1)
     world = build_world(task, seed=seed, mazes=mazes)
     ours, theirs = radiances(world, scattered(world, 24, seed))
     different = np.abs(ours - theirs).max(axis=1) > 2e-3
@@ -203,3 +211,43 @@ def test_components_of_greys_are_their_reflectances():
     np.testing.assert_allclose(few.reflectance, texels[:, :1], rtol=1e-6)
     radiance = few.reflectance @ np.diag(few.levels[0]) @ few.basis
     np.testing.assert_allclose(radiance, texels * light / np.pi, rtol=1e-6)
+
+
+def test_shadows_end_where_the_body_does():
+    """An agent in a maze, 35 m from the origin, sees the shadow of its own body. The edge of the shadow is that of the
+    sphere, to 0.3 mm. If shadow rays started at Mitsuba's distance from surfaces, it would be off by up to 3 mm.
+    """
+    scene = WorldScene(build_world("maze"), dataclasses.replace(EYES, fov_deg=100), "closed_form")
+    trials = FidelityTrials(scene)
+    views, rays = trials._views, trials._everywhere
+    trial = BoxSampling(scene.eye).trial(32, rays.receptors)
+    origins, directions = views.in_agents(scene.eyes, trial.directions)
+
+    def light():
+        components, z = trials._trace(views, trial, "direct")
+        return np.abs(components[0].numpy()).reshape(len(views), -1), z.numpy().reshape(len(views), -1)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(closed_form_tracer.spheres, "blocks", lambda *_: False)
+        free, _ = light()
+
+    def wrong():
+        """Return the number of rays that are shaded outside the shadow, by more than 0.3 mm."""
+        found, z = light()
+        seen = np.isfinite(z)
+        points = origins[:, None] + directions * (np.where(seen, z, 0) / trial.directions[:, 2])[..., None]
+        way = views.agents[:, None] - points
+        inside, close = np.zeros(z.shape, bool), np.zeros(z.shape, bool)
+        for lamp in scene.tracers.tracer_for("direct").lights:
+            ahead = way @ lamp.direction
+            beside = np.linalg.norm(way - ahead[..., None] * lamp.direction, axis=-1)
+            inside |= (ahead > 0) & (beside < BODY_RADIUS)
+            close |= np.abs(beside - BODY_RADIUS) < 3e-4
+        shaded = found < free * (1 - 1e-4)
+        # A lamp may be behind the surface. Rays inside the shadow of such a lamp are not darker.
+        return int((shaded & ~inside & ~close & seen).sum())
+
+    assert wrong() == 0
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(closed_form_tracer, "CLEARANCE", 1)
+        assert wrong() > 20

@@ -93,7 +93,7 @@ def nothing_on_spheres(monkeypatch):
     monkeypatch.setattr(
         light_table.LightTable,
         "on_body",
-        lambda self, body, centre, inputs: [[mi.Vector4f(0)] * light_baking.FOURS for _ in range(self._components)],
+        lambda self, body, four, centre, tables: [mi.Vector4f(0) for _ in range(self._components)],
     )
 
 

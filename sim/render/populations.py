@@ -1,0 +1,79 @@
+"""Populations of views and receptors over which the errors of trials are taken.
+
+There are two: any receptors in views from any place, and receptors that see an object in views with an object nearby.
+The second is separate because objects decide how an episode ends. Most receptors see floor and walls, and would hide
+errors at objects. All draws have fixed seeds, so the same world and eyes give the same populations.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from sim.eyes.sampling import BoxSampling, EyeSampling, Trial
+from sim.render.random_views import RandomViews, near_views, on_objects, random_views
+from sim.render.world_scene import WorldScene
+
+RECEPTORS = 24  # chosen: largest number of receptors of a population
+LEAST_WEIGHT = 1e-3  # weight of a receptor that sees an object in none of the views, compared with one of them
+ON_OBJECT = 0.02  # share of a receptor's field: a receptor sees an object that fills more than this share
+
+
+@dataclass(frozen=True)
+class Population:
+    """Views, and receptors that are tried in them.
+
+    receptors: their numbers, row by row · counted: whether each of them counts in each view, (view, receptor)
+    """
+
+    views: RandomViews
+    receptors: np.ndarray
+    counted: np.ndarray
+
+    def rms(self, error: np.ndarray) -> float:
+        """Return the root mean square of an error (view, channel, receptor) in the first views; 0 if none counts."""
+        counted = np.broadcast_to(self.counted[: len(error), None], error.shape)
+        return float(np.sqrt(np.mean(error[counted] ** 2))) if counted.any() else 0.0
+
+
+def everywhere(scene: WorldScene, views: int) -> Population:
+    """Return receptors drawn from all receptors, in this number of views from any place."""
+    receptors = _drawn(np.ones(int(np.prod(scene.eyes.resolution))))
+    counted = np.ones((views, len(receptors)), bool)
+    return Population(random_views(scene.world, scene.eyes, views), receptors, counted)
+
+
+def near_objects(scene: WorldScene, sampling: EyeSampling, views: int, rays: int) -> Population:
+    """Return receptors that see an object in this number of views with an object nearby.
+
+    In a wide eye, an object fills few receptors. Receptors that often see an object are therefore more likely drawn.
+
+    rays: number of rays through all receptors that decide which of them see an object
+    """
+    near, n = near_views(scene.world, scene.eyes, views), int(np.prod(scene.eyes.resolution))
+    middles = BoxSampling(scene.eye).trial(1, np.arange(n))
+    receptors = _drawn(_on_objects(scene, near, middles).sum(axis=0) + LEAST_WEIGHT)
+    trial = sampling.trial(rays / n, receptors)
+    weights = trial.weights.sum(axis=0)
+    shares = np.einsum("rp,vp->vr", weights, _on_objects(scene, near, trial)) / weights.sum(axis=-1)
+    return Population(near, receptors, shares > ON_OBJECT)
+
+
+def _drawn(weights: np.ndarray) -> np.ndarray:
+    """Return up to RECEPTORS numbers of receptors, in increasing order, with probabilities proportional to their
+    weights."""
+    chance = weights / weights.sum()
+    return np.sort(np.random.default_rng(0).choice(len(weights), min(RECEPTORS, len(weights)), replace=False, p=chance))
+
+
+def _on_objects(scene: WorldScene, views: RandomViews, trial: Trial) -> np.ndarray:
+    """Return which of a trial's rays hit an object, (view, ray)."""
+    radii = np.array([scene.model.geom_size[geom, 0] for geom in _objects(scene)])
+    return on_objects(views, *views.in_agents(scene.eyes, trial.directions), radii)
+
+
+def _objects(scene: WorldScene) -> list[int]:
+    """Return the ids of the objects' geoms."""
+    bodies = [scene.model.body(name).id for name in scene.world.objects]
+    return [int(np.flatnonzero(scene.model.geom_bodyid == body)[0]) for body in bodies]
