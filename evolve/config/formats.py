@@ -5,7 +5,8 @@
 2   the current format. "navigation" means a course, "maze" the maze, and `learning.rays_per_receptor` limits the rays.
 
 Runs of both formats may lack `learning.least_epochs`; the number of passes per update is then constant. They may lack
-`search.active`; CMA-ES then also learns from the worse candidates.
+`search.active`; CMA-ES then also learns from the worse candidates. Runs of user tasks may lack
+`world.encoded_textures`; textures are then as MuJoCo's compiler resolves them.
 
 A run of a former format can be opened, replayed and reported with its original meaning. Its training runs cannot be
 continued, because light is computed differently.
@@ -17,6 +18,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from evolve.config.checks import ConfigError
+from evolve.config.task_code import names_code
 
 __all__ = ["FORMAT", "LAST_OF_FORMER", "format_of", "task_then", "upgraded"]
 
@@ -48,6 +50,8 @@ def upgraded(tree: Mapping[str, Any]) -> Tree:
         now["learning"] = _learning_then(learning, number)
     if isinstance(search := now.get("search"), dict) and "optimizer" in search:
         now["search"] = {"active": True, **search}
+    if isinstance(world := now.get("world"), dict) and names_code(now.get("task")):
+        now["world"] = {"encoded_textures": False, **world}
     if number == 1 and "task" in now:
         now["task"] = task_then(now["task"])
     return now

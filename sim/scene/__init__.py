@@ -8,6 +8,7 @@ merged_parts   shapes that share a material, merged into one
 tessellation   geoms as triangles with MuJoCo's texture coordinates
 cube           triangles under cube textures
 surfaces       colours and textures
+linear_textures textures whose values are linear light
 bsdfs          materials as BSDFs
 spectra        measured spectra that replace colours
 lights         lights as emitters with daylight's spectrum
