@@ -2,12 +2,13 @@
 for Spectral Images", JCGT 10(3).
 
 A file has up to two parts for each eye. For an eye named "left", these are `left.spectral` (spectral radiance, channels
-`S0.450,000000nm` ...) and `left.receptors` (photoreceptor signals, channels `receptor_0` ...). Each part also contains
-a linear sRGB preview in the channels R, G and B, which ordinary image viewers show. Spectral parts precede receptor
-parts, because programs that support only one part, such as colour-science, read the first one. Pixels are 32-bit floats
-with ZIP compression.
+`S0.450,000000nm` ..., and reflectance, channels `T.450,000000nm` ...) and `left.receptors` (photoreceptor signals,
+channels `receptor_0` ...). Each part also contains a linear sRGB preview in the channels R, G and B, which plain
+viewers show. Readers that support only one part, such as colour-science, read the first part. Spectral parts precede
+receptor parts. Pixels are 32-bit floats with ZIP compression.
 
-A file is written completely or not at all. Each part stores a SHA-256 hash of its contents.
+A file is written completely or not at all. Each part stores a SHA-256 hash of its contents. Files of other programs
+need the spectral layout and have no hash.
 """
 
 from __future__ import annotations
@@ -24,7 +25,8 @@ from typing import Any
 import numpy as np
 
 from optics.numerics.arguments import items, reals, shown
-from sim.scene.color import preview
+from sim.exr_previews import preview_of_receptors, preview_of_spectra
+from sim.spectral_layout import PREVIEW, RADIANCE, REFLECTANCE, NoSpectra, channel, fields_of_views
 
 LAYOUT_VERSION = "1.0"
 UNITS = "W.m^-2.sr^-1"
@@ -34,11 +36,10 @@ SCALE = "relative: a white Lambertian facing unit daylight has radiance D65, 1 a
 MOST_BYTES = 2**30
 _HELD = "rhabdom"  # name of the attribute that stores all values other than channels, as JSON
 _HASH = "sha256"
-_PREVIEW = ("R", "G", "B")
 
 
 class ExrError(ValueError):
-    """Error for a file that is incomplete, damaged, or not written by `write_exr`."""
+    """A file that is incomplete, damaged, or without the spectral layout."""
 
 
 @dataclass(frozen=True)
@@ -46,13 +47,15 @@ class View:
     """Image of one eye.
 
     name: name of the eye, such as "left"
-    wavelengths_nm: wavelengths of the radiance's bands, (band,)
-    radiance: spectral radiance, (band, y, x) float32; None: no spectral part
-    receptors: signals of the receptors, (channel, y, x) float32; None: no receptor part
-    rgb: linear sRGB preview of the radiance, (y, x, 3) float32; None: `write_exr` computes it
+    wavelengths_nm: wavelengths of the bands of radiance and reflectance, (band,)
+    radiance: (band, y, x) float32, or None
+    receptors: (channel, y, x) float32, or None
+    rgb: (y, x, 3) float32 linear sRGB preview of the radiance, or of the reflectance in daylight; None: computed when
+        written
     attributes: further values that JSON can represent, such as seed, time step or position
-    peaks_nm: wavelength of peak sensitivity of each receptor channel, (channel,). The preview shows the channel with
-        the longest peak wavelength as red. None: channels are in descending order of their peak wavelengths.
+    peaks_nm: peak wavelength of each receptor channel, (channel,); the preview shows the longest as red. None: channels
+        are in descending order of their peaks.
+    reflectance: reflectance or transmittance, (band, y, x) float32, or None
     """
 
     name: str
@@ -62,31 +65,40 @@ class View:
     rgb: np.ndarray | None = None
     attributes: Mapping[str, Any] = field(default_factory=dict)
     peaks_nm: Sequence[float] | np.ndarray | None = None
+    reflectance: np.ndarray | None = None
 
     def __post_init__(self) -> None:
         where = f"View {shown(self.name)}"
         if not isinstance(self.name, str) or not self.name or not self.name.isprintable():
             raise ValueError(f"{where}: its name must be printable text, and not empty")
-        if self.radiance is None and self.receptors is None:
-            raise ValueError(f"{where}: has neither radiance nor receptors")
-        for label, image in (("radiance", self.radiance), ("receptors", self.receptors)):
+        if self.spectral is None and self.receptors is None:
+            raise ValueError(f"{where}: has neither radiance nor receptors, and no reflectance")
+        for label in ("radiance", "reflectance", "receptors"):
+            image = getattr(self, label)
             if image is not None and (len(_shape(image)) != 3 or 0 in image.shape):
                 raise ValueError(f"{where}: {label} {_kind(image)}: must be an array (band, y, x)")
         wavelengths = reals(f"{where}: wavelengths_nm", self.wavelengths_nm)
         if wavelengths.ndim != 1 or not np.all(np.isfinite(wavelengths)):
             raise ValueError(f"{where}: wavelengths_nm = {shown(self.wavelengths_nm)}: must be finite numbers (band,)")
-        if self.radiance is not None:
-            names = {_channel(nm) for nm in self.wavelengths_nm}
-            if len(self.radiance) != len(self.wavelengths_nm) or len(names) != len(self.radiance):
-                raise ValueError(f"{where}: needs one distinct wavelength per band of {self.radiance.shape}")
-            if self.rgb is not None and _shape(self.rgb) != (*self.radiance.shape[1:], 3):
+        if (spectral := self.spectral) is not None:
+            names = {channel(nm) for nm in self.wavelengths_nm}
+            if len(spectral) != len(self.wavelengths_nm) or len(names) != len(spectral):
+                raise ValueError(f"{where}: needs one distinct wavelength per band of {spectral.shape}")
+            if self.rgb is not None and _shape(self.rgb) != (*spectral.shape[1:], 3):
                 raise ValueError(f"{where}: rgb {_kind(self.rgb)}: must be an array (y, x, 3) like the radiance")
+            if self.reflectance is not None and self.reflectance.shape != spectral.shape:
+                raise ValueError(f"{where}: reflectance {_kind(self.reflectance)}: must have that of the radiance")
         if self.peaks_nm is not None:
             peaks = reals(f"{where}: peaks_nm", self.peaks_nm)
             if self.receptors is None or peaks.shape != (len(self.receptors),) or not np.isfinite(peaks).all():
                 raise ValueError(
                     f"{where}: peaks_nm = {shown(self.peaks_nm)}: must be a finite number for each channel of receptors"
                 )
+
+    @property
+    def spectral(self) -> np.ndarray | None:
+        """The radiance if there is any, otherwise the reflectance."""
+        return self.reflectance if self.radiance is None else self.radiance
 
 
 def _shape(image: Any) -> tuple[int, ...]:
@@ -112,7 +124,7 @@ def write_exr(path: str | os.PathLike[str], views: Sequence[View]) -> None:
     names = [view.name for view in views]
     if not views or len(set(names)) != len(names):
         raise ValueError(f"write_exr: views = {names}: must be at least one, and no name twice")
-    spectral = [_part(view, "spectral") for view in views if view.radiance is not None]
+    spectral = [_part(view, "spectral") for view in views if view.spectral is not None]
     receptors = [_part(view, "receptors") for view in views if view.receptors is not None]
     # OpenEXR requires the same display window in all parts, but images may differ in size, so the largest is used.
     shapes = [channels["R"].shape for _, channels, _ in spectral + receptors]
@@ -134,13 +146,16 @@ def write_exr(path: str | os.PathLike[str], views: Sequence[View]) -> None:
 
 
 def read_exr(path: str | os.PathLike[str], most_bytes: int = MOST_BYTES) -> list[View]:
-    """Read the views from a file that `write_exr` wrote.
+    """Read the views from a file that `write_exr` or another program wrote.
+
+    A file of another program needs channels of the spectral layout: radiance (`S0.450,0nm` ...) or reflectance
+    (`T.450,0nm` ...). Its views have the names of their parts, or of the file. An ExrWarning names contents that are
+    not read, such as polarisation.
 
     most_bytes: largest allowed size of the unpacked pixels [bytes]; the header of a small file can state any size
 
     Raises:
-        ExrError: the file is truncated, damaged, altered, too large, or not written by `write_exr`. The message is one
-            line.
+        ExrError: the file is truncated, damaged, altered, too large, or without spectral channels; one line.
         FileNotFoundError: the file does not exist.
     """
     import OpenEXR
@@ -154,7 +169,8 @@ def read_exr(path: str | os.PathLike[str], most_bytes: int = MOST_BYTES) -> list
         if (unpacked := sum(_pixel_bytes(part.header) for part in headers)) > most_bytes:
             raise ExrError(f"unpacks to {unpacked:,} bytes: must be at most most_bytes = {most_bytes:,}")
         parts = OpenEXR.File(io.BytesIO(content), separate_channels=True).parts
-        held = [_checked(part, expected) for part in parts]
+        is_own = any(key in part.header for part in parts for key in (_HASH, _HELD))
+        held = [_checked(part, expected) for part in parts] if is_own else []
     except ExrError as error:
         raise ExrError(f"{path}: {error}") from None
     except Exception as error:  # OpenEXR passes on C++ exceptions of any type
@@ -162,10 +178,13 @@ def read_exr(path: str | os.PathLike[str], most_bytes: int = MOST_BYTES) -> list
     if len(parts) != expected:
         raise ExrError(f"{path}: truncated ({len(parts)} of {expected} parts are whole)")
     try:
-        return _views(held)
+        return _views(held) if is_own else [View(**view) for view in fields_of_views(parts, Path(path).stem)]
+    except NoSpectra as error:
+        raise ExrError(f"{path}: {error}") from None
     except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
         reason = " ".join(str(error).split())[:200]
-        raise ExrError(f"{path}: holds no views, though its hash is right ({type(error).__name__}: {reason})") from None
+        why = ", though its hash is right" if is_own else ""
+        raise ExrError(f"{path}: holds no views{why} ({type(error).__name__}: {reason})") from None
 
 
 def _pixel_bytes(header: Mapping[str, Any]) -> int:
@@ -175,44 +194,41 @@ def _pixel_bytes(header: Mapping[str, Any]) -> int:
     return width * height * len(header["channels"]) * 4
 
 
-def _channel(nm: float) -> str:
-    return f"S0.{nm:.6f}nm".replace(".", ",").replace("S0,", "S0.", 1)
-
-
 def _part(view: View, kind: str) -> tuple[str, dict[str, np.ndarray], dict[str, str]]:
     """Return the name, channels and attributes of one part."""
     held: dict[str, Any] = {"attributes": dict(view.attributes)}
     attributes: dict[str, str] = {}
     if kind == "spectral":
-        assert view.radiance is not None
-        image, names = view.radiance, [_channel(nm) for nm in view.wavelengths_nm]
-        held["wavelengths_nm"] = [float(nm) for nm in view.wavelengths_nm]
-        rgb = preview(image, view.wavelengths_nm) if view.rgb is None else view.rgb
-        attributes = {"spectralLayoutVersion": LAYOUT_VERSION, "emissiveUnits": UNITS, "radianceScale": SCALE}
+        planes, nm = _spectral_planes(view), np.asarray(view.wavelengths_nm, float)
+        held["wavelengths_nm"] = nm.tolist()
+        rgb = preview_of_spectra(view.radiance, view.reflectance, nm) if view.rgb is None else view.rgb
+        attributes = {"spectralLayoutVersion": LAYOUT_VERSION}
+        if view.radiance is not None:
+            attributes |= {"emissiveUnits": UNITS, "radianceScale": SCALE}
     else:
         assert view.receptors is not None
-        image, names = view.receptors, [f"receptor_{c}" for c in range(len(view.receptors))]
+        planes = {f"receptor_{c}": plane for c, plane in enumerate(view.receptors)}
         if view.peaks_nm is not None:
             held["peaks_nm"] = [float(nm) for nm in view.peaks_nm]
-        rgb = _false_colors(image, view.peaks_nm)
+        rgb = preview_of_receptors(view.receptors, view.peaks_nm)
     try:
         attributes[_HELD] = json.dumps(held, sort_keys=True)
     except TypeError as error:
         raise ValueError(f"View {view.name!r}: attributes cannot be written as JSON ({error})") from None
-    planes = dict(zip(names, image, strict=True)) | dict(zip(_PREVIEW, np.moveaxis(rgb, -1, 0), strict=True))
+    planes |= dict(zip(PREVIEW, np.moveaxis(rgb, -1, 0), strict=True))
     channels = {name: np.ascontiguousarray(plane, dtype=np.float32) for name, plane in planes.items()}
     return f"{view.name}.{kind}", channels, attributes
 
 
-def _false_colors(receptors: np.ndarray, peaks_nm: Sequence[float] | np.ndarray | None) -> np.ndarray:
-    """Return a false-colour image (y, x, 3) of the receptor signals.
-
-    The channel with the longest peak wavelength is shown as red, the next as green, and the next as blue. A single
-    channel is shown as grey.
-    """
-    count = len(receptors)
-    order = np.arange(count) if peaks_nm is None else np.argsort(-np.asarray(peaks_nm, float), kind="stable")
-    return np.moveaxis(np.asarray(receptors)[order[np.minimum(range(3), count - 1)]], 0, -1)
+def _spectral_planes(view: View) -> dict[str, np.ndarray]:
+    """Return the channels of a view's radiance and reflectance, (y, x), by name."""
+    quantities = ((RADIANCE, view.radiance), (REFLECTANCE, view.reflectance))
+    return {
+        channel(nm, quantity): plane
+        for quantity, image in quantities
+        if image is not None
+        for nm, plane in zip(view.wavelengths_nm, image, strict=True)
+    }
 
 
 def _digest(name: str, channels: Mapping[str, np.ndarray], attributes: Mapping[str, str]) -> str:
@@ -254,8 +270,10 @@ def _views(parts: list[tuple[str, dict[str, np.ndarray], dict[str, Any]]]) -> li
             if nm.ndim != 1 or not np.all(np.isfinite(nm)):
                 raise ValueError("wavelengths_nm: must be finite numbers")
             view["wavelengths_nm"] = nm
-            view["radiance"] = np.stack([channels[_channel(x)] for x in nm])
-            view["rgb"] = np.stack([channels[c] for c in _PREVIEW], axis=-1)
+            for field_name, quantity in (("radiance", RADIANCE), ("reflectance", REFLECTANCE)):
+                if any(name.startswith(f"{quantity}.") for name in channels):
+                    view[field_name] = np.stack([channels[channel(x, quantity)] for x in nm])
+            view["rgb"] = np.stack([channels[c] for c in PREVIEW], axis=-1)
         else:
             count = sum(c.startswith("receptor_") for c in channels)
             view["receptors"] = np.stack([channels[f"receptor_{c}"] for c in range(count)])

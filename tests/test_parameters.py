@@ -54,6 +54,7 @@ OBLONG = (
 )
 PERFECT = ("eye.optics=false",)
 SQUARE = ("eye.square=true", "genome.resolution.start=4", *PERFECT)
+TEXTURED = f"{Path(__file__).parent / 'evolve' / 'grey_floor.py'}:GreyFloor"
 OWN = f"{Path(__file__).parents[1] / 'examples' / 'find_ball.py'}:FindBall"
 FOUR_TYPES = ("eye.receptors=genes", "genome.receptor_types.start=4", *PERFECT)
 
@@ -218,6 +219,7 @@ FIELDS = {
     "world.course": Case("world.course=long", views, NAVIGATING, "navigation"),
     "world.evaluation_course": Case("world.evaluation_course=long", views, NAVIGATING, "navigation"),
     "world.least_light": Case("world.least_light=0.01", views),
+    "world.encoded_textures": Case("world.encoded_textures=false", own_sight, task=TEXTURED),
     "search.optimizer": Case("search.optimizer=mutation", history),
     "search.steady_state": Case("search.steady_state=true", history),
     "search.population": Case("search.population=4", history),

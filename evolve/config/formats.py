@@ -5,8 +5,9 @@
 2   This is the current format. The task "navigation" is a course, the task "maze" is a maze, and
     `learning.rays_per_receptor` limits the number of rays in training.
 
-In files of both formats, two settings may be missing. Without `learning.least_epochs`, the number of passes per update
-is constant. Without `search.active`, CMA-ES also learns from the worse candidates.
+In files of both formats, some settings may be missing. Without `learning.least_epochs`, the number of passes per update
+is constant. Without `search.active`, CMA-ES also learns from the worse candidates. Without `world.encoded_textures`,
+the textures of user tasks are as MuJoCo's compiler resolves them.
 
 A run of a former format can be opened, replayed and reported; its settings keep their original meaning. Its training
 runs cannot be continued, because light is computed differently.
@@ -18,6 +19,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from evolve.config.checks import ConfigError
+from evolve.config.task_code import names_code
 
 __all__ = ["FORMAT", "LAST_OF_FORMER", "format_of", "task_then", "upgraded"]
 
@@ -49,6 +51,8 @@ def upgraded(tree: Mapping[str, Any]) -> Tree:
         now["learning"] = _learning_then(learning, number)
     if isinstance(search := now.get("search"), dict) and "optimizer" in search:
         now["search"] = {"active": True, **search}
+    if isinstance(world := now.get("world"), dict) and names_code(now.get("task")):
+        now["world"] = {"encoded_textures": False, **world}
     if number == 1 and "task" in now:
         now["task"] = task_then(now["task"])
     return now

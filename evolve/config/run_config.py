@@ -16,7 +16,15 @@ from evolve.config.settings import (
     WorldConfig,
     setting,
 )
-from evolve.config.task_card import OF_COURSES, OF_MAZES, OF_SLIDING_AGENTS, OPTIONAL_GENES, TaskCard, tasks_with
+from evolve.config.task_card import (
+    OF_COURSES,
+    OF_MAZES,
+    OF_SLIDING_AGENTS,
+    OF_USER_TASKS,
+    OPTIONAL_GENES,
+    TaskCard,
+    tasks_with,
+)
 from evolve.config.task_choice import TaskChoice
 from evolve.config.task_code import TaskCode
 from evolve.genome import anatomy
@@ -112,7 +120,7 @@ class RunConfig:
                     f"genome.{name}: is for user tasks; in {self.task} eyes look along the floor",
                     *(f"genome.{name}", "task"),
                 )
-        self._check_settings(OF_SLIDING_AGENTS)
+        self._check_settings((*OF_SLIDING_AGENTS, *OF_USER_TASKS))
 
     def _check_world(self) -> None:
         """Check the courses, and that settings of mazes and courses are changed only for tasks that have them."""
@@ -128,7 +136,8 @@ class RunConfig:
             default = getattr(SECTIONS[section], name)
             if key not in self.card.settings and getattr(getattr(self, section), name) != default:
                 others = tasks_with(key)
-                whose = f"the task {others[0]}" if len(others) == 1 else "built-in tasks"
+                kind = "built-in tasks" if others else "user tasks"
+                whose = f"the task {others[0]}" if len(others) == 1 else kind
                 raise ConfigError(f"{key}: is for {whose}, not for {self.task}", key, "task")
 
     def _check_light(self) -> None:

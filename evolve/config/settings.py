@@ -38,6 +38,13 @@ class WorldConfig:
         "darkest light of an episode, as a share of daylight; each episode draws its light between this and 1",
     )
 
+    encoded_textures: bool = setting(
+        True,
+        None,
+        "textures contain display colours, unless the model requests linear light; if false, those that MuJoCo's "
+        "compiler resolves to linear light contain it, as in runs without this setting",
+    )
+
     @property
     def training(self) -> dict[str, Any]:
         """Arguments of `sim.make_vec_env` that define the worlds in training."""

@@ -9,13 +9,14 @@ from evolve.config.task_code import LABEL
 from evolve.genome.genes import TILT
 from sim.worlds.catalog import TASKS
 
-__all__ = ["CARDS", "OF_COURSES", "OF_SLIDING_AGENTS", "TaskCard", "card_of", "tasks_with"]
+__all__ = ["CARDS", "OF_COURSES", "OF_SLIDING_AGENTS", "OF_USER_TASKS", "TaskCard", "card_of", "tasks_with"]
 
 # Settings that only some tasks have. OF_SLIDING_AGENTS are for tasks whose agent has a speed, a turning rate and
 # contact with walls.
 OF_SLIDING_AGENTS = ("world.least_light", "learning.first_speed", "learning.contact_ramp", "learning.least_return")
 OF_MAZES = ("world.mazes", "world.unseen")
 OF_COURSES = ("world.course", "world.evaluation_course")
+OF_USER_TASKS = ("world.encoded_textures",)  # built-in worlds have no image files
 OPTIONAL_GENES = (TILT,)  # genes that only some tasks have
 
 
@@ -68,7 +69,7 @@ def card_of(task: Any) -> TaskCard | None:
         return None
     if LABEL.fullmatch(task) is not None:
         name = task.rpartition(":")[2]
-        return TaskCard(name, name, f"for {task}, a user task", genes=(TILT,), has_file=True)
+        return TaskCard(name, name, f"for {task}, a user task", OF_USER_TASKS, (TILT,), has_file=True)
     return CARDS.get(task)
 
 

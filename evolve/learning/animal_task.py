@@ -33,7 +33,7 @@ def animal_task(
         ValueError: the eyes that the task places differ from the animal's.
     """
     if (code := config.choice.named_code) is not None:
-        task = with_phenotype(executed_task(code), phenotype, config, eyes)
+        task = with_phenotype(executed_task(code, config.world.encoded_textures), phenotype, config, eyes)
         return batched(task).in_mode(mode)
     eyes, layout = eyes or phenotype.eyes(config.eye), getattr(config.world, mode)
     asked = fidelity_asked(config.eye.rays_per_receptor, eyes)
@@ -53,7 +53,8 @@ def azimuths(phenotype: Phenotype, config: RunConfig) -> np.ndarray:
         ValueError: see `animal_task`.
     """
     if (code := config.choice.named_code) is not None:
-        return batched(with_phenotype(executed_task(code), phenotype, config)).azimuths()
+        task = executed_task(code, config.world.encoded_textures)
+        return batched(with_phenotype(task, phenotype, config)).azimuths()
     return phenotype.eyes(config.eye).azimuths()
 
 

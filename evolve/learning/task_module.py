@@ -9,6 +9,7 @@ from types import ModuleType
 
 from evolve.config.checks import ConfigError
 from evolve.config.task_code import TaskCode
+from sim.scene.source import with_compiled_color_spaces
 from sim.tasks.batch_task import BatchTask
 from sim.tasks.task import Task
 from sim.tasks.task_fidelity import resolve_other_fidelities
@@ -19,13 +20,15 @@ __all__ = ["executed_task"]
 
 
 @lru_cache(maxsize=4)
-def executed_task(code: TaskCode) -> Task | BatchTask:
-    """Execute the code of a user task, and return the task. Later changes of its file have no effect on this process.
+def executed_task(code: TaskCode, encoded_textures: bool = True) -> Task | BatchTask:
+    """Execute the code and return the task; later changes of the file have no effect.
+
+    encoded_textures: see `WorldConfig`
 
     Raises:
         ConfigError: the code cannot be executed, the class does not derive from `sim.Task` or `sim.BatchTask` or
-            requires arguments, its model cannot be compiled, or one of its settings is invalid. The message is one line
-            and names the file and the line of an error in the user's code.
+            requires arguments, its model cannot be compiled or cannot have the textures of an older run, or one of its
+            settings is invalid. The message is one line and names file and line of an error in the user's code.
     """
     module = _executed(code)
     cls = getattr(module, code.name, None)
@@ -33,11 +36,21 @@ def executed_task(code: TaskCode) -> Task | BatchTask:
         raise ConfigError(f"{code.label}: must be a class that derives from sim.Task or sim.BatchTask", "task")
     try:
         task = cls()
+        if not encoded_textures and hasattr(task, "model"):
+            _resolve_textures(task)
         compiled(task)
         require_rewards(task)
         return resolve_other_fidelities(task) if isinstance(task, Task) else task
     except (Exception, SystemExit) as error:
         raise ConfigError(f"{code.label}: {_told(error, code)}", "task") from error
+
+
+def _resolve_textures(task: Task | BatchTask) -> None:
+    """Let the textures that MuJoCo's compiler resolves to linear light contain it."""
+    try:
+        task.model = with_compiled_color_spaces(task.model)
+    except ValueError as error:
+        raise ValueError(f"{error}, because this run has world.encoded_textures = false") from error
 
 
 def _executed(code: TaskCode) -> ModuleType:

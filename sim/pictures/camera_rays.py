@@ -98,8 +98,10 @@ class CameraRays:
                 whole_numbers(_closed(mirror)),
                 mi.BSDFPtr([shape.bsdf() for shape in scene.shapes()]),
             )
-            self._outside: Any = dr.freeze(lambda *args: self._trace(False, *args))
-            self._inside: Any = dr.freeze(lambda *args: self._trace(True, *args))
+            # Mitsuba 3.9 does not expose the tables that sample a glowing texture to a recording.
+            may_record = not any(_is_textured_glow(light) for light in self._lights)
+            self._outside: Any = dr.freeze(lambda *args: self._trace(False, *args), enabled=may_record)
+            self._inside: Any = dr.freeze(lambda *args: self._trace(True, *args), enabled=may_record)
 
     def trace(self, view: Viewpoint, size: tuple[int, int], codes: np.ndarray) -> RayLight:
         """Return the light along rays of an image of size (height, width)."""
@@ -232,6 +234,12 @@ def _is_delta(light: MitsubaObject) -> bool:
 
 def _is_sun(lamp: Emitter) -> bool:
     return bool(lamp.description["type"] == "directional")
+
+
+def _is_textured_glow(light: MitsubaObject) -> bool:
+    """Return whether a light is a surface with a texture. (A sky's tables are exposed.)"""
+    kinds = int(mi.EmitterFlags.Surface) | int(mi.EmitterFlags.SpatiallyVarying)
+    return int(light.flags()) & kinds == kinds
 
 
 def _sun_weight(light: MitsubaObject) -> np.ndarray:

@@ -17,7 +17,6 @@ import numpy as np
 
 from optics.spectra.spectrum import Spectrum
 from sim.scene import spectra, surfaces
-from sim.scene.color import decode_srgb
 from sim.scene.variant import Description, MitsubaObject
 
 _TYPES = mujoco.mjtGeom
@@ -142,8 +141,7 @@ def _measured(
     if np.ptp(pixels, axis=2).max() > 0:
         name = model.material(int(model.geom_matid[geom])).name
         raise ValueError(f"spectra: material {name!r} has a coloured texture: must be grey with a spectrum")
-    is_linear = model.tex_colorspace[texture] == mujoco.mjtColorSpace.mjCOLORSPACE_LINEAR
-    share = pixels[..., :1] if is_linear else decode_srgb(pixels[..., :1])
+    share = surfaces.linear(model, texture, np.ones(3))[..., :1]
     # Mitsuba cannot multiply textures. Instead, black and the full reflectance are blended, with the texture as weight.
     black = matter(model, geom, {"type": "uniform", "value": 0.0})
     weight = surfaces.bitmap(share, to_uv) | {"raw": True}

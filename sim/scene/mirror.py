@@ -42,7 +42,8 @@ def mirror(
 ) -> Mirror:
     """Return the mirror of a MuJoCo model: a Mitsuba scene that follows the model's data.
 
-    model: an MjModel, or a source that compiles to one: an MjSpec, the path of an MJCF, URDF or MJB file, or MJCF text
+    model: an MjModel, or a source that compiles to one: an MjSpec, the path of an MJCF, URDF or MJB file, or MJCF text.
+        Textures of linear light must be marked in an MjModel, see `sim.scene.linear_textures`
     data: initial poses; None: the model's reference pose
     bodies: names of the bodies whose geoms are included ("world" is the static body); None: all bodies
     groups: visible geom groups; a geom with alpha 0 is never visible

@@ -5,13 +5,18 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from pathlib import Path
+from typing import TypeAlias, TypeVar
 
 import mujoco
 
+from sim.scene import linear_textures
 from sim.scene.bombs import require_finite, require_modest, require_modest_file
 
+Source: TypeAlias = mujoco.MjModel | mujoco.MjSpec | str | Path
+Made = TypeVar("Made")
 
-def load(source: mujoco.MjModel | mujoco.MjSpec | str | Path) -> mujoco.MjModel:
+
+def load(source: Source) -> mujoco.MjModel:
     """Return the model of an MjModel, an MjSpec, a file (MJCF, URDF or MJB), or MJCF text (which starts with "<").
 
     Raises:
@@ -19,26 +24,71 @@ def load(source: mujoco.MjModel | mujoco.MjSpec | str | Path) -> mujoco.MjModel:
     """
     if isinstance(source, mujoco.MjModel):
         return source
+    if is_compiled(source) and Path(source).is_file():
+        return _checked(lambda: mujoco.MjModel.from_binary_path(str(source)), repr(str(source)))
+    read, name = _specification(source)
+    return _checked(lambda: linear_textures.compiled(read()), name)
+
+
+def specification(source: mujoco.MjSpec | str | Path) -> mujoco.MjSpec:
+    """Return a copy of an MjSpec, or the specification in a file (MJCF or URDF) or in MJCF text, which can be compiled
+    again.
+
+    Raises:
+        ValueError: the source does not give a specification; one line names it.
+    """
+    read, name = _specification(source)
+    return _reported(read, name).copy()
+
+
+def is_compiled(source: Source) -> bool:
+    """Return whether a source is a compiled model, which has no specification."""
+    return isinstance(source, mujoco.MjModel) or (isinstance(source, str | Path) and Path(source).suffix == ".mjb")
+
+
+def with_compiled_color_spaces(source: Source) -> Source:
+    """Return a source of the same model, in which the colour textures that the compiler resolves to linear light
+    request it. A source without such textures is returned unchanged.
+
+    Raises:
+        ValueError: the source has such textures but is a compiled model, or it does not give a model.
+    """
+    model = load(source)
+    if not (resolved := linear_textures.resolved(model)):
+        return source
+    if is_compiled(source):
+        names = ", ".join(repr(model.tex(k).name) for k in resolved)
+        raise ValueError(f"textures {names} of a compiled model cannot request linear light: must be MJCF or an MjSpec")
+    return linear_textures.request(specification(source), resolved)
+
+
+def _specification(source: mujoco.MjSpec | str | Path) -> tuple[Callable[[], mujoco.MjSpec], str]:
+    """Return a function that reads a specification, and the source's name in messages."""
     if isinstance(source, mujoco.MjSpec):
-        return _compiled(source.compile, f"MjSpec {source.modelname!r}")
+        return lambda: source, f"MjSpec {source.modelname!r}"
     if isinstance(source, str) and source.lstrip().startswith("<"):
         require_modest(source, "this MJCF text")
-        return _compiled(lambda: mujoco.MjModel.from_xml_string(source), "this MJCF text")
+        return lambda: mujoco.MjSpec.from_string(source), "this MJCF text"
     if not isinstance(source, str | Path):
         raise ValueError(
             f"mirror: model is a {type(source).__name__}: must be an MjModel, an MjSpec, a path or MJCF text"
         )
     if not Path(source).is_file():
         raise ValueError(f"mirror: no file {str(source)!r}; give the path of an MJCF, URDF or MJB file")
-    if Path(source).suffix == ".mjb":
-        return _compiled(lambda: mujoco.MjModel.from_binary_path(str(source)), repr(str(source)))
     require_modest_file(Path(source), repr(str(source)))
-    return _compiled(lambda: mujoco.MjModel.from_xml_path(str(source)), repr(str(source)))
+    return lambda: mujoco.MjSpec.from_file(str(source)), repr(str(source))
 
 
-def _compiled(compile_it: Callable[[], mujoco.MjModel], name: str) -> mujoco.MjModel:
+def _checked(compile_it: Callable[[], mujoco.MjModel], name: str) -> mujoco.MjModel:
+    model = _reported(compile_it, name)
+    require_finite(model, name)
+    return model
+
+
+def _reported(make: Callable[[], Made], name: str) -> Made:
+    """Return what `make` returns, and report MuJoCo's errors in one line."""
     try:
-        model = compile_it()
+        return make()
     except (ValueError, mujoco.FatalError) as error:
         reason = " ".join(str(error).split()).removeprefix("Error: ").removeprefix("XML Error: ")
         missing = re.search(r"opening file '([^']*)'|resource not found|file not found", reason, re.IGNORECASE)
@@ -48,5 +98,3 @@ def _compiled(compile_it: Callable[[], mujoco.MjModel], name: str) -> mujoco.MjM
             else "correct what MuJoCo names"
         )
         raise ValueError(f"mirror: {name} does not compile: {reason}; {fix}") from error
-    require_finite(model, name)
-    return model

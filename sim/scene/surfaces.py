@@ -1,7 +1,7 @@
 """Colours and textures of geoms.
 
-MuJoCo's colours are display-referred. They are linearised here, and Jakob and Hanika's (2019) method assigns a spectrum
-to each RGB reflectance.
+MuJoCo's colours and textures are display-referred. They are linearised here, except for textures of linear light (see
+`linear_textures`). Jakob and Hanika's (2019) method assigns a spectrum to each RGB reflectance.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ import numpy as np
 
 from sim.scene import cube
 from sim.scene.color import decode_srgb
+from sim.scene.linear_textures import is_linear
 from sim.scene.variant import Description
 
 # MuJoCo's marker for a geom whose rgba is not set, so that its material's rgba applies.
@@ -94,9 +95,7 @@ def image(model: mujoco.MjModel, texture: int) -> np.ndarray:
 def linear(model: mujoco.MjModel, texture: int, color: np.ndarray) -> np.ndarray:
     """Return a texture's image times a display-referred colour (3,), in linear light, (height, width, 3)."""
     pixels = image(model, texture)
-    if model.tex_colorspace[texture] == mujoco.mjtColorSpace.mjCOLORSPACE_LINEAR:
-        return pixels * decode_srgb(color)
-    return decode_srgb(pixels * color)
+    return pixels * decode_srgb(color) if is_linear(model, texture) else decode_srgb(pixels * color)
 
 
 def reflectance_texture(model: mujoco.MjModel, geom: int, to_uv: np.ndarray | None = None) -> Description:

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 import mujoco
@@ -199,15 +198,10 @@ def _place(model: mujoco.MjModel, thing: str, name: str, variation: Variation | 
 
 def _specification(given: Any) -> mujoco.MjSpec:
     """Return a specification that can be compiled again."""
-    if isinstance(given, mujoco.MjSpec):
-        return given.copy()
-    if isinstance(given, str) and given.lstrip().startswith("<"):
-        return mujoco.MjSpec.from_string(given)
-    if isinstance(given, str | Path) and Path(given).suffix != ".mjb":
-        source.load(given)  # reports errors of the source
-        return mujoco.MjSpec.from_file(str(given))
-    kind = f"a {type(given).__name__}" if isinstance(given, mujoco.MjModel) else "a compiled file"
-    raise ValueError(f"vary: sizes: model is {kind}: must be MJCF or an MjSpec, which can be compiled again")
+    if source.is_compiled(given):
+        kind = "a MjModel" if isinstance(given, mujoco.MjModel) else "a compiled file"
+        raise ValueError(f"vary: sizes: model is {kind}: must be MJCF or an MjSpec, which can be compiled again")
+    return source.specification(given)
 
 
 def _fields_of(model: mujoco.MjModel) -> list[str]:

@@ -2,7 +2,7 @@
 
 fitness: test_fitness.py
 training_envs: test_fitness.py, test_task_module.py, test_animals_in_turn.py
-task_module: test_task_module.py, test_animals_in_turn.py
+task_module: test_task_module.py, test_textures_of_runs.py, test_animals_in_turn.py
 task_trial: test_task_module.py
 ppo: test_ppo.py, test_learning.py, search/test_successive_halving.py
 policy: test_policy.py
@@ -16,5 +16,5 @@ adam: test_adam.py
 tensor_file: test_policy.py, store/test_regular_files.py
 checkpoint: search/test_successive_halving.py
 training_rung: search/test_successive_halving.py
-animal_task: test_task_module.py, test_fitness.py
+animal_task: test_task_module.py, test_fitness.py, test_textures_of_runs.py
 """

@@ -1,7 +1,7 @@
-"""Tests of mirrors: which test covers which module. Helpers: oracle (MuJoCo's rays), drawn (its renderer), models, lit.
+"""Tests of mirrors: which test covers which module. Helpers: oracle, drawn (MuJoCo), models, lit, png.
 
 mirror: test_mirror.py, test_mirror_light.py
-source: test_mirror_source.py
+source: test_mirror_source.py, test_texture_colors.py
 bombs: test_bombs.py
 inventory: test_mirror.py
 rays: test_mirror.py
@@ -12,7 +12,8 @@ shapes: test_mirror.py, test_textures.py
 merged_parts: test_mirror.py
 tessellation: test_mirror.py, test_cube_textures.py
 cube: test_cube_textures.py
-surfaces: test_textures.py, test_mirror_light.py
+surfaces: test_textures.py, test_mirror_light.py, test_texture_colors.py
+linear_textures: test_texture_colors.py
 bsdfs: test_bsdfs.py
 coincident: test_coincident.py
 lights: test_lights.py, test_mirror_light.py

@@ -1,0 +1,28 @@
+"""Previews of views in linear sRGB, (y, x, 3), which plain viewers of EXR files show."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from optics.spectra.spectrum import LIMITS_NM, daylight
+from sim.scene.color import preview
+
+
+def preview_of_spectra(radiance: np.ndarray | None, reflectance: np.ndarray | None, nm: np.ndarray) -> np.ndarray:
+    """Return an image of the radiance, or else of the reflectance in daylight, (band, y, x) at wavelengths [nm]."""
+    if radiance is not None:
+        return preview(radiance, nm)
+    assert reflectance is not None
+    return preview(reflectance * daylight(np.clip(nm, *LIMITS_NM) * 1e-9)[:, None, None], nm)
+
+
+def preview_of_receptors(receptors: np.ndarray, peaks_nm: Sequence[float] | np.ndarray | None) -> np.ndarray:
+    """Return an image (y, x, 3) that shows the receptors of the longest waves as red, the next as green, then blue.
+
+    A single channel is shown as grey.
+    """
+    count = len(receptors)
+    order = np.arange(count) if peaks_nm is None else np.argsort(-np.asarray(peaks_nm, float), kind="stable")
+    return np.moveaxis(np.asarray(receptors)[order[np.minimum(range(3), count - 1)]], 0, -1)

@@ -1,0 +1,81 @@
+"""Textures whose values are linear light.
+
+MuJoCo displays the values of all textures alike, so they are display colours (IEC 61966-2-1), as its other colours are.
+A texture contains linear light only if its source requests it by `colorspace="linear"`. The compiler resolves "auto" to
+linear for image files without a colour chunk, so a compiled model does not show whether linear light was requested.
+`compiled` therefore marks requests in the model, in a tuple whose name ends with "linear_textures". A user who compiles
+a model can add such a tuple to its MJCF:
+
+    <custom><tuple name="linear_textures"><element objtype="texture" objname="NAME"/></tuple></custom>
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import mujoco
+import numpy as np
+
+MARK = "linear_textures"
+_LINEAR = mujoco.mjtColorSpace.mjCOLORSPACE_LINEAR
+_ROLES = (int(mujoco.mjtTextureRole.mjTEXROLE_RGB), int(mujoco.mjtTextureRole.mjTEXROLE_RGBA))
+
+
+def compiled(spec: mujoco.MjSpec) -> mujoco.MjModel:
+    """Return the model of a specification, in which textures with `colorspace="linear"` are marked."""
+    model = spec.compile()
+    requested = [k for k, texture in enumerate(spec.textures) if texture.colorspace == _LINEAR]
+    unmarked = [k for k in requested if not is_linear(model, k)]
+    if not unmarked:
+        return model
+    marked = spec.copy()
+    for k, texture in enumerate(marked.textures):
+        texture.name = texture.name or f"texture_{k}"
+    marked.add_tuple(
+        name=f"requested_{MARK}",
+        objtype=[mujoco.mjtObj.mjOBJ_TEXTURE] * len(unmarked),
+        objname=[marked.textures[k].name for k in unmarked],
+        objprm=[0.0] * len(unmarked),
+    )
+    return marked.compile()
+
+
+def is_linear(model: mujoco.MjModel, texture: int) -> bool:
+    """Return whether a texture contains linear light: it is marked, or it is a 2-D texture that the model says to be
+    linear and that has no file, so that the compiler cannot have resolved "auto".
+
+    Raises:
+        ValueError: a mark lists an object that is not a texture.
+    """
+    if texture in _marked(model):
+        return True
+    is_flat = model.tex_type[texture] == mujoco.mjtTexture.mjTEXTURE_2D
+    return bool(is_flat and model.tex_pathadr[texture] < 0 and model.tex_colorspace[texture] == _LINEAR)
+
+
+def resolved(model: mujoco.MjModel) -> list[int]:
+    """Return the colour textures that the model says to be linear, although their values are display colours."""
+    sky = np.flatnonzero(model.tex_type == mujoco.mjtTexture.mjTEXTURE_SKYBOX)
+    colors = {*sky.tolist(), *model.mat_texid[:, _ROLES].ravel().tolist()} - {-1}
+    return [k for k in sorted(colors) if model.tex_colorspace[k] == _LINEAR and not is_linear(model, k)]
+
+
+def request(spec: mujoco.MjSpec, textures: Iterable[int]) -> mujoco.MjSpec:
+    """Return a copy of a specification that requests linear light for these textures."""
+    found = spec.copy()
+    for k in textures:
+        found.textures[k].colorspace = _LINEAR
+    return found
+
+
+def _marked(model: mujoco.MjModel) -> set[int]:
+    """Return the textures that are marked as linear."""
+    found = set[int]()
+    for k in range(model.ntuple):
+        if not (name := model.tuple(k).name).endswith(MARK):
+            continue
+        entries = slice(model.tuple_adr[k], model.tuple_adr[k] + model.tuple_size[k])
+        if (model.tuple_objtype[entries] != mujoco.mjtObj.mjOBJ_TEXTURE).any():
+            raise ValueError(f"tuple {name!r} lists an object that is not a texture: must list textures only")
+        found |= set(model.tuple_objid[entries].tolist())
+    return found
