@@ -2,12 +2,14 @@
 
 1   without a number in the file. The task "navigation" means a maze, and `learning.rays_per_eye` limits the rays in
     training.
-2   the current format. "navigation" means a course, "maze" the maze, and `learning.rays_per_receptor` limits the rays.
+2   "navigation" means a course, "maze" the maze, and `learning.rays_per_receptor` limits the rays. Pupils are
+    rotated by 180° from the axes of the OSA. They still are if the run continues (`eye.pupil_turned`).
+3   the current format. Pupils have the axes of the OSA.
 
-Runs of both formats may lack `learning.least_epochs`; the number of passes per update is then constant. They may lack
-`search.active`; CMA-ES then also learns from the worse candidates.
+Runs of formats 1 and 2 may lack `learning.least_epochs`; the number of passes per update is then constant. They may
+lack `search.active`; CMA-ES then also learns from the worse candidates.
 
-A run of a former format can be opened, replayed and reported with its original meaning. Its training runs cannot be
+A run of a former format can be opened, replayed and reported with its original meaning. Runs of format 1 cannot be
 continued, because light is computed differently.
 """
 
@@ -18,9 +20,10 @@ from typing import Any
 
 from evolve.config.checks import ConfigError
 
-__all__ = ["FORMAT", "LAST_OF_FORMER", "format_of", "task_then", "upgraded"]
+__all__ = ["FORMAT", "LAST_OF_FORMER", "OLDEST_CONTINUED", "format_of", "in_own_axes", "task_then", "upgraded"]
 
-FORMAT = 2
+FORMAT = 3
+OLDEST_CONTINUED = 2
 LAST_OF_FORMER = "f4d9978"  # last commit that can continue runs of format 1
 
 Tree = dict[str, Any]
@@ -50,7 +53,15 @@ def upgraded(tree: Mapping[str, Any]) -> Tree:
         now["search"] = {"active": True, **search}
     if number == 1 and "task" in now:
         now["task"] = task_then(now["task"])
-    return now
+    return in_own_axes(now, number)
+
+
+def in_own_axes(tree: Mapping[str, Any], number: int) -> Tree:
+    """Return settings with pupils in the axes of this format: those of formats 1 and 2 are rotated by 180°."""
+    eye = tree.get("eye", {})
+    if number > 2 or not isinstance(eye, dict):
+        return dict(tree)
+    return {**tree, "eye": {"pupil_turned": True, **eye}}
 
 
 def _learning_then(learning: Tree, number: int) -> Tree:

@@ -14,14 +14,15 @@ from evolve.store.directory import Run
 
 __all__ = ["starts_from"]
 
-LENGTHS = ("sensor_width", "receptor_pitch", "relief_height")  # settings that are the units of optical genes
+# Settings that are the units and the axes of optical genes.
+AXES = ("sensor_width", "receptor_pitch", "relief_height", "pupil_turned")
 
 
 def starts_from(text: str) -> Source:
     """Return the genes of the animal RUN:ID as start values; RUN alone stands for the run's best animal.
 
-    RUN is a run directory. If the animal has optics, the settings that are the units of its genes are returned as well,
-    because with other units the same genes would describe another lens.
+    RUN is a run directory. If the animal has optics, the settings that are the units and the axes of its genes are
+    returned as well, because with others the same genes would describe another lens.
 
     Raises:
         RunError: the run or the candidate does not exist, or no candidate has succeeded.
@@ -34,7 +35,7 @@ def starts_from(text: str) -> Source:
     genome = {name: {"start": _exact(name, value)} for name, value in values.items() if not math.isnan(value)}
     tree: dict[str, Any] = {"genome": genome, "eye": {}}
     if candidate.phenotype.relief is not None:
-        tree["eye"] |= {name: getattr(run.config.eye, name) for name in LENGTHS}
+        tree["eye"] |= {name: getattr(run.config.eye, name) for name in AXES}
     if candidate.phenotype.rhabdom_diameter_um is not None:
         tree["eye"] |= {name: getattr(run.config.eye, name) for name in ("rhabdoms", *RHABDOMS)}
     if candidate.phenotype.lambda_max_nm is not None:
