@@ -123,7 +123,7 @@ class Recorder:
     ) -> dict[str, Any]:
         """Return the same scenes in the same light behind a perfect lens, as signals of the same receptors and as
         radiance on a finer grid."""
-        perfect = replace(self.phenotype.eyes(self.config.eye), optics=None, waveguide=None)
+        perfect = replace(self.phenotype.eyes(self.config.eye), optics=None, waveguide=None, pupil_turned=False)
         height, width = perfect.resolution
         factor = max(1, -(-FINE_PIXELS // max(height, width)))
         fine = replace(perfect, resolution=(factor * height, factor * width))
