@@ -205,6 +205,7 @@ FIELDS = {
     "eye.rays_per_receptor": Case("eye.rays_per_receptor=3", views),
     "eye.relief_points": Case("eye.relief_points=5", history, ("genome.doe.open=true",)),
     "eye.relief_symmetric": Case("eye.relief_symmetric=true", history, ("genome.doe.open=true",)),
+    "eye.pupil_turned": Case("eye.pupil_turned=true", point_image, ("genome.doe_01.start=0.9",)),
     "eye.square": Case("eye.square=true", history, ("eye.square=false", *PERFECT)),
     "eye.receptor_pitch": Case("eye.receptor_pitch=40e-6", point_image, ()),
     "eye.rhabdoms": Case("eye.rhabdoms=true", point_image, FOCUSED),

@@ -79,7 +79,8 @@ def load_episode(path: Path | str) -> Episode:
     try:
         arrays = _arrays(path)
         rest = parsed(str(arrays.pop("rest")))
-        rest |= {"phenotype": Phenotype.from_json(rest["phenotype"]), "eye": EyeConfig(**rest["eye"])}
+        eye = EyeConfig(**{"pupil_turned": True, **rest["eye"]})  # files without this setting are older than it
+        rest |= {"phenotype": Phenotype.from_json(rest["phenotype"]), "eye": eye}
         if (form := rest.pop("form", 1)) not in (1, FORM):
             raise ValueError(f"its form is {form!r}: must be at most {FORM}")
         terms = rest.pop("terms")

@@ -125,7 +125,7 @@ class Recorder:
         These are the signals of the same receptors, and the radiance on a finer grid, in the same scenes and the same
         light.
         """
-        perfect = replace(self.phenotype.eyes(self.config.eye), optics=None, waveguide=None)
+        perfect = replace(self.phenotype.eyes(self.config.eye), optics=None, waveguide=None, pupil_turned=False)
         height, width = perfect.resolution
         factor = max(1, -(-FINE_PIXELS // max(height, width)))
         fine = replace(perfect, resolution=(factor * height, factor * width))

@@ -65,7 +65,7 @@ def seen_and_perfect(animal: Phenotype, config: RunConfig) -> tuple[Floats, Floa
         fidelity = replace(PreparedTask(task).fidelity, rays_per_receptor=RAYS)
     else:
         fidelity = sim.Fidelity(RAYS, eyes.bands, light=light)
-    perfect = animal_task(animal, config, eyes=replace(eyes, optics=None, waveguide=None))
+    perfect = animal_task(animal, config, eyes=replace(eyes, optics=None, waveguide=None, pupil_turned=False))
     with closing(Simulation(task, SCENES, 0)) as worlds:
         worlds.reset()
         poses = worlds.poses()

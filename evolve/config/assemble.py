@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from evolve.config.checks import check_gene_value, check_value, suggestion
-from evolve.config.formats import FORMAT, format_of, upgraded
+from evolve.config.formats import FORMAT, OLDEST_CONTINUED, format_of, in_own_axes, upgraded
 from evolve.config.provenance import Source
 from evolve.config.relief_starts import no_such_gene, with_relief
 from evolve.config.run_config import SECTIONS, TASKS, ConfigError, EyeConfig, RunConfig
@@ -116,18 +116,20 @@ def _read_back(written: Source) -> RunConfig:
 def _asked_for(source: Source, code: TaskCode | None) -> Source:
     """Return the settings of a user's file, which may be the config.toml of another run.
 
-    The file must have the current format. It cannot select a user task, because only the command line may name code
-    that is executed.
+    The file must have a format whose settings have the same meaning today. It cannot select a user task, because only
+    the command line may name code that is executed.
     """
     if names_code(source.tree.get("task")) and code is None:
         raise ConfigError(
             f"{source.name}: task = {source.tree['task']!r}: a file cannot name code; use evolve run FILE.py:CLASS",
             "task",
         )
-    if "format" in source.tree and format_of(source.tree) != FORMAT:
-        raise ConfigError(f"{source.name}: format = {source.tree['format']}: must be {FORMAT}", "format")
+    number = format_of(source.tree) if "format" in source.tree else FORMAT
+    if number < OLDEST_CONTINUED:
+        raise ConfigError(f"{source.name}: format = {number}: must be {OLDEST_CONTINUED} to {FORMAT}", "format")
     known = ("format", "task", "task_sha256") if code else ("format",)
-    return replace(source, tree={key: value for key, value in source.tree.items() if key not in known})
+    tree = {key: value for key, value in source.tree.items() if key not in known}
+    return replace(source, tree=in_own_axes(tree, number))
 
 
 def to_toml(config: RunConfig) -> str:

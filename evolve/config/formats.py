@@ -2,15 +2,17 @@
 
 1   Files of this format do not state a format number. The task "navigation" is a maze, and `learning.rays_per_eye`
     limits the number of rays in training.
-2   This is the current format. The task "navigation" is a course, the task "maze" is a maze, and
-    `learning.rays_per_receptor` limits the number of rays in training.
+2   The task "navigation" is a course, the task "maze" is a maze, and `learning.rays_per_receptor` limits the number of
+    rays in training. Pupils are rotated by 180° from the axes of the OSA. They remain so if the run is continued
+    (`eye.pupil_turned`).
+3   This is the current format. Pupils have the axes of the OSA.
 
-In files of both formats, some settings may be missing. Without `learning.least_epochs`, the number of passes per update
-is constant. Without `search.active`, CMA-ES also learns from the worse candidates. Without `world.encoded_textures`,
-the textures of user tasks are as MuJoCo's compiler resolves them.
+In files of formats 1 and 2, some settings may be missing. Without `learning.least_epochs`, the number of passes per
+update is constant. Without `search.active`, CMA-ES also learns from the worse candidates. Without
+`world.encoded_textures`, the textures of user tasks are as MuJoCo's compiler resolves them.
 
-A run of a former format can be opened, replayed and reported; its settings keep their original meaning. Its training
-runs cannot be continued, because light is computed differently.
+A run of a former format can be opened, replayed and reported; its settings keep their original meaning. Runs of format
+1 cannot be continued, because light is computed differently.
 """
 
 from __future__ import annotations
@@ -21,9 +23,10 @@ from typing import Any
 from evolve.config.checks import ConfigError
 from evolve.config.task_code import names_code
 
-__all__ = ["FORMAT", "LAST_OF_FORMER", "format_of", "task_then", "upgraded"]
+__all__ = ["FORMAT", "LAST_OF_FORMER", "OLDEST_CONTINUED", "format_of", "in_own_axes", "task_then", "upgraded"]
 
-FORMAT = 2
+FORMAT = 3
+OLDEST_CONTINUED = 2
 LAST_OF_FORMER = "f4d9978"  # last commit that can continue runs of format 1
 
 Tree = dict[str, Any]
@@ -55,7 +58,15 @@ def upgraded(tree: Mapping[str, Any]) -> Tree:
         now["world"] = {"encoded_textures": False, **world}
     if number == 1 and "task" in now:
         now["task"] = task_then(now["task"])
-    return now
+    return in_own_axes(now, number)
+
+
+def in_own_axes(tree: Mapping[str, Any], number: int) -> Tree:
+    """Return settings with pupils in the axes of this format: those of formats 1 and 2 are rotated by 180°."""
+    eye = tree.get("eye", {})
+    if number > 2 or not isinstance(eye, dict):
+        return dict(tree)
+    return {**tree, "eye": {"pupil_turned": True, **eye}}
 
 
 def _learning_then(learning: Tree, number: int) -> Tree:

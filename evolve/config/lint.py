@@ -117,8 +117,8 @@ def idle_settings(config: RunConfig) -> list[str]:
     if search.active and search.optimizer != "CMA":
         notes.append(f"search.active has no effect: search.optimizer = {search.optimizer}")
     if not eye.optics:
-        reliefs = ("relief_height", "relief_points", "relief_symmetric")
-        given = [name for name in reliefs if getattr(eye, name) != getattr(EyeConfig, name)]
+        of_pupils = ("relief_height", "relief_points", "relief_symmetric", "pupil_turned")
+        given = [name for name in of_pupils if getattr(eye, name) != getattr(EyeConfig, name)]
         notes += [f"eye.{name} has no effect: eye.optics = false" for name in given]
     return notes
 

@@ -47,6 +47,9 @@ class EyeConfig:
     relief_symmetric: bool = setting(
         False, None, "reliefs are invariant under reflection and rotation by 90 degrees, with an eighth of the genes"
     )
+    pupil_turned: bool = setting(
+        False, None, "pupils are rotated by 180 degrees about their axes, as in runs of formats 1 and 2"
+    )
     rays_per_receptor: float | str = setting(
         AUTO,
         Interval(0, 4096, open_low=True),

@@ -110,18 +110,20 @@ class Phenotype:
         import optics
         import sim
 
+        pupil = self.pupil(eye)
         return sim.Eyes(
             n_eyes=self.n_eyes,
             resolution=self.resolution,
             fov_deg=self.fov_deg,
             placement_range_deg=self.placement_range_deg,
-            optics=self.pupil(eye),
+            optics=pupil,
             sensor_width=retina_width(self.resolution[1], eye),
             noise_sigma=eye.noise_sigma,
             photon_budget=optics.PhotonBudget(eye.illuminance, eye.integration_time) if eye.illuminance else None,
             bands=eye.bands,
             receptors=eye.receptors if self.lambda_max_nm is None else self.lambda_max_nm,
             waveguide=self.waveguide(eye),
+            pupil_turned=eye.pupil_turned and pupil is not None,
         )
 
     def to_json(self) -> dict[str, Any]:

@@ -162,10 +162,11 @@ def _acuity(run: Run) -> Html:
 def _relief(run: Run, genes: list[Gene]) -> Html:
     paths = {g.name: trajectory(run.candidates, lambda p, name=g.name: gene_values(p)[name]) for g in genes}  # type: ignore[misc]
     left_out = "Frozen genes" + (", and genes that mirror others," if run.config.eye.relief_symmetric else "")
+    turned = ", before the pupil is rotated by 180°" if run.config.eye.pupil_turned else ""
     caption = html(
-        "<b>{} … {}</b>: the {}, with each panel where its gene lies over the pupil (x to the right, y up). {} are "
-        "left out.",
-        *(genes[0].name, genes[-1].name, hint("relief"), left_out),
+        "<b>{} … {}</b>: the {}, with each panel where its gene lies over the pupil (from in front of the eye: x to "
+        "the right, y up{}). {} are left out.",
+        *(genes[0].name, genes[-1].name, hint("relief"), turned, left_out),
     )
     return html('<div class="wide">{}</div>\n', figure(relief_figure(paths), caption))
 

@@ -45,7 +45,7 @@ def resuming(run: Run, note: Callable[[str], Any] = _ignore) -> Iterator[bool]:
             run.forget_trainings(candidate.id for candidate in run.candidates)
             yield False
             return
-        run.require_present_format()
+        run.require_present_light()
         try_task(run.config)
         for change in _changes(run):
             note(change)

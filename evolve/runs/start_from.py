@@ -14,7 +14,8 @@ from evolve.store.directory import Run
 
 __all__ = ["starts_from"]
 
-LENGTHS = ("sensor_width", "receptor_pitch", "relief_height")  # lengths in units of which optical genes are given
+# Settings that are the units and the axes of optical genes.
+AXES = ("sensor_width", "receptor_pitch", "relief_height", "pupil_turned")
 
 
 def starts_from(text: str) -> Source:
@@ -36,7 +37,7 @@ def starts_from(text: str) -> Source:
     genome = {name: {"start": _exact(name, value)} for name, value in values.items() if not math.isnan(value)}
     tree: dict[str, Any] = {"genome": genome, "eye": {}}
     if candidate.phenotype.relief is not None:
-        tree["eye"] |= {name: getattr(run.config.eye, name) for name in LENGTHS}
+        tree["eye"] |= {name: getattr(run.config.eye, name) for name in AXES}
     if candidate.phenotype.rhabdom_diameter_um is not None:
         tree["eye"] |= {name: getattr(run.config.eye, name) for name in ("rhabdoms", *RHABDOMS)}
     if candidate.phenotype.lambda_max_nm is not None:

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Self
 
 from evolve.config.assemble import from_text, to_toml
-from evolve.config.formats import FORMAT, LAST_OF_FORMER, format_of
+from evolve.config.formats import FORMAT, LAST_OF_FORMER, OLDEST_CONTINUED, format_of
 from evolve.config.run_config import RunConfig
 from evolve.config.sources import parsed_toml
 from evolve.store.atomic_files import POLICIES, TRAININGS, UNFINISHED, sweep, write_whole
@@ -119,19 +119,17 @@ class Run:
                 raise RunError(f"{path} cannot be written: {error.strerror}") from error
         return cls.create(path, config, origin)
 
-    def require_present_format(self) -> None:
-        """Check that the run has the present format.
-
-        In runs of a former format, light was computed differently, so that they cannot be continued consistently.
+    def require_present_light(self) -> None:
+        """Check that the run has a format for which light is computed as in its earlier training.
 
         Raises:
-            RunError: the run has a former format; the message names the version that can continue it.
+            RunError: the format is older; the message names the version that can continue it.
         """
         number = format_of(parsed_toml(read(self.path / CONFIG), str(self.path / CONFIG)).tree)
-        if number != FORMAT:
+        if number < OLDEST_CONTINUED:
             raise RunError(
-                f"{self.path} has format {number}: must be {FORMAT} to be continued; rhabdom at commit "
-                f"{LAST_OF_FORMER} continues it, and status, report, replay and export read it here"
+                f"{self.path} has format {number}: must be {OLDEST_CONTINUED} to {FORMAT} to be continued; rhabdom at "
+                f"commit {LAST_OF_FORMER} continues it, and status, report, replay and export read it here"
             )
 
     def lock(self) -> RunLock:

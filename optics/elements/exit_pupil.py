@@ -10,13 +10,18 @@ import numpy as np
 from optics.elements.pupil import Pupil
 from optics.elements.wavefront import Zernike, mode
 from optics.numerics.arguments import complexes, is_sized, positive, shown, vacuum_wavelength, whole
+from optics.numerics.grid import sample_positions
 
 __all__ = ["ExitPupil", "read_exit_pupil"]
 
 MM, UM = 1e-3, 1e-6
 SECTORS, ROUND = 8, 0.9  # choice: each of 8 sectors must contain light out to 0.9 of the pupil's radius
+FULL = 0.8  # choice: the hull of the samples must fill this share of their circle. A hexagon fills 0.83, a square 0.64.
+NOT_ROUND = "the pupil is not round: only circles can be read"
 RAYS_PER_MODE = 3  # choice
 LIT = 1e-3  # choice: intensity from which on a sample counts as illuminated, relative to the brightest sample
+# Of samples that are partly covered by the rim, those with more than half of the amplitude have their centre inside.
+HALF = 0.5
 EVEN = 0.1  # choice: tolerance on amplitudes within ROUND of the radius, relative to their median
 # Choice: a central disk of 0.4 of the radius must contain at least 0.25 of the rays that an even distribution would
 # have there. Rays in concentric rings pass this test with any number of rings.
@@ -127,23 +132,50 @@ def _of_samples(system: Any, wavelength: float) -> tuple[np.ndarray, np.ndarray,
         raise ValueError(f"data has shape {data.shape}: must be a plane of finite complex numbers")
     if not np.isclose(own * UM, wavelength, rtol=1e-6):
         raise ValueError(f"wavelength = {wavelength:g} m: the object's is {own:g} µm")
-    lit = np.abs(data) > np.sqrt(LIT) * np.abs(data).max()
-    if not lit.any():
+    amplitude = np.abs(data)
+    illuminated = amplitude > np.sqrt(LIT) * amplitude.max()
+    if not illuminated.any():
         raise ValueError("data is dark everywhere: must hold the pupil's light")
-    y, x = ((np.arange(n) - n // 2) * pitch for n in data.shape)
+    y, x = (sample_positions(n, pitch) for n in data.shape)
+    lit = amplitude > HALF * np.median(amplitude[illuminated])
+    _check_even(amplitude, x, y, lit)
     rows, columns = np.nonzero(lit)
-    _check_even(np.abs(data), x, y, (rows, columns))
-    return x[columns], y[rows], -_unwrapped(data, lit)[lit] * wavelength / (2 * np.pi)
+    return x[columns], y[rows], -_unwrapped(data, illuminated)[lit] * wavelength / (2 * np.pi)
 
 
-def _check_even(amplitude: np.ndarray, x: np.ndarray, y: np.ndarray, lit: tuple[np.ndarray, np.ndarray]) -> None:
+def _check_even(amplitude: np.ndarray, x: np.ndarray, y: np.ndarray, lit: np.ndarray) -> None:
     """Raise a ValueError unless the circle around the illuminated samples is open and evenly illuminated everywhere."""
-    (top, bottom), (left, right) = ((at[n].min(), at[n].max()) for at, n in zip((y, x), lit, strict=True))
-    off = np.hypot(y[:, None] - (top + bottom) / 2, x[None, :] - (left + right) / 2)
-    within = amplitude[off < ROUND * max(bottom - top, right - left) / 2]
+    rows, columns = np.nonzero(lit)
+    (middle_x, middle_y), radius = _circle(x[columns], y[rows])
+    within = amplitude[np.hypot(y[:, None] - middle_y, x[None, :] - middle_x) < ROUND * radius]
     middle = np.median(within) if within.size else 0.0
     if within.size and np.abs(within - middle).max() > EVEN * middle:
         raise ValueError("data: the pupil is obscured, not round, or unevenly lit: only open circles can be read")
+
+
+def _circle(x: np.ndarray, y: np.ndarray) -> tuple[tuple[float, float], float]:
+    """Return the centre and the radius of the circle around the points.
+
+    The circle is fitted to all corners of their convex hull, because on a grid with an even number of samples a single
+    sample can lie on the rim (least squares; Kåsa, IEEE Trans. Instrum. Meas. 25, 8, 1976).
+
+    Raises:
+        ValueError: the hull is no disk.
+    """
+    from scipy.spatial import ConvexHull, QhullError
+
+    scale = float(max(np.ptp(x), np.ptp(y))) or 1.0
+    try:
+        hull = ConvexHull(np.stack([x, y], axis=1) / scale)
+    except (QhullError, ValueError):
+        raise ValueError(NOT_ROUND) from None
+    corners = hull.points[hull.vertices]
+    matrix = np.concatenate([2 * corners, np.ones((len(corners), 1))], axis=1)
+    middle = np.linalg.lstsq(matrix, np.sum(corners**2, axis=1), rcond=None)[0][:2]
+    radius = float(np.linalg.norm(corners - middle, axis=1).max())
+    if hull.volume < FULL * np.pi * radius**2:  # Qhull's name for the area of a plane hull
+        raise ValueError(NOT_ROUND)
+    return (float(middle[0]) * scale, float(middle[1]) * scale), radius * scale
 
 
 def _unwrapped(data: np.ndarray, lit: np.ndarray) -> np.ndarray:
@@ -158,13 +190,13 @@ def _fitted(x: np.ndarray, y: np.ndarray, ahead: np.ndarray, distance: float, me
     modes = [(n, m) for n in range(order + 1) for m in range(-n, n + 1, 2)]
     if len(x) < RAYS_PER_MODE * len(modes):
         raise ValueError(f"{len(x)} samples of the wavefront: must be {RAYS_PER_MODE * len(modes)} or more")
-    x, y = x - (x.max() + x.min()) / 2, y - (y.max() + y.min()) / 2
+    (middle_x, middle_y), radius = _circle(x, y)
+    x, y = x - middle_x, y - middle_y
     r = np.hypot(x, y)
     sector = ((np.arctan2(y, x) / (2 * np.pi) % 1) * SECTORS).astype(int) % SECTORS
     farthest = np.array([r[sector == each].max(initial=0.0) for each in range(SECTORS)])
-    if farthest.min() < ROUND * farthest.max():
-        raise ValueError("the pupil is not round: only circles can be read")
-    radius = float(farthest.max())
+    if farthest.min() < ROUND * radius:
+        raise ValueError(NOT_ROUND)
     if np.mean(r < CENTRE * radius) < FILLED * CENTRE**2:
         raise ValueError("the pupil is obscured: only open circles can be read")
     basis = np.stack([mode(n, m, x / radius, y / radius) for n, m in modes], axis=1)

@@ -32,7 +32,10 @@ LIGHT_FROM = ("cells", "centres")  # positions within scene cells from which lig
 class Eye(EyeSpec):
     """An eye: a pupil, a retina of receptors, and noise.
 
-    Arrays are in the orientation of the visual field: row 0 is at the top, column 0 on the left.
+    Pupil and retina have the axes of the OSA and of ANSI Z80.28, as seen by an observer in front of the eye: x to the
+    right, which is the owner's left, and y up. The image is inverted. Rows that ascend with y and columns that ascend
+    with x are therefore in the order of the visual field: row 0 sees the top, column 0 the left. All arrays have this
+    order.
 
     pupil: a Pupil. None is a perfect lens without blur and with a throughput of 1.
     resolution: number of receptors (height, width). Receptors are square; their pitch is sensor_width / width.
@@ -54,6 +57,7 @@ class Eye(EyeSpec):
         of `Microvilli`, repeated over the retina from its top left corner. Azimuths are measured in the visual field,
         from right towards up, in the plane perpendicular to the ray through the pupil's centre. Microvilli affect only
         polarised scenes (None: receptors are insensitive to polarisation).
+    pupil_turned: True if the pupil is rotated by 180° about the axis. The axes of `psf` are then those of the pupil.
     tolerance: relative L2 error of the PSF. It is also the error, relative to the signal of white, that each automatic
         choice may cause in a receptor's signal.
     dtype: "float32" or "float64", the type of PSF, kernel and signals.
@@ -81,7 +85,7 @@ class Eye(EyeSpec):
         return white_share(plain(self.kernel(1)), self.spectral_bands)
 
     def psf(self, z: Scalar = math.inf) -> PSFResult:
-        """Return the PSF on the retina for a point at the distance z [m] along the axis, in the sensor's orientation.
+        """Return the PSF on the retina for a point at the distance z [m] along the axis.
 
         The point lies in the viewing direction of the patch, and the PSF covers the window of `kernel`. The PSF of the
         perfect lens is one sample with all power.
@@ -99,7 +103,7 @@ class Eye(EyeSpec):
     ) -> np.ndarray | Array:
         """Return the receptive kernel (band, ky, kx) in the orientation of the visual field, with odd ky and kx.
 
-        It is the PSF, integrated over square cells of side pitch / samples_per_receptor, and rotated by 180°.
+        It is the PSF, integrated over square cells of side pitch / samples_per_receptor.
 
         z: distance of the scene along the axis [m].
         direction_deg: direction (right, up) of the light from the axis (None: the patch's eccentricity). The centre
@@ -127,13 +131,15 @@ class Eye(EyeSpec):
         return to_user(receptor_kernel(self, retina, z, tangents(asked), self.waveguide is not None))
 
     def _retina(self, samples_per_receptor: int) -> Retina:
+        return self._retina_for(self.spectral_bands.wavelengths, samples_per_receptor)
+
+    def _retina_for(self, wavelengths: np.ndarray, samples_per_receptor: int) -> Retina:
         cell = self.receptor_pitch / samples_per_receptor
-        return Retina(self.retina_distance, self.spectral_bands.wavelengths, cell, self.tolerance, self.dtype)
+        return Retina(self.retina_distance, wavelengths, cell, self.tolerance, self.dtype, self.pupil_turned)
 
     def chosen_bands(self) -> SpectralBands:
         """Return the fewest bands that keep a receptor's predicted error within the tolerance."""
-        large = self.receptor_pitch / CELLS_FOR_BANDS
-        retina = Retina(self.retina_distance, np.empty(0), large, self.tolerance, self.dtype)
+        retina = self._retina_for(np.empty(0), CELLS_FOR_BANDS)
         return bands_for(self, retina, tangents(self.eccentricity_deg))
 
     def sight(

@@ -13,7 +13,7 @@ from optics.eye.geometry import behind_pupil, check_pupil, direction, etendue, f
 from optics.eye.guided_field import check_guide
 from optics.eye.photoreceptor import throughput
 from optics.eye.polarization import check_rays, microvilli_of
-from optics.numerics.arguments import in_range, of_kind, positive, shape_2d
+from optics.numerics.arguments import flag, in_range, of_kind, positive, shape_2d
 from optics.numerics.autodiff import Scalar, number
 from optics.ommatidia.waveguide import Waveguide
 from optics.spectra.bands import SpectralBands
@@ -48,6 +48,7 @@ class EyeSpec:
     eccentricity_deg: tuple[float, float] = (0.0, 0.0)
     waveguide: Waveguide | None = None
     microvilli: Any = None
+    pupil_turned: bool = False
     spectral_bands: SpectralBands = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -60,6 +61,8 @@ class EyeSpec:
         if self.dtype not in ("float32", "float64"):
             raise ValueError(f"dtype = {self.dtype!r}: must be 'float32' or 'float64'")
         check_pupil(self.pupil, self.sensor_width, self.full_aperture)
+        if flag("pupil_turned", self.pupil_turned) and self.pupil is None:
+            raise ValueError("pupil_turned = True and pupil = None: must be False, or a Pupil that can be turned")
         check_guide(self.waveguide, self.pupil, self.receptor_pitch)
         object.__setattr__(self, "microvilli", microvilli_of(self.microvilli))
         if self.microvilli is not None:

@@ -3,7 +3,8 @@
 Let E(v) be the share of a point source's light on the pupil that a waveguide accepts and absorbs, if the source is
 imaged at the position v [m] relative to the waveguide. If the pitch of the retina is p, the receptor's kernel is
 E(v)/p², integrated over cells. For comparison, the signal of a square that absorbs all light is the mean over its area.
-The waveguide stands where the ray through the pupil's centre hits the retina, and points at that centre.
+The waveguide stands where the ray through the pupil's centre hits the retina, and points at that centre. The kernel of
+a source at the position u, for a receptor at r, has the argument r - u = -v, so that it is E rotated by 180°.
 """
 
 from __future__ import annotations
@@ -76,13 +77,16 @@ def guided_kernel(pupil: Pupil, retina: Retina, z: Scalar, direction: tuple[floa
         ValueError: the waveguide has no guided mode at one of the wavelengths, or an argument carries a derivative.
         AccuracyError: E needs too many samples.
     """
-    beams = beams_to(pupil, retina, z, (-direction[0], -direction[1]))
+    beams = beams_to(pupil, retina, z, retina.across_pupil(direction))
     spot = spot_of(beams, retina)
     bands = [_within(beam, spot, need.pitch, retina, guide) for beam, need in zip(beams, spot.needs, strict=True)]
     side = max(band.shape[0] for band in bands)
     wide = [np.pad(band, (side - band.shape[0]) // 2) for band in bands]
+    # On the axis of a symmetric pupil, E is symmetric, too.
+    even = direction == (0.0, 0.0) and all(pupil.mirror_symmetric(beam.wavelength) for beam in beams)
+    found = np.stack(wide) if retina.pupil_turned or even else np.stack(wide)[:, ::-1, ::-1]
     scale = (guide.focal / (retina.cell * guide.cells)) ** 2
-    return precision(retina.dtype).Tensor(np.maximum(np.stack(wide) * scale, 0))
+    return precision(retina.dtype).Tensor(np.maximum(found * scale, 0))
 
 
 def _within(beam: Beam, spot: Spot, pitch: float, retina: Retina, guide: Guide) -> np.ndarray:

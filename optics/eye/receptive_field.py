@@ -34,13 +34,27 @@ MOST_SECONDS = 3.0  # choice: time limit for the PSF of a band [s]
 
 @dataclass(frozen=True)
 class Retina:
-    """Properties of the retina that define the PSF: distance [m], wavelengths [m], cell size [m], tolerance, dtype."""
+    """Properties of the retina that define the PSF: distance [m], wavelengths [m], cell size [m], tolerance, dtype.
+
+    pupil_turned: True if the pupil is rotated by 180° about the axis.
+    """
 
     distance: Scalar
     wavelengths: np.ndarray
     cell: float
     tolerance: float
     dtype: str = "float32"
+    pupil_turned: bool = False
+
+    def across_pupil(self, direction: tuple[float, float]) -> tuple[float, float]:
+        """Return the tangents (x, y), in the pupil's axes, of the direction in which the light of a source travels.
+
+        Light from the right travels to the left of the eye's owner, which is +x. Light from below travels up, to +y.
+
+        direction: tangents (right, down) of the source's direction in the visual field.
+        """
+        right, down = direction
+        return (-right, -down) if self.pupil_turned else (right, down)
 
 
 @dataclass(frozen=True)
@@ -91,19 +105,19 @@ class Spot:
 def visual_kernel(
     pupil: Pupil, retina: Retina, z: Scalar, direction: tuple[float, float] = (0.0, 0.0), from_cell: bool = False
 ) -> Array:
-    """Return the PSF, integrated over the retina's cells and rotated by 180°: Dr.Jit (band, k, k), k odd.
+    """Return the PSF, integrated over the retina's cells: Dr.Jit (band, k, k), k odd.
 
-    The cells lie around the geometric image.
+    The cells lie around the geometric image. Their rows ascend with y and their columns with x. The image on the retina
+    is inverted, so that this is also the order of the visual field, from top to bottom and from left to right.
 
-    direction: tangents (right, down) of the source's direction in the visual field. The image lies on the opposite side
-        of the axis.
+    direction: tangents (right, down) of the source's direction in the visual field.
     from_cell: True if light comes from all over a cell of the scene, False if it comes from the cell's centre.
     """
     import drjit as dr
 
     if is_differentiable(retina.distance) and direction != (0.0, 0.0):
         raise ValueError("fov_deg is a Dr.Jit array: must be a number off the axis, as it also turns the light")
-    beams = beams_to(pupil, retina, z, (-direction[0], -direction[1]))
+    beams = beams_to(pupil, retina, z, retina.across_pupil(direction))
     spot = spot_of(beams, retina)
     # Each wavelength has its own samples, since longer wavelengths need fewer.
     requests = [
@@ -114,9 +128,12 @@ def visual_kernel(
     kernels = []
     for request, picture in zip(requests, pictures(requests, alike=True), strict=True):
         window = request.problem.window
-        across = types.Tensor(cell_integrals(window.shape[0], window.dx, tiles)[::-1].copy())
-        image = types.Tensor(picture.image, window.shape)
-        kernels.append(matmul(across, matmul(image, across, transposed=True)).array)
+        # Samples and cells both run backwards. A symmetric pupil thus has the same sums, in the same order, as a turned
+        # one, whose samples run forwards.
+        backwards = types.Tensor(cell_integrals(window.shape[0], window.dx, tiles)[::-1].copy())
+        samples = picture.image if retina.pupil_turned else dr.reverse(picture.image)
+        image = types.Tensor(samples, window.shape)
+        kernels.append(matmul(backwards, matmul(image, backwards, transposed=True)).array)
     flat = kernels[0] if len(kernels) == 1 else dr.concat(kernels)
     return dr.maximum(types.Tensor(flat, (len(kernels), tiles.count, tiles.count)), 0)
 
@@ -129,7 +146,7 @@ def retinal_psf(pupil: Pupil, retina: Retina, z: Scalar, direction: tuple[float,
     Raises:
         AccuracyError: no method reaches the tolerance within the limits on memory and time.
     """
-    beams = beams_to(pupil, retina, z, (-direction[0], -direction[1]))
+    beams = beams_to(pupil, retina, z, retina.across_pupil(direction))
     return _spread(beams, spot_of(beams, retina), retina)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
@@ -53,7 +54,7 @@ def bands_for(eye: EyeSpec, retina: Retina, direction: tuple[float, float]) -> S
     guided = eye.waveguide is not None
 
     def kernels(wavelengths: np.ndarray) -> np.ndarray:
-        on = Retina(retina.distance, wavelengths, retina.cell, retina.tolerance, retina.dtype)
+        on = replace(retina, wavelengths=wavelengths)
         return plain(receptor_kernel(eye, on, math.inf, direction, guided))
 
     if guided:

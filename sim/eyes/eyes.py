@@ -47,6 +47,7 @@ class Eyes:
         The resulting shot noise is added to the noise of `noise_sigma`. None: unlimited light, without shot noise.
     waveguide: an optics.Waveguide: receptors are rhabdoms, which receive light in waveguide modes; this requires
         `optics`. None: each receptor receives all light that falls on its square.
+    pupil_turned: True if the pupils are rotated by 180° about their axes
 
     Raises:
         ValueError: a value is outside its range, or the receptors are unknown; the message suggests the nearest name.
@@ -63,6 +64,7 @@ class Eyes:
     receptors: Any = "rgb"
     photon_budget: PhotonBudget | None = None
     waveguide: Waveguide | None = None
+    pupil_turned: bool = False
 
     def __post_init__(self) -> None:
         def check(name: str, valid: Callable[[Any], bool], range_: str) -> None:
@@ -97,6 +99,11 @@ class Eyes:
             raise ValueError(
                 f"Eyes: photon_budget = {shown(self.photon_budget)}: must be an optics.PhotonBudget or None"
             )
+        check("pupil_turned", lambda turned: isinstance(turned, bool | np.bool_), "True or False")
+        if self.pupil_turned and self.optics is None:
+            raise ValueError(
+                "Eyes: pupil_turned = True and optics = None: must be False, or a Pupil that can be turned"
+            )
         if self.waveguide is not None:
             self._check_waveguide()
 
@@ -114,6 +121,7 @@ class Eyes:
             receptors=self.receptors,
             photon_budget=self.photon_budget,
             waveguide=self.waveguide,
+            pupil_turned=self.pupil_turned,
         )
 
     def _check_waveguide(self) -> None:

@@ -30,8 +30,8 @@ from sim.tracing.walls import ALIGNED, NoClosedForm
 RANK_TOLERANCE = 1e-6
 # Chosen: largest deviation of a grey reflectance from its mean over the bands. Mitsuba's greys are not quite flat.
 GREY = 1e-4
-# Distance at which shadow rays and bounce rays start, compared with Mitsuba's. Closed forms have smaller rounding
-# errors than meshes. Mitsuba's distance, 3 mm in a maze, would shift the shadow of a body next to a wall by as much.
+# Distance at which shadow rays and bounce rays start, compared with Mitsuba's. The latter, 3 mm in a maze, would shift
+# the shadow of a body next to a wall by as much. Closed forms have smaller rounding errors than meshes.
 CLEARANCE = 1 / 16
 Irradiance = Callable[[Array, Array], list[Array]]  # function (point, normal) of a surface: irradiance per component
 ROW = 12  # floats per face: affine functions of (x, y, z) for the texel's column and row, then the texture's place
@@ -167,8 +167,7 @@ class ClosedForm:
         hit = self._hit(seen.ray, centres, tables)
         light = self._irradiance(hit, bodies, tables)
         if self.light == lighting.BOUNCE:
-            sample = mi.Point2f(samples.x, samples.y)
-            bounce_ray = lighting.spawn_bounce_ray(hit.point, hit.normal, sample, CLEARANCE)
+            bounce_ray = lighting.spawn_bounce_ray(hit.point, hit.normal, samples.xy, CLEARANCE)
             second_hit = self._hit(bounce_ray, bodies, tables)
             second = zip(second_hit.reflectance, self._irradiance(second_hit, bodies, tables), strict=True)
             light = [dr.select(hit.is_lit, dr.fma(r, e, first), 0) for first, (r, e) in zip(light, second, strict=True)]
@@ -198,10 +197,9 @@ class ClosedForm:
         point = ray(dr.select(seen | on_sphere, t, 0))
         offset, columns, rows, x, y = self._face_texel(face, point, tables)
         if centres:
-            sphere_normal, uv = spheres.normal_and_uv(self._bodies, centres, which, point)
-            normal = dr.select(on_sphere, sphere_normal, normal)
-            # Rounding may place the hit point of a distant sphere inside it, where the sphere would shade itself.
-            point = dr.select(on_sphere, spheres.surface_point(self._bodies, centres, which, sphere_normal), point)
+            round_, uv = spheres.normal_and_uv(self._bodies, centres, which, point)
+            normal = dr.select(on_sphere, round_, normal)
+            point = dr.select(on_sphere, spheres.surface_point(self._bodies, centres, which, round_), point)
             found = self._sphere_texel(which, uv)
             offset, columns, rows, x, y = (
                 dr.select(on_sphere, mine, other)

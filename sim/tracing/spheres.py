@@ -125,7 +125,8 @@ def normal_and_uv(spheres: Spheres, centres: list[Array], which: Array, point: A
 
 
 def surface_point(spheres: Spheres, centres: list[Array], which: Array, normal: Array) -> Array:
-    """Return the point of sphere `which` at which the surface has this normal."""
+    """Return the point of sphere `which` at which the surface has this normal. (Rounding may place the hit point of a
+    distant sphere inside it, where the sphere would shade itself.)"""
     point = mi.Point3f(0)
     for k, centre in enumerate(centres):
         point = dr.select(which == k, centre + normal * float(spheres.radii[k]), point)

@@ -98,6 +98,7 @@ EYES = {
         "eccentricity_deg": (0.0, 0.0),
         "microvilli": None,
         "photon_budget": None,
+        "pupil_turned": False,
     },
     "Microvilli": {"azimuth_deg": 0.0, "dichroic_ratio": 10.0},
     "Waveguide": {"diameter": 2e-6, "n_core": 1.363, "n_clad": 1.34, "length": None, "absorption": 6e3},

@@ -23,6 +23,7 @@ CALLS = {
         "receptors": "rgb",
         "photon_budget": None,
         "waveguide": None,
+        "pupil_turned": False,
     },
     "Fidelity": {"rays_per_receptor": 8, "bands": 4, "tolerance": None, "light": "direct", "samples": "rays"},
     "Mount": {

@@ -2,16 +2,16 @@
 
 band_choice: spectra/test_bands.py, test_sight_tolerance.py
 cell_integrals: test_cell_integrals.py
-eye: test_eye.py, test_eye_derivatives.py, test_eye_robustness.py
-eye_spec: test_eye.py, test_patches.py
+eye: test_eye.py, test_axes.py, test_eye_derivatives.py, test_eye_robustness.py
+eye_spec: test_eye.py, test_patches.py, test_axes.py
 geometry: test_patches.py
 kernel_bank: test_kernel_bank.py, test_sight_tolerance.py
 kernel_interpolation: test_kernel_interpolation.py, test_kernel_bank.py, test_sight_tolerance.py
 photoreceptor: test_photoreceptor.py
 polarization: test_polarization.py
 signals: test_eye.py, test_polarization.py
-receptive_field: test_receptive_field.py, test_scattered_light.py, test_eye.py, test_eye_robustness.py
-guided_field: test_guided_field.py
+receptive_field: test_receptive_field.py, test_scattered_light.py, test_axes.py, test_eye.py, test_eye_robustness.py
+guided_field: test_guided_field.py, test_axes.py
 receptor_kernel: test_guided_field.py, test_eye.py
 retinal_image: test_retinal_image.py
 summary: test_summary.py

@@ -62,14 +62,14 @@ def test_geometry():
 
 
 class TestOrientation:
-    """Visual-field coordinates: row 0 is up, column 0 left, and a kernel is the PSF turned by 180°."""
+    """Rows and columns of the retina ascend with y and x. This is the order of the visual field, from the top left."""
 
     @pytest.mark.parametrize("axis", [0, 1])
     def test_prism_shifts_the_scene_away_from_its_thick_side(self, axis):
-        """Light bent towards +x lands at +x; the retina's image is upside down, so the point appears at -x."""
+        """Light bent towards +x lands at +x, the owner's left, and appears on the right."""
         eye = Eye(Pupil(15e-6, prism(15e-6, 0.15, axis)), bands=1)
         shift = eye.sensor_distance * math.tan(math.asin(0.15)) / (eye.receptor_pitch / S)
-        expected = (-shift, 0) if axis == 0 else (0, -shift)
+        expected = (shift, 0) if axis == 0 else (0, shift)
         assert centroid(eye.kernel(S)[0]) == pytest.approx(expected, abs=0.5)
 
     def test_prism_makes_the_right_receptor_see_a_point(self):
@@ -79,9 +79,9 @@ class TestOrientation:
         seen = eye.see(scene, S)[0]
         column = (seen.sum(axis=0) @ np.arange(15)) / seen.sum()
         shift = eye.sensor_distance * math.tan(math.asin(0.15)) / eye.receptor_pitch
-        assert column == pytest.approx(40.5 / S - 0.5 - shift, abs=0.15)
+        assert column == pytest.approx(40.5 / S - 0.5 + shift, abs=0.15)
 
-    def test_kernel_is_the_psf_turned_by_180_degrees(self):
+    def test_kernel_has_the_order_of_the_psf(self):
         points = np.random.default_rng(3).random((4, 4)) * 20e-6
         eye = Eye(Pupil(20e-6, BSplineRelief(points)), bands=1)
         image = eye.psf().psf[0]
@@ -90,7 +90,7 @@ class TestOrientation:
         on_retina = image.sum(axis=1) @ x / image.sum(), image.sum(axis=0) @ x / image.sum()
         cell = eye.receptor_pitch / S
         assert np.hypot(*seen) > 0.5
-        assert seen == pytest.approx((-on_retina[0] / cell, -on_retina[1] / cell), abs=0.05)
+        assert seen == pytest.approx((on_retina[0] / cell, on_retina[1] / cell), abs=0.05)
 
 
 class TestKernel:
@@ -125,7 +125,7 @@ class TestKernel:
         diffraction."""
         pupil = Pupil(60e-6, BSplineRelief(np.random.default_rng(5).random((4, 4)) * 60e-6), n=1.6)
         eye = Eye(pupil, bands=1)
-        kernel = eye.kernel(2)[0][::-1, ::-1].astype(np.float64)
+        kernel = eye.kernel(2)[0].astype(np.float64)
         wavelength = float(eye.spectral_bands.wavelengths[0])
         from optics import PointSource
 
@@ -161,7 +161,7 @@ class TestKernel:
             shape=(n * m, n * m),
             tolerance=2e-3,
         )
-        summed = fine.psf[0].reshape(n, m, n, m).sum(axis=(1, 3))[::-1, ::-1] * (cell / m) ** 2
+        summed = fine.psf[0].reshape(n, m, n, m).sum(axis=(1, 3)) * (cell / m) ** 2
         assert np.linalg.norm(kernel - summed) < eye.tolerance * np.linalg.norm(summed)
 
     def test_near_objects_blur(self):

@@ -20,12 +20,12 @@ def eye_of(guide, pupil=LENS, receptors=9, bands=1, **others):
 
 
 def seen_by(ommatidium, eye, cells, side):
-    """Means over cells of an ommatidium's sensitivity, turned like a kernel: a cell belongs to points on the opposite
-    side (tangents)."""
+    """Means over cells of an ommatidium's sensitivity (tangents). A kernel belongs to points on the opposite side in
+    the order of the visual field, which is right and down. These have the same signs along x (left) and y (up)."""
     node, weight = np.polynomial.legendre.leggauss(4)
     at = (np.arange(side)[:, None] + 0.5 + node / 2 - side / 2).ravel() * PITCH / cells / FOCAL
     x, y = np.meshgrid(at, at)
-    taken = ommatidium.sensitivity(-np.arctan(x), -np.arctan(y), float(eye.spectral_bands.wavelengths[0]))
+    taken = ommatidium.sensitivity(np.arctan(x), np.arctan(y), float(eye.spectral_bands.wavelengths[0]))
     return np.einsum("yaxb,a,b->yx", taken.reshape(side, 4, side, 4), weight, weight) / 4 / cells**2
 
 
@@ -45,7 +45,7 @@ def test_an_eye_of_one_receptor_is_an_ommatidium(cells, diameter):
 
 @pytest.mark.slow
 def test_a_lopsided_pupil_turns_nothing_round():
-    """Kernels are receptive fields turned by 180°, also with coma and tilt in the wavefront."""
+    """Kernels have the orientation of receptive fields in the pupil's axes, also with coma and tilt."""
     bent = Pupil(
         12.5e-6,
         thin_lens_focal_length=1.34 * FOCAL,

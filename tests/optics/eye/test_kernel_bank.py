@@ -120,9 +120,9 @@ class TestField:
         cell = eye.receptor_pitch / 4 / eye.sensor_distance
         for degrees in (-15, 0, 15):
             tangent = math.tan(math.radians(degrees))
-            sine = 0.1 - math.sin(math.radians(degrees))  # towards +x; light from the right travels to -x
+            sine = 0.1 + math.sin(math.radians(degrees))  # towards +x; light from the right also travels to +x
             image = sine / math.sqrt(1 - sine**2)
-            assert shift((degrees, 0)) == pytest.approx(-(image + tangent) / cell, abs=1.0)
+            assert shift((degrees, 0)) == pytest.approx((image - tangent) / cell, abs=1.0)
 
     @pytest.mark.slow
     def test_error_falls_with_the_zones(self):

@@ -21,7 +21,7 @@ def test_cells_hold_the_light_that_the_direct_sum_sends_there(seed):
     for at in brightest[[0, 500, 5000]]:
         down, right = np.array(np.divmod(at, len(kernel))) - len(kernel) // 2
         dx = cell / parts
-        middle = -right * cell + dx / 2, -down * cell + dx / 2  # for an even number of samples, turned by 180°
+        middle = right * cell + dx / 2, down * cell + dx / 2  # for an even number of samples
         there = optics.psf(
             pupil,
             eye.spectral_bands.wavelengths,

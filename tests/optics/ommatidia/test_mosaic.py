@@ -45,8 +45,8 @@ def test_contrast_falls_as_a_gaussian_of_the_acceptance_angle():
 @pytest.mark.parametrize("place", [(0.024, 0.0), (-0.024, 0.0), (0.0, 0.02), (0.0, -0.02), (0.02, 0.02)])
 def test_a_lopsided_facet_looks_where_an_eye_of_it_does(place):
     """A prism and coma in front of a rhabdom: its signal for a small light equals that of the receptor of an `Eye` with
-    the same pupil and waveguide, whose scene is (right, down), up to tails of white outside the mosaic's window. On the
-    other side of the axis the signal is dark."""
+    the same pupil and waveguide, up to tails of white outside the mosaic's window. Cells of the scene ascend to the
+    right and down, the axes x and y to the left and up. On the other side of the axis the signal is dark."""
     bent = optics.Zernike({(1, 1): 0.12, (3, -1): 0.05})
     lens = Pupil(12.5e-6, thin_lens_focal_length=67e-6, medium_n=1.34, object_n=1.0, wavefront=bent)
     guide, focal, side = Waveguide(1.4e-6), 50e-6, 61
@@ -58,7 +58,7 @@ def test_a_lopsided_facet_looks_where_an_eye_of_it_does(place):
         return np.exp(-((np.tan(x) - place[0]) ** 2 + (np.tan(y) - place[1]) ** 2) / 0.01**2)
 
     at = np.arctan((np.arange(side) - side // 2) * 3e-6 / 9 / focal)
-    scenes = np.array([light(at[None, :], at[:, None]), np.ones((side, side))])
+    scenes = np.array([light(-at[None, :], -at[:, None]), np.ones((side, side))])
     seen, white = (float(eye.see(scene[None], 9)[0, 0, 0]) for scene in scenes)
     facet = AppositionEye(Ommatidium(lens, guide, eye.retina_distance), 0, 1.0)
     assert facet.see(light, wavelength)[0] == pytest.approx(seen / white, rel=0.03, abs=1e-3)

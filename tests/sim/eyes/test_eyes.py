@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import sim
-from optics import MaskMap, PhotonBudget, Pupil, Receptors, Waveguide
+from optics import MaskMap, PhotonBudget, Pupil, Receptors, Waveguide, Zernike
 from sim.eyes.eyes import BODY_RADIUS, camera_rotations, eye_positions, eye_rotations
 
 
@@ -88,6 +88,7 @@ CHANGES = {
     "receptors": ("lms", (2, 3, 4, 5)),
     "photon_budget": (PhotonBudget(illuminance=10.0), (2, 3, 4, 5)),
     "waveguide": (Waveguide(10e-6, 1.35), (2, 3, 4, 5)),
+    "pupil_turned": (True, (2, 3, 4, 5)),
 }
 
 
@@ -97,7 +98,7 @@ def test_every_field_moves_what_is_seen(field):
     matters behind a lens of fixed focal length.)
     """
     value, shape = CHANGES[field]
-    behind_a_lens = field in ("sensor_width", "waveguide")
+    behind_a_lens = field in ("sensor_width", "waveguide", "pupil_turned")
     before = _settled(behind_a_lens)
     after = _seen(sim.Eyes(**{**_given(behind_a_lens), field: value}))
     assert after.shape == shape
@@ -105,7 +106,8 @@ def test_every_field_moves_what_is_seen(field):
 
 
 def _given(behind_a_lens):
-    lens = {"optics": Pupil(50e-6, thin_lens_focal_length=240e-6)} if behind_a_lens else {}
+    coma = Zernike({(3, -1): 0.2})
+    lens = {"optics": Pupil(50e-6, thin_lens_focal_length=240e-6, wavefront=coma)} if behind_a_lens else {}
     return {"resolution": (4, 5), **lens}
 
 

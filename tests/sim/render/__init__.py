@@ -22,7 +22,7 @@ prepared_scene: test_batched_renderer.py, test_fidelity.py
 memory_budget: test_memory_budget.py, test_sample_choice.py
 receptor_noise: test_receptor_noise.py
 pending_frame: test_pending_frame.py, envs/test_eyes_of_kind.py
-model_renderer: test_model_renderer.py
+model_renderer: test_model_renderer.py, test_pupil_axes.py
 renderable: test_model_renderer.py, test_edge_rays.py
 model_fidelity: test_model_fidelity.py, test_model_light.py
 edge_rays: test_edge_rays.py

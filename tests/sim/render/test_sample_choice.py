@@ -56,7 +56,7 @@ def test_eyes_see_by_areas_where_rays_would_be_many(task, eyes, recwarn):
 
 
 def test_one_wide_area_does_where_it_cuts_spheres_finely_enough(monkeypatch):
-    """With the nine slices of narrow areas, the error would be larger."""
+    """The error would be larger with the nine slices of narrow areas."""
     world, eyes = (
         sim.build_world("detection"),
         sim.Eyes(n_eyes=4, resolution=(12, 12), fov_deg=45, placement_range_deg=120),
