@@ -1,24 +1,80 @@
-"""Short trial of a user task before a run starts. A failure in the task would affect every animal of the run."""
+"""Checks of a user task before a run starts: settings that would have no effect, and a short trial.
+
+A failure in the task would affect every animal of the run.
+"""
 
 from __future__ import annotations
 
 import warnings
+from collections.abc import Iterator, Sequence
 from contextlib import closing
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from evolve.config.checks import ConfigError
+from evolve.config.checks import AUTO, ConfigError
 from evolve.config.run_config import RunConfig
 from evolve.genome.genotype import Genotype
 from evolve.genome.phenotype import develop
 
 if TYPE_CHECKING:
     from sim.envs.vec_env import EyesVecEnv
+    from sim.tasks.task_settings import TaskSettings
 
-__all__ = ["try_task"]
+__all__ = ["UnusedSettingWarning", "check_settings", "try_task"]
 
 WORLDS, ACTIONS = 2, 4
+
+
+class UnusedSettingWarning(UserWarning):
+    """A user task defines a setting that has no effect on a run."""
+
+
+def check_settings(config: RunConfig) -> None:
+    """Refuse a user task with mounts that no animal would use, and warn about each other setting without effect.
+
+    The default `place` spreads an animal's eyes around a single mount. Recorded runs are not checked, so that they can
+    be continued and replayed with the eyes that they have.
+
+    Warns:
+        UnusedSettingWarning: the genome or the run determines a value that the task also defines.
+
+    Raises:
+        ConfigError: the task has several mounts and does not define `place`, or its module cannot be executed.
+    """
+    if (code := config.choice.named_code) is None:
+        return
+    from evolve.learning.task_module import executed_task  # loading takes seconds, and built-in tasks do not need it
+    from sim.eyes.mounts import Mount
+    from sim.tasks.task_settings import TaskSettings
+
+    task = executed_task(code)
+    if type(task).place is TaskSettings.place and isinstance(task.mounts, Sequence) and len(task.mounts) > 1:
+        on = ", ".join(f"{mount.on!r}" for mount in task.mounts if isinstance(mount, Mount))
+        raise ConfigError(
+            f"{config.task}: mounts has {len(task.mounts)} of sim.Mount (on {on}), but place spreads evolving eyes "
+            "around one: define mounts with one sim.Mount, or define place(n_eyes, placement_range_deg, "
+            "elevation_deg), which returns a sim.Mount for each eye",
+            "task",
+        )
+    for unused in _unused(task, config):
+        warnings.warn(f"{config.task}: {unused}", UnusedSettingWarning, stacklevel=2)
+
+
+def _unused(task: TaskSettings, config: RunConfig) -> Iterator[str]:
+    """Yield the settings of a task that have no effect on a run, each with the reason."""
+    from sim.render.fidelity import Fidelity
+    from sim.tasks.task_settings import TaskSettings
+
+    rays, bands, fidelity = config.eye.rays_per_receptor, config.eye.bands, task.fidelity
+    if task.eye is not TaskSettings.eye:
+        yield "eye has no effect: the genome and the section eye of the run's settings determine the eyes"
+    if task.auxiliary:
+        yield f"auxiliary = {task.auxiliary!r} has no effect: evolving eyes have no auxiliary entries"
+    if isinstance(fidelity, Fidelity) and rays != AUTO and fidelity != Fidelity(float(rays), bands):
+        yield f"fidelity has no effect: the run has eye.rays_per_receptor = {rays}"
+    elif isinstance(fidelity, Fidelity) and rays == AUTO and fidelity.bands != bands:
+        yield f"fidelity.bands = {fidelity.bands} has no effect: the run has eye.bands = {bands}"
 
 
 def try_task(config: RunConfig) -> None:

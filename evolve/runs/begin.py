@@ -10,7 +10,7 @@ from typing import TypeVar
 
 from evolve.config.assemble import assemble
 from evolve.config.run_config import RunConfig
-from evolve.learning.task_trial import try_task
+from evolve.learning.task_trial import check_settings, try_task
 from evolve.runs.start_from import starts_from
 from evolve.search.search import Search
 from evolve.store.directory import Run, next_directory
@@ -82,7 +82,8 @@ def prepare_run(request: RunRequest) -> PreparedRun:
     """Collect the settings of a run, and check that the run can start on this machine. Nothing is written.
 
     Raises:
-        ConfigError: a setting is invalid, the optimizer is unknown, or the user task fails; the message is one line.
+        ConfigError: a setting is invalid, the optimizer is unknown, or the user task fails or has several mounts
+            that no animal would use; the message is one line.
         RunError: the animal to start from does not exist.
         BackendError: Dr.Jit cannot find a usable LLVM library.
     """
@@ -90,6 +91,7 @@ def prepare_run(request: RunRequest) -> PreparedRun:
     config = assemble(request.task, request.preset, request.config, request.assignments, starts, request.scale)
     Search(config)  # raises an error for an unknown optimizer
     device.make_ready()
+    check_settings(config)
     try_task(config)
     origin = starts.name.removeprefix("--from ") if starts else None
     return PreparedRun(config, request.preset.removesuffix(f"-{config.task}"), origin)

@@ -57,7 +57,8 @@ class TaskSettings:
     name: name of the animal, if there are several; None: the name of the class
     failure_reward: reward of a step in which the world fails, as the term "failure". If rewards are negative costs, the
         default of 0 is better than any normal episode. In this case, set a value below the return of an episode.
-    mode: "training" or "evaluation", which is set when the environment is made; methods may use it
+    mode: "training" or "evaluation", which is set when the environment is made; methods may use it, a class must not
+        define it
     """
 
     model: mujoco.MjModel | mujoco.MjSpec | str | Path
@@ -92,7 +93,8 @@ class TaskSettings:
     def place(self, n_eyes: int, placement_range_deg: float, elevation_deg: float) -> Sequence[Mount]:
         """Return the mounts of the eyes of an evolving animal.
 
-        The default spreads the eyes in a fan around the first of `mounts`, see `sim.fan`.
+        The default spreads the eyes in a fan around the first of `mounts`, see `sim.fan`. A run with this default
+        needs a single mount.
         """
         assert not isinstance(self.mounts, Mapping)
         return fan(self.mounts[0], n_eyes, placement_range_deg, elevation_deg)
@@ -109,6 +111,8 @@ def compiled(task: TaskSettings, model: mujoco.MjModel | None = None) -> mujoco.
     name = type(task).__name__
     if not hasattr(task, "model"):
         raise ValueError(f"{name}: model: must be set, to an MjModel, a path or MJCF text")
+    if type(task).mode != TaskSettings.mode:
+        raise ValueError(f"{name}: mode = {type(task).mode!r}: must be left out, the environment sets it")
     kinds_of(task)
     finite(f"{name}: failure_reward", task.failure_reward)
     whole(f"{name}: substeps", task.substeps, 1, MOST_STEPS)
