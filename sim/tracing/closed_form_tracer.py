@@ -189,8 +189,9 @@ class ClosedForm:
         floor_first = on_floor & (t_floor < t)
         t = dr.select(floor_first, t_floor, t)
         seen = dr.isfinite(t)
-        # Rays without a hit use the floor's face, which also exists in worlds without walls.
-        face = dr.select(floor_first | ~seen, self._n_faces - 1, face)
+        face = dr.select(
+            floor_first | ~seen, self._n_faces - 1, face
+        )  # without a hit also the floor's, which always exists
         normal = dr.select(floor_first, mi.Normal3f(0, 0, 1), normal)
         t, which = spheres.nearest(self._bodies, centres, ray, t)
         on_sphere = which < len(centres)
@@ -200,11 +201,8 @@ class ClosedForm:
             round_, uv = spheres.normal_and_uv(self._bodies, centres, which, point)
             normal = dr.select(on_sphere, round_, normal)
             point = dr.select(on_sphere, spheres.surface_point(self._bodies, centres, which, round_), point)
-            found = self._sphere_texel(which, uv)
-            offset, columns, rows, x, y = (
-                dr.select(on_sphere, mine, other)
-                for mine, other in zip(found, (offset, columns, rows, x, y), strict=True)
-            )
+            found = zip(self._sphere_texel(which, uv), (offset, columns, rows, x, y), strict=True)
+            offset, columns, rows, x, y = (dr.select(on_sphere, mine, other) for mine, other in found)
         lit = (seen | on_sphere) & (t > 0) & (dr.dot(normal, ray.d) < 0)
         return _Hit(t, point, normal, lit, self._interpolate(offset, columns, rows, x, y, tables))
 

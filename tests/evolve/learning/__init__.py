@@ -3,8 +3,6 @@
 fitness: test_fitness.py
 training_envs: test_fitness.py, test_task_module.py, test_animals_in_turn.py
 task_module: test_task_module.py, test_textures_of_runs.py, test_animals_in_turn.py
-task_trial: test_task_module.py
-task_module: test_task_module.py, test_animals_in_turn.py
 task_trial: test_task_module.py, test_task_settings.py
 ppo: test_ppo.py, test_learning.py, search/test_successive_halving.py
 policy: test_policy.py
