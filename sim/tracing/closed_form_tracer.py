@@ -3,8 +3,8 @@
 A few walls are intersected one by one. If there are more, a ray walks through a grid in which each wall fills whole
 cells (Amanatides and Woo 1987). Reflectances are Mitsuba's (`sim.tracing.reflectance_atlas`). Components of light are
 usually bands. If all lights share one spectrum, and few spectra span the materials' spectra, there is one component per
-spanning spectrum. The spectrum of light that is reflected twice is a product of two materials' spectra. If such light
-is followed, all bands are traced, unless all materials are grey.
+spanning spectrum. The spectrum of light that is reflected twice is a product of two materials' spectra. If it is
+followed, all bands are traced, unless all materials are grey.
 """
 
 from __future__ import annotations
@@ -189,9 +189,8 @@ class ClosedForm:
         floor_first = on_floor & (t_floor < t)
         t = dr.select(floor_first, t_floor, t)
         seen = dr.isfinite(t)
-        face = dr.select(
-            floor_first | ~seen, self._n_faces - 1, face
-        )  # without a hit also the floor's, which always exists
+        # Rays without a hit use the floor's face, which also exists in worlds without walls.
+        face = dr.select(floor_first | ~seen, self._n_faces - 1, face)
         normal = dr.select(floor_first, mi.Normal3f(0, 0, 1), normal)
         t, which = spheres.nearest(self._bodies, centres, ray, t)
         on_sphere = which < len(centres)
