@@ -195,7 +195,7 @@ def test_unknown_samples_are_refused():
     ("change", "reason"),
     [
         (lambda g: (g.size.__setitem__(2, 0.7), g.pos.__setitem__(2, 0.7)), "walls of several heights"),
-        (lambda g: g.pos.__setitem__(0, g.pos[0] - 0.0131), "no grid"),
+        (lambda g: g.size.__setitem__(0, g.size[0] - 0.0131), "no grid"),
         (lambda g: setattr(g, "type", mujoco.mjtGeom.mjGEOM_ELLIPSOID), "neither a plane nor a box"),
     ],
 )
