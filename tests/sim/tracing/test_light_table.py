@@ -94,7 +94,9 @@ def nothing_on_spheres(monkeypatch):
     monkeypatch.setattr(
         light_table.LightTable,
         "on_body",
-        lambda self, body, four, *_: [dr.zeros(mi.Vector4f, dr.width(four)) for _ in range(self._components)],
+        lambda self, body, four, centre, tables: [
+            dr.zeros(mi.Vector4f, dr.width(four)) for _ in range(self._components)
+        ],
     )
 
 
