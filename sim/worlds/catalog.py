@@ -15,7 +15,7 @@ TASKS: Mapping[str, str] = MappingProxyType(
         "detection": "reach the goal sphere, avoid two adversaries that differ in stripe orientation only",
         "tracking": "detection with goal and adversaries that move",
         "maze": "get as far as possible through a maze of striped corridors",
-        "foraging": "reach the goal sphere, avoid an adversary that differs below 400 nm only",
+        "foraging": "reach the goal sphere, avoid two adversaries that differ below 400 nm only",
     }
 )
 

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from evolve.analysis.episode_failures import episode_failure_lines, episode_failures_of
+from evolve.config.task_code import names_code
 from evolve.runs.output import as_it_is
 from evolve.search.successive_halving import finished
 from evolve.store.candidate import Candidate
@@ -153,5 +154,6 @@ def standing_lines(now: dict[str, Any]) -> list[str]:
     for number, generation in told[-SHOWN:]:
         lines.append(f"generation {number}: best {generation['best']:.4g}, median {generation['median']:.4g}")
     if now["state"] == "interrupted":
-        lines.append(f"continue: evolve resume {now['directory']}")
+        task = f" --task {now['task']}" if names_code(now["task"]) else ""
+        lines.append(f"continue: evolve resume {now['directory']}{task}")
     return lines

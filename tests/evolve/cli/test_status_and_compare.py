@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from evolve.cli.commands.status import standing
+from evolve.cli.commands.status import standing, standing_lines
 from evolve.config.numbering import Place
 from evolve.genome.genotype import Genotype
 from evolve.genome.phenotype import develop
@@ -107,3 +107,10 @@ def test_status_of_many_generations_looks_at_each_candidate_once(finished, monke
     assert [g["evaluated"] for g in now["generations"]] == [4, 4, 4]
     assert now["state"] == "finished"
     assert looks == [0]
+
+
+@pytest.mark.parametrize(("task", "option"), [("detection", ""), ("car.py:Car", " --task car.py:Car")])
+def test_the_command_that_continues_a_run_names_a_user_task(finished, task, option):
+    """`evolve resume` executes the code of a user task only if the command names it."""
+    now = standing(Run.open(finished)) | {"state": "interrupted", "task": task}
+    assert standing_lines(now)[-1] == f"continue: evolve resume {finished}{option}"
