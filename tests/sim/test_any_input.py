@@ -12,7 +12,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import sim
-from sim.exr import ExrError
+from sim.exr.files import ExrError
 from sim.worlds.state import WorldState
 
 SLOW = [HealthCheck.too_slow, HealthCheck.function_scoped_fixture]

@@ -19,7 +19,7 @@ from evolve.report import tables
 from evolve.report.markup import document
 from evolve.store.candidate import Candidate
 from evolve.store.directory import Run
-from sim.exr import ExrError
+from sim.exr.files import ExrError
 from sim.scene.source import load
 from validation.evolve.hostile_runs import TEXTS, Stage
 

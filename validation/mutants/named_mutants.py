@@ -69,7 +69,7 @@ NAMED = (
         ("receptors with few photons are the noisiest", "self.photons.min()", "self.photons.max()"),
     ),
     *_mutants(
-        "sim/exr.py",
+        "sim/exr/files.py",
         ("missing parts", 'if attributes.get("parts") != str(expected):', "if False:"),
         (
             "an image is synced before it is renamed",

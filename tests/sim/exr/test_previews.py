@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from optics.spectra.bands import daylight
-from sim.exr import View, read_exr, write_exr
+from sim.exr.files import View, read_exr, write_exr
 from sim.scene.color import preview
 
 

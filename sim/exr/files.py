@@ -25,8 +25,8 @@ from typing import Any
 import numpy as np
 
 from optics.numerics.arguments import items, reals, shown
-from sim.exr_previews import preview_of_receptors, preview_of_spectra
-from sim.spectral_layout import PREVIEW, RADIANCE, REFLECTANCE, NoSpectra, channel, fields_of_views
+from sim.exr.previews import preview_of_receptors, preview_of_spectra
+from sim.exr.spectral_layout import PREVIEW, RADIANCE, REFLECTANCE, NoSpectra, channel, fields_of_views
 
 LAYOUT_VERSION = "1.0"
 UNITS = "W.m^-2.sr^-1"

@@ -1,0 +1,6 @@
+"""Spectral OpenEXR files of scenes and of signals.
+
+files            View, write_exr, read_exr: views in files that are written whole
+spectral_layout  channels of the spectral layout, also those of other programs
+previews         previews in linear sRGB
+"""
