@@ -4,35 +4,32 @@ The tables name each field of each config dataclass, and each gene, with a chang
 A field or gene that is missing here fails the test, so a new one needs an entry that shows its effect.
 """
 
-from collections import Counter
 from collections.abc import Callable
-from contextlib import ExitStack, closing
 from dataclasses import dataclass, fields, is_dataclass
 from functools import cache
 from pathlib import Path
-from tempfile import TemporaryDirectory
-from typing import ClassVar
-from unittest import mock
 
 import numpy as np
 import pytest
 
-import sim
 from evolve.config.assemble import assemble
 from evolve.config.run_config import SECTIONS, GeneConfig, RunConfig
 from evolve.genome.genes import ALL_GENES, LAMBDA_MAX, RHABDOM, SIDE, gene_table
 from evolve.genome.genotype import GENES, Genotype
 from evolve.genome.phenotype import develop
-from evolve.learning import fitness
-from evolve.learning.animal_task import animal_task
-from evolve.learning.training_envs import TrainingEnvs, worlds_of
-from evolve.runs import carry_on
-from evolve.search.loop import evolve as carry
-from evolve.store.directory import Run
 from optics.numerics import backend
-from sim.envs.prepared_task import PreparedTask
-from tests.closed_form import ClosedForm
-from tests.evolve.learning.bright_spot import BrightSpot
+from tests.parameter_outputs import (
+    budget_stages,
+    hired,
+    history,
+    life,
+    own_sight,
+    point_image,
+    rides,
+    sight,
+    throughput,
+    views,
+)
 
 # One training run of two updates and one evaluation episode, through a perfect lens.
 SMALL = (
@@ -62,115 +59,6 @@ FOUR_TYPES = ("eye.receptors=genes", "genome.receptor_types.start=4", *PERFECT)
 @pytest.fixture(scope="module", autouse=True)
 def _device(short_episodes):
     backend.require()
-
-
-# --- outputs, each a function of a config and the first animal
-
-
-class Pen(BrightSpot):
-    """A spot of light on a plane, observed without rendering. Moving incurs a cost through the term that contact has in
-    our worlds."""
-
-    failures: ClassVar = Counter()
-
-    def step_wait(self):
-        observation, reward, done, infos = super().step_wait()
-        cost = -0.1 * np.abs(self.action[:, 0])
-        for info, contact in zip(infos, cost, strict=True):
-            info["reward_terms"]["contact"] = contact
-        return observation, reward + cost, done, infos
-
-
-def pens(animal, config, *seeds):
-    """A replacement for `worlds_of`."""
-    episodes = config.evaluation.episodes
-    return TrainingEnvs(*(Pen(n, memory=animal.memory_frames) for n in (config.learning.n_envs, episodes, episodes)))
-
-
-def life(config, animal):
-    """Result of a candidate: its training, and the returns of its evaluation episodes. Learning is real, in worlds that
-    take milliseconds."""
-    with TemporaryDirectory() as folder, mock.patch.object(fitness, "worlds_of", pens):
-        outcome = fitness.evaluate(animal, config, 7, Path(folder) / "policy")
-    assert outcome.failure is None
-    return outcome.returns, outcome.steps, outcome.curve
-
-
-def views(config, animal):
-    """First observation of the animal in each of its training, selection and test environments."""
-    found = []
-    for each in vars(worlds_of(animal, config, 7, 8)).values():
-        with closing(each):
-            found.append(each.reset()["eyes"].tobytes())
-    return found
-
-
-def rides(config, animal):
-    """Rewards and ends of training episodes. The animals go straight on at full speed, mostly into a wall."""
-    lessons, *others = vars(worlds_of(animal, config, 7, 8)).values()
-    with ExitStack() as stack:
-        for each in (lessons, *others):
-            stack.enter_context(closing(each))
-        lessons.reset()
-        ahead = np.tile(np.float32([1, 0]), (lessons.num_envs, 1))
-        return [[part.tolist() for part in lessons.step(ahead)[1:3]] for _ in range(64)]
-
-
-def sight(config, animal):
-    """First observation of the animal in its world."""
-    eyes, memory = animal.eyes(config.eye), animal.memory_frames
-    worlds = sim.make_vec_env(config.task, eyes, 1, 7, memory=memory, rays_per_receptor=4)
-    try:
-        return worlds.reset()["eyes"].tobytes()
-    finally:
-        worlds.close()
-
-
-def own_sight(config, animal):
-    """First observation of the animal in a user task."""
-    worlds = PreparedTask(animal_task(animal, config)).vec_env(1, 7, animal.memory_frames)
-    try:
-        return worlds.reset()["eyes"].tobytes()
-    finally:
-        worlds.close()
-
-
-def point_image(config, animal):
-    """Image of a point on the retina, through pupil and relief."""
-    return animal.eyes(config.eye).eye().kernel(3).tobytes()
-
-
-def throughput(config, animal):
-    """Fraction of the light that the pupil transmits."""
-    return animal.eyes(config.eye).eye().throughput
-
-
-def history(config, animal):
-    """Candidates of the whole run with the seeds of their training, evaluated in closed form."""
-    with TemporaryDirectory() as folder:
-        run = Run.create(Path(folder) / "run", config)
-        carry(run, ClosedForm(), mock.Mock())
-        return [(candidate.genome, candidate.phenotype, candidate.seed) for candidate in run.candidates]
-
-
-def budget_stages(config, animal):
-    """Rungs after which candidates are evaluated, and the training steps of each."""
-    with TemporaryDirectory() as folder:
-        run = Run.create(Path(folder) / "run", config)
-        carry(run, ClosedForm(), mock.Mock())
-        return [(candidate.id, candidate.rung, candidate.steps) for candidate in run.in_order_of_finish]
-
-
-def hired(config, animal):
-    """Number of workers that a run starts."""
-    with TemporaryDirectory() as folder, mock.patch.object(carry_on, "LocalExecutor") as executor:
-        executor.side_effect = KeyboardInterrupt
-        with pytest.raises(KeyboardInterrupt):
-            carry_on.carry_on(Run.create(Path(folder) / "run", config), mock.Mock())
-        return executor.call_args.args[1]
-
-
-# --- changes and the outputs that they affect
 
 
 @dataclass(frozen=True)

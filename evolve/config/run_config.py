@@ -130,7 +130,7 @@ class RunConfig:
         self._check_settings((*OF_MAZES, *OF_COURSES))
 
     def _check_settings(self, keys: tuple[str, ...]) -> None:
-        """Check that those of these settings that the task does not have are at their default values."""
+        """Check that the task has these settings, or that they have their default values."""
         for key in keys:
             section, name = key.split(".")
             default = getattr(SECTIONS[section], name)

@@ -49,7 +49,7 @@ def preset_about(name: str) -> dict[str, Any]:
 
 
 def preset_sources(name: str | None, scale: str | None) -> list[Source]:
-    """Return the sources of a preset: its settings, then those of its scale, which override them; [] for None.
+    """Return the sources of a preset: its settings, then its scale, whose settings override them; [] for None.
 
     Raises:
         ConfigError: the preset or the scale is unknown.

@@ -54,7 +54,7 @@ def resuming(run: Run, note: Callable[[str], Any] = _ignore) -> Iterator[bool]:
 
 
 def _changes(run: Run) -> Iterator[str]:
-    """Yield notes on changed settings and on changed software, both of which may change the numbers of the run."""
+    """Yield notes on changed settings and changed software. Both may change the numbers of the run."""
     if altered(run.path):
         yield (
             f"config.toml has changed since the last start. Candidates from {len(run.candidates)} on are "

@@ -82,7 +82,7 @@ def _by_generations(run: Run, search: Search, executor: Executor, watcher: Watch
 
 
 def _steadily(run: Run, search: Search, executor: Executor, watcher: Watcher) -> None:
-    """Keep as many candidates in evaluation as a population has; replace each finished candidate by a new proposal."""
+    """Keep one population of candidates in evaluation, and replace each finished candidate by a new proposal."""
     under_way: dict[int, Proposal] = {}
 
     def refill() -> list[Proposal]:
@@ -131,7 +131,7 @@ def _write_down(run: Run, proposal: Proposal, job: Job, outcome: Evaluation, wat
 def _after(before: Candidate, candidate: Candidate) -> Candidate:
     """Return a candidate after a later rung, with seconds and episode failures summed over all its rungs.
 
-    If training failed in the later rung, steps and learning curve are those of the rung before.
+    If training failed in the later rung, steps and learning curve come from the rung before.
     """
     if candidate.failure is not None:
         candidate = replace(candidate, steps=before.steps, curve=before.curve)

@@ -1,4 +1,4 @@
-"""Checks that the files of trained policies are those of the record."""
+"""Checks that the files of trained policies match the record."""
 
 from __future__ import annotations
 

@@ -160,7 +160,7 @@ def _circle(x: np.ndarray, y: np.ndarray) -> tuple[tuple[float, float], float]:
     sample can lie on the rim (least squares; Kåsa, IEEE Trans. Instrum. Meas. 25, 8, 1976).
 
     Raises:
-        ValueError: the hull is no disk.
+        ValueError: the hull is not a disk.
     """
     from scipy.spatial import ConvexHull, QhullError
 

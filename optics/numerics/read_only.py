@@ -1,4 +1,4 @@
-"""Read-only arrays. Results share the arrays that they store with later results, so nobody may write into them.
+"""Read-only arrays. Results share the arrays that they store with later results, so these arrays must not change.
 
 Arrays that a function computes and does not store belong to the caller, who may write into them.
 """

@@ -7,10 +7,12 @@ point right above the surface, so that nothing can be in between.
 from __future__ import annotations
 
 from functools import cache
+from typing import Any
 
 import drjit as dr
 import mitsuba as mi
 
+from optics.numerics.autodiff import Array
 from sim.scene.variant import Description
 
 INNER = "light"  # name of the light with shadows among the parameters
@@ -32,30 +34,30 @@ def _register(variant: str) -> None:
     class Shadowless(mi.Emitter):
         """An emitter that delegates to another one, and moves the sampled point."""
 
-        def __init__(self, props):  # type: ignore[no-untyped-def]
+        def __init__(self, props: Any) -> None:
             super().__init__(props)
             self.light = props[INNER]
             self.m_flags = self.light.flags()
 
-        def sample_direction(self, it, sample, active=True):  # type: ignore[no-untyped-def]
+        def sample_direction(self, it: Array, sample: Array, active: Any = True) -> tuple[Array, Array]:
             found, weight = self.light.sample_direction(it, sample, active)
             step = _CLOSE * (1 + dr.max(dr.abs(it.p)))
             found.p = mi.Point3f(it.spawn_ray(found.d).o + found.d * step)
             return found, weight
 
-        def pdf_direction(self, it, ds, active=True):  # type: ignore[no-untyped-def]
+        def pdf_direction(self, it: Array, ds: Array, active: Any = True) -> Array:
             return self.light.pdf_direction(it, ds, active)
 
-        def eval_direction(self, it, ds, active=True):  # type: ignore[no-untyped-def]
+        def eval_direction(self, it: Array, ds: Array, active: Any = True) -> Array:
             return self.light.eval_direction(it, ds, active)
 
-        def eval(self, si, active=True):  # type: ignore[no-untyped-def]
+        def eval(self, si: Array, active: Any = True) -> Array:
             return self.light.eval(si, active)
 
-        def traverse(self, callback):  # type: ignore[no-untyped-def]
+        def traverse(self, callback: Any) -> None:
             callback.put(INNER, self.light, mi.ParamFlags.NonDifferentiable)
 
-        def bbox(self):  # type: ignore[no-untyped-def]
+        def bbox(self) -> Any:
             return self.light.bbox()
 
     mi.register_emitter("shadowless", Shadowless)

@@ -199,7 +199,7 @@ def _place(model: mujoco.MjModel, thing: str, name: str, variation: Variation | 
 def _specification(given: Any) -> mujoco.MjSpec:
     """Return a specification that can be compiled again."""
     if source.is_compiled(given):
-        kind = "a MjModel" if isinstance(given, mujoco.MjModel) else "a compiled file"
+        kind = "an MjModel" if isinstance(given, mujoco.MjModel) else "a compiled file"
         raise ValueError(f"vary: sizes: model is {kind}: must be MJCF or an MjSpec, which can be compiled again")
     return source.specification(given)
 

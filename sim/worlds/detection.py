@@ -25,7 +25,7 @@ def add_layout(spec: mujoco.MjSpec, rng: np.random.Generator) -> Layout:
     A goal has vertical stripes, which follow meridians. An adversary has horizontal stripes of about the same width,
     which follow parallels.
 
-    A goal's stripes are 12 sectors of 30° around the vertical axis, of which a viewer sees 6. The edges of an
+    A goal's stripes are 12 sectors of 30° around the vertical axis, and a viewer sees 6 of them. The edges of an
     adversary's stripes are placed such that light from above gives it the same brightness as a goal. A single receptor
     that sees the whole object therefore cannot distinguish a goal from an adversary by brightness.
     """

@@ -1,2 +1,1 @@
-"""Tests of sim: each folder covers the folder of the same name and lists which test covers which module.
-"""
+"""Tests of sim: each folder covers the folder of the same name and lists which test covers which module."""

@@ -153,7 +153,7 @@ def _watcher(run: Run, workers: int, arguments: Namespace) -> Bar | Events | Lin
 
 
 def _workers(scheduler: Scheduler | None) -> Callable[[RunConfig], AbstractContextManager[Workers]]:
-    """Return a function that starts the workers: those of Dask if there is a scheduler, else local processes."""
+    """Return a function that starts the workers: Dask's if there is a scheduler, else local processes."""
     return local_workers if scheduler is None else lambda config: DaskExecutor(scheduler)
 
 

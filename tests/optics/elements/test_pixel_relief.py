@@ -280,18 +280,6 @@ def test_a_stack_says_that_it_cannot():
         optics.propagate_through([pupil, optics.FreeSpace(1e-3)], wavelength=WAVELENGTH, out_dx=1e-6, out_shape=(9, 9))
 
 
-def test_a_message_takes_one_line_whatever_it_is_about():
-    """A value that would fill a page is named by its kind and shape."""
-    relief = PixelRelief(np.zeros((16, 16)))
-    for wrong, named in (
-        (relief, "aperture_radius = PixelRelief"),
-        (np.zeros((30, 30)), r"ndarray of shape \(30, 30\)"),
-    ):
-        with pytest.raises(ValueError, match=named) as caught:
-            Pupil(wrong)
-        assert "\n" not in str(caught.value)
-
-
 def test_a_flat_relief_is_known_to_be_flat_unless_it_may_change():
     """A flat relief is rotationally symmetric; one with derivatives is not, because its pixels may change."""
     assert PixelRelief(np.full((3, 3), 1e-7)).rotationally_symmetric

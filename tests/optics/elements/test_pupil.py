@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from optics import BSplineRelief, HeightMap, PointSource, Pupil, RefractiveIndex
+from optics import BSplineRelief, HeightMap, PixelRelief, PointSource, Pupil, RefractiveIndex
 from optics.apertures.aperture import EDGE_REACH
 from optics.numerics.grid import Grid
 from optics.numerics.precision import precision
@@ -116,3 +116,15 @@ def test_path_and_pupil_turn_together_most_at_the_rim():
     assert rim <= disk <= 1.1 * rim
     reach = (1 + EDGE_REACH) * radius
     assert soft == pytest.approx(1.33 * reach / math.hypot(reach, distance), rel=0.02)
+
+
+def test_a_message_takes_one_line_whatever_it_is_about():
+    """A value that would fill a page is named by its kind and shape."""
+    relief = PixelRelief(np.zeros((16, 16)))
+    for wrong, named in (
+        (relief, "aperture_radius = PixelRelief"),
+        (np.zeros((30, 30)), r"ndarray of shape \(30, 30\)"),
+    ):
+        with pytest.raises(ValueError, match=named) as caught:
+            Pupil(wrong)
+        assert "\n" not in str(caught.value)

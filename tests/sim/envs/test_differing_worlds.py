@@ -242,7 +242,7 @@ def test_renderers_take_what_datas_own_models_have():
         (
             {"thing.size": (1, 2)},
             mujoco.MjModel.from_xml_string(room()),
-            "vary: sizes: model is a MjModel: must be MJCF",
+            "vary: sizes: model is an MjModel: must be MJCF",
         ),
         (
             {"rail.start": ((0, 0, 0), (1, 1, 1))},

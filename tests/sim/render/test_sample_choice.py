@@ -14,6 +14,9 @@ from sim.render import eye_renderer
 from sim.render.fidelity import Level
 from sim.render.fidelity_choice import Allowed
 from sim.render.fidelity_stages import CAUTION
+from sim.render.populations import everywhere
+from sim.render.populations import near_objects as near_population
+from sim.render.random_views import on_objects
 from sim.render.sample_choice import (
     HARDLY_MORE,
     NUMBERS_OF_AREAS,
@@ -22,6 +25,7 @@ from sim.render.sample_choice import (
     _fewest,
     fewest_samples,
 )
+from sim.render.world_scene import WorldScene
 from sim.tracing.areas import sphere_areas
 from tests.sim.render.test_fidelity import DETECTION, behind_lens, near_objects, signals
 from tests.sim.tracing.area_views import ROW
@@ -252,3 +256,20 @@ def test_neighbouring_settings_cost_about_the_same(seed):
         assert error_of(fidelity) <= fidelity.tolerance
         costs.append(cost_of(fidelity))
     assert max(costs) <= 4 * min(costs)
+
+
+@pytest.mark.parametrize(("resolution", "fov"), [((48, 48), 90), ((16, 16), 150)])
+def test_trials_near_objects_use_receptors_that_see_them(resolution, fov):
+    """In wide eyes, five times as many pairs of views and receptors count as with receptors drawn evenly. All draws are
+    the same every time.
+    """
+    scene = WorldScene(sim.build_world("detection"), sim.Eyes(n_eyes=1, resolution=resolution, fov_deg=fov))
+    sampling = BoxSampling(scene.eye)
+    evenly, drawn, again = (
+        everywhere(scene, 96).receptors,
+        *(near_population(scene, sampling, 96, 4096) for _ in range(2)),
+    )
+    pairs = on_objects(drawn.views, *drawn.views.in_agents(scene.eyes, sampling.trial(1, evenly).directions), [0.5] * 3)
+    assert drawn.counted.sum() > 5 * pairs.sum()
+    np.testing.assert_array_equal(drawn.receptors, again.receptors)
+    np.testing.assert_array_equal(drawn.counted, again.counted)

@@ -21,7 +21,7 @@ shadowless: test_shadowless.py
 sky: test_sky.py
 spectra: test_spectra.py
 device_arrays: test_frozen_kernels.py
-color: test_color.py, test_exr.py
+color: test_color.py, exr/test_previews.py
 variation: test_variation.py
 world_models: envs/test_differing_worlds.py, envs/test_own_models.py
 model_settings: envs/test_own_models.py

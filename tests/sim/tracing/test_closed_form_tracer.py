@@ -13,11 +13,12 @@ import sim
 from sim.eyes.eyes import BODY_RADIUS
 from sim.eyes.sampling import BoxSampling
 from sim.render.fidelity_trials import FidelityTrials
+from sim.render.populations import near_objects
 from sim.render.world_scene import WorldScene
 from sim.scene.variant import variant
 from sim.tasks.registry import task_of
 from sim.tasks.simulation import Simulation
-from sim.tracing import closed_form_tracer
+from sim.tracing import closed_form_tracer, spheres
 from sim.tracing.closed_form_tracer import components_of, reflected_components_of
 from sim.tracing.reflectance_atlas import bake
 from sim.tracing.wall_intersection import Cells
@@ -251,3 +252,33 @@ def test_shadows_end_where_the_body_does():
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(closed_form_tracer, "CLEARANCE", 1)
         assert wrong() > 20
+
+
+def test_distant_spheres_do_not_shade_themselves(monkeypatch):
+    """Hit points on spheres 20 m away are rounded by more than the distance at which shadow rays start. Of 74,000 rays,
+    at most three are darker than with Mitsuba's distance, which is 16 times as long: those at the edges of shadows.
+    """
+    scene = WorldScene(build_world("detection"), dataclasses.replace(EYES, fov_deg=100), "closed_form")
+    trials = FidelityTrials(scene)
+    objects = near_objects(scene, BoxSampling(scene.eye), 96, 4096)
+    trial = BoxSampling(scene.eye).trial(32, objects.receptors)
+
+    def light():
+        return np.abs(trials._trace(objects.views, trial, "direct")[0][0].numpy())
+
+    def darker():
+        """Return the number of rays with less light than from Mitsuba's distance."""
+        close = light()
+        with monkeypatch.context() as patch:
+            patch.setattr(closed_form_tracer, "CLEARANCE", 1)
+            return int((close < light() - 0.02).sum())
+
+    assert darker() <= 3
+
+    def rounded(bodies, centres, which, normal):
+        """Return hit points as they are rounded: a tenth of a millimetre below the surface."""
+        return surface_point(bodies, centres, which, normal) - normal * 1e-4
+
+    surface_point = spheres.surface_point
+    monkeypatch.setattr(closed_form_tracer.spheres, "surface_point", rounded)
+    assert darker() > 20

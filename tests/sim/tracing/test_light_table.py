@@ -65,10 +65,10 @@ def cases():
     return found
 
 
-# Largest errors, relative to the noise: a quarter more than measured with these views. All light that is reflected
-# twice is 0.98, 0.77, 3.4 and 7.1 times the noise. The remaining error is the bodies' effect on this light, most of all
-# close to walls and in front of a bright floor.
-TOLERANCE = {"detection": 0.081, "foraging": 0.055, "navigation": 0.40, "stairs": 0.34}
+# Largest errors, relative to the noise: a quarter more than measured with these views, and a sixth in detection. All
+# light that is reflected twice is 0.98, 0.77, 3.4 and 7.1 times the noise. The remaining error is the bodies' effect on
+# this light, most of all close to walls and in front of a bright floor.
+TOLERANCE = {"detection": 0.081, "foraging": 0.047, "navigation": 0.135, "stairs": 0.28}
 
 
 @pytest.mark.parametrize("name", list(TOLERANCE))
@@ -81,6 +81,12 @@ def no_bodies(monkeypatch):
     monkeypatch.setattr(
         illumination.Illumination, "past_bodies", lambda self, patch, arriving, now, itself=-1: arriving
     )
+
+
+def hidden_from_the_wrong_side(monkeypatch):
+    """A mutant in which bodies hide the light that arrives on their near side."""
+    right = illumination.sum_of
+    monkeypatch.setattr(illumination, "sum_of", lambda fours, side: right(fours, -side))
 
 
 def no_floor_shadows(monkeypatch):
@@ -132,6 +138,7 @@ def other_side_of_the_cell(monkeypatch):
     ("mutant", "name"),
     [
         (no_bodies, "stairs"),
+        (hidden_from_the_wrong_side, "navigation"),
         (no_floor_shadows, "stairs"),
         (nothing_on_spheres, "detection"),
         (table_of_another_world, "detection"),
