@@ -230,7 +230,9 @@ def _one(plane: np.ndarray, how: TransformSampling, types: Precision) -> _Carrie
     if faded > MUCH * arrived:
         faded = max(faded - total * _evanescent_share(plane, how), 0.0)
     rounding = FLOAT_NOISE[types.dtype] * (1 + math.sqrt(total / arrived))
-    error = 2 * math.sqrt(grazing / arrived) + rounding + 2 * how.passage.ripple * math.sqrt(faded / arrived)
+    # Light where a fade begins is hardly faded, but blurred. It is assumed to be as bright as the light that arrives.
+    blurred_by_fade = 2 * how.passage.ripple * (1 + math.sqrt(faded / arrived)) if how.passage.band.fade else 0.0
+    error = 2 * math.sqrt(grazing / arrived) + rounding + blurred_by_fade
     result = result if brightest == 1 else result * result.dtype.type(brightest)
     return _Carried(result, error, 2 * math.sqrt(blurred / arrived))
 

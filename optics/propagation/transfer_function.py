@@ -2,6 +2,10 @@
 
     H = exp(2πi z √((n/λ)² - fx² - fy²))     (Goodman, §3.10.2)
 
+With sin θ = λf/n, the exponent is ikz - ikz (1 - cos θ). The first part is the same for all frequencies, so its whole
+waves are subtracted exactly. Only the second part is rounded. It does not grow with the distance, because the samples
+resolve it.
+
 Light whose angle to the axis is θ moves z tan θ to the side. Light that moves farther than from the far edge of one
 plane to the far edge of the other cannot reach the window. It is faded out before it can wrap around. A fade blurs the
 field. The width of the fade is a compromise: a narrow fade blurs over a large distance, so the unfaded band must
@@ -17,6 +21,7 @@ from functools import lru_cache
 import numpy as np
 
 from optics.apertures.soft_edge import kaiser_beta
+from optics.methods.angular_spectrum import versine
 from optics.numerics.autodiff import Array
 from optics.numerics.field import Field
 from optics.numerics.grid import Grid
@@ -204,13 +209,14 @@ class Passage:
         s2 = (x * x + y * y) * opaque(types, self.wavelength**2)
         z = opaque(types, self.z / self.wavelength)
         if self.paraxial:
-            waves, decay = z * (1 - s2 / 2), types.Float64(1)
+            sag, decay = s2 / 2, types.Float64(1)
         else:
-            waves = z * dr.sqrt(dr.maximum(1 - s2, 0))
+            sag = versine(dr.minimum(s2, 1))
             gone = dr.exp(-2 * math.pi * dr.abs(z) * dr.sqrt(dr.maximum(s2 - 1, 0)))
             decay = dr.select(s2 < 1, 1, gone if self.z >= 0 else 0)
         if self.band.fade:
             decay *= self._faded(x, y, types)
+        waves = opaque(types, math.fmod(self.z, self.wavelength) / self.wavelength) - z * sag
         waves += x * opaque(types, self.centre[0]) + y * opaque(types, self.centre[1])
         return Field.from_waves(decay, waves, grid, types).numpy()
 
