@@ -36,11 +36,7 @@ class Effort:
     fewest: number of points below which the estimate is useless.
     spare_digits: digits of the direct sum in addition to the requested accuracy. The first affordable value is used.
     share: time of the check relative to the time of the PSF.
-    share_of_few: the same for a window of fewer than `fewest` samples. Each sample is then compared, by a sum with more
-        digits than the PSF has, because the mean error that theory predicts says little about a single sample.
     seconds: time [s] that every check may take.
-    detail: error of the direct sum due to detail of a relief or wavefront that it does not resolve, relative to the
-        tolerance. A cubic spline has such detail at all frequencies.
     """
 
     points: int = 40
@@ -48,9 +44,7 @@ class Effort:
     fewest: int = 8
     spare_digits: tuple[float, ...] = (7.0, 4.0)
     share: float = 0.3
-    share_of_few: float = 4.0
     seconds: float = 3e-3
-    detail: float = 1e-2
 
 
 EFFORT = Effort()
@@ -96,9 +90,9 @@ def spot_check(beam: Beam, problem: Problem, image: np.ndarray, seconds: float) 
     if squared > 0.01 * total:
         total = min(total, float(np.mean(np.square(exact) / chance)))
     rounding = max(FLOAT_NOISE["float64"], float(np.finfo(precision(problem.dtype).dtype).eps))
-    # Error of the direct sum: 10^-digits of the amplitude of all light in phase, and twice that for the intensity.
-    own = 2 * 10.0 ** (darkness - reference.digits) + (EFFORT.detail * problem.tolerance if problem.detail else 0.0)
-    return CAUTION * math.sqrt(squared / total) + rounding + own
+    # The last term is the error of the direct sum: 10^-digits of the amplitude of all light in phase, and twice that
+    # for the intensity.
+    return CAUTION * math.sqrt(squared / total) + rounding + 2 * 10.0 ** (darkness - reference.digits)
 
 
 def _darkness(beam: Beam, problem: Problem, mean: float) -> float:
@@ -116,8 +110,7 @@ def _darkness(beam: Beam, problem: Problem, mean: float) -> float:
 
 def _affordable(problem: Problem, darkness: float, seconds: float, samples: int) -> _DirectSum:
     """Return the direct sum with as many points and digits as the time of the PSF allows."""
-    share = EFFORT.share_of_few if samples < EFFORT.fewest else EFFORT.share
-    pairs = max(share * seconds, EFFORT.seconds) * PAIRS_PER_SECOND
+    pairs = max(EFFORT.share * seconds, EFFORT.seconds) * PAIRS_PER_SECOND
     wanted = min(EFFORT.points_along_radius if problem.symmetric else EFFORT.points, samples)
     for spare in EFFORT.spare_digits:
         wished = spare - math.log10(problem.tolerance) + darkness

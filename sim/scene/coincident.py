@@ -16,7 +16,6 @@ import numpy as np
 from sim.scene import shapes, surfaces
 
 _TYPES = mujoco.mjtGeom
-_ASSETS = (_TYPES.mjGEOM_MESH, _TYPES.mjGEOM_SDF)
 _CURVED = (_TYPES.mjGEOM_SPHERE, _TYPES.mjGEOM_ELLIPSOID, _TYPES.mjGEOM_CAPSULE, _TYPES.mjGEOM_CYLINDER)
 POINTS = 120  # points on each geom that are compared with other geoms
 # Surfaces that are closer than APART count as coincident, and LIFT separates them. Both are in units of `_scale`. At a
@@ -133,10 +132,34 @@ def _touches(data: mujoco.MjData, points: np.ndarray, normals: np.ndarray, geom:
 def _cast(
     data: mujoco.MjData, geom: int, kind: mujoco.mjtGeom, start: np.ndarray, direction: np.ndarray, normal: np.ndarray
 ) -> float:
-    """Return the distance of a geom along a ray; writes the normal there to `normal`."""
-    if kind in _ASSETS:
+    """Return the distance of a geom along a ray, negative for a miss; writes the normal there to `normal`."""
+    if kind == _TYPES.mjGEOM_MESH:
         return float(mujoco.mj_rayMesh(data.model, data, geom, start, direction, normal))
+    if kind == _TYPES.mjGEOM_SDF:  # MuJoCo ends the process if it casts a ray at the mesh of a signed distance field
+        return _cast_at_triangles(data, geom, start, direction, normal)
     if kind == _TYPES.mjGEOM_HFIELD:
         return float(mujoco.mj_rayHfield(data.model, data, geom, start, direction, normal))
     place, turn, size = data.geom_xpos[geom], data.geom_xmat[geom], data.model.geom_size[geom]
     return float(mujoco.mju_rayGeom(place, turn, size, start, direction, kind, normal))
+
+
+def _cast_at_triangles(
+    data: mujoco.MjData, geom: int, start: np.ndarray, direction: np.ndarray, normal: np.ndarray
+) -> float:
+    """Return the same for the triangles of a geom (Möller and Trumbore 1997)."""
+    triangles, turn = shapes.untextured(data.model, geom), data.geom_xmat[geom].reshape(3, 3)
+    o, d = (start - data.geom_xpos[geom]) @ turn, direction @ turn
+    corners = triangles.vertices[triangles.faces]
+    one, other = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    across, from_corner = np.cross(d, other), o - corners[:, 0]
+    volume = np.einsum("mi,mi->m", one, across)
+    along = np.cross(from_corner, one)
+    per = 1 / np.where(volume == 0, np.inf, volume)
+    u, v = np.einsum("mi,mi->m", from_corner, across) * per, along @ d * per
+    t = np.where((u >= 0) & (v >= 0) & (u + v <= 1) & (volume != 0), np.einsum("mi,mi->m", other, along) * per, -1)
+    if (t < 0).all():
+        return -1.0
+    first = int(np.argmin(np.where(t < 0, np.inf, t)))
+    outwards = np.cross(one[first], other[first])
+    normal[:] = turn @ (outwards / np.linalg.norm(outwards))
+    return float(t[first])

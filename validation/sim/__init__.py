@@ -4,6 +4,7 @@ scene_against_mujoco      mirrored models compared with MuJoCo's renderer
 receptive_field_sampling  ray sampling of receptive fields compared with a convolution
 eyes_against_ray_caster   eyes on models compared with MuJoCo's ray caster
 speed_accuracy            error against speed of all rendering methods
+automatic_choice          cost of the automatic choice of samples
 equal_brightness          equal brightness of goal and adversary to one receptor
 environment_endurance     memory and kernels of an environment over many steps
 

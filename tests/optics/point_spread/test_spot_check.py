@@ -77,30 +77,3 @@ def test_the_check_owns_up_to_what_its_own_sum_is_good_to(spare, monkeypatch):
     assert wished <= reference.digits <= wished + spot_check_module.DIGITS_STEP
     same = spot_check_module._exact(beam, task, reference, np.arange(image.size))
     assert spot_check(beam, task, same, 1.0) == pytest.approx(2 * 10 ** (darkness - reference.digits), rel=1e-3)
-
-
-@pytest.mark.parametrize("seed", [2, 8, 11])
-def test_detail_that_neither_sum_resolves_is_in_the_prediction(seed):
-    """A height map is a cubic spline, with detail at all frequencies. Sums for a tolerance neglect the finest part, and
-    so does the sum of the check. The reference has a tolerance of 1e-10 and neglects far less."""
-    rng = np.random.default_rng(seed)
-    radius, relief, height, exponent = rng.uniform(1.5, 3), rng.random((6, 6)), rng.uniform(0.3, 2), rng.uniform(-8, -6)
-    pupil = Pupil(radius * 1e-6, relief * height * 1e-6)
-    asked = {"sensor_distance": 40e-6, "shape": (1, 1), "dtype": "float64", "method": "rayleigh_sommerfeld"}
-    result = optics.psf(pupil, tolerance=10**exponent, **asked)
-    exact = optics.psf(pupil, tolerance=1e-10, **asked).psf
-    assert abs(result.psf - exact).max() <= result.plan.predicted_error * exact.max()
-    assert result.plan.predicted_error <= 0.1 * 10**exponent
-
-
-@pytest.mark.parametrize("samples", [1, 3])
-def test_a_window_of_few_samples_is_compared_although_its_reference_takes_longer(samples):
-    """Theory predicts a mean error over many samples, and a single one may be several times less accurate. Here one
-    point of the direct sum has more nodes than the general limit on time allows."""
-    beam = Beam(Pupil(4e-3, thin_lens_focal_length=50e-3), PointSource(), 550e-9, 25e-3)
-    task = Problem.from_beam(beam, Grid((1, samples), 1e-6, (9e-4, 0.0)), 1e-2, "float64")
-    plan, sampling = choose(task, "rayleigh_sommerfeld")
-    image = sampling.intensity(beam, task).numpy() / beam.pupil.area
-    found, doubled = (spot_check(beam, task, factor * image, plan.seconds) for factor in (1.0, 2.0))
-    assert found < 1e-2
-    assert doubled == pytest.approx(CAUTION, rel=0.02)

@@ -40,8 +40,15 @@ KINDS = {
     "sharp": 'type="mesh" mesh="sharp"',
     "cube": 'type="mesh" mesh="cube"',
     "hfield": 'type="hfield" hfield="hills"',
+    "sdf": 'type="sdf" mesh="ball"',
 }
-SAME = [(kind, kind) for kind in KINDS] + [("box", "cube"), ("cube", "box"), ("painted box", "box")]
+SAME = [(kind, kind) for kind in KINDS] + [
+    ("box", "cube"),
+    ("cube", "box"),
+    ("painted box", "box"),
+    ("ball", "sdf"),
+    ("sdf", "ball"),
+]
 RED, BLUE = "1 .1 .1 1", ".1 .1 1 1"
 FOV = 30.0
 
