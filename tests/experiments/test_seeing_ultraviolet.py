@@ -69,6 +69,6 @@ def test_page_of_stored_runs(tmp_path):
     text = (tmp_path / "seeing_ultraviolet.md").read_text()
     assert "They do." in text
     assert "| shortest peak [nm] | 520 [520, 520] | 430 [4" in text
-    assert "(rank correlation with fitness -1.00)" in text
+    assert "(rank correlation of shortest peak and fitness: -1.00)" in text
     assert "| 400 to 435 nm | 12 | 0.65 | 3.5 |" in text  # the last two generations of both seeds
     assert (tmp_path / "figures" / "seeing_ultraviolet.png").stat().st_size > 10_000

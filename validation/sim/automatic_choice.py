@@ -8,8 +8,8 @@ property changes at a time: the number of receptors across, the field of view, o
 square eyes. Mazes and navigation have eyes of a single row, as in the evolved animals. Then 64 worlds are rendered with
 the chosen samples.
 
-**Table.** The error is the predicted error, without the bound for the eyes' spectral bands, divided by the tolerance. The
-time is the median CPU time of a frame per receptor, divided by the smallest such time of the same task. It rises
+**Table.** The error is the predicted error, without the bound for the eyes' spectral bands, divided by the tolerance.
+Times are median CPU times of a frame per receptor, divided by the smallest such time of the same task. They are longer
 where eyes have few receptors, because work that is done once per world or per eye is then shared by few receptors.
 
 **Bounds.** No error is above 1, and no setting takes rays. Between neighbouring settings of a sweep over resolutions

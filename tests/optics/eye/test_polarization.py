@@ -65,15 +65,15 @@ def test_bands_and_places_may_be_polarised_differently():
 
 def by_vector_focus(pupil, receptor, places, cells, left, right):
     """Signals of receptors for a scene that is polarised at one angle left of its middle and at another right of it.
-    The reference sums the vector focus, upside down on the retina, times the part of each receptor lit from each
-    side."""
+    The reference sums the vector focus times the part of each receptor lit from each side. Columns of the retina ascend
+    with x from the left of the visual field."""
     dx = WAVE / math.sin(math.atan(pupil.radius / F)) / 8
     found = np.zeros(len(places))
     for angle, side in ((left, 1), (right, -1)):
         jones = (math.cos(math.radians(angle)), math.sin(math.radians(angle)))
         light = optics.vector_focus(pupil, WAVE, F, polarization=jones, dx=dx, shape=(385, 385))
         profile = cells.absorbed(light).sum(axis=0) * dx**2
-        found += np.clip(0.5 + side * (-light.grid.x - places[:, None]) / receptor, 0, 1) @ profile
+        found += np.clip(0.5 + side * (light.grid.x - places[:, None]) / receptor, 0, 1) @ profile
     return found / ((1 + 1 / cells.dichroic_ratio) / 2)
 
 

@@ -260,7 +260,7 @@ def test_neighbouring_settings_cost_about_the_same(seed):
 
 @pytest.mark.parametrize(("resolution", "fov"), [((48, 48), 90), ((16, 16), 150)])
 def test_trials_near_objects_use_receptors_that_see_them(resolution, fov):
-    """In wide eyes, five times as many pairs of views and receptors count as with receptors drawn evenly. All draws are
+    """Five times as many pairs of views and receptors count in wide eyes as with receptors drawn evenly. All draws are
     the same every time.
     """
     scene = WorldScene(sim.build_world("detection"), sim.Eyes(n_eyes=1, resolution=resolution, fov_deg=fov))
