@@ -1,7 +1,7 @@
 """Cost of the automatic choice of samples over resolution, field of view and number of eyes
 
 Does the automatic choice ("auto") have a cliff, where a slightly different eye takes many more samples? It does not. In
-every setting it takes one to nine areas per receptor, and the predicted error is within the tolerance.
+every setting it takes one to six areas per receptor, and the predicted error is within the tolerance.
 
 **Method.** `sim.choose_fidelity` chooses samples for eyes with perfect lenses in detection, a maze and navigation. One
 property changes at a time: the number of receptors across, the field of view, or the number of eyes. Detection has
@@ -131,8 +131,8 @@ def relative_times(choices: Sequence[Choice]) -> list[float]:
 def table(choices: Sequence[Choice]) -> str:
     lines = ["task        receptors  field  eyes  per receptor  error  time"]
     for c, duration in zip(choices, relative_times(choices), strict=True):
-        size = f"{c.receptors} x {c.receptors}" if c.task == "detection" else f"{c.receptors} x 1"
-        samples = f"{c.number:g} {c.samples}"
+        size = f"{c.receptors if c.task == 'detection' else 1} x {c.receptors}"
+        samples = f"{c.number:g} {c.samples.removesuffix('s') if c.number == 1 else c.samples}"
         lines.append(
             f"{c.task:<11} {size:>9} {c.fov_deg:>5g}° {c.eyes:>5} {samples:>13} {c.error:>6.2f} {duration:>5.2f}"
         )
@@ -156,12 +156,15 @@ def draw(choices: Sequence[Choice], path: Path) -> None:
             heights = [c.number for c, _ in own], [duration for _, duration in own], [c.error for c, _ in own]
             for axes, values in zip(column, heights, strict=True):
                 axes.plot(at, values, "o-", ms=4, lw=1, color=color, label=task)
-        column[0].set(yscale="log", yticks=[1, 2, 4, 9], yticklabels=["1", "2", "4", "9"])
-        column[1].set(yscale="log")
+        column[0].set(yscale="log", yticks=[1, 2, 4, 6], yticklabels=["1", "2", "4", "6"])
+        column[0].minorticks_off()
+        column[1].set(yscale="log", yticks=[1, 3, 10, 30], yticklabels=["1", "3", "10", "30"])
+        column[1].minorticks_off()
         column[2].set(xlabel=sweep, ylim=(0, 1.1))
         column[2].axhline(1, color="black", ls=":", lw=1)
         if sweep == EYES:
             column[2].set(xscale="log", xticks=NUMBERS, xticklabels=[str(n) for n in NUMBERS])
+            column[2].minorticks_off()
     labels = ("areas per receptor", "time per receptor\n(least of the task = 1)", "error / tolerance")
     for axes, label in zip(rows[:, 0], labels, strict=True):
         axes.set_ylabel(label)
