@@ -14,7 +14,7 @@ import pytest
 
 from evolve.config.assemble import assemble
 from evolve.config.run_config import SECTIONS, GeneConfig, RunConfig
-from evolve.genome.genes import ALL_GENES, LAMBDA_MAX, RHABDOM, SIDE, gene_table
+from evolve.genome.genes import ALL_GENES, LAMBDA_MAX, RHABDOM, SIDE, VERTICAL, gene_table
 from evolve.genome.genotype import GENES, Genotype
 from evolve.genome.phenotype import develop
 from optics.numerics import backend
@@ -77,6 +77,7 @@ STAGNANT = ("learning.learning_rate=1e-30", "learning.total_steps=256", "learnin
 # Eyes whose receptors are one or two rhabdoms wide.
 FOCUSED = ("eye.receptor_pitch=4e-6",)
 GUIDED = ("eye.rhabdoms=true", *FOCUSED)
+HIGH = ("eye.vertical_fov=gene", *PERFECT)
 NAVIGATING = ("genome.resolution_height.start=1", "eye.rays_per_receptor=1", *PERFECT)
 FIELDS = {
     "task": Case("task=tracking", rides),
@@ -95,6 +96,7 @@ FIELDS = {
     "eye.relief_symmetric": Case("eye.relief_symmetric=true", history, ("genome.doe.open=true",)),
     "eye.pupil_turned": Case("eye.pupil_turned=true", point_image, ("genome.doe_01.start=0.9",)),
     "eye.square": Case("eye.square=true", history, ("eye.square=false", *PERFECT)),
+    "eye.vertical_fov": Case("eye.vertical_fov=horizontal", sight),
     "eye.receptor_pitch": Case("eye.receptor_pitch=40e-6", point_image, ()),
     "eye.rhabdoms": Case("eye.rhabdoms=true", point_image, FOCUSED),
     "eye.rhabdom_index": Case("eye.rhabdom_index=1.38", point_image, GUIDED),
@@ -147,6 +149,7 @@ GENE_OUTPUTS = {
     "placement_range_deg": sight,
     "elevation_deg": own_sight,
     "fov_deg": sight,
+    "vertical_fov_deg": sight,
     "resolution_height": sight,
     "resolution_width": sight,
     "resolution": sight,
@@ -196,7 +199,7 @@ def _names(cls, prefix=""):
 
 def test_tables_name_every_setting_and_every_gene():
     assert set(FIELDS) == set(_names(RunConfig))
-    assert set(GENE_OUTPUTS) == set(GENES) | set(gene_table(square=True, rhabdoms=True))
+    assert set(GENE_OUTPUTS) == set(GENES) | set(gene_table(square=True, rhabdoms=True, heights=True))
     assert all(is_dataclass(section) for section in SECTIONS.values())
 
 
@@ -215,7 +218,7 @@ def test_every_gene_moves_its_output(name):
     output = GENE_OUTPUTS[name]
     spectral = ALL_GENES[name].cluster == "spectral"
     task = "foraging" if spectral else OWN if output is own_sight else "detection"  # only foraging has colours
-    special = {SIDE: SQUARE, RHABDOM: GUIDED}
+    special = {SIDE: SQUARE, RHABDOM: GUIDED, VERTICAL: HIGH}
     given = FOUR_TYPES if spectral else special.get(name, () if output is point_image else PERFECT)
     before = _settled(output, task, given)
     config = small(task, (*given, f"genome.{name}.open=true"))

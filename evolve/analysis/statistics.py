@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from evolve.genome.genes import LAMBDA_MAX, RHABDOM, TILT
+from evolve.genome.genes import LAMBDA_MAX, RHABDOM, TILT, VERTICAL
 from evolve.genome.phenotype import Phenotype
 
 if TYPE_CHECKING:
@@ -157,6 +157,7 @@ def gene_values(phenotype: Phenotype, eye: EyeConfig | None = None) -> dict[str,
         "placement_range_deg": phenotype.placement_range_deg,
         **({} if phenotype.elevation_deg is None else {TILT: phenotype.elevation_deg}),
         "fov_deg": phenotype.fov_deg,
+        **({} if phenotype.vertical_fov_deg is None else {VERTICAL: phenotype.vertical_fov_deg}),
         "resolution_height": float(height),
         "resolution_width": float(width),
     }

@@ -31,6 +31,7 @@ from evolve.genome.genes import (
     RHABDOM,
     SIDE,
     SIDES,
+    VERTICAL,
     GeneConfig,
     group_members,
 )
@@ -38,6 +39,11 @@ from evolve.genome.genes import (
 __all__ = ["assemble", "from_text", "from_toml", "to_toml"]
 
 Tree = dict[str, Any]
+# Genes that only eyes with a certain setting have: kind of eyes, setting and its value.
+OF_SETTINGS = {
+    RHABDOM: ("with rhabdoms", "eye.rhabdoms", "true"),
+    VERTICAL: ("whose height evolves", "eye.vertical_fov", "gene"),
+}
 GENE_FIELDS = tuple(f.name for f in fields(GeneConfig))
 TOP_LEVEL = ("task", "seed", "workers", "task_sha256")
 SETTINGS = (*TOP_LEVEL, *(f"{section}.{f.name}" for section, cls in SECTIONS.items() for f in fields(cls)))
@@ -202,7 +208,7 @@ def _checked_genome(section: Tree) -> Tree:
         key, members, use = f"genome.{group}", group_members(group), section[group]
         if not members:
             raise ConfigError(
-                f"unknown gene {group!r}; {suggestion(group, (*GENES, SIDE, RHABDOM, *CLUSTERS, *FAMILIES))}", key
+                f"unknown gene {group!r}; {suggestion(group, (*GENES, SIDE, *OF_SETTINGS, *CLUSTERS, *FAMILIES))}", key
             )
         if not isinstance(use, dict):
             raise ConfigError(f"{key} = {use!r}: set {key}.open, .low, .high, .start or .opens_at", key)
@@ -235,10 +241,10 @@ def _require_genes(source: Source, eye: EyeConfig, card: TaskCard) -> None:
     for name in with_relief(source.tree, eye).get("genome", {}):
         if name in (SIDE, *SIDES) and name not in eye.genes:
             raise ConfigError(no_such_side(name, eye), f"genome.{name}", "eye.square")
-        if name == RHABDOM and name not in eye.genes:
+        if name in OF_SETTINGS and name not in eye.genes:
+            kind, key, value = OF_SETTINGS[name]
             raise ConfigError(
-                f"genome.{name}: only eyes with rhabdoms have this gene; set eye.rhabdoms = true",
-                *(f"genome.{name}", "eye.rhabdoms"),
+                f"genome.{name}: only eyes {kind} have this gene; set {key} = {value}", f"genome.{name}", key
             )
         if not card.has_gene(name):
             raise ConfigError(

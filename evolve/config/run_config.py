@@ -28,6 +28,7 @@ from evolve.config.task_card import (
 from evolve.config.task_choice import TaskChoice
 from evolve.config.task_code import TaskCode
 from evolve.genome import anatomy
+from evolve.genome.eye_config import VERTICAL_FOVS
 from evolve.genome.genes import CLUSTERS, GENES, INHERITED, Gene, GeneConfig
 from evolve.genome.interval import Interval
 from optics.spectra.receptors import RECEPTORS
@@ -88,6 +89,11 @@ class RunConfig:
         if self.eye.receptors not in (known := (*RECEPTORS, INHERITED)):
             raise ConfigError(
                 f"eye.receptors = {self.eye.receptors!r}: must be one of {', '.join(known)}", "eye.receptors"
+            )
+        if self.eye.vertical_fov not in VERTICAL_FOVS:
+            raise ConfigError(
+                f"eye.vertical_fov = {self.eye.vertical_fov!r}: must be one of {', '.join(VERTICAL_FOVS)}",
+                "eye.vertical_fov",
             )
         self._check_light()
         self._check_rhabdoms()

@@ -3,18 +3,20 @@
 Eyes sit on the equator of a head of radius `eye.head_radius`, and an eye is as wide as its retina. The angle between
 neighbouring eyes is placement range / (eyes - 1). All retinas are `eye.sensor_width` wide and filled with receptors,
 which are at least `eye.receptor_width` wide. If `eye.receptor_pitch` is above 0, the width of a retina is instead the
-number of receptors along its width times this pitch. A repair changes genes as little as possible.
+number of receptors along its width times this pitch. Height takes no space on the head, but receptors are also at
+least `eye.receptor_width` high. A repair changes genes as little as possible.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 from evolve.genome.eye_config import EyeConfig
-from evolve.genome.genes import ALL_GENES, RHABDOM, SIDE, SIDES, GeneConfig
+from evolve.genome.genes import ALL_GENES, RHABDOM, SIDE, SIDES, VERTICAL, GeneConfig
 
-__all__ = ["contradiction", "fitted", "retina_width", "sides"]
+__all__ = ["contradiction", "fitted", "receptor_side", "retina_width", "sides", "vertical_fov"]
 
 Values = dict[str, float]
 Uses = Mapping[str, GeneConfig]
@@ -26,6 +28,23 @@ SLACK = 1e-9  # tolerance for rounding, so that eyes in contact do not count as 
 def retina_width(receptors: float, sizes: EyeConfig) -> float:
     """Return the width of a retina with this number of receptors along its width [m]. The eye has the same width."""
     return receptors * sizes.receptor_pitch if sizes.receptor_pitch > 0 else sizes.sensor_width
+
+
+def vertical_fov(values: Values, sizes: EyeConfig) -> float | None:
+    """Return an eye's vertical field of view [deg]; None for square receptors."""
+    return {"receptors": None, "horizontal": values["fov_deg"], "gene": values.get(VERTICAL)}[sizes.vertical_fov]
+
+
+def receptor_side(resolution: tuple[float, float], fov_deg: float, vertical: float | None, sizes: EyeConfig) -> float:
+    """Return the shorter side of a receptor [m].
+
+    vertical: vertical field of view [deg]; None for square receptors
+    """
+    rows, columns = resolution
+    width = retina_width(columns, sizes)
+    if vertical is None:
+        return width / columns
+    return min(width / columns, width * _tangent(vertical) / _tangent(fov_deg) / rows)
 
 
 def sides(values: Values) -> tuple[int, int]:
@@ -54,10 +73,64 @@ def fitted(values: Values, uses: Uses, sizes: EyeConfig) -> Values:
         fits["placement_range_deg"] = min(needed, widest)
         fewest = receptors if sizes.receptor_pitch == 0 else _lowest(width, uses)
         fits["n_eyes"], fits[width] = _thinned((eyes, receptors), (_lowest("n_eyes", uses), fewest), widest, sizes)
+    fits |= _with_high_receptors(fits, uses, sizes)
     if RHABDOM in values:
-        pitch = 1e6 * retina_width(fits[width], sizes) / fits[width]
-        fits[RHABDOM] = min(values[RHABDOM], max(pitch, ALL_GENES[RHABDOM].range.low))
+        side = 1e6 * receptor_side(sides(fits), fits["fov_deg"], vertical_fov(fits, sizes), sizes)
+        fits[RHABDOM] = min(values[RHABDOM], max(side, ALL_GENES[RHABDOM].range.low))
     return fits
+
+
+def _with_high_receptors(values: Values, uses: Uses, sizes: EyeConfig) -> Values:
+    """Return the genes that change so that receptors are at least `eye.receptor_width` high.
+
+    The number of rows is reduced. If the lowest number does not fit, the vertical field of view grows to its highest
+    value at most, and then the horizontal field shrinks, which makes a retina of the same width higher.
+    """
+    vertical, fov_deg, rows = vertical_fov(values, sizes), values["fov_deg"], _height_gene(uses)
+    if vertical is None:
+        return {}
+    shape = _RowsThatFit(values[_width_gene(uses)], rows == SIDE, sizes)
+    fewest = _lowest(rows, uses)
+    if VERTICAL in values:
+        vertical = min(max(vertical, shape.least_vertical_deg(fewest, fov_deg)), _highest(VERTICAL, uses))
+        fov_deg = max(min(fov_deg, shape.most_fov_deg(fewest, vertical)), _lowest("fov_deg", uses))
+    counts = range(int(values[rows]), int(fewest), -1)
+    most = next((float(count) for count in counts if shape.fits(count, fov_deg, vertical)), fewest)
+    return {rows: most} | ({VERTICAL: vertical, "fov_deg": fov_deg} if VERTICAL in values else {})
+
+
+@dataclass(frozen=True)
+class _RowsThatFit:
+    """Rows of receptors of at least `eye.receptor_width` on a retina with this number of columns.
+
+    square: True if the number of columns equals the number of rows
+    """
+
+    columns: float
+    square: bool
+    sizes: EyeConfig
+
+    def _least_ratio(self, rows: float) -> float:
+        """Return the least height of the retina, divided by its width, for this number of rows."""
+        width = retina_width(rows if self.square else self.columns, self.sizes)
+        return rows * self.sizes.receptor_width / width
+
+    def fits(self, rows: float, fov_deg: float, vertical: float) -> bool:
+        return _tangent(vertical) * (1 + SLACK) >= self._least_ratio(rows) * _tangent(fov_deg)
+
+    def least_vertical_deg(self, rows: float, fov_deg: float) -> float:
+        return _degrees(self._least_ratio(rows) * _tangent(fov_deg))
+
+    def most_fov_deg(self, rows: float, vertical: float) -> float:
+        return _degrees(_tangent(vertical) / self._least_ratio(rows))
+
+
+def _tangent(field_deg: float) -> float:
+    return math.tan(math.radians(field_deg) / 2)
+
+
+def _degrees(tangent: float) -> float:
+    return math.degrees(2 * math.atan(tangent))
 
 
 def _thinned(asked: Pair, least: Pair, range_deg: float, sizes: EyeConfig) -> Pair:
@@ -85,7 +158,7 @@ def _ratio(one: float, other: float) -> float:
 
 def contradiction(uses: Uses, sizes: EyeConfig) -> Contradiction | None:
     """Return None if every genome can be repaired; else a message and the names of the contradicting settings."""
-    return _crowded_retina(uses, sizes) or _crowded_head(uses, sizes)
+    return _crowded_retina(uses, sizes) or _low_retina(uses, sizes) or _crowded_head(uses, sizes)
 
 
 def _crowded_retina(uses: Uses, sizes: EyeConfig) -> Contradiction | None:
@@ -106,6 +179,21 @@ def _crowded_retina(uses: Uses, sizes: EyeConfig) -> Contradiction | None:
     return None
 
 
+def _low_retina(uses: Uses, sizes: EyeConfig) -> Contradiction | None:
+    fields = {"fov_deg": _lowest("fov_deg", uses)} | ({VERTICAL: _highest(VERTICAL, uses)} if VERTICAL in uses else {})
+    vertical, rows, width = vertical_fov(fields, sizes), _height_gene(uses), _width_gene(uses)
+    if vertical is None:
+        return None
+    fewest, columns = _lowest(rows, uses), _lowest(width, uses)
+    if _RowsThatFit(columns, rows == SIDE, sizes).fits(fewest, fields["fov_deg"], vertical):
+        return None
+    return (
+        f"{fewest:g} rows of receptors at least {sizes.receptor_width:g} m high (eye.receptor_width) do not fit on a "
+        f"retina {retina_width(columns, sizes):g} m wide with fields of view of {fields['fov_deg']:g}° x {vertical:g}°",
+        (f"genome.{rows}.low", f"genome.{rows}.start", "eye.receptor_width", "eye.vertical_fov"),
+    )
+
+
 def _crowded_head(uses: Uses, sizes: EyeConfig) -> Contradiction | None:
     width = _width_gene(uses)
     eyes, receptors = _lowest("n_eyes", uses), _lowest(width, uses)
@@ -120,6 +208,10 @@ def _crowded_head(uses: Uses, sizes: EyeConfig) -> Contradiction | None:
         f"head of radius {sizes.head_radius:g} m (eye.head_radius)",
         ("genome.n_eyes.low", "genome.n_eyes.start", "eye.head_radius", *keys),
     )
+
+
+def _height_gene(uses: Uses) -> str:
+    return SIDE if SIDE in uses else SIDES[0]
 
 
 def _width_gene(uses: Uses) -> str:

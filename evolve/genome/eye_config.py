@@ -9,8 +9,9 @@ from typing import Any
 from evolve.genome.genes import RELIEF_POINTS, Gene, gene_table
 from evolve.genome.interval import Interval
 
-__all__ = ["AUTO", "EyeConfig", "setting"]
+__all__ = ["AUTO", "VERTICAL_FOVS", "EyeConfig", "setting"]
 
+VERTICAL_FOVS = ("receptors", "horizontal", "gene")  # valid values of `eye.vertical_fov`
 AUTO = "auto"  # value of a setting whose number is chosen automatically
 
 
@@ -58,6 +59,12 @@ class EyeConfig:
     square: bool = setting(
         False, None, "eyes are square: the gene resolution replaces resolution_height and resolution_width"
     )
+    vertical_fov: str = setting(
+        VERTICAL_FOVS[0],
+        None,
+        "an eye's vertical field of view; receptors: that of square receptors; horizontal: as wide as the horizontal "
+        "one; gene: from the gene vertical_fov_deg",
+    )
     receptor_pitch: float = setting(
         0.0,
         Interval(0, 1e-4),
@@ -88,4 +95,5 @@ class EyeConfig:
     @property
     def genes(self) -> Mapping[str, Gene]:
         """All genes of animals that have these eyes, by name."""
-        return gene_table(self.relief_points, self.relief_symmetric, self.square, self.rhabdoms)
+        heights = self.vertical_fov == "gene"
+        return gene_table(self.relief_points, self.relief_symmetric, self.square, self.rhabdoms, heights)

@@ -26,6 +26,7 @@ __all__ = [
     "SIDE",
     "SIDES",
     "TILT",
+    "VERTICAL",
     "Gene",
     "GeneConfig",
     "gene_table",
@@ -41,6 +42,7 @@ RELIEF_POINTS = Interval(4, 9)
 SIDE = "resolution"  # gene of square eyes, which replaces the two genes SIDES
 SIDES = ("resolution_height", "resolution_width")
 RHABDOM = "rhabdom_diameter_um"  # gene of eyes whose receptors are rhabdoms
+VERTICAL = "vertical_fov_deg"  # gene of eyes whose height evolves
 TILT = "elevation_deg"  # gene that exists only in user tasks; in built-in tasks eyes look along the floor
 REAL: Literal["real"] = "real"
 INTEGER: Literal["integer"] = "integer"
@@ -112,15 +114,20 @@ class Gene:
 
 @lru_cache
 def gene_table(
-    relief_points: int = 4, relief_symmetric: bool = False, square: bool = False, rhabdoms: bool = False
+    relief_points: int = 4,
+    relief_symmetric: bool = False,
+    square: bool = False,
+    rhabdoms: bool = False,
+    heights: bool = False,
 ) -> Mapping[str, Gene]:
     """Return all genes by name, in the order of the genome.
 
     The relief has relief_points² genes. If it is symmetric, it has only the genes of an eighth of its area. Square eyes
-    have one gene for both sides. Rhabdoms add a gene for their diameter.
+    have one gene for both sides. Rhabdoms add a gene for their diameter, and `heights` one for the vertical field.
     """
     relief = set(representatives(relief_points, relief_symmetric))
-    absent = (*(SIDES if square else (SIDE,)), *(() if rhabdoms else (RHABDOM,)))
+    optional = {RHABDOM: rhabdoms, VERTICAL: heights}
+    absent = (*(SIDES if square else (SIDE,)), *(name for name, present in optional.items() if not present))
     return {
         name: gene
         for name, gene in _all_genes(relief_points).items()
@@ -140,6 +147,7 @@ def _body() -> list[Gene]:
         gene("placement_range_deg", REAL, (0, 180), (0, 180, 90), "deg", "arc over which the eyes are spread"),
         _held(gene(TILT, REAL, (-90, 90), (-60, 60, 0), "deg", "elevation of the eyes; only in user tasks")),
         gene("fov_deg", REAL, (1, 100), (1, 100, 45), "deg", "an eye's horizontal field of view"),
+        gene(VERTICAL, REAL, (1, 170), (1, 100, 45), "deg", "an eye's vertical field of view"),
         gene("resolution_height", INTEGER, (1, 64), (1, 16, 1), "receptors", "an eye's receptors, top to bottom"),
         gene("resolution_width", INTEGER, (1, 64), (1, 16, 1), "receptors", "an eye's receptors, left to right"),
         gene(SIDE, INTEGER, (1, 64), (1, 16, 1), "receptors", "a square eye's receptors, along either side"),

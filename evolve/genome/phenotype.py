@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from evolve.genome.anatomy import fitted, retina_width, sides
+from evolve.genome.anatomy import fitted, receptor_side, retina_width, sides, vertical_fov
 from evolve.genome.eye_config import EyeConfig
 from evolve.genome.genes import APERTURE_SHAPES, INHERITED, LAMBDA_MAX, RHABDOM, TILT, GeneConfig
 from evolve.genome.genotype import Genotype
@@ -55,6 +55,7 @@ class Phenotype:
     `encoder` is the width of the brain's first layers, of which there is one for each eye.
     `lambda_max_nm` are the wavelengths at which the pigments of the receptor types absorb most. If it is None, the
     setting `eye.receptors` of the run determines the receptors.
+    `vertical_fov_deg` is the vertical field of view. If it is None, receptors are square.
     """
 
     n_eyes: int
@@ -73,6 +74,7 @@ class Phenotype:
     encoder: int = FORMER_ENCODER
     elevation_deg: float | None = None
     rhabdom_diameter_um: float | None = None
+    vertical_fov_deg: float | None = None
 
     def waveguide(self, eye: EyeConfig) -> optics.Waveguide | None:
         """Return the waveguide that each receptor forms, at most as wide as the receptor; None for square receptors."""
@@ -80,9 +82,9 @@ class Phenotype:
 
         if self.rhabdom_diameter_um is None:
             return None
-        pitch = retina_width(self.resolution[1], eye) / self.resolution[1]
+        side = receptor_side(self.resolution, self.fov_deg, self.vertical_fov_deg, eye)
         return optics.Waveguide(
-            diameter=min(1e-6 * self.rhabdom_diameter_um, pitch),
+            diameter=min(1e-6 * self.rhabdom_diameter_um, side),
             n_core=eye.rhabdom_index,
             n_clad=eye.rhabdom_surround,
             length=eye.rhabdom_length or None,
@@ -124,6 +126,7 @@ class Phenotype:
             receptors=eye.receptors if self.lambda_max_nm is None else self.lambda_max_nm,
             waveguide=self.waveguide(eye),
             pupil_turned=eye.pupil_turned and pupil is not None,
+            vertical_fov_deg=self.vertical_fov_deg,
         )
 
     def to_json(self) -> dict[str, Any]:
@@ -167,6 +170,7 @@ def develop(genome: NDArray[np.float64], config: Settings) -> Phenotype:
         encoder=ceil(values["neurons"] / NEURONS_PER_FEATURE),
         elevation_deg=values.get(TILT),
         rhabdom_diameter_um=values.get(RHABDOM),
+        vertical_fov_deg=vertical_fov(values, config.eye),
     )
 
 

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from evolve.analysis.statistics import acuity_cpd, generation_statistics
 from evolve.report.markup import Html, html, joined, rounded
+from evolve.report.tables import field_of_view
 from evolve.store.candidate import Candidate
 from evolve.store.directory import Run
 
@@ -35,7 +36,7 @@ def animal_as_html(candidate: Candidate) -> Html:
     facts = {
         "fitness": candidate.failure or rounded(candidate.fitness),
         "episodes solved": "–" if candidate.failure else f"{100 * candidate.success_rate:.0f} %",
-        "eyes": f"{animal.n_eyes} of {height} × {width} receptors, {rounded(animal.fov_deg)}° wide",
+        "eyes": f"{animal.n_eyes} of {height} × {width} receptors, {field_of_view(animal)}",
         "acuity": f"{rounded(acuity_cpd(animal))} cycles per degree",
         "brain": f"{animal.layers} layers of {animal.neurons} neurons, {animal.memory_frames} frames of memory",
     }

@@ -32,7 +32,8 @@ def agent_figure(eyes: sim.Eyes, name: str, placed: Sequence[float] | np.ndarray
     behind = joined(_eye(azimuth, half) for azimuth in azimuths if not _faces(azimuth))
     before = joined(_eye(azimuth, half) for azimuth in azimuths if _faces(azimuth))
     height, width = eyes.resolution
-    says = f"{eyes.n_eyes} eyes of {height} by {width} receptors, {eyes.fov_deg:.0f} degrees wide each"
+    size = f"{eyes.fov_deg:.0f} degrees wide and {eyes.fovy_deg:.0f} high"
+    says = f"{eyes.n_eyes} eyes of {height} by {width} receptors, each {size}"
     return html(
         '<svg class="agent" viewBox="-150 -112 300 224" role="img" aria-label="{}">'
         '<defs><radialGradient id="{}-skin" cx="38%" cy="30%" r="75%"><stop offset="0" stop-color="#efe4d2"/>'

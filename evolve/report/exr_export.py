@@ -84,4 +84,5 @@ def _attributes(episode: Episode, t: int, eye: int) -> dict[str, Any]:
         "eye_azimuth_deg": float(np.degrees(episode.azimuths[eye])),
         **({} if episode.phenotype.elevation_deg is None else {"eye_elevation_deg": up}),
         "fov_deg": episode.eyes.fov_deg,
+        **({} if episode.eyes.vertical_fov_deg is None else {"vertical_fov_deg": episode.eyes.vertical_fov_deg}),
     }

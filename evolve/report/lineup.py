@@ -6,6 +6,7 @@ from evolve.analysis.statistics import acuity_cpd, champions
 from evolve.learning.animal_task import azimuths
 from evolve.report.agent_figure import agent_figure
 from evolve.report.markup import Html, html, joined, rounded
+from evolve.report.tables import field_of_view
 from evolve.store.candidate import Candidate
 from evolve.store.directory import Run
 
@@ -57,7 +58,7 @@ def _card(run: Run, generation: int, candidate: Candidate, name: str) -> Html:
         "candidate": str(candidate.id),
         "fitness": rounded(candidate.fitness),
         "episodes solved": f"{100 * candidate.success_rate:.0f} %",
-        "eyes": f"{animal.n_eyes} of {height} × {width}, {rounded(animal.fov_deg)}° each",
+        "eyes": f"{animal.n_eyes} of {height} × {width}, {field_of_view(animal)}",
         "acuity": f"{rounded(acuity_cpd(animal))} cycles/degree",
         "brain": f"{animal.neurons} neurons, {animal.memory_frames} frames",
     }

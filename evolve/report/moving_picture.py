@@ -87,7 +87,9 @@ def write_mp4(episode: Episode, path: Path) -> Path:
 def _frames(episode: Episode, stride: int) -> Iterator[Image.Image]:
     """Return the frames of an episode, at every `stride`-th time step."""
     eyes = display(episode.signals, episode.gain)
-    return (_frame(_world(episode, time), eyes[time]) for time in range(0, len(episode), stride))
+    return (
+        _frame(_world(episode, time), eyes[time], episode.eyes.field_aspect) for time in range(0, len(episode), stride)
+    )
 
 
 def _palette() -> Image.Image:
@@ -118,15 +120,18 @@ def _world(episode: Episode, time: int) -> Image.Image:
     return world.resize((width, HEIGHT), Image.Resampling.LANCZOS)
 
 
-def _frame(world: Image.Image, seen: np.ndarray) -> Image.Image:
-    """Return one frame, with the world on the left, and the signals of all eyes in a column on the right."""
+def _frame(world: Image.Image, seen: np.ndarray, aspect: float) -> Image.Image:
+    """Return one frame, with the world on the left, and the signals of all eyes in a column on the right.
+
+    aspect: width of a field of view divided by its height
+    """
     width = world.width
     room = (HEIGHT - GAP * (len(seen) - 1)) / len(seen)
-    size = min(ASIDE / seen.shape[2], room / seen.shape[1])
-    picture = Image.new("RGB", (width + GAP + round(seen.shape[2] * size), HEIGHT), PAPER)
+    high = min(ASIDE / aspect, room)
+    shape = max(1, round(aspect * high)), max(1, round(high))
+    picture = Image.new("RGB", (width + GAP + shape[0], HEIGHT), PAPER)
     picture.paste(world, (0, 0))
     for number, one in enumerate(seen):
-        shape = max(1, round(one.shape[1] * size)), max(1, round(one.shape[0] * size))
         grown = Image.fromarray(np.ascontiguousarray(one)).resize(shape, Image.Resampling.NEAREST)
         picture.paste(grown, (width + GAP, round(number * (room + GAP))))
     return picture

@@ -87,8 +87,8 @@ def _sights(episode: Episode) -> Html:
     eyes, gain = episode.eyes, episode.gain
     height, width = eyes.resolution
     room = 140 if eyes.n_eyes <= 2 else 88 if eyes.n_eyes <= 6 else 60
-    scale = room / max(height, width)
-    shape = style(f"width:{scale * width:.4g}px;aspect-ratio:{width}/{height}")
+    aspect = eyes.field_aspect
+    shape = style(f"width:{room * min(aspect, 1):.4g}px;aspect-ratio:{aspect:.4g}")
     size = html('width="{}" height="{}" {}', width, height, shape)
     pairs = [_pair(eye, name, size) for eye, name in enumerate(eyes.names())]
     brighter = "" if gain == 1 else f", brightened {rounded(gain)} times (1/a², to compensate for the pupil's area)"

@@ -65,7 +65,11 @@ class RerunStream:
     def camera(self, entity: tuple[str, ...], eyes: sim.Eyes) -> None:
         """Log an entity as a camera with the field of view of these eyes. It looks along z, with x right and y down."""
         height, width = eyes.resolution
-        focal_length = width / (2 * math.tan(math.radians(eyes.fov_deg) / 2))  # in receptors
+        # In receptor widths and heights.
+        focal_length = [
+            side / (2 * math.tan(math.radians(fov) / 2))
+            for side, fov in ((width, eyes.fov_deg), (height, eyes.fovy_deg))
+        ]
         axes = self.rr.ViewCoordinates.RDF
         self.always(entity, self.rr.Pinhole(focal_length=focal_length, width=width, height=height, camera_xyz=axes))
 

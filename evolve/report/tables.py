@@ -99,13 +99,25 @@ def _candidate_row(candidate: Candidate) -> list[str]:
     return [str(candidate.id), str(candidate.generation), *shown, solved, *_traits(candidate.phenotype), *effort]
 
 
+def field_of_view(animal: Phenotype) -> str:
+    """Return the fields of view of an animal's eyes, with the vertical one unless receptors are square."""
+    high = "" if animal.vertical_fov_deg is None else f", {rounded(animal.vertical_fov_deg)}° high"
+    return f"{rounded(animal.fov_deg)}° wide{high}"
+
+
+def _fields(phenotype: Phenotype) -> str:
+    """Return the fields of view (width × height); only the width if receptors are square."""
+    fields = (phenotype.fov_deg, *(() if phenotype.vertical_fov_deg is None else (phenotype.vertical_fov_deg,)))
+    return " × ".join(map(rounded, fields))
+
+
 def _traits(phenotype: Phenotype) -> list[str]:
     height, width = phenotype.resolution
     aperture, index = (
         "–" if value is None else rounded(value) for value in (phenotype.relative_aperture, phenotype.refractive_index)
     )
     return [
-        *(str(phenotype.n_eyes), rounded(phenotype.placement_range_deg), rounded(phenotype.fov_deg)),
+        *(str(phenotype.n_eyes), rounded(phenotype.placement_range_deg), _fields(phenotype)),
         *(f"{height} × {width}", rounded(acuity_cpd(phenotype)), aperture, index),
         *(str(phenotype.memory_frames), str(phenotype.neurons)),
     ]

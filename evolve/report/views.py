@@ -57,9 +57,8 @@ def _row(episode: Episode, eye: int, name: str, frame: int, lens: optics.Eye) ->
         ("own optics, no noise", display(through_optics(lens, episode.radiance[frame, eye]), gain)),
         ("own optics, noise", display(episode.signals[time, eye], gain)),
     )
-    height, width = episode.signals.shape[-2:]
-    scale = WIDTH / max(height, width)
-    size = style(f"width:{scale * width:.4g}px;aspect-ratio:{width}/{height}")
+    aspect = episode.eyes.field_aspect
+    size = style(f"width:{WIDTH * min(aspect, 1):.4g}px;aspect-ratio:{aspect:.4g}")
     cells = joined(
         html('<div><img src="{}" {} alt="{} eye: {}"><span>{}</span></div>', data_uri(pixels), size, name, label, label)
         for label, pixels in pictures

@@ -37,8 +37,8 @@ def choose_bands(
     - The error of the kernels: the largest difference, over all scenes, between the kernels of white light that result
       from n and from 2n bands.
 
-    kernels: function of wavelengths that returns kernels (wave, k, k), with cells that are 1/samples_per_receptor of a
-        receptor wide. None: the kernel is the same for all wavelengths.
+    kernels: function of wavelengths that returns kernels (wave, ky, kx), with samples_per_receptor cells along each
+        side of a receptor. None: the kernel is the same for all wavelengths.
     white: share of the signal of white that is transmitted by kernels wide enough to contain all light. None: the share
     that the given kernels transmit.
 

@@ -38,7 +38,8 @@ class Eye(EyeSpec):
     order.
 
     pupil: a Pupil. None is a perfect lens without blur and with a throughput of 1.
-    resolution: number of receptors (height, width). Receptors are square; their pitch is sensor_width / width.
+    resolution: number of receptors (height, width). Receptors are square with the side sensor_width / width, unless
+        `vertical_fov_deg` is given.
     fov_deg: horizontal field of view in front of the eye, in [1e-3, 170]. The retina lies at f = L / (2 tan(fov/2))
         behind the pupil. If the indices n behind and n₀ in front of the pupil differ, it lies at f n/n₀.
     sensor_width: L, width [m] of the retina or of the modelled patch of it.
@@ -58,6 +59,8 @@ class Eye(EyeSpec):
         from right towards up, in the plane perpendicular to the ray through the pupil's centre. Microvilli affect only
         polarised scenes (None: receptors are insensitive to polarisation).
     pupil_turned: True if the pupil is rotated by 180° about the axis. The axes of `psf` are then those of the pupil.
+    vertical_fov_deg: vertical field of view [degrees], 0.001 to 170, which determines the height of the receptors.
+        None: receptors are square, and the height of the retina follows from the number of rows.
     tolerance: relative L2 error of the PSF. It is also the error, relative to the signal of white, that each automatic
         choice may cause in a receptor's signal.
     dtype: "float32" or "float64", the type of PSF, kernel and signals.
@@ -103,7 +106,7 @@ class Eye(EyeSpec):
     ) -> np.ndarray | Array:
         """Return the receptive kernel (band, ky, kx) in the orientation of the visual field, with odd ky and kx.
 
-        It is the PSF, integrated over square cells of side pitch / samples_per_receptor.
+        It is the PSF, integrated over cells. A receptor consists of samples_per_receptor² cells of its own shape.
 
         z: distance of the scene along the axis [m].
         direction_deg: direction (right, up) of the light from the axis (None: the patch's eccentricity). The centre
@@ -134,7 +137,8 @@ class Eye(EyeSpec):
         return self._retina_for(self.spectral_bands.wavelengths, samples_per_receptor)
 
     def _retina_for(self, wavelengths: np.ndarray, samples_per_receptor: int) -> Retina:
-        cell = self.receptor_pitch / samples_per_receptor
+        height, width = self.receptor_size
+        cell = height / samples_per_receptor, width / samples_per_receptor
         return Retina(self.retina_distance, wavelengths, cell, self.tolerance, self.dtype, self.pupil_turned)
 
     def chosen_bands(self) -> SpectralBands:
@@ -173,8 +177,10 @@ class Eye(EyeSpec):
         within = self.tolerance if tolerance is None else in_range("tolerance", tolerance, 1e-6, 0.5)
         s = whole("samples_per_receptor", samples_per_receptor, 1, 64)
         from_cell = one_of("light_from", light_from, LIGHT_FROM) == LIGHT_FROM[0]
-        wide, counts = self.sensor_width / (2 * number(self.sensor_distance)), (depth_layers, field_zones)
-        (aside, below), high = tangents(self.eccentricity_deg), wide * self.resolution[0] / self.resolution[1]
+        counts, half_width = (depth_layers, field_zones), self.sensor_width / 2
+        half_height = self.resolution[0] / 2 * self.receptor_size[0]
+        high, wide = (half / number(self.sensor_distance) for half in (half_height, half_width))
+        aside, below = tangents(self.eccentricity_deg)
 
         def kernel_at(distance: Scalar, right: float, down: float) -> Array:
             place = aside + right * wide, below + down * high
@@ -198,10 +204,10 @@ class Eye(EyeSpec):
 
         This is the reference for renderers.
 
-        radiance: radiance (band, Y, X) of the scene's cells, whose side is pitch / samples_per_receptor. It is constant
-            within each cell (for the alternative, see `light_from` of `Eye.sight`). The scene is centred on the axis
-            and dark outside. Its smallest size is h s x w s cells, with s = samples_per_receptor; larger scenes exceed
-            this height and this width by even numbers.
+        radiance: radiance (band, Y, X) of the scene's cells. A receptor consists of s x s cells of its own shape, with
+            s = samples_per_receptor. Radiance is constant within each cell (for the alternative, see `light_from` of
+            `Eye.sight`). The scene is centred on the axis and dark outside. Its smallest size is h s x w s cells;
+            larger scenes exceed this height and this width by even numbers.
         rng: random generator of the noise; None for signals without noise. Noise carries no derivative.
         z: distance [m] of the scene along the axis, a number or one per cell (Y, X).
         sight: kernels from `Eye.sight` with the same samples_per_receptor; None computes them. Objects outside its

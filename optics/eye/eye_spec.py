@@ -9,7 +9,15 @@ from typing import Any
 import numpy as np
 
 from optics.elements.pupil import Pupil
-from optics.eye.geometry import behind_pupil, check_pupil, direction, etendue, focal_length
+from optics.eye.geometry import (
+    behind_pupil,
+    check_pupil,
+    check_vertical,
+    direction,
+    etendue,
+    focal_length,
+    receptor_size,
+)
 from optics.eye.guided_field import check_guide
 from optics.eye.photoreceptor import throughput
 from optics.eye.polarization import check_rays, microvilli_of
@@ -49,12 +57,14 @@ class EyeSpec:
     waveguide: Waveguide | None = None
     microvilli: Any = None
     pupil_turned: bool = False
+    vertical_fov_deg: float | None = None
     spectral_bands: SpectralBands = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "resolution", shape_2d("resolution", self.resolution))
         in_range("fov_deg", self.fov_deg, 1e-3, 170, carried=True)
         positive("sensor_width", self.sensor_width)
+        check_vertical(self.vertical_fov_deg, self.fov_deg)
         object.__setattr__(self, "eccentricity_deg", direction("eccentricity_deg", self.eccentricity_deg))
         in_range("noise_sigma", self.noise_sigma, 0, 1e6)
         in_range("tolerance", self.tolerance, 1e-6, 0.5)
@@ -63,7 +73,7 @@ class EyeSpec:
         check_pupil(self.pupil, self.sensor_width, self.full_aperture)
         if flag("pupil_turned", self.pupil_turned) and self.pupil is None:
             raise ValueError("pupil_turned = True and pupil = None: must be False, or a Pupil that can be turned")
-        check_guide(self.waveguide, self.pupil, self.receptor_pitch)
+        check_guide(self.waveguide, self.pupil, self.receptor_size)
         object.__setattr__(self, "microvilli", microvilli_of(self.microvilli))
         if self.microvilli is not None:
             check_rays(self.pupil, number(self.retina_distance), self.tolerance)
@@ -95,8 +105,19 @@ class EyeSpec:
 
     @property
     def receptor_pitch(self) -> float:
-        """Distance [m] between the centres of neighbouring receptors."""
+        """Distance [m] between the centres of horizontally neighbouring receptors."""
         return self.sensor_width / self.resolution[1]
+
+    @property
+    def receptor_size(self) -> tuple[float, float]:
+        """Height and width [m] of a receptor. They are equal unless `vertical_fov_deg` is given."""
+        return receptor_size(self.resolution, self.sensor_width, self.fov_deg, self.vertical_fov_deg)
+
+    @property
+    def fovy_deg(self) -> float:
+        """Vertical field of view [degrees]: `vertical_fov_deg`, or that of square receptors."""
+        height, _ = self.receptor_size
+        return math.degrees(2 * math.atan(self.resolution[0] * height / (2 * number(self.sensor_distance))))
 
     @property
     def relative_aperture(self) -> Scalar:
@@ -128,7 +149,7 @@ class EyeSpec:
         """Absorbed photons for a signal of 1, per receptor type (type,); None without a photon budget."""
         if self.photon_budget is None:
             return None
-        light = etendue(self.widest_pupil, self.receptor_pitch, number(self.sensor_distance))
+        light = etendue(self.widest_pupil, math.prod(self.receptor_size), number(self.sensor_distance))
         return self.photon_budget.photons(self.spectral_bands, light)
 
     def chosen_bands(self) -> SpectralBands:

@@ -9,7 +9,16 @@ from optics.elements.pupil import MIDDLE, Pupil
 from optics.numerics.arguments import in_range, of_kind, point_2d, positive
 from optics.numerics.autodiff import Scalar, is_differentiable, number
 
-__all__ = ["behind_pupil", "check_pupil", "direction", "etendue", "focal_length", "tangents"]
+__all__ = [
+    "behind_pupil",
+    "check_pupil",
+    "check_vertical",
+    "direction",
+    "etendue",
+    "focal_length",
+    "receptor_size",
+    "tangents",
+]
 
 WIDEST_DEG = 80
 
@@ -22,6 +31,17 @@ def focal_length(width: float, fov_deg: Scalar) -> Scalar:
         sine, cosine = dr.sincos(dr.deg2rad(fov_deg) / 2)  # dr.tan uses dr.rcp beyond 45 degrees: error 1e-6 on a GPU
         return width * cosine / (2 * sine)
     return width / (2 * math.tan(math.radians(fov_deg) / 2))
+
+
+def receptor_size(
+    resolution: tuple[int, int], width: float, fov_deg: Scalar, vertical_fov_deg: float | None
+) -> tuple[float, float]:
+    """Return the height and width [m] of a receptor on a retina of this width [m], see `Eye`."""
+    rows, columns = resolution
+    if vertical_fov_deg is None:
+        return width / columns, width / columns
+    height = 2 * number(focal_length(width, fov_deg)) * math.tan(math.radians(vertical_fov_deg) / 2)
+    return height / rows, width / columns
 
 
 def behind_pupil(pupil: Pupil | None, focal: Scalar) -> Scalar:
@@ -47,9 +67,21 @@ def check_pupil(pupil: Pupil | None, width: float, full_aperture: float | None) 
         )
 
 
-def etendue(widest_pupil: float, receptor_pitch: float, focal: float) -> float:
-    """Return the etendue [m² sr] of a receptor behind a pupil with a throughput of 1."""
-    return math.pi / 4 * (widest_pupil * receptor_pitch / focal) ** 2
+def check_vertical(vertical_fov_deg: float | None, fov_deg: Scalar) -> None:
+    """Raise a ValueError unless the vertical field of view [degrees] is None or valid."""
+    if vertical_fov_deg is None:
+        return
+    in_range("vertical_fov_deg", vertical_fov_deg, 1e-3, 170)
+    if is_differentiable(fov_deg):
+        raise ValueError(
+            "vertical_fov_deg is given and fov_deg is a Dr.Jit array: must be None, so that receptors keep their size "
+            "while the focal length changes"
+        )
+
+
+def etendue(widest_pupil: float, receptor_area: float, focal: float) -> float:
+    """Return the etendue [m² sr] of a receptor [m²] behind a pupil with a throughput of 1."""
+    return math.pi / 4 * receptor_area * (widest_pupil / focal) ** 2
 
 
 def direction(name: str, value: Any) -> tuple[float, float]:

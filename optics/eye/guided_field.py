@@ -1,8 +1,8 @@
 """Receptive fields of receptors that are waveguides: the share of the light on the pupil that their modes accept.
 
 Let E(v) be the share of a point source's light on the pupil that a waveguide accepts and absorbs, if the source is
-imaged at the position v [m] relative to the waveguide. If the pitch of the retina is p, the receptor's kernel is
-E(v)/p², integrated over cells. For comparison, the signal of a square that absorbs all light is the mean over its area.
+imaged at the position v [m] relative to the waveguide. If a receptor takes the area A of the retina, its kernel is
+E(v)/A, integrated over cells. For comparison, the signal of a square that absorbs all light is the mean over its area.
 The waveguide stands where the ray through the pupil's centre hits the retina, and points at that centre. The kernel of
 a source at the position u, for a receptor at r, has the argument r - u = -v, so that it is E rotated by 180°.
 """
@@ -53,25 +53,29 @@ class Guide:
     from_cell: bool = True
 
 
-def check_guide(waveguide: Waveguide | None, pupil: Pupil | None, pitch: float) -> None:
-    """Raise a ValueError for a waveguide that overlaps its neighbours or has no pupil in front of it."""
+def check_guide(waveguide: Waveguide | None, pupil: Pupil | None, receptor: tuple[float, float]) -> None:
+    """Raise a ValueError for a waveguide that overlaps its neighbours or has no pupil in front of it.
+
+    receptor: height and width of a receptor [m].
+    """
     if waveguide is None:
         return
     of_kind("waveguide", waveguide, Waveguide, "Waveguide(2e-6), or None for receptors that are squares")
     if pupil is None:
         raise ValueError("waveguide is given and pupil = None: must be a Pupil, which illuminates the waveguide")
-    if waveguide.diameter > pitch * (1 + 1e-9):
+    height, width = receptor
+    if waveguide.diameter > min(receptor) * (1 + 1e-9):
+        side = f"sensor_width / resolution[1] = {width:g}" if width <= height else f"a receptor's height {height:g}"
         raise ValueError(
-            f"waveguide.diameter = {waveguide.diameter:g}: must be at most sensor_width / resolution[1] = {pitch:g} m, "
-            "so that neighbours do not overlap"
+            f"waveguide.diameter = {waveguide.diameter:g}: must be at most {side} m, so that neighbours do not overlap"
         )
 
 
 def guided_kernel(pupil: Pupil, retina: Retina, z: Scalar, direction: tuple[float, float], guide: Guide) -> Array:
-    """Return the share of light that a receptor accepts from every cell around its direction: Dr.Jit (band, k, k).
+    """Return the share of light that a receptor accepts from every cell around its direction: Dr.Jit (band, ky, kx).
 
-    k is even if `guide.cells` is even. The orientation is that of `receptive_field.visual_kernel`, which also documents
-    the other arguments.
+    ky and kx are even if `guide.cells` is even. The orientation is that of `receptive_field.visual_kernel`, which also
+    documents the other arguments.
 
     Raises:
         ValueError: the waveguide has no guided mode at one of the wavelengths, or an argument carries a derivative.
@@ -80,12 +84,12 @@ def guided_kernel(pupil: Pupil, retina: Retina, z: Scalar, direction: tuple[floa
     beams = beams_to(pupil, retina, z, retina.across_pupil(direction))
     spot = spot_of(beams, retina)
     bands = [_within(beam, spot, need.pitch, retina, guide) for beam, need in zip(beams, spot.needs, strict=True)]
-    side = max(band.shape[0] for band in bands)
-    wide = [np.pad(band, (side - band.shape[0]) // 2) for band in bands]
+    sides = np.max([band.shape for band in bands], axis=0)
+    wide = [np.pad(band, [((side - n) // 2,) * 2 for side, n in zip(sides, band.shape, strict=True)]) for band in bands]
     # On the axis of a symmetric pupil, E is symmetric, too.
     even = direction == (0.0, 0.0) and all(pupil.mirror_symmetric(beam.wavelength) for beam in beams)
     found = np.stack(wide) if retina.pupil_turned or even else np.stack(wide)[:, ::-1, ::-1]
-    scale = (guide.focal / (retina.cell * guide.cells)) ** 2
+    scale = guide.focal**2 / math.prod(side * guide.cells for side in retina.cell)
     return precision(retina.dtype).Tensor(np.maximum(found * scale, 0))
 
 
@@ -99,9 +103,12 @@ def _within(beam: Beam, spot: Spot, pitch: float, retina: Retina, guide: Guide) 
     half = spot.half_of_rays + most - spot.half + diffracted
     while True:
         half = min(half, most)
-        count = 2 * math.ceil(half / retina.cell - guide.cells % 2 / 2) + guide.cells % 2
-        cells = _Cells(count, retina.cell / guide.focal, pitch / guide.focal, retina.tolerance)
-        found, share = _seen(beam, spot, guide, cells)
+        counts = (2 * math.ceil(half / side - guide.cells % 2 / 2) + guide.cells % 2 for side in retina.cell)
+        rows, columns = (
+            _Cells(count, side / guide.focal, pitch / guide.focal, retina.tolerance)
+            for count, side in zip(counts, retina.cell, strict=True)
+        )
+        found, share = _seen(beam, spot, guide, rows, columns)
         if share >= 1 - retina.tolerance or half == most:
             return found
         half *= WIDER
@@ -139,30 +146,29 @@ def _radius(waveguide: Waveguide, beam: Beam) -> float:
     return modes[0].radius * (1 + min(DEPTHS / modes[0].w, DEPTHS))
 
 
-def _seen(beam: Beam, spot: Spot, guide: Guide, cells: _Cells) -> tuple[np.ndarray, float]:
+def _seen(beam: Beam, spot: Spot, guide: Guide, rows: _Cells, columns: _Cells) -> tuple[np.ndarray, float]:
     """Return E integrated over each cell, in terms of tangents, and the share of the total that the cells contain."""
     from scipy.ndimage import map_coordinates
 
     middle = [math.tan(angle) for angle in beam.source.angle]
-    at, weight = cells.places(guide.from_cell)
-    along_x, along_y = (tangent + at.ravel() for tangent in middle)
+    (across, weight_x), (down, weight_y) = columns.places(guide.from_cell), rows.places(guide.from_cell)
+    along_x, along_y = middle[0] + across.ravel(), middle[1] + down.ravel()
     own = 1 / math.hypot(1, *middle)
     cosine = 1 / np.sqrt(1 + along_x**2 + along_y[:, None] ** 2)
     # Sines are relative to the sine of the source's direction, which the phase of the modes already contains.
     sine_x, sine_y = along_x * cosine - middle[0] * own, along_y[:, None] * cosine - middle[1] * own
-    sines = _grid_around(sine_x, sine_y, cells.step)
+    sines = _grid_around(sine_x, sine_y, rows.step)
     modes = guide.waveguide.modes(beam.wavelength)
     taken = np.array([guide.waveguide.absorbed(mode) for mode in modes])
     steepest = float(np.hypot(np.abs(sine_x).max(), np.abs(sine_y).max()))
-    digits = MORE_DIGITS - math.log10(cells.tolerance)
+    digits = MORE_DIGITS - math.log10(rows.tolerance)
     caught = modes_at_pupil(beam, modes, steepest, spot.centre, digits)
     seen = caught.power_on(sines, taken, digits)
     places = [(sine_y - sines.y[0]) / sines.dx, (sine_x - sines.x[0]) / sines.dx]
     found = map_coordinates(seen, places, order=DEGREE, mode="nearest")
-    nodes = len(weight)
-    by_cell = found.reshape(cells.count, nodes, cells.count, nodes)
+    by_cell = found.reshape(rows.count, len(weight_y), columns.count, len(weight_x))
     inner = seen[MARGIN:-MARGIN, MARGIN:-MARGIN].sum() * sines.dx**2
-    return np.einsum("yaxb,a,b->yx", by_cell, weight, weight), float(inner / caught.total(taken))
+    return np.einsum("yaxb,a,b->yx", by_cell, weight_y, weight_x), float(inner / caught.total(taken))
 
 
 def _grid_around(x: np.ndarray, y: np.ndarray, step: float) -> Grid:

@@ -36,7 +36,7 @@ class KernelBank:
 
     inverse_distance: 1/z [1/m] of the (nearest, farthest) distance.
     field: (half height, half width) of the retina in cells.
-    kernels: a Dr.Jit tensor (band, k, k) for each node (layer, row, column).
+    kernels: a Dr.Jit tensor (band, ky, kx) for each node (layer, row, column).
     choices: the chosen numbers of nodes, for depth and for the field.
     averaged: True if a receptor's signal is the mean over its cells. It is False with waveguides.
     """

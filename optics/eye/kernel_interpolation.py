@@ -127,14 +127,14 @@ def worst_difference(terms: Sequence[tuple[float, np.ndarray]], samples_per_rece
     It is the sum over the positive part, or over the negative part, of the receptor's receptive field (kernel ⊗
     receptor aperture).
 
-    terms: pairs of share and kernel (band, k, k).
+    terms: pairs of share and kernel (band, ky, kx).
     """
-    side = max(kernel.shape[-1] for _, kernel in terms)
-    total = np.zeros((terms[0][1].shape[0], side, side))
+    sides = np.max([kernel.shape for _, kernel in terms], axis=0)
+    total = np.zeros(sides)
     for share, kernel in terms:
-        margin = (side - kernel.shape[-1]) // 2
-        inner = slice(margin, side - margin)
-        total[:, inner, inner] += share * kernel
+        margins = (sides - kernel.shape) // 2
+        inner = tuple(slice(margin, side - margin) for margin, side in zip(margins, sides, strict=True))
+        total[inner] += share * kernel
     s = samples_per_receptor
     for _ in range(2):  # convolution with the receptor's aperture along one axis, then along the other
         summed = np.cumsum(np.pad(total, ((0, 0), (0, 0), (s, s - 1))), axis=2)

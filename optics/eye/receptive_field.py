@@ -34,14 +34,15 @@ MOST_SECONDS = 3.0  # choice: time limit for the PSF of a band [s]
 
 @dataclass(frozen=True)
 class Retina:
-    """Properties of the retina that define the PSF: distance [m], wavelengths [m], cell size [m], tolerance, dtype.
+    """Properties of the retina that define the PSF: distance [m], wavelengths [m], cells, tolerance, dtype.
 
+    cell: height and width of a cell [m].
     pupil_turned: True if the pupil is rotated by 180° about the axis.
     """
 
     distance: Scalar
     wavelengths: np.ndarray
-    cell: float
+    cell: tuple[float, float]
     tolerance: float
     dtype: str = "float32"
     pupil_turned: bool = False
@@ -105,7 +106,7 @@ class Spot:
 def visual_kernel(
     pupil: Pupil, retina: Retina, z: Scalar, direction: tuple[float, float] = (0.0, 0.0), from_cell: bool = False
 ) -> Array:
-    """Return the PSF, integrated over the retina's cells: Dr.Jit (band, k, k), k odd.
+    """Return the PSF, integrated over the retina's cells: Dr.Jit (band, ky, kx), both odd.
 
     The cells lie around the geometric image. Their rows ascend with y and their columns with x. The image on the retina
     is inverted, so that this is also the order of the visual field, from top to bottom and from left to right.
@@ -124,18 +125,20 @@ def visual_kernel(
         _request(beam, spot, need, spot.window(_pitch_for_cells(need.pitch, retina), BESIDE), retina)
         for beam, need in zip(beams, spot.needs, strict=True)
     ]
-    tiles, types = Tiles(spot.cells(retina.cell) + 2 * from_cell, retina.cell, from_cell), precision(retina.dtype)
-    kernels = []
+    rows, columns = (Tiles(spot.cells(side) + 2 * from_cell, side, from_cell) for side in retina.cell)
+    types, kernels = precision(retina.dtype), []
     for request, picture in zip(requests, pictures(requests, alike=True), strict=True):
         window = request.problem.window
         # Samples and cells both run backwards. A symmetric pupil thus has the same sums, in the same order, as a turned
         # one, whose samples run forwards.
-        backwards = types.Tensor(cell_integrals(window.shape[0], window.dx, tiles)[::-1].copy())
-        samples = picture.image if retina.pupil_turned else dr.reverse(picture.image)
-        image = types.Tensor(samples, window.shape)
-        kernels.append(matmul(backwards, matmul(image, backwards, transposed=True)).array)
+        down, across = (
+            types.Tensor(cell_integrals(samples, window.dx, tiles)[::-1].copy())
+            for samples, tiles in zip(window.shape, (rows, columns), strict=True)
+        )
+        image = types.Tensor(picture.image if retina.pupil_turned else dr.reverse(picture.image), window.shape)
+        kernels.append(matmul(down, matmul(image, across, transposed=True)).array)
     flat = kernels[0] if len(kernels) == 1 else dr.concat(kernels)
-    return dr.maximum(types.Tensor(flat, (len(kernels), tiles.count, tiles.count)), 0)
+    return dr.maximum(types.Tensor(flat, (len(kernels), rows.count, columns.count)), 0)
 
 
 def retinal_psf(pupil: Pupil, retina: Retina, z: Scalar, direction: tuple[float, float] = (0.0, 0.0)) -> PSFResult:
@@ -160,13 +163,14 @@ def spot_of(beams: list[Beam], retina: Retina) -> Spot:
     centre_x, centre_y = _image(beams[len(beams) // 2], distance)
     needs = tuple(_needs(beam, retina, (centre_x, centre_y)) for beam in beams)
     half, pitch = max(need.half_window for need in needs), min(need.pitch for need in needs)
-    if _cells_within(half, retina.cell) > MOST_CELLS:
+    narrow = min(retina.cell)
+    if _cells_within(half, narrow) > MOST_CELLS:
         raise AccuracyError(
-            f"the light spreads over {2 * half:.3g} m, {2 * half / retina.cell:.0f} cells of {retina.cell:.3g} m: "
+            f"the light spreads over {2 * half:.3g} m, {2 * half / narrow:.0f} cells of {narrow:.3g} m: "
             f"at most {MOST_CELLS}; increase the field of view or the cells"
             + (", or flatten the relief" if beams[0].pupil.height is not None else "")
         )
-    half = retina.cell * (_cells_within(half, retina.cell) + 1) / 2
+    half = max(side * (_cells_within(half, side) + 1) / 2 for side in retina.cell)
     return Spot((centre_x, centre_y), half, pitch, needs)
 
 
@@ -183,7 +187,7 @@ def _image(beam: Beam, distance: float) -> tuple[float, float]:
 def _pitch_for_cells(pitch: float, retina: Retina) -> float:
     """Return the largest pitch [m] for integrals over cells, given the `pitch` that the PSF itself requires."""
     each = samples_per_cycle(retina.tolerance)
-    return pitch * each / samples_per_cycle(retina.tolerance, retina.cell / (pitch * each))
+    return pitch * each / samples_per_cycle(retina.tolerance, min(retina.cell) / (pitch * each))
 
 
 def _spread(beams: list[Beam], spot: Spot, retina: Retina) -> PSFResult:
@@ -200,10 +204,11 @@ def _request(beam: Beam, spot: Spot, need: _WindowNeeds, window: Grid, retina: R
 def perfect_psf(retina: Retina, radius: float) -> PSFResult:
     """Return a PSF with all power in one cell: a perfect lens of this aperture radius [m], without diffraction."""
     types = precision(retina.dtype)
-    image = types.Tensor(np.full((len(retina.wavelengths), 1, 1), 1 / retina.cell**2))
+    _, width = retina.cell
+    image = types.Tensor(np.full((len(retina.wavelengths), 1, 1), 1 / width**2))
     pupil = Pupil(radius, thin_lens_focal_length=retina.distance)
     plan = Plan("perfect_lens", (1, 1), retina.dtype, 0.0, "no pupil: geometric image, no blur")
-    return PSFResult(image, retina.cell, retina.wavelengths, retina.distance, pupil, (plan,))
+    return PSFResult(image, width, retina.wavelengths, retina.distance, pupil, (plan,))
 
 
 def _needs(beam: Beam, retina: Retina, centre: tuple[float, float]) -> _WindowNeeds:

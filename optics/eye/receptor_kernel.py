@@ -34,12 +34,12 @@ def receptor_kernel(eye: EyeSpec, retina: Retina, z: Scalar, direction: tuple[fl
         return visual_kernel(eye.pupil, retina, z, direction, from_cell)
     without_derivative("fov_deg", eye.sensor_distance)
     without_derivative("z", z)
-    guide = Guide(eye.waveguide, number(eye.sensor_distance), round(eye.receptor_pitch / retina.cell), from_cell)
+    guide = Guide(eye.waveguide, number(eye.sensor_distance), round(eye.receptor_pitch / retina.cell[1]), from_cell)
     return guided_kernel(eye.pupil, retina, z, direction, guide)
 
 
 def white_share(kernels: np.ndarray, bands: SpectralBands) -> float:
-    """Return the share of white's signal in daylight that kernels (band, k, k) transmit, averaged over channels."""
+    """Return the share of white's signal in daylight that kernels (band, ky, kx) transmit, averaged over channels."""
     seen = kernels.sum(axis=(1, 2)) * daylight(bands.wavelengths)
     return float((bands.weights @ seen).mean())
 

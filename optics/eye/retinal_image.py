@@ -118,9 +118,9 @@ def at_receptors(image: Array, samples_per_receptor: int, types: Precision) -> A
 
 
 def with_centre(kernel: Array) -> Array:
-    """Return a kernel (band, k, k) with odd k. An even kernel is shifted by half a cell."""
-    side = kernel.shape[-1]
-    return kernel if side % 2 else type(kernel)(np.pad(kernel.numpy(), ((0, 0), (1, 0), (1, 0))))
+    """Return a kernel (band, ky, kx) with odd ky and kx. Even sides are extended by one, a shift by half a cell."""
+    odd = [(side + 1) % 2 for side in kernel.shape[1:]]
+    return type(kernel)(np.pad(kernel.numpy(), ((0, 0), *((more, 0) for more in odd)))) if any(odd) else kernel
 
 
 def _of_receptors(image: Array, shares: np.ndarray, types: Precision) -> Array:

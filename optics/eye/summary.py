@@ -37,16 +37,18 @@ class Description:
         distance to the retina. The brightness of the image is proportional to 1/f_number².
     wavelength: mean wavelength [m] of daylight, weighted by the receptors.
     diffraction_cpd: cut-off frequency of an aperture of this width, 2 sin θ/λ on the retina.
-    sampling_cpd: Nyquist frequency of the receptors, 1/(2 Δφ).
+    sampling_cpd: Nyquist frequency of the receptors, 1/(2 Δφ), horizontally.
     noise_cpd: lowest frequency at which the contrast of the optics falls below the noise.
-    acuity_cpd: smallest of these three frequencies; NaN if one is unknown.
+    acuity_cpd: horizontal acuity, the smallest of these three frequencies; NaN if one is unknown.
+    acuity_vertical_cpd: vertical acuity, with the Nyquist frequency of the receptors' rows.
     binding: name of the smallest known limit: "diffraction", "sampling" or "noise".
     strehl_ratio: Strehl ratio of the band nearest `wavelength`.
     image_quality: see `optics.image_quality`.
     noise: standard deviation of the signal of a receptor that sees white, from all sources of noise.
     photons: photons that such a receptor absorbs per integration time, averaged over channels (None: no photon budget).
     acceptance_angle_deg: full width at half maximum of a receptor's angular sensitivity, horizontally.
-    interommatidial_angle_deg: angle Δφ between neighbouring receptors.
+    interommatidial_angle_deg: angle Δφ between horizontally neighbouring receptors.
+    interommatidial_vertical_deg: the same between vertically neighbouring receptors.
     plan: plan of the PSF of the least accurate band.
     white_signal: signal of a receptor that sees white: the throughput, reduced by the losses of waveguides.
     unknown: one line, with the reason, for each measure that cannot be computed accurately enough from the PSF. The
@@ -66,6 +68,7 @@ class Description:
     photons: float | None
     acceptance_angle_deg: float
     interommatidial_angle_deg: float
+    interommatidial_vertical_deg: float
     plan: Plan
     unknown: tuple[str, ...] = ()
     white_signal: float = math.nan
@@ -83,6 +86,18 @@ class Description:
     def acuity_cpd(self) -> float:
         return self._limits[self.binding] if len(self._limits) == len(LIMITS) else math.nan
 
+    @property
+    def sampling_vertical_cpd(self) -> float:
+        return 1 / (2 * self.interommatidial_vertical_deg)
+
+    @property
+    def acuity_vertical_cpd(self) -> float:
+        return self._vertical_limit if len(self._limits) == len(LIMITS) else math.nan
+
+    @property
+    def _vertical_limit(self) -> float:
+        return min((self._limits | {"sampling": self.sampling_vertical_cpd}).values())
+
     def __str__(self) -> str:
         shot = "" if self.photons is None else f", of {self.photons:.3g} photons per receptor"
         bound = "at most " if math.isnan(self.acuity_cpd) else ""
@@ -92,6 +107,7 @@ class Description:
             "noise": f"{self.noise:.2g} of {self.white_signal:.3g} for white{shot}",
             **{f"limit: {name}": f"{_cycles(limit)}{self._mark(name)}" for name, limit in self._limits.items()},
             "acuity": f"{bound}{_cycles(self._limits[self.binding])}, {self.binding} binds",
+            **self._vertical_rows(bound),
             "acceptance": f"{self.acceptance_angle_deg:.3g}°, {self._overlap:.3g} of the angle between receptors",
             "receptors": f"{self.interommatidial_angle_deg:.3g}° apart",
             "PSF": f"{self.plan.method}, {self.plan.samples[0]} x {self.plan.samples[1]} samples, "
@@ -99,6 +115,13 @@ class Description:
             **{f"not known ({number})": line for number, line in enumerate(self.unknown, start=1)},
         }
         return "\n".join(f"{name:<20}{value}" for name, value in rows.items())
+
+    def _vertical_rows(self, bound: str) -> dict[str, str]:
+        """Rows on the vertical direction, unless receptors are square."""
+        if math.isclose(self.interommatidial_vertical_deg, self.interommatidial_angle_deg, rel_tol=1e-9):
+            return {}
+        apart = f"rows of receptors {self.interommatidial_vertical_deg:.3g}° apart"
+        return {"acuity, vertical": f"{bound}{_cycles(self._vertical_limit)}, {apart}"}
 
     def _mark(self, name: str) -> str:
         return "  <- binding" if name == self.binding else ""
@@ -157,6 +180,7 @@ def describe(eye: EyeSpec, light: float, result: PSFResult, kernel: Kernels) -> 
         photons=photons,
         acceptance_angle_deg=_acceptance(eye, white, kernel) / per_degree,
         interommatidial_angle_deg=eye.receptor_pitch / per_degree,
+        interommatidial_vertical_deg=eye.receptor_size[0] / per_degree,
         plan=result.plan,
         unknown=tuple(unknown),
     )
@@ -203,8 +227,8 @@ def _acceptance(eye: EyeSpec, white: PSFResult, kernel: Kernels) -> float:
         return eye.receptor_pitch
     if eye.waveguide is not None:
         return _guided_acceptance(eye, eye.waveguide.diameter, kernel)
-    half = eye.receptor_pitch / 2
-    rows = _within(white.y, white.psf[0], white.y, half)
+    half_height, half = (side / 2 for side in eye.receptor_size)
+    rows = _within(white.y, white.psf[0], white.y, half_height)
     peak = int(np.argmax(_within(white.x, rows.T, white.x, half).max(axis=0)))
     at = np.arange(white.x[0] - half, white.x[-1] + half, white.dx / FINER)
     profile = _within(white.x, rows[peak], at, half)

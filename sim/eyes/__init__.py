@@ -2,6 +2,7 @@
 
 eyes              Eyes: the eyes of the built-in agent
 sampling          choice of the rays or areas of an eye
+tangent_plane     size, directions and parts of receptors on the plane at distance 1
 sensor            directions and weights of the samples
 receptive_fields  receptive fields behind a pupil, and random directions drawn from all of them
 field_areas       rectangles of the visual field, and the share of each receptive field in them

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from optics.numerics.arguments import shown
+from optics.numerics.renamed import warn_renamed
 from optics.spectra.bands import FINEST
 from optics.spectra.photon_budget import PhotonBudget
 from optics.spectra.receptors import receptors_of
@@ -48,6 +49,8 @@ class Eyes:
     waveguide: an optics.Waveguide: receptors are rhabdoms, which receive light in waveguide modes; this requires
         `optics`. None: each receptor receives all light that falls on its square.
     pupil_turned: True if the pupils are rotated by 180° about their axes
+    vertical_fov_deg: vertical field of view of one eye [deg], in [0.001, 170], which determines the height of the
+        receptors. None: receptors are square.
 
     Raises:
         ValueError: a value is outside its range, or the receptors are unknown; the message suggests the nearest name.
@@ -65,6 +68,7 @@ class Eyes:
     photon_budget: PhotonBudget | None = None
     waveguide: Waveguide | None = None
     pupil_turned: bool = False
+    vertical_fov_deg: float | None = None
 
     def __post_init__(self) -> None:
         def check(name: str, valid: Callable[[Any], bool], range_: str) -> None:
@@ -86,6 +90,7 @@ class Eyes:
             f"(height, width), whole numbers, each at least 1 and at most {MOST}",
         )
         check("fov_deg", lambda x: 1e-3 <= x <= 170.0, "in [0.001, 170]")
+        check("vertical_fov_deg", lambda x: x is None or 1e-3 <= x <= 170.0, "in [0.001, 170], or None")
         check("placement_range_deg", lambda x: 0.0 <= x <= 360.0, "in [0, 360]")
         check("sensor_width", lambda x: 0.0 < x < math.inf, "positive and finite")
         check("noise_sigma", lambda x: 0.0 <= x < math.inf, "non-negative and finite")
@@ -122,13 +127,19 @@ class Eyes:
             photon_budget=self.photon_budget,
             waveguide=self.waveguide,
             pupil_turned=self.pupil_turned,
+            vertical_fov_deg=self.vertical_fov_deg,
         )
 
     def _check_waveguide(self) -> None:
+        from optics.eye.geometry import receptor_size
         from optics.eye.guided_field import check_guide
 
         try:
-            check_guide(self.waveguide, self.optics, self.sensor_width / self.resolution[1])
+            check_guide(
+                self.waveguide,
+                self.optics,
+                receptor_size(self.resolution, self.sensor_width, self.fov_deg, self.vertical_fov_deg),
+            )
         except ValueError as error:
             raise ValueError(f"Eyes: {error}") from None
 
@@ -148,10 +159,25 @@ class Eyes:
         special = {1: ("center",), 2: ("left", "right"), 3: ("left", "center", "right")}
         return special.get(self.n_eyes, tuple(f"eye_{i}" for i in range(self.n_eyes)))
 
-    def fov_vertical_deg(self) -> float:
-        """Return the vertical field of view [deg] of a flat retina with square receptors."""
+    @property
+    def fovy_deg(self) -> float:
+        """Vertical field of view of one eye [deg]: `vertical_fov_deg`, or that of square receptors."""
+        if self.vertical_fov_deg is not None:
+            return self.vertical_fov_deg
         height, width = self.resolution
         return math.degrees(2 * math.atan(math.tan(math.radians(self.fov_deg) / 2) * height / width))
+
+    @property
+    def field_aspect(self) -> float:
+        """Width of an eye's field of view divided by its height, on a plane in front of the eye."""
+        if self.vertical_fov_deg is None:
+            return self.resolution[1] / self.resolution[0]
+        return math.tan(math.radians(self.fov_deg) / 2) / math.tan(math.radians(self.vertical_fov_deg) / 2)
+
+    def fov_vertical_deg(self) -> float:
+        """Return `fovy_deg`. Deprecated."""
+        warn_renamed("Eyes.fov_vertical_deg()", "Eyes.fovy_deg")
+        return self.fovy_deg
 
 
 def _is_pupil(value: Any) -> bool:

@@ -54,13 +54,13 @@ class FieldAreas:
 
     @property
     def middles(self) -> np.ndarray:
-        """Centres of the rectangles, x right, y down [receptor pitches], (rectangle, 2)."""
+        """Centres of the rectangles, x right, y down [receptor widths and heights], (rectangle, 2)."""
         y, x = ((e[1:] + e[:-1]) / 2 for e in self.edges)
         return np.stack(np.broadcast_arrays(x[None], y[:, None]), axis=-1).reshape(-1, 2)
 
     @property
     def size(self) -> tuple[float, float]:
-        """Width and height of a rectangle [receptor pitches]."""
+        """Width and height of a rectangle [receptor widths and heights]."""
         y, x = self.edges
         return float(x[1] - x[0]), float(y[1] - y[0])
 
@@ -72,11 +72,11 @@ class FieldAreas:
 
         receptors: receptors, numbered row by row
         """
-        size, cells = fields.field.shape[1], fields.cells
         rows, columns = np.divmod(receptors, fields.resolution[1])
+        lines = zip(self.edges, fields.resolution, fields.field.shape[1:], (rows, columns), strict=True)
         down, across = (
-            {i: _shares(e, i + 0.5 - n / 2, size, cells) for i in np.unique(places)}
-            for e, n, places in zip(self.edges, fields.resolution, (rows, columns), strict=True)
+            {i: _shares(e, i + 0.5 - n / 2, size, fields.cells) for i in np.unique(places)}
+            for e, n, size, places in lines
         )
         in_columns = {j: fields.field @ shares.T for j, shares in across.items()}
         found = np.stack([down[i] @ in_columns[j] for i, j in zip(rows, columns, strict=True)], axis=1)

@@ -29,7 +29,7 @@ class NoRaysError(ValueError):
 class Draw:
     """Random directions, drawn from the mixture of receptive fields.
 
-    points: points on the tangent plane [receptor pitches], x right, y down, (ray, 2), in order of y
+    points: points on the tangent plane [receptor widths and heights], x right, y down, (ray, 2), in order of y
     rows, columns: indices of the mixture's cells that contain the points, (ray,)
     """
 
@@ -87,7 +87,7 @@ class ReceptiveFields:
 
     @property
     def widths(self) -> tuple[float, float]:
-        """Height and width of the field in the plane in which it is narrowest [receptor pitches].
+        """Height and width of the field in the plane in which it is narrowest [receptor heights and widths].
 
         They are the equivalent widths (sum p)² / sum p² of the field's vertical and horizontal profiles p. A uniform
         field that covers a receptor's square has the width 1.
@@ -151,7 +151,7 @@ def cells_for(eye: optics.Eye) -> int:
     fewest = cells_per_receptor(eye.resolution)
     if eye.waveguide is None:
         return fewest
-    return min(max(fewest, math.ceil(CELLS_ACROSS * eye.receptor_pitch / eye.waveguide.diameter)), MOST_CELLS)
+    return min(max(fewest, math.ceil(CELLS_ACROSS * max(eye.receptor_size) / eye.waveguide.diameter)), MOST_CELLS)
 
 
 def receptive_fields_of(eye: optics.Eye, depth: DepthLayers = ONE_PSF) -> ReceptiveFields:
@@ -201,9 +201,9 @@ def van_der_corput(n: int, base: int) -> np.ndarray:
 
 def _as_wide(kernels: list[np.ndarray]) -> np.ndarray:
     """Return the planes of all kernels as one array (plane, y, x); zeros are added around narrower kernels."""
-    side = max(kernel.shape[-1] for kernel in kernels)
-    margins = [(side - kernel.shape[-1]) // 2 for kernel in kernels]
-    return np.concatenate([np.pad(k, ((0, 0), (m, m), (m, m))) for k, m in zip(kernels, margins, strict=True)])
+    sides = np.max([kernel.shape[1:] for kernel in kernels], axis=0)
+    margins = [[(0, 0), *((m, m) for m in (sides - kernel.shape[1:]) // 2)] for kernel in kernels]
+    return np.concatenate([np.pad(kernel, margin) for kernel, margin in zip(kernels, margins, strict=True)])
 
 
 def _averaged(kernel: np.ndarray, cells: int) -> np.ndarray:

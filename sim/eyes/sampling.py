@@ -26,6 +26,7 @@ from sim.eyes.receptive_fields import (
 )
 from sim.eyes.receptor_sums import within_stretches
 from sim.eyes.sensor import BoxSensor, ReceptiveFieldSensor, Sensor
+from sim.eyes.tangent_plane import aspect_of, directions_of, extent_of, on_tangent_plane, parts_of
 
 # Chosen: small weights are omitted if this changes no signal by more than this share of the receptors' noise. The noise
 # and this error together are then at most √(1 + 0.1²) = 1.005 times the noise alone.
@@ -66,9 +67,10 @@ class BoxSampling:
         return BoxSensor(*self._rays(rays, np.arange(np.prod(self.eye.resolution))), rays)
 
     def areas(self, per_receptor: float, *, in_rows: bool = True) -> BoxSensor:
-        """Return the sensor whose samples divide each receptor's square into a grid of this number of rectangles.
+        """Return the sensor whose samples divide each receptor into a grid of this number of rectangles.
 
-        If `in_rows` is True, the grid has at most as many rows as columns; otherwise it has a single row.
+        If `in_rows` is True, the rectangles are as nearly square as possible (see `parts_of`); otherwise the grid has a
+        single row.
         """
         count = max(1, round(per_receptor))
         return BoxSensor(*self._areas(count, in_rows, np.arange(np.prod(self.eye.resolution))))
@@ -83,12 +85,12 @@ class BoxSampling:
     def _areas(
         self, count: int, in_rows: bool, receptors: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, int, DepthLayers, tuple[float, float]]:
-        rows, columns = parts_of(count, in_rows)
+        rows, columns = parts_of(count, in_rows, aspect_of(self.eye))
         y, x = (index.ravel() for index in np.indices((rows, columns)))
         within = np.stack([(x + 0.5) / columns, (y + 0.5) / rows], axis=-1)
         points = (within + self._corners()[receptors]).reshape(-1, 2)
         plane = on_tangent_plane(self.eye, points).astype(np.float32)
-        return plane, _unused(plane), count, self.depth, _extent(self.eye, (1 / columns, 1 / rows))
+        return plane, _unused(plane), count, self.depth, extent_of(self.eye, (1 / columns, 1 / rows))
 
     def trial(self, rays_per_receptor: float, receptors: np.ndarray) -> Trial:
         """Return the samples of the sensor with this number of rays, for these receptors only (numbered row by row)."""
@@ -175,7 +177,7 @@ class FieldSampling:
         lattice = self._lattice(per_receptor, in_rows)
         plane = on_tangent_plane(self.eye, lattice.middles).astype(np.float32)
         weights = self._in_rows(lambda receptors: lattice.weights(self.fields, receptors))
-        extent = _extent(self.eye, lattice.size)
+        extent = extent_of(self.eye, lattice.size)
         return ReceptiveFieldSensor(plane, _unused(plane), weights, self.eye.resolution, self.depth, extent)
 
     def may_share(self, per_receptor: float, *, in_rows: bool = True) -> bool:
@@ -184,18 +186,19 @@ class FieldSampling:
         The same must be true of their height. Larger areas would give neighbouring receptors with different fields the
         same signal.
         """
-        sides = (1 / n for n in _parts_or_share(per_receptor, in_rows))
+        sides = (1 / n for n in _parts_or_share(per_receptor, in_rows, aspect_of(self.eye)))
         return all(side <= max(1, width / 2) for side, width in zip(sides, self.fields.widths, strict=True))
 
     def area_trial(self, per_receptor: float, receptors: np.ndarray, *, in_rows: bool = True) -> Trial:
         """Return the samples of the sensor with this number of areas, for these receptors only."""
         lattice = self._lattice(per_receptor, in_rows)
         plane = on_tangent_plane(self.eye, lattice.middles).astype(np.float32)
-        return Trial(plane, _unused(plane), lattice.weights(self.fields, receptors), _extent(self.eye, lattice.size))
+        return Trial(plane, _unused(plane), lattice.weights(self.fields, receptors), extent_of(self.eye, lattice.size))
 
     def _lattice(self, per_receptor: float, in_rows: bool) -> FieldAreas:
         beyond = min(allowed_error(self.eye, self.tolerance) / self.eye.aperture_throughput, BEYOND)
-        return FieldAreas.from_fields(self.fields, _parts_or_share(per_receptor, in_rows), beyond)
+        parts = _parts_or_share(per_receptor, in_rows, aspect_of(self.eye))
+        return FieldAreas.from_fields(self.fields, parts, beyond)
 
     def _sensor(self, rays: int) -> ReceptiveFieldSensor:
         draw = self.fields.draw(rays)
@@ -214,32 +217,20 @@ class FieldSampling:
         return within_stretches(weights, self.eye.resolution, negligible_share(self.eye))
 
 
-def parts_of(count: int, in_rows: bool) -> tuple[int, int]:
-    """Return the rows and columns of a receptor that is divided into this number of parts."""
-    rows = max(n for n in range(1, math.isqrt(count) + 1) if count % n == 0) if in_rows else 1
-    return rows, count // rows
-
-
-def _parts_or_share(per_receptor: float, in_rows: bool) -> tuple[float, float]:
+def _parts_or_share(per_receptor: float, in_rows: bool, aspect: float) -> tuple[float, float]:
     """Return the numbers of rows and columns of areas per receptor.
 
     One or more areas per receptor are rounded to a whole number. If `per_receptor` is below 1, several receptors share
     an area, so there is less than one column per receptor, and with `in_rows` also less than one row.
     """
     if per_receptor >= 1:
-        return parts_of(round(per_receptor), in_rows)
+        return parts_of(round(per_receptor), in_rows, aspect)
     return (math.sqrt(per_receptor), math.sqrt(per_receptor)) if in_rows else (1.0, per_receptor)
 
 
 def _unused(plane: np.ndarray) -> np.ndarray:
     """Return placeholders for bounce samples. Areas do not use them: their reflected light is read from a table."""
     return np.zeros((len(plane), 2), np.float32)
-
-
-def _extent(eye: optics.Eye, size: tuple[float, float]) -> tuple[float, float]:
-    """Return a rectangle's width and height on the plane at distance 1, from its size in receptor pitches."""
-    side = eye.receptor_pitch / eye.sensor_distance
-    return side * size[0], side * size[1]
 
 
 def _bounce_samples(draw: Draw) -> np.ndarray:
@@ -272,24 +263,6 @@ def build_sensor(eye: optics.Eye, rays_per_receptor: float, depth: DepthLayers =
         optics.AccuracyError: the pupil spreads light too far for the PSF to be computed.
     """
     return eye_sampling(eye, depth).sensor(rays_per_receptor)
-
-
-def directions_of(eye: optics.Eye, plane: np.ndarray) -> np.ndarray:
-    """Return unit vectors (ray, 3) in the eye's frame towards points of the tangent plane.
-
-    plane: points (x right, y down) [receptor pitches], (ray, 2)
-    """
-    v = on_tangent_plane(eye, plane)
-    return (v / np.linalg.norm(v, axis=-1, keepdims=True)).astype(np.float32)
-
-
-def on_tangent_plane(eye: optics.Eye, plane: np.ndarray) -> np.ndarray:
-    """Return points of the tangent plane as points in the eye's frame at distance 1 along its axis, (ray, 3).
-
-    plane: points (x right, y down) [receptor pitches], (ray, 2)
-    """
-    side = eye.receptor_pitch / eye.sensor_distance
-    return np.stack([plane[:, 0] * side, -plane[:, 1] * side, np.ones(len(plane))], axis=-1)
 
 
 def negligible_share(eye: optics.Eye) -> float:

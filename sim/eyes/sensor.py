@@ -3,9 +3,9 @@
 `sim.eyes.sampling` chooses the samples. All directions are fixed when the sensor is built, so that the same kernel
 renders every step.
 
-Coordinates are positions on the visual field's tangent plane, in receptor pitches: x to the right, and y *down*, in the
-direction of increasing rows. The origin is on the optical axis. For h x w receptors, receptor (i, j) covers the square
-[j - w/2, j + 1 - w/2] x [i - h/2, i + 1 - h/2].
+Coordinates are positions on the visual field's tangent plane: x to the right, in receptor widths, and y *down*, in
+receptor heights, in the direction of increasing rows. The origin is on the optical axis. For h x w receptors, receptor
+(i, j) covers the square [j - w/2, j + 1 - w/2] x [i - h/2, i + 1 - h/2].
 """
 
 from __future__ import annotations

@@ -49,15 +49,16 @@ def depth(trials: FidelityTrials, eye: optics.Eye, allowed: float) -> tuple[Dept
     the world.
 
     Light that comes from a point at the distance z and passes the pupil at p is shifted by f p/z, compared with light
-    from infinity. The mean of this shift over a disk of radius R is |Δx| + |Δy| = 8/(3π) f R/z. Relative to the width
-    of a square receptor, it is the share of the receptor's field that moves. This share bounds the error of any scene
+    from infinity. The means of |Δx| and |Δy| over a disk of radius R are both 4/(3π) f R/z. Divided by a receptor's
+    width and height, they sum to the share of the receptor's field that moves. This share bounds the error of any scene
     up to white.
     """
     if eye.pupil is None:
         return ONE_PSF, Level("depth", str(ONE_PSF), 0.0, "a perfect lens does not blur")
     distances = trials.distances()
     near, far = float(np.quantile(distances, NEAREST, method="higher")), float(distances[-1])
-    shift = 8 / (3 * math.pi) * eye.sensor_distance * eye.pupil.radius / near / eye.receptor_pitch
+    aside = 4 / (3 * math.pi) * eye.sensor_distance * eye.pupil.radius / near
+    shift = sum(aside / side for side in eye.receptor_size)
     bound = eye.throughput * shift
     if bound <= allowed:
         why = f"blur of {shift:.1e} of a receptor at {near:.2g} m, the nearest visible distance"

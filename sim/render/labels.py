@@ -9,7 +9,7 @@ import numpy as np
 
 from optics.numerics.autodiff import Array
 from sim.eyes.depth_layers import ONE_PSF
-from sim.eyes.sampling import directions_of
+from sim.eyes.tangent_plane import directions_of
 from sim.render.eye_rays import FreeEyes
 from sim.render.optic_flow import flow_between, receptor_centres
 from sim.render.pending_frame import FrameSlot

@@ -38,9 +38,10 @@ def see(world: World, eyes: Eyes, state: WorldState, index: int = 0) -> np.ndarr
 def receptor_direction(eyes: Eyes, axis: np.ndarray, row: int, column: int) -> np.ndarray:
     """Return the unit vector (3,) in which a receptor's centre looks; axis: of the eye, (3,); row 0 is on top."""
     height, width = eyes.resolution
-    pitch = 2 * np.tan(np.radians(eyes.fov_deg) / 2) / width  # pitch of receptors on a plane at distance 1
     right, up = np.array([axis[1], -axis[0], 0]), np.array([0, 0, 1])
-    towards = axis + pitch * (column + 0.5 - width / 2) * right - pitch * (row + 0.5 - height / 2) * up
+    across = np.tan(np.radians(eyes.fov_deg) / 2) * ((2 * column + 1) / width - 1)
+    down = np.tan(np.radians(eyes.fovy_deg) / 2) * ((2 * row + 1) / height - 1)
+    towards = axis + across * right - down * up
     return np.asarray(towards / np.linalg.norm(towards))
 
 

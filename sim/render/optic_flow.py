@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 import optics
-from sim.eyes.sampling import on_tangent_plane
+from sim.eyes.tangent_plane import on_tangent_plane, tangent_size
 from sim.scene.poses import Poses
 
 Frames = tuple[np.ndarray, np.ndarray]  # pupils [m] (world, eye, 3), eyes' frames (world, eye, 3, 3)
@@ -42,8 +42,8 @@ def flow_between(
     carried = _carried(points, np.where(seen, geoms, 0), moments)
     ahead = np.einsum("weqp,werq->werp", later_axes, carried - later_pupils[:, :, None])
     before = seen & (ahead[..., 2] > 0)
-    side = eye.receptor_pitch / eye.sensor_distance
-    places = ahead[..., :2] / np.where(before, ahead[..., 2], 1.0)[..., None] / side * [1, -1]
+    height, width = tangent_size(eye)
+    places = ahead[..., :2] / np.where(before, ahead[..., 2], 1.0)[..., None] / [width, -height]
     found = np.where(before[..., None], places - centres, np.nan)
     return np.moveaxis(found, -1, 2).reshape(worlds, eyes, 2, *eye.resolution).astype(np.float32)
 

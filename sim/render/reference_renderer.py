@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Mapping
+from fractions import Fraction
 from typing import Any
 
 import mujoco
@@ -21,6 +22,8 @@ from sim.scene.cameras import Viewpoint
 from sim.scene.mirror import MirrorWarning, mirror
 from sim.worlds.state import WorldState, pose
 from sim.worlds.world import World
+
+MOST_PIXELS = 16  # chosen: the largest number of pixels along a cell's side
 
 
 class ReferenceRenderer:
@@ -39,7 +42,7 @@ class ReferenceRenderer:
     seed: seed of the samples; the attribute may be changed between images
 
     Raises:
-        ValueError: an invalid argument.
+        ValueError: an invalid argument, or receptors whose sides are not in the ratio of small whole numbers.
         optics.AccuracyError: a pupil whose light spreads too far.
     """
 
@@ -61,6 +64,7 @@ class ReferenceRenderer:
         self.bands: optics.SpectralBands = self.eye.spectral_bands
         fewest = cells_for(self.eye) if self.eye.waveguide is not None else 4
         self.samples_per_receptor = samples_per_receptor or (1 if self.eye.pupil is None else fewest)
+        self._pixels = _pixels_per_cell(self.eye.receptor_size)
         self._integrator, self._spp, self._sampler, self.seed = integrator, spp, sampler, seed
         self._has_depth = depths is not None
         z: Any = np.array(depths) if depths else math.inf
@@ -74,8 +78,11 @@ class ReferenceRenderer:
     @property
     def shape(self) -> tuple[int, int]:
         """Cells (Y, X) of an image, which covers the fields of all receptors."""
-        reach = max(kernel.shape[-1] // 2 for kernel in self.sight.kernels.values())
-        height, width = (n * self.samples_per_receptor + 2 * reach for n in self.eye.resolution)
+        sides = np.max([kernel.shape[1:] for kernel in self.sight.kernels.values()], axis=0)
+        height, width = (
+            n * self.samples_per_receptor + 2 * (int(side) // 2)
+            for n, side in zip(self.eye.resolution, sides, strict=True)
+        )
         return height, width
 
     def pictures(self, state: WorldState) -> np.ndarray:
@@ -95,17 +102,20 @@ class ReferenceRenderer:
     def _signals(self, view: Viewpoint) -> np.ndarray:
         z: Any = math.inf
         if self._has_depth:
-            height, width = self.shape
-            z = self._mirror.render_depth(view, width, height)
+            (height, width), (down, across) = self.shape, self._pixels
+            fine = self._mirror.render_depth(view, width * across, height * down)
+            z = fine[down // 2 :: down, across // 2 :: across]
         return np.asarray(
             self.eye.see(self._picture(view), self.samples_per_receptor, z=z, sight=self.sight), np.float32
         )
 
     def _picture(self, view: Viewpoint) -> np.ndarray:
-        height, width = self.shape
-        return self._mirror.render(
-            view, width, height, self._integrator, self._spp, self.bands.wavelengths, self.seed, self._sampler
+        (height, width), (down, across) = self.shape, self._pixels
+        size = width * across, height * down
+        fine = self._mirror.render(
+            view, *size, self._integrator, self._spp, self.bands.wavelengths, self.seed, self._sampler
         )
+        return fine.reshape(-1, height, down, width, across).mean(axis=(2, 4))
 
     def _views(self, state: WorldState, index: int) -> list[Viewpoint]:
         """Return every eye's view of one world, after moving all bodies to their places in the state."""
@@ -115,9 +125,25 @@ class ReferenceRenderer:
         cos, sin = np.cos(state.heading[index]), np.sin(state.heading[index])
         turn = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
         agent = np.array([*state.position[index], EYE_HEIGHT])
-        half = self.shape[0] / 2 * self.eye.receptor_pitch / self.samples_per_receptor
+        half = self.shape[0] / 2 * self.eye.receptor_size[0] / self.samples_per_receptor
         fovy_deg = math.degrees(2 * math.atan(half / self.eye.sensor_distance))
         return [
             Viewpoint(agent + turn @ position, turn @ rotation, fovy_deg)
             for position, rotation in zip(eye_positions(azimuths), camera_rotations(azimuths), strict=True)
         ]
+
+
+def _pixels_per_cell(receptor: tuple[float, float]) -> tuple[int, int]:
+    """Return the rows and columns of square pixels in a cell, which has the shape of a receptor.
+
+    Raises:
+        ValueError: the ratio of the sides is not a ratio of whole numbers up to `MOST_PIXELS`.
+    """
+    height, width = receptor
+    ratio = Fraction(height / width).limit_denominator(MOST_PIXELS)
+    if not math.isclose(ratio, height / width, rel_tol=1e-6) or ratio.numerator > MOST_PIXELS:
+        raise ValueError(
+            f"Eyes.vertical_fov_deg makes receptors {height / width:.6g} times as high as wide: for the reference "
+            f"renderer, this must be a ratio of whole numbers up to {MOST_PIXELS}"
+        )
+    return ratio.numerator, ratio.denominator

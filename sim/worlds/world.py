@@ -217,4 +217,4 @@ def _add_eye_cameras(body: mujoco.MjsBody, eyes: Eyes) -> None:
     for i, (position, rotation) in enumerate(zip(eye_positions(azimuths), camera_rotations(azimuths), strict=True)):
         quat = np.empty(4)
         mujoco.mju_mat2Quat(quat, rotation.ravel())
-        body.add_camera(name=f"eye_{i}", pos=position.tolist(), quat=quat.tolist(), fovy=eyes.fov_vertical_deg())
+        body.add_camera(name=f"eye_{i}", pos=position.tolist(), quat=quat.tolist(), fovy=eyes.fovy_deg)

@@ -1,6 +1,6 @@
 """Tests of evolve/genome: which test covers which module.
 
-genes: test_genotype.py, test_rhabdoms.py
+genes: test_genotype.py, test_rhabdoms.py, test_vertical_fov.py
 genotype: test_genotype.py
 phenotype: test_genotype.py, test_anatomy.py
 anatomy: test_anatomy.py

@@ -9,7 +9,7 @@ from stable_baselines3 import PPO
 import optics
 import sim
 from sim.eyes.eyes import BODY_RADIUS
-from sim.eyes.sampling import directions_of
+from sim.eyes.tangent_plane import directions_of
 from sim.render.optic_flow import receptor_centres
 from sim.tasks.user_tasks import with_evolved_eyes
 from sim.worlds.state import pose

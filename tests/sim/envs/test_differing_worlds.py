@@ -9,7 +9,7 @@ from gymnasium.utils.env_checker import check_env
 from scipy.stats import kstest
 
 import sim
-from sim.eyes.sampling import directions_of
+from sim.eyes.tangent_plane import directions_of
 from sim.render.optic_flow import receptor_centres
 from sim.scene.variation import Variation
 from sim.scene.world_models import WorldModels

@@ -89,6 +89,7 @@ CHANGES = {
     "photon_budget": (PhotonBudget(illuminance=10.0), (2, 3, 4, 5)),
     "waveguide": (Waveguide(10e-6, 1.35), (2, 3, 4, 5)),
     "pupil_turned": (True, (2, 3, 4, 5)),
+    "vertical_fov_deg": (60.0, (2, 3, 4, 5)),
 }
 
 

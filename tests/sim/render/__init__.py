@@ -1,7 +1,7 @@
 """Tests of rendering: which test covers which module.
 
 one_ray: test_one_ray.py
-batched_renderer: test_batched_renderer.py, test_one_ray.py, test_reference_renderer.py
+batched_renderer: test_batched_renderer.py, test_one_ray.py, test_reference_renderer.py, test_vertical_field.py
 eye_renderer: test_eye_renderer.py, test_batched_renderer.py, test_model_renderer.py
 ray_kernel: test_batched_renderer.py, test_one_ray.py
 eye_rays: test_batched_renderer.py, test_model_renderer.py
@@ -9,7 +9,7 @@ area_kernel: test_area_kernel.py
 light_factors: test_eye_renderer.py, envs/test_light_levels.py
 labels: test_labels.py
 world_scene: test_batched_renderer.py
-reference_renderer: test_reference_renderer.py
+reference_renderer: test_reference_renderer.py, test_vertical_field.py
 fidelity: test_fidelity.py, eyes/test_depth_layers.py
 fidelity_choice: test_fidelity.py, test_model_fidelity.py
 world_fidelity: test_fidelity.py, eyes/test_depth_layers.py

@@ -10,7 +10,7 @@ import torch
 
 import optics
 import sim
-from sim.eyes.sampling import directions_of
+from sim.eyes.tangent_plane import directions_of
 from sim.render.optic_flow import receptor_centres
 from tests.sim.render.test_model_renderer import MODEL, posed
 

@@ -1,0 +1,59 @@
+"""Receptors on the tangent plane of an eye's visual field: their size, directions, and division into parts."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+import optics
+
+
+def directions_of(eye: optics.Eye, plane: np.ndarray) -> np.ndarray:
+    """Return unit vectors (ray, 3) in the eye's frame towards points of the tangent plane.
+
+    plane: points (x right, y down) [receptor widths and heights], (ray, 2)
+    """
+    v = on_tangent_plane(eye, plane)
+    return (v / np.linalg.norm(v, axis=-1, keepdims=True)).astype(np.float32)
+
+
+def on_tangent_plane(eye: optics.Eye, plane: np.ndarray) -> np.ndarray:
+    """Return points of the tangent plane as points in the eye's frame at distance 1 along its axis, (ray, 3).
+
+    plane: points (x right, y down) [receptor widths and heights], (ray, 2)
+    """
+    height, width = tangent_size(eye)
+    return np.stack([plane[:, 0] * width, -plane[:, 1] * height, np.ones(len(plane))], axis=-1)
+
+
+def tangent_size(eye: optics.Eye) -> tuple[float, float]:
+    """Return the height and width of a receptor on the plane at distance 1 along the axis."""
+    height, width = eye.receptor_size
+    return height / eye.sensor_distance, width / eye.sensor_distance
+
+
+def parts_of(count: int, in_rows: bool, aspect: float = 1.0) -> tuple[int, int]:
+    """Return the rows and columns of a receptor that is divided into this number of parts.
+
+    With `in_rows`, the parts are as nearly square as possible. A square receptor has at most as many rows as columns.
+
+    aspect: height of a receptor / its width
+    """
+    if not in_rows:
+        return 1, count
+    divisors = [n for n in range(1, count + 1) if count % n == 0]
+    rows = min(divisors, key=lambda n: (round(abs(math.log(n * n / (count * aspect))), 9), n))
+    return rows, count // rows
+
+
+def aspect_of(eye: optics.Eye) -> float:
+    """Return the height of a receptor divided by its width."""
+    height, width = eye.receptor_size
+    return height / width
+
+
+def extent_of(eye: optics.Eye, size: tuple[float, float]) -> tuple[float, float]:
+    """Return a rectangle's width and height on the plane at distance 1; its size is in receptor widths and heights."""
+    height, width = tangent_size(eye)
+    return width * size[0], height * size[1]
