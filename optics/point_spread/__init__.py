@@ -18,5 +18,6 @@ contrast       mtf, image_quality
 mixture        sums over wavelengths
 white          white_psf: light of a lamp, weighted by receptors
 through_focus  through_focus: PSFs at several distances of the sensor
+circle_sums    sums over samples within circles, for any number of radii
 concentration  strehl_ratio, encircled_energy
 """
