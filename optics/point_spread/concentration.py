@@ -239,7 +239,6 @@ def encircled_energy(
         raise ValueError(f"centre = {shown(centre)}: must lie within the PSF's window, around {shown(result.centre)}")
     if not ((wanted >= 0) & (wanted <= edge * (1 + 1e-9))).all():
         raise ValueError(f"radii = {shown(radii)}: must be in [0, {edge:g}] m, inside the PSF's window")
-    cutoff = result.highest_cutoff
     seen, kernel = _around(result, middle, float(wanted.max()), edge)
     distance = np.hypot(seen.x[None, :] - middle[0], seen.y[:, None] - middle[1]).ravel()
     types, values = precision("float64"), precision("float64").Float(flat(seen.tensor))
