@@ -18,7 +18,7 @@ from optics.numerics.grid import Grid
 from optics.numerics.precision import opaque, precision
 from optics.point_spread.circle_sums import SoftCircles, soft_sums, sums_of_cells
 from optics.point_spread.mixture import Mixture, a_mixture, flat
-from optics.point_spread.psf_result import SUM_ERROR, PSFResult
+from optics.point_spread.psf_result import PSFResult
 
 __all__ = ["encircled_energy", "strehl_ratio"]
 
@@ -32,6 +32,8 @@ NEIGHBOURHOOD = 9  # choice: samples along a side of such a window
 PARABOLOID_ERROR = 3e-5
 OF_A_MASK = 1e-6  # choice: neglected level of a mask's spectrum for the peak without aberration
 RIPPLE = 1e-5  # choice: ripple of the circle's spectrum
+CELLS = 20.0  # choice: error of a circle's edge between cells, in units of the ripple
+SPREAD = 0.1  # choice: smallest share of the error of all light in the window that a circle may have
 DIGITS = 10.0  # choice: digits of the peak without aberration
 FINE = 1 / 3  # choice: coarsest pitch for circles in units of 1/cutoff; finer pitches need less area beyond a circle
 
@@ -250,8 +252,10 @@ def encircled_energy(
     total = to_user(types.Tensor(sums * seen.dx**2, (seen.tensor.shape[0], wanted.size)))
     if not with_error:
         return total
-    own = np.array([[plan.predicted_error] for plan in seen.plans])
-    return total, SUM_ERROR * own * np.maximum(plain(total), RIPPLE) + 20 * RIPPLE
+    # The error of the PSF may be anywhere in the window, even if the circle is dark.
+    share = np.maximum(plain(total), SPREAD * plain(seen.window_sums)[:, None]) / plain(seen.window_sums)[:, None]
+    bright = np.pi * wanted**2 * seen.psf.max(axis=(1, 2))[:, None]
+    return total, seen.sum_error[:, None] * share + RIPPLE * (CELLS if kernel is None else np.minimum(bright, 1.0))
 
 
 def _around(
