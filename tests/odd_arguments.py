@@ -58,3 +58,32 @@ def complaints(call, valid):
             if (said := complaint(call, valid | {argument: odd})) is not None:
                 found[argument, what] = said
     return found
+
+
+def masked(value, rng):
+    """The same numbers, at least one of them masked; a row of three for None, and None for values of other kinds."""
+    try:
+        given = np.asarray([1.0, 2.0, 3.0] if value is None else value)
+    except (TypeError, ValueError):
+        return None
+    if given.dtype.kind not in "iufc" or not given.size:
+        return None
+    hidden = np.array(rng.random(given.shape) < 0.3)
+    hidden.flat[rng.integers(given.size)] = True
+    return np.ma.masked_array(given, hidden)
+
+
+def masked_complaints(call, valid, rng):
+    """Arguments that accept masked elements, or refuse them in the wrong form. Lists may contain them, too."""
+    found = {}
+    for argument, value in valid.items():
+        if (array := masked(value, rng)) is None:
+            continue
+        for odd in [array, *([list(array)] if array.ndim == 1 else [])]:
+            try:
+                call(**valid | {argument: odd})
+                found[argument, type(odd).__name__] = "accepted"
+            except Exception:
+                if (said := complaint(call, valid | {argument: odd})) is not None:
+                    found[argument, type(odd).__name__] = said
+    return found

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from evolve.genome.genes import LAMBDA_MAX, RHABDOM, TILT, VERTICAL
 from evolve.genome.phenotype import Phenotype
+from optics.numerics.arguments import unmasked
 
 if TYPE_CHECKING:
     import optics
@@ -265,7 +266,7 @@ def bootstrap_interval(
     Raises:
         ValueError: samples are missing or not finite, or the level is outside (0, 1).
     """
-    values = np.asarray(samples, dtype=np.float64)
+    values = np.asarray(unmasked("samples", samples), dtype=np.float64)
     if values.ndim != 1 or not values.size or not np.isfinite(values).all():
         raise ValueError(f"samples: must be one or more finite numbers, got {values}")
     if not 0 < level < 1:

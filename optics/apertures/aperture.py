@@ -15,7 +15,7 @@ import numpy as np
 
 from optics.apertures.outline import Outline
 from optics.apertures.soft_edge import SoftEdge
-from optics.numerics.arguments import LARGEST, in_range, positive
+from optics.numerics.arguments import in_range, positive
 from optics.numerics.autodiff import Array
 from optics.numerics.cost import SOFT_EDGE_SAMPLE
 from optics.numerics.precision import Precision, padded_for_packets
@@ -25,6 +25,7 @@ __all__ = ["EDGE_REACH", "LEAST_RIPPLE", "Aperture", "Nodes", "SoftAperture"]
 # Choice: the largest reach of the soft edge beyond the aperture, in radii.
 EDGE_REACH = 0.25
 LEAST_RIPPLE = 1e-13  # choice: smallest ripple of a soft edge's spectrum; it is above the rounding errors of float64
+MOST_CYCLES = 1e90  # far beyond pupils of valid size, wavelength and distance, which the planner then refuses
 
 
 class SoftAperture(ABC):
@@ -143,7 +144,7 @@ class Aperture(ABC):
         Raises:
             ValueError: passband negative, ripple outside [1e-13, 0.5], or widest_reach not positive.
         """
-        in_range("passband", passband, 0.0, LARGEST)
+        in_range("passband", passband, 0.0, MOST_CYCLES)
         in_range("ripple", ripple, LEAST_RIPPLE, 0.5)
         positive("widest_reach", widest_reach, "pupil radii")
         return self._softened(SoftEdge.cheapest(passband, ripple, widest_reach, self.half_widths))

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from optics.numerics.autodiff import is_differentiable, number
+from optics.numerics.autodiff import grad_enabled, is_differentiable, number
 
 __all__ = [
     "close_match",
@@ -25,6 +25,7 @@ __all__ = [
     "reals",
     "shape_2d",
     "shown",
+    "unmasked",
     "vacuum_wavelength",
     "vacuum_wavelengths",
     "whole",
@@ -89,6 +90,19 @@ def positive(name: str, value: float, unit: str = "m", *, infinite: bool = False
     return number
 
 
+def unmasked(name: str, value: Any) -> Any:
+    """Return `value`; ValueError if elements of it are masked (numpy.ma), because NumPy would use them as data.
+
+    The other checks of numbers include this check.
+    """
+    if isinstance(value, (tuple, list)):
+        for entry in value:
+            unmasked(name, entry)
+    elif isinstance(value, np.ma.MaskedArray) and np.ma.is_masked(value):
+        raise ValueError(f"{name} has masked elements: must be without them, so fill or remove them (numpy.ma)")
+    return value
+
+
 def without_derivative(name: str, value: Any) -> Any:
     """Return `value`; ValueError if `value`, or an entry of it, carries a derivative, which would be lost.
 
@@ -99,15 +113,11 @@ def without_derivative(name: str, value: Any) -> Any:
     if isinstance(value, (tuple, list)):
         for entry in value:
             without_derivative(name, entry)
-    elif getattr(value, "requires_grad", False) or (is_differentiable(value) and _asks(value)):
+    elif isinstance(value, np.ma.MaskedArray):
+        unmasked(name, value)
+    elif getattr(value, "requires_grad", False) or (is_differentiable(value) and grad_enabled(value)):
         raise ValueError(f"{name} requires a derivative, but none is propagated through it: pass a plain number")
     return value
-
-
-def _asks(value: Any) -> bool:
-    import drjit as dr
-
-    return bool(dr.grad_enabled(value))
 
 
 def vacuum_wavelength(value: Any) -> float:
@@ -144,7 +154,7 @@ def shape_2d(name: str, value: Any) -> tuple[int, int]:
     without_derivative(name, value)
     try:
         height, width = (int(n) for n in value)
-        whole = all(float(n) == int(n) for n in value)
+        whole = all(bool(n == int(n)) for n in value)
     except (TypeError, ValueError, OverflowError):
         height = width = 0
         whole = False
@@ -183,24 +193,17 @@ def close_match(word: str, known: Iterable[str], cutoff: float = 0.5) -> str | N
 
 def point_2d(name: str, value: Any, what: str = "lengths (x, y) [m]") -> tuple[float, float]:
     """Return (x, y) as finite floats."""
+    without_derivative(name, value)
     try:
-        x, y = without_derivative(name, value)
-    except TypeError:
+        x, y = value
+    except (TypeError, ValueError):
         raise ValueError(f"{name} = {shown(value)}: must be two {what}") from None
-    except ValueError as error:
-        raise ValueError(
-            str(error) if " requires " in str(error) else f"{name} = {shown(value)}: must be two {what}"
-        ) from None
     return in_range(name, x, -LARGEST, LARGEST), in_range(name, y, -LARGEST, LARGEST)
 
 
 def reals(name: str, values: Any) -> np.ndarray:
     """Return `values` as a float64 array of any shape; ValueError unless they are real numbers without derivatives."""
-    without_derivative(name, values)
-    try:
-        given = np.asarray(values)
-    except (TypeError, ValueError):
-        given = np.asarray(None)
+    given = _array(name, values)
     if given.dtype.kind not in "biuf":
         kind = "complex ones" if given.dtype.kind == "c" else shown(values)
         raise ValueError(f"{name}: must be real numbers, not {kind}")
@@ -209,14 +212,18 @@ def reals(name: str, values: Any) -> np.ndarray:
 
 def complexes(name: str, values: Any) -> np.ndarray:
     """Return `values` as an array of any shape; ValueError unless they are numbers without derivatives."""
-    without_derivative(name, values)
-    try:
-        given = np.asarray(values)
-    except (TypeError, ValueError):
-        given = np.asarray(None)
+    given = _array(name, values)
     if given.dtype.kind not in "biufc":
         raise ValueError(f"{name}: must be numbers, not {shown(values)}")
     return given
+
+
+def _array(name: str, values: Any) -> np.ndarray:
+    without_derivative(name, values)
+    try:
+        return np.asarray(values)
+    except (TypeError, ValueError):
+        return np.asarray(None)
 
 
 def radiance_cube(value: Any, bands: int, least: tuple[int, int]) -> np.ndarray:
@@ -281,7 +288,7 @@ def of_kind(name: str, value: Any, kind: type, example: str) -> Any:
 
 def _number(name: str, value: Any, carried: bool = False) -> float:
     # Derivatives of PyTorch would be lost even if those of Dr.Jit are propagated.
-    if not carried or getattr(value, "requires_grad", False):
+    if not carried or getattr(value, "requires_grad", False) or isinstance(value, np.ma.MaskedArray):
         without_derivative(name, value)
     try:
         if isinstance(value, (str, bytes)):

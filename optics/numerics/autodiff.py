@@ -9,7 +9,7 @@ import numpy as np
 from optics.numerics.backend import BackendError
 from optics.numerics.device import VARIABLE, device
 
-__all__ = ["Array", "Scalar", "is_differentiable", "number", "plain", "to_user"]
+__all__ = ["Array", "Scalar", "grad_enabled", "is_differentiable", "number", "plain", "to_user"]
 
 # Dr.Jit creates its types when a backend is first loaded, so type checkers cannot see them. These names are aliases of
 # `Any` that document the intended type.
@@ -20,6 +20,13 @@ Scalar = Any  # a number, or a Dr.Jit array of one element that carries a deriva
 def is_differentiable(value: Any) -> bool:
     """Return whether `value` is a Dr.Jit array or tensor, as opposed to a Python or NumPy number."""
     return type(value) is not float and type(value).__module__.startswith("drjit")
+
+
+def grad_enabled(value: Array) -> bool:
+    """Return whether a Dr.Jit array carries a derivative."""
+    import drjit as dr
+
+    return bool(dr.grad_enabled(value))
 
 
 def number(value: Any) -> float:

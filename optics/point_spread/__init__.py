@@ -14,9 +14,11 @@ population     PSFs of many pupils with one plan
 population_members  parameters of each pupil for the common plan
 batch          psf_batch: PSFs of many eyes at once
 modulation_transfer  MTF: contrast at any frequency
+arriving       fraction of the light that is not evanescent
 contrast       mtf, image_quality
 mixture        sums over wavelengths
 white          white_psf: light of a lamp, weighted by receptors
 through_focus  through_focus: PSFs at several distances of the sensor
+circle_sums    sums over samples within circles, for any number of radii
 concentration  strehl_ratio, encircled_energy
 """

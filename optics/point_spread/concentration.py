@@ -10,15 +10,15 @@ from typing import Any
 
 import numpy as np
 
-from optics.apertures.circular import disk_profile
 from optics.apertures.soft_edge import SoftEdge
 from optics.numerics.accuracy import AccuracyError
 from optics.numerics.arguments import flag, point_2d, reals, shown
-from optics.numerics.autodiff import Array, number, to_user
+from optics.numerics.autodiff import Array, number, plain, to_user
 from optics.numerics.grid import Grid
-from optics.numerics.precision import opaque, padded_for_packets, precision
+from optics.numerics.precision import opaque, precision
+from optics.point_spread.circle_sums import SoftCircles, soft_sums, sums_of_cells
 from optics.point_spread.mixture import Mixture, a_mixture, flat
-from optics.point_spread.psf_result import SUM_ERROR, PSFResult
+from optics.point_spread.psf_result import PSFResult
 
 __all__ = ["encircled_energy", "strehl_ratio"]
 
@@ -32,6 +32,8 @@ NEIGHBOURHOOD = 9  # choice: samples along a side of such a window
 PARABOLOID_ERROR = 3e-5
 OF_A_MASK = 1e-6  # choice: neglected level of a mask's spectrum for the peak without aberration
 RIPPLE = 1e-5  # choice: ripple of the circle's spectrum
+CELLS = 20.0  # choice: error of a circle's edge between cells, in units of the ripple
+SPREAD = 0.1  # choice: smallest share of the error of all light in the window that a circle may have
 DIGITS = 10.0  # choice: digits of the peak without aberration
 FINE = 1 / 3  # choice: coarsest pitch for circles in units of 1/cutoff; finer pitches need less area beyond a circle
 
@@ -226,8 +228,6 @@ def encircled_energy(
         AccuracyError: the samples are too coarse, or too few around the circle, and other samples cannot be computed.
             The message states which samples are sufficient.
     """
-    import drjit as dr
-
     flag("with_error", with_error)
     if not isinstance(result, PSFResult):
         return a_mixture(result).encircled_energy(radii, centre, with_error)
@@ -241,60 +241,55 @@ def encircled_energy(
         raise ValueError(f"centre = {shown(centre)}: must lie within the PSF's window, around {shown(result.centre)}")
     if not ((wanted >= 0) & (wanted <= edge * (1 + 1e-9))).all():
         raise ValueError(f"radii = {shown(radii)}: must be in [0, {edge:g}] m, inside the PSF's window")
-    cutoff = result.highest_cutoff
-    seen = result if result.holds_cells else _around(result, middle, float(wanted.max()), edge, cutoff)
-    x, y = seen.x[None, :] - middle[0], seen.y[:, None] - middle[1]
-    distance = np.hypot(x, y)
-    inside = np.stack([_within(distance, r, seen, cutoff).ravel() for r in wanted])
-    types, waves, size = precision("float64"), seen.tensor.shape[0], distance.size
-    error = (
-        SUM_ERROR
-        * np.array([[plan.predicted_error] for plan in seen.plans])
-        * np.maximum(
-            np.einsum("wp,rp->wr", np.abs(seen.psf.reshape(waves, size)).astype(np.float64), np.abs(inside))
-            * seen.dx**2,
-            RIPPLE,
-        )
-        + 20 * RIPPLE
-    )
-    if isinstance(seen.tensor, np.ndarray) or not dr.grad_enabled(seen.tensor):
-        found = np.einsum("wp,rp->wr", seen.psf.reshape(waves, size).astype(np.float64), inside) * seen.dx**2
-        return (found, error) if with_error else found
-    values = types.Float(dr.ravel(seen.tensor))
-    shares = [types.Float(padded_for_packets(row)) for row in inside]
-    parts = [
-        dr.sum(dr.gather(types.Float, values, dr.arange(types.Index, size) + k * size) * share)
-        for k in range(waves)
-        for share in shares
-    ]
-    total = to_user(
-        types.Tensor((parts[0] if len(parts) == 1 else dr.concat(parts)) * seen.dx**2, (waves, len(wanted)))
-    )
-    return (total, error) if with_error else total
+    seen, kernel = _around(result, middle, float(wanted.max()), edge)
+    distance = np.hypot(seen.x[None, :] - middle[0], seen.y[:, None] - middle[1]).ravel()
+    types, values = precision("float64"), precision("float64").Float(flat(seen.tensor))
+    if kernel is None:
+        sums = sums_of_cells(values, distance, wanted, seen.dx)
+    else:
+        unit = result.highest_cutoff
+        sums = soft_sums(SoftCircles.around(distance * unit, wanted * unit, kernel), values)
+    total = to_user(types.Tensor(sums * seen.dx**2, (seen.tensor.shape[0], wanted.size)))
+    if not with_error:
+        return total
+    # The error of the PSF may be anywhere in the window, even if the circle is dark.
+    share = np.maximum(plain(total), SPREAD * plain(seen.window_sums)[:, None]) / plain(seen.window_sums)[:, None]
+    bright = np.pi * wanted**2 * seen.psf.max(axis=(1, 2))[:, None]
+    return total, seen.sum_error[:, None] * share + RIPPLE * (CELLS if kernel is None else np.minimum(bright, 1.0))
 
 
-def _kernel(dx: float, cutoff: float) -> SoftEdge:
-    """Return a kernel in units of 1/cutoff that passes the intensity's frequencies and blocks their aliases."""
-    return SoftEdge(1.0, 1 / (dx * cutoff) - 1, RIPPLE)
+def _around(
+    result: PSFResult, middle: tuple[float, float], radius: float, edge: float
+) -> tuple[PSFResult, SoftEdge | None]:
+    """Return a PSF whose samples suffice for sums within a circle, and the kernel; None for means over cells.
 
+    Samples are fine enough, and they extend beyond the circle by the reach of the kernel.
 
-def _around(result: PSFResult, middle: tuple[float, float], radius: float, edge: float, cutoff: float) -> PSFResult:
-    """Return a PSF whose samples are fine enough and extend beyond the circle by the reach of the kernel."""
-    if result.dx <= FINE / cutoff and radius + _kernel(result.dx, cutoff).reach / cutoff <= edge:
-        return result
-    pitch = min(result.dx, FINE / cutoff)
-    half = math.ceil((radius + _kernel(pitch, cutoff).reach / cutoff) / pitch)
-    return result.recompute_on(Grid((2 * half + 1, 2 * half + 1), pitch, middle), "encircled energy")
-
-
-def _within(distance: np.ndarray, radius: float, result: PSFResult, cutoff: float) -> np.ndarray:
-    """Return the weight of each sample: the softened circle at this distance from its centre."""
-    if radius == 0:
-        return np.zeros(distance.shape)
+    radius: radius [m] of the circle. edge: distance [m] from its centre to the outermost samples.
+    """
     if result.holds_cells:
-        return np.clip((radius - distance) / result.dx + 0.5, 0, 1)
-    kernel = _kernel(result.dx, cutoff)
-    share = (distance <= radius).astype(np.float64)
-    near = np.abs(distance - radius) < kernel.reach / cutoff
-    share[near] = disk_profile(kernel, radius * cutoff, distance[near] * cutoff)
-    return share
+        return result, None
+    cutoff = result.highest_cutoff
+    if result.dx <= FINE / cutoff:
+        kernel = _kernel(result.dx, cutoff, edge - radius)
+        if radius + kernel.reach / cutoff <= edge:
+            return result, kernel
+    pitch = min(result.dx, FINE / cutoff)
+    kernel = _kernel(pitch, cutoff, math.inf)
+    half = math.ceil((radius + kernel.reach / cutoff) / pitch)
+    window = Grid((2 * half + 1, 2 * half + 1), pitch, middle)
+    return result.recompute_on(window, "encircled energy"), kernel
+
+
+def _kernel(dx: float, cutoff: float, room: float) -> SoftEdge:
+    """Return a kernel in units of 1/cutoff that passes the intensity's frequencies and blocks their aliases.
+
+    Its spectrum ends as early as its reach permits, because sums then need fewer nodes.
+
+    room: largest reach [m].
+    """
+    last = 1 / (dx * cutoff) - 1
+    latest = SoftEdge(1.0, last, RIPPLE)
+    if room <= 0:
+        return latest
+    return SoftEdge(1.0, min(last, max(1 / FINE - 1, 1 + latest.reach * (last - 1) / (room * cutoff))), RIPPLE)

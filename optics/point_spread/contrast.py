@@ -12,19 +12,17 @@ from typing import Any
 import numpy as np
 
 from optics.numerics.accuracy import AccuracyError
-from optics.numerics.arguments import flag, in_range, positive, reals, shown
+from optics.numerics.arguments import flag, in_range, positive
 from optics.numerics.autodiff import Array, Scalar, number, plain, to_user
 from optics.numerics.grid import Grid
 from optics.numerics.precision import opaque, precision
+from optics.point_spread.arriving import arriving_light
 from optics.point_spread.mixture import Mixture, a_mixture, flat, mixed
 from optics.point_spread.modulation_transfer import MTF
 from optics.point_spread.psf_result import PSFResult
-from optics.point_spread.request import Request
 
 __all__ = ["combined_mtf", "image_quality", "mtf"]
 
-# Choice: the light in the window may exceed the light that arrives by this amount, because sums have errors.
-HELD_TOO_MUCH = 1e-2
 GROWTHS = 3  # choice: largest number of windows that are tried
 ROOM = 0.5  # choice: exponent of the factor √2 by which an enlarged window exceeds the necessary width
 
@@ -51,7 +49,7 @@ def mtf(result: PSFResult | Mixture, arriving: Any = None, tolerance: float = 0.
             raise ValueError("arriving: must be None for a mixture of wavelengths, which have different values")
         mixture: MTF = a_mixture(result).mtf(tolerance)
         return mixture
-    light, unsure = _arriving(result, arriving)
+    light, unsure = arriving_light(result, arriving)
     known = light.numpy()
     seen = _wide(result.with_pitch(0.5 / result.highest_cutoff, "the MTF"), known, tolerance)
     lost = np.maximum(known - plain(seen.window_sums), 0)
@@ -72,7 +70,7 @@ def combined_mtf(result: PSFResult, weights: np.ndarray, tolerance: float) -> MT
     weights: (sum, wavelength). They may be negative.
     """
     positive("tolerance", tolerance, "contrast")
-    light, unsure = _arriving(result, None)
+    light, unsure = arriving_light(result, None)
     known = light.numpy()
     seen = _wide(result.with_pitch(0.5 / float(result.cutoff.max()), "the MTF"), known, tolerance)
     missing = np.maximum(known - plain(seen.window_sums), 0) + unsure + seen.sum_error
@@ -118,51 +116,6 @@ def _transformed(seen: PSFResult, light: Array, error: np.ndarray) -> MTF:
     whole = dr.repeat(dr.maximum(arrives, held), height * width)
     shares = types.Tensor(values * seen.dx**2 / whole, (waves, height, width))
     return MTF.from_shares(shares, seen.window, seen.cutoff, error)
-
-
-def _arriving(result: PSFResult, arriving: Any) -> tuple[Array, np.ndarray]:
-    """Return the fraction of the pupil's light that arrives on the plane, and its uncertainty, (wavelength,)."""
-    types = precision("float64")
-    if arriving is None:
-        return _not_evanescent(result)
-    held, known = plain(result.power), reals("arriving", arriving)
-    if known.shape not in ((), held.shape):
-        raise ValueError(f"arriving has shape {known.shape}: must be a number, or one per wavelength {held.shape}")
-    if not ((known > 0) & (known <= 1) & (known > held - HELD_TOO_MUCH)).all():
-        raise ValueError(f"arriving = {shown(arriving)}: must be in (0, 1] and at least the window's {shown(held)}")
-    return types.Float(np.full(held.shape, known)), np.zeros(held.shape)
-
-
-def _not_evanescent(result: PSFResult) -> tuple[Array, np.ndarray]:
-    """Return the fraction of light that is not evanescent, and its uncertainty.
-
-    The squared spectrum of a straight edge, integrated over frequencies above f, is 1/(2π²f) per length of the edge.
-    For an aperture of perimeter P and area A, the fraction λP/(2π²A) is therefore evanescent. It is multiplied by the
-    mask's transmission along the edge, relative to that of the whole aperture. Light that the relief bends beyond
-    grazing is evanescent, too.
-    """
-    import drjit as dr
-
-    pupil, outline, types = result.pupil, result.pupil.aperture.outline, precision("float64")
-    wavelength = types.Float(np.array([at / pupil.index_behind(at) for at in map(float, result.wavelengths)]))
-    ratio = outline.length / (2 * math.pi**2 * pupil.aperture.area)
-    light, rim = pupil.transmission, 1.0
-    if pupil.mask is not None:
-        x, y = (types.Float64(np.ascontiguousarray(at)) for at in outline.points().T)
-        rim = dr.mean(dr.square(pupil.amplitude(x, y, types))) / light
-    edge = dr.minimum(wavelength * ratio / opaque(types, pupil.aperture_radius) * rim, 0.5)
-    bent = np.zeros(len(result.wavelengths))
-    if result.can_recompute:
-        bent = np.array([_bent_beyond_grazing(request) for request in result.requests])
-        bent = bent if result.shares is None else np.atleast_1d(result.shares @ bent)
-    return (1 - edge) * types.Float(1 - bent) * light, number(light) * (np.square(edge.numpy()) + bent)
-
-
-def _bent_beyond_grazing(request: Request) -> float:
-    """Return the fraction of the pupil's light that the relief bends beyond grazing."""
-    pupil = request.beam.pupil
-    x, _ = pupil.slopes(request.beam.wavelength, request.beam.source).rays(1.0, request.beam.index)
-    return float(np.mean(~np.isfinite(x)))
 
 
 def image_quality(

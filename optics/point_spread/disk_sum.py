@@ -7,11 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from optics.apertures.circular import disk_profile
+from optics.apertures.circular import disk_table
 from optics.apertures.soft_edge import SoftEdge
 from optics.numerics.accuracy import AccuracyError
 from optics.numerics.arguments import point_2d, positive, shown, without_derivative
 from optics.numerics.grid import Grid
+from optics.numerics.precision import padded_for_packets, precision
 from optics.point_spread.converging import Converging, VectorFocus
 
 __all__ = ["DiskSum"]
@@ -62,9 +63,9 @@ class DiskSum:
         seen = _around(light, towards, middle, radius)
         x, y = seen.grid.x - middle[0], seen.grid.y - middle[1]
         distance, kernel, unit = np.hypot(x[None, :], y[:, None]), _kernel(seen.dx, towards.cutoff), towards.cutoff
-        share = (distance <= radius).astype(np.float64)
-        near = np.abs(distance - radius) < kernel.reach / unit
-        share[near] = disk_profile(kernel, radius * unit, distance[near] * unit)
+        types = precision("float64")
+        at = types.Float64(padded_for_packets(distance * unit))
+        share = disk_table(kernel, radius * unit).at(at, types).numpy().reshape(distance.shape)
         return cls(seen, share, radius)
 
     def integrate(self, picture: np.ndarray) -> tuple[float, float]:

@@ -34,7 +34,9 @@ __all__ = ["PSFResult", "spread"]
 MOST_AGAIN = 2049  # choice: most samples along a side of a recomputed window
 MANY = 8  # choice: smallest number of wavelengths for which planning each separately would take longer than computing
 MOST_SECONDS = 20.0  # choice: time limit for a recomputed window [s]
-SUM_ERROR = 3.0  # choice: relative error of a sum divided by that of the PSF; see test_measure_errors.py
+# Choice: relative error of sums over a PSF, of values at points or of means over cells, divided by that of the PSF. See
+# test_measure_bounds.py.
+SUM_ERROR, CELL_SUM_ERROR = 1.0, 3.0
 OF_CELLS = ("pinhole", "geometric", "perfect_lens")  # methods whose samples are means over cells
 
 
@@ -145,7 +147,8 @@ class PSFResult(ReadOnlyArrays, OnWindow):
         """Error of sums over the PSF due to the error of the PSF, relative to the pupil's power, (wavelength,)."""
         errors = [plan.predicted_error for plan in self.plans]
         own = np.array(errors if len(errors) == len(self.psf) else [max(errors)] * len(self.psf))
-        found: np.ndarray = SUM_ERROR * own * self.psf.sum(axis=(1, 2), dtype=np.float64) * self.dx**2
+        factor = CELL_SUM_ERROR if self.holds_cells else SUM_ERROR
+        found: np.ndarray = factor * own * self.psf.sum(axis=(1, 2), dtype=np.float64) * self.dx**2
         return found
 
     can_be_seen_anew, through, held = renamed("can_recompute"), renamed("recompute_on"), renamed("window_sums")

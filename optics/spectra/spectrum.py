@@ -13,7 +13,7 @@ from importlib import resources
 
 import numpy as np
 
-from optics.numerics.arguments import one_of, vacuum_wavelengths, without_derivative
+from optics.numerics.arguments import one_of, unmasked, vacuum_wavelengths, without_derivative
 
 __all__ = [
     "ILLUMINANTS",
@@ -120,7 +120,7 @@ def cie_1931(wavelengths: np.ndarray) -> np.ndarray:
 
 
 def _nanometres(wavelengths: np.ndarray) -> np.ndarray:
-    nm = np.asarray(wavelengths, dtype=np.float64) * 1e9
+    nm = np.asarray(unmasked("wavelengths", wavelengths), dtype=np.float64) * 1e9
     low, high = LIMITS_NM
     outside = nm[~((nm > low - 1e-6) & (nm < high + 1e-6))]
     if outside.size:

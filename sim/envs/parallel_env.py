@@ -9,7 +9,7 @@ import numpy as np
 from gymnasium import spaces
 from pettingzoo import ParallelEnv
 
-from optics.numerics.arguments import did_you_mean
+from optics.numerics.arguments import did_you_mean, unmasked
 from sim.envs.animals import Animals
 from sim.envs.follow_camera import RENDER_MODES
 from sim.envs.prepared_task import PreparedTask
@@ -135,7 +135,8 @@ class EncounterEnv(ParallelEnv[str, dict[str, np.ndarray], np.ndarray]):
         for name in self.agents:
             if name not in actions:
                 raise ValueError(f"actions: {name!r} has none: must have one for each of {', '.join(self.agents)}")
-            action, shape = np.asarray(actions[name], np.float32), self.action_spaces[name].shape
+            shape = self.action_spaces[name].shape
+            action = np.asarray(unmasked(f"actions: {name!r}", actions[name]), np.float32)
             if action.shape != shape:
                 raise ValueError(f"actions: {name!r} has shape {action.shape}: must be {shape}")
             found.append(action[None])

@@ -24,7 +24,7 @@ from typing import Any
 
 import numpy as np
 
-from optics.numerics.arguments import items, reals, shown
+from optics.numerics.arguments import items, reals, shown, unmasked
 from sim.exr.previews import preview_of_receptors, preview_of_spectra
 from sim.exr.spectral_layout import PREVIEW, RADIANCE, REFLECTANCE, NoSpectra, channel, fields_of_views
 
@@ -74,7 +74,7 @@ class View:
         if self.spectral is None and self.receptors is None:
             raise ValueError(f"{where}: has neither radiance nor receptors, and no reflectance")
         for label in ("radiance", "reflectance", "receptors"):
-            image = getattr(self, label)
+            image = unmasked(f"{where}: {label}", getattr(self, label))
             if image is not None and (len(_shape(image)) != 3 or 0 in image.shape):
                 raise ValueError(f"{where}: {label} {_kind(image)}: must be an array (band, y, x)")
         wavelengths = reals(f"{where}: wavelengths_nm", self.wavelengths_nm)

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from scipy.constants import c, h, k
 
-from optics.numerics.arguments import did_you_mean
+from optics.numerics.arguments import did_you_mean, unmasked
 from optics.spectra.spectrum import cie_1931, daylight
 
 DAYLIGHT = 6504.0  # [K] the correlated colour temperature of CIE D65
@@ -194,6 +194,7 @@ def _ratio(kelvins: float, wavelengths: np.ndarray) -> np.ndarray:
 
 def _corners(given: Any) -> np.ndarray | None:
     """Return (low, high) as an array (2,) or (2, 3); None if it is not such a pair of finite numbers."""
+    unmasked("vary", given)
     try:
         corners = np.asarray(given, float)
     except (TypeError, ValueError):

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import optics
-from tests.odd_arguments import complaints
+from tests.odd_arguments import complaints, masked_complaints
 from tests.slow_part import slow
 
 LENS = optics.Pupil(20e-6, thin_lens_focal_length=240e-6)
@@ -168,6 +168,12 @@ CALLS = SHAPES | ELEMENTS | SPECTRA | EYES | PICTURES | MEASURES | FIELDS
 @pytest.mark.parametrize("name", [slow(name) if name in ("propagate", "vector_focus") else name for name in CALLS])
 def test_any_argument(name):
     assert complaints(getattr(optics, name), CALLS[name]) == {}
+
+
+@pytest.mark.parametrize("name", CALLS)
+def test_masked_elements_are_refused(name):
+    """NumPy would use the numbers under the mask as data."""
+    assert masked_complaints(getattr(optics, name), CALLS[name], np.random.default_rng(len(name))) == {}
 
 
 def test_nothing_of_the_face_is_forgotten():

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import optics
-from tests.odd_arguments import complaints
+from tests.odd_arguments import complaints, masked_complaints
 from tests.slow_part import slow
 
 GREEN = {"wavelength": 500e-9}
@@ -116,6 +116,12 @@ CALLS = {
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")  # NaN in, NaN out
 def test_any_argument(name):
     assert complaints(*CALLS[name]()) == {}
+
+
+@pytest.mark.parametrize("name", CALLS)
+def test_masked_elements_are_refused(name):
+    """NumPy would use the numbers under the mask as data."""
+    assert masked_complaints(*CALLS[name](), np.random.default_rng(len(name))) == {}
 
 
 @pytest.mark.parametrize("odd", [None, "many", 0, 1.5, np.zeros((2, 2))])

@@ -29,6 +29,9 @@ def test_a_refusal_names_what_there_is():
     named."""
     with pytest.raises(optics.AccuracyError, match=r"the pupil \(radius 25 m, Fresnel number [\d.e+]+\)$"):
         optics.psf(optics.Pupil(25))
+    for radius in (25e3, 10 ** np.random.default_rng(1).uniform(1, 5)):  # nanometres, and any other unit
+        with pytest.raises(optics.AccuracyError, match=r"needs .* the pupil \(radius [\d.e+]+ m, Fresnel number"):
+            optics.psf(optics.Pupil(radius))
     with pytest.raises(optics.AccuracyError, match=r"Fresnel number [\d.]+\); a flatter height needs less$"):
         optics.psf(optics.Pupil(25e-6, np.random.default_rng(0).random((8, 8)) * 0.9e-3))
 

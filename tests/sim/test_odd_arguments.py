@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import sim
-from tests.odd_arguments import complaints
+from tests.odd_arguments import complaints, masked_complaints
 
 MOUNT = sim.Mount("head", 30.0)
 VIEW = {"name": "left", "wavelengths_nm": np.array([450.0]), "radiance": np.ones((1, 2, 2), np.float32)}
@@ -45,6 +45,12 @@ CALLS = {
 @pytest.mark.parametrize("name", CALLS)
 def test_any_argument(name):
     assert complaints(getattr(sim, name), CALLS[name]) == {}
+
+
+@pytest.mark.parametrize("name", CALLS)
+def test_masked_elements_are_refused(name):
+    """NumPy would use the numbers under the mask as data."""
+    assert masked_complaints(getattr(sim, name), CALLS[name], np.random.default_rng(len(name))) == {}
 
 
 def test_views_to_write(tmp_path):
