@@ -110,7 +110,7 @@ def _darkness(beam: Beam, problem: Problem, mean: float) -> float:
 
 def _affordable(problem: Problem, darkness: float, seconds: float, samples: int) -> _DirectSum:
     """Return the direct sum with as many points and digits as the time of the PSF allows."""
-    pairs = max(EFFORT.share * seconds, EFFORT.seconds) * PAIRS_PER_SECOND
+    pairs = max(EFFORT.share * seconds, EFFORT.seconds) * PAIRS_PER_SECOND["float32"]
     wanted = min(EFFORT.points_along_radius if problem.symmetric else EFFORT.points, samples)
     for spare in EFFORT.spare_digits:
         wished = spare - math.log10(problem.tolerance) + darkness
@@ -132,7 +132,7 @@ def _drawn(problem: Problem, image: np.ndarray, points: int) -> tuple[np.ndarray
         chance = np.full(points, 1 / points)  # there are few points, so each is compared once
     else:
         chance = _chances(image.astype(np.float64), problem.window.shape)
-    order = _by_radius(problem.window) if problem.symmetric else np.arange(image.size)
+    order = _in_order(problem.window) if problem.symmetric else np.arange(image.size)
     levels = (np.arange(points) + 0.5) / points
     drawn = order[np.searchsorted(np.cumsum(chance[order]), levels).clip(max=image.size - 1)]
     return drawn, chance[drawn]
@@ -175,13 +175,20 @@ def _chances(bright: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
     squares[1:-1, 1:-1] = np.square(bright).reshape(shape)
     rows = squares[:-2] + squares[1:-1] + squares[2:]
     near = (rows[:, :-2] + rows[:, 1:-1] + rows[:, 2:]).ravel()
-    rim, fixed = _fixed_chances(shape)
+    rim, fixed = (_large_chances if bright.size > LARGE else _small_chances)(shape)
     lit = bright * rim
     found = fixed + bright / bright.sum() + near / near.sum()
     return (found + lit / lit.sum() if lit.any() else found + fixed / 3) / KINDS
 
 
-@lru_cache(maxsize=16)
+LARGE = 2**18  # choice, limited by memory: arrays of 16 windows are cached up to this number of samples, else of one
+
+
+def _in_order(window: Grid) -> np.ndarray:
+    """Return the result of `_by_radius`, from a cache if possible."""
+    return (_large_order if math.prod(window.shape) > LARGE else _small_order)(window)
+
+
 def _by_radius(window: Grid) -> np.ndarray:
     """Return flat indices in order of the distance from the axis.
 
@@ -192,12 +199,14 @@ def _by_radius(window: Grid) -> np.ndarray:
     return np.argsort(np.round(radii / window.dx**2, 6), kind="stable")
 
 
+_small_order, _large_order = (lru_cache(maxsize=count)(_by_radius) for count in (16, 1))
+
+
 # Choice: exponent of u², where u in [-1, 1] is the position across the window. u²⁴ has fallen to one half at 1 - |u| =
 # ln 2 / 24, a seventieth of the window's width from the side.
 STEEP = 12
 
 
-@lru_cache(maxsize=16)
 def _fixed_chances(shape: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
     """Return the nearness of sides and corners, flat, and the sum of the three parts that do not depend on the PSF."""
     height, width = shape
@@ -211,3 +220,6 @@ def _fixed_chances(shape: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
     corners = (np.add.outer(y, x) / 2) ** STEEP
     rim = sides.ravel() / 4 + corners.ravel() / corners.sum()
     return rim, 1 / rim.size + rim
+
+
+_small_chances, _large_chances = (lru_cache(maxsize=count)(_fixed_chances) for count in (16, 1))
