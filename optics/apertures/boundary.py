@@ -145,13 +145,26 @@ def _first_of_coincident(middle: np.ndarray, left: np.ndarray) -> np.ndarray:
 def _cut_segments(pieces: Outline, points: np.ndarray) -> np.ndarray:
     """Return the segments (n, 2, 2), cut at the points that lie on them."""
     found = []
+    by_axis = [points[np.argsort(points[:, axis], kind="stable")] for axis in (0, 1)]
     for start, end in pieces.segments:
         along = end - start
         size = float(np.hypot(*along))
-        on_line = np.abs((points - start) @ (-along[1], along[0])) / size < COINCIDENT
-        at = _between((points[on_line] - start) @ along / size**2, 0.0, 1.0, SHORTEST / size)
+        near = _near_segment(by_axis, start, end)
+        on_line = np.abs((near - start) @ (-along[1], along[0])) / size < COINCIDENT
+        at = _between((near[on_line] - start) @ along / size**2, 0.0, 1.0, SHORTEST / size)
         found += [(start + first * along, start + last * along) for first, last in itertools.pairwise(at)]
     return np.array(found, dtype=np.float64).reshape(-1, 2, 2)
+
+
+def _near_segment(by_axis: list[np.ndarray], start: np.ndarray, end: np.ndarray) -> np.ndarray:
+    """Return the points (n, 2) within the range of x or of y of a segment, whichever is smaller.
+
+    by_axis: the points in the order of x, and in the order of y.
+    """
+    axis = int(abs(end[1] - start[1]) < abs(end[0] - start[0]))
+    low, high = sorted((start[axis], end[axis]))
+    first, last = np.searchsorted(by_axis[axis][:, axis], (low - SHORTEST, high + SHORTEST))
+    return by_axis[axis][first:last]
 
 
 def _cut_arcs(pieces: Outline, points: np.ndarray) -> np.ndarray:
@@ -174,8 +187,10 @@ def _meeting_points(pieces: Outline) -> np.ndarray:
     outline.
     """
     found = [pieces.ends]
+    low, high = pieces.segments.min(axis=1) - SHORTEST * 2, pieces.segments.max(axis=1) + SHORTEST * 2
     for number, (start, end) in enumerate(pieces.segments):
-        later = pieces.segments[number + 1 :]
+        overlap = (low[number + 1 :] <= high[number]) & (high[number + 1 :] >= low[number])
+        later = pieces.segments[number + 1 :][overlap.all(axis=1)]
         found.append(_of_lines(start, end - start, later[:, 0], later[:, 1] - later[:, 0]))
         found += [_of_line_and_circle(start, end - start, arc) for arc in pieces.arcs]
     for arc, other in itertools.combinations(pieces.arcs, 2):

@@ -100,15 +100,17 @@ class Outline(ReadOnlyArrays):
         y = np.asarray(y, dtype=np.float64)
         middle = float(y.mean())
         found = []
-        for cx, cy, radius, begin, end in self.arcs:
-            if abs(y - cy).max() < radius:
-                half = np.sqrt(radius**2 - (y - cy) ** 2)
-                reach = np.sqrt(radius**2 - (middle - cy) ** 2)
-                sides = [side for side in (-1, 1) if _within(np.arctan2(middle - cy, side * reach), begin, end)]
-                found += [cx + side * half for side in sides]
+        reached = np.abs(y - self.arcs[:, 1, None]).max(axis=1) < self.arcs[:, 2]
+        cx, cy, radius, begin, end = self.arcs[reached].T[..., None]
+        half, reach = np.sqrt(radius**2 - (y - cy) ** 2), np.sqrt(radius**2 - (middle - cy) ** 2)
+        for side in (-1, 1):
+            angle = np.arctan2(middle - cy, side * reach)
+            on_arc = ((angle - begin) % TURN < end - begin) | (end - begin >= TURN)
+            found += list((cx + side * half)[on_arc[:, 0]])
         (x0, y0), (x1, y1) = (self.segments[:, k].T for k in (0, 1))
-        for i in np.flatnonzero((np.minimum(y0, y1) < middle) & (middle < np.maximum(y0, y1))):
-            found.append(x0[i] + (y - y0[i]) * (x1[i] - x0[i]) / (y1[i] - y0[i]))
+        crossed = (np.minimum(y0, y1) < middle) & (middle < np.maximum(y0, y1))
+        x0, y0, x1, y1 = (end[crossed, None] for end in (x0, y0, x1, y1))
+        found += list(x0 + (y - y0) * (x1 - x0) / (y1 - y0))
         return np.sort(np.array(found).reshape(-1, len(y)).T, axis=1)
 
     def heights(self, x: float) -> np.ndarray:

@@ -13,88 +13,25 @@ from functools import cached_property
 from optics.elements.beam import Beam
 from optics.methods.fresnel import paraxial_integral
 from optics.methods.problem import Problem, PupilEdge
+from optics.methods.row_blocks import row_blocks
 from optics.methods.spectral_taper import Taper, tapers
+from optics.methods.spectrum_sampling import SpectrumSampling
 from optics.numerics.autodiff import Array, Scalar
 from optics.numerics.cost import CALL, PUPIL_SAMPLE, SPECTRUM_SAMPLE
-from optics.numerics.even_fields import even_seconds, even_sum, quarter, whole
+from optics.numerics.even_fields import whole
 from optics.numerics.field import Field
-from optics.numerics.fourier import dft2, fast_length, predicted_seconds
+from optics.numerics.fourier import fast_length
 from optics.numerics.grid import Grid
 from optics.numerics.precision import Precision, opaque, precision
 
 __all__ = [
     "GridSampling",
-    "SpectrumSampling",
     "arrived",
     "split_period",
     "split_spectrum",
     "whole_period",
     "whole_spectrum",
 ]
-
-
-class SpectrumSampling:
-    """Samples of a spectrum and of the planes onto which it is transformed.
-
-    method: "angular_spectrum" or "split_angular_spectrum".
-    taper: taper that fades the spectrum out.
-    period: width [m] after which the field in the pupil's plane repeats. The spectrum's samples are 1/period apart.
-    output_period: number of samples per period in the plane where the last transform starts (split) or ends (whole).
-    even: whether the field is even in x and y. A quarter of each plane is then sufficient.
-    """
-
-    method: str
-    taper: Taper
-    period: float
-    output_period: int
-    even: bool = False
-
-    @property
-    def is_whole(self) -> bool:
-        """True if no paraxial part is split off."""
-        return self.method == "angular_spectrum"
-
-    @cached_property
-    def spectrum(self) -> Grid:
-        return Grid.square(2 * math.ceil(self.taper.end * self.period) + 1, 1 / self.period)
-
-    @cached_property
-    def relay(self) -> Grid:
-        return Grid.square(self.output_period, self.period / self.output_period)
-
-    def part(self, grid: Grid) -> Grid:
-        """Return the samples that represent a plane: a quarter if the field is even, else all."""
-        return quarter(grid) if self.even else grid
-
-    def sum(self, field: Field, start: Grid, period: Scalar, end: Grid, sign: int) -> Field:
-        """Return the Fourier sum from the samples of one plane to the samples of another, see `fourier.dft2`."""
-        if self.even:
-            return even_sum(field, start.shape, period, end)
-        return dft2(field, period, end.shape, sign, end.dx, end.centre)
-
-    def sum_seconds(self, start: Grid, period: float, end: Grid) -> float:
-        return even_seconds(start.shape, end.shape) if self.even else predicted_seconds(start.shape, period, end.shape)
-
-    def seconds_from_spectrum(self, window: Grid) -> float:
-        """Return the predicted time of the transforms from the spectrum to the window."""
-        if self.is_whole:
-            return self.sum_seconds(self.spectrum, self.output_period, window)
-        to_relay = self.sum_seconds(self.spectrum, self.output_period, self.relay)
-        # This period is not a whole number, so `dft2` uses a matrix.
-        return to_relay + self.sum_seconds(self.relay, 0.5, window)
-
-    def whole_phase(self, field: Field, beam: Beam, problem: Problem) -> Field:
-        """Return the field with the phase that `arrived` omits for a split spectrum: e^{iπr²/λz}/i."""
-        if self.is_whole:
-            return field
-        types = precision(problem.dtype)
-        x, y = problem.window.coordinates(types)
-        waves = (x * x + y * y) * (0.5 / opaque(types, problem.wavelength)) / opaque(types, beam.distance) - 0.25
-        return field * Field.from_waves(1.0, waves, problem.window, types)
-
-    def plane(self, problem: Problem) -> float:
-        """Return the width [m] of the plane over which rounding errors spread light."""
-        return self.period if self.is_whole else problem.wavelength * problem.distance / self.relay.dx
 
 
 @dataclass(frozen=True)
@@ -109,6 +46,7 @@ class GridSampling(SpectrumSampling):
     output_period: int
     even: bool = False
     seconds: float = 0.0
+    bytes: float = 0.0
     model_error: float = 0.0
 
     @cached_property
@@ -133,13 +71,6 @@ class GridSampling(SpectrumSampling):
     @property
     def samples(self) -> tuple[int, int]:
         return self.pupil.shape
-
-    @property
-    def largest(self) -> int:
-        """Side of the largest square array."""
-        sides = [self.pupil.shape[0], self.spectrum.shape[0]]
-        side = max(sides if self.is_whole else [*sides, self.output_period])
-        return side // 2 + 1 if self.even else side
 
 
 def whole_spectrum(problem: Problem) -> list[GridSampling]:
@@ -201,13 +132,25 @@ def split_period(problem: Problem, taper: Taper, outermost: float) -> tuple[floa
 
 
 def _timed(sampling: GridSampling, problem: Problem) -> GridSampling:
-    seconds = sampling.sum_seconds(sampling.pupil, sampling.pupil_period, sampling.spectrum)
+    seconds, needed = _spectrum_cost(sampling, problem.dtype)
     seconds += sampling.seconds_from_spectrum(problem.window)
     pupil, spectrum = sampling.pupil.shape[0], sampling.spectrum.shape[0]
     points = pupil**2 * (PUPIL_SAMPLE + sampling.edge.seconds_per_point) + spectrum**2 * SPECTRUM_SAMPLE
     points *= 0.25 if sampling.even else 1.0
     seconds += points + CALL["angular_spectrum"]
-    return replace(sampling, seconds=seconds)
+    needed = max(needed, sampling.bytes_from_spectrum(problem.window, problem.dtype))
+    return replace(sampling, seconds=seconds, bytes=needed)
+
+
+def _spectrum_cost(how: GridSampling, dtype: str) -> tuple[float, float]:
+    """Return the time [s] and the memory [bytes] of the sum from the pupil to the spectrum."""
+    stored, spectrum = how.part(how.pupil), how.part(how.spectrum)
+    blocks = row_blocks(stored)
+    needed = how.sum_bytes(blocks[0][1], spectrum, dtype)
+    if how.even or len(blocks) == 1:
+        return how.sum_seconds(how.pupil, how.pupil_period, how.spectrum), needed
+    each = how.sum_seconds(blocks[0][1], how.pupil_period, how.spectrum)
+    return len(blocks) * (each + math.prod(spectrum.shape) * SPECTRUM_SAMPLE), needed
 
 
 def _angular_spectrum(beam: Beam, problem: Problem, how: GridSampling, types: Precision) -> Field:
@@ -215,10 +158,20 @@ def _angular_spectrum(beam: Beam, problem: Problem, how: GridSampling, types: Pr
 
     A split spectrum omits a phase that does not affect the intensity.
     """
-    u = beam.behind(how.edge.aperture, how.part(how.pupil), types)
-    spectrum = how.sum(u, how.pupil, how.pupil_period, how.spectrum, -1)
+    spectrum = _spectrum(beam, how, types)
     found = arrived(spectrum, beam, problem, how).scaled((how.pupil.dx / how.period) ** 2)
     return whole(found, problem.window) if how.even else found
+
+
+def _spectrum(beam: Beam, how: GridSampling, types: Precision) -> Field:
+    """Return the spectrum of the field behind the pupil, as the sum over blocks of rows."""
+    total = None
+    for first, block in row_blocks(how.part(how.pupil)):
+        u = beam.behind(how.edge.aperture, block, types)
+        part = how.sum(u, how.pupil, how.pupil_period, how.spectrum, -1, first)
+        total = part if total is None else (total + part).evaluated()
+    assert total is not None
+    return total
 
 
 def arrived(spectrum: Field, beam: Beam, problem: Problem, how: SpectrumSampling) -> Field:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
@@ -12,9 +12,17 @@ from optics.elements.beam import Beam
 from optics.methods.far_field_nodes import WindowNodes, all_nodes, few_nodes
 from optics.methods.problem import Problem, PupilEdge
 from optics.numerics.autodiff import Array
-from optics.numerics.cost import CALL, MATMUL_FLOPS, PUPIL_SAMPLE, SPECTRUM_SAMPLE, WINDOW_SAMPLE
+from optics.numerics.cost import (
+    CALL,
+    DIRECTION_BYTES,
+    ITEM_BYTES,
+    MATMUL_FLOPS,
+    PUPIL_SAMPLE,
+    SPECTRUM_SAMPLE,
+    WINDOW_SAMPLE,
+)
 from optics.numerics.field import Field
-from optics.numerics.fourier import dft2, fast_length, predicted_seconds
+from optics.numerics.fourier import dft2, fast_length, predicted_bytes, predicted_seconds
 from optics.numerics.grid import Grid
 from optics.numerics.interpolation import LAGRANGE_8, TAPS, chebyshev_points, lagrange_basis, lagrange_weights
 from optics.numerics.precision import Precision, opaque, padded_for_packets, precision
@@ -45,6 +53,7 @@ class FarFieldSampling:
     period: int
     nodes: WindowNodes
     seconds: float
+    bytes: float
     method: str = "far_field"
     model_error: float = 0.0
 
@@ -63,10 +72,6 @@ class FarFieldSampling:
     @property
     def samples(self) -> tuple[int, int]:
         return self.pupil.shape
-
-    @property
-    def largest(self) -> int:
-        return max(self.pupil.shape[0], self.directions.shape[0])
 
 
 def far_field(problem: Problem) -> list[FarFieldSampling]:
@@ -93,8 +98,14 @@ def far_field(problem: Problem) -> list[FarFieldSampling]:
     step = problem.wavelength / (period * pitch)
     directions = Grid.square(2 * (math.ceil(sine / step) + TAPS) + 1, step)
     nodes = _nodes(problem, count)
-    seconds = _seconds(FarFieldSampling(edge, pupil, directions, period, nodes, 0.0), problem)
-    return [FarFieldSampling(edge, pupil, directions, period, nodes, seconds)]
+    unknown = FarFieldSampling(edge, pupil, directions, period, nodes, 0.0, 0.0)
+    return [replace(unknown, seconds=_seconds(unknown, problem), bytes=_bytes(unknown, problem.dtype))]
+
+
+def _bytes(how: FarFieldSampling, dtype: str) -> float:
+    item, directions = ITEM_BYTES[dtype], how.directions.shape[0] ** 2
+    weights = directions * (how.nodes.count * (8 + 2 * item) + 2 * len(how.nodes.kept) * item + DIRECTION_BYTES)
+    return weights + predicted_bytes(how.pupil.shape, how.directions.shape, item)
 
 
 def _seconds(how: FarFieldSampling, problem: Problem) -> float:

@@ -14,9 +14,9 @@ from optics.elements.beam import Beam
 from optics.methods.problem import Problem, PupilEdge
 from optics.methods.rays import MARGIN, Rays, brightness, disk_area, mismatch
 from optics.numerics.autodiff import Array, Scalar, is_differentiable, number
-from optics.numerics.cost import CALL, PUPIL_SAMPLE
+from optics.numerics.cost import CALL, ITEM_BYTES, PUPIL_SAMPLE
 from optics.numerics.field import Field
-from optics.numerics.fourier import dft2, predicted_seconds
+from optics.numerics.fourier import dft2, predicted_bytes, predicted_seconds
 from optics.numerics.grid import Grid
 from optics.numerics.precision import opaque, precision
 
@@ -41,6 +41,7 @@ class ParaxialSampling:
     edge: PupilEdge
     pupil: Grid
     seconds: float
+    bytes: float
     problem: Problem
     padding: float = 1.0
 
@@ -61,10 +62,6 @@ class ParaxialSampling:
     @property
     def samples(self) -> tuple[int, int]:
         return self.pupil.shape
-
-    @property
-    def largest(self) -> int:
-        return self.pupil.shape[0]
 
 
 def fresnel(problem: Problem) -> list[ParaxialSampling]:
@@ -96,7 +93,8 @@ def _sampling(method: str, problem: Problem, turning: float) -> list[ParaxialSam
         + predicted_seconds(pupil.shape, 0.5, problem.window.shape)
         + pupil.shape[0] ** 2 * (PUPIL_SAMPLE + edge.seconds_per_point)
     )
-    return [ParaxialSampling(method, edge, pupil, seconds, problem)]
+    needed = predicted_bytes(pupil.shape, problem.window.shape, ITEM_BYTES[problem.dtype])
+    return [ParaxialSampling(method, edge, pupil, seconds, needed, problem)]
 
 
 def model_error(problem: Problem, curved: bool) -> float:

@@ -13,7 +13,7 @@ from optics.methods.problem import Problem
 from optics.methods.rayleigh_sommerfeld import cached_nodes, node_count
 from optics.methods.rays import brightness, mismatch
 from optics.numerics.autodiff import Array, is_differentiable, number
-from optics.numerics.cost import CALL, RAY
+from optics.numerics.cost import CALL, RAY, RAY_BYTES
 from optics.numerics.device import VARIABLE, device
 from optics.numerics.precision import Precision, opaque, padded_for_packets, precision
 
@@ -41,6 +41,7 @@ class RaySampling:
     count: int
     model_error: float
     seconds: float
+    bytes: float
     method: str = "geometric"
     padding: float = 1.0
 
@@ -75,11 +76,6 @@ class RaySampling:
     def samples(self) -> tuple[int, int]:
         return self.count, 1
 
-    @property
-    def largest(self) -> int:
-        """Side of a square array that takes the same memory as the rays, which have four numbers each."""
-        return 2 * math.ceil(math.sqrt(self.count))
-
 
 @dataclass(frozen=True)
 class PinholeSampling:
@@ -89,7 +85,7 @@ class PinholeSampling:
     seconds: float = CALL["pinhole"]
     method: str = "pinhole"
     samples: tuple[int, int] = (1, 1)
-    largest: int = 1
+    bytes: float = 0.0
     padding: float = 1.0
 
     def intensity(self, beam: Beam, problem: Problem) -> Array:
@@ -136,7 +132,7 @@ def geometric(problem: Problem) -> list[RaySampling]:
     cycles = 2 ** (math.ceil(4 * math.log2(max(cycles, 1.0))) / 4)
     count = node_count(problem.aperture, cycles, DIGITS)
     seconds = CALL["geometric"] + count * RAY
-    return [RaySampling((problem.aperture, cycles, DIGITS), count, model, seconds)]
+    return [RaySampling((problem.aperture, cycles, DIGITS), count, model, seconds, count * RAY_BYTES)]
 
 
 def pinhole(problem: Problem) -> list[PinholeSampling]:

@@ -20,7 +20,15 @@ from optics.methods.problem import Problem
 from optics.methods.spectral_taper import Taper, tapers
 from optics.numerics.autodiff import Array
 from optics.numerics.bessel import bessel_j0
-from optics.numerics.cost import BESSEL_PAIR, CALL, PROFILE_ENTRY, PROFILE_SAMPLE
+from optics.numerics.cost import (
+    BESSEL_PAIR,
+    CALL,
+    ITEM_BYTES,
+    NODE_BYTES,
+    PROFILE_ENTRY,
+    PROFILE_SAMPLE,
+    SYMMETRIC_BYTES,
+)
 from optics.numerics.field import Field
 from optics.numerics.grid import Grid
 from optics.numerics.precision import Precision, opaque, precision
@@ -42,6 +50,7 @@ class HankelSampling:
     angles: int
     line: RadialProfile | DistinctRadii
     seconds: float
+    bytes: float
     method: str = "hankel"
     model_error: float = 0.0
     padding: float = 1.0
@@ -63,11 +72,6 @@ class HankelSampling:
     @property
     def samples(self) -> tuple[int, int]:
         return sum(self.radii), self.angles
-
-    @property
-    def largest(self) -> int:
-        """Side of a square array of the same size as the largest array, the matrix that refines the line of radii."""
-        return math.isqrt(max(self.line.entries, sum(self.radii), self.angles, self.line.points))
 
 
 def hankel(problem: Problem) -> list[HankelSampling]:
@@ -94,7 +98,10 @@ def _sampling(problem: Problem, taper: Taper) -> HankelSampling:
     pairs = sum(radii) * angles + angles * line.points
     seconds = CALL["hankel"] + pairs * BESSEL_PAIR + line.entries * PROFILE_ENTRY
     seconds += math.prod(problem.window.shape) * PROFILE_SAMPLE
-    return HankelSampling(taper, radii, _round_up(angles), line, seconds)
+    needed = line.entries * ITEM_BYTES[problem.dtype] + (sum(radii) + angles + line.points) * NODE_BYTES
+    if line is not profile:
+        needed += math.prod(problem.window.shape) * SYMMETRIC_BYTES
+    return HankelSampling(taper, radii, _round_up(angles), line, seconds, needed)
 
 
 def _round_up(n: int) -> int:

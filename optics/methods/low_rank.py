@@ -14,7 +14,7 @@ from optics.methods.problem import Problem
 from optics.methods.pupil_sampling import PupilSamples, samples_of
 from optics.methods.sine_samples import SineSamples, sine_samples
 from optics.numerics.autodiff import Array
-from optics.numerics.cost import CALL, FOURIER_ENTRY, KERNEL_ENTRY, MATMUL_FLOPS
+from optics.numerics.cost import CALL, FOURIER_ENTRY, ITEM_BYTES, KERNEL_ENTRY, MATMUL_FLOPS
 from optics.numerics.field import Field
 from optics.numerics.grid import Grid, sample_positions
 from optics.numerics.interpolation import chebyshev_points, lagrange_basis
@@ -46,6 +46,7 @@ class LowRankSampling:
     half_width: float
     scale: float
     seconds: float
+    bytes: float
     method: str = "low_rank"
     model_error: float = 0.0
     padding: float = 1.0
@@ -71,10 +72,6 @@ class LowRankSampling:
     @property
     def samples(self) -> tuple[int, int]:
         return len(self.pupil.at), len(self.pupil.at)
-
-    @property
-    def largest(self) -> int:
-        return len(self.pupil.at)  # without the matrix, for which MOST_BYTES is the limit
 
 
 def low_rank(problem: Problem) -> list[LowRankSampling]:
@@ -114,7 +111,11 @@ def _sampling(problem: Problem, pupil: PupilSamples, half: float, scale: float) 
         + pupil.seconds
         + inner * (height + columns) * FOURIER_ENTRY
     )
-    return LowRankSampling(pupil, rank, half, scale, seconds)
+    item = ITEM_BYTES[problem.dtype]
+    # Matrix between pupil and window, pupil, Fourier kernels while they are computed, and products.
+    needed = 4 * item * inner * inner + 8 * item * len(pupil.at) ** 2 + 40 * inner * (height + columns)
+    needed += 4 * item * columns * (inner + height)
+    return LowRankSampling(pupil, rank, half, scale, seconds, needed)
 
 
 def _rank(problem: Problem, pupil: PupilSamples, half: float, scale: float, most: int) -> int | None:

@@ -40,8 +40,8 @@ class Sampling(Protocol):
         """Period of the pupil's transform divided by the number of its samples; 1 without a period."""
 
     @property
-    def largest(self) -> int:
-        """Side of the largest square array that is computed."""
+    def bytes(self) -> float:
+        """Predicted memory of the method at its peak, without the arrays of the window (`window_cost`)."""
 
     @property
     def model_error(self) -> float:

@@ -10,14 +10,24 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from optics.elements.beam import Beam
-from optics.methods.angular_spectrum import SpectrumSampling, arrived, split_period, whole_period
+from optics.methods.angular_spectrum import arrived, split_period, whole_period
 from optics.methods.problem import Problem
 from optics.methods.pupil_sampling import PixelSamples, pixel_samples
 from optics.methods.rayleigh_sommerfeld import node_rule
 from optics.methods.spectral_taper import Taper, tapers
+from optics.methods.spectrum_sampling import SpectrumSampling
 from optics.numerics.autodiff import Array
-from optics.numerics.cost import CALL, MATMUL_FLOPS, NODE_FOURIER_ENTRY, PIXEL_NODE, SPECTRUM_SAMPLE
+from optics.numerics.cost import (
+    CALL,
+    ITEM_BYTES,
+    MATMUL_FLOPS,
+    NODE_BYTES,
+    NODE_FOURIER_ENTRY,
+    PIXEL_NODE,
+    SPECTRUM_SAMPLE,
+)
 from optics.numerics.field import Field
+from optics.numerics.fourier import predicted_bytes
 from optics.numerics.grid import Grid
 from optics.numerics.matrices import complex_flops, complex_matmul
 from optics.numerics.precision import Precision, precision
@@ -35,6 +45,7 @@ class PixelSpectrum(SpectrumSampling):
     period: float
     output_period: int
     seconds: float = 0.0
+    bytes: float = 0.0
     model_error: float = 0.0
     padding: float = 1.0
 
@@ -53,12 +64,6 @@ class PixelSpectrum(SpectrumSampling):
     @property
     def samples(self) -> tuple[int, int]:
         return len(self.pupil.at), len(self.pupil.at)
-
-    @property
-    def largest(self) -> int:
-        """Side of the largest square array."""
-        arrays = [len(self.pupil.at), self.spectrum.shape[0]]
-        return max(arrays if self.is_whole else [*arrays, self.output_period])
 
 
 def whole_pixel_spectrum(problem: Problem) -> list[PixelSpectrum]:
@@ -93,8 +98,11 @@ def _timed(sampling: PixelSpectrum, problem: Problem) -> PixelSpectrum:
     nodes, kept = len(sampling.pupil.at), sampling.spectrum.shape[0]
     sums = (complex_flops(nodes * nodes * kept) + complex_flops(nodes * kept * kept)) / MATMUL_FLOPS[problem.dtype]
     points = nodes * nodes * PIXEL_NODE + kept * kept * SPECTRUM_SAMPLE + nodes * kept * NODE_FOURIER_ENTRY
+    needed = predicted_bytes((nodes, nodes), (kept, kept), ITEM_BYTES[problem.dtype]) + nodes * nodes * NODE_BYTES
     return replace(
-        sampling, seconds=CALL["angular_spectrum"] + sums + points + sampling.seconds_from_spectrum(problem.window)
+        sampling,
+        seconds=CALL["angular_spectrum"] + sums + points + sampling.seconds_from_spectrum(problem.window),
+        bytes=max(needed, sampling.bytes_from_spectrum(problem.window, problem.dtype)),
     )
 
 

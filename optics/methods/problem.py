@@ -135,6 +135,16 @@ class Problem:
         return self.radius**2 / (self.wavelength * self.distance)
 
     @property
+    def waves(self) -> float:
+        """Largest number of waves in a phase before whole waves are subtracted.
+
+        It contains the waves of the longest path, and those that the steepest slope adds up to over the radius.
+        """
+        reach = self.radius + self.window.half_diagonal
+        path = reach**2 / (math.hypot(reach, self.distance) + self.distance) / self.wavelength
+        return path + self.radius * self.phase_band_inside
+
+    @property
     def steepest_sine(self) -> float:
         """Largest sine of the rays that meet in a point of the window; see `scalar_theory.steepest_sine`."""
         leaving = self.phase_band_inside * self.wavelength + self.wavelength / self.radius

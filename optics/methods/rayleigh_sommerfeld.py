@@ -13,7 +13,7 @@ from optics.elements.beam import Beam
 from optics.methods.carrier import on_line
 from optics.methods.problem import Problem
 from optics.numerics.autodiff import Array
-from optics.numerics.cost import CALL, NODE, PAIRS_PER_SECOND
+from optics.numerics.cost import CALL, ITEM_BYTES, NODE, NODE_BYTES, PAIRS_PER_SECOND
 from optics.numerics.field import Field
 from optics.numerics.grid import Grid
 from optics.numerics.precision import Precision, opaque, precision
@@ -35,7 +35,10 @@ MOST_DIGITS = 14.0  # choice: most digits that can be requested of float64 sums,
 # Choice: digits beyond the tolerance. They are few, because the rule resolves the highest frequency everywhere.
 SPARE_DIGITS = 0.5
 ON_AXIS = 1e-9  # rounding: points closer to the x axis than this share of the radius lie on it
-SMALL_RULE = 5000  # choice, limited by memory: more rules are cached if they have at most this number of nodes
+# Choice, limited by memory: numbers of nodes up to which 128 or 16 rules are cached. Of larger rules, one is cached.
+SMALL_RULE, LARGE_RULE = 5000, 2**20
+AT_ONCE = 2**22  # choice, limited by memory: number of nodes that are summed at once
+LANES = 16  # number of points that a processor with AVX-512 sums in the time of one
 FAR = 0.25  # choice: ratio of radius to distance below which nodes for the phase also resolve the kernel
 
 
@@ -55,6 +58,7 @@ class NodeSampling:
     count: int
     line: RadialProfile | None
     seconds: float
+    bytes: float
     method: str = "rayleigh_sommerfeld"
     model_error: float = 0.0
     padding: float = 1.0
@@ -94,10 +98,6 @@ class NodeSampling:
     def samples(self) -> tuple[int, int]:
         return self.count, 1
 
-    @property
-    def largest(self) -> int:
-        return math.ceil(math.sqrt(self.count))
-
 
 def nodes(problem: Problem) -> list[NodeSampling]:
     """Return a sampling whose nodes resolve the combined phase of pupil and path."""
@@ -110,8 +110,10 @@ def nodes(problem: Problem) -> list[NodeSampling]:
         line = line if line.pays(outputs) else None
         outputs = line.points if line else outputs
         count = count if line is None else math.ceil(count / 2)
-    seconds = CALL["rayleigh_sommerfeld"] + count * outputs / PAIRS_PER_SECOND + count * NODE
-    return [NodeSampling(problem.aperture, cycles, digits, count, line, seconds)]
+    pairs = count * max(outputs, LANES)
+    seconds = CALL["rayleigh_sommerfeld"] + pairs / PAIRS_PER_SECOND[problem.dtype] + count * NODE
+    needed = count * NODE_BYTES + (line.entries * ITEM_BYTES[problem.dtype] if line else 0.0)
+    return [NodeSampling(problem.aperture, cycles, digits, count, line, seconds, needed)]
 
 
 def node_rule(problem: Problem) -> tuple[float, float]:
@@ -153,8 +155,9 @@ def cached_nodes(aperture: Aperture, cycles: float, digits: float, halved: bool 
     halved: whether to return only nodes on one side of the x axis. This is for mirror-symmetric pupils and points on
         the x axis, for which both sides contribute the same.
     """
-    small = (aperture.node_count(cycles, digits) or math.inf) <= SMALL_RULE
-    return (_small_rules if small else _large_rules)(aperture, cycles, digits, halved)
+    count = aperture.node_count(cycles, digits) or LARGE_RULE
+    rules = _small_rules if count <= SMALL_RULE else _large_rules if count <= LARGE_RULE else _largest_rule
+    return rules(aperture, cycles, digits, halved)
 
 
 def _made(aperture: Aperture, cycles: float, digits: float, halved: bool) -> Nodes:
@@ -168,6 +171,7 @@ def _made(aperture: Aperture, cycles: float, digits: float, halved: bool) -> Nod
 
 _small_rules = lru_cache(maxsize=128)(_made)
 _large_rules = lru_cache(maxsize=16)(_made)
+_largest_rule = lru_cache(maxsize=1)(_made)
 
 
 def _intensity_band(problem: Problem) -> float:
@@ -191,15 +195,32 @@ def direct_sum(beam: Beam, rule: Rule, x: Array, y: Array, types: Precision) -> 
     import drjit as dr
 
     found = cached_nodes(*rule)
+    parts = [slice(start, start + AT_ONCE) for start in range(0, max(len(found), 1), AT_ONCE)]
+    re, im = dr.zeros(types.Float64, dr.width(x)), dr.zeros(types.Float64, dr.width(x))
+    for part in parts:
+        re, im = _added(beam, (found.x[part], found.y[part], found.weight[part]), (x, y), (re, im), types)
+        if len(parts) > 1:
+            dr.eval(re, im)
+    return Field(types.Float(re), types.Float(im), Grid((1, dr.width(x)), 1.0), types)
+
+
+def _added(
+    beam: Beam, rule: tuple[np.ndarray, ...], at: tuple[Array, Array], total: tuple[Array, Array], types: Precision
+) -> tuple[Array, Array]:
+    """Return the real and imaginary part of `total` at points (x, y), plus the sum over nodes (x, y, weight)."""
+    import drjit as dr
+
+    x, y = at
+    found_x, found_y, found_weight = (types.Float64(column) for column in rule)
     radius = opaque(types, beam.radius)
-    nodes_x, nodes_y = types.Float64(found.x) * radius, types.Float64(found.y) * radius
+    nodes_x, nodes_y = found_x * radius, found_y * radius
     z, wavelength = opaque(types, beam.distance), opaque(types, beam.wavelength / beam.index)
-    weight = types.Float64(found.weight) * dr.square(radius) * z / (2 * math.pi)
+    weight = found_weight * dr.square(radius) * z / (2 * math.pi)
     if beam.pupil.mask is not None:
-        weight *= beam.pupil.amplitude(types.Float64(found.x), types.Float64(found.y), types)
+        weight *= beam.pupil.amplitude(found_x, found_y, types)
     waves = beam.waves(nodes_x, nodes_y, types)
     dr.eval(nodes_x, nodes_y, weight, waves, x, y)
-    count = dr.opaque(types.Index, len(found.weight))
+    count = dr.opaque(types.Index, len(rule[0]))
     cycles = 1 / wavelength  # multiplication by this number is faster than division by the wavelength
     k = 2 * math.pi * cycles
 
@@ -214,7 +235,6 @@ def direct_sum(beam: Beam, rule: Rule, x: Array, y: Array, types: Precision) -> 
         near, far, sin, cos = size * nearness, size * k, types.Float64(sin), types.Float64(cos)
         return i + 1, re + near * cos + far * sin, im + near * sin - far * cos
 
-    zero = dr.zeros(types.Float64, dr.width(x))
     start = dr.zeros(types.Index, dr.width(x))
-    _, re, im = dr.while_loop((start, zero, zero), lambda i, re, im: i < count, add, max_iterations=-1)
-    return Field(types.Float(re), types.Float(im), Grid((1, dr.width(x)), 1.0), types)
+    _, re, im = dr.while_loop((start, *total), lambda i, re, im: i < count, add, max_iterations=-1)
+    return re, im

@@ -4,12 +4,23 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-__all__ = ["FLOAT_NOISE", "MOST_SAMPLES", "AccuracyError", "Option", "Plan"]
+__all__ = [
+    "FLOAT_NOISE",
+    "MOST_BYTES",
+    "MOST_SAMPLES",
+    "MOST_SECONDS",
+    "AccuracyError",
+    "Option",
+    "Plan",
+    "size_of",
+]
 
 
-# Choice: side of the largest square array. 4096² complex64 numbers take 134 MB, and several such arrays exist at the
-# same time.
+# Choice: side of the largest square array in `optics.propagate`. 4096² complex64 numbers take 134 MB, and several such
+# arrays exist at the same time.
 MOST_SAMPLES = 4096
+MOST_BYTES = 4e9  # choice: largest predicted memory of a PSF
+MOST_SECONDS = 60.0  # choice: largest predicted time of a PSF
 
 
 # Rounding error of a method's sums, relative to the root mean square of the field.
@@ -89,6 +100,11 @@ class Plan:
             for option in self.options
         ]
         return "\n".join([*head, "compared", *others])
+
+
+def size_of(count: float) -> str:
+    """Return a number of bytes in words, such as "1.3 GB"."""
+    return f"{count / 1e9:.2g} GB" if count >= 1e8 else f"{count / 1e6:.2g} MB"
 
 
 def _size(samples: tuple[int, int]) -> str:

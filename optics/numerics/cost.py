@@ -9,16 +9,24 @@ from __future__ import annotations
 __all__ = [
     "BESSEL_PAIR",
     "CALL",
+    "CHECK_BYTES",
+    "CHECK_SAMPLE",
+    "CHECK_SYMMETRIC_SAMPLE",
     "DFT_CALL",
+    "DIRECTION_BYTES",
     "FFT_COPY",
     "FFT_FLOPS",
     "FFT_LINE_SAMPLE",
     "FOLDED_SAMPLE",
     "FOURIER_ENTRY",
+    "ITEM_BYTES",
     "KERNEL_ENTRY",
     "MATMUL_FLOPS",
     "NODE",
+    "NODE_BYTES",
     "NODE_FOURIER_ENTRY",
+    "OUTPUT_ARRAYS",
+    "OUTPUT_SAMPLE",
     "PAIRS_PER_SECOND",
     "PIXEL_NODE",
     "PIXEL_NODE_GEOMETRY",
@@ -26,15 +34,17 @@ __all__ = [
     "PROFILE_SAMPLE",
     "PUPIL_SAMPLE",
     "RAY",
+    "RAY_BYTES",
     "SOFT_EDGE_SAMPLE",
     "SPECTRUM_SAMPLE",
+    "SYMMETRIC_BYTES",
     "WINDOW_SAMPLE",
 ]
 
 # Arithmetic [1/s].
 MATMUL_FLOPS = {"float32": 45e9, "float64": 22e9}  # additions and multiplications in matrix products
 FFT_FLOPS = 12e9  # counted as 5 n log2 n for a line of n samples
-PAIRS_PER_SECOND = 2.5e8  # pairs of node and point in the direct sum
+PAIRS_PER_SECOND = {"float32": 2.5e8, "float64": 1.8e8}  # pairs of node and point in the direct sum
 
 # Seconds per call, independent of its size.
 CALL = {
@@ -63,7 +73,19 @@ WINDOW_SAMPLE = 1e-7  # sample of the window, interpolated from 8 x 8 directions
 BESSEL_PAIR = 1e-8  # pair of nodes in a Hankel transform
 PROFILE_ENTRY = 1e-9  # entry of the matrix that refines the radius of a symmetric image
 PROFILE_SAMPLE = 1.5e-8  # sample of a symmetric image, interpolated from 8 radii
+OUTPUT_SAMPLE = {"float32": 1.5e-8, "float64": 3e-8}  # sample of the finished window, computed and copied to NumPy
+CHECK_SAMPLE = 5.5e-8  # sample of the window, in the selection of points for the spot check
+CHECK_SYMMETRIC_SAMPLE = 1e-7  # the same if the points are selected by their radius
 NODE = 4e-9  # path at a node of the direct sum
 PIXEL_NODE = 6e-8  # path and phase at a node within a pixel
 PIXEL_NODE_GEOMETRY = 1e-8  # position and weight of a node within a pixel
 RAY = 1e-7  # path, four slopes, nine cells
+
+# Bytes.
+ITEM_BYTES = {"float32": 4.0, "float64": 8.0}  # real number
+OUTPUT_ARRAYS = 4.0  # arrays of real numbers that are as large as the window
+CHECK_BYTES = 80.0  # per sample of the window: float64 arrays of the spot check
+NODE_BYTES = 72.0  # node of the direct sum: position, weight, path, and copies while the rule is computed
+RAY_BYTES = 112.0  # node of the ray method
+SYMMETRIC_BYTES = 48.0  # per sample of the window: sorting of distinct radii
+DIRECTION_BYTES = 24.0  # direction of the far field, without the weights of nodes

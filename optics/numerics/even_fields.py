@@ -34,16 +34,16 @@ def even_seconds(shape_in: Shape, shape_out: Shape) -> float:
     return (ny * nx * mx + ny * mx * my) / 2 / MATMUL_FLOPS["float32"] + 2 * DFT_CALL
 
 
-def even_sum(field: Field, shape: Shape, period: Scalar, grid: Grid) -> Field:
+def even_sum(field: Field, shape: Shape, period: Scalar, grid: Grid, first: int = 0) -> Field:
     """Return Σ_j u[j] exp(± 2πi j·k / period), as in `fourier.dft2`, for samples k of the quarter `grid`.
 
-    field: values u on the quarter of a plane of `shape` samples.
+    field: values u on the quarter of a plane of `shape` samples, or on some of its rows, which start at row `first`.
     """
     types, (ny, nx), (my, mx) = field.types, shape, grid.shape
     quarters = field.evaluated().grid.shape
     across = down = _cosines(types, mx, nx, period)
-    if (ny, my) != (nx, mx):
-        down = _cosines(types, my, ny, period)
+    if (ny, my) != (nx, mx) or quarters[0] != ny // 2 + 1:
+        down = _cosines(types, my, ny, period, first, quarters[0])
     re, im = (
         matmul(down, matmul(types.Tensor(part, quarters), across, transposed=True)).array
         for part in (field.re, field.im)
@@ -51,13 +51,18 @@ def even_sum(field: Field, shape: Shape, period: Scalar, grid: Grid) -> Field:
     return Field(re, im, quarter(grid), types)
 
 
-def _cosines(types: Precision, n_out: int, n_in: int, period: Scalar) -> Array:
-    """Return the weights (k, j) of sample j together with its mirror image for frequency k, both counted from 0."""
+def _cosines(
+    types: Precision, n_out: int, n_in: int, period: Scalar, first: int = 0, count: int | None = None
+) -> Array:
+    """Return the weights (k, j) of sample j together with its mirror image for frequency k, both counted from 0.
+
+    first, count: first sample j and number of samples; None: all.
+    """
     import drjit as dr
 
-    entries = Grid((n_out // 2 + 1, n_in // 2 + 1), 1.0)
+    entries = Grid((n_out // 2 + 1, n_in // 2 + 1 if count is None else count), 1.0)
     x, y = entries.coordinates(types)
-    j, k = x + opaque(types, entries.shape[1] // 2), y + opaque(types, entries.shape[0] // 2)
+    j, k = x + opaque(types, entries.shape[1] // 2 + first), y + opaque(types, entries.shape[0] // 2)
     alone = (j == 0) | (j > opaque(types, (n_in - 1) // 2))
     wave = Field.from_waves(
         dr.select(alone, types.Float(1), types.Float(2)), j * k / opaque(types, period), entries, types

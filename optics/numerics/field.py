@@ -48,6 +48,9 @@ class Field:
         im = self.re * other.im + self.im * other.re
         return Field(re, im, self.grid, self.types)
 
+    def __add__(self, other: Field) -> Field:
+        return Field(self.re + other.re, self.im + other.im, self.grid, self.types)
+
     def scaled(self, factor: Scalar) -> Field:
         scale = self.types.Float(opaque(self.types, factor))
         return Field(self.re * scale, self.im * scale, self.grid, self.types)

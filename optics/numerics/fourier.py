@@ -33,10 +33,12 @@ __all__ = [
     "kept_indices",
     "periodic_spectrum",
     "periodic_sum",
+    "predicted_bytes",
     "predicted_seconds",
 ]
 
 LONGEST_FFT = 2**31
+SUM_ARRAYS = 4  # real arrays per array of a sum: real and imaginary part, each with one temporary array
 AT_A_TIME, FEWEST_LINES = 2**17, 16  # choice: samples transformed at once (a megabyte), and fewest lines
 
 
@@ -155,6 +157,12 @@ def predicted_seconds(shape_in: tuple[int, int], period: float, shape_out: tuple
     if _fft_wins(shape_in, period, shape_out):
         return _fft_seconds(shape_in, int(period), shape_out)
     return matrix_seconds(shape_in, shape_out)
+
+
+def predicted_bytes(shape_in: tuple[int, int], shape_out: tuple[int, int], item: float) -> float:
+    """Return the approximate memory of one `dft2`, including its input and output, for real numbers of `item` bytes."""
+    (ny, nx), (my, mx) = shape_in, shape_out
+    return SUM_ARRAYS * item * (ny * nx + ny * mx + my * mx + mx * nx + my * ny)
 
 
 def _fft_wins(shape_in: tuple[int, int], period: float, shape_out: tuple[int, int]) -> bool:

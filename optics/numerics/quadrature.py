@@ -39,7 +39,16 @@ def gauss_legendre_count(cycles: float, digits: float, degree: int = 0) -> int:
 
     degree: degree of the polynomial.
     """
-    return ceil((int(harmonics(np.array(pi * cycles), digits)) + degree) / 2)
+    return ceil((_degree(float(f"{cycles:.12g}"), digits) + degree) / 2)
+
+
+@lru_cache(maxsize=4096)
+def _degree(cycles: float, digits: float) -> int:
+    """Return the degree of the polynomial that represents a wave of `cycles` cycles between the ends.
+
+    Rules for the many parts of an opening often need the same number.
+    """
+    return int(harmonics(np.array(pi * cycles), digits))
 
 
 @lru_cache(maxsize=256)

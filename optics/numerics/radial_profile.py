@@ -20,6 +20,9 @@ __all__ = ["DistinctRadii", "RadialProfile"]
 # Choice: entries of the matrix that maps points to the table; 128 MB in float64. If the matrix would be larger, the
 # image is computed at the positions of the table.
 LARGEST_MATRIX = 2**24
+LARGE_WINDOW = (
+    2**18
+)  # choice, limited by memory: radii of 8 windows are cached up to this number of samples, else of one
 BESIDE = TAPS // 2 - 1  # number of positions of the table beyond the axis; there is one more beyond the rim
 
 
@@ -123,7 +126,11 @@ class DistinctRadii:
     @property
     def positions(self) -> np.ndarray:
         """Radii [m] in ascending order."""
-        return _distinct(self.window)[0]
+        return self._distinct[0]
+
+    @property
+    def _distinct(self) -> tuple[np.ndarray, np.ndarray]:
+        return (_large_distinct if math.prod(self.window.shape) > LARGE_WINDOW else _small_distinct)(self.window)
 
     @property
     def radius(self) -> float:
@@ -139,16 +146,18 @@ class DistinctRadii:
         """Return values, given at `positions`, at the samples of the window, flat."""
         import drjit as dr
 
-        return dr.gather(types.Float, types.Float(values), types.Index(_distinct(self.window)[1]))
+        return dr.gather(types.Float, types.Float(values), types.Index(self._distinct[1]))
 
 
-@lru_cache(maxsize=8)
 def _distinct(window: Grid) -> tuple[np.ndarray, np.ndarray]:
     """Return the distinct radii [m] and, for every sample, the index of its radius, flat."""
     squared = np.add.outer(np.square(window.y), np.square(window.x)).ravel() / window.dx**2
     # Squared radii are rounded, because rounding errors would make equal radii distinct.
     found, which = np.unique(np.round(squared, 6), return_inverse=True)
     return np.sqrt(found) * window.dx, padded_for_packets(which.ravel().astype(np.uint32))
+
+
+_small_distinct, _large_distinct = (lru_cache(maxsize=count)(_distinct) for count in (8, 1))
 
 
 def _places(table: int) -> np.ndarray:

@@ -5,6 +5,7 @@ psf_result     PSFResult: a PSF that can be recomputed over other windows
 request        Request: the parameters of one PSF
 planner        the cheapest method within the tolerance
 pictures       computation of requested PSFs, which is repeated if a check fails
+window_cost    time and memory of a window, and their limits
 spot_check     comparison of a PSF with the direct sum at a few points
 vector_focus   vector_focus: beyond scalar theory
 converging     VectorFocus: a polarised field behind a pupil

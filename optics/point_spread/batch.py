@@ -31,6 +31,7 @@ from optics.point_spread.population import population_pictures
 from optics.point_spread.population_members import Member
 from optics.point_spread.psf_result import PSFResult
 from optics.point_spread.request import Request, Setup
+from optics.point_spread.window_cost import check_window
 
 __all__ = ["PSFBatch", "psf_batch"]
 
@@ -133,6 +134,7 @@ def psf_batch(
     in_range("tolerance", tolerance, 1e-12, 0.5)
     members = list(_members(pupils, wavelengths, sensor_distance, source_distances))
     precision(dtype)
+    check_window(window, dtype, len(members))
     plain = isinstance(method, str) and (method, dtype) == ("auto", "float32")
     by_one_plan = population_pictures(members, window, tolerance) if plain else ()
     known = {index: (image, plan) for index, image, plan in by_one_plan}

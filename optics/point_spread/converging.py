@@ -23,6 +23,7 @@ from optics.numerics.read_only import ReadOnlyArrays, read_only
 from optics.point_spread.pictures import PSFPicture, pictures
 from optics.point_spread.request import Request
 from optics.point_spread.spot_check import spot_check
+from optics.point_spread.window_cost import check_window
 
 __all__ = ["Converging", "VectorFocus"]
 
@@ -31,6 +32,7 @@ MOST_NODES = 400_000  # choice, limited by memory: number of plane waves in a su
 SUM_ERROR = 1e-8  # error of a sum of plane waves
 CHECK_SECONDS = 0.5  # choice: assumed time of a field [s], of which a check takes at most a third
 MOST_SECONDS, FIELDS = 60.0, 7  # choice: time limit [s], and the number of fields that share it
+FIELD_ARRAYS = 4 * FIELDS  # arrays of real numbers: real and imaginary part of each field, and as many temporary arrays
 SINGLE = 1e-4  # choice: smallest tolerance for which float32 is sufficient
 
 
@@ -75,6 +77,7 @@ class Converging(ReadOnlyArrays):
         Raises:
             AccuracyError: no method meets the tolerance within the limits on memory and time.
         """
+        check_window(window, "float64", arrays=FIELD_ARRAYS)
         found, plan = self._aplanatic(window) if self.aplanatic else self._plane_waves(window) or self._exact(window)
         parts = np.tensordot(self.jones, found[:6].reshape(2, 3, *window.shape), axes=1)
         intensity, pure = (np.abs(parts) ** 2).sum(axis=0), parts[0] if len(parts) == 1 else None

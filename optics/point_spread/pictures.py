@@ -18,6 +18,7 @@ from optics.numerics.field import Field
 from optics.numerics.precision import opaque, precision
 from optics.point_spread.request import Request
 from optics.point_spread.spot_check import spot_check
+from optics.point_spread.window_cost import check_window
 
 __all__ = ["PSFPicture", "pictures"]
 
@@ -130,6 +131,9 @@ def pictures(requests: Sequence[Request], alike: bool = False) -> list[PSFPictur
     """
     import drjit as dr
 
+    if requests:
+        problem = requests[0].problem
+        check_window(problem.window, problem.dtype, len(requests))
     planned: list[tuple[Request, tuple[Plan, Sampling]]] = []
     for request in requests:
         told = request.after(planned[-1][0], planned[-1][1][0]) if alike and planned else request
@@ -153,7 +157,7 @@ def _checked(attempt: _Attempt, asked: Request, tries: int) -> PSFPicture:
     """
     problem, tolerance = attempt.request.problem, asked.problem.tolerance
     image = attempt.image.numpy()
-    error = spot_check(attempt.request.beam, problem, image, attempt.plan.seconds)
+    error = spot_check(attempt.request.beam, problem, image, attempt.sampling.seconds)
     if error is None:
         return attempt.stated(_predicted_error(image, attempt.sampling, problem))
     named = attempt.approximates and asked.method == attempt.plan.method

@@ -45,8 +45,17 @@ from optics.methods.method_sampling import Sampling
 from optics.methods.pixelated_spectrum import split_pixel_spectrum, whole_pixel_spectrum
 from optics.methods.problem import Problem
 from optics.methods.rayleigh_sommerfeld import nodes
-from optics.numerics.accuracy import FLOAT_NOISE, MOST_SAMPLES, AccuracyError, Option, Plan
+from optics.numerics.accuracy import (
+    FLOAT_NOISE,
+    MOST_BYTES,
+    MOST_SECONDS,
+    AccuracyError,
+    Option,
+    Plan,
+    size_of,
+)
 from optics.numerics.cost import CALL, DFT_CALL, PAIRS_PER_SECOND, WINDOW_SAMPLE
+from optics.point_spread.window_cost import check_window, window_bytes, window_seconds
 
 __all__ = ["APPROXIMATE", "EXACT", "FIELDS", "METHODS", "choose"]
 
@@ -106,7 +115,7 @@ class Weighing:
 WEIGHING = {
     "hankel": Weighing(CALL["hankel"]),
     "low_rank": Weighing(CALL["low_rank"]),
-    "rayleigh_sommerfeld": Weighing(CALL["rayleigh_sommerfeld"], 1 / PAIRS_PER_SECOND, 1e-4),
+    "rayleigh_sommerfeld": Weighing(CALL["rayleigh_sommerfeld"], 1 / PAIRS_PER_SECOND["float32"], 1e-4),
     "fresnel": Weighing(CALL["fresnel"] + DFT_CALL, 0.0, 3e-3),
     "fraunhofer": Weighing(CALL["fresnel"] + DFT_CALL, 0.0, 3e-3),
     "geometric": Weighing(CALL["geometric"], 0.0, 3e-3),
@@ -118,7 +127,7 @@ WEIGHING = {
 
 
 @lru_cache(maxsize=256)
-def choose(problem: Problem, method: str = "auto", most_seconds: float = 60.0) -> tuple[Plan, Sampling]:
+def choose(problem: Problem, method: str = "auto", most_seconds: float = MOST_SECONDS) -> tuple[Plan, Sampling]:
     """Return the plan and the fastest sampling that meets the problem's tolerance.
 
     Planning takes as long as a small PSF, so plans are cached.
@@ -135,6 +144,7 @@ def choose(problem: Problem, method: str = "auto", most_seconds: float = 60.0) -
     if asked[0] not in METHODS:
         raise ValueError(f"method = {method!r}: must be 'auto', 'exact' or one of {', '.join(METHODS)}")
     _check_dtype(problem)
+    check_window(problem.window, problem.dtype)
     allowed = _model_tolerance(problem) if method == "auto" else math.inf
     outputs = math.prod(problem.window.shape)
     known = METHODS if problem.pixelated is None else FOR_PIXELS
@@ -148,8 +158,8 @@ def choose(problem: Problem, method: str = "auto", most_seconds: float = 60.0) -
         samplings = known[name](problem)
         if not samplings:
             continue
-        weighed[name] = option = min(samplings, key=_cost)
-        if _within(option, most_seconds) and (best is None or option.seconds < best.seconds):
+        weighed[name] = option = min(samplings, key=lambda each: _cost(each, problem))
+        if _within(option, problem, most_seconds) and (best is None or option.seconds < best.seconds):
             best = option if option.model_error <= allowed else best
     if best is None:
         candidates = [option for option in weighed.values() if option.model_error <= allowed]
@@ -174,16 +184,21 @@ def _sampling_error(problem: Problem) -> float:
     return problem.tolerance / 2 + FLOAT_NOISE[problem.dtype]
 
 
-def _seconds(option: Sampling) -> float:
-    return option.seconds
+def _seconds(option: Sampling, problem: Problem) -> float:
+    """Return the time of the whole PSF: that of the method, and that of the window."""
+    return option.seconds + window_seconds(problem)
 
 
-def _cost(option: Sampling) -> tuple[bool, float]:
-    return option.largest > MOST_SAMPLES, option.seconds
+def _bytes(option: Sampling, problem: Problem) -> float:
+    return option.bytes + window_bytes(problem)
 
 
-def _within(option: Sampling, most_seconds: float) -> bool:
-    return option.largest <= MOST_SAMPLES and option.seconds <= most_seconds
+def _cost(option: Sampling, problem: Problem) -> tuple[bool, float]:
+    return _bytes(option, problem) > MOST_BYTES, option.seconds
+
+
+def _within(option: Sampling, problem: Problem, most_seconds: float) -> bool:
+    return _bytes(option, problem) <= MOST_BYTES and _seconds(option, problem) <= most_seconds
 
 
 def _plan(problem: Problem, best: Sampling, weighed: dict[str, Sampling], most_seconds: float) -> Plan:
@@ -192,7 +207,7 @@ def _plan(problem: Problem, best: Sampling, weighed: dict[str, Sampling], most_s
             name,
             option.samples,
             _sampling_error(problem) + option.model_error,
-            option.seconds,
+            _seconds(option, problem),
             _verdict(option, best, problem, most_seconds),
         )
         for name, option in weighed.items()
@@ -203,20 +218,20 @@ def _plan(problem: Problem, best: Sampling, weighed: dict[str, Sampling], most_s
         + ("cheapest method that meets the tolerance" if len(weighed) > 1 else "requested")
     )
     error = _sampling_error(problem) + best.model_error
-    sampled = best.method, best.samples, problem.dtype, error, why, best.seconds, tuple(options), best.padding
-    return Plan(*sampled, problem.scalar_error)
+    sampled = best.method, best.samples, problem.dtype, error, why, _seconds(best, problem)
+    return Plan(*sampled, tuple(options), best.padding, problem.scalar_error)
 
 
 def _verdict(option: Sampling, best: Sampling, problem: Problem, most_seconds: float) -> str:
     if option is best:
         return "chosen"
-    if option.largest > MOST_SAMPLES:
-        return f"too large: {option.largest} across, at most {MOST_SAMPLES}"
-    if option.seconds > most_seconds:
+    if _bytes(option, problem) > MOST_BYTES:
+        return f"too large: {size_of(_bytes(option, problem))}, at most {size_of(MOST_BYTES)}"
+    if _seconds(option, problem) > most_seconds:
         return f"too slow: at most {most_seconds:g} s"
     if option.model_error > _model_tolerance(problem):
         return f"approximation with an error of {option.model_error:.1g}"
-    return f"{option.seconds / best.seconds:.1f} times as slow"
+    return f"{_seconds(option, problem) / _seconds(best, problem):.1f} times as slow"
 
 
 def _refusal(problem: Problem, found: list[Sampling], most_seconds: float, method: str) -> str:
@@ -234,9 +249,11 @@ def _refusal(problem: Problem, found: list[Sampling], most_seconds: float, metho
             f"{problem.distance:.3g} m reaches rays too close to grazing for a sampled spectrum: shrink the window or "
             "use method='rayleigh_sommerfeld'"
         )
-    least = min(found, key=_seconds)
+    least = min(found, key=lambda option: option.seconds)
+    across = f"{least.samples[0]} nodes" if least.samples[1] == 1 else f"{max(least.samples)} samples across"
     return (
-        f"tolerance = {problem.tolerance:g} needs {least.largest} samples across and about {least.seconds:.2g} s by "
-        f"{least.method}; the limits are {MOST_SAMPLES} and {most_seconds:g} s: widen the tolerance, shrink the window "
-        f"({width:.3g} m) or the pupil (radius {problem.radius:.3g} m, Fresnel number {problem.fresnel_number:.3g})"
+        f"tolerance = {problem.tolerance:g} needs {across}, {size_of(_bytes(least, problem))} and about "
+        f"{_seconds(least, problem):.2g} s by {least.method}; the limits are {size_of(MOST_BYTES)} and "
+        f"{most_seconds:g} s: widen the tolerance, shrink the window ({width:.3g} m) or the pupil (radius "
+        f"{problem.radius:.3g} m, Fresnel number {problem.fresnel_number:.3g})"
     )

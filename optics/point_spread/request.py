@@ -9,11 +9,13 @@ from optics.elements.pupil import Pupil
 from optics.elements.source import PointSource
 from optics.methods.method_sampling import Sampling
 from optics.methods.problem import Problem
-from optics.numerics.accuracy import AccuracyError, Plan
+from optics.numerics.accuracy import MOST_SECONDS, AccuracyError, Plan
 from optics.numerics.arguments import one_of
 from optics.numerics.autodiff import Scalar
 from optics.numerics.grid import Grid
+from optics.numerics.precision import precision
 from optics.point_spread.planner import EXACT, METHODS, choose
+from optics.point_spread.window_cost import check_window, window_seconds
 
 __all__ = ["Request", "Setup"]
 
@@ -36,7 +38,7 @@ class Request:
     beam: Beam
     problem: Problem
     method: str = "auto"
-    most_seconds: float = 60.0
+    most_seconds: float = MOST_SECONDS
     keeps_field: bool = False
     like: Plan | None = None
 
@@ -80,7 +82,8 @@ class Request:
             plan, sampling = choose(self.problem, self.like.method, self.most_seconds)
         except AccuracyError:
             return None
-        if plan.seconds > GROWN * self.like.seconds:
+        window = window_seconds(self.problem)
+        if plan.seconds - window > GROWN * (self.like.seconds - window):
             return None
         return replace(plan, why=plan.why.replace("requested", "same method as at the previous wavelength")), sampling
 
@@ -111,6 +114,8 @@ class Setup:
 
     def __post_init__(self) -> None:
         one_of("method", self.method, ("auto", "exact", *METHODS))
+        precision(self.dtype)
+        check_window(self.window, self.dtype)
 
     def request(self, pupil: Pupil, wavelength: float) -> Request:
         """Return the request for a pupil at a vacuum wavelength [m].

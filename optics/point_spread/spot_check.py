@@ -17,13 +17,16 @@ from optics.numerics.grid import Grid
 from optics.numerics.precision import precision
 from optics.numerics.quadrature import stepped_up
 
-__all__ = ["CAUTION", "spot_check"]
+__all__ = ["CAUTION", "path_rounding", "spot_check"]
 
 # Choice: safety factor on the estimate. From 40 points, the root mean square of the error is known only to within a
 # factor of about two. tests/optics/point_spread/test_robustness.py checks that the stated error bounds the true error.
 CAUTION = 3.5
 
 
+# Choice: relative rounding error of a path, times 2π for the phase and 2 for the intensity, reduced by averaging over
+# the pupil. test_spot_check.py checks the value against sums in extended precision.
+WAVE_ROUNDING = 1.1e-16
 DIGITS_STEP = 0.25  # choice: digits of a rule are rounded to multiples of this, so that cached rules are used
 
 
@@ -35,7 +38,8 @@ class Effort:
     points_along_radius: number of points of a rotationally symmetric PSF.
     fewest: number of points below which the estimate is useless.
     spare_digits: digits of the direct sum in addition to the requested accuracy. The first affordable value is used.
-    share: time of the check relative to the time of the PSF.
+    share: time of the check relative to the time of the PSF. share_of_few: the same for windows with fewer than
+        `fewest` samples. Without a check, the error of the only sample of a window may be as large as its bound.
     seconds: time [s] that every check may take.
     """
 
@@ -44,6 +48,7 @@ class Effort:
     fewest: int = 8
     spare_digits: tuple[float, ...] = (7.0, 4.0)
     share: float = 0.3
+    share_of_few: float = 1.0
     seconds: float = 3e-3
 
 
@@ -90,9 +95,19 @@ def spot_check(beam: Beam, problem: Problem, image: np.ndarray, seconds: float) 
     if squared > 0.01 * total:
         total = min(total, float(np.mean(np.square(exact) / chance)))
     rounding = max(FLOAT_NOISE["float64"], float(np.finfo(precision(problem.dtype).dtype).eps))
-    # The last term is the error of the direct sum: 10^-digits of the amplitude of all light in phase, and twice that
-    # for the intensity.
-    return CAUTION * math.sqrt(squared / total) + rounding + 2 * 10.0 ** (darkness - reference.digits)
+    # The last two terms are errors that the direct sum shares with the PSF: 10^-digits of the amplitude of all light in
+    # phase, and twice that for the intensity; and the rounding of paths.
+    shared = 2 * 10.0 ** (darkness - reference.digits) + path_rounding(problem, darkness)
+    return CAUTION * math.sqrt(squared / total) + rounding + shared
+
+
+def path_rounding(problem: Problem, darkness: float) -> float:
+    """Return the relative error of the intensity that the rounding of paths in float64 causes.
+
+    An error of the phase changes the amplitude by the same fraction of the amplitude of all light in phase. A
+    comparison with the direct sum does not show this error, because the direct sum has similar paths.
+    """
+    return WAVE_ROUNDING * problem.waves * 10.0**darkness
 
 
 def _darkness(beam: Beam, problem: Problem, mean: float) -> float:
@@ -110,7 +125,8 @@ def _darkness(beam: Beam, problem: Problem, mean: float) -> float:
 
 def _affordable(problem: Problem, darkness: float, seconds: float, samples: int) -> _DirectSum:
     """Return the direct sum with as many points and digits as the time of the PSF allows."""
-    pairs = max(EFFORT.share * seconds, EFFORT.seconds) * PAIRS_PER_SECOND
+    share = EFFORT.share if samples >= EFFORT.fewest else EFFORT.share_of_few
+    pairs = max(share * seconds, EFFORT.seconds) * PAIRS_PER_SECOND["float32"]
     wanted = min(EFFORT.points_along_radius if problem.symmetric else EFFORT.points, samples)
     for spare in EFFORT.spare_digits:
         wished = spare - math.log10(problem.tolerance) + darkness
@@ -132,7 +148,7 @@ def _drawn(problem: Problem, image: np.ndarray, points: int) -> tuple[np.ndarray
         chance = np.full(points, 1 / points)  # there are few points, so each is compared once
     else:
         chance = _chances(image.astype(np.float64), problem.window.shape)
-    order = _by_radius(problem.window) if problem.symmetric else np.arange(image.size)
+    order = _in_order(problem.window) if problem.symmetric else np.arange(image.size)
     levels = (np.arange(points) + 0.5) / points
     drawn = order[np.searchsorted(np.cumsum(chance[order]), levels).clip(max=image.size - 1)]
     return drawn, chance[drawn]
@@ -175,13 +191,20 @@ def _chances(bright: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
     squares[1:-1, 1:-1] = np.square(bright).reshape(shape)
     rows = squares[:-2] + squares[1:-1] + squares[2:]
     near = (rows[:, :-2] + rows[:, 1:-1] + rows[:, 2:]).ravel()
-    rim, fixed = _fixed_chances(shape)
+    rim, fixed = (_large_chances if bright.size > LARGE else _small_chances)(shape)
     lit = bright * rim
     found = fixed + bright / bright.sum() + near / near.sum()
     return (found + lit / lit.sum() if lit.any() else found + fixed / 3) / KINDS
 
 
-@lru_cache(maxsize=16)
+LARGE = 2**18  # choice, limited by memory: arrays of 16 windows are cached up to this number of samples, else of one
+
+
+def _in_order(window: Grid) -> np.ndarray:
+    """Return the result of `_by_radius`, from a cache if possible."""
+    return (_large_order if math.prod(window.shape) > LARGE else _small_order)(window)
+
+
 def _by_radius(window: Grid) -> np.ndarray:
     """Return flat indices in order of the distance from the axis.
 
@@ -192,12 +215,14 @@ def _by_radius(window: Grid) -> np.ndarray:
     return np.argsort(np.round(radii / window.dx**2, 6), kind="stable")
 
 
+_small_order, _large_order = (lru_cache(maxsize=count)(_by_radius) for count in (16, 1))
+
+
 # Choice: exponent of u², where u in [-1, 1] is the position across the window. u²⁴ has fallen to one half at 1 - |u| =
 # ln 2 / 24, a seventieth of the window's width from the side.
 STEEP = 12
 
 
-@lru_cache(maxsize=16)
 def _fixed_chances(shape: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
     """Return the nearness of sides and corners, flat, and the sum of the three parts that do not depend on the PSF."""
     height, width = shape
@@ -211,3 +236,6 @@ def _fixed_chances(shape: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
     corners = (np.add.outer(y, x) / 2) ** STEEP
     rim = sides.ravel() / 4 + corners.ravel() / corners.sum()
     return rim, 1 / rim.size + rim
+
+
+_small_chances, _large_chances = (lru_cache(maxsize=count)(_fixed_chances) for count in (16, 1))

@@ -74,7 +74,7 @@ def operations(types: Precision) -> Iterator[Operation]:
     )
     sample = cost.PUPIL_SAMPLE + cost.SOFT_EDGE_SAMPLE
     yield Operation("sample of a pupil", sample, (256, 512, 1024), lambda n: n * n, lambda n: _pupil(n, types))
-    pair = 1 / cost.PAIRS_PER_SECOND
+    pair = 1 / cost.PAIRS_PER_SECOND["float32"]
     yield Operation(
         "pair of the direct sum", pair, (32, 64, 128), lambda n: n * n * _nodes(), lambda n: _direct(n, types)
     )

@@ -10,6 +10,8 @@ hankel: test_textbook.py, test_oracles_circular.py
 low_rank: test_low_rank.py, test_textbook.py
 pixelated_spectrum: elements/test_pixel_relief.py
 problem: point_spread/test_planner.py
+row_blocks: test_row_blocks.py
+spectrum_sampling: test_row_blocks.py, test_even_pupils.py
 pupil_sampling: test_textbook.py, elements/test_pixel_relief.py
 rayleigh_sommerfeld: test_textbook.py, test_oracles_circular.py
 rays: test_geometric.py

@@ -105,7 +105,7 @@ def test_plan_prints_as_a_table():
 
 def test_refusals_say_what_it_would_take():
     far_too_large = dataclasses.replace(WIDE, radius=3e-3, distance=2e-3, window=Grid.square(1001, 4e-6))
-    with pytest.raises(AccuracyError, match=r"needs \d+ samples across .* the limits are"):
+    with pytest.raises(AccuracyError, match=r"needs \d+ samples across, \d+ GB and about .* the limits are"):
         choose(far_too_large)
     with pytest.raises(AccuracyError, match="dtype='float64' allows"):
         choose(dataclasses.replace(LENS, tolerance=1e-8))

@@ -9,7 +9,8 @@ import optics
 from optics import Grid, PointSource, Pupil
 from optics.elements.beam import Beam
 from optics.methods.problem import Problem
-from optics.methods.rayleigh_sommerfeld import cached_nodes
+from optics.methods.rayleigh_sommerfeld import cached_nodes, turns
+from optics.numerics.accuracy import FLOAT_NOISE
 from optics.point_spread import spot_check as spot_check_module
 from optics.point_spread.planner import choose
 from optics.point_spread.spot_check import CAUTION, spot_check
@@ -77,3 +78,64 @@ def test_the_check_owns_up_to_what_its_own_sum_is_good_to(spare, monkeypatch):
     assert wished <= reference.digits <= wished + spot_check_module.DIGITS_STEP
     same = spot_check_module._exact(beam, task, reference, np.arange(image.size))
     assert spot_check(beam, task, same, 1.0) == pytest.approx(2 * 10 ** (darkness - reference.digits), rel=1e-3)
+
+
+def in_extended_precision(pupil, wavelength, distance, x, y):
+    """Return the PSF at points of a lens's image, from the Rayleigh-Sommerfeld sum with 64 bits of mantissa."""
+    real, beam = np.longdouble, Beam(pupil, PointSource(), wavelength, distance)
+    window = Grid((1, 2), float(np.ptp(x)) or 1e-9, (float(x.mean()), float(y.mean())))
+    rule = cached_nodes(pupil.aperture, turns(Problem.from_beam(beam, window, 1e-10, "float64"), 13.0), 13.0)
+    xi, eta = real(rule.x) * real(pupil.radius), real(rule.y) * real(pupil.radius)
+    z, f, wave = real(distance), real(pupil.thin_lens_focal_length), real(wavelength)
+    turn = 8 * np.arctan(real(1))
+    weight, k = real(rule.weight) * real(pupil.radius) ** 2 * z / turn, turn / wave
+    squared = xi**2 + eta**2
+    lens = squared / (np.sqrt(squared + f * f) + f)
+    found = []
+    for at_x, at_y in zip(x, y, strict=True):
+        off = (real(at_x) - xi) ** 2 + (real(at_y) - eta) ** 2
+        long = np.sqrt(off + z * z)
+        waves = (off / (long + z) - lens) / wave
+        phase, size = (waves - np.rint(waves)) * turn, weight / long**2
+        re, im = np.cos(phase) / long + k * np.sin(phase), np.sin(phase) / long - k * np.cos(phase)
+        found.append(float((size * re).sum() ** 2 + (size * im).sum() ** 2))
+    return np.array(found) / pupil.area
+
+
+@pytest.mark.skipif(np.finfo(np.longdouble).eps > 1e-18, reason="needs extended precision")
+@pytest.mark.parametrize("seed", range(8))
+def test_long_paths_round_more(seed):
+    """Lenses of centimetres have paths of thousands of waves. The check cannot see their rounding, because the direct
+    sum has the same paths. The actual error was up to ten times the stated one."""
+    rng = np.random.default_rng(seed)
+    radius, slope = 10 ** rng.uniform(-1.7, -1), rng.uniform(0.1, 0.25)
+    distance = radius / slope
+    airy = 550e-9 / (2 * slope)
+    pupil = Pupil(radius, thin_lens_focal_length=distance)
+    window = Grid((1, 8), 0.4 * airy, (airy * (0.0, 60.0)[seed % 2], airy * rng.uniform(0, 3)))
+    beam = Beam(pupil, PointSource(), 550e-9, distance)
+    task = Problem.from_beam(beam, window, 1e-9, "float64")
+    reference = spot_check_module._affordable(task, 3.0, 1.0, 8)
+    image = spot_check_module._exact(beam, task, reference, np.arange(8))
+    exact = in_extended_precision(pupil, 550e-9, distance, window.x, np.full(8, window.y[0]))
+    error = np.linalg.norm(image - exact) / np.linalg.norm(exact)
+    assert error <= spot_check(beam, task, image, 1.0) < 1e-7
+
+
+def test_ordinary_paths_round_as_before():
+    """The rounding of paths is small relative to the floors of both dtypes, for a bright and for a dark window."""
+    task = picture((61, 61), 0.2e-6)[1]
+    assert spot_check_module.path_rounding(task, 1.0) < 0.2 * FLOAT_NOISE["float64"]
+    assert spot_check_module.path_rounding(task, 5.0) < 0.01 * 10 * FLOAT_NOISE["float32"]
+
+
+@pytest.mark.parametrize("samples", range(1, 8))
+def test_windows_with_few_samples_are_checked(samples):
+    """The check of a single sample was omitted if it took longer than a third of the PSF. Its error can then be 0.63 of
+    the tolerance, and the prediction was 0.5."""
+    beam = Beam(Pupil(1e-3, optics.BSplineRelief(1e-7 * np.eye(4))), PointSource(), 550e-9, 10e-3)
+    task = Problem.from_beam(beam, Grid((1, samples), 3e-6, (1e-4, 2e-4)), 1e-4)
+    sampling = choose(task, "rayleigh_sommerfeld")[1]
+    assert 2e5 < sampling.count < 5e6
+    reference = spot_check_module._affordable(task, 0.3, sampling.seconds, samples)
+    assert reference.points == samples

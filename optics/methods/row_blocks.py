@@ -1,0 +1,40 @@
+"""Blocks of rows of a pupil that is too large to be evaluated at once. The sums over the blocks add up to its spectrum.
+
+Memory then depends on the size of a block and of the spectrum, and not on the number of samples of the pupil.
+"""
+
+from __future__ import annotations
+
+from optics.numerics.autodiff import Scalar
+from optics.numerics.field import Field
+from optics.numerics.grid import Grid
+from optics.numerics.precision import opaque
+
+__all__ = ["row_blocks", "with_rows_moved"]
+
+AT_ONCE = 2**24  # choice, limited by memory: largest number of samples of a block
+
+
+def row_blocks(grid: Grid) -> list[tuple[int, Grid]]:
+    """Return the first row and the samples of each block. A small grid is its own single block."""
+    height, width = grid.shape
+    count = -(-height * width // AT_ONCE)
+    if count == 1:
+        return [(0, grid)]
+    rows = -(-height // count)
+    found = []
+    for first in range(0, height, rows):
+        here = min(rows, height - first)
+        y = grid.centre[1] + (first + here // 2 - height // 2) * grid.dx
+        found.append((first, Grid((here, width), grid.dx, (grid.centre[0], y))))
+    return found
+
+
+def with_rows_moved(spectrum: Field, rows: int, period: Scalar, sign: int) -> Field:
+    """Return the Fourier sum of samples that lie `rows` rows further along y, see `fourier.dft2`."""
+    if rows == 0:
+        return spectrum
+    types = spectrum.types
+    _, k = Grid(spectrum.grid.shape, 1.0).coordinates(types)
+    waves = k * opaque(types, sign * rows) / opaque(types, period)
+    return spectrum * Field.from_waves(1.0, waves, spectrum.grid, types)

@@ -1,0 +1,99 @@
+"""The planes between which the methods of the angular spectrum transform a field, and the sums between them."""
+
+from __future__ import annotations
+
+import math
+from functools import cached_property
+from itertools import pairwise
+
+from optics.elements.beam import Beam
+from optics.methods.problem import Problem
+from optics.methods.row_blocks import with_rows_moved
+from optics.methods.spectral_taper import Taper
+from optics.numerics.autodiff import Scalar
+from optics.numerics.cost import ITEM_BYTES
+from optics.numerics.even_fields import even_seconds, even_sum, quarter
+from optics.numerics.field import Field
+from optics.numerics.fourier import dft2, predicted_bytes, predicted_seconds
+from optics.numerics.grid import Grid
+from optics.numerics.precision import opaque, precision
+
+__all__ = ["SpectrumSampling"]
+
+
+class SpectrumSampling:
+    """Samples of a spectrum and of the planes onto which it is transformed.
+
+    method: "angular_spectrum" or "split_angular_spectrum".
+    taper: taper that fades the spectrum out.
+    period: width [m] after which the field in the pupil's plane repeats. The spectrum's samples are 1/period apart.
+    output_period: number of samples per period in the plane where the last transform starts (split) or ends (whole).
+    even: whether the field is even in x and y. A quarter of each plane is then sufficient.
+    """
+
+    method: str
+    taper: Taper
+    period: float
+    output_period: int
+    even: bool = False
+
+    @property
+    def is_whole(self) -> bool:
+        """True if no paraxial part is split off."""
+        return self.method == "angular_spectrum"
+
+    @cached_property
+    def spectrum(self) -> Grid:
+        return Grid.square(2 * math.ceil(self.taper.end * self.period) + 1, 1 / self.period)
+
+    @cached_property
+    def relay(self) -> Grid:
+        return Grid.square(self.output_period, self.period / self.output_period)
+
+    def part(self, grid: Grid) -> Grid:
+        """Return the samples that represent a plane: a quarter if the field is even, else all."""
+        return quarter(grid) if self.even else grid
+
+    def sum(self, field: Field, start: Grid, period: Scalar, end: Grid, sign: int, first: int = 0) -> Field:
+        """Return the Fourier sum from the samples of one plane to the samples of another, see `fourier.dft2`.
+
+        first: first row of the field, if it contains only some rows of the plane.
+        """
+        if self.even:
+            return even_sum(field, start.shape, period, end, first)
+        found = dft2(field, period, end.shape, sign, end.dx, end.centre)
+        return with_rows_moved(found, first + field.grid.shape[0] // 2 - start.shape[0] // 2, period, sign)
+
+    def sum_seconds(self, start: Grid, period: float, end: Grid) -> float:
+        return even_seconds(start.shape, end.shape) if self.even else predicted_seconds(start.shape, period, end.shape)
+
+    def sum_bytes(self, start: Grid, end: Grid, dtype: str) -> float:
+        """Return the memory of a sum between the stored samples of two planes, or between blocks of them."""
+        return predicted_bytes(start.shape, end.shape, ITEM_BYTES[dtype])
+
+    def bytes_from_spectrum(self, window: Grid, dtype: str) -> float:
+        """Return the predicted memory of the transforms from the spectrum to the window."""
+        planes = [self.spectrum, window] if self.is_whole else [self.spectrum, self.relay, window]
+        stored = [self.part(plane) for plane in planes]
+        return max(self.sum_bytes(*pair, dtype) for pair in pairwise(stored))
+
+    def seconds_from_spectrum(self, window: Grid) -> float:
+        """Return the predicted time of the transforms from the spectrum to the window."""
+        if self.is_whole:
+            return self.sum_seconds(self.spectrum, self.output_period, window)
+        to_relay = self.sum_seconds(self.spectrum, self.output_period, self.relay)
+        # This period is not a whole number, so `dft2` uses a matrix.
+        return to_relay + self.sum_seconds(self.relay, 0.5, window)
+
+    def whole_phase(self, field: Field, beam: Beam, problem: Problem) -> Field:
+        """Return the field with the phase that `arrived` omits for a split spectrum: e^{iπr²/λz}/i."""
+        if self.is_whole:
+            return field
+        types = precision(problem.dtype)
+        x, y = problem.window.coordinates(types)
+        waves = (x * x + y * y) * (0.5 / opaque(types, problem.wavelength)) / opaque(types, beam.distance) - 0.25
+        return field * Field.from_waves(1.0, waves, problem.window, types)
+
+    def plane(self, problem: Problem) -> float:
+        """Return the width [m] of the plane over which rounding errors spread light."""
+        return self.period if self.is_whole else problem.wavelength * problem.distance / self.relay.dx

@@ -1,0 +1,56 @@
+"""Time and memory that every PSF needs for its window, in addition to the time and memory of its method."""
+
+from __future__ import annotations
+
+import math
+
+from optics.methods.problem import Problem
+from optics.numerics.accuracy import MOST_BYTES, MOST_SECONDS, AccuracyError, size_of
+from optics.numerics.cost import (
+    CHECK_BYTES,
+    CHECK_SAMPLE,
+    CHECK_SYMMETRIC_SAMPLE,
+    ITEM_BYTES,
+    OUTPUT_ARRAYS,
+    OUTPUT_SAMPLE,
+)
+from optics.numerics.grid import Grid
+
+__all__ = ["check_window", "window_bytes", "window_seconds"]
+
+
+def window_seconds(problem: Problem) -> float:
+    """Return the time of evaluating the PSF, copying it to NumPy, and selecting the points of the spot check [s]."""
+    check = CHECK_SYMMETRIC_SAMPLE if problem.symmetric else CHECK_SAMPLE
+    each = OUTPUT_SAMPLE[problem.dtype] + (0.0 if problem.reach is not None else check)
+    return math.prod(problem.window.shape) * each
+
+
+def window_bytes(problem: Problem) -> float:
+    """Return the memory of all arrays that are as large as the window, at their peak [bytes]."""
+    each = OUTPUT_ARRAYS * ITEM_BYTES[problem.dtype] + (0.0 if problem.reach is not None else CHECK_BYTES)
+    return math.prod(problem.window.shape) * each
+
+
+def check_window(window: Grid, dtype: str, count: int = 1, arrays: int = 1) -> None:
+    """Refuse a window that exceeds the limits even if its method needs neither time nor memory.
+
+    count: number of PSFs over the window that exist at the same time.
+    arrays: number of arrays of real numbers that are stored for each PSF.
+
+    Raises:
+        AccuracyError: the window needs too much memory or time.
+    """
+    samples = math.prod(window.shape)
+    each = OUTPUT_ARRAYS * ITEM_BYTES[dtype] + CHECK_BYTES + (count * arrays - 1) * ITEM_BYTES[dtype]
+    seconds = samples * (OUTPUT_SAMPLE[dtype] + CHECK_SAMPLE)
+    if samples * each <= MOST_BYTES and seconds <= MOST_SECONDS:
+        return
+    height, width = window.shape
+    most = math.isqrt(int(MOST_BYTES / each))
+    many, fewer = (f"{count} PSFs of shape", "compute fewer PSFs at once, or ") if count > 1 else ("shape", "")
+    raise AccuracyError(
+        f"{many} = ({height}, {width}) needs {size_of(samples * each)} and about {seconds:.2g} s for each PSF; the "
+        f"limits are {size_of(MOST_BYTES)} and {MOST_SECONDS:g} s: {fewer}use at most {most**2} samples, such as "
+        f"({most}, {most}), with a larger dx, or compute the window in parts (centre)"
+    )
