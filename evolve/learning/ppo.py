@@ -121,7 +121,8 @@ class AdaptingPPO(PPO):
     def train(self) -> None:
         for name in ("rewards", "values", "log_probs"):
             _require_finite(name, getattr(self.rollout_buffer, name), self.num_timesteps)
-        super().train()
+        with np.errstate(over="ignore", invalid="ignore"):  # the next lines report overflow as an error
+            super().train()
         # If the loss overflows, SB3 clips the gradient to zero. The weights then remain finite, but nothing is learnt.
         _require_finite("loss", np.asarray(self.logger.name_to_value["train/value_loss"]), self.num_timesteps)
         for name, parameter in self.policy.named_parameters():

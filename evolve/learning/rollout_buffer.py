@@ -45,6 +45,11 @@ class FrameRolloutBuffer(RolloutBuffer):
         sizes = known_beside_eyes(self.observation_space)
         self.beside = {name: np.zeros((worlds, steps, size), np.float32) for name, size in sizes.items()}
 
+    def compute_returns_and_advantage(self, last_values: Tensor, dones: np.ndarray) -> None:
+        """Compute returns and advantages. Overflow is reported when the learner finds that the loss is not finite."""
+        with np.errstate(over="ignore", invalid="ignore"):
+            super().compute_returns_and_advantage(last_values, dones)
+
     def reset(self) -> None:
         shape = (self.buffer_size, self.n_envs)
         self.actions = np.zeros((*shape, self.action_dim), np.float32)

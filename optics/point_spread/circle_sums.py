@@ -96,7 +96,8 @@ def soft_sums(circles: SoftCircles, values: Array) -> Array:
             self.set_grad_out(self.eval(self.grad_in("values")))
 
         def backward(self) -> None:
-            grad = self.grad_out().numpy().reshape(-1, circles.radii.shape[0])
+            given: Any = self.grad_out()
+            grad = given.numpy().reshape(-1, circles.radii.shape[0])
             self.set_grad_in("values", types.Float(padded_for_packets(circles.transposed(grad))))
 
     return dr.custom(SoftSums, values)

@@ -24,9 +24,17 @@ from typing import Any
 
 import numpy as np
 
-from optics.numerics.arguments import items, reals, shown, unmasked
+from optics.numerics.arguments import items, shown, unmasked
 from sim.exr.previews import preview_of_receptors, preview_of_spectra
-from sim.exr.spectral_layout import PREVIEW, RADIANCE, REFLECTANCE, NoSpectra, channel, fields_of_views
+from sim.exr.spectral_layout import (
+    PREVIEW,
+    RADIANCE,
+    REFLECTANCE,
+    NoSpectra,
+    channel,
+    fields_of_views,
+    require_nanometres,
+)
 
 LAYOUT_VERSION = "1.0"
 UNITS = "W.m^-2.sr^-1"
@@ -77,9 +85,7 @@ class View:
             image = unmasked(f"{where}: {label}", getattr(self, label))
             if image is not None and (len(_shape(image)) != 3 or 0 in image.shape):
                 raise ValueError(f"{where}: {label} {_kind(image)}: must be an array (band, y, x)")
-        wavelengths = reals(f"{where}: wavelengths_nm", self.wavelengths_nm)
-        if wavelengths.ndim != 1 or not np.all(np.isfinite(wavelengths)):
-            raise ValueError(f"{where}: wavelengths_nm = {shown(self.wavelengths_nm)}: must be finite numbers (band,)")
+        require_nanometres(f"{where}: wavelengths_nm", self.wavelengths_nm)
         if (spectral := self.spectral) is not None:
             names = {channel(nm) for nm in self.wavelengths_nm}
             if len(spectral) != len(self.wavelengths_nm) or len(names) != len(spectral):
@@ -89,11 +95,10 @@ class View:
             if self.reflectance is not None and self.reflectance.shape != spectral.shape:
                 raise ValueError(f"{where}: reflectance {_kind(self.reflectance)}: must have that of the radiance")
         if self.peaks_nm is not None:
-            peaks = reals(f"{where}: peaks_nm", self.peaks_nm)
-            if self.receptors is None or peaks.shape != (len(self.receptors),) or not np.isfinite(peaks).all():
-                raise ValueError(
-                    f"{where}: peaks_nm = {shown(self.peaks_nm)}: must be a finite number for each channel of receptors"
-                )
+            peaks = require_nanometres(f"{where}: peaks_nm", self.peaks_nm)
+            if self.receptors is None or peaks.shape != (len(self.receptors),):
+                what = "must be a finite number for each channel of receptors"
+                raise ValueError(f"{where}: peaks_nm = {shown(self.peaks_nm)}: {what}")
 
     @property
     def spectral(self) -> np.ndarray | None:
@@ -266,10 +271,7 @@ def _views(parts: list[tuple[str, dict[str, np.ndarray], dict[str, Any]]]) -> li
             raise ValueError(f"part {part_name!r}: must be spectral or receptors, with attributes")
         view = fields.setdefault(name, {"name": name, "attributes": held["attributes"]})
         if kind == "spectral":
-            nm = np.array(held["wavelengths_nm"], dtype=np.float64)
-            if nm.ndim != 1 or not np.all(np.isfinite(nm)):
-                raise ValueError("wavelengths_nm: must be finite numbers")
-            view["wavelengths_nm"] = nm
+            view["wavelengths_nm"] = nm = require_nanometres("wavelengths_nm", held["wavelengths_nm"])
             for field_name, quantity in (("radiance", RADIANCE), ("reflectance", REFLECTANCE)):
                 if any(name.startswith(f"{quantity}.") for name in channels):
                     view[field_name] = np.stack([channels[channel(x, quantity)] for x in nm])

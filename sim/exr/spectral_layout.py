@@ -17,6 +17,9 @@ from typing import Any
 
 import numpy as np
 
+from optics.numerics.arguments import reals, shown
+from optics.spectra.spectrum import SHORTEST_NM
+
 PREVIEW = ("R", "G", "B")
 RADIANCE, REFLECTANCE = "S0", "T"
 LIGHT_SPEED = 299_792_458.0  # [m/s]
@@ -36,6 +39,14 @@ class ExrWarning(UserWarning):
 def channel(nm: float, quantity: str = RADIANCE) -> str:
     """Return the name of a channel at a wavelength [nm]."""
     return f"{quantity}.{f'{nm:.6f}'.replace('.', ',')}nm"
+
+
+def require_nanometres(name: str, values: Any) -> np.ndarray:
+    """Return wavelengths [nm]; ValueError unless all of them are finite and plausible, which they are not in metres."""
+    nm = reals(name, values)
+    if nm.ndim != 1 or not np.isfinite(nm).all() or (nm < SHORTEST_NM).any():
+        raise ValueError(f"{name} = {shown(values)}: must be finite numbers in nanometres (550, not 550e-9), (band,)")
+    return nm
 
 
 class NoSpectra(ValueError):

@@ -88,8 +88,7 @@ class Mirror:
         self.spectra = resolve(model, spectra)
         visible = _visible(model, bodies, groups)
         self.geoms = np.array([g for g in visible if shapes.has_shape(model, g)], dtype=int)
-        if not len(self.geoms):
-            raise ValueError("mirror: the model has no visible geom of a kind that can be mirrored")
+        surfaces.require_geoms(model, self.geoms.tolist(), "mirror: ")
         data = _reference_pose(model) if data is None else _checked(model, data)
         self._places = PoseSnapshot.from_data(data)
         together = coincident.coincidences(data, self.geoms.tolist())

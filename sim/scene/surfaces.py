@@ -52,6 +52,22 @@ def visible(model: mujoco.MjModel, groups: Sequence[int]) -> list[int]:
     return [g for g in range(model.ngeom) if model.geom_group[g] in groups and rgba(model, g)[3] > 0]
 
 
+def require_geoms(model: mujoco.MjModel, geoms: Sequence[int], where: str = "") -> None:
+    """Raise a ValueError if no geom can be mirrored. A URDF may have lost its visuals.
+
+    where: beginning of the error message
+    """
+    if len(geoms):
+        return
+    why = "the model has no visible geom of a kind that can be mirrored"
+    if not model.ngeom:
+        why = (
+            "the model has no geoms; MuJoCo discards the visuals of a URDF, unless its <robot> contains "
+            '<mujoco><compiler discardvisual="false"/></mujoco>'
+        )
+    raise ValueError(f"{where}{why}")
+
+
 def texture_id(model: mujoco.MjModel, geom: int) -> int:
     """Return the colour texture of a geom's material, -1 for none."""
     material = model.geom_matid[geom]

@@ -69,8 +69,7 @@ class ModelScene:
         in_bands, self._off = lights_in_bands(model, self.spectra, eye)
         self._seen = surfaces.visible(model, groups)
         self.geoms = [g for g in self._seen if shapes.has_shape(model, g)]
-        if not self.geoms:
-            raise ValueError("the model has no visible geom of a kind that can be mirrored")
+        surfaces.require_geoms(model, self.geoms)
         data = mujoco.MjData(model)
         mujoco.mj_forward(model, data)
         self.coincidences = coincidences(data, self.geoms)

@@ -83,7 +83,6 @@ def test_rewards_that_are_no_numbers_end_the_training():
         learn(worlds=Poisoned(16))
 
 
-@pytest.mark.filterwarnings("ignore:.*encountered in:RuntimeWarning")
 def test_a_loss_that_overflows_ends_the_training():
     """The critic's squared error is infinite. Gradient clipping would turn this into a training run without effect."""
     model = AdaptingPPO(BrightSpot(16), SMALL, QUICK, 0)
@@ -91,6 +90,18 @@ def test_a_loss_that_overflows_ends_the_training():
     model.rollout_buffer.returns[:] = 1e30
     with pytest.raises(TrainingDiverged, match="loss not finite after 512 steps"):
         model.train()
+
+
+@pytest.mark.parametrize("reward", [1e30, -1e30, 1e38, -1e38])
+@pytest.mark.filterwarnings("error::RuntimeWarning")
+def test_huge_rewards_end_the_training_without_warnings(reward):
+    class Huge(BrightSpot):
+        def step_wait(self):
+            observation, earned, done, infos = super().step_wait()
+            return observation, np.float32(reward) + earned, done, infos
+
+    with pytest.raises(TrainingDiverged, match="not finite"):
+        learn(worlds=Huge(16))
 
 
 class Dear(BrightSpot):

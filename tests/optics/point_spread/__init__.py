@@ -1,7 +1,9 @@
 """Tests that fail when a module of optics/point_spread is broken.
 
+arriving: test_measure_bounds.py
 batch: test_batch.py
-concentration: test_measures.py, test_measure_errors.py
+circle_sums: test_circle_sums.py
+concentration: test_measures.py, test_measure_errors.py, test_measure_bounds.py
 microvilli: test_microvilli.py
 converging: test_vector_focus.py, test_microvilli.py
 disk_sum: test_microvilli.py

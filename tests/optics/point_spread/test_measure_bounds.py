@@ -58,7 +58,12 @@ def test_encircled_energy_is_within_its_bound(seed):
     n, apart = 2 * int(rng.integers(8, 20)) + 1, rng.uniform(0.15, 0.6)
     radii = rng.uniform(0, n // 2, 5) * apart * unit
     exact = optics.psf(
-        pupil, [WAVELENGTH], dx=0.11 * unit, shape=(2 * int(n * apart / 0.22) + 19,) * 2, tolerance=1e-7, dtype="float64"
+        pupil,
+        [WAVELENGTH],
+        dx=0.11 * unit,
+        shape=(2 * int(n * apart / 0.22) + 19,) * 2,
+        tolerance=1e-7,
+        dtype="float64",
     )
     (true,), (least,) = optics.encircled_energy(exact, radii, with_error=True)
     assert least.max() < 1.5e-5

@@ -53,14 +53,24 @@ def test_more_and_fewer_receptors_are_shown_from_long_to_short(tmp_path, count, 
     ("count", "peaks", "words"),
     [
         (3, (400, 500), r"peaks_nm = \(400, 500\): must be a finite number for each channel"),
-        (1, 400, "peaks_nm = 400: must be a finite number for each channel"),
-        (1, [np.nan], r"peaks_nm = \[nan\]: must be a finite number for each channel"),
+        (1, 400, "peaks_nm = 400: must be finite numbers in nanometres"),
+        (1, [np.nan], r"peaks_nm = \[nan\]: must be finite numbers in nanometres"),
         (1, "long", "peaks_nm: must be real numbers, not 'long'"),
     ],
 )
 def test_peaks_that_are_not_the_receptors_are_refused(count, peaks, words):
     with pytest.raises(ValueError, match=f"View 'eye': {words}"):
         View("eye", receptors=np.ones((count, 2, 2)), peaks_nm=peaks)
+
+
+@pytest.mark.parametrize("wrong", [-1.0, 0.0, np.inf, 550e-9, *(-(10 ** np.random.default_rng(6).uniform(-9, 3, 3)))])
+def test_wavelengths_are_nanometres(wrong):
+    """Metres round to the same channel, so that the former message spoke of distinct wavelengths. -1 was accepted."""
+    says = r"must be finite numbers in nanometres \(550, not 550e-9\)"
+    with pytest.raises(ValueError, match=f"View 'eye': wavelengths_nm = .*{says}"):
+        View("eye", np.array([wrong, 650e-9]), np.ones((2, 2, 2)))
+    with pytest.raises(ValueError, match=f"View 'eye': peaks_nm = .*{says}"):
+        View("eye", receptors=np.ones((2, 2, 2)), peaks_nm=(450.0, wrong))
 
 
 def test_radiance_alone_has_no_peaks():

@@ -12,7 +12,7 @@ shapes: test_mirror.py, test_textures.py
 merged_parts: test_mirror.py
 tessellation: test_mirror.py, test_cube_textures.py
 cube: test_cube_textures.py
-surfaces: test_textures.py, test_mirror_light.py, test_texture_colors.py
+surfaces: test_urdf.py, test_textures.py, test_mirror_light.py, test_texture_colors.py
 linear_textures: test_texture_colors.py
 bsdfs: test_bsdfs.py
 coincident: test_coincident.py
