@@ -138,4 +138,5 @@ def _after(before: Candidate, candidate: Candidate) -> Candidate:
     if candidate.failure is not None:
         candidate = replace(candidate, steps=before.steps, curve=before.curve)
     failures = total_episode_failures(before.episode_failures, candidate.episode_failures)
-    return replace(candidate, seconds=before.seconds + candidate.seconds, episode_failures=failures)
+    seconds = before.seconds + candidate.seconds
+    return replace(candidate, seconds=seconds, episode_failures=failures).recordable()

@@ -171,9 +171,9 @@ def test_a_damaged_checkpoint_is_set_aside_and_trained_again(tmp_path, monkeypat
     The form of the test reads checkpoints as a worker does. A candidate would fail if a damaged file reached it.
     """
     (tmp_path / "a").mkdir()
-    whole, _ = carry(tmp_path / "a" / "run", tiny(*HALVING), monkeypatch)
+    whole, _ = carry(tmp_path / "a" / "run", tiny(*HALVING, "search.generations=1"), monkeypatch)
     with pytest.raises(KeyboardInterrupt):
-        carry(tmp_path / "run", tiny(*HALVING), monkeypatch, until=7)
+        carry(tmp_path / "run", tiny(*HALVING, "search.generations=1"), monkeypatch, until=7)
     kept = sorted((tmp_path / "run" / "trainings").iterdir())
     contents = {path.name: damaged(path.read_bytes()) for path in kept}
     contents[kept[0].name] = kept[1].read_bytes()
