@@ -2,12 +2,15 @@
 
 import collections
 import math
+import os
 import random
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from evolve.config.assemble import assemble, from_text, to_toml
+from evolve.config.checks import ConfigError
 from evolve.config.numbering import Place
 from evolve.search.loop import evolve
 from evolve.store.candidate import Candidate
@@ -162,3 +165,25 @@ def test_a_run_of_random_evaluations_can_be_opened_and_resumed(kind, tmp_path):
     again = Run.open(run.path)
     assert again.record.lines == run.record.lines == seen.candidates
     evolve(again, Drawn(None), seen)
+
+
+@pytest.mark.parametrize("name", [b"t\xff", b"\xf0\x9f\x98"])
+def test_a_task_whose_file_name_is_no_text_is_refused_before_a_run_exists(name, tmp_path, monkeypatch):
+    """Settings are UTF-8 text, so that the run could not be written."""
+    monkeypatch.chdir(tmp_path)
+    file = os.fsdecode(name) + ".py"
+    (tmp_path / file).write_text("class Mine:\n    pass\n")
+    with pytest.raises(ConfigError, match="the name of the file must be UTF-8") as caught:
+        assemble(f"{file}:Mine", "quick")
+    assert str(caught.value).isprintable()
+
+
+def test_settings_of_any_task_file_read_back_equal(tmp_path, monkeypatch):
+    """Names with line ends or backslashes are refused, as before."""
+    monkeypatch.chdir(tmp_path)
+    drawn = Random(random.randrange(2**32), 0)
+    for number in range(20):
+        text = drawn.text().translate(dict.fromkeys(map(ord, "\0\\\r\n"))).encode(errors="ignore").decode()
+        (tmp_path / f"{number}{text}.py").write_text("class Mine:\n    pass\n")
+        config = assemble(f"{number}{text}.py:Mine", "quick")
+        assert replace(from_text(to_toml(config)), code=config.code) == config
