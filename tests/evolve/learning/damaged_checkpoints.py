@@ -110,7 +110,7 @@ DAMAGES = {
     "a missing tensor": with_tensors(without, checksum=False),
     "a missing tensor, with a checksum": with_tensors(without, checksum=True),
     "a wrong shape": with_tensors(other_shape, checksum=False),
-    "a wrong shape, with a checksum": with_tensors(other_shape, checksum=True),
+    "a misshapen tensor, with a checksum": with_tensors(other_shape, checksum=True),
     "a foreign tensor, with a checksum": with_tensors(foreign, checksum=True),
     "no checksum": without_checksum,
     "no numbers, with a checksum": without_numbers,
