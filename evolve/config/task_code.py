@@ -52,6 +52,10 @@ class TaskCode:
         """
         place, _, name = named.partition(".py:") if ".py:" in named else (named.removesuffix(".py"), "", "")
         file = Path(f"{place}.py")
+        if any("\ud800" <= letter <= "\udfff" for letter in file.name):  # bytes that are not UTF-8
+            raise ConfigError(
+                f"task = {named!r}: the name of the file must be UTF-8, as in a run's config.toml", "task"
+            )
         try:
             content = file.read_bytes()
         except OSError as error:

@@ -16,5 +16,6 @@ rollout_buffer    rollout buffer that stores each frame once
 adam              Adam optimizer on a single vector of all weights
 tensor_file       reading of tensors from a run's files
 checkpoint        state of a training run, stored in a file
+checkpoint_file   owner and checksum of such a file
 training_rung     rung of a training run under successive halving
 """

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-import json
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import safetensors
 import safetensors.torch
 from torch import Tensor
 
-from evolve.learning.tensor_file import read_tensors
+from evolve.learning.checkpoint_file import CheckpointError, owned, read_owned, sealed
 from evolve.store.atomic_files import write_whole
-from evolve.store.regular_files import StrangeFileError
 
 __all__ = ["Checkpoint", "load_checkpoint", "save_checkpoint"]
 
@@ -38,8 +38,11 @@ class Checkpoint:
     adam: Mapping[str, Tensor | int]
 
 
-def save_checkpoint(checkpoint: Checkpoint, path: Path) -> None:
-    """Write a checkpoint as safetensors, completely or not at all. Numbers are stored in its metadata."""
+def save_checkpoint(checkpoint: Checkpoint, path: Path, owner: Mapping[str, Any]) -> None:
+    """Write a checkpoint as safetensors, completely or not at all. Numbers are stored in its metadata.
+
+    owner: the training run from which the checkpoint comes, see `TrainingRung.owners`
+    """
     parts = {"now": checkpoint.now, "best": checkpoint.best, "adam": checkpoint.adam}
     tensors = {
         f"{part}/{name}": value.detach().clone().contiguous()
@@ -47,34 +50,47 @@ def save_checkpoint(checkpoint: Checkpoint, path: Path) -> None:
         for name, value in values.items()
         if isinstance(value, Tensor)
     }
-    rest = {"steps": checkpoint.steps, "curve": checkpoint.curve, "unit": checkpoint.unit}
-    metadata = {"training": json.dumps({**rest, "adam_steps": checkpoint.adam["steps"]})}
-    write_whole(path, safetensors.torch.save(tensors, metadata))
+    numbers = {"steps": checkpoint.steps, "curve": checkpoint.curve, "unit": checkpoint.unit}
+    metadata = owned(owner, {**numbers, "adam_steps": checkpoint.adam["steps"]})
+    write_whole(path, sealed(safetensors.torch.save(tensors, metadata)))
 
 
-def load_checkpoint(path: Path) -> Checkpoint | None:
-    """Load a checkpoint that `save_checkpoint` wrote; None if the file is missing or damaged.
+def load_checkpoint(path: Path, owner: Mapping[str, Any]) -> Checkpoint | None:
+    """Load a checkpoint that `save_checkpoint` wrote for the same owner; None if the file is missing.
 
     Nothing in the file is executed.
 
     Raises:
+        CheckpointError: the file is damaged, or belongs to another owner.
         StrangeFileError: the path is a link, FIFO or directory.
     """
+    found = read_owned(path, owner)
+    if found is None:
+        return None
+    content, numbers = found
     try:
-        metadata, tensors = read_tensors(path)
-        rest = json.loads(metadata["training"])
-        return Checkpoint(
-            steps=int(rest["steps"]),
-            curve=tuple((int(steps), float(value)) for steps, value in rest["curve"]),
-            unit=float(rest["unit"]),
+        tensors = safetensors.torch.load(content)
+        checkpoint = Checkpoint(
+            steps=int(numbers["steps"]),
+            curve=tuple((int(steps), float(value)) for steps, value in numbers["curve"]),
+            unit=float(numbers["unit"]),
             now=_part(tensors, "now"),
             best=_part(tensors, "best"),
-            adam={**_part(tensors, "adam"), "steps": int(rest["adam_steps"])},
+            adam={**_part(tensors, "adam"), "steps": int(numbers["adam_steps"])},
         )
-    except StrangeFileError:
-        raise
-    except (OSError, safetensors.SafetensorError, KeyError, TypeError, ValueError, OverflowError, RecursionError):
-        return None
+    except (safetensors.SafetensorError, KeyError, TypeError, ValueError, OverflowError) as error:
+        raise CheckpointError(f"its content is not that of a checkpoint ({type(error).__name__})") from error
+    _require_possible(checkpoint)
+    return checkpoint
+
+
+def _require_possible(checkpoint: Checkpoint) -> None:
+    """Check that training can have ended in this state."""
+    at = [0, *(steps for steps, _ in checkpoint.curve)]
+    if at != sorted(set(at)) or not 0 < checkpoint.steps == at[-1]:
+        raise CheckpointError("its steps and its learning curve are impossible")
+    if not 0 < checkpoint.unit < math.inf:
+        raise CheckpointError(f"its unit of rewards is {checkpoint.unit:.3g}, and not positive")
 
 
 def _part(tensors: Mapping[str, Tensor], part: str) -> dict[str, Tensor]:

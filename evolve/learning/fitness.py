@@ -13,6 +13,7 @@ import numpy as np
 from evolve.config.run_config import RunConfig
 from evolve.genome.phenotype import Phenotype
 from evolve.learning.checkpoint import Checkpoint, load_checkpoint, save_checkpoint
+from evolve.learning.checkpoint_file import CheckpointError, set_aside
 from evolve.learning.policy import Brain, TrainingDiverged, save_policy
 from evolve.learning.ppo import Episodes, Progress, Training, Worlds, play, train
 from evolve.learning.training_envs import worlds_of
@@ -33,6 +34,7 @@ def evaluate(
     """Train one candidate, write its policy, and measure its fitness.
 
     On one machine, the same arguments give the same outcome. If learning diverges, a failed Evaluation is returned.
+    Checkpoints that cannot be used are set aside with a CheckpointWarning, and have no effect on the outcome.
 
     seed: seed of the policy's initial weights, of all worlds and of all random numbers in learning
     policy_path: path of the trained policy (safetensors), which is not written if learning diverged
@@ -69,22 +71,32 @@ def _live_until(
     failures: Counter[str],
     progress: Progress | None,
 ) -> tuple[Training, Episodes]:
-    """Train to the end of this rung, starting from the latest existing checkpoint, and play the evaluation episodes.
+    """Train to the end of this rung, starting from the latest usable checkpoint, and play the evaluation episodes.
 
     Failures of episodes since this checkpoint are counted in `failures`.
     """
+    owners = rung.owners(phenotype, config, seed)
     begun, first = None, 0
     for earlier in reversed(range(rung.number)):
-        if begun is None and (begun := load_checkpoint(rung.checkpoints[earlier])) is not None:
+        try:
+            begun = load_checkpoint(rung.checkpoints[earlier], owners[earlier])
+        except CheckpointError as error:
+            set_aside(rung.checkpoints[earlier], error)
+        if begun is not None:
             first = earlier + 1
+            break
     for number in range(first, rung.number + 1):
         learning = replace(config.learning, total_steps=rung.ends[number])
         # `rungs=1`: the rung must not be divided further, because its parts could be shorter than a rollout.
         life = replace(config, learning=learning, search=replace(config.search, rungs=1))
         entropy = [seed, number] if number else seed  # the first rung starts like an undivided training run
-        training, episodes = _live(phenotype, life, entropy, failures, progress, begun)
+        try:
+            training, episodes = _live(phenotype, life, entropy, failures, progress, begun)
+        except CheckpointError as error:  # the file is sound, but comes from a version with another network
+            set_aside(rung.checkpoints[number - 1], error)
+            return _live_until(rung, phenotype, config, seed, failures, progress)
         begun = training.end
-        save_checkpoint(begun, rung.checkpoints[number])
+        save_checkpoint(begun, rung.checkpoints[number], owners[number])
     return training, episodes
 
 

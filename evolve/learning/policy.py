@@ -254,7 +254,7 @@ def set_learnt(policy: EyePolicy, tensors: Mapping[str, Tensor]) -> None:
         ValueError: a name or a shape differs from the policy's.
     """
     own = learnt(policy)
-    _require_same_shapes(own, tensors)
+    require_same_shapes(own, tensors)
     for name, tensor in own.items():
         tensor.copy_(tensors[name])
 
@@ -268,10 +268,15 @@ def _require_shape(config: PolicyConfig, tensors: Mapping[str, Tensor]) -> None:
     if config.layers > len(tensors):
         raise ValueError(f"it has {len(tensors)} tensors, too few for {config.layers} layers")
     with torch.device("meta"):  # shapes without storage
-        _require_same_shapes(learnt(build_policy(config)), tensors)
+        require_same_shapes(learnt(build_policy(config)), tensors)
 
 
-def _require_same_shapes(own: Mapping[str, Tensor], tensors: Mapping[str, Tensor]) -> None:
+def require_same_shapes(own: Mapping[str, Tensor], tensors: Mapping[str, Tensor]) -> None:
+    """Check that these are the tensors of a policy, by their names and shapes.
+
+    Raises:
+        ValueError: a name or a shape differs.
+    """
     if tensors.keys() != own.keys():
         raise ValueError(f"tensors missing or unknown: {sorted(tensors.keys() ^ own.keys())}")
     for name, tensor in own.items():

@@ -20,7 +20,16 @@ from stable_baselines3.common.vec_env import VecEnv
 from evolve.config.run_config import LearningConfig
 from evolve.learning.adam import Adam
 from evolve.learning.checkpoint import Checkpoint
-from evolve.learning.policy import FIRST_SPREAD, Brain, EyePolicy, TrainingDiverged, learnt, set_learnt
+from evolve.learning.checkpoint_file import CheckpointError
+from evolve.learning.policy import (
+    FIRST_SPREAD,
+    Brain,
+    EyePolicy,
+    TrainingDiverged,
+    learnt,
+    require_same_shapes,
+    set_learnt,
+)
 from evolve.learning.rollout_buffer import FrameRolloutBuffer
 from evolve.learning.schedule import first_step_size, schedule
 from evolve.learning.training_rewards import RewardsInUnits, ramped_share
@@ -165,7 +174,18 @@ class AdaptingPPO(PPO):
         return Checkpoint(self.num_timesteps, tuple(curve), float(self.env.unit), now, best, adam)
 
     def restore(self, begun: Checkpoint) -> None:
-        """Restore the state in a checkpoint. Training continues with new worlds and new random numbers."""
+        """Restore the state in a checkpoint. Training continues with new worlds and new random numbers.
+
+        Raises:
+            CheckpointError: the checkpoint does not have the tensors of this learner.
+        """
+        moments = {name: value for name, value in self.policy.optimizer.state_dict().items() if name != "steps"}
+        try:
+            require_same_shapes(learnt(self.policy), begun.now)
+            require_same_shapes(learnt(self.policy), begun.best)
+            require_same_shapes(moments, {name: value for name, value in begun.adam.items() if name != "steps"})
+        except ValueError as error:
+            raise CheckpointError(f"its tensors are not those of this network ({error})") from error
         self.num_timesteps = begun.steps
         self.env.unit = begun.unit
         set_learnt(self.policy, begun.now)
@@ -217,6 +237,7 @@ def train(
 
     Raises:
         TrainingDiverged: rewards, loss, weights or actions are not finite.
+        CheckpointError: `begun` does not have the tensors of this learner.
     """
     model = AdaptingPPO(worlds.training, brain, config, seed)
     report = _Report(progress, config.total_steps) if progress else None

@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import safetensors.torch
 
+from evolve.learning.checkpoint_file import metadata_of
 from evolve.store.regular_files import read
 
 if TYPE_CHECKING:
     from torch import Tensor
 
 __all__ = ["read_tensors"]
-
-LENGTH_BYTES = 8  # size of the number at the start of a file, which is the length of its header [bytes]
 
 
 def read_tensors(path: Path) -> tuple[dict[str, str], dict[str, Tensor]]:
@@ -29,6 +27,4 @@ def read_tensors(path: Path) -> tuple[dict[str, str], dict[str, Tensor]]:
     """
     content = read(path)
     tensors = safetensors.torch.load(content)  # also validates the header, which is parsed below
-    end = LENGTH_BYTES + int.from_bytes(content[:LENGTH_BYTES], "little")
-    metadata = json.loads(content[LENGTH_BYTES:end]).get("__metadata__") or {}
-    return metadata, tensors
+    return metadata_of(content), tensors

@@ -2,8 +2,17 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
+
+from evolve.config.assemble import to_toml
+from evolve.config.run_config import RunConfig
+from evolve.genome.phenotype import Phenotype
+from evolve.learning.checkpoint_file import CheckpointError, read_owned, set_aside
+from evolve.store.versions import fingerprint
 
 __all__ = ["TrainingRung"]
 
@@ -15,12 +24,42 @@ class TrainingRung:
     ends: number of training steps at the end of each rung up to this rung, in ascending order
     checkpoints: path of the checkpoint at the end of each of these rungs; training continues from the latest checkpoint
         that exists
+    candidate: id of the candidate; None outside a run
     """
 
     ends: tuple[int, ...]
     checkpoints: tuple[Path, ...]
+    candidate: int | None = None
 
     @property
     def number(self) -> int:
         """Number of this rung, counted from 0; it is the value `rung` in a record."""
         return len(self.ends) - 1
+
+    def owners(self, phenotype: Phenotype, config: RunConfig, seed: int) -> tuple[dict[str, Any], ...]:
+        """Return the owner of each checkpoint, as JSON values: everything on which the state of training depends.
+
+        The settings are compared without the number of workers and of generations, which have no effect on it.
+        """
+        common = {
+            "candidate": self.candidate,
+            "seed": seed,
+            "animal": hashlib.sha256(json.dumps(phenotype.to_json()).encode()).hexdigest()[:16],
+            "settings": fingerprint(to_toml(config)),
+        }
+        numbers = range(len(self.ends))
+        return tuple({**common, "rung": number, "ends": list(self.ends[: number + 1])} for number in numbers)
+
+    def set_aside_unusable(self, phenotype: Phenotype, config: RunConfig, seed: int) -> None:
+        """Set aside the checkpoints of earlier rungs that cannot be used, until one is found that can.
+
+        Raises:
+            OSError: a checkpoint is not a regular file, or cannot be renamed.
+        """
+        owners = self.owners(phenotype, config, seed)
+        for path, owner in reversed(list(zip(self.checkpoints[:-1], owners[:-1], strict=True))):
+            try:
+                if read_owned(path, owner) is not None:
+                    return
+            except CheckpointError as error:
+                set_aside(path, error)

@@ -141,7 +141,7 @@ def _evaluate(function: Callable[..., Evaluation], order: Order, progress: Calla
         if order.begun is not None:
             number, content = order.begun
             checkpoints[number].write_bytes(content)
-        rung = (TrainingRung(order.ends, checkpoints),) if checkpoints else ()
+        rung = (TrainingRung(order.ends, checkpoints, order.id),) if checkpoints else ()
         outcome = evaluated(function, (phenotype, config, order.seed, policy, *rung), progress)
         return _text(outcome), _content(policy), _content(checkpoints[-1]) if checkpoints else b""
 

@@ -110,7 +110,9 @@ def _job(run: Run, proposal: Proposal, rung: int = 0) -> Job:
     training = None
     if run.config.search.rungs > 1:
         ends = budgets(run.config.search, run.config.learning)[: rung + 1]
-        training = TrainingRung(ends, tuple(run.checkpoint_path(proposal.id, i) for i in range(rung + 1)))
+        checkpoints = tuple(run.checkpoint_path(proposal.id, i) for i in range(rung + 1))
+        training = TrainingRung(ends, checkpoints, proposal.id)
+        training.set_aside_unusable(phenotype, run.config, seed)
     return Job(proposal.id, phenotype, run.config, seed, run.policy_path(proposal.id), training)
 
 
@@ -136,4 +138,5 @@ def _after(before: Candidate, candidate: Candidate) -> Candidate:
     if candidate.failure is not None:
         candidate = replace(candidate, steps=before.steps, curve=before.curve)
     failures = total_episode_failures(before.episode_failures, candidate.episode_failures)
-    return replace(candidate, seconds=before.seconds + candidate.seconds, episode_failures=failures)
+    seconds = before.seconds + candidate.seconds
+    return replace(candidate, seconds=seconds, episode_failures=failures).recordable()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 import re
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -15,7 +15,7 @@ from evolve.config.numbering import Place
 from evolve.genome.interval import Interval
 from evolve.genome.phenotype import Phenotype
 from evolve.genome.plain_values import listed, parsed, real, whole_number
-from evolve.store.evaluation import Evaluation
+from evolve.store.evaluation import Evaluation, escaped
 from optics.numerics.renamed import renamed
 
 __all__ = ["Candidate"]
@@ -79,19 +79,57 @@ class Candidate:
         outcome: Evaluation,
         parents: tuple[int, ...] = (),
     ) -> Candidate:
-        """Return the candidate at `place` with its outcome. If its fitness is not finite, it counts as failed."""
+        """Return the candidate at `place` with its outcome, as a record can store it (see `recordable`).
+
+        If its fitness is not finite, it counts as failed.
+        """
         if outcome.failure is None and not math.isfinite(outcome.fitness):
             outcome = Evaluation.failed(f"fitness is {outcome.fitness}", outcome.seconds)
         found = {f.name: getattr(outcome, f.name) for f in fields(Evaluation)}
-        return cls(**vars(place), genome=genome, phenotype=phenotype, seed=seed, **found, parents=parents)
+        candidate = cls(**vars(place), genome=genome, phenotype=phenotype, seed=seed, **found, parents=parents)
+        return candidate.recordable()
+
+    def recordable(self) -> Candidate:
+        """Return the candidate as a record restores it: text is escaped, and infinity in a list becomes NaN.
+
+        If a value of the outcome has the wrong type or is outside the range of a record, the candidate counts as
+        failed. If it has failed already, such values are dropped.
+
+        Raises:
+            ValueError: another value, such as the genome or the seed, cannot be recorded.
+        """
+        try:
+            return self._restored()
+        except ValueError as error:
+            failure = self.failure if isinstance(self.failure, str) else f"its outcome cannot be recorded: {error}"
+        try:
+            return self._failed(failure, seconds=self.seconds, episode_failures=self.episode_failures)._restored()
+        except ValueError:
+            return self._failed(failure)._restored()
+
+    def _failed(self, failure: str, **kept: Any) -> Candidate:
+        """Return the candidate as failed. Of its outcome, only the fields `kept` remain."""
+        return replace(self, **{**vars(Evaluation.failed(failure)), **kept}, policy=None)
+
+    def _restored(self) -> Candidate:
+        """Return the candidate after writing and reading, or raise a ValueError that states the reason."""
+        try:
+            candidate = Candidate.from_line(self.to_line())
+        except TypeError as error:
+            raise ValueError(str(error)) from error
+        # NaN does not equal itself. Only a failed candidate can have it as its success rate.
+        return candidate if math.isfinite(candidate.success_rate) else replace(candidate, success_rate=0.0)
 
     def to_line(self) -> str:
-        """Return the candidate as a line of JSON. Numbers can be restored bit for bit; NaN and infinity become null."""
+        """Return the candidate as a line of JSON.
+
+        Numbers can be restored bit for bit. NaN and infinity become null, and text that is not valid is escaped.
+        """
         record = {KEYS.get(name, name): value for name, value in vars(self).items()}
         record["phenotype"] = self.phenotype.to_json()
         if not self.episode_failures:
             del record["mishaps"]
-        return json.dumps(_finite(record), allow_nan=False) + "\n"
+        return json.dumps(_json_value(record), allow_nan=False) + "\n"
 
     @classmethod
     def from_line(cls, line: str) -> Candidate:
@@ -178,7 +216,7 @@ def _text(value: Any, name: str) -> str | None:
     """
     if value is not None and not isinstance(value, str):
         raise ValueError(f"{name}: must be text or null")
-    return value if value is None else value.encode(errors="backslashreplace").decode()
+    return value if value is None else escaped(value)
 
 
 def _checksum(value: Any) -> str | None:
@@ -188,10 +226,12 @@ def _checksum(value: Any) -> str | None:
     return value
 
 
-def _finite(value: Any) -> Any:
-    """Return a value with None in place of infinity and NaN, which JSON cannot represent."""
+def _json_value(value: Any) -> Any:
+    """Return a value with None in place of infinity and NaN, which JSON cannot represent, and with escaped text."""
     if isinstance(value, dict):
-        return {key: _finite(entry) for key, entry in value.items()}
+        return {key: _json_value(entry) for key, entry in value.items()}
     if isinstance(value, list | tuple):
-        return [_finite(entry) for entry in value]
+        return [_json_value(entry) for entry in value]
+    if isinstance(value, str):
+        return escaped(value)
     return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -6,7 +6,7 @@ import math
 from collections import Counter
 from dataclasses import dataclass
 
-__all__ = ["Evaluation", "most_frequent", "total_episode_failures"]
+__all__ = ["Evaluation", "escaped", "most_frequent", "total_episode_failures"]
 
 KINDS, LONGEST = 4, 300  # maximum number of different messages that are stored, and of characters in each
 OTHERS = "others"  # message under which all other failures are counted
@@ -60,6 +60,10 @@ def total_episode_failures(*mishaps: tuple[tuple[str, int], ...]) -> tuple[tuple
     return most_frequent(counts)
 
 
+def escaped(text: str) -> str:
+    """Return a text with escapes in place of lone surrogates, which come from bytes in file names, for example."""
+    return text.encode(errors="backslashreplace").decode()
+
+
 def _in_one_line(text: str) -> str:
-    told = text.encode(errors="backslashreplace").decode()  # names of files may contain invalid characters
-    return " ".join(told.split())
+    return " ".join(escaped(text).split())

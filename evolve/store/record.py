@@ -73,11 +73,12 @@ class Record:
         """Append a candidate, and synchronise the file with the disk.
 
         Raises:
-            RunError: the candidate is already on record, another process has changed the record, or the record cannot
-                be written; earlier lines remain intact.
+            RunError: the candidate is already on record or cannot be restored from it, another process has changed the
+                record, or the record cannot be written; earlier lines remain intact.
         """
         if (candidate.id, candidate.rung) in self.lines:
             raise RunError(f"{self.path.parent}: candidate {candidate.id} has been evaluated already")
+        _require_readable(candidate, self.path)
         line = candidate.to_line().encode()
         try:
             with opened(self.path, "ab") as file:
@@ -106,6 +107,21 @@ class Record:
                 os.fsync(file.fileno())
         except OSError as error:
             raise RunError(f"{self.path}: cannot be written: {error.strerror}") from error
+
+
+def _require_readable(candidate: Candidate, path: Path) -> None:
+    """Check that a candidate will read back equal; `Candidate.recordable` returns such candidates.
+
+    Raises:
+        RunError: it would read back differently, or be refused.
+    """
+    try:
+        if candidate == candidate.recordable():
+            return
+        reason = "it would read back differently"
+    except ValueError as error:
+        reason = str(error)
+    raise RunError(f"{path}: candidate {candidate.id} cannot be written: {reason}; nothing is added")
 
 
 def _furthest(lines: Lines) -> tuple[Candidate, ...]:

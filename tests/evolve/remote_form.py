@@ -8,7 +8,10 @@ import time
 from dataclasses import replace
 from pathlib import Path
 
+import safetensors
+
 from evolve.config.checks import ConfigError
+from evolve.learning.checkpoint_file import owned, read_owned, sealed
 from evolve.store.atomic_files import write_whole
 from evolve.store.evaluation import Evaluation
 
@@ -81,14 +84,15 @@ def in_stages(phenotype, config, seed, policy_path, rung, progress):
     """Train in rungs: the policy is the text of all steps so far, and the fitness depends on every letter."""
     with (Path(os.environ["RHABDOM_TEST"]) / "calls.log").open("a") as log:
         log.write(f"{int(policy_path.stem)} in rung {rung.number}\n")
-    text, first = "", 0
+    text, first, owners = "", 0, rung.owners(phenotype, config, seed)
     for number in reversed(range(rung.number)):
-        if not text and rung.checkpoints[number].exists():
-            text, first = rung.checkpoints[number].read_text(), number + 1
+        if not text and (kept := read_owned(rung.checkpoints[number], owners[number])) is not None:
+            text, first = kept[1]["text"], number + 1
     for number in range(first, rung.number + 1):
         progress(rung.ends[number], rung.ends[number])
         text += f"{seed} to {rung.ends[number]} on {number}, "
-        write_whole(rung.checkpoints[number], text.encode())
+        content = safetensors.serialize({}, owned(owners[number], {"text": text}))
+        write_whole(rung.checkpoints[number], sealed(content))
     write_whole(policy_path, text.encode())
     luck = int.from_bytes(hashlib.sha256(text.encode()).digest()[:4]) / 2**32
     fitness = -abs(phenotype.fov_deg - 70.0) + 20 * luck

@@ -138,7 +138,7 @@ def climbed(number: int, animal: Phenotype) -> list[Row]:
         ends = budgets(run.search, run.learning)
         for rung in range(RUNGS):
             began = time.process_time()
-            outcome = evaluate(animal, run, number, policy, stretch=TrainingRung(ends[: rung + 1], kept[: rung + 1]))
+            outcome = evaluate(animal, run, number, policy, rung=TrainingRung(ends[: rung + 1], kept[: rung + 1]))
             spent = time.process_time() - began
             if outcome.failure is not None:
                 raise RuntimeError(f"animal {number}: {outcome.failure}")

@@ -14,7 +14,8 @@ training_rewards: test_ppo.py
 rollout_buffer: test_rollout_buffer.py
 adam: test_adam.py
 tensor_file: test_policy.py, store/test_regular_files.py
-checkpoint: search/test_successive_halving.py
+checkpoint: test_checkpoint.py, search/test_successive_halving.py
+checkpoint_file: test_checkpoint.py, search/test_successive_halving.py
 training_rung: search/test_successive_halving.py
 animal_task: test_task_module.py, test_fitness.py, test_textures_of_runs.py
 """

@@ -14,6 +14,7 @@ from types import SimpleNamespace
 
 import pytest
 
+from evolve.learning.checkpoint_file import CheckpointWarning
 from evolve.search import dask_worker
 from evolve.search.dask_executor import DaskExecutor
 from evolve.search.local_executor import ExecutorError, LocalExecutor
@@ -97,9 +98,9 @@ def cluster(tmp_path_factory):
     cluster.kill()
 
 
-def carried(path, config, executor):
-    run = Run.create(path, config)
-    onlooker = SilentWatcher()
+def carried(path, config, executor, until=None):
+    run = Run.open(path) if path.exists() else Run.create(path, config)
+    onlooker = SilentWatcher(until)
     with executor as it:
         evolve(run, it, onlooker)
     return Run.open(path), onlooker
@@ -132,6 +133,22 @@ def test_history_of_successive_halving_is_the_local_one(tmp_path, cluster, monke
     for candidate in whole:
         assert far.policy_path(candidate.id).read_bytes() == local.policy_path(candidate.id).read_bytes()
     assert set(cluster.calls().values()) == {1, 2, 3}, "no rung starts twice"
+
+
+@pytest.mark.slow
+def test_a_damaged_checkpoint_does_not_travel(tmp_path, cluster, monkeypatch):
+    """Files are damaged between two rungs. Their candidates start from the beginning on some worker."""
+    monkeypatch.setenv("RHABDOM_TEST", str(tmp_path))
+    config = tiny("search.rungs=3", "learning.total_steps=16384")
+    local, _ = carried(tmp_path / "local", config, LocalExecutor(in_stages, 2))
+    with pytest.raises(KeyboardInterrupt):
+        carried(tmp_path / "dask", config, cluster.executor("in_stages"), until=4)
+    for path in (tmp_path / "dask" / "trainings").iterdir():
+        path.write_bytes(path.read_bytes()[:-1] + b"x")
+    with pytest.warns(CheckpointWarning, match="it is damaged.*; it is renamed to"):
+        far, _ = carried(tmp_path / "dask", None, cluster.executor("in_stages"))
+    assert finished(far)
+    assert history(far) == history(local)
 
 
 @pytest.mark.slow

@@ -2,7 +2,7 @@
 
 directory: test_directory.py
 record: test_record.py
-candidate: test_record.py
+candidate: test_record.py, test_reads_back_equal.py
 evaluation: test_record.py
 shipped_run: cli/test_demo.py
 policies: test_policies.py
