@@ -188,11 +188,13 @@ def _add_watching(commands: Commands) -> None:
     listing.add_argument("--json", action="store_true", help="print JSON")
     compare = _command(commands, "compare", "compare.compare", "compare runs side by side")
     compare.add_argument("directories", type=Path, nargs="+", metavar="DIR", help="run directories")
+    _add_damage(compare)
     compare.add_argument("--json", action="store_true", help="print JSON")
     compare.add_argument("--html", type=Path, metavar="FILE", help="also write an HTML page with their fitness curves")
     drift = _command(commands, "drift", "drift.drift", "test which genes moved further than chance explains")
     drift.add_argument("directories", type=Path, nargs="+", metavar="DIR", help="run directories that differ in seeds")
     many = "number of searches with random fitness to compare with (default: 200)"
+    _add_damage(drift)
     drift.add_argument("--searches", type=_searches, default=200, metavar="N", help=many)
     drift.add_argument("--json", action="store_true", help="print JSON")
 
@@ -289,4 +291,11 @@ def _command(
     parser.set_defaults(module=module, function=function, parser=parser)
     if directory:
         parser.add_argument("directory", type=Path, metavar="DIR", help="run directory")
+        _add_damage(parser)
     return parser
+
+
+def _add_damage(command: argparse.ArgumentParser) -> None:
+    command.add_argument(
+        "--before-damage", action="store_true", help="use only the lines of a record before the first damaged one"
+    )

@@ -1,0 +1,67 @@
+"""Checksums of a run's files: SHA-256 of whole files, and the list of checksums of the EXR files in a folder."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from collections.abc import Iterable
+from pathlib import Path
+
+from evolve.store.atomic_files import write_whole
+from evolve.store.regular_files import opened, read
+
+__all__ = ["digest", "harmed", "list_checksums"]
+
+LISTED = "SHA256SUMS"  # name of the list, whose form is that of sha256sum: "checksum  name"
+LARGEST_LIST = 2**24  # bytes; 150,000 files
+ENTRY = re.compile(r"([0-9a-f]{64})  ([^/\n]+\.exr)")
+SHOWN = 5  # maximum number of names in a message
+
+
+def digest(path: Path) -> str | None:
+    """Return the SHA-256 of a file; None if the file is missing.
+
+    Raises:
+        OSError: the file cannot be read, or is not a regular file.
+    """
+    try:
+        with opened(path) as file:
+            return hashlib.file_digest(file, "sha256").hexdigest()
+    except FileNotFoundError:
+        return None
+
+
+def list_checksums(folder: Path, files: Iterable[Path]) -> None:
+    """Add the checksums of EXR files to the list of their folder. Entries of other files are kept.
+
+    Raises:
+        OSError: a file cannot be read, or the list cannot be written.
+    """
+    new = [f"{digest(path)}  {path.name}" for path in files]
+    names = {line.partition("  ")[2] for line in new}
+    kept = [line for line in _lines(folder) if line.partition("  ")[2] not in names]
+    write_whole(folder / LISTED, "".join(f"{line}\n" for line in [*kept, *new]).encode())
+
+
+def harmed(folder: Path) -> str | None:
+    """Return a message about EXR files whose content differs from their checksums; None if there are none.
+
+    Files that were deleted are not reported, because they can be exported again.
+    """
+    known = [match for line in _lines(folder) if (match := ENTRY.fullmatch(line))]
+    try:
+        wrong = [match[2] for match in known if digest(folder / match[2]) not in (None, match[1])]
+    except OSError as error:
+        return f"{error.filename}: cannot be read: {error.strerror}"
+    if not wrong:
+        return None
+    names = ", ".join(wrong[:SHOWN]) + (", ..." if len(wrong) > SHOWN else "")
+    return f"{folder}: {len(wrong)} EXR files do not match their checksums ({names}): export them again"
+
+
+def _lines(folder: Path) -> list[str]:
+    """Return the lines of the list of checksums; [] if there is no list."""
+    try:
+        return read(folder / LISTED, LARGEST_LIST).decode(errors="replace").splitlines()
+    except FileNotFoundError:
+        return []
