@@ -2,18 +2,15 @@
 
 import json
 import random
-import shutil
 
 import pytest
 
-import evolve
-from evolve.runs import carry_on
-from evolve.search.local_executor import LocalExecutor
+from evolve.search.loop import evolve
 from evolve.store.chain import Chain, sealed_record
 from evolve.store.directory import Run, RunError
 from evolve.store.record import Record
-from tests.evolve.closed_form import bowl
-from tests.evolve.store.handwriting import records_of, write_records
+from tests.evolve.search.kills import Here, Nobody, carry
+from tests.evolve.store.handwriting import records_of
 from tests.evolve.store.records import CONFIG, candidate
 
 LINES = 6
@@ -25,13 +22,6 @@ def record(run):
     for number in range(LINES):
         run.append(candidate(number))
     return run.path / "candidates.jsonl"
-
-
-@pytest.fixture
-def closed_form(monkeypatch):
-    """Use the real engine with a known fitness."""
-    monkeypatch.setattr(carry_on, "evaluate_candidate", bowl)
-    monkeypatch.setattr(carry_on, "LocalExecutor", lambda evaluate, count, prepare: LocalExecutor(evaluate, count))
 
 
 def with_other_digit(content, chance, first=0):
@@ -121,22 +111,23 @@ def test_commands_name_the_line_and_use_the_lines_before_it_on_request(record, c
     assert record.read_bytes() == changed, "reading must not write"
 
 
-def test_a_run_continues_before_the_damage_to_the_record_of_an_undisturbed_one(closed_form, finished, tmp_path):
-    path = shutil.copytree(finished, tmp_path / "run")
+def test_a_run_continues_before_the_damage_to_the_record_of_an_undisturbed_one(tmp_path):
+    path = tmp_path / "run"
     record, chance = path / "candidates.jsonl", random.Random()
+    carry(path, CONFIG)
     whole, content = records_of(record), record.read_bytes()
     last = content.rindex(b"\n", 0, -1) + 1
     changed, line = with_other_digit(content[:last], chance)
     changed += content[last:-9]  # the last line is torn
     record.write_bytes(changed)
     with pytest.raises(RunError, match=f"line {line}: is damaged"):
-        evolve.resume(path, progress=False)
+        carry(path, CONFIG)
     assert record.read_bytes() == changed
-    run = evolve.resume(path, before_damage=True, progress=False)
+    run = Run.open(path, before_damage=True)
+    with run.lock():
+        run.repair()
+        evolve(run, Here(tmp_path / "run.log"), Nobody())
     assert (path / "candidates.jsonl.damaged-1").read_bytes() == changed
     assert f"line {line}: is damaged" in run.notice
     assert Run.open(path).notice is None
-    again = records_of(record)
-    assert [{**one, "seconds": 0} for one in again] == [{**one, "seconds": 0} for one in whole]
-    write_records(record, again)
-    assert len(Run.open(path).candidates) == len(whole)
+    assert records_of(record) == whole
