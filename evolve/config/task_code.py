@@ -53,11 +53,14 @@ class TaskCode:
         place, _, name = named.partition(".py:") if ".py:" in named else (named.removesuffix(".py"), "", "")
         file = Path(f"{place}.py")
         try:
-            content = file.read_bytes()
+            with file.open("rb") as opened:
+                content = opened.read(LARGEST_FILE + 1)
         except OSError as error:
             raise ConfigError(f"task = {named!r}: {file} cannot be read ({error.strerror})", "task") from error
         if len(content) > LARGEST_FILE:
-            raise ConfigError(f"task = {named!r}: {file} has {len(content):,} bytes: must be Python text", "task")
+            raise ConfigError(
+                f"task = {named!r}: {file} has more than {LARGEST_FILE:,} bytes: must be Python text", "task"
+            )
         text, classes = _parsed(file, content)
         if name not in classes:
             known = did_you_mean(name, classes) if name else ""

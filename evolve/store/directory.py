@@ -10,6 +10,7 @@ lock               lock that the process working on the run holds
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,8 +18,9 @@ from typing import Self
 
 from evolve.config.assemble import from_text, to_toml
 from evolve.config.formats import FORMAT, LAST_OF_FORMER, OLDEST_CONTINUED, format_of
+from evolve.config.numbering import generation_ids
 from evolve.config.run_config import RunConfig
-from evolve.config.sources import parsed_toml
+from evolve.config.sources import LARGEST_TOML, parsed_toml
 from evolve.store.atomic_files import POLICIES, TRAININGS, UNFINISHED, sweep, write_whole
 from evolve.store.candidate import Candidate
 from evolve.store.checksums import harmed
@@ -26,7 +28,7 @@ from evolve.store.lock import LONGEST, RunLock
 from evolve.store.policies import lost
 from evolve.store.record import Record, RunError
 from evolve.store.regular_files import folder, opened, read, require_folder, require_regular
-from evolve.store.versions import CONFIG, LARGEST_CONFIG, config_change, record_start
+from evolve.store.versions import CONFIG, config_change, record_start
 from evolve.store.versions import FILE as VERSIONS
 
 __all__ = ["Candidate", "Run", "RunError", "next_directory"]
@@ -96,7 +98,7 @@ class Run:
             raise RunError(f"{path} is not a run: there is no such directory")
         _require_plain(path)
         try:
-            config = from_text(read(path / CONFIG, LARGEST_CONFIG), str(path / CONFIG))
+            config = from_text(read(path / CONFIG, LARGEST_TOML), str(path / CONFIG))
         except FileNotFoundError:
             raise RunError(f"{path} is not a run: it holds no {CONFIG}") from None
         if task is not None:
@@ -127,7 +129,7 @@ class Run:
         Raises:
             RunError: the format is older; the message names the version that can continue it.
         """
-        number = format_of(parsed_toml(read(self.path / CONFIG, LARGEST_CONFIG), str(self.path / CONFIG)).tree)
+        number = format_of(parsed_toml(read(self.path / CONFIG, LARGEST_TOML), str(self.path / CONFIG)).tree)
         if number < OLDEST_CONTINUED:
             raise RunError(
                 f"{self.path} has format {number}: must be {OLDEST_CONTINUED} to {FORMAT} to be continued; rhabdom at "
@@ -153,7 +155,7 @@ class Run:
             RunError: the record is damaged or cannot be written, or config.toml has changed since the run was opened.
         """
         try:
-            text = read(self.path / CONFIG, LARGEST_CONFIG)
+            text = read(self.path / CONFIG, LARGEST_TOML)
         except OSError as error:
             raise RunError(f"{self.path / CONFIG}: cannot be read: {error.strerror}") from error
         if from_text(text, str(self.path / CONFIG)) != self.config:
@@ -232,7 +234,9 @@ class Run:
 
     def generation(self, number: int) -> list[Candidate]:
         """Return the evaluated candidates of one generation."""
-        return [candidate for candidate in self.candidates if candidate.generation == number]
+        ids = generation_ids(number, self.config.search.population)
+        first, end = (bisect_left(self.candidates, one, key=lambda c: c.id) for one in (ids.start, ids.stop))
+        return list(self.candidates[first:end])
 
     @property
     def in_order_of_finish(self) -> list[Candidate]:

@@ -11,14 +11,15 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
+from evolve.config.sources import LARGEST_TOML
 from evolve.store.atomic_files import write_whole
 from evolve.store.regular_files import read
 from optics.numerics.device import device
 
-__all__ = ["LARGEST_CONFIG", "config_change", "origin", "present", "record_start", "recorded"]
+__all__ = ["config_change", "origin", "present", "record_start", "recorded"]
 
 FILE, CONFIG = "versions.json", "config.toml"
-LARGEST_CONFIG, LARGEST_FILE = 2**20, 2**24  # bytes
+LARGEST_FILE = 2**24  # bytes; thousands of starts
 PACKAGES = (
     "rhabdom",
     "numpy",
@@ -68,7 +69,7 @@ def config_change(run: Path, candidates: int) -> str | None:
     starts = _starts(run)
     if not starts:
         return None
-    last, now = starts[-1], _checksums(read(run / CONFIG, LARGEST_CONFIG))
+    last, now = starts[-1], _checksums(read(run / CONFIG, LARGEST_TOML))
     changed = f"{CONFIG} has changed since the last start"
     if last.get("settings", now["settings"]) != now["settings"]:
         return (
@@ -101,7 +102,7 @@ def record_start(run: Path, candidates: int, origin: str | None = None, config: 
     start: dict[str, Any] = {
         "time": datetime.now(UTC).isoformat(timespec="seconds"),
         "candidates": candidates,
-        **_checksums(read(run / CONFIG, LARGEST_CONFIG) if config is None else config),
+        **_checksums(read(run / CONFIG, LARGEST_TOML) if config is None else config),
         "versions": present(),
     }
     if origin is not None:

@@ -21,6 +21,7 @@ from evolve.runs.output import as_it_is
 from evolve.search.successive_halving import finished
 from evolve.store.candidate import Candidate
 from evolve.store.directory import Run
+from evolve.store.evaluation import shortened
 from evolve.store.lock import holder
 
 __all__ = ["listing", "standing", "standing_lines", "status"]
@@ -69,8 +70,9 @@ def listing(arguments: Namespace) -> int:
 def _standing_or_reason(path: Path) -> dict[str, Any]:
     try:
         return {name: value for name, value in standing(Run.open(path)).items() if name != "generations"}
-    except (ValueError, OSError) as error:
-        return {"directory": str(path), "state": "unreadable", "reason": " ".join(str(error).split())}
+    except Exception as error:  # one directory, whatever it contains, must not hide the others
+        reason = str(error) or type(error).__name__
+        return {"directory": str(path), "state": "unreadable", "reason": shortened(" ".join(reason.split()))}
 
 
 def _in_one_line(one: dict[str, Any]) -> str:
