@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from evolve.store.atomic_files import write_whole
-from evolve.store.regular_files import opened, read
+from evolve.store.regular_files import read
 
 __all__ = ["digest", "harmed", "list_checksums"]
 
@@ -26,8 +26,7 @@ def digest(path: Path) -> str | None:
         OSError: the file cannot be read, or is not a regular file.
     """
     try:
-        with opened(path) as file:
-            return hashlib.file_digest(file, "sha256").hexdigest()
+        return hashlib.sha256(read(path)).hexdigest()
     except FileNotFoundError:
         return None
 
