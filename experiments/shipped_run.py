@@ -10,6 +10,7 @@ policies would take megabytes; their hashes are removed from the record.
 from __future__ import annotations
 
 import argparse
+import json
 import shutil
 from dataclasses import replace
 from pathlib import Path
@@ -17,6 +18,7 @@ from pathlib import Path
 import evolve
 from evolve.config.assemble import to_toml
 from evolve.search.successive_halving import finished
+from evolve.store.chain import sealed_record
 from evolve.store.directory import Run
 
 FOLDER = Path(evolve.__file__).parent / "demo"
@@ -35,9 +37,12 @@ def ship(source: Path, folder: Path = FOLDER) -> Run:
     shutil.rmtree(folder, ignore_errors=True)
     (folder / "policies").mkdir(parents=True)
     (folder / "config.toml").write_text(to_toml(replace(run.config, workers=0)), encoding="utf-8")
-    shutil.copyfile(source / "versions.json", folder / "versions.json")
+    starts = json.loads((source / "versions.json").read_text(encoding="utf-8"))
+    for start in starts:
+        start.pop("config", None)  # the checksum of the source's config.toml
+    (folder / "versions.json").write_text(json.dumps(starts, indent=1), encoding="utf-8")
     kept = [one if one.id == best else replace(one, policy=None) for one in run.in_order_of_finish]
-    (folder / "candidates.jsonl").write_text("".join(one.to_line() for one in kept), encoding="utf-8")
+    (folder / "candidates.jsonl").write_bytes(sealed_record(one.to_line() for one in kept))
     shutil.copyfile(run.policy_path(best), folder / "policies" / run.policy_path(best).name)
     return Run.open(folder)
 

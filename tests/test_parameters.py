@@ -96,7 +96,7 @@ FIELDS = {
     "eye.relief_symmetric": Case("eye.relief_symmetric=true", history, ("genome.doe.open=true",)),
     "eye.pupil_turned": Case("eye.pupil_turned=true", point_image, ("genome.doe_01.start=0.9",)),
     "eye.square": Case("eye.square=true", history, ("eye.square=false", *PERFECT)),
-    "eye.vertical_fov": Case("eye.vertical_fov=horizontal", sight),
+    "eye.vertical_fov": Case("eye.vertical_fov=horizontal", sight, ("genome.resolution_height.start=3", *PERFECT)),
     "eye.receptor_pitch": Case("eye.receptor_pitch=40e-6", point_image, ()),
     "eye.rhabdoms": Case("eye.rhabdoms=true", point_image, FOCUSED),
     "eye.rhabdom_index": Case("eye.rhabdom_index=1.38", point_image, GUIDED),

@@ -28,6 +28,7 @@ import numpy as np
 
 import optics
 import sim
+from evolve.store.chain import sealed_record, without_checksum
 
 TASKS = ("navigation", "maze", "detection", "tracking", "foraging")
 EXAMPLES = Path(__file__).parents[1] / "examples"
@@ -157,17 +158,21 @@ def evolution(folder: Path) -> Iterator[tuple[str, str]]:
     _evolve(*EVOLUTION, "--out", str(run))
     yield "record", _record(run)
     yield from _frames(run)
-    lines = [json.loads(line) for line in (run / "candidates.jsonl").read_text().splitlines()]
+    lines = _lines(run)
     for line in lines:
         line["seconds"] = 60.0  # measured times differ from run to run
-    (run / "candidates.jsonl").write_text("".join(json.dumps(line) + "\n" for line in lines))
+    (run / "candidates.jsonl").write_bytes(sealed_record(json.dumps(line) + "\n" for line in lines))
     _evolve("report", str(run))
     yield "numbers of the report", _hash(" ".join(_numbers((run / "report.html").read_text())))
 
 
+def _lines(run: Path) -> list[dict[str, Any]]:
+    return [json.loads(without_checksum(line)) for line in (run / "candidates.jsonl").read_bytes().splitlines()]
+
+
 def _record(run: Path) -> str:
-    lines = [json.loads(line) for line in (run / "candidates.jsonl").read_text().splitlines()]
-    return _hash(json.dumps([{k: v for k, v in line.items() if k != "seconds"} for line in lines], sort_keys=True))
+    lines = [{k: v for k, v in line.items() if k != "seconds"} for line in _lines(run)]
+    return _hash(json.dumps(lines, sort_keys=True))
 
 
 def _frames(run: Path, task: str = "") -> Iterator[tuple[str, str]]:

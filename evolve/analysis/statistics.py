@@ -42,6 +42,7 @@ __all__ = [
 Floats = NDArray[np.float64]
 SPREAD = (0.1, 0.9)  # quantiles between which a population's spread is shown
 PERCENTILE_RESAMPLES = 2000
+RESAMPLED_AT_ONCE = 2**20  # samples drawn at once, which limits the memory
 
 
 @dataclass(frozen=True)
@@ -273,8 +274,11 @@ def bootstrap_interval(
         raise ValueError(f"level = {level!r}: must be in (0, 1)")
     if values.size == 1:
         return math.nan, math.nan
-    chosen = np.random.default_rng(seed).integers(values.size, size=(PERCENTILE_RESAMPLES, values.size))
-    low, high = np.quantile(statistic(values[chosen], axis=1), [(1 - level) / 2, (1 + level) / 2])
+    chance = np.random.default_rng(seed)
+    rows = min(PERCENTILE_RESAMPLES, max(1, RESAMPLED_AT_ONCE // values.size))
+    counts = [min(rows, PERCENTILE_RESAMPLES - done) for done in range(0, PERCENTILE_RESAMPLES, rows)]
+    found = [statistic(values[chance.integers(values.size, size=(count, values.size))], axis=1) for count in counts]
+    low, high = np.quantile(np.concatenate(found), [(1 - level) / 2, (1 + level) / 2])
     return float(low), float(high)
 
 

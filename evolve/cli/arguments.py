@@ -10,6 +10,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NoReturn, TypeAlias
 
+from evolve.cli.argument_values import searches, seed
+
 __all__ = ["SHELLS", "build_parser", "parse"]
 
 SHELLS = ("bash", "zsh", "tcsh")
@@ -188,12 +190,14 @@ def _add_watching(commands: Commands) -> None:
     listing.add_argument("--json", action="store_true", help="print JSON")
     compare = _command(commands, "compare", "compare.compare", "compare runs side by side")
     compare.add_argument("directories", type=Path, nargs="+", metavar="DIR", help="run directories")
+    _add_damage(compare)
     compare.add_argument("--json", action="store_true", help="print JSON")
     compare.add_argument("--html", type=Path, metavar="FILE", help="also write an HTML page with their fitness curves")
     drift = _command(commands, "drift", "drift.drift", "test which genes moved further than chance explains")
     drift.add_argument("directories", type=Path, nargs="+", metavar="DIR", help="run directories that differ in seeds")
     many = "number of searches with random fitness to compare with (default: 200)"
-    drift.add_argument("--searches", type=_searches, default=200, metavar="N", help=many)
+    _add_damage(drift)
+    drift.add_argument("--searches", type=searches, default=200, metavar="N", help=many)
     drift.add_argument("--json", action="store_true", help="print JSON")
 
 
@@ -208,7 +212,7 @@ def _add_products(commands: Commands) -> None:
         _add_task(product)
         if name != "report":
             product.add_argument("--candidate", type=int, metavar="ID", help="candidate to play (default: the best)")
-            product.add_argument("--seed", type=_seed, default=0, help="seed of the episode (default: 0)")
+            product.add_argument("--seed", type=seed, default=0, help="seed of the episode (default: 0)")
         if name == "replay":
             product.add_argument("--rrd", action="store_true", help="also write a recording for Rerun")
             product.add_argument("--gif", action="store_true", help="also write an animated GIF, for slides and pages")
@@ -260,20 +264,6 @@ def _add_tables(commands: Commands) -> None:
     completion.add_argument("shell", choices=SHELLS, help="the shell")
 
 
-def _seed(text: str) -> int:
-    """Return the seed in the text of an argument."""
-    if not text.isdecimal():
-        raise argparse.ArgumentTypeError(f"{text!r}: must be a whole number, 0 or more")
-    return int(text)
-
-
-def _searches(text: str) -> int:
-    """Return the number of searches in the text of an argument. A p-value needs at least 2."""
-    if not text.isdecimal() or int(text) < 2:
-        raise argparse.ArgumentTypeError(f"{text!r}: must be a whole number, 2 or more")
-    return int(text)
-
-
 def _command(
     commands: Commands, name: str, home: str, meaning: str, directory: bool = False
 ) -> argparse.ArgumentParser:
@@ -289,4 +279,11 @@ def _command(
     parser.set_defaults(module=module, function=function, parser=parser)
     if directory:
         parser.add_argument("directory", type=Path, metavar="DIR", help="run directory")
+        _add_damage(parser)
     return parser
+
+
+def _add_damage(command: argparse.ArgumentParser) -> None:
+    command.add_argument(
+        "--before-damage", action="store_true", help="use only the lines of a record before the first damaged one"
+    )

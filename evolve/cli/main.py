@@ -20,6 +20,8 @@ from evolve.runs.output import voices
 
 __all__ = ["main"]
 
+LONGEST = 1800  # maximum number of characters of an error message
+
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one subcommand and return the exit code."""
@@ -72,7 +74,10 @@ def _require_system() -> None:
 def _one_line(error: Exception) -> str:
     if isinstance(error, OSError) and error.filename is not None:
         return f"{error.filename}: {error.strerror}"
-    return " ".join(str(error).split())
+    if isinstance(error, MemoryError):
+        return "not enough memory: close other programs, or use a machine with more memory"
+    text = " ".join(str(error).split())
+    return text if len(text) <= LONGEST else f"{text[: LONGEST // 2]} [...] {text[-LONGEST // 2 :]}"
 
 
 def _is_users(error: Exception) -> bool:
@@ -83,4 +88,6 @@ def _is_users(error: Exception) -> bool:
     from evolve.store.lock import LockedError
     from optics.numerics.backend import BackendError
 
-    return isinstance(error, ConfigError | RunError | LockedError | ExecutorError | BackendError | OSError)
+    return isinstance(
+        error, ConfigError | RunError | LockedError | ExecutorError | BackendError | OSError | MemoryError
+    )

@@ -15,6 +15,7 @@ from evolve.config.provenance import Source
 from evolve.config.run_config import TASKS
 
 __all__ = [
+    "LARGEST_TOML",
     "SCALES",
     "parsed_toml",
     "preset_about",
@@ -26,6 +27,10 @@ __all__ = [
 ]
 
 Tree = dict[str, Any]
+LARGEST_TOML = 2**18  # maximum size of a file [bytes]; a run's config.toml has 4,000
+MOST_PARTS = 10  # maximum number of parts of a dotted key; tomllib takes a time quadratic in it
+_KEY_PART = r"(?:[\w-]++|\"[^\"\n]*+\"|'[^'\n]*+')[ \t]*+"
+_LONG_KEY = re.compile(rf"(?<![\w-]){_KEY_PART}(?:\.[ \t]*+{_KEY_PART}){{{MOST_PARTS}}}")
 SCALES = ("laptop", "paper")  # names of the scales of presets that have several scales; the first is the default
 
 
@@ -87,7 +92,11 @@ def read_toml(path: Path) -> Source:
             line in it.
     """
     try:
-        return parsed_toml(path.read_bytes(), str(path))
+        with path.open("rb") as file:
+            content = file.read(LARGEST_TOML + 1)  # the file may be a pipe, which has no size
+        if len(content) > LARGEST_TOML:
+            raise ConfigError(f"{path}: has more than {LARGEST_TOML:,} bytes: must be a TOML file of settings")
+        return parsed_toml(content, str(path))
     except OSError as error:
         raise ConfigError(f"{path}: cannot be read ({error.strerror})") from error
 
@@ -102,6 +111,9 @@ def parsed_toml(text: bytes | str, name: str) -> Source:
     """
     try:
         text = text.decode("utf-8") if isinstance(text, bytes) else text
+        if found := _LONG_KEY.search(text):
+            line = text.count("\n", 0, found.start()) + 1
+            raise ConfigError(f"{name}, line {line}: a key has more than {MOST_PARTS} parts: must be section.key")
         return Source(name, tomllib.loads(text), text)
     except UnicodeDecodeError as error:
         raise ConfigError(f"{name}: is not UTF-8 text") from error
@@ -125,8 +137,8 @@ def read_assignment(text: str) -> Source:
     """
     key, equals, value = (part.strip() for part in text.partition("="))
     parts = key.split(".")
-    if not equals or not all(parts) or not value:
-        raise ConfigError(f"--set {text!r}: must look like section.key=value")
+    if not equals or not all(parts) or not value or len(parts) > MOST_PARTS or _LONG_KEY.search(value):
+        raise ConfigError(f"--set {quoted(text)}: must look like section.key=value")
     try:
         found: Tree = tomllib.loads(f"value = {value}")
     except tomllib.TOMLDecodeError:
@@ -134,7 +146,7 @@ def read_assignment(text: str) -> Source:
     except (ValueError, RecursionError) as error:  # a number of 6,000 digits, or deeply nested brackets
         raise ConfigError(f"--set {key}: {_first_line(error)}") from error
     if found.keys() != {"value"}:
-        raise ConfigError(f"--set {text!r}: must be one setting")
+        raise ConfigError(f"--set {quoted(text)}: must be one setting")
     leaf: Any = found["value"]
     tree: Tree = reduce(lambda inner, part: {part: inner}, reversed(parts), leaf)
     return Source(f"--set {text.strip()}", tree)

@@ -57,11 +57,14 @@ class TaskCode:
                 f"task = {named!r}: the name of the file must be UTF-8, as in a run's config.toml", "task"
             )
         try:
-            content = file.read_bytes()
+            with file.open("rb") as opened:
+                content = opened.read(LARGEST_FILE + 1)
         except OSError as error:
             raise ConfigError(f"task = {named!r}: {file} cannot be read ({error.strerror})", "task") from error
         if len(content) > LARGEST_FILE:
-            raise ConfigError(f"task = {named!r}: {file} has {len(content):,} bytes: must be Python text", "task")
+            raise ConfigError(
+                f"task = {named!r}: {file} has more than {LARGEST_FILE:,} bytes: must be Python text", "task"
+            )
         text, classes = _parsed(file, content)
         if name not in classes:
             known = did_you_mean(name, classes) if name else ""

@@ -32,7 +32,8 @@ def retina_width(receptors: float, sizes: EyeConfig) -> float:
 
 def vertical_fov(values: Values, sizes: EyeConfig) -> float | None:
     """Return an eye's vertical field of view [deg]; None for square receptors."""
-    return {"receptors": None, "horizontal": values["fov_deg"], "gene": values.get(VERTICAL)}[sizes.vertical_fov]
+    gene = {"receptors": None, "horizontal": "fov_deg", "gene": VERTICAL}[sizes.vertical_fov]
+    return None if gene is None else values[gene]
 
 
 def receptor_side(resolution: tuple[float, float], fov_deg: float, vertical: float | None, sizes: EyeConfig) -> float:
@@ -86,9 +87,10 @@ def _with_high_receptors(values: Values, uses: Uses, sizes: EyeConfig) -> Values
     The number of rows is reduced. If the lowest number does not fit, the vertical field of view grows to its highest
     value at most, and then the horizontal field shrinks, which makes a retina of the same width higher.
     """
-    vertical, fov_deg, rows = vertical_fov(values, sizes), values["fov_deg"], _height_gene(uses)
+    vertical = vertical_fov(values, sizes)
     if vertical is None:
         return {}
+    fov_deg, rows = values["fov_deg"], _height_gene(uses)
     shape = _RowsThatFit(values[_width_gene(uses)], rows == SIDE, sizes)
     fewest = _lowest(rows, uses)
     if VERTICAL in values:

@@ -65,6 +65,7 @@ def resume(
     directory: Path | str,
     task: str | None = None,
     *,
+    before_damage: bool = False,
     callbacks: Sequence[Callback] = (),
     progress: bool = True,
 ) -> OpenedRun:
@@ -74,6 +75,7 @@ def resume(
 
     directory: directory of a run that was started with the command or from Python
     task: "FILE.py:CLASS" if the run has a user task, whose code runs only if you name it here; else None
+    before_damage: whether to continue from the lines of the record before the first damaged one; a copy is kept
     callbacks: functions that are called as callback(run, candidate) after every evaluated candidate; an exception ends
         the run
     progress: whether to print the progress to stderr
@@ -86,7 +88,7 @@ def resume(
         BackendError: Dr.Jit cannot find a usable LLVM.
     """
     _check(directory=directory, task=task)
-    opened = OpenedRun.open(directory, task)
+    opened = OpenedRun.open(directory, task, before_damage)
     opened.resume(callbacks, progress)
     return opened
 

@@ -11,7 +11,8 @@ import sim
 from evolve.analysis.episode import Episode
 from evolve.analysis.recorder import record
 from evolve.report.doing import Doing, in_silence
-from evolve.store.directory import Run
+from evolve.store.checksums import list_checksums
+from evolve.store.directory import EXR, Run
 from evolve.store.regular_files import folder, require_regular
 
 __all__ = ["export_episode", "export_run"]
@@ -33,7 +34,7 @@ def export_run(
     if out is not None:
         out.parent.mkdir(parents=True, exist_ok=True)
     doing("the agent plays an episode", 0.0)
-    return export_episode(record(run, candidate_id, seed), out or run.path / "exr", doing)
+    return export_episode(record(run, candidate_id, seed), out or run.path / EXR, doing)
 
 
 def export_episode(episode: Episode, directory: Path, doing: Doing = in_silence) -> list[Path]:
@@ -41,7 +42,7 @@ def export_episode(episode: Episode, directory: Path, doing: Doing = in_silence)
 
     A file has two parts for each eye: the spectral radiance in front of the eye (`left.spectral`) and the signals of
     its receptors (`left.receptors`). File names contain the candidate, the seed of the episode and the time, so that
-    exports of different episodes do not overwrite each other.
+    exports of different episodes do not overwrite each other. The folder also contains a list of their checksums.
     """
     folder(directory)
     files = []
@@ -51,6 +52,7 @@ def export_episode(episode: Episode, directory: Path, doing: Doing = in_silence)
         doing(f"writing {path.name}", frame / len(episode.radiance_frames))
         sim.write_exr(path, _views(episode, frame))
         files.append(path)
+    list_checksums(directory, files)
     return files
 
 

@@ -6,8 +6,10 @@ If the values in the runs are within the range of these searches, the genes may 
 from __future__ import annotations
 
 import math
+from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
+from itertools import takewhile
 from typing import Any
 
 import numpy as np
@@ -17,12 +19,12 @@ from evolve.config.run_config import RunConfig
 from evolve.genome.phenotype import Phenotype
 from evolve.report.comparison import differing_settings
 from evolve.search import successive_halving
-from evolve.search.null_model import Floats, last_generations, null_model, p_value
+from evolve.search.null_model import last_generations, null_model, p_value
 from evolve.store.directory import Run, RunError
 
 __all__ = ["Drift", "QuantityDrift", "drift_of"]
 
-SEARCHES = 200  # default number of searches with random fitness
+SEARCHES, MOST_SEARCHES = 200, 100_000  # default and maximum number of searches with random fitness
 ALLOWED_TO_DIFFER = ("seed", "workers")  # settings in which the runs of a comparison may differ
 
 
@@ -97,16 +99,17 @@ def drift_of(runs: Sequence[Run], searches: int = SEARCHES, done: Callable[[floa
     Raises:
         RunError: the runs differ in settings other than their seeds, two runs have the same seed, or a run has no
             complete generation.
-        ValueError: there are fewer than two searches.
+        ValueError: there are fewer than two searches, or more than MOST_SEARCHES.
     """
-    if searches < 2:
-        raise ValueError(f"searches = {searches}: must be 2 or more")
+    if not 2 <= searches <= MOST_SEARCHES:
+        raise ValueError(f"searches = {searches}: must be from 2 to {MOST_SEARCHES:,}")
     _require_alike(runs)
     config, generations = runs[0].config, min(_complete(run) for run in runs)
     model = null_model(config, lambda animal: _measured(animal, config), generations, searches, done)
     last, moved = last_generations(config, generations)[-1], []
+    run_ends = [_ends(run, last) for run in runs]
     for quantity in model.means:
-        found, ends = [_end(run, quantity, last) for run in runs], model.ends(quantity, last)
+        found, ends = [end[quantity] for end in run_ends], model.ends(quantity, last)
         if all(map(math.isfinite, found)) and ends.size and np.ptp(ends) > 0:
             low, median, high = (float(q) for q in np.quantile(ends, [0.025, 0.5, 0.975]))
             moved.append(QuantityDrift(quantity, tuple(found), low, median, high, p_value(found, ends)))
@@ -127,8 +130,8 @@ def _require_alike(runs: Sequence[Run]) -> None:
 
 def _complete(run: Run) -> int:
     """Return the number of generations that are complete, counted from the start of the run."""
-    known = [successive_halving.complete(run, generation) for generation in range(run.config.search.generations)]
-    done = [*known, False].index(False)
+    known = (successive_halving.complete(run, generation) for generation in range(run.config.search.generations))
+    done = sum(takewhile(bool, known))
     if not done:
         raise RunError(f"{run.path}: no generation is complete yet")
     return done
@@ -144,9 +147,16 @@ def _open(name: str, config: RunConfig) -> bool:
     return name in config.genome and config.genome[name].open
 
 
-def _end(run: Run, quantity: str, generations: range) -> float:
-    """Return the mean of a quantity over the successful candidates of these generations; NaN if none of them has it."""
-    alive = [c for c in run.candidates if c.generation in generations and succeeded(c)]
-    values: Floats = np.array([_measured(c.phenotype, run.config)[quantity] for c in alive])
-    finite = values[np.isfinite(values)]
-    return float(finite.mean()) if finite.size else math.nan
+def _ends(run: Run, generations: range) -> dict[str, float]:
+    """Return the mean of each quantity over the successful candidates of these generations; NaN if none of them has it.
+
+    Quantities of which no candidate has a value have the value NaN.
+    """
+    values: dict[str, list[float]] = defaultdict(list)
+    for candidate in run.candidates:
+        if candidate.generation in generations and succeeded(candidate):
+            for quantity, value in _measured(candidate.phenotype, run.config).items():
+                values[quantity].append(value)
+    finite = {quantity: [value for value in found if math.isfinite(value)] for quantity, found in values.items()}
+    means = {quantity: float(np.mean(found)) for quantity, found in finite.items() if found}
+    return defaultdict(lambda: math.nan, means)

@@ -9,7 +9,7 @@ from typing import Any
 from evolve.learning.task_trial import try_task
 from evolve.search.successive_halving import finished
 from evolve.store.directory import Run
-from evolve.store.versions import altered, present, record_start, recorded
+from evolve.store.versions import present, record_start, recorded
 from optics.numerics import device
 
 __all__ = ["resuming"]
@@ -26,8 +26,8 @@ def resuming(run: Run, note: Callable[[str], Any] = _ignore) -> Iterator[bool]:
     If candidates remain, the run has also been checked, and versions.json contains this start. Otherwise, obsolete
     checkpoints have been removed.
 
-    note: function that is called with each remark for the user: on lost policies, on lost lines of the record, and on
-        settings or software that have changed
+    note: function that is called with each remark for the user: on damaged files, on settings that have changed, and
+        on software that has changed
 
     Raises:
         LockedError: another process is working on the run.
@@ -54,12 +54,7 @@ def resuming(run: Run, note: Callable[[str], Any] = _ignore) -> Iterator[bool]:
 
 
 def _changes(run: Run) -> Iterator[str]:
-    """Yield notes on changed settings and changed software. Both may change the numbers of the run."""
-    if altered(run.path):
-        yield (
-            f"config.toml has changed since the last start. Candidates from {len(run.candidates)} on are "
-            "trained and evaluated with other settings than earlier ones"
-        )
+    """Yield a note on changed software, which may change the numbers of the run."""
     then, now = recorded(run.path), present()
     changed = [f"{name} {now[name]} (was {then[name]})" for name in now if name in then and then[name] != now[name]]
     if changed:

@@ -22,9 +22,9 @@ from evolve.search.same_search import SameSearch
 from evolve.search.search import Proposal, Search, training_seed
 from evolve.search.successive_halving import budgets, reaching
 from evolve.store.candidate import Candidate
+from evolve.store.checksums import digest
 from evolve.store.directory import Run
 from evolve.store.evaluation import Evaluation, total_episode_failures
-from evolve.store.policies import digest
 
 __all__ = ["Executor", "Watcher", "evolve"]
 

@@ -97,19 +97,13 @@ def reaching(run: Run, generation: int, rung: int) -> set[int]:
 
 def complete(run: Run, generation: int) -> bool:
     """Return whether all candidates of a generation have been evaluated after every rung that they reach."""
-    return _complete(run, generation, _evaluated(run))
+    return all(
+        run.on_record(candidate_id, rung) is not None
+        for rung in range(run.config.search.rungs)
+        for candidate_id in reaching(run, generation, rung)
+    )
 
 
 def finished(run: Run) -> bool:
     """Return whether all candidates of a run have been evaluated after every rung that they reach."""
-    evaluated = _evaluated(run)
-    return all(_complete(run, generation, evaluated) for generation in range(run.config.search.generations))
-
-
-def _evaluated(run: Run) -> list[set[int]]:
-    """Return, for each rung, the ids of all candidates that have been evaluated after it."""
-    return [run.evaluated_at(rung) for rung in range(run.config.search.rungs)]
-
-
-def _complete(run: Run, generation: int, evaluated: Sequence[set[int]]) -> bool:
-    return all(reaching(run, generation, rung) <= done for rung, done in enumerate(evaluated))
+    return all(complete(run, generation) for generation in range(run.config.search.generations))

@@ -15,7 +15,7 @@ from evolve.config.numbering import Place
 from evolve.genome.interval import Interval
 from evolve.genome.phenotype import Phenotype
 from evolve.genome.plain_values import listed, parsed, real, whole_number
-from evolve.store.evaluation import Evaluation, escaped
+from evolve.store.evaluation import Evaluation, escaped, shortened
 from optics.numerics.renamed import renamed
 
 __all__ = ["Candidate"]
@@ -151,7 +151,7 @@ class Candidate:
                 genome=_reals(record, "genome"),
                 phenotype=Phenotype.from_json(record["phenotype"]),
                 fitness=-math.inf if record["fitness"] is None else real(record["fitness"], "fitness", _ANY),
-                returns=_reals(record, "returns", or_none=True),
+                returns=_reals(record, "returns", or_none=True, most=_MOST_RETURNS),
                 success_rate=_real_or_none(record["success_rate"], "success_rate", Interval(0, 1)),
                 seconds=real(record["seconds"], "seconds", Interval(0, 1e300)),
                 curve=tuple(_point(entry) for entry in listed(record["curve"], "curve", 0, _LONGEST)),
@@ -183,12 +183,13 @@ class Candidate:
 KEYS = {"episode_failures": "mishaps"}  # name of a field -> its name in records, if it differs
 _ANY = Interval(-1e300, 1e300)
 _LONGEST = 1_000_000  # maximum number of entries of a list in a record
+_MOST_RETURNS = 10_000  # maximum number of evaluation episodes, see the settings
 # Maximum values in a record. The ranges of the settings limit ids and generations; random generators limit seeds.
 _COUNTS = {"id": 10**9, "generation": 10**5, "index": 10**4, "seed": 2**64 - 1, "steps": 10**12, "rung": 9}
 
 
-def _reals(record: dict[str, Any], name: str, or_none: bool = False) -> tuple[float, ...]:
-    values = listed(record[name], name, 0, _LONGEST)
+def _reals(record: dict[str, Any], name: str, or_none: bool = False, most: int = _LONGEST) -> tuple[float, ...]:
+    values = listed(record[name], name, 0, most)
     return tuple(_real_or_none(value, name, _ANY) if or_none else real(value, name, _ANY) for value in values)
 
 
@@ -212,11 +213,12 @@ def _episode_failure(entry: Any) -> tuple[str, int]:
 def _text(value: Any, name: str) -> str | None:
     """Return a text or None after a check.
 
-    Failure messages may contain names of files, and thus bytes that are not valid text. These are escaped.
+    Failure messages may contain names of files, and thus bytes that are not valid text. These are escaped. Records of
+    former versions may contain messages of any length. These are shortened.
     """
     if value is not None and not isinstance(value, str):
         raise ValueError(f"{name}: must be text or null")
-    return value if value is None else escaped(value)
+    return value if value is None else shortened(escaped(value))
 
 
 def _checksum(value: Any) -> str | None:

@@ -10,6 +10,7 @@ lock               lock that the process working on the run holds
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,22 +18,24 @@ from typing import Self
 
 from evolve.config.assemble import from_text, to_toml
 from evolve.config.formats import FORMAT, LAST_OF_FORMER, OLDEST_CONTINUED, format_of
+from evolve.config.numbering import generation_ids
 from evolve.config.run_config import RunConfig
-from evolve.config.sources import parsed_toml
+from evolve.config.sources import LARGEST_TOML, parsed_toml
 from evolve.store.atomic_files import POLICIES, TRAININGS, UNFINISHED, sweep, write_whole
 from evolve.store.candidate import Candidate
+from evolve.store.checksums import harmed
 from evolve.store.lock import LONGEST, RunLock
 from evolve.store.policies import lost
 from evolve.store.record import Record, RunError
 from evolve.store.regular_files import folder, opened, read, require_folder, require_regular
+from evolve.store.versions import CONFIG, config_change, record_start
 from evolve.store.versions import FILE as VERSIONS
-from evolve.store.versions import fingerprint, record_start
 
 __all__ = ["Candidate", "Run", "RunError", "next_directory"]
 
-CONFIG = "config.toml"
 CANDIDATES = "candidates.jsonl"
-PRODUCTS = ("exr", "tensorboard")  # folders of exported files
+EXR = "exr"  # folder of exported images
+PRODUCTS = (EXR, "tensorboard")  # folders of exported files
 
 
 @dataclass
@@ -68,20 +71,21 @@ class Run:
                 _require_no_run(path)
                 folder(path / POLICIES)
                 opened(path / CANDIDATES, "ab", create=True).close()
-                text = to_toml(config)
+                text = to_toml(config).encode()
                 (path / VERSIONS).unlink(missing_ok=True)  # may be left by a process that was killed at this point
-                record_start(path, 0, origin, fingerprint(text))
-                write_whole(path / CONFIG, text.encode())
+                record_start(path, 0, origin, text)
+                write_whole(path / CONFIG, text)
         except OSError as error:
             raise RunError(f"{error.filename or path} cannot be written: {error.strerror}") from error
         return cls(path, config, Record(path / CANDIDATES))
 
     @classmethod
-    def open(cls, path: Path | str, task: str | None = None) -> Self:
+    def open(cls, path: Path | str, task: str | None = None, before_damage: bool = False) -> Self:
         """Open a run directory.
 
         task: "FILE.py:CLASS", if the run has a user task. The code of a user task is executed only if the task is named
             here. It is needed to continue the run and to let its animals play.
+        before_damage: whether to use only the lines of the record before the first damaged line, if there is one
 
         Raises:
             RunError: the directory contains no run, or a line of its record is invalid; the message names the file and
@@ -94,12 +98,12 @@ class Run:
             raise RunError(f"{path} is not a run: there is no such directory")
         _require_plain(path)
         try:
-            config = from_text(read(path / CONFIG), str(path / CONFIG))
+            config = from_text(read(path / CONFIG, LARGEST_TOML), str(path / CONFIG))
         except FileNotFoundError:
             raise RunError(f"{path} is not a run: it holds no {CONFIG}") from None
         if task is not None:
             config = config.with_code(task)
-        return cls(path, config, Record.read(path / CANDIDATES, config))
+        return cls(path, config, Record.read(path / CANDIDATES, config, before_damage))
 
     @classmethod
     def create_next(cls, config: RunConfig, preset: str, origin: str | None = None) -> Self:
@@ -125,7 +129,7 @@ class Run:
         Raises:
             RunError: the format is older; the message names the version that can continue it.
         """
-        number = format_of(parsed_toml(read(self.path / CONFIG), str(self.path / CONFIG)).tree)
+        number = format_of(parsed_toml(read(self.path / CONFIG, LARGEST_TOML), str(self.path / CONFIG)).tree)
         if number < OLDEST_CONTINUED:
             raise RunError(
                 f"{self.path} has format {number}: must be {OLDEST_CONTINUED} to {FORMAT} to be continued; rhabdom at "
@@ -144,24 +148,25 @@ class Run:
     def repair(self) -> None:
         """Read the record again, and remove an unfinished last line and incomplete files.
 
-        The caller must hold the lock.
+        If the run was opened with `before_damage`, the lines from the first damaged one on are also removed. A copy of
+        the damaged record is kept. The caller must hold the lock.
 
         Raises:
             RunError: the record is damaged or cannot be written, or config.toml has changed since the run was opened.
         """
         try:
-            text = read(self.path / CONFIG)
+            text = read(self.path / CONFIG, LARGEST_TOML)
         except OSError as error:
             raise RunError(f"{self.path / CONFIG}: cannot be read: {error.strerror}") from error
         if from_text(text, str(self.path / CONFIG)) != self.config:
             raise RunError(f"{self.path / CONFIG} has changed since the run was opened; open it again")
-        self.record = Record.read(self.record.path, self.config)
+        self.record = Record.read(self.record.path, self.config, self.record.before_damage)
         try:
             for folder in (self.path, self.path / POLICIES, self.path / TRAININGS):
                 sweep(folder)
         except OSError as error:
             raise RunError(f"{self.record.path}: cannot be written: {error.strerror}") from error
-        self.record.cut_off_unfinished()
+        self.record.cut_off_unused()
 
     def append(self, candidate: Candidate) -> None:
         """Append a candidate to the record, and synchronise the file with the disk.
@@ -195,8 +200,16 @@ class Run:
 
     @property
     def notice(self) -> str | None:
-        """Message about a skipped line of the record or about lost policies, in one line; None if there is neither."""
-        return self.record.notice or lost(self.candidates, self.policy_path)
+        """Message about damage, in one line: lines of the record that were left out, lost policies, a config.toml that
+        has changed since the last start, and EXR files that do not match their checksums. None if there is none.
+        """
+        found = (
+            self.record.notice,
+            lost(self.candidates, self.policy_path),
+            config_change(self.path, len(self.candidates)),
+            harmed(self.path / EXR),
+        )
+        return "; ".join(filter(None, found)) or None
 
     @property
     def best(self) -> Candidate | None:
@@ -221,7 +234,9 @@ class Run:
 
     def generation(self, number: int) -> list[Candidate]:
         """Return the evaluated candidates of one generation."""
-        return [candidate for candidate in self.candidates if candidate.generation == number]
+        ids = generation_ids(number, self.config.search.population)
+        first, end = (bisect_left(self.candidates, one, key=lambda c: c.id) for one in (ids.start, ids.stop))
+        return list(self.candidates[first:end])
 
     @property
     def in_order_of_finish(self) -> list[Candidate]:

@@ -6,9 +6,10 @@ import math
 from collections import Counter
 from dataclasses import dataclass
 
-__all__ = ["Evaluation", "escaped", "most_frequent", "total_episode_failures"]
+__all__ = ["Evaluation", "escaped", "most_frequent", "shortened", "total_episode_failures"]
 
 KINDS, LONGEST = 4, 300  # maximum number of different messages that are stored, and of characters in each
+LONGEST_FAILURE = 1000  # maximum number of characters of the message of a failed candidate
 OTHERS = "others"  # message under which all other failures are counted
 
 
@@ -38,7 +39,7 @@ class Evaluation:
     @classmethod
     def failed(cls, failure: str, seconds: float = 0.0) -> Evaluation:
         """Return the evaluation of a candidate that failed."""
-        return cls(fitness=-math.inf, seconds=seconds, failure=_in_one_line(failure))
+        return cls(fitness=-math.inf, seconds=seconds, failure=shortened(_in_one_line(failure)))
 
 
 def most_frequent(failures: Counter[str]) -> tuple[tuple[str, int], ...]:
@@ -63,6 +64,14 @@ def total_episode_failures(*mishaps: tuple[tuple[str, int], ...]) -> tuple[tuple
 def escaped(text: str) -> str:
     """Return a text with escapes in place of lone surrogates, which come from bytes in file names, for example."""
     return text.encode(errors="backslashreplace").decode()
+
+
+def shortened(failure: str) -> str:
+    """Return the message of a failure with at most LONGEST_FAILURE characters; the middle of longer ones is omitted."""
+    if len(failure) <= LONGEST_FAILURE:
+        return failure
+    half = LONGEST_FAILURE // 2 - 4
+    return f"{failure[:half]} [...] {failure[-half:]}"
 
 
 def _in_one_line(text: str) -> str:

@@ -2,30 +2,17 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Callable, Iterable
 from pathlib import Path
 
 from evolve.store.candidate import Candidate
+from evolve.store.checksums import digest
 from evolve.store.record import RunError
-from evolve.store.regular_files import read
 
-__all__ = ["digest", "lost", "require_policy"]
+__all__ = ["lost", "require_policy"]
 
 SHOWN = 5  # maximum number of ids in a message
 REMEDY = "restore the file from a copy of the run; only replay, report and export need it"
-
-
-def digest(path: Path) -> str | None:
-    """Return the SHA-256 of a policy's file; None if the file is missing.
-
-    Raises:
-        OSError: the file cannot be read, or is not a regular file.
-    """
-    try:
-        return hashlib.sha256(read(path)).hexdigest()
-    except FileNotFoundError:
-        return None
 
 
 def lost(candidates: Iterable[Candidate], where: Callable[[int], Path]) -> str | None:

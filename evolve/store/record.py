@@ -1,24 +1,28 @@
 """The record of a run, candidates.jsonl: one line per evaluated candidate and rung, in the order of completion.
 
-When a record is read, every line is checked. Writing only appends lines.
+When a record is read, the values and the checksum of every line are checked. Writing only appends lines.
 """
 
 from __future__ import annotations
 
 import os
+import shutil
 from bisect import bisect_left
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import BinaryIO
 
 from evolve.config.numbering import Place
 from evolve.config.run_config import RunConfig
 from evolve.genome.genotype import Genotype
+from evolve.store.atomic_files import unfinished
 from evolve.store.candidate import Candidate
-from evolve.store.regular_files import opened, read
+from evolve.store.chain import Chain, without_checksum
+from evolve.store.regular_files import opened, require_size
 
 __all__ = ["Record", "RunError"]
 
-LAST_LINE = "; it is the last line: if you delete it, the run can continue and evaluates this candidate again"
+LARGEST_RECORD, LONGEST_LINE = 2**31, 2**25  # bytes; a line of a candidate has some thousands
 Lines = dict[tuple[int, int], Candidate]  # (candidate id, rung) -> the candidate after this rung
 
 
@@ -32,42 +36,78 @@ class Record:
 
     lines: candidates by (id, rung), in the order of the file
     candidates: candidates in the order of their ids, each as recorded after the last rung that it has reached
-    notice: message about an unfinished last line that was skipped, for example after a power failure; None without one
+    notice: message about lines that were left out: an unfinished last line, for example after a power failure, or all
+        lines from a damaged one on; None without such lines
+    before_damage: whether only the lines before the first damaged line are used; otherwise, damage is an error
     """
 
     path: Path
     lines: Lines = field(default_factory=dict)
     candidates: tuple[Candidate, ...] = ()
     notice: str | None = None
+    before_damage: bool = False
     _whole_bytes: int = 0
+    _chain: Chain = field(default_factory=Chain)
+    _damaged: bool = False
 
     @classmethod
-    def read(cls, path: Path, config: RunConfig) -> Record:
-        """Read a record, and check that each line agrees with `config` and with earlier lines.
+    def read(cls, path: Path, config: RunConfig, before_damage: bool = False) -> Record:
+        """Read a record, and check each line: its values, its agreement with `config` and earlier lines, its checksum.
+
+        before_damage: whether to use only the lines before the first damaged line, if there is one
 
         Raises:
             RunError: the file cannot be read, or a line is damaged; the message names the file and the line.
         """
+        record = cls(path, before_damage=before_damage)
+        torn = False
         try:
-            content = read(path)
+            with opened(path) as file:
+                require_size(file, path, LARGEST_RECORD)
+                torn = record._read_lines(file, config)
         except OSError as error:
             raise RunError(f"{path}: cannot be read: {error.strerror}") from error
-        whole_bytes = content.rfind(b"\n") + 1
-        texts = content[:whole_bytes].splitlines()
-        notice = None
-        if len(content) > whole_bytes:
-            notice = f"{path}: line {len(texts) + 1} is unfinished and is left out; its candidate counts as unevaluated"
-        lines: Lines = {}
+        except ValueError as error:
+            record._leave_out(f"{path}, line {len(record.lines) + 1}: is damaged: {error}")
+        if torn:
+            name = f"{path}: line {len(record.lines) + 1}"
+            record.notice = f"{name} is unfinished and is left out; its candidate counts as unevaluated"
+        record.candidates = _furthest(record.lines)
+        return record
+
+    def _read_lines(self, file: BinaryIO, config: RunConfig) -> bool:
+        """Read all lines of a file, and return whether its last line is unfinished.
+
+        Raises:
+            ValueError: the next line is damaged; the message states the reason.
+        """
         dimension = Genotype(config.genome).dimension
-        for number, text in enumerate(texts, start=1):
-            try:
-                candidate = Candidate.from_line(text.decode())
-                _require_agreement(candidate, config, dimension, lines)
-            except ValueError as error:
-                hint = LAST_LINE if number == len(texts) else ""
-                raise RunError(f"{path}, line {number}: is damaged: {error}{hint}") from error
-            lines[candidate.id, candidate.rung] = candidate
-        return cls(path, lines, _furthest(lines), notice, whole_bytes)
+        while text := file.readline(LONGEST_LINE + 1):
+            if len(text) > LONGEST_LINE:
+                raise ValueError(f"it has more than {LONGEST_LINE:,} bytes")
+            if not text.endswith(b"\n"):
+                return True
+            candidate = Candidate.from_line(without_checksum(text).decode())
+            _require_agreement(candidate, config, dimension, self.lines)
+            self._chain = self._chain.after(text)
+            self.lines[candidate.id, candidate.rung] = candidate
+            self._whole_bytes += len(text)
+        return False
+
+    def _leave_out(self, damage: str) -> None:
+        """Leave out a damaged line and all lines after it.
+
+        Raises:
+            RunError: `before_damage` is false.
+        """
+        if not self.before_damage:
+            raise RunError(f"{damage}; --before-damage uses only the {len(self.lines)} lines before it")
+        self.notice, self._damaged = f"{damage}; this line and all after it are left out", True
+
+    @property
+    def unchecked(self) -> int:
+        """Number of lines without a checksum. They are the first ones, which a former version wrote."""
+        return self._chain.unchecked
 
     def append(self, candidate: Candidate) -> None:
         """Append a candidate, and synchronise the file with the disk.
@@ -79,7 +119,7 @@ class Record:
         if (candidate.id, candidate.rung) in self.lines:
             raise RunError(f"{self.path.parent}: candidate {candidate.id} has been evaluated already")
         _require_readable(candidate, self.path)
-        line = candidate.to_line().encode()
+        line = self._chain.sealed(candidate.to_line().encode())
         try:
             with opened(self.path, "ab") as file:
                 if file.tell() != self._whole_bytes:  # another run may have been started in the directory
@@ -92,21 +132,32 @@ class Record:
         except OSError as error:
             raise RunError(f"{self.path}: cannot be written: {error.strerror}") from error
         self._whole_bytes += len(line)
+        self._chain = self._chain.after(line)
         self.lines[candidate.id, candidate.rung] = candidate
         self.candidates = _with(self.candidates, candidate)
 
-    def cut_off_unfinished(self) -> None:
-        """Remove an unfinished last line from the file.
+    def cut_off_unused(self) -> None:
+        """Remove the lines that were left out from the file. If they include a damaged line, keep a copy of the file.
 
         Raises:
             RunError: the file cannot be written.
         """
         try:
             with opened(self.path, "r+b") as file:
+                if self._damaged:
+                    self._copy(file)
                 file.truncate(self._whole_bytes)
                 os.fsync(file.fileno())
         except OSError as error:
             raise RunError(f"{self.path}: cannot be written: {error.strerror}") from error
+
+    def _copy(self, file: BinaryIO) -> None:
+        """Copy the damaged file to the first free path `candidates.jsonl.damaged-N`."""
+        number = 1
+        while os.path.lexists(copy := self.path.with_name(f"{self.path.name}.damaged-{number}")):
+            number += 1
+        with unfinished(copy) as path, path.open("r+b") as target:
+            shutil.copyfileobj(file, target)
 
 
 def _require_readable(candidate: Candidate, path: Path) -> None:

@@ -20,6 +20,7 @@ __all__ = [
     "read",
     "require_folder",
     "require_regular",
+    "require_size",
     "sync_folder",
 ]
 
@@ -30,6 +31,7 @@ _KINDS = (
     (stat.S_ISDIR, "a directory"),
     (stat.S_ISREG, "a file"),
 )
+LARGEST = 2**30  # maximum size of files that are read at once, such as policies [bytes]
 _FLAGS = {"rb": os.O_RDONLY, "r+b": os.O_RDWR, "ab": os.O_WRONLY | os.O_APPEND}
 
 
@@ -51,15 +53,29 @@ def opened(path: Path, mode: Literal["rb", "r+b", "ab"] = "rb", create: bool = F
     return os.fdopen(_descriptor(path, flags, alone=mode != "rb"), mode)
 
 
-def read(path: Path) -> bytes:
-    """Return the content of a run's file.
+def read(path: Path, most: int = LARGEST) -> bytes:
+    """Return the content of a run's file, whose size is checked before it is read.
+
+    most: maximum size [bytes]
 
     Raises:
-        StrangeFileError: the path is not a regular file.
+        StrangeFileError: the path is not a regular file, or the file is too large.
         OSError: the file does not exist or cannot be read.
     """
     with opened(path) as file:
-        return file.read()
+        require_size(file, path, most)
+        return file.read(most)
+
+
+def require_size(file: BinaryIO, path: Path, most: int) -> None:
+    """Check the size of an open file before it is read.
+
+    Raises:
+        StrangeFileError: the file has more than `most` bytes.
+    """
+    size = os.fstat(file.fileno()).st_size
+    if size > most:
+        raise _strange(path, f"has {size:,} bytes: must have at most {most:,}")
 
 
 def created(path: Path) -> BinaryIO:

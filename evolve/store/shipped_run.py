@@ -26,7 +26,7 @@ def copy_shipped_run(directory: Path) -> Run:
     """
     files = dict(_files(resources.files("evolve") / FOLDER))
     there = [name for name in files if (directory / name).exists()]
-    same = all(read(directory / name) == files[name] for name in there)
+    same = all(_same(directory / name, files[name]) for name in there)
     if not same or (not there and directory.exists() and any(directory.iterdir())):
         raise RunError(f"{directory} holds other files: choose another directory with --out")
     directory.mkdir(parents=True, exist_ok=True)
@@ -34,6 +34,10 @@ def copy_shipped_run(directory: Path) -> Run:
         if name not in there:
             write_whole(directory / name, content)
     return Run.open(directory)
+
+
+def _same(path: Path, content: bytes) -> bool:
+    return path.stat().st_size == len(content) and read(path) == content
 
 
 def _files(folder: Traversable, within: str = "") -> Iterator[tuple[str, bytes]]:

@@ -11,13 +11,15 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
+from evolve.config.sources import LARGEST_TOML
 from evolve.store.atomic_files import write_whole
 from evolve.store.regular_files import read
 from optics.numerics.device import device
 
-__all__ = ["altered", "fingerprint", "origin", "present", "record_start", "recorded"]
+__all__ = ["config_change", "origin", "present", "record_start", "recorded"]
 
-FILE = "versions.json"
+FILE, CONFIG = "versions.json", "config.toml"
+LARGEST_FILE = 2**24  # bytes; thousands of starts
 PACKAGES = (
     "rhabdom",
     "numpy",
@@ -56,38 +58,51 @@ def commits(run: Path) -> list[str]:
     return list(dict.fromkeys(commit for commit in known if commit))
 
 
-def fingerprint(config: str) -> str:
-    """Return the fingerprint of a run's config.toml.
+def config_change(run: Path, candidates: int) -> str | None:
+    """Return a message if a run's config.toml has changed since the last start of the run; None otherwise.
 
-    The fingerprint ignores lines that do not influence training and evaluation: comments, the number of workers, and
-    the number of generations.
+    Records of former versions contain no checksum of the file. Only changes of settings that influence training and
+    evaluation are then noticed.
+
+    candidates: number of candidates that have been evaluated
+    """
+    starts = _starts(run)
+    if not starts:
+        return None
+    last, now = starts[-1], _checksums(read(run / CONFIG, LARGEST_TOML))
+    changed = f"{CONFIG} has changed since the last start"
+    if last.get("settings", now["settings"]) != now["settings"]:
+        return (
+            f"{changed}. Candidates from {candidates} on are trained and evaluated with other settings than earlier "
+            "ones. If you did not change it, restore it from a copy"
+        )
+    if last.get("config", now["config"]) != now["config"]:
+        return f"{changed}, but only in comments, workers or generations"
+    return None
+
+
+def _checksums(config: bytes) -> dict[str, str]:
+    """Return the checksum of a config.toml, and the fingerprint of the settings that influence training and evaluation.
+
+    The fingerprint ignores comments, the number of workers, and the number of generations.
     """
     left_out = ("workers =", "generations =", "#")
-    lines = [line.strip() for line in config.splitlines() if line.strip() and not line.startswith(left_out)]
-    return hashlib.sha256("\n".join(lines).encode()).hexdigest()[:16]
+    lines = [line.strip() for line in config.decode().splitlines() if line.strip() and not line.startswith(left_out)]
+    settings = hashlib.sha256("\n".join(lines).encode()).hexdigest()[:16]
+    return {"settings": settings, "config": hashlib.sha256(config).hexdigest()}
 
 
-def altered(run: Path) -> bool:
-    """Return whether a run's config.toml has changed since the last start of the run."""
-    starts = _starts(run)
-    return bool(starts) and starts[-1].get("settings", _settings(run)) != _settings(run)
-
-
-def _settings(run: Path) -> str:
-    return fingerprint(read(run / "config.toml").decode())
-
-
-def record_start(run: Path, candidates: int, origin: str | None = None, settings: str | None = None) -> None:
+def record_start(run: Path, candidates: int, origin: str | None = None, config: bytes | None = None) -> None:
     """Record a start of a run with the present versions.
 
     candidates: number of candidates that have been evaluated before this start
     origin: "RUN:ID", the animal from which the run starts; None without one
-    settings: fingerprint of the settings; None: it is computed from the run's config.toml
+    config: content of the run's config.toml; None: it is read
     """
     start: dict[str, Any] = {
         "time": datetime.now(UTC).isoformat(timespec="seconds"),
         "candidates": candidates,
-        "settings": settings or _settings(run),
+        **_checksums(read(run / CONFIG, LARGEST_TOML) if config is None else config),
         "versions": present(),
     }
     if origin is not None:
@@ -104,7 +119,7 @@ def origin(run: Path) -> str | None:
 def _starts(run: Path) -> list[dict[str, Any]]:
     """Return the recorded starts of a run. A lost or damaged file counts as empty: a run can continue without it."""
     try:
-        starts = json.loads(read(run / FILE))
+        starts = json.loads(read(run / FILE, LARGEST_FILE))
         return [start for start in starts if isinstance(start["versions"], dict)]
     except (OSError, ValueError, KeyError, TypeError, RecursionError):
         return []

@@ -42,6 +42,7 @@ SCALE = "relative: a white Lambertian facing unit daylight has radiance D65, 1 a
 # Default limit for the bytes of unpacked pixels in a file. Sixteen eyes of 128 x 128 receptors in 64 bands need a
 # fifteenth of it.
 MOST_BYTES = 2**30
+LARGEST_HEADER = 2**24  # bytes of a file other than pixels
 _HELD = "rhabdom"  # name of the attribute that stores all values other than channels, as JSON
 _HASH = "sha256"
 
@@ -168,6 +169,8 @@ def read_exr(path: str | os.PathLike[str], most_bytes: int = MOST_BYTES) -> list
     if not Path(path).is_file():
         raise FileNotFoundError(f"no such file: {path}")
     try:
+        if (size := Path(path).stat().st_size) > most_bytes + LARGEST_HEADER:  # larger than without compression
+            raise ExrError(f"has {size:,} bytes: must be at most most_bytes = {most_bytes:,}")
         content = Path(path).read_bytes()
         headers = OpenEXR.File(io.BytesIO(content), header_only=True).parts
         expected = len(headers)

@@ -9,6 +9,7 @@ import random
 import shutil
 import socket
 import time
+from collections.abc import Sequence
 from contextlib import chdir, redirect_stderr, redirect_stdout
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,6 +23,7 @@ from evolve.config.numbering import Place
 from evolve.genome.genotype import Genotype
 from evolve.genome.phenotype import develop
 from evolve.store.candidate import Candidate
+from evolve.store.chain import sealed_record, without_checksum
 from evolve.store.directory import Run
 from evolve.store.evaluation import Evaluation
 
@@ -88,8 +90,9 @@ class Stage:
 
     @property
     def lines(self) -> list[str]:
-        """Lines of the run's record."""
-        return (self.folder / "whole" / "candidates.jsonl").read_text().splitlines(keepends=True)
+        """Lines of the run's record, without checksums."""
+        written = (self.folder / "whole" / "candidates.jsonl").read_bytes().splitlines()
+        return [without_checksum(line).decode() + "\n" for line in written]
 
     @property
     def victim(self) -> Path:
@@ -156,13 +159,17 @@ def _put(kind: str, place: Path, victim: Path) -> None:
         place.write_text("")
 
 
+def _write_record(run: Path, lines: Sequence[str]) -> None:
+    (run / "candidates.jsonl").write_bytes(sealed_record(lines))
+
+
 def impossible_value(chance: random.Random, stage: Stage) -> str | None:
     """Put an invalid value anywhere in a line of the record."""
     run, record = stage.copy(), json.loads(stage.lines[-1])
     table = record["phenotype"] if chance.random() < 0.5 else record
     table[chance.choice([name for name in table if name != "failure"])] = "@"
     line = json.dumps(record).replace('"@"', chance.choice(IMPOSSIBLE), 1)
-    (run / "candidates.jsonl").write_text("".join(stage.lines[:-1]) + line + "\n")
+    _write_record(run, [*stage.lines[:-1], line + "\n"])
     return refusal(stage, chance.choice(READERS), run)
 
 
@@ -171,7 +178,7 @@ def shape_bomb(chance: random.Random, stage: Stage) -> str | None:
     run, record = stage.copy(), json.loads(stage.lines[-1])
     trait = chance.choice(list(BOMBS))
     record["phenotype"][trait] = "@"
-    (run / "candidates.jsonl").write_text(json.dumps(record).replace('"@"', BOMBS[trait], 1) + "\n")
+    _write_record(run, [json.dumps(record).replace('"@"', BOMBS[trait], 1) + "\n"])
     began = time.process_time()
     wrong = refusal(stage, "status", run)
     took = time.process_time() - began
@@ -200,7 +207,7 @@ def steering_text(chance: random.Random, stage: Stage) -> str | None:
     name = "".join(letters).replace("/", "-").encode(errors="surrogateescape").decode(errors="surrogateescape")
     run, record = stage.copy(f"run{name}"), json.loads(stage.lines[-1])
     record |= {"failure": f"ValueError: {name}", "fitness": None}
-    (run / "candidates.jsonl").write_text("".join(stage.lines[:-1]) + json.dumps(record) + "\n")
+    _write_record(run, [*stage.lines[:-1], json.dumps(record) + "\n"])
     code, out, err = call(chance.choice(("status", "compare")), run)
     plain = (out + err).translate(dict.fromkeys(map(ord, "\n\t"))).isprintable()  # newlines and tabs are harmless
     return None if code == 0 and plain else f"code {code}, said {out + err!r}"

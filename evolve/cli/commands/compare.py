@@ -13,7 +13,7 @@ __all__ = ["compare"]
 
 def compare(arguments: Namespace) -> int:
     """Print a comparison of several runs; with --html, also write it as a page."""
-    runs = [Run.open(directory) for directory in arguments.directories]
+    runs = [Run.open(directory, before_damage=arguments.before_damage) for directory in arguments.directories]
     if arguments.json:
         found = {"runs": [run_summary(run) for run in runs], "settings": differing_settings(runs)}
         print(json.dumps(found, indent=1, allow_nan=False))

@@ -14,7 +14,7 @@ __all__ = ["drift"]
 
 def drift(arguments: Namespace) -> int:
     """Print how far each gene moved in the runs, compared with searches with random fitness."""
-    runs = [Run.open(directory) for directory in arguments.directories]
+    runs = [Run.open(directory, before_damage=arguments.before_damage) for directory in arguments.directories]
     said = "searches with random fitness"
     with Waiting(1).of_one_step(said) as wait:
         found = drift_of(runs, arguments.searches, lambda share: wait.within(said, share))

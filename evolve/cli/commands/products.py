@@ -14,7 +14,7 @@ from typing import Any
 
 from evolve.cli.waiting import Waiting
 from evolve.report.write import FILE as REPORT
-from evolve.store.directory import Run
+from evolve.store.directory import EXR, Run
 from optics.numerics import device
 
 __all__ = ["REPORT", "Products", "export", "finished_products", "open_page", "replay", "report"]
@@ -66,7 +66,7 @@ def finished_products(run: Run, shown: bool, replay: bool = False) -> Products:
             wait.step("writing the replay")
             played = write_page(run, best)
         wait.step("writing EXR files")
-        frames = exr_export.export_episode(best, run.path / "exr", wait.within)
+        frames = exr_export.export_episode(best, run.path / EXR, wait.within)
         wait.step("writing the report")
         return Products(write(run, best, doing=wait.within), frames, played)
 
@@ -128,6 +128,6 @@ def _waiting(arguments: Namespace, text: str) -> Waiting:
 
 def _open(arguments: Namespace) -> Run:
     """Open the run, and check that eyes can be computed on this machine."""
-    run = Run.open(arguments.directory, arguments.task)
+    run = Run.open(arguments.directory, arguments.task, arguments.before_damage)
     device.make_ready()
     return run

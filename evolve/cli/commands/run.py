@@ -24,7 +24,8 @@ from evolve.runs.resume import resuming
 from evolve.search.dask_executor import DaskExecutor
 from evolve.search.scheduler import Scheduler
 from evolve.store.candidate import Candidate
-from evolve.store.directory import Run
+from evolve.store.checksums import harmed
+from evolve.store.directory import EXR, Run
 
 __all__ = ["resume", "start"]
 
@@ -53,7 +54,7 @@ def resume(arguments: Namespace) -> int:
     scheduler = _scheduler(arguments)
     if arguments.tensorboard:
         require_tensorboard()
-    run = Run.open(arguments.directory, arguments.task)
+    run = Run.open(arguments.directory, arguments.task, arguments.before_damage)
     with resuming(run, _silence if arguments.quiet else _note) as unfinished:
         if not arguments.json:
             state = f"{len(run.candidates)} of {run.config.candidates} candidates are on record"
@@ -131,12 +132,12 @@ def _carry_on(run: Run, arguments: Namespace, scheduler: Scheduler | None) -> in
 
 
 def _already_finished(run: Run, arguments: Namespace) -> int:
-    """Write the report and EXR files of a finished run if they are missing.
+    """Write the report and EXR files of a finished run if they are missing, or if EXR files are damaged.
 
     They are missing if the run was killed after its last evaluation.
     """
-    page, frames = run.path / REPORT, sorted((run.path / "exr").glob("*.exr"))
-    if not page.is_file() or not frames:
+    page, frames = run.path / REPORT, sorted((run.path / EXR).glob("*.exr"))
+    if not page.is_file() or not frames or harmed(run.path / EXR):
         return _finish(run, arguments)
     if not arguments.json:
         print(f"nothing is left to do; report: {page}")

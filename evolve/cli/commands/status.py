@@ -21,6 +21,7 @@ from evolve.runs.output import as_it_is
 from evolve.search.successive_halving import finished
 from evolve.store.candidate import Candidate
 from evolve.store.directory import Run
+from evolve.store.evaluation import shortened
 from evolve.store.lock import holder
 
 __all__ = ["listing", "standing", "standing_lines", "status"]
@@ -31,7 +32,7 @@ SHOWN = 12  # number of generations shown, the latest ones
 
 def status(arguments: Namespace) -> int:
     """Print the state of a run; with --watch, print it again after each change until no process works on the run."""
-    now = standing(Run.open(arguments.directory))
+    now = _read(arguments)
     if not arguments.watch:
         _show(arguments, now)
         return 0
@@ -43,7 +44,11 @@ def status(arguments: Namespace) -> int:
         if now["state"] != "running":
             return 0
         time.sleep(WATCH_S)
-        now = standing(Run.open(arguments.directory))
+        now = _read(arguments)
+
+
+def _read(arguments: Namespace) -> dict[str, Any]:
+    return standing(Run.open(arguments.directory, before_damage=arguments.before_damage))
 
 
 def listing(arguments: Namespace) -> int:
@@ -65,8 +70,9 @@ def listing(arguments: Namespace) -> int:
 def _standing_or_reason(path: Path) -> dict[str, Any]:
     try:
         return {name: value for name, value in standing(Run.open(path)).items() if name != "generations"}
-    except (ValueError, OSError) as error:
-        return {"directory": str(path), "state": "unreadable", "reason": " ".join(str(error).split())}
+    except Exception as error:  # one directory, whatever it contains, must not hide the others
+        reason = str(error) or type(error).__name__
+        return {"directory": str(path), "state": "unreadable", "reason": shortened(" ".join(reason.split()))}
 
 
 def _in_one_line(one: dict[str, Any]) -> str:
@@ -103,6 +109,7 @@ def standing(run: Run) -> dict[str, Any]:
         "state": state,
         "process": worker,
         "notice": run.notice,
+        "lines_without_checksum": run.record.unchecked,
         "candidates": {
             "evaluated": len(run.candidates),
             "failed": sum(candidate.failure is not None for candidate in run.candidates),
@@ -143,6 +150,8 @@ def standing_lines(now: dict[str, Any]) -> list[str]:
         f"{now['directory']}: {now['task']}, {now['state']}{by}",
         f"{count['evaluated']} of {count['planned']} candidates evaluated{failed}, {now['steps']:,} steps trained",
     ]
+    if unchecked := now["lines_without_checksum"]:
+        lines.append(f"checksums: none in the first {unchecked} lines of the record, which a former version wrote")
     if now["last_failure"]:
         lines.append(f"last failure: {now['last_failure']}")
     lines += episode_failure_lines(now["mishaps"])

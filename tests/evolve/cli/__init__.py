@@ -2,6 +2,7 @@
 
 main: test_main.py
 arguments: test_main.py
+argument_values: store/test_sizes.py, report/test_gene_drift.py
 waiting: test_products.py
 notes: test_notes.py
 run_plan: test_run_plan.py

@@ -1,6 +1,5 @@
 """`evolve.run` and the command produce the same record; notebooks are generated from pages, and can be run."""
 
-import json
 import os
 import runpy
 import subprocess
@@ -19,6 +18,7 @@ from evolve.runs import carry_on
 from evolve.search.local_executor import LocalExecutor
 from evolve.store.directory import Run
 from tests.evolve.closed_form import TINY, bowl
+from tests.evolve.store.handwriting import records_of
 from tests.test_docs import CODE, agrees
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -35,8 +35,9 @@ def closed_form(monkeypatch):
 
 
 def record(path: Path) -> list[dict[str, object]]:
-    lines = [json.loads(line) for line in (path / "candidates.jsonl").read_text().splitlines()]
-    return sorted(({**line, "seconds": 0} for line in lines), key=lambda line: line["id"])
+    return sorted(
+        ({**line, "seconds": 0} for line in records_of(path / "candidates.jsonl")), key=lambda line: line["id"]
+    )
 
 
 def test_record_is_the_commands(closed_form, call, finished, tmp_path, monkeypatch):

@@ -22,6 +22,7 @@ from evolve.store.candidate import Candidate
 from evolve.store.directory import Run
 from evolve.store.evaluation import Evaluation
 from tests.evolve.report.reported import BEST, HOSTILE, SEEING, Page, film_of
+from tests.evolve.store.handwriting import records_of, write_records
 
 
 def test_table_holds_every_candidate_with_the_stores_fitness(run, page):
@@ -102,8 +103,9 @@ def test_references_inside_figures_lead_somewhere(content, page):
 def test_same_run_same_bytes_other_data_other_page(run, episode, content, tmp_path):
     assert render(run, episode).decode() == content
     other = shutil.copytree(run.path, tmp_path / run.path.name)
-    lines = (other / "candidates.jsonl").read_text().replace('"fitness": 7.0', '"fitness": 8.5')
-    (other / "candidates.jsonl").write_text(lines)
+    lines = records_of(other / "candidates.jsonl")
+    assert lines[-1]["fitness"] == 7.0
+    write_records(other / "candidates.jsonl", [*lines[:-1], {**lines[-1], "fitness": 8.5}])
     changed = render(Run.open(other), episode).decode()
     assert changed != content
     assert [row[2] for row in Page(changed).rows["all-candidates"][1:]][-1] == "8.50"

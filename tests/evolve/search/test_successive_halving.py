@@ -1,6 +1,5 @@
 """Successive halving: promotion, cost, and a training run in rungs that equals a whole one."""
 
-import json
 import random
 from dataclasses import replace
 from types import SimpleNamespace
@@ -24,6 +23,7 @@ from tests.evolve.closed_form import tiny
 from tests.evolve.remote_form import MISHAPS, fails_late, in_stages
 from tests.evolve.search.test_loop import SilentWatcher
 from tests.evolve.small_run import PHENOTYPE, small_config
+from tests.evolve.store.handwriting import records_of, write_records
 
 THREE = SearchConfig(population=7, generations=5, rungs=3, promoted=0.5)
 HALVING = ("search.population=7", "search.rungs=3", "learning.total_steps=16384")
@@ -200,12 +200,11 @@ def damaged(content):
 def test_a_record_whose_rungs_do_not_follow_each_other_is_damaged(tmp_path, monkeypatch):
     run, _ = carry(tmp_path / "run", tiny(*HALVING), monkeypatch)
     record = run.path / "candidates.jsonl"
-    written = [json.loads(line) for line in record.read_text().splitlines()]
-    orphan = next(line for line in written if line["rung"] == 1)
-    record.write_text(json.dumps(orphan) + "\n")
+    orphan = next(line for line in records_of(record) if line["rung"] == 1)
+    write_records(record, [orphan])
     with pytest.raises(RunError, match=r"line 1: is damaged: .* is on rung 1, but the rung below is missing"):
         Run.open(run.path)
-    record.write_text(json.dumps({**orphan, "rung": 3}) + "\n")
+    write_records(record, [{**orphan, "rung": 3}])
     with pytest.raises(RunError, match=r"rung = 3: must be at least 0 and below search\.rungs = 3"):
         Run.open(run.path)
 

@@ -1,7 +1,9 @@
 """Tests of evolve/store: which test covers which module.
 
 directory: test_directory.py
-record: test_record.py
+record: test_record.py, test_chain.py, test_sizes.py
+chain: test_chain.py
+checksums: test_checksums.py, test_policies.py
 candidate: test_record.py, test_reads_back_equal.py
 evaluation: test_record.py
 shipped_run: cli/test_demo.py

@@ -121,7 +121,7 @@ def test_a_config_that_changed_since_the_run_was_opened_is_not_overlooked(run):
 
 
 def test_a_run_that_is_begun_again_comes_from_where_this_attempt_says(tmp_path):
-    record_start(tmp_path, 0, "runs/a:3", "0")  # the process was then killed
+    record_start(tmp_path, 0, "runs/a:3", b"")  # the process was then killed
     Run.create(tmp_path, CONFIG)
     assert origin(tmp_path) is None
 

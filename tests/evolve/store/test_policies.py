@@ -8,8 +8,9 @@ import pytest
 from evolve.search.local_executor import LocalExecutor
 from evolve.search.loop import evolve
 from evolve.store.atomic_files import write_whole
+from evolve.store.checksums import digest
 from evolve.store.directory import Run, RunError
-from evolve.store.policies import digest, lost, require_policy
+from evolve.store.policies import lost, require_policy
 from tests.evolve.closed_form import leaves_a_policy, tiny
 from tests.evolve.conftest import Silent
 from tests.evolve.store.records import candidate

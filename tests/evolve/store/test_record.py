@@ -163,6 +163,6 @@ def test_a_line_is_on_the_disk_when_it_is_on_record_and_what_is_cut_off_is_gone_
     with record.open("ab") as file:
         file.write(b'{"half')
     again = Run.open(run.path)
-    again.record.cut_off_unfinished()
+    again.record.cut_off_unused()
     assert record.stat().st_size == whole
     assert sizes == [whole, whole]

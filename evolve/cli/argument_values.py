@@ -1,0 +1,24 @@
+"""Values of arguments: whole numbers within a range."""
+
+from __future__ import annotations
+
+import argparse
+
+__all__ = ["searches", "seed"]
+
+MOST_SEARCHES = 100_000  # as in evolve.report.gene_drift, whose import takes seconds
+LONGEST = 4000  # maximum number of digits; Python converts at most 4,300
+
+
+def seed(text: str) -> int:
+    """Return the seed in the text of an argument."""
+    if not text.isdecimal() or len(text) > LONGEST:
+        raise argparse.ArgumentTypeError(f"{text[:40]!r}: must be a whole number, 0 or more")
+    return int(text)
+
+
+def searches(text: str) -> int:
+    """Return the number of searches in the text of an argument. A p-value needs at least 2."""
+    if not text.isdecimal() or len(text) > LONGEST or not 2 <= int(text) <= MOST_SEARCHES:
+        raise argparse.ArgumentTypeError(f"{text[:40]!r}: must be a whole number from 2 to {MOST_SEARCHES:,}")
+    return int(text)
