@@ -14,14 +14,14 @@ from typing import Any
 
 from evolve.search.job import ExecutorError
 from evolve.search.scheduler import Scheduler, close
-from evolve.search.signs_of_life import SignsOfLife
+from evolve.search.signs_of_life import SCHEDULER, SignsOfLife
 
 __all__ = ["LISTEN_S", "Connection", "ConnectionLost"]
 
 CONNECT_S = 8.0
 LISTEN_S = 0.5  # interval between checks
 QUESTION_S = 5.0  # maximum interval between questions to the scheduler, whose answer lists all workers
-NOTICE_S = 10.0  # maximum silence before a note says for what the run waits
+NOTICE_S = 10.0  # maximum silence before a note states the missing sign of life
 Events = Callable[[Any], Any]
 
 
@@ -69,11 +69,11 @@ class Connection:
         Dask's client also reconnects, but gives up after seconds, so a new client replaces it.
         """
         while True:
+            self._pass_time(CONNECT_S + LISTEN_S)
             self.close()
             with contextlib.suppress(ExecutorError):
                 return self._open()
             time.sleep(LISTEN_S)
-            self._pass_time(CONNECT_S + LISTEN_S)
 
     def require_worker(self) -> None:
         """Wait until a worker is connected."""
@@ -158,15 +158,15 @@ class Connection:
         """
         before, self._checked = self._checked, time.monotonic()
         self.signs.wait(min(self._checked - before, longest))
-        silence, missing = self.signs.silence_s, self.signs.missing
-        if self.signs.exhausted:
-            raise ExecutorError(
-                f"{self.scheduler.address}: waited {self.patience_s:g} s for {missing}; all evaluated candidates are "
-                "on record: continue with evolve resume as soon as the cluster works again"
-            )
-        if not self._noted and silence >= min(NOTICE_S, self.patience_s / 4):
+        missing = SCHEDULER if self.lost else self.signs.missing
+        if not self._noted and (self.lost or self.signs.silence_s >= min(NOTICE_S, self.patience_s / 4)):
             self._noted = True
             self.note(
                 f"{self.scheduler.address}: waiting for {missing}; without a sign of life the run ends after "
                 f"{self.patience_s:g} s"
+            )
+        if self.signs.exhausted:
+            raise ExecutorError(
+                f"{self.scheduler.address}: waited {self.patience_s:g} s for {missing}; all evaluated candidates are "
+                "on record: continue with evolve resume as soon as the cluster works again"
             )

@@ -125,7 +125,7 @@ class Scheduler:
         # Dask's own time limit excludes the first messages, for which a stopped scheduler would let it wait forever.
         threading.Thread(target=connect, daemon=True).start()
         try:
-            client = opened.get(timeout=timeout)
+            client = opened.get(timeout=timeout + RETRY_S)
         except Empty:
             client = TimeoutError(f"no answer within {timeout:g} s")
         if not isinstance(client, Exception):

@@ -6,8 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-__all__ = ["SignsOfLife"]
+__all__ = ["SCHEDULER", "SignsOfLife"]
 
+SCHEDULER = "an answer of the scheduler"
 SHOWN = 3  # number of workers that a message names
 
 
@@ -76,7 +77,7 @@ class SignsOfLife:
     def missing(self) -> str:
         """Missing sign of life, as text."""
         if self._scheduler_s >= self._workers_s:
-            return "an answer of the scheduler"
+            return SCHEDULER
         if not self._silent_s:
             return "a worker (none is connected)"
         if silent := [address for address in self._silent_s if address not in self._paused]:

@@ -5,9 +5,11 @@ import signal
 import socket
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 from evolve.search.dask_executor import DaskExecutor
+from evolve.search.job import ExecutorError
 from evolve.search.scheduler import Scheduler
 
 ROOT = Path(__file__).parents[3]
@@ -61,6 +63,22 @@ class Cluster:
             for process in self.processes[kind]:
                 process.wait()
             self.processes[kind] = []
+
+    def heal(self, workers=2):
+        """Continue stopped processes, replace dead ones, and wait until all workers are connected."""
+        for kind, processes in self.processes.items():
+            self.processes[kind] = [process for process in processes if process.poll() is None]
+            self.signal(kind, signal.SIGCONT)
+        self.start(workers - len(self.processes["worker"]))
+        deadline = time.monotonic() + 120
+        while True:
+            try:
+                client = Scheduler(self.address, *self.files).client(60)
+                break
+            except ExecutorError:
+                assert time.monotonic() < deadline, "the scheduler does not answer"
+        client.wait_for_workers(workers, timeout=120)
+        client.close()
 
     def executor(self, function, patience_s=60.0, **options):
         scheduler = Scheduler(self.address, *self.files)
