@@ -127,6 +127,7 @@ class Connection:
             silence = f"worker {address} has given no sign of life for {self.patience_s:g} s"
             self.note(f"{self.scheduler.address}: {silence}; its candidates are evaluated by other workers")
             self.ask(partial(self.client.scheduler.unregister, address=address, stimulus_id=self.topic))
+            self.signs.forget(address)
 
     def close(self) -> None:
         if self._question is not None:

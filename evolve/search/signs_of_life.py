@@ -52,10 +52,15 @@ class SignsOfLife:
         alive = any(silence == 0.0 for address, silence in silent.items() if address not in self._paused)
         self._workers_s = 0.0 if alive else self._workers_s + passed
 
+    def forget(self, address: str) -> None:
+        """Forget a worker that has been removed; the next answer may still contain it."""
+        self._silent_s.pop(address, None)
+        self._last_seen.pop(address, None)
+
     @property
     def usable(self) -> int:
         """Number of connected workers that accept or evaluate candidates."""
-        return len(self._silent_s) - len(self._paused)
+        return len(self._silent_s.keys() - set(self._paused))
 
     @property
     def silence_s(self) -> float:

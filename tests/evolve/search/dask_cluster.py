@@ -69,6 +69,8 @@ class Cluster:
         for kind, processes in self.processes.items():
             self.processes[kind] = [process for process in processes if process.poll() is None]
             self.signal(kind, signal.SIGCONT)
+        if not self.processes["scheduler"]:
+            self.kill("worker")  # workers may end if their scheduler does
         self.start(workers - len(self.processes["worker"]))
         deadline = time.monotonic() + 120
         while True:

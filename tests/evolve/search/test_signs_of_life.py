@@ -42,6 +42,16 @@ def test_silence_begins_at_the_last_heartbeat_of_any_worker(seed):
         assert set(found.lost_workers) == (set() if shortest >= PATIENCE_S else lost)
 
 
+def test_a_worker_that_was_removed_is_not_lost_again():
+    found = signs(*({"a": worker(1), "b": worker(beat)} for beat in range(12)))
+    assert found.lost_workers == ("a",)
+    found.forget("a")
+    assert found.lost_workers == ()
+    found.wait(1.0)
+    found.answer({"a": worker(1), "b": worker(13)})
+    assert found.lost_workers == ()
+
+
 def test_a_training_may_take_longer_than_the_patience():
     found = signs(*({"a": worker(beat, executing=["job"])} for beat in range(100)))
     assert found.silence_s == 0.0

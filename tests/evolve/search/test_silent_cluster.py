@@ -105,6 +105,7 @@ def test_candidates_of_a_silent_worker_are_evaluated_by_another_one(tmp_path, cl
             found.append((job.id, outcome.failure))
             if len(found) == 1:
                 cluster.signal("worker", signal.SIGSTOP, count=1)
+    cluster.kill("worker")
     assert sorted(found) == [(number, None) for number in range(8)]
     assert ["has given no sign of life for 6 s; its candidates are evaluated by other" in note for note in notes] == [
         True
