@@ -20,6 +20,7 @@ SHARING = {
     "lives behind lenses": ("tests/experiments/test_sharp_lenses.py",),
     "a wheel": ("tests/rhabdom/test_wheel.py",),
     "a Dask cluster": ("tests/evolve/search/test_dask_executor.py",),
+    "a silent Dask cluster": ("tests/evolve/search/test_silent_cluster.py",),
     "animals that evolve in turn": ("tests/evolve/learning/test_animals_in_turn.py",),
     "tables and figures of a run": ("tests/evolve/interactive/test_opened_run.py",),
     "outputs before a change": ("tests/test_parameters.py",),

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import contextlib
-import time
 import uuid
 from collections import deque
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from queue import Empty, SimpleQueue
 from types import TracebackType
@@ -14,6 +13,7 @@ from typing import Any
 
 from evolve.config.assemble import to_toml
 from evolve.search import dask_worker
+from evolve.search.dask_connection import LISTEN_S, Connection, ConnectionLost
 from evolve.search.job import ATTEMPTS, ExecutorError, Job, Progress
 from evolve.search.scheduler import Scheduler
 from evolve.store.atomic_files import write_whole
@@ -21,9 +21,11 @@ from evolve.store.evaluation import Evaluation
 
 __all__ = ["DaskExecutor"]
 
-CONNECT_S = 8.0
-LISTEN_S = 0.5  # interval between progress updates
 REPLY_S = 10.0  # time limit for a worker to send its result
+
+
+def _ignore(note: str) -> None:
+    """Ignore a note."""
 
 
 @dataclass(frozen=True)
@@ -48,7 +50,9 @@ class DaskExecutor:
     scheduler: the scheduler, or its address
     function: "module:name" of the function that evaluates a candidate; it takes the arguments of
         `evolve.learning.fitness.evaluate`
-    patience_s: maximum time to wait for the first worker, and for an unreachable scheduler [s]
+    patience_s: maximum time without a sign of life of the scheduler, or of any worker [s]; a heartbeat is one, so an
+        evaluation may take longer
+    note: function that is called with one line if the run waits for a sign of life, or gives up a worker
     count: number of workers at the start
 
     Raises:
@@ -58,9 +62,10 @@ class DaskExecutor:
     scheduler: Scheduler | str
     function: str = "evolve.search.worker:evaluate_candidate"
     patience_s: float = 600.0
+    note: Callable[[str], Any] = _ignore
     count: int = 0
     _name: str = field(default_factory=lambda: f"rhabdom-{uuid.uuid4().hex[:12]}")
-    _client: Any = None
+    _connection: Any = None
     _told: SimpleQueue[list[int]] = field(default_factory=SimpleQueue)
 
     def __post_init__(self) -> None:
@@ -69,20 +74,19 @@ class DaskExecutor:
         self._scheduler, self._address = self.scheduler, self.scheduler.address
 
     def __enter__(self) -> DaskExecutor:
-        self._client = self._connected(min(CONNECT_S, self.patience_s))
+        self._connection = Connection(self._scheduler, self.patience_s, self.note, self._name, self._told.put)
         try:
-            self._client.wait_for_workers(1, timeout=self.patience_s)
-        except TimeoutError:
-            self._client.close()
-            raise ExecutorError(f"{self._address}: no worker has connected within {self.patience_s:g} s") from None
-        self.count = len(self._client.scheduler_info(n_workers=-1)["workers"])
+            self._connection.require_worker()
+        except BaseException:
+            self._connection.close()
+            raise
+        self.count = self._connection.signs.usable
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        with contextlib.suppress(Exception):  # closing fails if the connection is already lost
-            self._client.close()
+        self._connection.close()
 
     def run(self, jobs: Iterable[Job], progress: Progress | None = None) -> Iterator[tuple[Job, Evaluation]]:
         """Evaluate all jobs, and yield each with its outcome as soon as it is complete.
@@ -97,26 +101,34 @@ class DaskExecutor:
         under_way: dict[Any, _Trial] = {}
         try:
             while waiting or under_way:
-                if self._client.status != "running":
-                    self._reconnect()
+                if self._connection.lost:
+                    self._connection.restore()
                     waiting.extendleft(trial.job for trial in reversed(under_way.values()))
                     under_way.clear()
-                while waiting:
-                    trial = self._trial(waiting.popleft())
-                    under_way[self._submit(trial)] = trial
-                for future in self._done(under_way):
-                    trial = under_way.pop(future)
-                    if future.status in ("cancelled", "lost"):
-                        waiting.append(trial.job)
-                    elif self._died_too_few_times(trial, future):
-                        under_way[self._submit(trial)] = trial
-                    elif (outcome := self._outcome(trial, future)) is not None:
-                        yield trial.job, outcome
-                    else:
-                        under_way[future] = trial
+                with contextlib.suppress(ConnectionLost):
+                    yield from self._round(waiting, under_way)
                 self._tell(progress)
         finally:
             self._withdraw(under_way)
+
+    def _round(self, waiting: deque[Job], under_way: dict[Any, _Trial]) -> Iterator[tuple[Job, Evaluation]]:
+        """Submit all waiting jobs, and yield the jobs that are complete."""
+        while waiting:
+            trial = self._trial(waiting[0])
+            under_way[self._submit(trial)] = trial
+            waiting.popleft()
+        for future in self._done(under_way):
+            trial = under_way[future]
+            if future.status in ("cancelled", "lost"):
+                waiting.append(under_way.pop(future).job)
+            elif self._died_too_few_times(trial, future):
+                under_way[self._submit(trial)] = trial
+                del under_way[future]
+            elif (outcome := self._outcome(trial, future)) is not None:
+                del under_way[future]
+                yield trial.job, outcome
+        self._connection.check()
+        self._connection.remove_lost_workers()
 
     def _trial(self, job: Job) -> _Trial:
         """Return a job with a new counter of its attempts.
@@ -126,20 +138,30 @@ class DaskExecutor:
         from distributed import Variable
 
         name = f"{self._name}-{job.id}-{uuid.uuid4().hex[:6]}"
-        counter = Variable(name, client=self._client)
-        counter.set(0)
+        counter = Variable(name, client=self._connection.client)
+        self._connection.ask(lambda: counter.set(0))
         return _Trial(job, counter, dask_worker.encode(job, to_toml(job.config), self.function, name, self._name))
 
     def _submit(self, trial: _Trial) -> Any:
         key = f"{trial.order.counter}-{uuid.uuid4().hex[:6]}"
-        return self._client.submit(dask_worker.evaluate, trial.order, key=key, pure=False, retries=0)
+        try:
+            return self._connection.client.submit(dask_worker.evaluate, trial.order, key=key, pure=False, retries=0)
+        except Exception:
+            if self._connection.lost:
+                raise ConnectionLost from None
+            raise
 
     def _died_too_few_times(self, trial: _Trial, future: Any) -> bool:
         """Return whether the scheduler gave up a job because its workers died, although attempts remain."""
         from distributed import KilledWorker
 
-        killed = future.status == "error" and isinstance(future.exception(), KilledWorker)
-        return killed and int(trial.counter.get()) < ATTEMPTS
+        if future.status != "error" or not isinstance(future.exception(), KilledWorker):
+            return False
+        try:
+            return int(self._connection.ask(lambda: trial.counter.get(timeout=REPLY_S))) < ATTEMPTS
+        except TimeoutError:  # a scheduler that was restarted has no counter
+            self._connection.ask(lambda: trial.counter.set(0))
+            return True
 
     def _done(self, under_way: dict[Any, _Trial]) -> list[Any]:
         """Wait up to LISTEN_S for a first result, and return all futures that are no longer pending."""
@@ -164,12 +186,14 @@ class DaskExecutor:
                 raise ExecutorError(f"{self._address}: {error}")
             return Evaluation.failed(f"{type(error).__name__}: {error}")
         try:
-            outcome, policy, checkpoint = dask_worker.decode(future.result(timeout=REPLY_S))
-        except TimeoutError:
+            reply = self._connection.ask(future.result, REPLY_S)
+        except (TimeoutError, KilledWorker):
             return None
+        outcome, policy, checkpoint = dask_worker.decode(reply)
         # If the worker that stores a result dies, Dask repeats the evaluation, unless the result has been released.
-        future.release()
-        trial.counter.delete()
+        with contextlib.suppress(Exception):  # a lost connection releases both
+            future.release()
+            trial.counter.delete()
         if policy:
             write_whole(trial.job.policy_path, policy)
         if checkpoint and trial.job.rung is not None:
@@ -183,33 +207,7 @@ class DaskExecutor:
                 if progress is not None:
                     progress(*report)
 
-    def _connected(self, timeout: float) -> Any:
-        security = self._scheduler.security()
-        from distributed import Client
-
-        try:
-            client = Client(self._address, timeout=timeout, security=security, set_as_default=False)
-        except (OSError, TimeoutError, ValueError) as error:
-            reason = (str(error) or type(error).__name__).splitlines()[0]
-            raise ExecutorError(f"no Dask scheduler answers at {self._address}: {reason}") from None
-        client.subscribe_topic(self._name, lambda event: self._told.put(event[1]))
-        return client
-
-    def _reconnect(self) -> None:
-        """Wait until the scheduler can be reached again, for at most `patience_s`."""
-        deadline = time.monotonic() + self.patience_s
-        while self._client.status != "running":
-            if self._client.status == "connecting":  # Dask's client is already trying to reconnect
-                time.sleep(LISTEN_S)
-            else:
-                try:
-                    self._client = self._connected(min(CONNECT_S, self.patience_s))
-                except ExecutorError:
-                    time.sleep(LISTEN_S)
-            if time.monotonic() > deadline:
-                raise ExecutorError(f"{self._address}: the scheduler has been unreachable for {self.patience_s:g} s")
-
     def _withdraw(self, under_way: dict[Any, _Trial]) -> None:
         """Cancel unfinished jobs; a worker stops its evaluation at its next progress report."""
         with contextlib.suppress(Exception):  # an unreachable scheduler has no jobs to cancel
-            self._client.cancel(list(under_way), force=True)
+            self._connection.client.cancel(list(under_way), force=True)

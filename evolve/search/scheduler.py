@@ -2,22 +2,28 @@
 
 from __future__ import annotations
 
+import contextlib
+import logging
 import re
 import socket
 import ssl
+import threading
 import time
+from asyncio import CancelledError
 from dataclasses import dataclass
 from pathlib import Path
+from queue import Empty, SimpleQueue
 from typing import Any
 
 from evolve.config.checks import ConfigError
 from evolve.search.job import ExecutorError
 
-__all__ = ["Scheduler"]
+__all__ = ["Scheduler", "close"]
 
 ADDRESS = re.compile(r"(?:(?P<protocol>tcp|tls)://)?(?P<host>\[[0-9A-Fa-f:.%\w]+\]|[^\s:/\[\]]+):(?P<port>\d{1,5})")
 ANSWER_S = 5.0  # time limit for an answer, enough for a scheduler that is just starting
 RETRY_S = 0.25  # interval between attempts to connect
+CLOSE_S = 2.0  # time limit for closing a connection, which a silent scheduler does not confirm
 
 
 @dataclass(frozen=True)
@@ -72,7 +78,7 @@ class Scheduler:
             ) from None
 
     def require_answer(self) -> None:
-        """Check that the scheduler answers, before a run starts.
+        """Check that the scheduler answers, with these certificates, before a run starts.
 
         Raises:
             ConfigError: the address requires certificates, but there are none.
@@ -86,13 +92,57 @@ class Scheduler:
         while True:
             try:
                 socket.create_connection((host, port), timeout=max(RETRY_S, deadline - time.monotonic())).close()
-                return
+                break
             except (OSError, UnicodeError) as error:
                 unknown = isinstance(error, socket.gaierror | UnicodeError)
                 if unknown or time.monotonic() + RETRY_S > deadline:
                     reason = "there is no such host" if unknown else error
                     raise ExecutorError(f"no Dask scheduler answers at {self.address}: {reason}") from None
             time.sleep(RETRY_S)
+        close(self.client(ANSWER_S))
+
+    def client(self, timeout: float) -> Any:
+        """Return a Dask client that is connected to the scheduler.
+
+        timeout: maximum time for the connection [s]
+
+        Raises:
+            ConfigError: see `security`
+            ExecutorError: the scheduler does not answer, or Dask is not installed.
+        """
+        security = self.security()
+        from distributed import Client
+
+        _silence_dask()
+        opened: SimpleQueue[Any] = SimpleQueue()
+
+        def connect() -> None:
+            try:
+                opened.put(Client(self.address, timeout=timeout, security=security, set_as_default=False))
+            except Exception as error:
+                opened.put(error)
+
+        # Dask's own time limit excludes the first messages, for which a stopped scheduler would let it wait forever.
+        threading.Thread(target=connect, daemon=True).start()
+        try:
+            client = opened.get(timeout=timeout + RETRY_S)
+        except Empty:
+            client = TimeoutError(f"no answer within {timeout:g} s")
+        if not isinstance(client, Exception):
+            return client
+        if not isinstance(client, OSError | ValueError):
+            raise client
+        raise ExecutorError(f"no Dask scheduler answers at {self.address}: {self._reason(client)}") from None
+
+    def _reason(self, error: Exception) -> str:
+        """Return the reason of a failed connection in one line, with the remedy if encryption is the cause."""
+        from distributed.comm.core import CommClosedError
+
+        if not isinstance(error, CommClosedError):
+            return (str(error) or type(error).__name__).splitlines()[0]
+        if self.encrypted:
+            return "the TLS handshake failed; the scheduler must use TLS, and its certificates must match these files"
+        return "it closed the connection; if it uses TLS, the address must begin with tls://"
 
     def security(self) -> Any:
         """Return Dask's `Security` with the certificates of this object; None if Dask's own settings apply.
@@ -115,3 +165,16 @@ class Scheduler:
                 f"--scheduler {self.address}: needs certificates: --tls-ca-file, --tls-cert and --tls-key"
             )
         return None
+
+
+def close(client: Any) -> None:
+    """Close a Dask client. Errors are ignored, because closing fails if the connection is already lost."""
+    with contextlib.suppress(Exception, CancelledError):
+        client.close(timeout=CLOSE_S)
+
+
+def _silence_dask() -> None:
+    """Suppress log messages of Dask in this process. They have tracebacks, and rhabdom reports lost connections."""
+    for name in ("distributed", "tornado", "asyncio", *logging.root.manager.loggerDict):
+        if name.split(".")[0] in ("distributed", "tornado", "asyncio"):
+            logging.getLogger(name).setLevel(logging.CRITICAL + 1)

@@ -36,6 +36,12 @@ def slow(phenotype, config, seed, policy_path, progress):
     return bowl(phenotype, config, seed, policy_path, progress)
 
 
+def long(phenotype, config, seed, policy_path, progress):
+    """Evaluate like `bowl`, but for 15 s without a progress report."""
+    time.sleep(15.0)
+    return bowl(phenotype, config, seed, policy_path, progress)
+
+
 def endless(phenotype, config, seed, policy_path, progress):
     """Run for half a minute and report progress."""
     for step in range(300):

@@ -117,7 +117,7 @@ def _carry_on(run: Run, arguments: Namespace, scheduler: Scheduler | None) -> in
     """
     shown = _Shown(arguments)
     try:
-        carry_on(run, shown.watched, _workers(scheduler))
+        carry_on(run, shown.watched, _workers(scheduler, _silence if arguments.quiet else _note))
     except KeyboardInterrupt:
         own = f" --task {arguments.task}" if run.config.code is not None else ""
         print(
@@ -153,9 +153,11 @@ def _watcher(run: Run, workers: int, arguments: Namespace) -> Bar | Events | Lin
     return watcher(run, sys.stdout if arguments.json else sys.stderr, workers, arguments.json)
 
 
-def _workers(scheduler: Scheduler | None) -> Callable[[RunConfig], AbstractContextManager[Workers]]:
+def _workers(
+    scheduler: Scheduler | None, note: Callable[[str], None]
+) -> Callable[[RunConfig], AbstractContextManager[Workers]]:
     """Return a function that starts the workers: Dask's if there is a scheduler, else local processes."""
-    return local_workers if scheduler is None else lambda config: DaskExecutor(scheduler)
+    return local_workers if scheduler is None else lambda config: DaskExecutor(scheduler, note=note)
 
 
 def _scheduler(arguments: Namespace) -> Scheduler | None:

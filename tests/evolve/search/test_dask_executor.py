@@ -2,15 +2,8 @@
 die.
 """
 
-import os
-import signal
-import socket
-import subprocess
-import sys
 import time
 from collections import deque
-from pathlib import Path
-from types import SimpleNamespace
 
 import pytest
 
@@ -25,62 +18,12 @@ from evolve.store.directory import Run
 from evolve.store.versions import present
 from tests.evolve.closed_form import tiny
 from tests.evolve.remote_form import bowl, in_stages
+from tests.evolve.search.dask_cluster import Cluster
 from tests.evolve.search.test_local_executor import jobs
 from tests.evolve.search.test_loop import SilentWatcher, history
 from tests.evolve.search.test_scheduler import certificates
 
 pytest.importorskip("distributed")
-ROOT = Path(__file__).parents[3]
-
-
-class Cluster:
-    """Processes of a scheduler and its workers; `tls` is a certificate and its key, required for all connections."""
-
-    def __init__(self, folder, tls=()):
-        self.folder, self.protocol = folder, "tls" if tls else "tcp"
-        self.files = (tls[0], *tls) if tls else ()
-        self.flags = [
-            x for pair in zip(("--tls-ca-file", "--tls-cert", "--tls-key"), self.files, strict=False) for x in pair
-        ]
-        with socket.socket() as free:
-            free.bind(("127.0.0.1", 0))
-            self.address = f"{self.protocol}://127.0.0.1:{free.getsockname()[1]}"
-        self.processes = []
-        self.environment = {**os.environ, "PYTHONPATH": str(ROOT), "RHABDOM_TEST": str(folder)}
-
-    def start(self, workers=2):
-        port = self.address.rpartition(":")[2]
-        own = ("--protocol", self.protocol, "--host", "127.0.0.1", "--port", port, "--dashboard-address", ":0")
-        self._run("scheduler", *own)
-        for _ in range(workers):
-            self._run("worker", self.address, "--nthreads", "1", "--dashboard-address", ":0", "--death-timeout", "60")
-
-    def _run(self, *arguments):
-        command = [sys.executable, "-m", "dask", *arguments, *self.flags]
-        log = (self.folder / f"{arguments[0]}.log").open("a")
-        self.processes.append(
-            subprocess.Popen(
-                command, cwd=self.folder, env=self.environment, stdout=log, stderr=log, start_new_session=True
-            )
-        )
-        log.close()
-
-    def kill(self):
-        """Kill all processes at once, including nannies and their workers."""
-        for process in self.processes:
-            os.killpg(process.pid, signal.SIGKILL)
-            process.wait()
-        self.processes = []
-
-    def executor(self, function):
-        return DaskExecutor(Scheduler(self.address, *self.files), f"tests.evolve.remote_form:{function}", patience_s=60)
-
-    def calls(self):
-        """Return the number of starts of each candidate since the last call."""
-        log = self.folder / "calls.log"
-        names = [int(line.split()[0]) for line in log.read_text().splitlines()] if log.exists() else []
-        log.unlink(missing_ok=True)
-        return {name: names.count(name) for name in names}
 
 
 @pytest.fixture(autouse=True)
@@ -295,12 +238,3 @@ def test_behind_certificates_the_history_is_the_same_and_strangers_stay_outside(
         cluster.kill()
     local, _ = carried(tmp_path / "local", config, LocalExecutor(bowl, 1))
     assert history(far) == history(local)
-
-
-@pytest.mark.slow
-def test_a_scheduler_that_is_gone_for_good_ends_the_run(tmp_path):
-    """A closed connection is opened again until the patience is exhausted."""
-    executor = DaskExecutor("tcp://127.0.0.1:9", patience_s=0.5)
-    executor._client = SimpleNamespace(status="closed")
-    with pytest.raises(ExecutorError, match=r"the scheduler has been unreachable for 0\.5 s"):
-        list(executor.run(jobs(tmp_path, 1)))

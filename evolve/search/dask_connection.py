@@ -1,0 +1,173 @@
+"""Connection to a Dask scheduler. No call waits for longer than the patience without a sign of life."""
+
+from __future__ import annotations
+
+import asyncio
+import concurrent.futures
+import contextlib
+import math
+import time
+from collections.abc import Awaitable, Callable
+from dataclasses import dataclass, field
+from functools import partial
+from typing import Any
+
+from evolve.search.job import ExecutorError
+from evolve.search.scheduler import Scheduler, close
+from evolve.search.signs_of_life import SCHEDULER, SignsOfLife
+
+__all__ = ["LISTEN_S", "Connection", "ConnectionLost"]
+
+CONNECT_S = 8.0
+LISTEN_S = 0.5  # interval between checks
+QUESTION_S = 5.0  # maximum interval between questions to the scheduler, whose answer lists all workers
+NOTICE_S = 10.0  # maximum silence before a note states the missing sign of life
+Events = Callable[[Any], Any]
+
+
+class ConnectionLost(Exception):
+    """The scheduler has not answered a call, because the connection was lost."""
+
+
+@dataclass
+class Connection:
+    """Connection to a scheduler, which is asked regularly which workers are alive.
+
+    patience_s: maximum time without a sign of life of the scheduler, or of any worker [s]
+    note: function that is called with one line if the run waits for a sign of life
+    topic, events: Dask topic to subscribe to, and the function that receives its events
+
+    Raises:
+        ExecutorError: the scheduler does not answer, or Dask is not installed. All methods raise it if the patience is
+            exhausted.
+    """
+
+    scheduler: Scheduler
+    patience_s: float
+    note: Callable[[str], Any]
+    topic: str
+    events: Events
+    client: Any = None
+    signs: SignsOfLife = field(init=False)
+    _question: concurrent.futures.Future[Any] | None = None
+    _asked: float = -math.inf
+    _checked: float = 0.0
+    _noted: bool = False
+
+    def __post_init__(self) -> None:
+        self.signs = SignsOfLife(self.patience_s, 2 * self._interval + LISTEN_S)
+        self._open()
+        self._checked = time.monotonic()
+
+    @property
+    def lost(self) -> bool:
+        return bool(self.client.status != "running")
+
+    def restore(self) -> None:
+        """Connect again, which is attempted until the patience is exhausted.
+
+        Dask's client also reconnects, but gives up after seconds, so a new client replaces it.
+        """
+        while True:
+            self._pass_time(CONNECT_S + LISTEN_S)
+            self.close()
+            with contextlib.suppress(ExecutorError):
+                return self._open()
+            time.sleep(LISTEN_S)
+
+    def require_worker(self) -> None:
+        """Wait until a worker is connected."""
+        while not self.signs.usable:
+            self.check()
+            if self.lost:
+                self.restore()
+            time.sleep(LISTEN_S / 10)
+
+    def check(self) -> None:
+        """Take signs of life into account that have arrived since the last check, and ask for new ones."""
+        if self._question is not None and self._question.done():
+            question, self._question = self._question, None
+            if not question.cancelled() and question.exception() is None:
+                self.signs.answer(question.result()["workers"])
+                self._noted = self._noted and self.signs.silence_s > 0
+        if self._question is None and not self.lost and time.monotonic() - self._asked >= self._interval:
+            self._asked = time.monotonic()
+            self._question = self._start(lambda: self.client.scheduler.identity(n_workers=-1))
+        self._pass_time(2 * LISTEN_S)
+
+    def ask(self, call: Callable[[], Awaitable[Any]], timeout: float = math.inf) -> Any:
+        """Return the result of a call of Dask, which may take as long as there are signs of life.
+
+        Raises:
+            ConnectionLost: the connection was lost during the call.
+            TimeoutError: the call has taken longer than `timeout` seconds.
+        """
+        from distributed.client import ClosedClientError
+
+        deadline = time.monotonic() + timeout
+        answer = self._start(call)
+        try:
+            while not concurrent.futures.wait([answer], timeout=LISTEN_S).done:
+                self.check()
+                if self.lost:
+                    raise ConnectionLost
+                if time.monotonic() > deadline:
+                    raise TimeoutError
+            return answer.result()
+        except TimeoutError:
+            raise
+        except (OSError, concurrent.futures.CancelledError, asyncio.CancelledError, ClosedClientError):
+            raise ConnectionLost from None
+        finally:
+            answer.cancel()
+
+    def remove_lost_workers(self) -> None:
+        """Remove workers that have been silent for too long from the scheduler, which reassigns their candidates."""
+        for address in self.signs.lost_workers:
+            silence = f"worker {address} has given no sign of life for {self.patience_s:g} s"
+            self.note(f"{self.scheduler.address}: {silence}; its candidates are evaluated by other workers")
+            self.ask(partial(self.client.scheduler.unregister, address=address, stimulus_id=self.topic))
+            self.signs.forget(address)
+
+    def close(self) -> None:
+        if self._question is not None:
+            self._question.cancel()
+            self._question = None
+        close(self.client)
+
+    @property
+    def _interval(self) -> float:
+        return min(QUESTION_S, self.patience_s / 10)
+
+    def _open(self) -> None:
+        self.client = self.scheduler.client(min(CONNECT_S, self.patience_s))
+        self.client.subscribe_topic(self.topic, lambda event: self.events(event[1]))
+        self._asked = -math.inf
+
+    def _start(self, call: Callable[[], Awaitable[Any]]) -> concurrent.futures.Future[Any]:
+        """Start a call in the thread of Dask's client."""
+
+        async def awaited() -> Any:
+            return await call()
+
+        return asyncio.run_coroutine_threadsafe(awaited(), self.client.loop.asyncio_loop)
+
+    def _pass_time(self, longest: float) -> None:
+        """Add the time since the last check, note a long silence, and raise an error at the end of the patience.
+
+        longest: limit of the time that is added; this process may have been stopped meanwhile [s]
+        """
+        before, self._checked = self._checked, time.monotonic()
+        self.signs.wait(min(self._checked - before, longest))
+        missing = SCHEDULER if self.lost else self.signs.missing
+        if not self._noted and (self.lost or self.signs.silence_s >= min(NOTICE_S, self.patience_s / 4)):
+            self._noted = True
+            self.note(
+                f"{self.scheduler.address}: waiting for {missing}; without a sign of life the run ends after "
+                f"{self.patience_s:g} s"
+            )
+        if self.signs.exhausted:
+            raise ExecutorError(
+                f"{self.scheduler.address}: waited {self.patience_s:g} s for {missing}; all evaluated candidates are "
+                "on record: continue with evolve resume as soon as the cluster works again"
+            )

@@ -1,0 +1,100 @@
+"""Record of the signs of life of a Dask scheduler and its workers, and of the time that has passed without them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+__all__ = ["SCHEDULER", "SignsOfLife"]
+
+SCHEDULER = "an answer of the scheduler"
+SHOWN = 3  # number of workers that a message names
+
+
+@dataclass
+class SignsOfLife:
+    """Time without signs of life of a scheduler and its workers.
+
+    An answer is a sign of life of the scheduler, and a heartbeat is one of a worker. Heartbeats continue during a
+    training, so a training may take longer than the patience.
+
+    patience_s: maximum time without a sign of life [s]
+    regular_s: maximum time between two answers of a scheduler that is alive [s]; if it was silent for longer, the
+        workers are not blamed for the difference
+    """
+
+    patience_s: float
+    regular_s: float
+    _scheduler_s: float = 0.0
+    _workers_s: float = 0.0
+    _last_seen: dict[str, float] = field(default_factory=dict)
+    _silent_s: dict[str, float] = field(default_factory=dict)
+    _paused: tuple[str, ...] = ()
+
+    def wait(self, seconds: float) -> None:
+        """Add time that has passed without an answer of the scheduler."""
+        self._scheduler_s += seconds
+
+    def answer(self, workers: Mapping[str, Mapping[str, Any]]) -> None:
+        """Take an answer of the scheduler into account.
+
+        workers: address and description of each connected worker, as in the scheduler's `identity`
+        """
+        passed, self._scheduler_s = min(self._scheduler_s, self.regular_s), 0.0
+        silent = {}
+        for address, worker in workers.items():
+            beats = worker["last_seen"] != self._last_seen.get(address)
+            silent[address] = 0.0 if beats else self._silent_s[address] + passed
+        self._silent_s = silent
+        self._last_seen = {address: worker["last_seen"] for address, worker in workers.items()}
+        self._paused = tuple(address for address, worker in workers.items() if not _usable(worker))
+        alive = any(silence == 0.0 for address, silence in silent.items() if address not in self._paused)
+        self._workers_s = 0.0 if alive else self._workers_s + passed
+
+    def forget(self, address: str) -> None:
+        """Forget a worker that has been removed; the next answer may still contain it."""
+        self._silent_s.pop(address, None)
+        self._last_seen.pop(address, None)
+
+    @property
+    def usable(self) -> int:
+        """Number of connected workers that accept or evaluate candidates."""
+        return len(self._silent_s.keys() - set(self._paused))
+
+    @property
+    def silence_s(self) -> float:
+        """Time since the last sign of life of the scheduler, or of any worker if the scheduler answers [s]."""
+        return max(self._scheduler_s, self._workers_s)
+
+    @property
+    def exhausted(self) -> bool:
+        return self.silence_s >= self.patience_s
+
+    @property
+    def lost_workers(self) -> tuple[str, ...]:
+        """Addresses of workers that have been silent for longer than the patience, while others are alive."""
+        if self._workers_s >= self.patience_s:
+            return ()
+        return tuple(address for address, silence in self._silent_s.items() if silence >= self.patience_s)
+
+    @property
+    def missing(self) -> str:
+        """Missing sign of life, as text."""
+        if self._scheduler_s >= self._workers_s:
+            return SCHEDULER
+        if not self._silent_s:
+            return "a worker (none is connected)"
+        if silent := [address for address in self._silent_s if address not in self._paused]:
+            return f"a heartbeat of {_named(silent)}"
+        return f"a worker that accepts candidates ({_named(list(self._paused))} paused, usually for lack of memory)"
+
+
+def _usable(worker: Mapping[str, Any]) -> bool:
+    """Return whether a worker accepts candidates, or evaluates one."""
+    return worker["status"] == "running" or bool(worker.get("metrics", {}).get("executing"))
+
+
+def _named(addresses: list[str]) -> str:
+    more = f" and {len(addresses) - SHOWN} more" if len(addresses) > SHOWN else ""
+    return f"worker{'s' * (len(addresses) > 1)} {', '.join(addresses[:SHOWN])}{more}"
