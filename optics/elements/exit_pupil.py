@@ -11,6 +11,7 @@ from optics.elements.pupil import Pupil
 from optics.elements.wavefront import Zernike, mode
 from optics.numerics.arguments import complexes, is_sized, positive, shown, vacuum_wavelength, whole
 from optics.numerics.grid import sample_positions
+from optics.numerics.number_types import full_precision
 
 __all__ = ["ExitPupil", "read_exit_pupil"]
 
@@ -210,6 +211,7 @@ def _fitted(x: np.ndarray, y: np.ndarray, ahead: np.ndarray, distance: float, me
 
 def _flat(name: str, values: Any) -> np.ndarray:
     """Convert a NumPy array, or a tensor that can become one, to a flat float64 array."""
+    values = full_precision(name, values)
     plain = values.detach().cpu().numpy() if hasattr(values, "detach") else values
     try:
         return np.atleast_1d(np.asarray(plain, dtype=np.float64)).ravel()

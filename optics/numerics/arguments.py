@@ -6,7 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from optics.numerics.autodiff import is_differentiable, number
+from optics.numerics.autodiff import is_differentiable, number, plain
+from optics.numerics.number_types import as_array, full_precision
 
 __all__ = [
     "close_match",
@@ -19,6 +20,7 @@ __all__ = [
     "items",
     "of_kind",
     "one_of",
+    "plain_reals",
     "point_2d",
     "positive",
     "radiance_cube",
@@ -196,24 +198,21 @@ def point_2d(name: str, value: Any, what: str = "lengths (x, y) [m]") -> tuple[f
 
 def reals(name: str, values: Any) -> np.ndarray:
     """Return `values` as a float64 array of any shape; ValueError unless they are real numbers without derivatives."""
-    without_derivative(name, values)
-    try:
-        given = np.asarray(values)
-    except (TypeError, ValueError):
-        given = np.asarray(None)
+    given = as_array(name, without_derivative(name, values))
     if given.dtype.kind not in "biuf":
         kind = "complex ones" if given.dtype.kind == "c" else shown(values)
         raise ValueError(f"{name}: must be real numbers, not {kind}")
     return given.astype(np.float64)
 
 
+def plain_reals(name: str, values: Any) -> np.ndarray:
+    """Return `values` as a float64 array of any shape, without the derivatives that arrays of Dr.Jit may carry."""
+    return plain(full_precision(name, values)) if is_differentiable(values) else reals(name, values)
+
+
 def complexes(name: str, values: Any) -> np.ndarray:
     """Return `values` as an array of any shape; ValueError unless they are numbers without derivatives."""
-    without_derivative(name, values)
-    try:
-        given = np.asarray(values)
-    except (TypeError, ValueError):
-        given = np.asarray(None)
+    given = as_array(name, without_derivative(name, values))
     if given.dtype.kind not in "biufc":
         raise ValueError(f"{name}: must be numbers, not {shown(values)}")
     return given
@@ -283,6 +282,7 @@ def _number(name: str, value: Any, carried: bool = False) -> float:
     # Derivatives of PyTorch would be lost even if those of Dr.Jit are propagated.
     if not carried or getattr(value, "requires_grad", False):
         without_derivative(name, value)
+    value = full_precision(name, value)
     try:
         if isinstance(value, (str, bytes)):
             raise TypeError

@@ -9,7 +9,7 @@ from functools import cached_property
 
 import numpy as np
 
-from optics.numerics.arguments import finite, in_range, of_kind, positive, shown, vacuum_wavelength, whole
+from optics.numerics.arguments import finite, in_range, of_kind, positive, reals, shown, vacuum_wavelength, whole
 from optics.numerics.read_only import read_only
 from optics.ommatidia.ommatidium import Ommatidium
 
@@ -87,7 +87,7 @@ class AppositionEye:
             raise ValueError(f"radiance = {shown(radiance)}: must be a function of angles x and y [rad]")
         x, y, weights = self.field(wavelength)
         own = self.directions
-        scene = np.asarray(radiance(own[:, :1] + x, own[:, 1:] + y), dtype=np.float64)
+        scene = reals("radiance", radiance(own[:, :1] + x, own[:, 1:] + y))
         if scene.shape != (len(own), len(x)) or not np.isfinite(scene).all():
             raise ValueError(f"radiance gives shape {scene.shape}: must be finite, of its angles' shape")
         found: np.ndarray = scene @ weights

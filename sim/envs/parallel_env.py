@@ -10,6 +10,7 @@ from gymnasium import spaces
 from pettingzoo import ParallelEnv
 
 from optics.numerics.arguments import did_you_mean
+from optics.numerics.number_types import resolved
 from sim.envs.animals import Animals
 from sim.envs.follow_camera import RENDER_MODES
 from sim.envs.prepared_task import PreparedTask
@@ -135,7 +136,7 @@ class EncounterEnv(ParallelEnv[str, dict[str, np.ndarray], np.ndarray]):
         for name in self.agents:
             if name not in actions:
                 raise ValueError(f"actions: {name!r} has none: must have one for each of {', '.join(self.agents)}")
-            action, shape = np.asarray(actions[name], np.float32), self.action_spaces[name].shape
+            action, shape = np.asarray(resolved(actions[name]), np.float32), self.action_spaces[name].shape
             if action.shape != shape:
                 raise ValueError(f"actions: {name!r} has shape {action.shape}: must be {shape}")
             found.append(action[None])

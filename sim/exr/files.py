@@ -25,6 +25,7 @@ from typing import Any
 import numpy as np
 
 from optics.numerics.arguments import items, reals, shown
+from optics.numerics.number_types import full_precision
 from sim.exr.previews import preview_of_receptors, preview_of_spectra
 from sim.exr.spectral_layout import PREVIEW, RADIANCE, REFLECTANCE, NoSpectra, channel, fields_of_views
 
@@ -73,9 +74,10 @@ class View:
             raise ValueError(f"{where}: its name must be printable text, and not empty")
         if self.spectral is None and self.receptors is None:
             raise ValueError(f"{where}: has neither radiance nor receptors, and no reflectance")
-        for label in ("radiance", "reflectance", "receptors"):
-            image = getattr(self, label)
-            if image is not None and (len(_shape(image)) != 3 or 0 in image.shape):
+        for label in ("radiance", "reflectance", "receptors", "rgb"):
+            image = full_precision(f"{where}: {label}", getattr(self, label))
+            object.__setattr__(self, label, image)
+            if label != "rgb" and image is not None and (len(_shape(image)) != 3 or 0 in image.shape):
                 raise ValueError(f"{where}: {label} {_kind(image)}: must be an array (band, y, x)")
         wavelengths = reals(f"{where}: wavelengths_nm", self.wavelengths_nm)
         if wavelengths.ndim != 1 or not np.all(np.isfinite(wavelengths)):

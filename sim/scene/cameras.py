@@ -13,6 +13,7 @@ import mitsuba as mi
 import mujoco
 import numpy as np
 
+from optics.numerics.arguments import reals
 from sim.scene.pose_snapshot import PoseSnapshot
 from sim.scene.variant import MitsubaObject
 
@@ -33,12 +34,13 @@ class Viewpoint:
     @staticmethod
     def looking_at(origin: np.ndarray, target: np.ndarray, fovy_deg: float = 45.0) -> Viewpoint:
         """Return a viewpoint at `origin` that looks at `target` [m], with z up (y up if the direction is vertical)."""
-        back = np.asarray(origin, float) - np.asarray(target, float)
+        origin, target = reals("origin", origin), reals("target", target)
+        back = origin - target
         back /= np.linalg.norm(back)
         right = np.cross([0, 1.0, 0] if abs(back[2]) > 1 - 1e-9 else [0, 0, 1.0], back)
         right /= np.linalg.norm(right)
         rotation = np.column_stack([right, np.cross(back, right), back])
-        return Viewpoint(np.asarray(origin, float), rotation, fovy_deg)
+        return Viewpoint(origin, rotation, fovy_deg)
 
     def rays(self, width: int, height: int) -> np.ndarray:
         """Return directions through the centres of the pixels, of unit depth along the axis, (y, x, 3)."""

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from optics.numerics.number_types import resolved
 from sim.tasks.outcome import Outcome
 
 __all__ = ["columns", "mapping", "not_finite", "require_outcome", "rows"]
@@ -91,6 +92,6 @@ def require_outcome(outcome: Outcome, n: int, learners: int) -> None:
 
 def _array(where: str, returned: Any, kind: Any) -> np.ndarray:
     try:
-        return np.asarray(returned, kind)
+        return np.asarray(resolved(returned), kind)
     except (TypeError, ValueError) as error:
         raise ValueError(f"{where} returned {returned!r:.80}: must be an array of numbers") from error

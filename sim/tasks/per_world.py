@@ -12,6 +12,7 @@ from typing import Self
 import mujoco
 import numpy as np
 
+from optics.numerics.number_types import resolved
 from sim.physics.mujoco_worlds import MujocoWorlds
 from sim.physics.physics import Physics
 from sim.scene.variation import Variation
@@ -163,7 +164,7 @@ class PerWorld(BatchTask):
         """
         found = []
         for number, (animal, whose) in enumerate(zip(self.animals, self._whose, strict=True)):
-            felt = np.asarray(animal.proprioception(data), np.float32)
+            felt = np.asarray(resolved(animal.proprioception(data)), np.float32)
             if felt.ndim != 1 or not np.isfinite(felt).all():
                 raise ValueError(f"{whose}proprioception returned {felt!r:.100}: must be finite numbers, (k,)")
             size = self._sizes.get(number) or self._sizes.setdefault(number, len(felt))
