@@ -10,7 +10,7 @@ successive_halving: test_successive_halving.py
 job: test_local_executor.py, test_dask_executor.py
 local_executor: test_local_executor.py
 worker: test_local_executor.py
-dask_executor: test_dask_executor.py
+dask_executor: test_dask_executor.py, test_dask_reconnection.py
 scheduler: test_scheduler.py, test_dask_executor.py
 dask_worker: test_dask_executor.py
 """
