@@ -83,3 +83,14 @@ def test_visibility_is_interpolated_between_rays():
 def test_colours_repeat():
     for eye in range(3 * len(overlay.COLORS)):
         np.testing.assert_array_equal(overlay._color(eye), overlay.COLORS[eye % len(overlay.COLORS)])
+
+
+def test_the_own_body_does_not_hide_an_eye():
+    """An eye is drawn if the surface in its pixel is at most one body's width in front of it."""
+    dot = overlay._Dot(np.arange(3), np.array([1.0, 1.0, 0.5]), np.array([0.0, 1.0, 0.0]), 4.0)
+    end = 4.0 - 2 * overlay.BODY_RADIUS
+    for depth, drawn in ((end * 1.01, True), (end * 0.99, False)):
+        shown = np.full((4, 3), 100, np.uint8)
+        overlay._draw_dot(shown, dot, lambda pixels, z=depth: np.full(len(pixels), 1 / z), np.full(3, 200.0))
+        expected = [200, 0, 150, 100] if drawn else [100] * 4
+        np.testing.assert_array_equal(shown, np.repeat(np.array(expected)[:, None], 3, axis=1))
