@@ -115,7 +115,7 @@ print(sorted(name for name in sys.modules if name.split(".")[0] in slow or name 
 
 @pytest.mark.parametrize("alike", [None, False, True])
 def test_methods_are_reused_only_on_request(monkeypatch, alike):
-    """By default, each PSF has a plan of its own: results do not depend on the PSFs that are computed with them."""
+    """Each PSF has its own plan by default, so that its result does not depend on the others."""
     requests = optics.psf(LENS, [500e-9, 550e-9], sensor_distance=400e-6, **WINDOW).requests
     reused = []
     right = Request.after
