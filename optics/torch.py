@@ -18,6 +18,7 @@ from optics.numerics.arguments import of_kind, vacuum_wavelengths
 from optics.numerics.autodiff import Array, Scalar
 from optics.numerics.backend import BackendError
 from optics.numerics.device import VARIABLE, make_ready
+from optics.numerics.number_types import full_precision
 from optics.numerics.precision import precision
 from optics.point_spread.psf import psf as drjit_psf
 
@@ -56,7 +57,9 @@ def psf(
         relief = BSplineRelief(heights) if heights.shape == (4, 4) else HeightMap(heights)
         return drjit_psf(Pupil(radius, relief, n=n, **(pupil or {})), **view).tensor
 
-    tensor: torch.Tensor = spread(*(_moved(value, place) for value in (heights, radius, n)))
+    tensor: torch.Tensor = spread(
+        _moved("heights", heights, place), _moved("radius", radius, place), _moved("n", n, place)
+    )
     return tensor.to(heights.device)
 
 
@@ -72,7 +75,8 @@ def _place() -> str:
     return place
 
 
-def _moved(value: Any, place: str) -> Any:
+def _moved(name: str, value: Any, place: str) -> Any:
+    value = full_precision(name, value)
     return value.double().to(place) if isinstance(value, torch.Tensor) else value
 
 
@@ -101,7 +105,8 @@ class PointSpread(torch.nn.Module):
         super().__init__()
         if heights is not None:
             of_kind("heights", heights, torch.Tensor, "torch.zeros(4, 4)")
-        start = torch.zeros(4, 4, dtype=torch.float64) if heights is None else heights.detach().double()
+        known = torch.zeros(4, 4) if heights is None else full_precision("heights", heights)
+        start = known.detach().double()
         self.relief = torch.nn.Parameter(start / unit)
         self.radius, self.n, self.unit = radius, n, unit
         self.view = {"wavelengths": vacuum_wavelengths(wavelengths), **view}

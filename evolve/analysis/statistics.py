@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from evolve.genome.genes import LAMBDA_MAX, RHABDOM, TILT, VERTICAL
 from evolve.genome.phenotype import Phenotype
-from optics.numerics.arguments import unmasked
+from optics.numerics.number_types import full_precision
 
 if TYPE_CHECKING:
     import optics
@@ -267,7 +267,7 @@ def bootstrap_interval(
     Raises:
         ValueError: samples are missing or not finite, or the level is outside (0, 1).
     """
-    values = np.asarray(unmasked("samples", samples), dtype=np.float64)
+    values = np.asarray(full_precision("samples", samples), dtype=np.float64)
     if values.ndim != 1 or not values.size or not np.isfinite(values).all():
         raise ValueError(f"samples: must be one or more finite numbers, got {values}")
     if not 0 < level < 1:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evolve.genome.genes import ALL_GENES, CLUSTERS, GENES, Gene, GeneConfig, group_members
-from optics.numerics.arguments import unmasked
+from optics.numerics.number_types import full_precision
 
 __all__ = ["CLUSTERS", "GENES", "Gene", "GeneConfig", "Genotype", "group_members"]
 
@@ -53,7 +53,7 @@ class Genotype:
         Raises:
             ValueError: the length of `genome` is not `dimension`, or a coordinate is not finite.
         """
-        genome = np.asarray(unmasked("genome", genome), dtype=np.float64)
+        genome = np.asarray(full_precision("genome", genome), dtype=np.float64)
         if genome.shape != (self.dimension,) or not np.all(np.isfinite(genome)):
             raise ValueError(f"genome has shape {genome.shape}: must be {self.dimension} finite numbers")
         values = {name: use.start for name, use in self.uses.items()}

@@ -33,11 +33,11 @@ def ask_tell(
     optimizer = build_optimizer(Space(genes=(), start=start, seed=(seed,)), search)
     for generation in range(search.generations):
         ids = generation_ids(generation, search.population)
-        genomes = [optimizer.ask(candidate_id)[0] for candidate_id in ids]
-        values = [fitness(genome) for genome in genomes]
-        for candidate_id, value in zip(ids, values, strict=True):
+        genomes = {candidate_id: optimizer.ask(candidate_id)[0] for candidate_id in ids}
+        values = {candidate_id: fitness(genome) for candidate_id, genome in genomes.items()}
+        for candidate_id, value in values.items():
             optimizer.tell(candidate_id, value)
-        yield genomes, values
+        yield list(genomes.values()), list(values.values())
 
 
 def main() -> None:

@@ -16,7 +16,7 @@ from evolve.store.atomic_files import write_whole
 from evolve.store.regular_files import read
 from optics.numerics.device import device
 
-__all__ = ["config_change", "origin", "present", "record_start", "recorded"]
+__all__ = ["config_change", "fingerprint", "origin", "present", "record_start", "recorded"]
 
 FILE, CONFIG = "versions.json", "config.toml"
 LARGEST_FILE = 2**24  # bytes; thousands of starts
@@ -81,15 +81,20 @@ def config_change(run: Path, candidates: int) -> str | None:
     return None
 
 
-def _checksums(config: bytes) -> dict[str, str]:
-    """Return the checksum of a config.toml, and the fingerprint of the settings that influence training and evaluation.
+def fingerprint(config: str) -> str:
+    """Return the fingerprint of a run's config.toml.
 
-    The fingerprint ignores comments, the number of workers, and the number of generations.
+    The fingerprint ignores lines that do not influence training and evaluation: comments, the number of workers, and
+    the number of generations.
     """
     left_out = ("workers =", "generations =", "#")
-    lines = [line.strip() for line in config.decode().splitlines() if line.strip() and not line.startswith(left_out)]
-    settings = hashlib.sha256("\n".join(lines).encode()).hexdigest()[:16]
-    return {"settings": settings, "config": hashlib.sha256(config).hexdigest()}
+    lines = [line.strip() for line in config.splitlines() if line.strip() and not line.startswith(left_out)]
+    return hashlib.sha256("\n".join(lines).encode()).hexdigest()[:16]
+
+
+def _checksums(config: bytes) -> dict[str, str]:
+    """Return the fingerprint and the checksum of a config.toml."""
+    return {"settings": fingerprint(config.decode()), "config": hashlib.sha256(config).hexdigest()}
 
 
 def record_start(run: Path, candidates: int, origin: str | None = None, config: bytes | None = None) -> None:

@@ -48,7 +48,7 @@ class Bitmap(ReadOnlyArrays):
 
     def contains(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         n = len(self.image)
-        column, row = (np.floor((np.asarray(at, dtype=np.float64) + 1) * (n / 2)).astype(int) for at in (x, y))
+        column, row = (np.floor((reals(name, at) + 1) * (n / 2)).astype(int) for name, at in (("x", x), ("y", y)))
         inside = (row >= 0) & (row < n) & (column >= 0) & (column < n)
         return np.asarray(inside & self.image[np.clip(row, 0, n - 1), np.clip(column, 0, n - 1)])
 

@@ -11,7 +11,7 @@ import numpy as np
 from optics.apertures.aperture import Aperture, Nodes, SoftAperture
 from optics.apertures.outline import Outline
 from optics.apertures.soft_edge import SoftEdge
-from optics.numerics.arguments import in_range, shown
+from optics.numerics.arguments import in_range, reals, shown
 from optics.numerics.autodiff import Array
 from optics.numerics.interpolation import Interpolant
 from optics.numerics.precision import Precision
@@ -37,7 +37,7 @@ class Circle(Aperture):
         return 1.0, 1.0
 
     def contains(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        return np.asarray(np.hypot(x, y) <= 1)
+        return np.asarray(np.hypot(reals("x", x), reals("y", y)) <= 1)
 
     @property
     def outline(self) -> Outline:
@@ -86,7 +86,7 @@ class Annulus(Aperture):
         return 1.0, 1.0
 
     def contains(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        r = np.hypot(x, y)
+        r = np.hypot(reals("x", x), reals("y", y))
         return np.asarray((r >= self.inner) & (r <= 1))
 
     @property

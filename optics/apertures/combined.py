@@ -18,7 +18,7 @@ from optics.apertures.shapes import Disk, Shape
 from optics.apertures.soft_edge import SoftEdge
 from optics.apertures.soft_outline import SoftOutline
 from optics.apertures.strips import strips
-from optics.numerics.arguments import finite, in_range, is_sized, one_of, shown, whole
+from optics.numerics.arguments import finite, in_range, is_sized, one_of, reals, shown, whole
 
 __all__ = ["Combined", "difference", "hexagonal_segments", "intersection", "union"]
 
@@ -60,7 +60,7 @@ class Combined(Aperture):
             raise ValueError(f"{self.rule} of {len(self.shapes)} shapes: must leave something open within the pupil")
 
     def contains(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        x, y = np.broadcast_arrays(np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64))
+        x, y = np.broadcast_arrays(reals("x", x), reals("y", y))
         return np.asarray(RULES[self.rule]([shape.contains(x, y) for shape in self.shapes]) & (np.hypot(x, y) <= 1))
 
     @cached_property

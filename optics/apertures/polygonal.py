@@ -12,7 +12,8 @@ from optics.apertures.outline import Outline
 from optics.apertures.soft_edge import SoftEdge
 from optics.apertures.soft_polygon import SoftPolygon
 from optics.apertures.triangulation import crossing, kernel_point, triangle_nodes, triangles
-from optics.numerics.arguments import finite, positive, shown, whole, without_derivative
+from optics.numerics.arguments import finite, positive, reals, shown, whole, without_derivative
+from optics.numerics.number_types import full_precision
 from optics.numerics.quadrature import gauss_legendre, gauss_legendre_count
 
 __all__ = ["Polygon", "Slit"]
@@ -70,7 +71,7 @@ class Polygon(Aperture):
 
     def contains(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         """Return a mask of the points inside: those from which a ray towards +x crosses an odd number of edges."""
-        x, y = np.broadcast_arrays(np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64))
+        x, y = np.broadcast_arrays(reals("x", x), reals("y", y))
         inside = np.zeros(x.shape, dtype=bool)
         for (x0, y0), (x1, y1) in zip(self.vertices, np.roll(self.vertices, -1, axis=0), strict=True):
             if y0 != y1:
@@ -133,7 +134,7 @@ class Slit(Aperture):
         return self.width / 2, self.height / 2
 
     def contains(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        return np.asarray((np.abs(x) <= self.width / 2) & (np.abs(y) <= self.height / 2))
+        return np.asarray((np.abs(reals("x", x)) <= self.width / 2) & (np.abs(reals("y", y)) <= self.height / 2))
 
     @property
     def outline(self) -> Outline:
@@ -163,7 +164,7 @@ def _twice_area(vertices: np.ndarray) -> float:
 
 def _checked(value: Any) -> np.ndarray:
     """Return the vertices as an (n, 2) array; ValueError unless they form a simple polygon within the unit circle."""
-    without_derivative("vertices", value)
+    value = full_precision("vertices", without_derivative("vertices", value))
     try:
         vertices = np.array(value, dtype=np.float64)
     except (TypeError, ValueError, OverflowError):

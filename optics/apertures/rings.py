@@ -88,9 +88,8 @@ class Rings(Aperture):
         return float(self.radii[-1]), float(self.radii[-1])
 
     def contains(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        return np.asarray(np.searchsorted(self.radii, np.hypot(x, y)) % 2 == 1) | (
-            (np.hypot(x, y) == 0) & bool(self.radii[0] == 0)
-        )
+        r = np.hypot(reals("x", x), reals("y", y))
+        return np.asarray(np.searchsorted(self.radii, r) % 2 == 1) | ((r == 0) & bool(self.radii[0] == 0))
 
     @property
     def outline(self) -> Outline:

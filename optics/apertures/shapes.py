@@ -8,7 +8,7 @@ from typing import Protocol
 import numpy as np
 
 from optics.apertures.outline import Outline
-from optics.numerics.arguments import finite, in_range, point_2d, positive, whole
+from optics.numerics.arguments import finite, in_range, point_2d, positive, reals, whole
 
 __all__ = ["Disk", "Oblong", "Shape", "Spider"]
 
@@ -52,6 +52,7 @@ class Disk:
         return Outline.circles((float(self.radius),), self.centre)
 
     def contains(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        x, y = reals("x", x), reals("y", y)
         return np.asarray(np.hypot(x - self.centre[0], y - self.centre[1]) <= self.radius)
 
 
@@ -85,6 +86,7 @@ class Oblong:
         return Outline.polygon(np.column_stack([corners.real, corners.imag]) + self.centre)
 
     def contains(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        x, y = reals("x", x), reals("y", y)
         place = (x - self.centre[0] + 1j * (y - self.centre[1])) * np.exp(-1j * np.deg2rad(self.rotation_deg))
         return np.asarray((np.abs(place.real) <= self.width / 2) & (np.abs(place.imag) <= self.height / 2))
 

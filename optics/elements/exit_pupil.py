@@ -9,8 +9,9 @@ import numpy as np
 
 from optics.elements.pupil import Pupil
 from optics.elements.wavefront import Zernike, mode
-from optics.numerics.arguments import complexes, is_sized, positive, shown, unmasked, vacuum_wavelength, whole
+from optics.numerics.arguments import complexes, is_sized, positive, shown, vacuum_wavelength, whole
 from optics.numerics.grid import sample_positions
+from optics.numerics.number_types import full_precision
 
 __all__ = ["ExitPupil", "read_exit_pupil"]
 
@@ -210,7 +211,8 @@ def _fitted(x: np.ndarray, y: np.ndarray, ahead: np.ndarray, distance: float, me
 
 def _flat(name: str, values: Any) -> np.ndarray:
     """Convert a NumPy array, or a tensor that can become one, to a flat float64 array."""
-    plain = values.detach().cpu().numpy() if hasattr(values, "detach") else unmasked(name, values)
+    values = full_precision(name, values)
+    plain = values.detach().cpu().numpy() if hasattr(values, "detach") else values
     try:
         return np.atleast_1d(np.asarray(plain, dtype=np.float64)).ravel()
     except (TypeError, ValueError):

@@ -15,7 +15,7 @@ import numpy as np
 
 from optics.elements.fine_detail import band_of, power_beyond, reach_of
 from optics.elements.square_samples import on_both_sides, square_samples
-from optics.numerics.arguments import finite, positive, reals
+from optics.numerics.arguments import finite, plain_reals, positive
 from optics.numerics.autodiff import Array, is_differentiable, plain
 from optics.numerics.interpolation import cubic_bsplines
 from optics.numerics.matrices import matmul
@@ -93,7 +93,7 @@ class BSplineRelief(Relief):
 
     def __post_init__(self) -> None:
         given = self.control_points
-        points = np.array(plain(given) if is_differentiable(given) else reals("control_points", given))
+        points = np.array(plain_reals("control_points", given))
         if is_differentiable(self.control_points) and points.size == 16:
             points = points.reshape(4, 4)
         if points.shape != (4, 4) or not np.isfinite(points).all():

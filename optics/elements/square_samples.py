@@ -6,8 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from optics.numerics.arguments import reals
-from optics.numerics.autodiff import is_differentiable, plain
+from optics.numerics.arguments import plain_reals
 
 __all__ = ["on_both_sides", "square_samples"]
 
@@ -23,7 +22,7 @@ def square_samples(samples: Any, name: str = "height", what: str = "heights [m]"
     Raises:
         ValueError: not square, empty, or not finite.
     """
-    heights = np.array(plain(samples) if is_differentiable(samples) else reals(name, samples))
+    heights = np.array(plain_reals(name, samples))
     if heights.ndim != 2 or heights.shape[0] != heights.shape[1] or heights.size == 0:
         raise ValueError(f"{name} has shape {heights.shape}: must be square (n, n), n at least 1")
     if not np.isfinite(heights).all():

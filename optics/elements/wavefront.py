@@ -18,8 +18,8 @@ import numpy as np
 from optics.elements.relief import HeightMap
 from optics.elements.square_samples import square_samples
 from optics.elements.zernike_order import HIGHEST, fringe_mode, noll_mode, numbered, osa_mode
-from optics.numerics.arguments import finite, positive, reals, shown
-from optics.numerics.autodiff import Array, is_differentiable, number, plain
+from optics.numerics.arguments import finite, plain_reals, positive, reals, shown
+from optics.numerics.autodiff import Array, is_differentiable, number
 from optics.numerics.precision import Precision, opaque
 
 __all__ = ["HIGHEST", "Aberration", "WavefrontMap", "Zernike", "mode"]
@@ -283,7 +283,7 @@ def _check_mode(key: Any) -> None:
 
 def _of_vector(given: Any) -> dict[tuple[int, int], float]:
     """Convert a vector, ordered by the index of OSA, to a dictionary of modes."""
-    vector = plain(given) if is_differentiable(given) else reals("coefficients_um", given)
+    vector = plain_reals("coefficients_um", given)
     most = (HIGHEST + 1) * (HIGHEST + 2) // 2
     if vector.ndim != 1 or not 0 < vector.size <= most:
         raise ValueError(

@@ -22,6 +22,7 @@ from optics.numerics.accuracy import AccuracyError
 from optics.numerics.arguments import positive, shown, whole, without_derivative
 from optics.numerics.autodiff import Array, Scalar, is_differentiable, number, plain
 from optics.numerics.interpolation import linear_weights
+from optics.numerics.number_types import full_precision
 
 __all__ = ["KernelBank", "prepare"]
 
@@ -58,9 +59,10 @@ class KernelBank:
         if is_differentiable(z):
             positive("z", z, infinite=True, carried=True)
         else:
-            _distances(z)
-            if np.ndim(z) and np.shape(z) != shape:
+            found = _distances(z)
+            if np.ndim(z) and found.shape != shape:
                 raise ValueError(f"z has shape {np.shape(z)}: must be one distance or one per cell, {shape}")
+            z = found
         if len(self.kernels) == 1:
             return [1]
         layers, rows, columns = (1 + max(node[axis] for node in self.kernels) for axis in range(3))
@@ -197,7 +199,7 @@ def _grid(across: int, resolution: tuple[int, int]) -> tuple[int, int]:
 
 
 def _distances(z: Any) -> np.ndarray:
-    without_derivative("z", z)
+    z = full_precision("z", without_derivative("z", z))
     try:
         distances = np.atleast_1d(np.asarray(z, dtype=np.float64))
     except (TypeError, ValueError, OverflowError):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from optics.numerics.arguments import in_range, positive, reals, unmasked
+from optics.numerics.arguments import in_range, positive, reals
 from optics.numerics.autodiff import Array, Scalar
 from optics.numerics.matrices import matmul
 from optics.numerics.precision import Precision, opaque
@@ -51,7 +51,7 @@ def own_type(signals: Array, mosaic: np.ndarray, types: Precision) -> Array:
 def gaussian_noise(signal: np.ndarray, sigma: float, rng: np.random.Generator) -> np.ndarray:
     """Return a signal with Gaussian noise of the standard deviation `sigma` [units of the signal]."""
     sigma = in_range("sigma", sigma, 0.0, 1e6)
-    return unmasked("signal", signal) + sigma * rng.standard_normal(signal.shape)
+    return reals("signal", signal) + sigma * rng.standard_normal(np.shape(signal))
 
 
 def photon_noise(signal: np.ndarray, photons: float | np.ndarray, rng: np.random.Generator) -> np.ndarray:
@@ -60,13 +60,13 @@ def photon_noise(signal: np.ndarray, photons: float | np.ndarray, rng: np.random
     signal: (channel, y, x).
     photons: absorbed photons for a signal of 1: a number, one per channel, or one per receptor (channel, y, x).
     """
-    budget = np.atleast_1d(reals("photons", photons))
+    signal, budget = reals("signal", signal), np.atleast_1d(reals("photons", photons))
     positive("photons", float(budget.min()), "1")
-    if not np.all(unmasked("signal", signal) >= 0):
+    if not np.all(signal >= 0):
         raise ValueError(f"signal = {np.min(signal):g} at its least: must not be negative")
     if budget.ndim == 1:
         budget = budget.reshape(-1, *(1,) * (np.ndim(signal) - 1))
-    expected = np.asarray(signal, dtype=np.float64) * budget
+    expected = signal * budget
     in_range("signal x photons", float(expected.max(initial=0.0)), 0, MOST_PHOTONS)
     return rng.poisson(expected) / budget
 

@@ -6,7 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from optics.numerics.autodiff import grad_enabled, is_differentiable, number
+from optics.numerics.autodiff import grad_enabled, is_differentiable, number, plain
+from optics.numerics.number_types import as_array, full_precision, resolved
 
 __all__ = [
     "close_match",
@@ -19,13 +20,13 @@ __all__ = [
     "items",
     "of_kind",
     "one_of",
+    "plain_reals",
     "point_2d",
     "positive",
     "radiance_cube",
     "reals",
     "shape_2d",
     "shown",
-    "unmasked",
     "vacuum_wavelength",
     "vacuum_wavelengths",
     "whole",
@@ -90,19 +91,6 @@ def positive(name: str, value: float, unit: str = "m", *, infinite: bool = False
     return number
 
 
-def unmasked(name: str, value: Any) -> Any:
-    """Return `value`; ValueError if elements of it are masked (numpy.ma), because NumPy would use them as data.
-
-    The other checks of numbers include this check.
-    """
-    if isinstance(value, (tuple, list)):
-        for entry in value:
-            unmasked(name, entry)
-    elif isinstance(value, np.ma.MaskedArray) and np.ma.is_masked(value):
-        raise ValueError(f"{name} has masked elements: must be without them, so fill or remove them (numpy.ma)")
-    return value
-
-
 def without_derivative(name: str, value: Any) -> Any:
     """Return `value`; ValueError if `value`, or an entry of it, carries a derivative, which would be lost.
 
@@ -114,7 +102,7 @@ def without_derivative(name: str, value: Any) -> Any:
         for entry in value:
             without_derivative(name, entry)
     elif isinstance(value, np.ma.MaskedArray):
-        unmasked(name, value)
+        resolved(name, value)
     elif getattr(value, "requires_grad", False) or (is_differentiable(value) and grad_enabled(value)):
         raise ValueError(f"{name} requires a derivative, but none is propagated through it: pass a plain number")
     return value
@@ -203,27 +191,24 @@ def point_2d(name: str, value: Any, what: str = "lengths (x, y) [m]") -> tuple[f
 
 def reals(name: str, values: Any) -> np.ndarray:
     """Return `values` as a float64 array of any shape; ValueError unless they are real numbers without derivatives."""
-    given = _array(name, values)
+    given = as_array(name, without_derivative(name, values))
     if given.dtype.kind not in "biuf":
         kind = "complex ones" if given.dtype.kind == "c" else shown(values)
         raise ValueError(f"{name}: must be real numbers, not {kind}")
     return given.astype(np.float64)
 
 
+def plain_reals(name: str, values: Any) -> np.ndarray:
+    """Return `values` as a float64 array of any shape, without the derivatives that arrays of Dr.Jit may carry."""
+    return plain(full_precision(name, values)) if is_differentiable(values) else reals(name, values)
+
+
 def complexes(name: str, values: Any) -> np.ndarray:
     """Return `values` as an array of any shape; ValueError unless they are numbers without derivatives."""
-    given = _array(name, values)
+    given = as_array(name, without_derivative(name, values))
     if given.dtype.kind not in "biufc":
         raise ValueError(f"{name}: must be numbers, not {shown(values)}")
     return given
-
-
-def _array(name: str, values: Any) -> np.ndarray:
-    without_derivative(name, values)
-    try:
-        return np.asarray(values)
-    except (TypeError, ValueError):
-        return np.asarray(None)
 
 
 def radiance_cube(value: Any, bands: int, least: tuple[int, int]) -> np.ndarray:
@@ -290,6 +275,7 @@ def _number(name: str, value: Any, carried: bool = False) -> float:
     # Derivatives of PyTorch would be lost even if those of Dr.Jit are propagated.
     if not carried or getattr(value, "requires_grad", False) or isinstance(value, np.ma.MaskedArray):
         without_derivative(name, value)
+    value = full_precision(name, value)
     try:
         if isinstance(value, (str, bytes)):
             raise TypeError

@@ -10,6 +10,8 @@ from typing import Any
 
 import numpy as np
 
+from optics.numerics.number_types import full_precision
+
 __all__ = ["ReadOnlyArrays", "read_only"]
 
 
@@ -27,4 +29,4 @@ class ReadOnlyArrays:
         for field in fields(self):
             value = getattr(self, field.name, None)
             if isinstance(value, np.ndarray):
-                object.__setattr__(self, field.name, read_only(value))
+                object.__setattr__(self, field.name, read_only(full_precision(field.name, value)))

@@ -15,6 +15,7 @@ from optics.numerics.accuracy import AccuracyError
 from optics.numerics.arguments import in_range, of_kind, one_of, positive, shown, vacuum_wavelength, without_derivative
 from optics.numerics.autodiff import number
 from optics.numerics.grid import Grid
+from optics.numerics.number_types import full_precision
 from optics.numerics.precision import precision
 from optics.point_spread.converging import Converging, VectorFocus
 
@@ -110,7 +111,7 @@ def _check_aplanatic(beam: Beam) -> None:
 
 def _polarised(polarization: Any) -> tuple[np.ndarray, tuple[float, float, float, float]]:
     """Return Jones vectors (part, 2) of parts that do not interfere, and the Stokes parameters divided by the first."""
-    without_derivative("polarization", polarization)
+    polarization = full_precision("polarization", without_derivative("polarization", polarization))
     try:
         given = np.asarray((1, 0, 0, 0) if polarization is None else polarization, dtype=complex)
     except (TypeError, ValueError, OverflowError):

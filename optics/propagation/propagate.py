@@ -116,7 +116,7 @@ def propagate(
     lit = _lit(given)
     source = Grid(lit.shape[-2:], dx)
     sources = lit.reshape(-1, *source.shape)
-    if np.may_share_memory(sources, u):  # the result stores the sources, so later changes of u must not affect them
+    if np.may_share_memory(sources, given):  # the result stores the sources, so later changes of u must not affect them
         sources = sources.copy()
     in_range("tolerance", tolerance, 10 * FLOAT_NOISE[precision(dtype).dtype], 0.5)
     passage = Passage(

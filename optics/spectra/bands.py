@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from optics.numerics.arguments import flag, shown, unmasked, whole
+from optics.numerics.arguments import flag, shown, whole
 from optics.numerics.interpolation import linear_weights
+from optics.numerics.number_types import full_precision
 from optics.numerics.read_only import ReadOnlyArrays
 from optics.numerics.renamed import renamed
 from optics.spectra.pigment import pigment_absorptance
@@ -107,7 +108,7 @@ def _nonnegative(weights: np.ndarray, caught: np.ndarray, means: np.ndarray) -> 
 
 def _values(found: Any, shape: tuple[int, ...]) -> np.ndarray:
     """Return the values of a spectrum at wavelengths, or raise a ValueError."""
-    unmasked("radiance", found)
+    found = full_precision("radiance", found)
     try:
         values = np.broadcast_to(np.asarray(found, np.float64), shape)
     except (TypeError, ValueError, OverflowError):

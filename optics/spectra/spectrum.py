@@ -13,7 +13,8 @@ from importlib import resources
 
 import numpy as np
 
-from optics.numerics.arguments import one_of, unmasked, vacuum_wavelengths, without_derivative
+from optics.numerics.arguments import one_of, reals, vacuum_wavelengths, without_derivative
+from optics.numerics.number_types import full_precision
 
 __all__ = [
     "ILLUMINANTS",
@@ -72,7 +73,7 @@ class Spectrum:
 
 
 def _row(name: str, numbers: Sequence[float]) -> tuple[float, ...]:
-    without_derivative(name, numbers)
+    numbers = full_precision(name, without_derivative(name, numbers))
     try:
         row = np.asarray(numbers, dtype=np.float64)
     except (TypeError, ValueError, OverflowError):
@@ -120,7 +121,7 @@ def cie_1931(wavelengths: np.ndarray) -> np.ndarray:
 
 
 def _nanometres(wavelengths: np.ndarray) -> np.ndarray:
-    nm = np.asarray(unmasked("wavelengths", wavelengths), dtype=np.float64) * 1e9
+    nm = reals("wavelengths", wavelengths) * 1e9
     low, high = LIMITS_NM
     outside = nm[~((nm > low - 1e-6) & (nm < high + 1e-6))]
     if outside.size:

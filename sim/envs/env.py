@@ -7,7 +7,8 @@ from typing import Any
 import gymnasium
 import numpy as np
 
-from optics.numerics.arguments import shown, unmasked
+from optics.numerics.arguments import shown
+from optics.numerics.number_types import resolved
 from sim.envs.assembly import make_vec_env
 from sim.envs.follow_camera import RENDER_MODES
 from sim.eyes.eyes import Eyes
@@ -64,7 +65,7 @@ class EyesEnv(gymnasium.Env[dict[str, np.ndarray], np.ndarray]):
 
     def step(self, action: np.ndarray) -> tuple[dict[str, np.ndarray], float, bool, bool, dict[str, Any]]:
         observation, reward, terminated, truncated, info = self._batch.step_once(
-            np.asarray(unmasked("action", action))[None]
+            np.asarray(resolved("action", action))[None]
         )
         info[0].pop("episode", None)  # entry of Stable-Baselines3; Gymnasium reserves this name for its wrappers
         return _only(observation), float(reward[0]), bool(terminated[0]), bool(truncated[0]), info[0]

@@ -9,7 +9,8 @@ import numpy as np
 from gymnasium import spaces
 from pettingzoo import ParallelEnv
 
-from optics.numerics.arguments import did_you_mean, unmasked
+from optics.numerics.arguments import did_you_mean
+from optics.numerics.number_types import resolved
 from sim.envs.animals import Animals
 from sim.envs.follow_camera import RENDER_MODES
 from sim.envs.prepared_task import PreparedTask
@@ -136,7 +137,7 @@ class EncounterEnv(ParallelEnv[str, dict[str, np.ndarray], np.ndarray]):
             if name not in actions:
                 raise ValueError(f"actions: {name!r} has none: must have one for each of {', '.join(self.agents)}")
             shape = self.action_spaces[name].shape
-            action = np.asarray(unmasked(f"actions: {name!r}", actions[name]), np.float32)
+            action = np.asarray(resolved(f"actions: {name!r}", actions[name]), np.float32)
             if action.shape != shape:
                 raise ValueError(f"actions: {name!r} has shape {action.shape}: must be {shape}")
             found.append(action[None])

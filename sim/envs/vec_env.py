@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from optics.numerics.arguments import shown, unmasked
+from optics.numerics.arguments import shown
+from optics.numerics.number_types import resolved
 from sim.envs import held_state
 from sim.envs.animals import Advanced, Animals
 from sim.envs.one_environment import OneEnvironment
@@ -118,7 +119,7 @@ class EyesVecEnv(OneEnvironment):
         self.animals.seed(tuple(drawn))
 
     def step_async(self, actions: np.ndarray) -> None:
-        actions = np.asarray(unmasked("actions", actions), np.float32)
+        actions = np.asarray(resolved("actions", actions), np.float32)
         if actions.shape != self._commanded.shape:
             raise ValueError(f"actions have shape {actions.shape}: must be {self._commanded.shape}")
         self._commanded = actions

@@ -24,7 +24,8 @@ from typing import Any
 
 import numpy as np
 
-from optics.numerics.arguments import items, shown, unmasked
+from optics.numerics.arguments import items, shown
+from optics.numerics.number_types import full_precision
 from sim.exr.previews import preview_of_receptors, preview_of_spectra
 from sim.exr.spectral_layout import (
     PREVIEW,
@@ -82,9 +83,10 @@ class View:
             raise ValueError(f"{where}: its name must be printable text, and not empty")
         if self.spectral is None and self.receptors is None:
             raise ValueError(f"{where}: has neither radiance nor receptors, and no reflectance")
-        for label in ("radiance", "reflectance", "receptors"):
-            image = unmasked(f"{where}: {label}", getattr(self, label))
-            if image is not None and (len(_shape(image)) != 3 or 0 in image.shape):
+        for label in ("radiance", "reflectance", "receptors", "rgb"):
+            image = full_precision(f"{where}: {label}", getattr(self, label))
+            object.__setattr__(self, label, image)
+            if label != "rgb" and image is not None and (len(_shape(image)) != 3 or 0 in image.shape):
                 raise ValueError(f"{where}: {label} {_kind(image)}: must be an array (band, y, x)")
         require_nanometres(f"{where}: wavelengths_nm", self.wavelengths_nm)
         if (spectral := self.spectral) is not None:

@@ -13,7 +13,7 @@ import mitsuba as mi
 import mujoco
 import numpy as np
 
-from optics.numerics.arguments import unmasked
+from optics.numerics.arguments import reals
 from sim.scene.pose_snapshot import PoseSnapshot
 from sim.scene.variant import MitsubaObject
 
@@ -34,9 +34,7 @@ class Viewpoint:
     @staticmethod
     def looking_at(origin: np.ndarray, target: np.ndarray, fovy_deg: float = 45.0) -> Viewpoint:
         """Return a viewpoint at `origin` that looks at `target` [m], with z up (y up if the direction is vertical)."""
-        origin, target = (
-            np.asarray(unmasked(name, at), float) for name, at in (("origin", origin), ("target", target))
-        )
+        origin, target = reals("origin", origin), reals("target", target)
         back = origin - target
         back /= np.linalg.norm(back)
         right = np.cross([0, 1.0, 0] if abs(back[2]) > 1 - 1e-9 else [0, 0, 1.0], back)

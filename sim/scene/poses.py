@@ -10,6 +10,7 @@ from zlib import crc32
 import mujoco
 import numpy as np
 
+from optics.numerics.number_types import full_precision
 from optics.numerics.renamed import renamed
 
 OF_MODELS = (
@@ -76,6 +77,10 @@ class Poses:
     light_active: np.ndarray | None = None
     heights: np.ndarray | None = None
     others: np.ndarray | None = None
+
+    def __post_init__(self) -> None:
+        for f in fields(self):
+            full_precision(f.name, getattr(self, f.name))
 
     of = renamed("from_data")
 

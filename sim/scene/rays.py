@@ -14,8 +14,8 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from optics.numerics.arguments import unmasked
 from optics.numerics.autodiff import Array
+from optics.numerics.number_types import full_precision
 from optics.spectra.spectrum import LIMITS_NM
 from sim.scene.variant import Description, MitsubaObject
 
@@ -38,7 +38,7 @@ def checked_wavelengths(wavelengths: Any) -> np.ndarray:
         ValueError: no wavelength, or a wavelength outside the range of the spectra, for example because it is in
             nanometres.
     """
-    found = np.asarray(unmasked("wavelengths", wavelengths), float)
+    found = np.asarray(full_precision("wavelengths", wavelengths), float)
     low, high = (1e-9 * limit for limit in LIMITS_NM)
     if found.ndim != 1 or not len(found) or not ((found > low - ROUNDING) & (found < high + ROUNDING)).all():
         said = " ".join(repr(wavelengths).split())

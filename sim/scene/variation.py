@@ -14,7 +14,8 @@ from typing import Any
 import numpy as np
 from scipy.constants import c, h, k
 
-from optics.numerics.arguments import did_you_mean, unmasked
+from optics.numerics.arguments import did_you_mean
+from optics.numerics.number_types import full_precision, resolved
 from optics.spectra.spectrum import cie_1931, daylight
 
 DAYLIGHT = 6504.0  # [K] the correlated colour temperature of CIE D65
@@ -58,7 +59,7 @@ class Variation:
                 _check_names(name, given)
                 continue
             least, most = LIMITS[what]
-            corners = _corners(given)
+            corners = _corners(f"vary: {name}", given)
             wanted = {COLOR: (3,), START: None}.get(what, ())
             fits = corners is not None and corners.shape[1:] in ({(), (3,)} if wanted is None else {wanted})
             if corners is None or not fits or not (least <= corners[0]).all() or not (corners[1] <= most).all():
@@ -84,7 +85,7 @@ class Variation:
             elif what == TEMPERATURE:
                 found[name] = 1 / (1 / low + (1 / high - 1 / low) * random.random())
             else:
-                corners = np.asarray((low, high), float)
+                corners = np.asarray(resolved(name, (low, high)), float)
                 drawn = corners[0] + (corners[1] - corners[0]) * random.random(corners.shape[1:])
                 found[name] = drawn if drawn.ndim else float(drawn)
         return found
@@ -192,9 +193,9 @@ def _ratio(kelvins: float, wavelengths: np.ndarray) -> np.ndarray:
     return found
 
 
-def _corners(given: Any) -> np.ndarray | None:
+def _corners(name: str, given: Any) -> np.ndarray | None:
     """Return (low, high) as an array (2,) or (2, 3); None if it is not such a pair of finite numbers."""
-    unmasked("vary", given)
+    given = full_precision(name, given)
     try:
         corners = np.asarray(given, float)
     except (TypeError, ValueError):

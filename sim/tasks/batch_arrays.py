@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from optics.numerics.arguments import unmasked
+from optics.numerics.number_types import resolved
 from sim.tasks.outcome import Outcome
 
 __all__ = ["columns", "mapping", "not_finite", "require_outcome", "rows"]
@@ -72,7 +72,7 @@ def require_outcome(outcome: Outcome, n: int, learners: int) -> None:
         ValueError: an array has another shape, a reward is not finite, or the outcome names worlds that do not exist.
     """
     for name in ("terms", "terminated", "success", "over"):
-        unmasked(f"judge: {name}", outcome.terms.terms if name == "terms" else getattr(outcome, name))
+        resolved(f"judge: {name}", outcome.terms.terms if name == "terms" else getattr(outcome, name))
     size = n * learners
     shapes = outcome.terms.terms.shape[1:], outcome.terminated.shape, outcome.success.shape
     for name, shape in zip(("terms", "terminated", "success"), shapes, strict=True):
@@ -93,7 +93,7 @@ def require_outcome(outcome: Outcome, n: int, learners: int) -> None:
 
 
 def _array(where: str, returned: Any, kind: Any) -> np.ndarray:
-    unmasked(where, returned)
+    returned = resolved(where, returned)
     try:
         return np.asarray(returned, kind)
     except (TypeError, ValueError) as error:

@@ -11,7 +11,8 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from optics.numerics.arguments import did_you_mean, of_kind, unmasked
+from optics.numerics.arguments import did_you_mean, of_kind
+from optics.numerics.number_types import resolved
 from sim.physics.controls import actuator_names
 from sim.tasks.batch_task import BatchTask
 from sim.tasks.task import Task
@@ -65,7 +66,7 @@ class Frozen:
         try:
             predict = getattr(self.policy, "predict", None)
             found = self.policy(observation) if predict is None else predict(observation, deterministic=True)[0]
-            actions = np.asarray(unmasked("actions", found), np.float32)
+            actions = np.asarray(resolved("actions", found), np.float32)
         except Exception as error:
             said = " ".join(f"{type(error).__name__}: {error}".split())
             raise RuntimeError(f"policy of {name_of(self.task)!r}: {said}") from error

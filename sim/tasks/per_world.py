@@ -12,7 +12,7 @@ from typing import Self
 import mujoco
 import numpy as np
 
-from optics.numerics import arguments
+from optics.numerics import number_types
 from sim.physics.mujoco_worlds import MujocoWorlds
 from sim.physics.physics import Physics
 from sim.scene.variation import Variation
@@ -27,7 +27,7 @@ from sim.tasks.task_settings import compiled
 
 __all__ = ["PerWorld"]
 
-_OURS = (__file__, arguments.__file__, task_module.__file__, batch_task.__file__, simulation.__file__)
+_OURS = (__file__, number_types.__file__, task_module.__file__, batch_task.__file__, simulation.__file__)
 
 
 @dataclass
@@ -164,7 +164,7 @@ class PerWorld(BatchTask):
         """
         found = []
         for number, (animal, whose) in enumerate(zip(self.animals, self._whose, strict=True)):
-            felt = np.asarray(arguments.unmasked(f"{whose}proprioception", animal.proprioception(data)), np.float32)
+            felt = np.asarray(number_types.resolved(f"{whose}proprioception", animal.proprioception(data)), np.float32)
             if felt.ndim != 1 or not np.isfinite(felt).all():
                 raise ValueError(f"{whose}proprioception returned {felt!r:.100}: must be finite numbers, (k,)")
             size = self._sizes.get(number) or self._sizes.setdefault(number, len(felt))

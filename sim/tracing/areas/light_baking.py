@@ -49,6 +49,15 @@ class Baking:
         light = [components.reflectance, components.levels, *lights, self._orders]
         return [np.asarray(a, np.float64) for a in (*surfaces, walls.floor, *light, self._kinds, settings)]
 
+    @property
+    def layout(self) -> dict[str, int]:
+        """The size of each table by name."""
+        nodes, count = self._nodes, range(len(self._tracer.basis))
+        cells = int(nodes.grid.free.sum())
+        sizes = {"floor": cells * nodes.across**2, "walls": cells * len(SIDES) * nodes.across * nodes.up}
+        bodies = {f"body_{i}": cells * nodes.places**2 * 4 * FOURS for i in range(len(self._kinds))}
+        return {f"bounced_{name}_{k}": size for name, size in (sizes | bodies).items() for k in count}
+
     def tables(self) -> dict[str, np.ndarray]:
         """Return all tables by name, one for each component, float32, flat. Each iteration adds one reflection, until
         the tables stop changing."""

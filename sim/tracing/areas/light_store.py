@@ -1,21 +1,27 @@
-"""A cache on disk of tables of reflected light, which take seconds to bake and are the same for the same world."""
+"""A cache on disk of tables of reflected light, which take seconds to bake and are the same for the same world.
+
+A file is used only if it is exactly the archive that would be written for this world: the expected names, shapes and
+number types, finite numbers, and a checksum that includes the world. Otherwise the tables are baked again.
+"""
 
 from __future__ import annotations
 
 import contextlib
 import hashlib
+import io
 import os
 import tempfile
 import zipfile
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from sim.tracing.areas.light_baking import Baking
 
-VERSION = 2  # version of the tables, to be increased when the same ingredients give other tables
+VERSION = 3  # version of the tables, to be increased when the same ingredients give other tables or other files
 KEPT = 200  # largest number of files; the oldest are deleted first
+CHECKSUM = "sha256"  # name of the table that contains the checksum
+ENTRY = 1024  # largest number of bytes that an archive adds to each table
 
 
 def cache_folder() -> Path:
@@ -25,14 +31,14 @@ def cache_folder() -> Path:
 
 def stored(baking: Baking) -> dict[str, np.ndarray]:
     """Return the tables, from disk if they are stored there. Without a writable disk, they are baked every time."""
-    path = cache_folder() / f"{_digest(baking.ingredients)}.npz"
-    # If a file is missing, truncated or foreign, the tables are baked again.
-    with contextlib.suppress(OSError, ValueError, zipfile.BadZipFile, EOFError), np.load(path) as file:
-        return {name: file[name] for name in file.files}
-    tables = baking.tables()
-    with contextlib.suppress(OSError):
-        _write(path, tables)
-    return tables
+    world = _digest(baking.ingredients)
+    path = cache_folder() / f"{world}.npz"
+    found = _read(path, baking.layout, world)
+    if found is None:
+        found = baking.tables()
+        with contextlib.suppress(OSError):
+            _write(path, found, world)
+    return found
 
 
 def _digest(ingredients: list[np.ndarray]) -> str:
@@ -43,12 +49,62 @@ def _digest(ingredients: list[np.ndarray]) -> str:
     return digest.hexdigest()
 
 
-def _write(path: Path, tables: dict[str, Any]) -> None:
+def _checksum(tables: dict[str, np.ndarray], world: str) -> np.ndarray:
+    """Return the checksum of a world's tables, as bytes."""
+    digest = hashlib.sha256(world.encode())
+    for name in sorted(tables):
+        digest.update(f"{name} {tables[name].size} ".encode())
+        digest.update(tables[name].tobytes())
+    return np.frombuffer(digest.digest(), np.uint8)
+
+
+def _read(path: Path, layout: dict[str, int], world: str) -> dict[str, np.ndarray] | None:
+    """Return the tables of a file, or None if it is missing, damaged or not of this layout and world."""
+    sizes: dict[str, tuple[np.dtype, int]] = {name: (np.dtype(np.float32), size) for name, size in layout.items()}
+    sizes[CHECKSUM] = (np.dtype(np.uint8), hashlib.sha256().digest_size)
+    most = sum(dtype.itemsize * size + ENTRY for dtype, size in sizes.values())
+    try:
+        if not path.is_file() or path.stat().st_size > most:
+            return None
+        with path.open("rb") as file:
+            archive = zipfile.ZipFile(io.BytesIO(file.read(most)))
+        if sorted(archive.namelist()) != sorted(f"{name}.npy" for name in sizes):
+            return None
+        tables = {name: _table(archive, name, dtype, size) for name, (dtype, size) in sizes.items()}
+    except Exception:  # zipfile raises errors of many kinds when an archive is damaged
+        return None
+    checksum = tables.pop(CHECKSUM)
+    sound = np.array_equal(checksum, _checksum(tables, world)) and all(np.isfinite(t).all() for t in tables.values())
+    return tables if sound else None
+
+
+def _table(archive: zipfile.ZipFile, name: str, dtype: np.dtype, size: int) -> np.ndarray:
+    """Return a flat table of an archive. Memory is allocated for the expected size, not for the size in its header.
+
+    Raises:
+        ValueError: the table does not have this number type and size.
+    """
+    header = io.BytesIO()
+    written = {"descr": np.lib.format.dtype_to_descr(dtype), "fortran_order": False, "shape": (size,)}
+    np.lib.format.write_array_header_1_0(header, written)
+    expected = header.getvalue()
+    with archive.open(f"{name}.npy") as file:
+        content = file.read(len(expected) + dtype.itemsize * size + 1)
+    if not content.startswith(expected) or len(content) != len(expected) + dtype.itemsize * size:
+        raise ValueError(f"{name}: must be {size} numbers of type {dtype}")
+    return np.frombuffer(content, dtype, offset=len(expected)).copy()
+
+
+def _write(path: Path, tables: dict[str, np.ndarray], world: str) -> None:
     """Write the file completely or not at all, even if other processes write it at the same time."""
     path.parent.mkdir(parents=True, exist_ok=True)
     for old in sorted(path.parent.glob("*.npz"), key=lambda p: p.stat().st_mtime)[: -(KEPT - 1)]:
         old.unlink(missing_ok=True)
     handle, name = tempfile.mkstemp(dir=path.parent, suffix=".part")
-    with os.fdopen(handle, "wb") as file:
-        np.savez(file, **tables)
-    os.replace(name, path)
+    try:
+        with os.fdopen(handle, "wb") as file:
+            np.savez(file, **tables, **{CHECKSUM: _checksum(tables, world)})  # type: ignore[arg-type]
+        os.replace(name, path)
+    except BaseException:
+        Path(name).unlink(missing_ok=True)
+        raise

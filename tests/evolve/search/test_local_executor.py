@@ -244,3 +244,9 @@ def test_freed_memory_is_kept_for_the_next_arrays():
     mapped, kept = map(int, done.stdout.split())
     assert mapped > 10_000, "the test is not valid"
     assert kept < mapped / 100
+
+
+@pytest.mark.parametrize("count", [-1, -8])
+def test_a_negative_number_of_workers_is_refused(count):
+    with pytest.raises(ValueError, match=f"count = {count}: must be 0, one per core, or more"):
+        LocalExecutor(print, count)

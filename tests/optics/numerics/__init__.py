@@ -14,6 +14,7 @@ fourier_matrices: test_fourier.py
 grid: test_grid.py
 interpolation: test_interpolation.py
 matrices: test_fourier.py
+number_types: test_number_types.py, sim/test_number_types.py
 precision: test_precision.py
 quadrature: test_quadrature.py
 radial_profile: test_radial_profile.py

@@ -9,6 +9,7 @@ import pytest
 import optics
 from optics.numerics.accuracy import FLOAT_NOISE
 from optics.point_spread import pictures
+from optics.point_spread.request import Request
 
 LENS = optics.Pupil(20e-6, thin_lens_focal_length=400e-6)
 PLAIN = optics.Pupil(20e-6)
@@ -110,3 +111,14 @@ print(sorted(name for name in sys.modules if name.split(".")[0] in slow or name 
 """
     found = subprocess.run([sys.executable, "-c", small], capture_output=True, text=True, check=True)
     assert found.stdout.strip() == "[]"
+
+
+@pytest.mark.parametrize("alike", [None, False, True])
+def test_methods_are_reused_only_on_request(monkeypatch, alike):
+    """Each PSF has its own plan by default, so that its result does not depend on the others."""
+    requests = optics.psf(LENS, [500e-9, 550e-9], sensor_distance=400e-6, **WINDOW).requests
+    reused = []
+    right = Request.after
+    monkeypatch.setattr(Request, "after", lambda self, *before: reused.append(self) or right(self, *before))
+    pictures.pictures(requests, **({} if alike is None else {"alike": alike}))
+    assert len(reused) == bool(alike)

@@ -5,13 +5,13 @@ parallel_env: test_parallel_env.py, test_pictures.py
 auxiliary: test_auxiliary.py
 one_environment: test_vec_env.py, test_pictures.py
 env: test_env.py
-vec_env: test_vec_env.py, test_env.py, test_light_levels.py, test_handed_out.py
+vec_env: test_vec_env.py, test_episode_infos.py, test_env.py, test_light_levels.py, test_handed_out.py
 vector_env: test_vector_env.py
 registered_env: test_vector_env.py
 registration: test_env.py, test_vector_env.py, worlds/test_catalog.py
 observation: test_vec_env.py, test_task_state.py, test_tasks_page.py
 follow_camera: test_env.py
-field_of_view_overlay: test_env.py
+field_of_view_overlay: test_field_of_view_overlay.py, test_env.py
 retina_images: test_env.py
 prepared_task: test_features.py, evolve/learning/test_fitness.py
 batch_task_checker: test_batch_task.py

@@ -12,8 +12,8 @@ reflectance_atlas: test_closed_form_tracer.py
 areas.area_tracer: test_areas.py, test_areas_behind_pupils.py
 areas.light_table: test_light_table.py
 areas.light_nodes: test_light_table.py
-areas.light_baking: test_light_table.py
-areas.light_store: test_light_table.py
+areas.light_baking: test_light_table.py, test_light_store.py
+areas.light_store: test_light_store.py, test_light_table.py
 areas.cell_grid: test_light_table.py
 areas.branches: test_areas.py
 areas.columns: test_areas.py

@@ -1,7 +1,6 @@
 """Light that is reflected twice, looked up in tables, against very many rays."""
 
 import dataclasses
-import os
 
 import drjit as dr
 import mitsuba as mi
@@ -14,7 +13,7 @@ import sim
 from sim.render.world_scene import WorldScene
 from sim.scene.variant import variant
 from sim.tracing import lighting
-from sim.tracing.areas import illuminated_bodies, illumination, light_baking, light_store, light_table
+from sim.tracing.areas import illuminated_bodies, illumination, light_baking, light_table
 from sim.worlds.layout import Starts
 from sim.worlds.state import WorldState
 from sim.worlds.world import build_world
@@ -235,29 +234,6 @@ def test_tables_are_baked_once_per_world(monkeypatch):
 
 def flat(level):
     return optics.Spectrum((300.0, 800.0), (level, level))
-
-
-def test_a_broken_file_is_baked_anew():
-    world = build_world("detection")
-    first = tables(world)
-    (path,) = light_store.cache_folder().glob("*.npz")
-    path.write_bytes(path.read_bytes()[:1000])
-    np.testing.assert_array_equal(tables(world).floor[0].numpy(), first.floor[0].numpy())
-
-
-def test_without_a_disk_it_is_baked_every_time(monkeypatch, tmp_path):
-    blocked = tmp_path / "file"
-    blocked.write_text("")
-    monkeypatch.setenv("XDG_CACHE_HOME", str(blocked))
-    assert len(tables(build_world("detection")).floor[0]) > 0
-
-
-def test_old_files_go_first(monkeypatch, tmp_path):
-    monkeypatch.setattr(light_store, "KEPT", 3)
-    for i in range(6):
-        light_store._write(tmp_path / f"{i}.npz", {"a": np.zeros(1, np.float32)})
-        os.utime(tmp_path / f"{i}.npz", (i, i))
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["3.npz", "4.npz", "5.npz"]
 
 
 def test_worlds_without_walls_reflect_nothing_twice():

@@ -1,0 +1,65 @@
+"""Types of given arrays: half precision and masks are refused, and lazy operations of PyTorch are carried out."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+__all__ = ["as_array", "full_precision", "resolved"]
+
+HALF = "float16", "bfloat16", "complex32", "float8", "float6_", "float4_"  # starts of names of types
+DRJIT_HALF = "Float16", "f16"  # ends of names of Dr.Jit's types
+
+
+def resolved(name: str, value: Any) -> Any:
+    """Return `value`, with PyTorch's lazy conjugation and negation carried out; ValueError if elements are masked.
+
+    NumPy cannot read tensors that are marked as conjugate or negative, such as `tensor.conj()` and its imaginary part.
+    It would use masked elements (numpy.ma) as data. Entries of lists and tuples are treated in the same way.
+    """
+    if isinstance(value, (list, tuple)):
+        entries = [resolved(name, entry) for entry in value]
+        return value if all(old is new for old, new in zip(value, entries, strict=True)) else entries
+    if isinstance(value, np.ma.MaskedArray) and np.ma.is_masked(value):
+        raise ValueError(f"{name} has masked elements: must be without them, so fill or remove them (numpy.ma)")
+    if not hasattr(value, "resolve_conj"):
+        return value
+    return value.resolve_conj().resolve_neg() if value.is_conj() or value.is_neg() else value
+
+
+def full_precision(name: str, value: Any) -> Any:
+    """Return `value` as `resolved` does; ValueError if it, or an entry of it, is in half precision or less.
+
+    Near 1 µm, the step of float16 is 60 nm, a tenth of a wavelength.
+    """
+    kind = _half(value)
+    if kind:
+        raise ValueError(f"{name}: must be float32 or float64, not {kind}, whose steps near 1 µm are at least 60 nm")
+    return resolved(name, value)
+
+
+def as_array(name: str, values: Any) -> np.ndarray:
+    """Return `values` as an array; one of objects if NumPy cannot convert them. See `full_precision`."""
+    values = full_precision(name, values)
+    try:
+        given = np.asarray(values)
+    except (TypeError, ValueError):
+        return np.asarray(None)
+    full_precision(name, given)  # other containers, such as buffers and data frames
+    return given
+
+
+def _half(value: Any) -> str:
+    """Return the name of the type of half precision in `value`, or an empty string."""
+    if type(value) in (float, int, str):
+        return ""  # fast path: planning calls this thousands of times
+    if isinstance(value, (list, tuple)):
+        return next(filter(None, map(_half, value)), "")
+    if isinstance(value, (np.ndarray, np.generic)):
+        kind = value.dtype.name
+    elif type(value).__module__.startswith("drjit"):
+        return type(value).__name__ if type(value).__name__.endswith(DRJIT_HALF) else ""
+    else:
+        kind = str(getattr(value, "dtype", "")).removeprefix("torch.")
+    return kind if kind.startswith(HALF) else ""

@@ -1,0 +1,96 @@
+"""Fields of view in the image of a world, against an independent computation pixel by pixel."""
+
+import math
+
+import numpy as np
+import pytest
+
+import sim
+from sim.envs import field_of_view_overlay as overlay
+from sim.scene.cameras import Viewpoint
+
+SIZE = 20, 31  # height and width, which differ
+EYES = sim.Eyes(n_eyes=2, resolution=(1, 3), fov_deg=70, placement_range_deg=90)
+VIEW = Viewpoint.looking_at(np.array([-1.5, -0.4, 0.9]), np.array([1.0, 0.3, 0.5]), 60.0)
+
+
+def ray(row, column):
+    """Return the direction of the ray through a pixel, of unit depth."""
+    half = math.tan(math.radians(VIEW.fovy_deg) / 2)
+    right, up = (2 * column + 1 - SIZE[1]) / SIZE[0] * half, (SIZE[0] - 2 * row - 1) / SIZE[0] * half
+    return VIEW.rotation @ np.array([right, up, -1.0])
+
+
+def points():
+    """Return depth and position at the eyes' height for each pixel that shows this plane."""
+    found = {}
+    for row in range(SIZE[0]):
+        for column in range(SIZE[1]):
+            direction = ray(row, column)
+            depth = (overlay.EYE_HEIGHT - VIEW.position[2]) / direction[2]
+            if depth > 0:
+                found[row * SIZE[1] + column] = depth, VIEW.position + depth * direction
+    return found
+
+
+def test_points_of_the_plane():
+    level, expected = overlay._level(VIEW, SIZE), points()
+    assert list(level.pixels) == list(expected)
+    assert 0 < len(expected) < SIZE[0] * SIZE[1]
+    for i, (depth, point) in enumerate(expected.values()):
+        assert level.depth[i] == pytest.approx(depth)
+        np.testing.assert_allclose(level.points[i], point[:2], rtol=1e-9)
+        assert point[2] == pytest.approx(overlay.EYE_HEIGHT)
+        up = np.linalg.norm(VIEW.rotation @ np.array([0, 2 * depth / SIZE[0], 0])) * math.tan(math.radians(30))
+        assert level.pixel[i] == pytest.approx(up)
+
+
+@pytest.mark.parametrize("azimuth", [0.4, -2.9])
+def test_pixels_within_a_field_of_view(azimuth):
+    """A pixel is within the field if its point is in front of the eye and not too far from the axis."""
+    eye, half = np.array([0.13, -0.21]), math.radians(EYES.fov_deg) / 2
+    field = overlay._field(overlay._level(VIEW, SIZE), EYES, azimuth, eye)
+    shown = dict(zip(field.pixels.tolist(), range(len(field.pixels)), strict=True))
+    rays = np.linspace(-half, half, overlay.FAN)
+    inside = 0
+    for pixel, (depth, point) in points().items():
+        ahead = np.array([math.cos(azimuth), math.sin(azimuth)]) @ (point[:2] - eye)
+        left = np.array([-math.sin(azimuth), math.cos(azimuth)]) @ (point[:2] - eye)
+        angle, distance = math.atan2(left, ahead), math.hypot(ahead, left)
+        if distance > overlay.FARTHEST:
+            assert pixel not in shown
+        elif abs(angle) < half:
+            i, inside = shown[pixel], inside + 1
+            assert field.opacity[i] >= np.float32(overlay.FILL)
+            assert field.distance[i] == pytest.approx(distance, rel=1e-5)
+            assert field.depth[i] == pytest.approx(depth, rel=1e-5)
+            near = rays[field.ray[i]] + field.share[i] * (rays[1] - rays[0])
+            assert near == pytest.approx(angle, abs=1e-5)
+        elif pixel in shown:  # the antialiased rim
+            assert field.opacity[shown[pixel]] <= np.float32(overlay.RIM)
+    assert inside > 5
+
+
+def test_visibility_is_interpolated_between_rays():
+    reach = np.arange(overlay.FAN) / 10 + 1.0
+    rays, share = np.array([0, 3, 3, overlay.FAN - 2]), np.array([0.5, 0.25, 0.25, 1.0], np.float32)
+    end = 1.0 + (rays + share) / 10
+    distance = (end + np.array([-1e-3, 1e-3, -1e-3, -1e-3])).astype(np.float32)
+    field = overlay._Field(np.arange(4), np.ones(4), np.ones(4), distance, rays, share)
+    np.testing.assert_array_equal(field.visible(reach), [True, False, True, True])
+
+
+def test_colours_repeat():
+    for eye in range(3 * len(overlay.COLORS)):
+        np.testing.assert_array_equal(overlay._color(eye), overlay.COLORS[eye % len(overlay.COLORS)])
+
+
+def test_the_own_body_does_not_hide_an_eye():
+    """An eye is drawn if the surface in its pixel is at most one body's width in front of it."""
+    dot = overlay._Dot(np.arange(3), np.array([1.0, 1.0, 0.5]), np.array([0.0, 1.0, 0.0]), 4.0)
+    end = 4.0 - 2 * overlay.BODY_RADIUS
+    for depth, drawn in ((end * 1.01, True), (end * 0.99, False)):
+        shown = np.full((4, 3), 100, np.uint8)
+        overlay._draw_dot(shown, dot, lambda pixels, z=depth: np.full(len(pixels), 1 / z), np.full(3, 200.0))
+        expected = [200, 0, 150, 100] if drawn else [100] * 4
+        np.testing.assert_array_equal(shown, np.repeat(np.array(expected)[:, None], 3, axis=1))
