@@ -9,13 +9,13 @@ pace: test_pace.py, test_run_plan.py
 tensorboard: test_tensorboard.py
 doctor: test_doctor.py
 commands.run: test_commands.py, test_run_plan.py, search/test_kill.py, runs/test_two_faces.py
-commands.status: test_main.py, test_status_and_compare.py, test_commands.py, test_hostile_runs.py
+commands.status: test_main.py, test_status_and_compare.py, test_commands.py, test_hostile_runs.py, test_generations.py
 commands.listings: test_main.py
 commands.products: test_products.py, test_commands.py, test_main.py
 commands.show_config: test_main.py
 commands.demo: test_demo.py
 commands.completion: test_main.py
 commands.validate: test_validate.py
-commands.compare: test_status_and_compare.py
-commands.drift: report/test_gene_drift.py
+commands.compare: test_status_and_compare.py, test_generations.py
+commands.drift: report/test_gene_drift.py, test_generations.py
 """
