@@ -48,7 +48,9 @@ def recorded(request, tmp_path):
 def test_every_command_counts_from_0(recorded, call):
     run, said = recorded
     counted, path, population = range(run.config.search.generations), run.path, run.config.search.population
-    assert [candidate.generation for candidate in run.candidates] == [i // population for i in range(len(run.candidates))]
+    assert [candidate.generation for candidate in run.candidates] == [
+        i // population for i in range(len(run.candidates))
+    ]
     shown = [int(NUMBERS.search(line)[1]) for line in said.splitlines()]
     assert shown == [min(i // population, counted[-1]) for i in range(1, len(run.candidates) + 1)]
     assert numbers(said) == set(counted)
