@@ -12,6 +12,7 @@ from evolve.config.assemble import assemble
 from evolve.config.run_config import RunConfig
 from evolve.learning.task_trial import check_settings, try_task
 from evolve.runs.start_from import starts_from
+from evolve.search.optimizers import OWN
 from evolve.search.search import Search
 from evolve.store.directory import Run, next_directory
 from optics.numerics import device
@@ -78,8 +79,11 @@ class PreparedRun:
             yield run
 
 
-def prepare_run(request: RunRequest) -> PreparedRun:
+def prepare_run(request: RunRequest, tried: bool = True) -> PreparedRun:
     """Collect the settings of a run, and check that the run can start on this machine. Nothing is written.
+
+    tried: whether to build the search and to try the user task in this process; False if the run is only planned:
+        other processes then measure its pace, and try the task first
 
     Raises:
         ConfigError: a setting is invalid, the optimizer is unknown, or the user task fails or has several mounts
@@ -89,9 +93,11 @@ def prepare_run(request: RunRequest) -> PreparedRun:
     """
     starts = starts_from(request.start_from) if request.start_from else None
     config = assemble(request.task, request.preset, request.config, request.assignments, starts, request.scale)
-    Search(config)  # raises an error for an unknown optimizer
+    if tried or config.search.optimizer not in OWN:  # importing nevergrad takes seconds
+        Search(config)  # raises an error for an unknown optimizer
     device.make_ready()
-    check_settings(config)
-    try_task(config)
+    if tried:
+        check_settings(config)
+        try_task(config)
     origin = starts.name.removeprefix("--from ") if starts else None
     return PreparedRun(config, request.preset.removesuffix(f"-{config.task}"), origin)

@@ -34,7 +34,7 @@ def start(arguments: Namespace) -> int:
     scheduler = _scheduler(arguments)
     if arguments.tensorboard:
         require_tensorboard()
-    prepared = prepare_run(_request(arguments))
+    prepared = prepare_run(_request(arguments), tried=not arguments.dry_run)
     if arguments.dry_run:
         return _show(RunPlan.from_config(prepared.config, prepared.directory(arguments.out)), arguments.json)
     notes = (

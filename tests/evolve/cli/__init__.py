@@ -4,8 +4,8 @@ main: test_main.py
 arguments: test_main.py
 waiting: test_products.py
 notes: test_notes.py
-run_plan: test_run_plan.py
-pace: test_pace.py, test_run_plan.py
+run_plan: test_run_plan.py, test_dry_run.py
+pace: test_pace.py, test_run_plan.py, test_dry_run.py
 tensorboard: test_tensorboard.py
 doctor: test_doctor.py
 commands.run: test_commands.py, test_run_plan.py, search/test_kill.py, runs/test_two_faces.py
