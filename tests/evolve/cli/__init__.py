@@ -1,7 +1,7 @@
 """Tests of evolve/cli: which test covers which module.
 
 main: test_main.py
-arguments: test_main.py
+arguments: test_options.py, test_main.py
 waiting: test_products.py
 notes: test_notes.py
 run_plan: test_run_plan.py, test_dry_run.py
