@@ -20,7 +20,7 @@ from tempfile import TemporaryDirectory
 from evolve.config.run_config import ConfigError, LearningConfig, RunConfig
 from evolve.genome.phenotype import Phenotype
 from evolve.learning.schedule import mean_passes, schedule
-from evolve.learning.task_trial import check_task
+from evolve.runs.begin import check_task
 from evolve.search.job import ExecutorError
 from evolve.search.worker import evaluate_candidate, prepare_device
 

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from sim.envs.vec_env import EyesVecEnv
     from sim.tasks.task_settings import TaskSettings
 
-__all__ = ["UnusedSettingWarning", "check_settings", "check_task", "try_task"]
+__all__ = ["UnusedSettingWarning", "check_settings", "try_task"]
 
 WORLDS, ACTIONS = 2, 4
 
@@ -99,20 +99,6 @@ def try_task(config: RunConfig) -> None:
         raise ConfigError(" ".join(said.split()), "task") from error
     if failure is not None:
         raise ConfigError(f"{config.task}: {failure}", "task")
-
-
-def check_task(config: RunConfig) -> list[Warning | str]:
-    """Check the settings of the user task, try it, and return each warning once; for use in a worker process.
-
-    Raises:
-        ConfigError: see `check_settings` and `try_task`.
-    """
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
-        check_settings(config)
-        try_task(config)
-    own = [warning for warning in caught if warning.category.__module__.split(".")[0] in ("optics", "sim", "evolve")]
-    return list({str(warning.message): warning.message for warning in own}.values())
 
 
 def _failure(worlds: EyesVecEnv) -> str | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -17,7 +18,7 @@ from evolve.search.search import Search
 from evolve.store.directory import Run, next_directory
 from optics.numerics import device
 
-__all__ = ["PreparedRun", "RunRequest", "prepare_run"]
+__all__ = ["PreparedRun", "RunRequest", "check_task", "prepare_run"]
 
 RunT = TypeVar("RunT", bound=Run)
 
@@ -101,3 +102,17 @@ def prepare_run(request: RunRequest, tried: bool = True) -> PreparedRun:
         try_task(config)
     origin = starts.name.removeprefix("--from ") if starts else None
     return PreparedRun(config, request.preset.removesuffix(f"-{config.task}"), origin)
+
+
+def check_task(config: RunConfig) -> list[Warning | str]:
+    """Check the settings of the user task, try it, and return each warning once; for use in a worker process.
+
+    Raises:
+        ConfigError: see `check_settings` and `try_task`.
+    """
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        check_settings(config)
+        try_task(config)
+    own = [warning for warning in caught if warning.category.__module__.split(".")[0] in ("optics", "sim", "evolve")]
+    return list({str(warning.message): warning.message for warning in own}.values())

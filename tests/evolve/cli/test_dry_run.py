@@ -12,8 +12,8 @@ import evolve.cli.pace
 from evolve.cli.pace import ROLLOUTS, _short_life
 from evolve.config.assemble import assemble
 from evolve.config.run_config import LearningConfig
-from evolve.learning.task_trial import UnusedSettingWarning, check_task
-from evolve.runs.begin import RunRequest, prepare_run
+from evolve.learning.task_trial import UnusedSettingWarning
+from evolve.runs.begin import RunRequest, check_task, prepare_run
 from evolve.store.evaluation import Evaluation
 from tests.evolve.small_run import PHENOTYPE, small_config
 
