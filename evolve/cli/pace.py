@@ -1,12 +1,14 @@
 """Measurement of the speed of this machine.
 
-Some ten seconds of real training are timed, in as many processes as the run will have.
+A few seconds of real training are timed, in as many processes as the run will have.
 """
 
 from __future__ import annotations
 
+import math
 import multiprocessing
 import time
+import warnings
 from collections.abc import Mapping
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
@@ -18,14 +20,15 @@ from tempfile import TemporaryDirectory
 from evolve.config.run_config import ConfigError, LearningConfig, RunConfig
 from evolve.genome.phenotype import Phenotype
 from evolve.learning.schedule import mean_passes, schedule
+from evolve.runs.begin import check_task
 from evolve.search.job import ExecutorError
 from evolve.search.worker import evaluate_candidate, prepare_device
 
 __all__ = ["Pace", "measure_pace"]
 
-# Number of rollouts in a measurement. Four are the minimum from which the times for start, step and evaluation can be
-# computed separately. An evaluation follows the second and the fourth rollout.
-ROLLOUTS = 4
+# Number of rollouts in a measurement. Three are the minimum from which the times for start, step and pass can be
+# computed separately. PLAYS evaluations follow the last rollout: one for the learning curve, and one for the fitness.
+ROLLOUTS, PLAYS = 3, 2
 
 DIED = (
     "a process that measured this machine's pace died, probably because memory ran out: use fewer workers "
@@ -73,8 +76,9 @@ def measure_pace(config: RunConfig, animals: Mapping[str, Phenotype], workers: i
 
     Raises:
         BackendError: Dr.Jit does not work on this machine.
-        ConfigError: an animal cannot be evaluated on this machine, for example because its eyes cannot be computed. The
-            message names the animal and the reason.
+        ConfigError: the user task fails or has several mounts that no animal would use, or an animal cannot be
+            evaluated on this machine, for example because its eyes cannot be computed. The message names the animal and
+            the reason.
         ExecutorError: a worker process died.
     """
     context = multiprocessing.get_context("spawn")
@@ -82,6 +86,9 @@ def measure_pace(config: RunConfig, animals: Mapping[str, Phenotype], workers: i
     paces: dict[str, list[Pace]] = {name: [] for name in animals}
     try:
         with ProcessPoolExecutor(workers, mp_context=context, initializer=prepare_device) as pool:
+            if config.choice.named_code is not None:
+                for warning in pool.submit(check_task, config).result():
+                    warnings.warn(warning, stacklevel=2)
             lives = [pool.submit(_short_life, config, animals[name], seed) for seed, name in enumerate(tried)]
             for name, life in zip(tried, lives, strict=True):
                 try:
@@ -105,14 +112,15 @@ def _slowest(paces: list[Pace]) -> Pace:
 
 
 def _short_life(config: RunConfig, animal: Phenotype, seed: int) -> Pace:
-    """Time a training run of four rollouts, with an evaluation after the second and after the fourth.
+    """Time a training run of three short rollouts, followed by the evaluations.
 
-    The first update has the full number of passes over the samples, and the third may have only a third of it. The
+    The first update has the full number of passes over the samples, and the second may have only half of it. The
     difference between their times is the time of the passes.
     """
-    rollout = config.learning.n_envs * config.learning.n_steps
-    spans = {"total_steps": ROLLOUTS * rollout, "eval_interval": ROLLOUTS // 2 * rollout, "decay_after": rollout // 2}
-    short = replace(config.learning, **spans)
+    short = _with_short_rollouts(config.learning)
+    rollout = short.n_envs * short.n_steps
+    spans = {"total_steps": ROLLOUTS * rollout, "eval_interval": ROLLOUTS * rollout, "decay_after": rollout // 2}
+    short = replace(short, **spans)
     # The training run is not divided into rungs, because they would be shorter than a rollout.
     once = replace(config, learning=short, search=replace(config.search, rungs=1))
     marks: list[float] = []
@@ -123,12 +131,13 @@ def _short_life(config: RunConfig, animal: Phenotype, seed: int) -> Pace:
             *(animal, once, seed, policy),
             progress=lambda steps, planned: marks.append(time.perf_counter()),
         )
+        ended = time.perf_counter()
         if outcome.failure is not None:
             raise ValueError(outcome.failure)
         size = policy.stat().st_size
-    first, second, third, fourth = marks
-    all_passes, fewer, few = (schedule(short, number * rollout)[0] for number in (1, 2, 3))
-    step_s, late_step_s = (second - first) / rollout, (fourth - third) / rollout
+    first, second, third = marks
+    all_passes, few, last = (schedule(short, number * rollout)[0] for number in (1, 2, 3))
+    step_s, late_step_s = (second - first) / rollout, (third - second) / rollout
     pass_s = max(step_s - late_step_s, 0.0) / (all_passes - few) if few < all_passes else 0.0
     pass_s = min(pass_s, step_s / all_passes)
     if pass_s == 0:
@@ -136,7 +145,16 @@ def _short_life(config: RunConfig, animal: Phenotype, seed: int) -> Pace:
     return Pace(
         start_s=max(first - began - rollout * (step_s - all_passes * pass_s), 0.0),
         steps_per_s=1 / step_s,
-        play_s=max(third - second - rollout * (step_s - (all_passes - fewer) * pass_s), 0.0),
+        play_s=max(ended - third - rollout * last * pass_s, 0.0) / PLAYS,
         policy_bytes=size,
         pass_s=pass_s,
     )
+
+
+def _with_short_rollouts(learning: LearningConfig) -> LearningConfig:
+    """Return the settings with the shortest rollouts that consist of whole batches.
+
+    The time per step is nearly the same, because an update takes a time for each batch.
+    """
+    whole_batches = math.lcm(learning.batch_size, learning.n_envs) // learning.n_envs
+    return replace(learning, n_steps=max(2, min(learning.n_steps, whole_batches)))

@@ -49,7 +49,7 @@ class RunPlan:
         return cls(config, directory, config.workers or cores())
 
     def measured(self) -> RunPlan:
-        """Return the plan with the paces measured on this machine. The measurement takes some ten seconds."""
+        """Return the plan with the paces measured on this machine. The measurement takes a few seconds."""
         paces = measure_pace(self.config, self.animals, self.workers)
         return RunPlan(self.config, self.directory, self.workers, paces)
 

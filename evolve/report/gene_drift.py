@@ -78,7 +78,7 @@ class Drift:
             rows.append((one.quantity, *numbers))
         widths = [max(len(row[place]) for row in rows) for place in range(len(rows[0]))]
         table = ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]
-        first, last = self.generations[0] + 1, self.generations[-1] + 1
+        first, last = self.generations[0], self.generations[-1]
         return [
             *table,
             f"Means over candidates of generations {first} to {last}; null model: {self.searches} searches with random "

@@ -41,7 +41,7 @@ def _whose(generation: int) -> str:
 
     Its generation is not 0 if all candidates of the earlier generations have failed.
     """
-    return f"Generation {generation}’s best, the first to succeed" if generation else "The first generation’s best"
+    return f"Generation {generation}’s best{', the first to succeed' if generation else ''}"
 
 
 def _thinned(best: list[tuple[int, Candidate]]) -> list[tuple[int, Candidate]]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -12,11 +13,12 @@ from evolve.config.assemble import assemble
 from evolve.config.run_config import RunConfig
 from evolve.learning.task_trial import check_settings, try_task
 from evolve.runs.start_from import starts_from
+from evolve.search.optimizers import OWN
 from evolve.search.search import Search
 from evolve.store.directory import Run, next_directory
 from optics.numerics import device
 
-__all__ = ["PreparedRun", "RunRequest", "prepare_run"]
+__all__ = ["PreparedRun", "RunRequest", "check_task", "prepare_run"]
 
 RunT = TypeVar("RunT", bound=Run)
 
@@ -78,8 +80,11 @@ class PreparedRun:
             yield run
 
 
-def prepare_run(request: RunRequest) -> PreparedRun:
+def prepare_run(request: RunRequest, tried: bool = True) -> PreparedRun:
     """Collect the settings of a run, and check that the run can start on this machine. Nothing is written.
+
+    tried: whether to build the search and to try the user task in this process; False if the run is only planned:
+        other processes then measure its pace, and try the task first
 
     Raises:
         ConfigError: a setting is invalid, the optimizer is unknown, or the user task fails or has several mounts
@@ -89,9 +94,25 @@ def prepare_run(request: RunRequest) -> PreparedRun:
     """
     starts = starts_from(request.start_from) if request.start_from else None
     config = assemble(request.task, request.preset, request.config, request.assignments, starts, request.scale)
-    Search(config)  # raises an error for an unknown optimizer
+    if tried or config.search.optimizer not in OWN:  # importing nevergrad takes seconds
+        Search(config)  # raises an error for an unknown optimizer
     device.make_ready()
-    check_settings(config)
-    try_task(config)
+    if tried:
+        check_settings(config)
+        try_task(config)
     origin = starts.name.removeprefix("--from ") if starts else None
     return PreparedRun(config, request.preset.removesuffix(f"-{config.task}"), origin)
+
+
+def check_task(config: RunConfig) -> list[Warning | str]:
+    """Check the settings of the user task, try it, and return each warning once; for use in a worker process.
+
+    Raises:
+        ConfigError: see `check_settings` and `try_task`.
+    """
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        check_settings(config)
+        try_task(config)
+    own = [warning for warning in caught if warning.category.__module__.split(".")[0] in ("optics", "sim", "evolve")]
+    return list({str(warning.message): warning.message for warning in own}.values())

@@ -85,11 +85,12 @@ class Tally:
         return statistics.median(fitness) if fitness else None
 
     def summary(self) -> str:
-        """Return the generation, best and median fitness, pace and remaining time as text."""
+        """Return the generation, counted from 0, best and median fitness, pace and remaining time as text."""
         run = self._run
         search = run.config.search
-        reached = Place.from_id(len(run.candidates), search.population).generation + 1
-        parts = [f"generation {min(reached, search.generations)}/{search.generations}"]
+        last = search.generations - 1
+        reached = Place.from_id(len(run.candidates), search.population).generation
+        parts = [f"generation {min(reached, last)} of 0 to {last}"]
         if run.best is not None:
             parts.append(f"best {run.best.fitness:.3g}")
         if run.best is not None and self.median is not None:

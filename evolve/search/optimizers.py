@@ -21,9 +21,10 @@ from evolve.config.checks import ConfigError, suggestion
 from evolve.config.run_config import SearchConfig
 from evolve.genome.genes import Gene, GeneConfig
 
-__all__ = ["Optimizer", "Space", "build_optimizer"]
+__all__ = ["OWN", "Optimizer", "Space", "build_optimizer"]
 
 Floats = NDArray[np.float64]
+OWN = ("CMA", "mutation")  # names of optimizers that are defined here
 
 
 @dataclass(frozen=True)

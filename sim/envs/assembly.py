@@ -24,6 +24,7 @@ from sim.tasks.registry import task_of
 from sim.tasks.reward import check_mode
 from sim.tasks.simulation import check_least_return
 from sim.tasks.task import Task
+from sim.tasks.task_settings import TaskSettings
 from sim.tasks.user_tasks import batched
 from sim.worlds.course import Course
 from sim.worlds.world import build_world
@@ -32,7 +33,14 @@ if TYPE_CHECKING:
     from sim.envs.parallel_env import EncounterEnv
 
 AUTO = "auto"
-OF_ENVIRONMENTS = {"task", "n_envs", "seed", "memory", "mode", "least_return", "episode_steps", "render_mode"}
+LAYOUT = "only built-in tasks have layouts; the world of a user task is its model"
+OF_TASKS = {  # arguments for built-in tasks only, each with the way in which a user task defines the same
+    "eyes": "a user task defines its eyes by its settings eye and mounts",
+    "rays_per_receptor": "a user task defines it by its setting fidelity",
+    **dict.fromkeys(("world_seed", "mazes", "course"), LAYOUT),
+    **{name: f"a user task defines it by its setting {name}" for name in ("fidelity", "spectra", "vary", "auxiliary")},
+}
+IN_RESET = "pass it to reset(seed=...)"
 MOST = 1_000_000  # chosen limit for n_envs and for memory, more than any memory can hold
 
 
@@ -140,6 +148,13 @@ def make_parallel_env(
     return EncounterEnv(encounter, seed, memory, render_mode)
 
 
+def refuse(options: Mapping[str, Any], reasons: Mapping[str, str]) -> None:
+    """Refuse the arguments that `reasons` names."""
+    for name, why in reasons.items():
+        if name in options:
+            raise ValueError(f"{name} = {shown(options[name])}: must be left out, {why}")
+
+
 def in_bands(eyes: Eyes | Mapping[str, Eyes], bands: int) -> Any:
     """Return the same eyes with this number of spectral bands."""
     if isinstance(eyes, Eyes):
@@ -154,11 +169,16 @@ def _require_eyes(eyes: Any) -> None:
 
 
 def _refuse_for_tasks(given: Mapping[str, Any]) -> None:
-    """Refuse arguments that a user task defines itself."""
-    defaults = {name: p.default for name, p in inspect.signature(make_vec_env).parameters.items()}
-    for name in set(defaults) - OF_ENVIRONMENTS:
-        if given[name] != defaults[name]:
-            raise ValueError(f"{name} = {given[name]!r}: must be left out, a sim.Task defines it itself")
+    """Refuse arguments that a user task defines itself, and a task that defines its mode itself."""
+    parameters = inspect.signature(make_vec_env).parameters
+    for name, why in OF_TASKS.items():
+        if given[name] != parameters[name].default:
+            raise ValueError(f"{name} = {shown(given[name])}: must be left out, {why}")
+    task = given["task"]
+    for animal in task.animals if isinstance(task, Encounter) else (task,):
+        if animal.mode not in (TaskSettings.mode, given["mode"]):
+            name = type(animal).__name__
+            raise ValueError(f"{name}: mode = {shown(animal.mode)}: must be left out, the environment's mode sets it")
 
 
 def _fidelity_of(

@@ -7,16 +7,15 @@ from typing import Any
 import gymnasium
 import numpy as np
 
-from optics.numerics.arguments import shown
 from optics.numerics.number_types import resolved
-from sim.envs.assembly import make_vec_env
+from sim.envs.assembly import IN_RESET, make_vec_env, refuse
 from sim.envs.follow_camera import RENDER_MODES
 from sim.eyes.eyes import Eyes
 from sim.tasks.batch_task import BatchTask
 from sim.tasks.encounter import Encounter
 from sim.tasks.task import Task
 
-_OF_BATCHES = {"seed": "pass it to reset(seed=...)", "n_envs": "this is one world: make_vec_env has several"}
+_OF_BATCHES = {"seed": IN_RESET, "n_envs": "this is one world: make_vec_env has several"}
 
 
 class EyesEnv(gymnasium.Env[dict[str, np.ndarray], np.ndarray]):
@@ -38,9 +37,7 @@ class EyesEnv(gymnasium.Env[dict[str, np.ndarray], np.ndarray]):
             raise ValueError(
                 "task: several animals learn in a sim.Encounter: use the result of `alone`, or make_parallel_env"
             )
-        for name, why in _OF_BATCHES.items():
-            if name in options:
-                raise ValueError(f"{name} = {shown(options[name])}: must be left out, {why}")
+        refuse(options, _OF_BATCHES)
         self._batch = make_vec_env(task, eyes, n_envs=1, seed=None, render_mode=render_mode, **options)
         self.render_mode = render_mode
         self.observation_space = self._batch.observation_space

@@ -13,7 +13,7 @@ from sim.render.prepared_scene import PreparedScene
 from sim.render.world_scene import WorldScene
 from sim.tasks.batch_task import Agent
 from sim.tasks.built_in import AgentTask
-from sim.tasks.eye_kinds import EYES, EyeKind
+from sim.tasks.eye_kinds import EYES, EyeKind, named_in_errors
 from sim.tasks.simulation import Simulation
 
 __all__ = ["AgentRenderers", "renderers_for", "scenes_for"]
@@ -63,7 +63,8 @@ def _of_agent(
     for kind in agent.kinds:
         fidelity = fidelities[kind.name]
         if scenes is None:
-            renderer = EyeRenderer(_scene_of_model(simulation, kind, fidelity), simulation.n, fidelity)
+            with named_in_errors(agent.name):
+                renderer = EyeRenderer(_scene_of_model(simulation, kind, fidelity), simulation.n, fidelity)
         else:
             renderer = BatchedRenderer.from_scene(scenes[kind.name], simulation.n, fidelity)
         eyes[kind.name] = renderer

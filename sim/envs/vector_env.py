@@ -9,11 +9,13 @@ import numpy as np
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
-from sim.envs.assembly import make_vec_env
+from sim.envs.assembly import IN_RESET, make_vec_env, refuse
 from sim.envs.follow_camera import RENDER_MODES
 from sim.eyes.eyes import Eyes
 from sim.tasks.encounter import Encounter
 from sim.tasks.task import Task
+
+_OF_THE_BATCH = {"seed": IN_RESET, "n_envs": "it is num_envs here"}
 
 
 class EyesVectorEnv(VectorEnv[dict[str, np.ndarray], np.ndarray, np.ndarray]):
@@ -43,6 +45,7 @@ class EyesVectorEnv(VectorEnv[dict[str, np.ndarray], np.ndarray, np.ndarray]):
             raise ValueError(
                 "task: several animals learn in a sim.Encounter: pass the result of `alone`, or use sim.make_vec_env"
             )
+        refuse(options, _OF_THE_BATCH)
         self._batch = make_vec_env(task, eyes, n_envs=num_envs, seed=None, **options)
         self.num_envs, self.render_mode = num_envs, self._batch.render_mode
         self.single_observation_space = self._batch.observation_space

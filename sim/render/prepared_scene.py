@@ -183,11 +183,19 @@ class PreparedScene:
         data = mujoco.MjData(self.model)
         mujoco.mj_forward(self.model, data)
         pupils, _ = self.places.frames(Poses.from_data([data]))
-        for mount, pupil in zip(self.mounts, pupils[0], strict=True):
+        for number, (mount, pupil) in enumerate(zip(self.mounts, pupils[0], strict=True)):
             for geom in self.scene.geoms:
                 if (depth := depth_inside(self.model, data, geom, pupil)) > 0:
-                    name = self.model.geom(geom).name or f"{geom}"
                     raise ValueError(
-                        f"Mount on {mount.on!r}: the eye is inside geom {name!r}, {depth:.2g} m below its surface: "
-                        f"offset must lead out of it"
+                        f"mounts[{number}] on {mount.on!r}: in the reference pose of {_named(self.model)}, the eye at "
+                        f"({', '.join(f'{part:.3g}' for part in pupil.tolist())}) m of the world is inside geom "
+                        f"{self.model.geom(geom).name or geom!r} of body "
+                        f"{self.model.body(self.model.geom_bodyid[geom]).name!r}, {depth:.2g} m below its surface: "
+                        "offset must lead out of it"
                     )
+
+
+def _named(model: mujoco.MjModel) -> str:
+    """Return the words "the model", with the model's name if it has one."""
+    name = model.names.partition(b"\0")[0].decode()
+    return "the model" if name in ("", "MuJoCo Model") else f"the model {name!r}"

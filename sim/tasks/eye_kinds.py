@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -76,6 +77,16 @@ def kinds_of(task: TaskSettings) -> tuple[EyeKind, ...]:
         )
         for name in eyes
     )
+
+
+@contextmanager
+def named_in_errors(animal: str) -> Iterator[None]:
+    """Begin the message of each ValueError that is raised in this context with the name of an animal."""
+    try:
+        yield
+    except ValueError as error:
+        error.args = (f"{animal}: {error}",)
+        raise
 
 
 def auxiliary_of(names: Iterable[str], where: str) -> tuple[str, ...]:

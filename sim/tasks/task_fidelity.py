@@ -17,7 +17,7 @@ from sim.scene.poses import Poses
 from sim.scene.variation import Variation
 from sim.tasks.batch_task import BatchTask
 from sim.tasks.encounter import Frozen, among, split_agents
-from sim.tasks.eye_kinds import EYES, several
+from sim.tasks.eye_kinds import EYES, named_in_errors, several
 from sim.tasks.per_world import PerWorld
 from sim.tasks.simulation import Simulation
 from sim.tasks.task import Task
@@ -36,7 +36,8 @@ def fidelities_of(task: BatchTask | Task) -> dict[str, Fidelity]:
         ValueError: `fidelity` is neither a `sim.Fidelity` nor "auto", or the task's model or eyes are invalid.
     """
     batch = PerWorld(task) if isinstance(task, Task) else task
-    kinds = batch.agents()[0].kinds
+    animal = batch.agents()[0]
+    kinds = animal.kinds
     for kind in kinds:
         if not isinstance(kind.fidelity, Fidelity) and kind.fidelity != AUTO:
             said = f"fidelity = {kind.fidelity!r}"
@@ -53,9 +54,10 @@ def fidelities_of(task: BatchTask | Task) -> dict[str, Fidelity]:
         for kind in kinds:
             if kind.name not in found:
                 tolerance = None if variation is None else _in_brightest(variation, kind.eye)
-                found[kind.name] = choose_model_fidelity(
-                    model, kind.eye, kind.mounts, poses, tolerance, spectra=batch.spectra, varied=varied
-                )
+                with named_in_errors(animal.name):
+                    found[kind.name] = choose_model_fidelity(
+                        model, kind.eye, kind.mounts, poses, tolerance, spectra=batch.spectra, varied=varied
+                    )
     return found
 
 

@@ -32,10 +32,12 @@ __all__ = ["resume", "start"]
 
 def start(arguments: Namespace) -> int:
     """Start a run and continue it to its end; with --dry-run, print its plan only."""
+    if arguments.dry_run:
+        _refuse_without_run(arguments)
     scheduler = _scheduler(arguments)
     if arguments.tensorboard:
         require_tensorboard()
-    prepared = prepare_run(_request(arguments))
+    prepared = prepare_run(_request(arguments), tried=not arguments.dry_run)
     if arguments.dry_run:
         return _show(RunPlan.from_config(prepared.config, prepared.directory(arguments.out)), arguments.json)
     notes = (
@@ -61,6 +63,13 @@ def resume(arguments: Namespace) -> int:
             done = f"all {run.config.candidates} candidates have been evaluated"
             print(f"{run.path}: {state if unfinished else done}", flush=True)
         return _carry_on(run, arguments, scheduler) if unfinished else _already_finished(run, arguments)
+
+
+def _refuse_without_run(arguments: Namespace) -> None:
+    """Refuse options that apply to a run that starts, and have no effect on a plan."""
+    for name in ("open", "tensorboard", "quiet", "scheduler"):
+        if getattr(arguments, name):
+            raise ConfigError(f"--{name}: must be left out with --dry-run, which prints the plan for this machine only")
 
 
 def _request(arguments: Namespace) -> RunRequest:
@@ -171,8 +180,7 @@ def _scheduler(arguments: Namespace) -> Scheduler | None:
     if getattr(arguments, "workers", None) is not None:
         raise ConfigError("--workers: is for this machine's processes; with Dask, all available workers take part")
     scheduler = Scheduler(arguments.scheduler, *files)
-    if not getattr(arguments, "dry_run", False):
-        scheduler.require_answer()
+    scheduler.require_answer()
     return scheduler
 
 

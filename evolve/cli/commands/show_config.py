@@ -9,6 +9,7 @@ from dataclasses import Field, fields
 from typing import Any
 
 from evolve.config.assemble import assemble, to_toml
+from evolve.config.checks import ConfigError
 from evolve.config.formats import FORMAT
 from evolve.config.run_config import SECTIONS, TASKS, RunConfig
 from evolve.config.task_code import LABEL
@@ -23,11 +24,21 @@ KINDS = {"int": "integer", "float": "number", "bool": "boolean", "str": "string"
 def config(arguments: Namespace) -> int:
     """Print all settings of a run as TOML, or the schema of the settings as JSON."""
     if arguments.what == "schema":
+        _refuse_for_schema(arguments)
         print(json.dumps(schema(), indent=1))
         return 0
     chosen = assemble(arguments.task, arguments.preset, arguments.config, arguments.set, scale=arguments.scale)
     print(to_toml(chosen), end="")
     return 0
+
+
+def _refuse_for_schema(arguments: Namespace) -> None:
+    """Refuse options that determine values of settings: the schema describes the settings of all runs."""
+    values = {"TASK": arguments.task, "--config": arguments.config, "--set": arguments.set, "--scale": arguments.scale}
+    values["--preset"] = arguments.preset != arguments.parser.get_default("preset")
+    for name, given in values.items():
+        if given:
+            raise ConfigError(f"{name}: must be left out with schema, which describes the settings of all runs")
 
 
 def schema() -> dict[str, Any]:

@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 
 import evolve.cli.pace
-from evolve.cli.pace import Pace, _short_life, _slowest, measure_pace
+from evolve.cli.pace import ROLLOUTS, Pace, _short_life, _slowest, measure_pace
 from evolve.config.run_config import ConfigError, LearningConfig
 from evolve.genome.genotype import Genotype
 from evolve.genome.phenotype import develop
@@ -55,7 +55,7 @@ def test_pace_is_measured_with_the_real_thing(tmp_path, short_episodes):
     config = small_config()
     animal = develop(Genotype(config.genome).start, config)
     learning = replace(config.learning, total_steps=64 * config.learning.n_envs * config.learning.n_steps)
-    # the four measured rollouts are too few for these rungs
+    # the measured rollouts are too few for these rungs
     rungs = replace(config, learning=learning, search=replace(config.search, rungs=4))
     pace = measure_pace(rungs, {"start": animal}, 1)["start"]
     assert evaluate(animal, config, 0, tmp_path / "policy").failure is None
@@ -87,6 +87,7 @@ class Clock:
             self.now += 0.0002 * schedule(learning, steps)[0] * rollout
             if steps % learning.eval_interval == 0:
                 self.now += 3.0
+        self.now += 3.0  # the evaluation of the trained policy
         policy.write_bytes(b"1234567")
         return Evaluation(1.0)
 
@@ -113,7 +114,7 @@ def test_a_pass_takes_no_more_than_the_whole(monkeypatch):
         def evaluate(self, animal, config, seed, policy, progress):
             def later(steps, planned):
                 progress(steps, planned)
-                self.now += 1e3 * (steps == 4096)
+                self.now += 1e3 * (steps == config.learning.total_steps // ROLLOUTS)
 
             return super().evaluate(animal, config, seed, policy, later)
 

@@ -232,7 +232,11 @@ def test_dask_is_sent_the_text(tmp_path):
         ("<mujoco>", "<mujoko>", "mujoko"),
         ("episode_steps = 20", "episode_steps = 0", r"episode_steps = 0: must be"),
         ('sim.Mount("cart"', 'sim.Mount("kart"', "no site or camera or body 'kart' in the model; did you mean 'cart'"),
-        ("offset=(0.26, 0, 0.12)", "offset=(0, 0, 0)", "the eye is inside geom"),
+        (
+            "offset=(0.26, 0, 0.12)",
+            "offset=(0, 0, 0)",
+            r"FindBall: mounts\[0\] on 'cart': in the reference pose of the model",
+        ),
         ('{"near": ', '{"near": 0 * ', None),
         ('{"near": -abs(data.mocap_pos[0, 1] - data.qpos[0]) / 10}', "data.qpos", "must be numbers by name"),
         ("rng.uniform(-2, 2)", "rng.uniform()[3]", r"reset, line \d+ of mine\.py"),

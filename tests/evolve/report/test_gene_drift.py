@@ -88,7 +88,7 @@ def test_the_command_says_it_to_people_and_machines(call, runs):
     assert code == 0
     rows = {line.split()[0]: line.split() for line in out.splitlines()}
     assert float(rows["fov_deg"][-1]) == pytest.approx(2 / 6, rel=0.01)
-    assert "generations 10 to 12" in out
+    assert "generations 9 to 11" in out
     told = json.loads(call("drift", runs[0].path, "--searches", 5, "--json")[1])
     assert (told["generations"], told["searches"]) == ([9, 11], 5)
     found = {one["quantity"]: one for one in told["moved"]}

@@ -51,7 +51,7 @@ def test_first_and_best_are_the_records(run, content):
 
 
 def test_the_first_animal_is_of_the_first_generation_that_has_one(run, content):
-    assert "<h4>The first generation’s best</h4>" in content
+    assert "<h4>Generation 0’s best</h4>" in content
     failed = Evaluation.failed("no luck")
     fell = {c.id: Candidate.from_evaluation(c.place, c.genome, c.phenotype, c.seed, failed) for c in run.generation(0)}
     late = replace(run, record=replace(run.record, candidates=tuple(fell.get(c.id, c) for c in run.candidates)))

@@ -1,6 +1,6 @@
 """Tests of environments: which test covers which module.
 
-assembly: test_env.py, test_vec_env.py, test_tasks_page.py
+assembly: test_arguments.py, test_env.py, test_vec_env.py, test_tasks_page.py
 parallel_env: test_parallel_env.py, test_pictures.py
 auxiliary: test_auxiliary.py
 one_environment: test_vec_env.py, test_pictures.py

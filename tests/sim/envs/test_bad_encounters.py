@@ -1,5 +1,8 @@
 """Encounters that are refused, and the report of an animal that fails."""
 
+import random
+import re
+
 import numpy as np
 import pytest
 
@@ -136,3 +139,22 @@ def test_what_goes_wrong_is_the_animals_of_that_name(encounter, policy, words):
     with pytest.warns(UserWarning, match=words):
         *_, infos = env.step(np.zeros((2, 2)))
     assert words in infos[0]["failure"]
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_an_eye_inside_a_geom_is_named_with_its_animal_and_its_position(seed):
+    """Both kinds of checks are covered, during the choice of a fidelity and without it."""
+    draw = random.Random(seed)
+    animal, rest = (Prey(), Predator()) if seed % 2 else (Predator(), Prey())
+    mounts, number = list(animal.mounts), draw.randrange(animal.n_eyes)
+    ahead = draw.uniform(0.01, 0.15)
+    mounts[number] = sim.Mount(animal.body, offset=(ahead, 0, 0.02))
+    animal.mounts, animal.fidelity = tuple(mounts), "auto" if seed < 2 else animal.fidelity
+    start = 0 if animal.body == "prey" else 2
+    words = (
+        f"{type(animal).__name__}: mounts[{number}] on '{animal.body}': in the reference pose of the model, the eye at "
+        f"({start + ahead:.3g}, 0, 0.32) m of the world is inside geom {1 if animal.body == 'prey' else 2} of body "
+        f"'{animal.body}', "
+    )
+    with pytest.raises(ValueError, match=f"^{re.escape(words)}"):
+        sim.make_vec_env(sim.Encounter(animal, rest).alone(type(animal).__name__, {}), n_envs=1)

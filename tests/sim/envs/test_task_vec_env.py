@@ -231,7 +231,12 @@ class FailingReset(Face):
         (NoMounts, {}, ValueError, "mounts = .*must contain at least one sim.Mount"),
         (NoSubsteps, {}, ValueError, "NoSubsteps: substeps = 0: must be a whole number"),
         (FailingReset, {}, RuntimeError, "reset, line .* of test_task_vec_env.py: KeyError: 'nothing'"),
-        (Face, {"eyes": sim.Eyes()}, ValueError, "eyes = .*: must be left out, a sim.Task defines it itself"),
+        (
+            Face,
+            {"eyes": sim.Eyes()},
+            ValueError,
+            "eyes = .*: must be left out, a user task defines its eyes by its settings eye and mounts",
+        ),
         (Face, {"n_envs": 0}, ValueError, "n_envs = 0: must be a whole number"),
         (Face, {"render_mode": "ascii"}, ValueError, "render_mode = 'ascii': must be one of"),
     ],

@@ -85,7 +85,10 @@ def test_both_sides_mirror():
         (lambda: sim.ring(None, 2, 90, 0.2)[0], "Mount: on = None: must be a kind of str"),
         (lambda: sim.Mount("head", azimuth_deg=np.inf), "azimuth_deg = inf: must be finite"),
         (lambda: sim.Mount("head", offset=(1, 2)), "offset = .* must be three lengths"),
-        (lambda: sim.Mount("head", offset=(0.05, 0, 0)), "inside geom 'skull', 0.05 m below its surface: offset must"),
+        (
+            lambda: sim.Mount("head", offset=(0.05, 0, 0)),
+            "inside geom 'skull' of body 'head', 0.05 m below its surface: offset must",
+        ),
     ],
 )
 def test_bad_mounts_are_named(mount, words):
@@ -161,6 +164,8 @@ def test_eyes_inside_a_mesh_are_refused():
     def made(text, ahead):
         return sim.ModelRenderer(text, EYE, [sim.Mount("head", offset=(ahead, 0, 0))], 1, sim.Fidelity(1, bands=1))
 
-    with pytest.raises(ValueError, match=r"inside geom 'skull', 0\.0[45].* m below its surface: offset must lead out"):
+    with pytest.raises(
+        ValueError, match=r"inside geom 'skull' of body 'head', 0\.0[45].* m below its surface: offset must lead out"
+    ):
         made(cube(1), 0.46)
     assert made(cube(1), 0.51).moving == made(cube(1, lids=False), 0.4).moving == 1
