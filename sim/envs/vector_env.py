@@ -57,7 +57,7 @@ class EyesVectorEnv(VectorEnv[dict[str, np.ndarray], np.ndarray, np.ndarray]):
             raise ValueError(f"reset: options = {options!r}: must be left out, reset has no options")
         given: Any = seed
         if isinstance(given, Sequence | np.ndarray) and not isinstance(given, str | bytes) and np.ndim(given):
-            self._batch.seed_worlds(given)
+            self._batch.seed_worlds(list(given))
         elif given is not None:
             self._batch.seed(given)
         return self._batch.reset(), self._together(self._batch.reset_infos)
