@@ -21,6 +21,7 @@ from evolve.config.run_config import ConfigError, RunConfig
 from evolve.genome.phenotype import Phenotype
 from evolve.learning.training_rung import TrainingRung
 from evolve.store.evaluation import Evaluation
+from rhabdom.streams import send_all_to_stderr
 
 __all__ = ["Message", "evaluate_candidate", "evaluated", "prepare_device", "refusal", "work"]
 
@@ -44,6 +45,7 @@ class Message:
 
 def work(connection: Connection, evaluate: Callable[..., Evaluation], prepare: Callable[[], None] | None) -> None:
     """Evaluate the candidates that arrive through the pipe, and send a message for each result; run in the process."""
+    send_all_to_stderr()
     threading.Thread(target=_die_with_parent, daemon=True).start()
     try:
         if prepare is not None:
