@@ -65,20 +65,20 @@ def private_stdout() -> Iterator[TextIO]:
     Within the context, everything else that is written to descriptor 1 goes to stderr: the output of users' code,
     libraries and child processes. If stdout has been replaced, for example by a test, the replacement is yielded.
     """
-    if sys.stdout is not sys.__stdout__ or sys.stdout.fileno() != 1:
+    original: Any = sys.__stdout__
+    if sys.stdout is not original or original.fileno() != 1:
         yield sys.stdout
         return
-    stream: Any = sys.stdout
     with suppress(OSError):
-        stream.flush()
-    lines = 1 if stream.isatty() else -1
-    own = open(os.dup(1), "w", lines, encoding=stream.encoding, errors=stream.errors)  # noqa: SIM115
+        original.flush()
+    lines = 1 if original.isatty() else -1
+    own = open(os.dup(1), "w", lines, encoding=original.encoding, errors=original.errors)  # noqa: SIM115
     os.dup2(2, 1)
     try:
         yield own
     finally:
         with suppress(OSError, ValueError):
-            stream.flush()
+            original.flush()
         os.dup2(own.fileno(), 1)
         with suppress(OSError):
             own.close()
