@@ -16,6 +16,7 @@ from importlib import import_module
 from evolve.cli.arguments import parse
 from evolve.cli.commands import INTERRUPTED
 from evolve.cli.notes import notes
+from evolve.config.task_errors import error_in_task
 from evolve.runs.output import results, silenced, voices
 from rhabdom.streams import open_closed_streams, repair_encodings
 
@@ -51,10 +52,11 @@ def _outcome(arguments: Sequence[str]) -> int:
         return INTERRUPTED
     except BrokenPipeError:
         raise
-    except Exception as error:
-        if not _is_users(error):
+    except BaseException as error:
+        place = error_in_task(error)
+        if place is None and not (isinstance(error, Exception) and _is_users(error)):
             raise
-        print(f"evolve: error: {_one_line(error)}", file=sys.stderr)
+        print(f"evolve: error: {place or _one_line(error)}", file=sys.stderr)
         return 2
 
 
@@ -82,13 +84,13 @@ def _require_system() -> None:
         raise SystemExit(2)
 
 
-def _one_line(error: Exception) -> str:
+def _one_line(error: BaseException) -> str:
     if isinstance(error, OSError) and error.filename is not None:
         return f"{error.filename}: {error.strerror}"
     return " ".join(str(error).split())
 
 
-def _is_users(error: Exception) -> bool:
+def _is_users(error: BaseException) -> bool:
     """Return whether users can correct the cause of an error. Any other error is a bug and keeps its traceback."""
     from evolve.config.run_config import ConfigError
     from evolve.search.local_executor import ExecutorError
