@@ -1,18 +1,8 @@
-"""Entry point of `python -m evolve`. Other modules are imported only after Ctrl-C is handled."""
+"""Entry point of `python -m evolve`, which is the command `evolve`."""
 
 import sys
 
-
-def main() -> int:
-    """Import the module of the command, run the command, and return its exit code."""
-    try:
-        from evolve.cli.main import main as command
-
-        return command()
-    except KeyboardInterrupt:  # Ctrl-C during the import
-        print("evolve: interrupted", file=sys.stderr)
-        return 130
-
+from rhabdom.command import run_command
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(run_command())

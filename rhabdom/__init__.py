@@ -4,11 +4,12 @@ optics    wave optics, from light to photoreceptor signals
 sim       simulated worlds, and the signals of eyes in them
 evolve    evolutionary search: genomes, learning, runs
 
-`rhabdom.optics` and `optics` are the same package. Each package is imported on first use. This package contains two
+`rhabdom.optics` and `optics` are the same package. Each package is imported on first use. This package contains three
 modules:
 
 importing  locations of the three packages, and conflicts with other packages of the same names
 command    entry point of the command `evolve`
+streams    standard streams that stay usable if they are closed, full or badly encoded
 """
 
 from __future__ import annotations

@@ -8,8 +8,11 @@ from __future__ import annotations
 import os
 import signal
 import threading
+from contextlib import suppress
 from importlib import import_module
 from types import FrameType
+
+from rhabdom.streams import open_closed_streams
 
 __all__ = ["run_command"]
 
@@ -19,13 +22,14 @@ _SAID = b"evolve: interrupted\n"
 
 def run_command() -> int:
     """Run one command and return the exit code."""
+    open_closed_streams()
     ours = threading.current_thread() is threading.main_thread()
     if ours and signal.getsignal(signal.SIGINT) is signal.default_int_handler:
         signal.signal(signal.SIGINT, _interrupt)
     try:
         return int(import_module("evolve.cli.main").main())
     except KeyboardInterrupt:
-        os.write(2, _SAID)
+        _report()
         return INTERRUPTED
 
 
@@ -36,9 +40,14 @@ def _interrupt(number: int, frame: FrameType | None) -> None:
     replace or suppress it.
     """
     if _imports(frame):
-        os.write(2, _SAID)
+        _report()
         os._exit(INTERRUPTED)
     signal.default_int_handler(number, frame)
+
+
+def _report() -> None:
+    with suppress(OSError):  # stderr may be full
+        os.write(2, _SAID)
 
 
 def _imports(frame: FrameType | None) -> bool:

@@ -8,9 +8,10 @@ import re
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import NoReturn, TypeAlias
+from typing import Any, NoReturn, TypeAlias
 
 from evolve.cli.argument_values import searches, seed
+from evolve.runs.output import say
 
 __all__ = ["SHELLS", "build_parser", "parse"]
 
@@ -50,6 +51,10 @@ Commands: TypeAlias = "argparse._SubParsersAction[Parser]"
 
 class Parser(argparse.ArgumentParser):
     """Argument parser whose error messages are one line, with a suggestion for a mistyped word."""
+
+    def _print_message(self, message: str, file: Any = None) -> None:
+        """Print help and the version as results of the command."""
+        say(message, end="")
 
     def error(self, message: str) -> NoReturn:
         said = re.sub(r" \(choose from (.*)\)", "", message)

@@ -9,6 +9,7 @@ import subprocess
 import sys
 from importlib import metadata
 
+from evolve.runs.output import say
 from optics.numerics import backend
 from optics.numerics.device import device
 from rhabdom.importing import namesakes
@@ -134,9 +135,9 @@ def print_findings(as_json: bool = False) -> int:
     """Print the findings; return 0 if everything that `evolve run` needs works, else 2."""
     findings = examine()
     if as_json:
-        print(json.dumps(findings, indent=2))
+        say(json.dumps(findings, indent=2))
     else:
-        print("\n".join(_lines(findings)))
+        say("\n".join(_lines(findings)))
     return 0 if findings["good"] else 2
 
 

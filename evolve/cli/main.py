@@ -10,13 +10,15 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Sequence
-from contextlib import ExitStack, redirect_stdout
+from contextlib import nullcontext
 from importlib import import_module
 
 from evolve.cli.arguments import parse
 from evolve.cli.commands import INTERRUPTED
 from evolve.cli.notes import notes
-from evolve.runs.output import voices
+from evolve.config.task_errors import error_in_task
+from evolve.runs.output import results, silenced, voices
+from rhabdom.streams import open_closed_streams, repair_encodings
 
 __all__ = ["main"]
 
@@ -26,9 +28,15 @@ LONGEST = 1800  # maximum number of characters of an error message
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one subcommand and return the exit code."""
     given = list(sys.argv[1:] if arguments is None else arguments)
+    open_closed_streams()
+    replaced = repair_encodings()
+    # `run` and `resume` continue even if the program that reads their output through a pipe has ended, or the disk is
+    # full. The scripts of `validate` are child processes that print their results themselves.
+    patient = given[:1] in (["run"], ["resume"]) and not {"--dry-run", "--help", "-h"} & {*given}
     try:
-        # `run` and `resume` continue even if the program that reads their output through a pipe has ended.
-        with voices(patient=given[:1] in (["run"], ["resume"])), notes():
+        with voices(patient, private=given[:1] != ["validate"]), notes():
+            for encoding in replaced:
+                print(f"note: encoding {encoding}: cannot write text; UTF-8 is used", file=sys.stderr)
             return _outcome(given)
     except BrokenPipeError:
         return 0  # the reader of a pipe has ended, for example in `evolve genes | head`
@@ -37,29 +45,36 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _outcome(arguments: Sequence[str]) -> int:
     """Run one subcommand and return the exit code. Errors that users can correct are printed as one line."""
     try:
-        parsed = parse(arguments)
-        if parsed.module != "validate":
-            _require_system()
-        # Numerical libraries read these variables on import. They are limited to one thread because runs must be
-        # reproducible, and with several threads the order of summation varies.
-        os.environ.update(dict.fromkeys(("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1"))
-        if getattr(parsed, "device", None):
-            os.environ["RHABDOM_DEVICE"] = parsed.device  # worker processes inherit this variable
-        command = import_module(f"evolve.cli.commands.{parsed.module}")
-        with ExitStack() as silence:
-            if getattr(parsed, "quiet", False):
-                silence.enter_context(redirect_stdout(silence.enter_context(open(os.devnull, "w", encoding="utf-8"))))
-            return int(getattr(command, parsed.function)(parsed))
+        try:
+            return _code(arguments)
+        finally:
+            results().flush()
     except KeyboardInterrupt:
         print("evolve: interrupted", file=sys.stderr)
         return INTERRUPTED
     except BrokenPipeError:
         raise
-    except Exception as error:
-        if not _is_users(error):
+    except BaseException as error:
+        place = error_in_task(error)
+        if place is None and not (isinstance(error, Exception) and _is_users(error)):
             raise
-        print(f"evolve: error: {_one_line(error)}", file=sys.stderr)
+        print(f"evolve: error: {place or _one_line(error)}", file=sys.stderr)
         return 2
+
+
+def _code(arguments: Sequence[str]) -> int:
+    """Run one subcommand and return the exit code."""
+    parsed = parse(arguments)
+    if parsed.module != "validate":
+        _require_system()
+    # Numerical libraries read these variables on import. They are limited to one thread because runs must be
+    # reproducible, and with several threads the order of summation varies.
+    os.environ.update(dict.fromkeys(("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1"))
+    if getattr(parsed, "device", None):
+        os.environ["RHABDOM_DEVICE"] = parsed.device  # worker processes inherit this variable
+    command = import_module(f"evolve.cli.commands.{parsed.module}")
+    with silenced() if getattr(parsed, "quiet", False) else nullcontext():
+        return int(getattr(command, parsed.function)(parsed))
 
 
 def _require_system() -> None:
@@ -71,7 +86,7 @@ def _require_system() -> None:
         raise SystemExit(2)
 
 
-def _one_line(error: Exception) -> str:
+def _one_line(error: BaseException) -> str:
     if isinstance(error, OSError) and error.filename is not None:
         return f"{error.filename}: {error.strerror}"
     if isinstance(error, MemoryError):
@@ -80,7 +95,7 @@ def _one_line(error: Exception) -> str:
     return text if len(text) <= LONGEST else f"{text[: LONGEST // 2]} [...] {text[-LONGEST // 2 :]}"
 
 
-def _is_users(error: Exception) -> bool:
+def _is_users(error: BaseException) -> bool:
     """Return whether users can correct the cause of an error. Any other error is a bug and keeps its traceback."""
     from evolve.config.run_config import ConfigError
     from evolve.search.local_executor import ExecutorError

@@ -13,6 +13,7 @@ square_eyes    settings of square eyes, which have one gene for height and width
 task_choice    TaskChoice: a task, and its code if the user has named it
 task_card      TaskCard: properties of a task that are known without executing it
 task_code      TaskCode: source text of a user task
+task_errors    place of an error in the code of a user task
 numbering      conversion between a candidate's id and its generation
 tasks/         default settings of the tasks
 """

@@ -9,6 +9,8 @@ from types import ModuleType
 
 from evolve.config.checks import ConfigError
 from evolve.config.task_code import TaskCode
+from evolve.config.task_errors import MODULE
+from rhabdom.streams import open_closed_streams
 from sim.scene.source import with_compiled_color_spaces
 from sim.tasks.batch_task import BatchTask
 from sim.tasks.task import Task
@@ -41,7 +43,9 @@ def executed_task(code: TaskCode, encoded_textures: bool = True) -> Task | Batch
         compiled(task)
         require_rewards(task)
         return resolve_other_fidelities(task) if isinstance(task, Task) else task
-    except (Exception, SystemExit) as error:
+    except KeyboardInterrupt:
+        raise
+    except BaseException as error:  # for example SystemExit, which would end this process
         raise ConfigError(f"{code.label}: {_told(error, code)}", "task") from error
 
 
@@ -55,7 +59,7 @@ def _resolve_textures(task: Task | BatchTask) -> None:
 
 def _executed(code: TaskCode) -> ModuleType:
     """Execute the code as a module. It has a unique name in `sys.modules`, where pickle and dataclasses look it up."""
-    name = f"rhabdom_task_{code.sha256[:16]}"
+    name = f"{MODULE}{code.sha256[:16]}"
     module = ModuleType(name)
     module.__file__ = str(code.file)
     sys.modules[name] = module
@@ -63,9 +67,13 @@ def _executed(code: TaskCode) -> ModuleType:
         sys.path.append(str(code.file.parent))  # at the end, so that its files do not shadow modules
     try:
         exec(compile(code.text, str(code.file), "exec"), module.__dict__)
-    except (Exception, SystemExit) as error:  # sys.exit in the code would end this process
+    except KeyboardInterrupt:
+        raise
+    except BaseException as error:
         del sys.modules[name]
         raise ConfigError(f"{code.file.name}: {_told(error, code)}", "task") from error
+    finally:
+        open_closed_streams()  # the code may have closed one
     return module
 
 

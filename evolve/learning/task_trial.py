@@ -14,8 +14,10 @@ import numpy as np
 
 from evolve.config.checks import AUTO, ConfigError
 from evolve.config.run_config import RunConfig
+from evolve.config.task_errors import error_in_task
 from evolve.genome.genotype import Genotype
 from evolve.genome.phenotype import develop
+from rhabdom.streams import open_closed_streams
 
 if TYPE_CHECKING:
     from sim.envs.vec_env import EyesVecEnv
@@ -94,9 +96,16 @@ def try_task(config: RunConfig) -> None:
         with closing(task.vec_env(WORLDS, config.seed, animal.memory_frames)) as worlds, warnings.catch_warnings():
             warnings.simplefilter("ignore")  # the failure is reported as an error instead
             failure = _failure(worlds)
-    except (ValueError, RuntimeError, OSError) as error:
-        said = str(error) if isinstance(error, ConfigError) else f"{config.task}: {error}"
+    except KeyboardInterrupt:
+        raise
+    except BaseException as error:
+        place = error_in_task(error)
+        if place is None and not isinstance(error, ValueError | RuntimeError | OSError):
+            raise
+        said = str(error) if isinstance(error, ConfigError) else f"{config.task}: {place or error}"
         raise ConfigError(" ".join(said.split()), "task") from error
+    finally:
+        open_closed_streams()  # the task may have closed one
     if failure is not None:
         raise ConfigError(f"{config.task}: {failure}", "task")
 

@@ -1,8 +1,10 @@
-"""Safe output of text on a terminal. Commands print all text through a Voice.
+"""Safe output of text on a terminal. Commands print all text through a Voice, and their results with `say`.
 
 Messages, settings and names of directories may come from an untrusted source. Escape sequences in them are printed as
 visible text, so that they have no effect on the terminal. Characters that the terminal's encoding lacks are spelt out
-("sigma"), or printed as numbers. If a reader such as `head` closes the pipe, a run continues.
+("sigma"), or printed as numbers. If a reader such as `head` closes the pipe, or the disk is full, a run continues.
+
+stdout contains only what `say` prints. Within a command, `print` writes to stderr, as do the users' tasks.
 """
 
 from __future__ import annotations
@@ -12,10 +14,12 @@ import os
 import sys
 import unicodedata
 from collections.abc import Iterator
-from contextlib import contextmanager
-from typing import Any, TextIO, cast
+from contextlib import contextmanager, nullcontext
+from typing import TextIO, cast
 
-__all__ = ["Voice", "as_it_is", "printable", "spelled", "voices"]
+from rhabdom.streams import OwnedStream, private_stdout
+
+__all__ = ["Voice", "as_it_is", "printable", "results", "say", "silenced", "spelled", "voices"]
 
 _UNSEEN = ("Cc", "Cf", "Cn", "Co", "Cs", "Zl", "Zp")  # controls, direction marks, unassigned characters, line ends
 _LAYOUT = "\n\t"
@@ -54,61 +58,89 @@ def _named(letter: str) -> str:
     return letter.encode("ascii", "backslashreplace").decode() if not letter.isascii() else f"\\x{ord(letter):02x}"
 
 
-class Voice:
+class Voice(OwnedStream):
     """A text stream that writes to another stream, with control characters escaped.
 
     stream: the stream that receives the text
-    patient: if the reader has closed the pipe, whether to continue without output; False: BrokenPipeError ends the
-        command
+    patient: whether to continue without output after a fault. False: if the reader has closed the pipe, a
+        BrokenPipeError ends the command, and other faults raise an OSError
     obeyed: whether control characters are written unchanged; True for a progress bar, which needs them
+    name: name of the stream in the error, and in the note of a patient stream; None: faults other than a closed pipe
+        are not reported
     """
 
-    def __init__(self, stream: TextIO, patient: bool, obeyed: bool = False) -> None:
-        self.stream, self.patient, self.obeyed = stream, patient, obeyed
+    def __init__(self, stream: TextIO, patient: bool, obeyed: bool = False, name: str | None = None) -> None:
+        super().__init__(stream, self._judge)
+        self.patient, self.obeyed, self.name = patient, obeyed, name
 
     def write(self, text: str) -> int:
-        shown = spelled(text if self.obeyed else printable(text), self.stream)
-        self._heard(lambda: self.stream.write(shown))
+        super().write(spelled(text if self.obeyed else printable(text), self.stream))
         return len(text)
 
-    def flush(self) -> None:
-        self._heard(self.stream.flush)
-
-    def _heard(self, speak: Any) -> None:
-        try:
-            speak()
-        except OSError as error:
-            if error.errno not in (errno.EPIPE, errno.EIO):  # other errors than a closed pipe or terminal
-                raise
-            self._fall_silent()
+    def _judge(self, fault: OSError | ValueError) -> None:
+        """Report a fault, or raise it if the stream is not patient."""
+        number = fault.errno if isinstance(fault, OSError) else errno.EBADF
+        if number in (errno.EPIPE, errno.EIO):  # a closed pipe or terminal
             if not self.patient:
-                raise BrokenPipeError(error.errno, error.strerror) from error
+                raise BrokenPipeError(number, os.strerror(number)) from fault
+        elif self.name is not None and number is not None:
+            if not self.patient:
+                raise OSError(number, os.strerror(number), self.name) from fault
+            print(f"note: {self.name}: {os.strerror(number)}; further output is discarded", file=sys.stderr)
 
-    def _fall_silent(self) -> None:
-        """Redirect the stream to the null device, which discards the buffer and all further output."""
-        nowhere = os.open(os.devnull, os.O_WRONLY)
-        os.dup2(nowhere, self.stream.fileno())
-        os.close(nowhere)
 
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self.stream, name)
+_results: TextIO | None = None
+
+
+def results() -> TextIO:
+    """Return the stream for the results of a command: stdout."""
+    return sys.stdout if _results is None else _results
+
+
+def say(text: str, end: str = "\n", flush: bool = False) -> None:
+    """Print a part of a command's result on stdout."""
+    print(text, end=end, file=results(), flush=flush)
 
 
 @contextmanager
-def voices(patient: bool) -> Iterator[None]:
+def voices(patient: bool, private: bool = False) -> Iterator[None]:
     """Replace stdout and stderr by Voices within the context.
 
-    patient: see `Voice`
+    patient: see `Voice`; stderr is always patient
+    private: whether only `say` writes to stdout, and everything else to stderr. False: `print` writes to stdout, too
     """
     before = sys.stdout, sys.stderr
-    sys.stdout, sys.stderr = (cast(TextIO, Voice(stream, patient)) for stream in before)
+    sys.stderr = cast(TextIO, Voice(before[1], patient=True))
     try:
-        yield
-        sys.stdout.flush()
+        with private_stdout() if private else nullcontext(before[0]) as stdout:
+            own = cast(TextIO, Voice(stdout, patient, name="stdout"))
+            sys.stdout = cast(TextIO, Voice(before[1], patient=True)) if private else own
+            with _results_on(own):
+                yield
+                own.flush()
     finally:
         sys.stdout, sys.stderr = before
 
 
+@contextmanager
+def silenced() -> Iterator[None]:
+    """Discard the results of a command within the context."""
+    with open(os.devnull, "w", encoding="utf-8") as null, _results_on(null):
+        yield
+
+
+@contextmanager
+def _results_on(stream: TextIO) -> Iterator[None]:
+    global _results
+    before, _results = _results, stream
+    try:
+        yield
+    finally:
+        _results = before
+
+
 def as_it_is(stream: TextIO) -> TextIO:
     """Return a stream that writes to the same place, but does not escape control characters."""
-    return cast(TextIO, Voice(stream.stream, stream.patient, obeyed=True)) if isinstance(stream, Voice) else stream
+    if not isinstance(stream, Voice):
+        return stream
+    return cast(TextIO, Voice(stream.stream, stream.patient, obeyed=True, name=stream.name))

@@ -18,9 +18,11 @@ from pathlib import Path
 from typing import Any, Literal
 
 from evolve.config.run_config import ConfigError, RunConfig
+from evolve.config.task_errors import error_in_task
 from evolve.genome.phenotype import Phenotype
 from evolve.learning.training_rung import TrainingRung
 from evolve.store.evaluation import Evaluation
+from rhabdom.streams import send_all_to_stderr
 
 __all__ = ["Message", "evaluate_candidate", "evaluated", "prepare_device", "refusal", "work"]
 
@@ -44,6 +46,7 @@ class Message:
 
 def work(connection: Connection, evaluate: Callable[..., Evaluation], prepare: Callable[[], None] | None) -> None:
     """Evaluate the candidates that arrive through the pipe, and send a message for each result; run in the process."""
+    send_all_to_stderr()
     threading.Thread(target=_die_with_parent, daemon=True).start()
     try:
         if prepare is not None:
@@ -56,6 +59,7 @@ def work(connection: Connection, evaluate: Callable[..., Evaluation], prepare: C
             arguments = connection.recv()
         except EOFError:
             return
+        send_all_to_stderr()  # again, because a task may have closed or replaced the streams
         try:
             outcome = evaluated(evaluate, arguments, lambda *steps: connection.send(Message("progress", steps)))
         except (OSError, MemoryError) as error:
@@ -133,12 +137,15 @@ def evaluated(
     began = time.perf_counter()
     try:
         return evaluate(*arguments, progress=progress)
-    except (OSError, MemoryError, ConfigError):
+    except KeyboardInterrupt:
         raise
-    except Exception as error:
+    except BaseException as error:
+        place = error_in_task(error)  # a task may raise anything, such as SystemExit or an OSError
+        if isinstance(error, MemoryError | ConfigError) or (isinstance(error, OSError) and place is None):
+            raise
         if isinstance(error, RuntimeError) and any(words in str(error) for words in NO_MEMORY):
             raise MemoryError(_one_line(error)) from error
-        return Evaluation.failed(_one_line(error), time.perf_counter() - began)
+        return Evaluation.failed(place or _one_line(error), time.perf_counter() - began)
     finally:
         _give_back_memory()
 
@@ -167,7 +174,7 @@ def _give_back_memory() -> None:
         trim(0)
 
 
-def _one_line(error: Exception) -> str:
+def _one_line(error: BaseException) -> str:
     """Return an error as one line, such as "ValueError: message (file.py:12)"."""
     where = traceback.extract_tb(error.__traceback__)[-1]
     return f"{type(error).__name__}: {error} ({Path(where.filename).name}:{where.lineno})"

@@ -12,6 +12,7 @@ import numpy as np
 
 from optics.numerics.arguments import shown, whole
 from optics.spectra.spectrum import Spectrum
+from sim.envs.calls import seed_of
 from sim.envs.follow_camera import check_render_mode
 from sim.envs.prepared_task import PreparedTask
 from sim.envs.vec_env import EyesVecEnv
@@ -209,8 +210,7 @@ def _check(n_envs: int, seed: int | None, memory: int, mode: str, render_mode: s
     for name, number in (("n_envs", n_envs), ("memory", memory)):
         _require_whole(name, number, 1)
         whole(name, number, 1, MOST)
-    if seed is not None:
-        _require_whole("seed", seed, 0)
+    seed_of("seed", seed)
     check_mode(mode)
     check_render_mode(render_mode)
 

@@ -7,8 +7,8 @@ from typing import Any
 import gymnasium
 import numpy as np
 
-from optics.numerics.number_types import resolved
 from sim.envs.assembly import IN_RESET, make_vec_env, refuse
+from sim.envs.calls import seed_of
 from sim.envs.follow_camera import RENDER_MODES
 from sim.eyes.eyes import Eyes
 from sim.tasks.batch_task import BatchTask
@@ -52,6 +52,7 @@ class EyesEnv(gymnasium.Env[dict[str, np.ndarray], np.ndarray]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
+        seed = seed_of("seed", seed)
         super().reset(seed=seed)
         if options:
             raise ValueError(f"reset: options = {options!r}: must be left out, reset has no options")
@@ -61,9 +62,13 @@ class EyesEnv(gymnasium.Env[dict[str, np.ndarray], np.ndarray]):
         return _only(observation), self._batch.reset_infos[0]
 
     def step(self, action: np.ndarray) -> tuple[dict[str, np.ndarray], float, bool, bool, dict[str, Any]]:
-        observation, reward, terminated, truncated, info = self._batch.step_once(
-            np.asarray(resolved("action", action))[None]
-        )
+        """Take one action.
+
+        Raises:
+            ValueError: the action is not real, finite numbers of the right shape, or it is masked.
+            RuntimeError: before the first reset, or after `close`.
+        """
+        observation, reward, terminated, truncated, info = self._batch.step_once(action)
         info[0].pop("episode", None)  # entry of Stable-Baselines3; Gymnasium reserves this name for its wrappers
         return _only(observation), float(reward[0]), bool(terminated[0]), bool(truncated[0]), info[0]
 

@@ -9,6 +9,8 @@ import numpy as np
 from stable_baselines3.common.vec_env import VecEnv
 from stable_baselines3.common.vec_env.base_vec_env import tile_images
 
+from sim.envs.calls import seed_of
+
 
 class OneEnvironment(VecEnv):
     """Worlds that share one environment, and therefore its attributes and methods."""
@@ -21,8 +23,12 @@ class OneEnvironment(VecEnv):
         )
 
     def seed(self, seed: int | None = None) -> Sequence[int | None]:
-        """Seed all random streams at the next reset. World i uses streams derived from (seed, i)."""
-        self._seeds = [seed] * self.num_envs
+        """Seed all random streams at the next reset. World i uses streams derived from (seed, i).
+
+        Raises:
+            ValueError: the seed is neither a whole number from 0 on nor None.
+        """
+        self._seeds = [seed_of("seed", seed)] * self.num_envs
         return self._seeds
 
     def render(self, mode: str | None = None) -> np.ndarray | None:

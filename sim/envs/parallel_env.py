@@ -10,8 +10,8 @@ from gymnasium import spaces
 from pettingzoo import ParallelEnv
 
 from optics.numerics.arguments import did_you_mean
-from optics.numerics.number_types import resolved
 from sim.envs.animals import Animals
+from sim.envs.calls import CallOrder, one_worlds_action, seed_of
 from sim.envs.follow_camera import RENDER_MODES
 from sim.envs.prepared_task import PreparedTask
 from sim.envs.renderers import renderers_for
@@ -42,7 +42,7 @@ class EncounterEnv(ParallelEnv[str, dict[str, np.ndarray], np.ndarray]):
         renderers = renderers_for(simulation, simulation.agents, PreparedTask(task).fidelities, None)
         self._animals = Animals(simulation, renderers, memory)
         self._pictures = WorldPictures(self._animals, render_mode)
-        self._begun = False
+        self._calls = CallOrder()
         self.observation_spaces = self._named([senses.observation_space for senses in self._animals.learners])
         self.action_spaces = self._named([senses.action_space for senses in self._animals.learners])
 
@@ -56,10 +56,13 @@ class EncounterEnv(ParallelEnv[str, dict[str, np.ndarray], np.ndarray]):
         self, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[dict[str, dict[str, np.ndarray]], dict[str, dict[str, Any]]]:
         """Start an episode. Options are accepted, because PettingZoo's tests pass some, but have no effect."""
+        self._calls.start_reset()
+        seed = seed_of("seed", seed)
         if seed is not None:
             self._animals.seed(seed)
-        self.agents, self._begun = list(self.possible_agents), True
+        self.agents = list(self.possible_agents)
         observations, varied = self._observed(self._animals.reset()), self._animals.simulation.variation_info(0)
+        self._calls.finish_reset()
         return observations, {name: {"reward_terms": {}, "is_success": False, **varied} for name in self.agents}
 
     def step(
@@ -74,10 +77,10 @@ class EncounterEnv(ParallelEnv[str, dict[str, np.ndarray], np.ndarray]):
         """Take one action of every animal. Steps after the end of an episode have no effect.
 
         Raises:
-            ValueError: an action is missing, belongs to an unknown animal, or has the wrong shape.
-            RuntimeError: before the first reset.
+            ValueError: an action is missing, belongs to an unknown animal, has the wrong shape, or is not finite.
+            RuntimeError: before the first reset, or after `close`.
         """
-        self._require_begun()
+        self._calls.require_begun()
         if not self.agents:
             return {}, {}, {}, {}, {}
         advanced = self._animals.advance(self._commanded(actions))
@@ -109,16 +112,14 @@ class EncounterEnv(ParallelEnv[str, dict[str, np.ndarray], np.ndarray]):
         """
         if self.render_mode is None:
             return None
-        self._require_begun()
+        self._calls.require_begun()
         pictures = self._pictures.taken()
         return pictures[0] if self.render_mode == "rgb_array" else pictures
 
     def close(self) -> None:
+        """Stop all threads. No other call may follow."""
+        self._calls.close()
         self._animals.simulation.close()
-
-    def _require_begun(self) -> None:
-        if not self._begun:
-            raise RuntimeError("the world has not begun: call reset first")
 
     def _named(self, values: Any) -> dict[str, Any]:
         return dict(zip(self.possible_agents, values, strict=True))
@@ -137,8 +138,5 @@ class EncounterEnv(ParallelEnv[str, dict[str, np.ndarray], np.ndarray]):
             if name not in actions:
                 raise ValueError(f"actions: {name!r} has none: must have one for each of {', '.join(self.agents)}")
             shape = self.action_spaces[name].shape
-            action = np.asarray(resolved(f"actions: {name!r}", actions[name]), np.float32)
-            if action.shape != shape:
-                raise ValueError(f"actions: {name!r} has shape {action.shape}: must be {shape}")
-            found.append(action[None])
+            found.append(one_worlds_action(f"action of {name!r}", actions[name], shape)[None])
         return found

@@ -9,10 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from optics.numerics.arguments import shown
-from optics.numerics.number_types import resolved
 from sim.envs import held_state
 from sim.envs.animals import Advanced, Animals
+from sim.envs.calls import CallOrder, actions_of, one_worlds_action, seed_of
 from sim.envs.one_environment import OneEnvironment
 from sim.envs.renderers import AgentRenderers
 from sim.envs.senses import Arrays, Senses
@@ -56,6 +55,7 @@ class EyesVecEnv(OneEnvironment):
         self.task: Any = getattr(simulation.task, "task", simulation.task)
         self._pictures = WorldPictures(self.animals, render_mode)
         self._learners, self._everyone = self.animals.learners, np.arange(simulation.n)
+        self._calls = CallOrder()
         if isinstance(self.task, Encounter):
             _require_alike(self.task, self._learners)
         first = self._learners[0]
@@ -93,6 +93,12 @@ class EyesVecEnv(OneEnvironment):
         return self._learners[0].renderer
 
     def reset(self) -> Arrays:
+        """Start all episodes; return their first observations.
+
+        Raises:
+            RuntimeError: after `close`, or between `step_async` and `step_wait`.
+        """
+        self._calls.start_reset()
         if self._seeds[0] is not None:
             self.animals.seed(self._seeds[0])
         self._reset_seeds()
@@ -100,6 +106,7 @@ class EyesVecEnv(OneEnvironment):
         self._returns[:] = 0.0
         observations = self.animals.reset()
         self.reset_infos = self._first_infos(self._everyone)
+        self._calls.finish_reset()
         return _rows(observations)
 
     def seed_worlds(self, seeds: Sequence[int | None]) -> None:
@@ -109,27 +116,36 @@ class EyesVecEnv(OneEnvironment):
         Raises:
             ValueError: another number of seeds, or a seed that is not a whole number from 0 on.
         """
+        self._calls.require_open()
         own = self.simulation.streams.episodes
         if len(seeds) != len(own):
             raise ValueError(f"seed has {len(seeds)} numbers: must have one for each of {len(own)} worlds")
-        for world, seed in enumerate(seeds):
-            if seed is not None and (isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0):
-                raise ValueError(f"seed[{world}] = {shown(seed)}: must be a whole number, at least 0, or None")
-        drawn = (int(rng.integers(2**63)) if seed is None else int(seed) for seed, rng in zip(seeds, own, strict=True))
+        known = [seed_of(f"seed[{world}]", seed) for world, seed in enumerate(seeds)]
+        drawn = (int(rng.integers(2**63)) if seed is None else seed for seed, rng in zip(known, own, strict=True))
         self.animals.seed(tuple(drawn))
 
     def step_async(self, actions: np.ndarray) -> None:
-        actions = np.asarray(resolved("actions", actions), np.float32)
-        if actions.shape != self._commanded.shape:
-            raise ValueError(f"actions have shape {actions.shape}: must be {self._commanded.shape}")
-        self._commanded = actions
+        """Store the actions that `step_wait` takes. An action that is not finite ends the episode of its world.
 
-    def step_once(self, actions: np.ndarray) -> tuple[Arrays, np.ndarray, np.ndarray, np.ndarray, list[dict[str, Any]]]:
-        """Take one action without restarting worlds whose episode ended, as a single environment requires.
-
-        Returns observation, reward, terminated, truncated, info.
+        Raises:
+            ValueError: the actions are not real numbers, are masked, or have another shape.
+            RuntimeError: before the first reset, after `close`, or after another `step_async`.
         """
-        self.step_async(actions)
+        self._calls.require_begun()
+        self._commanded = actions_of("actions", actions, self._commanded.shape)
+        self._calls.expect_wait()
+
+    def step_once(self, action: np.ndarray) -> tuple[Arrays, np.ndarray, np.ndarray, np.ndarray, list[dict[str, Any]]]:
+        """Take one action in the only world, without restarting it if its episode ends.
+
+        Returns observation, reward, terminated, truncated, info, all as batches of one.
+
+        Raises:
+            ValueError: the action is not finite, or `step_async` would refuse it.
+            RuntimeError: before the first reset, or after `close`.
+        """
+        self._calls.require_begun()
+        self.step_async(one_worlds_action("action", action, self.action_space.shape)[None])
         advanced = self._advance()
         step = advanced.step
         infos = self._infos(step)
@@ -137,6 +153,11 @@ class EyesVecEnv(OneEnvironment):
         return _rows(observations), step.reward, step.terminated, step.truncated, infos
 
     def step_wait(self) -> tuple[Arrays, np.ndarray, np.ndarray, list[dict[str, Any]]]:
+        """Take the actions of `step_async`.
+
+        Raises:
+            RuntimeError: without `step_async`, or after `close`.
+        """
         advanced = self._advance()
         step = advanced.step
         infos, done = self._infos(step), step.done
@@ -159,9 +180,9 @@ class EyesVecEnv(OneEnvironment):
         The state does not contain such values.
 
         Raises:
-            RuntimeError: before the first reset, or if the model enables MuJoCo's sleeping bodies.
+            RuntimeError: before the first reset, after `close`, or if the model enables MuJoCo's sleeping bodies.
         """
-        self._require_begun()
+        self._calls.require_begun()
         return self.animals.get_state()
 
     def set_state(self, state: Mapping[str, np.ndarray], worlds: Sequence[int] | None = None) -> Arrays:
@@ -169,7 +190,7 @@ class EyesVecEnv(OneEnvironment):
 
         Raises:
             ValueError: the state belongs to another task or number of worlds, or an index in `worlds` is out of range.
-            RuntimeError: before the first reset, or if the model enables MuJoCo's sleeping bodies.
+            RuntimeError: before the first reset, after `close`, or if the model enables MuJoCo's sleeping bodies.
         """
         held_state.checked(state, self.get_state())
         chosen = held_state.chosen_worlds(worlds, len(self._everyone))
@@ -178,6 +199,8 @@ class EyesVecEnv(OneEnvironment):
         return _rows([senses.now for senses in self._learners])
 
     def close(self) -> None:
+        """Stop all threads. No other call may follow."""
+        self._calls.close()
         self.simulation.close()
 
     def get_images(self) -> list[np.ndarray]:
@@ -186,16 +209,12 @@ class EyesVecEnv(OneEnvironment):
         Raises:
             RuntimeError: before the first reset.
         """
-        self._require_begun()
+        self._calls.require_begun()
         return self._pictures.taken()
 
     def _advance(self) -> Advanced:
-        """Take one action.
-
-        Raises:
-            RuntimeError: before the first reset.
-        """
-        self._require_begun()
+        """Take the pending actions."""
+        self._calls.take()
         learners = len(self._learners)
         return self.animals.advance(np.split(self._commanded, learners) if learners > 1 else [self._commanded])
 
@@ -207,10 +226,6 @@ class EyesVecEnv(OneEnvironment):
         for k, info in enumerate(self._first_infos(ended)):
             self.reset_infos[k // len(ended) * n + ended[k % len(ended)]] = info
         return pending
-
-    def _require_begun(self) -> None:
-        if not self._learners[0].begun:
-            raise RuntimeError("the worlds have not begun: call reset first")
 
     def _add_terminal_observations(
         self, infos: list[dict[str, Any]], seen: list[Arrays], ended: np.ndarray, last: list[Arrays]

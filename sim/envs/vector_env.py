@@ -58,10 +58,11 @@ class EyesVectorEnv(VectorEnv[dict[str, np.ndarray], np.ndarray, np.ndarray]):
     ) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
         if options:
             raise ValueError(f"reset: options = {options!r}: must be left out, reset has no options")
-        if isinstance(seed, Sequence | np.ndarray):
-            self._batch.seed_worlds(seed)
-        elif seed is not None:
-            self._batch.seed(seed)
+        given: Any = seed
+        if isinstance(given, Sequence | np.ndarray) and not isinstance(given, str | bytes) and np.ndim(given):
+            self._batch.seed_worlds(list(given))
+        elif given is not None:
+            self._batch.seed(given)
         return self._batch.reset(), self._together(self._batch.reset_infos)
 
     def step(

@@ -95,6 +95,9 @@ def require_outcome(outcome: Outcome, n: int, learners: int) -> None:
 def _array(where: str, returned: Any, kind: Any) -> np.ndarray:
     returned = resolved(where, returned)
     try:
-        return np.asarray(returned, kind)
-    except (TypeError, ValueError) as error:
-        raise ValueError(f"{where} returned {returned!r:.80}: must be an array of numbers") from error
+        given = np.asarray(returned)
+        if given.dtype.kind in "biufO":  # NumPy would also convert text, such as "1.5", and drop imaginary parts
+            return given.astype(kind)
+    except (TypeError, ValueError, OverflowError):
+        pass
+    raise ValueError(f"{where} returned {returned!r:.80}: must be an array of numbers")

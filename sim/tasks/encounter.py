@@ -67,7 +67,9 @@ class Frozen:
             predict = getattr(self.policy, "predict", None)
             found = self.policy(observation) if predict is None else predict(observation, deterministic=True)[0]
             actions = np.asarray(resolved("actions", found), np.float32)
-        except Exception as error:
+        except KeyboardInterrupt:
+            raise
+        except BaseException as error:
             said = " ".join(f"{type(error).__name__}: {error}".split())
             raise RuntimeError(f"policy of {name_of(self.task)!r}: {said}") from error
         if actions.shape != shape:

@@ -13,6 +13,7 @@ import mujoco
 import numpy as np
 
 from optics.numerics import number_types
+from optics.numerics.arguments import shown
 from sim.physics.mujoco_worlds import MujocoWorlds
 from sim.physics.physics import Physics
 from sim.scene.variation import Variation
@@ -22,7 +23,7 @@ from sim.tasks.batch_task import Agent, BatchTask
 from sim.tasks.encounter import Encounter, name_of, of_world, require_own_actuators, split_agents
 from sim.tasks.eye_kinds import auxiliary_of, kinds_of
 from sim.tasks.outcome import Outcome, RewardTerms
-from sim.tasks.task import Task, named_terms
+from sim.tasks.task import Task, condition, named_terms
 from sim.tasks.task_settings import compiled
 
 __all__ = ["PerWorld"]
@@ -94,7 +95,7 @@ class PerWorld(BatchTask):
             try:
                 for animal in self.animals:
                     animal.reset(worlds.datas[world], rng)
-            except Exception as error:
+            except BaseException as error:
                 raise RuntimeError(_told(error)) from error
 
     def take(self, worlds: MujocoWorlds, actions: np.ndarray, failed: Mapping[int, str]) -> Mapping[int, str]:
@@ -106,7 +107,7 @@ class PerWorld(BatchTask):
                 if world not in failed and world not in found:
                     try:
                         animal.act(data, own[world])
-                    except Exception as error:
+                    except BaseException as error:
                         found[world] = _told(error)
         return found
 
@@ -123,7 +124,7 @@ class PerWorld(BatchTask):
                         own[world] = now
                     judged.append(outcomes)
                     continue
-                except Exception as error:
+                except BaseException as error:
                     failure[world] = _told(error)
             worlds.require_places(world)
             # Terminated, not truncated: learners must not bootstrap from the state after a failure.
@@ -143,7 +144,7 @@ class PerWorld(BatchTask):
         try:
             of_worlds = [self._felt(worlds.datas[world]) for world in chosen]
             return [_stacked(list(own)) for own in zip(*of_worlds, strict=True)]
-        except Exception as error:
+        except BaseException as error:
             raise RuntimeError(_told(error)) from error
 
     def _judged(self, data: mujoco.MjData) -> tuple[list[_OfWorld], bool]:
@@ -151,10 +152,13 @@ class PerWorld(BatchTask):
         outcomes, over = [], False
         for animal, whose in zip(self.learners, self._whose, strict=False):
             terms = named_terms(animal, data, whose)
-            ended, done = bool(animal.terminated(data)), bool(animal.succeeded(data))
+            ended = condition(f"{whose}terminated", animal.terminated(data))
+            done = condition(f"{whose}succeeded", animal.succeeded(data))
             outcomes.append(_OfWorld(terms, terminated=ended, success=done))
             over |= ended
-        return outcomes, over | any(other.task.terminated(data) for other in self.frozen)
+        for other in self.frozen:
+            over |= condition(f"{name_of(other.task)}: terminated", other.task.terminated(data))
+        return outcomes, over
 
     def _felt(self, data: mujoco.MjData) -> list[np.ndarray]:
         """Return the proprioception of every animal in a world.
@@ -164,7 +168,7 @@ class PerWorld(BatchTask):
         """
         found = []
         for number, (animal, whose) in enumerate(zip(self.animals, self._whose, strict=True)):
-            felt = np.asarray(number_types.resolved(f"{whose}proprioception", animal.proprioception(data)), np.float32)
+            felt = _row(f"{whose}proprioception", animal.proprioception(data))
             if felt.ndim != 1 or not np.isfinite(felt).all():
                 raise ValueError(f"{whose}proprioception returned {felt!r:.100}: must be finite numbers, (k,)")
             size = self._sizes.get(number) or self._sizes.setdefault(number, len(felt))
@@ -173,6 +177,17 @@ class PerWorld(BatchTask):
             self._sizes[number] = len(felt)
             found.append(felt)
         return found
+
+
+def _row(where: str, returned: object) -> np.ndarray:
+    returned = number_types.resolved(where, returned)
+    try:
+        given = np.asarray(returned)
+        if given.dtype.kind in "biuf":
+            return given.astype(np.float32)
+    except (TypeError, ValueError):
+        pass
+    raise ValueError(f"{where} returned {shown(returned)}: must be finite numbers, (k,)")
 
 
 def _in_mode(task: Task, mode: str) -> Task:
@@ -189,8 +204,13 @@ def _stacked(felt: Sequence[np.ndarray | None]) -> dict[str, np.ndarray]:
     return {"feels": np.array([np.full(size, np.nan, np.float32) if row is None else row for row in felt])}
 
 
-def _told(error: Exception) -> str:
-    """Return the message of an error; if it was raised in the user's file, with the function and line."""
+def _told(error: BaseException) -> str:
+    """Return the message of an error; if it was raised in the user's file, with the function and line.
+
+    The error may be a SystemExit or another exception that would end the program. Only Ctrl-C is raised again.
+    """
+    if isinstance(error, KeyboardInterrupt):
+        raise error
     for frame in traceback.extract_tb(error.__traceback__):
         if frame.filename not in _OURS:
             place = f"{frame.name}, line {frame.lineno} of {Path(frame.filename).name}"

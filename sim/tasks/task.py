@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
+from numbers import Real
 from typing import TYPE_CHECKING, Any
 
 import mujoco
 import numpy as np
 
+from optics.numerics.arguments import shown
 from sim.physics.controls import controls_of
 from sim.tasks.task_settings import TaskSettings
 
@@ -82,6 +85,29 @@ def named_terms(task: Task, data: mujoco.MjData, whose: str = "") -> dict[str, f
     if not isinstance(terms, Mapping):
         raise ValueError(f"{whose}rewards returned {terms!r}: must be numbers by name, such as {{'progress': 0.1}}")
     for name, value in terms.items():
-        if not np.isscalar(value) or not np.isfinite(value):
-            raise ValueError(f"{whose}rewards: {name!r} is {value!r}: must be one finite number")
+        if not _is_finite(value):
+            raise ValueError(f"{whose}rewards: {name!r} is {shown(value)}: must be one finite number")
     return {str(name): float(value) for name, value in terms.items()}
+
+
+def condition(where: str, returned: Any) -> bool:
+    """Return what a method returned as a truth value; None counts as False.
+
+    where: the method, for the error message
+
+    Raises:
+        ValueError: the method returned text, or several values.
+    """
+    try:
+        if not isinstance(returned, str | bytes):
+            return bool(returned)
+    except ValueError:
+        pass  # NumPy refuses arrays of several values
+    raise ValueError(f"{where} returned {shown(returned)}: must be True or False")
+
+
+def _is_finite(value: Any) -> bool:
+    try:
+        return isinstance(value, Real | np.bool_) and math.isfinite(float(value))
+    except OverflowError:  # an int beyond the range of floats
+        return False

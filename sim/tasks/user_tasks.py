@@ -61,9 +61,9 @@ def with_evolved_eyes(task: UserTask, eyes: Eyes, elevation_deg: float = 0.0) ->
     animal.eye, animal.auxiliary = eyes.eye(), ()
     try:
         animal.mounts = tuple(task.place(eyes.n_eyes, eyes.placement_range_deg, elevation_deg))
-    except ValueError:
+    except (ValueError, KeyboardInterrupt):
         raise
-    except Exception as error:
+    except BaseException as error:  # for example SystemExit, which would end the program
         raise ValueError(f"{name}: place: {type(error).__name__}: {error}") from error
     if len(animal.mounts) != eyes.n_eyes or not all(isinstance(mount, Mount) for mount in animal.mounts):
         raise ValueError(f"{name}: place returned {animal.mounts!r:.200}: must be {eyes.n_eyes} of sim.Mount")

@@ -2,4 +2,5 @@
 
 importing: test_importing.py, test_wheel.py
 command: test_wheel.py
+streams: test_streams.py
 """

@@ -6,6 +6,7 @@ import json
 from argparse import Namespace
 
 from evolve.report.comparison import comparison_lines, differing_settings, run_summary, write_page
+from evolve.runs.output import say
 from evolve.store.directory import Run
 
 __all__ = ["compare"]
@@ -16,11 +17,11 @@ def compare(arguments: Namespace) -> int:
     runs = [Run.open(directory, before_damage=arguments.before_damage) for directory in arguments.directories]
     if arguments.json:
         found = {"runs": [run_summary(run) for run in runs], "settings": differing_settings(runs)}
-        print(json.dumps(found, indent=1, allow_nan=False))
+        say(json.dumps(found, indent=1, allow_nan=False))
     else:
-        print("\n".join(comparison_lines(runs)))
+        say("\n".join(comparison_lines(runs)))
     if arguments.html:
         write_page(runs, arguments.html)
         if not arguments.json:
-            print(f"page: {arguments.html}")
+            say(f"page: {arguments.html}")
     return 0

@@ -7,6 +7,7 @@ from argparse import Namespace
 
 from evolve.cli.commands.products import finished_products, open_page
 from evolve.cli.commands.status import standing, standing_lines
+from evolve.runs.output import say
 from evolve.store.shipped_run import copy_shipped_run
 from optics.numerics import device
 
@@ -19,13 +20,13 @@ def demo(arguments: Namespace) -> int:
     run = copy_shipped_run(arguments.out)
     shown = not (arguments.json or arguments.quiet)
     if shown:
-        print("\n".join(standing_lines(standing(run))))
-        print("The best animal plays an episode; report, replay and EXR files are written ...", flush=True)
+        say("\n".join(standing_lines(standing(run))))
+        say("The best animal plays an episode; report, replay and EXR files are written ...", flush=True)
     made = finished_products(run, shown, replay=True)
     if arguments.json:
-        print(json.dumps(made.record(run), indent=1))
+        say(json.dumps(made.record(run), indent=1))
     else:
-        print("\n".join(made.lines(run)))
-        print(f"See the record: evolve status {run.path}. Evolve your own: evolve run detection --preset quick")
+        say("\n".join(made.lines(run)))
+        say(f"See the record: evolve status {run.path}. Evolve your own: evolve run detection --preset quick")
     open_page(made.report, arguments)
     return 0

@@ -7,6 +7,7 @@ from argparse import Namespace
 
 from evolve.cli.waiting import Waiting
 from evolve.report.gene_drift import drift_of
+from evolve.runs.output import say
 from evolve.store.directory import Run
 
 __all__ = ["drift"]
@@ -19,7 +20,7 @@ def drift(arguments: Namespace) -> int:
     with Waiting(1).of_one_step(said) as wait:
         found = drift_of(runs, arguments.searches, lambda share: wait.within(said, share))
     if arguments.json:
-        print(json.dumps(found.as_plain_values(), indent=1, allow_nan=False))
+        say(json.dumps(found.as_plain_values(), indent=1, allow_nan=False))
     else:
-        print("\n".join(found.lines()))
+        say("\n".join(found.lines()))
     return 0

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import json
-import sys
 from argparse import Namespace
 
 from evolve.config.run_config import TASKS, SearchConfig
 from evolve.config.sources import preset_about, preset_names
 from evolve.genome.genes import CLUSTERS, GENES, Gene
-from evolve.runs.output import spelled
+from evolve.runs.output import results, say, spelled
 
 __all__ = ["genes", "presets", "tasks"]
 
@@ -17,9 +16,9 @@ __all__ = ["genes", "presets", "tasks"]
 def tasks(arguments: Namespace) -> int:
     """Print the tasks."""
     if arguments.json:
-        print(json.dumps(dict(TASKS), indent=1))
+        say(json.dumps(dict(TASKS), indent=1))
         return 0
-    print("\n".join(f"{name:<12}{meaning}" for name, meaning in TASKS.items()))
+    say("\n".join(f"{name:<12}{meaning}" for name, meaning in TASKS.items()))
     return 0
 
 
@@ -27,10 +26,10 @@ def presets(arguments: Namespace) -> int:
     """Print the presets with their task (if they set one), their scales and their purpose."""
     found = [preset_about(name) for name in preset_names()]
     if arguments.json:
-        print(json.dumps(found, indent=1))
+        say(json.dumps(found, indent=1))
         return 0
     for one in found:
-        print(f"{one['name']:<24}{one['task'] or 'any task':<12}{', '.join(one['scales']) or '-':<16}{one['about']}")
+        say(f"{one['name']:<24}{one['task'] or 'any task':<12}{', '.join(one['scales']) or '-':<16}{one['about']}")
     return 0
 
 
@@ -38,15 +37,15 @@ def genes(arguments: Namespace) -> int:
     """Print the genes with their valid range, default search range, start value and meaning."""
     ordered = [gene for cluster in CLUSTERS for gene in GENES.values() if gene.cluster == cluster]
     if arguments.json:
-        print(json.dumps([_record(gene) for gene in ordered], indent=1))
+        say(json.dumps([_record(gene) for gene in ordered], indent=1))
         return 0
     header = ("gene", "cluster", "kind", "range", "unit", "open", "searched", "start", "mutation", "what it does")
     rows = [header, *(_row(gene) for gene in ordered)]
-    rows = [tuple(spelled(cell, sys.stdout) for cell in row) for row in rows]
+    rows = [tuple(spelled(cell, results()) for cell in row) for row in rows]
     widths = [max(len(row[column]) for row in rows) for column in range(len(header))]
     for row in rows:
-        print("  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip())
-    print(
+        say("  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip())
+    say(
         f"\n{len(GENES)} genes. Open or freeze a gene or a cluster: --set genome.NAME.open=true or false\n"
         "Open a gene from generation N: --set genome.NAME.opens_at=N\n"
         "Use a relief of N x N genes: --set eye.relief_points=N. Mirror and rotate an eighth of them: --set\n"

@@ -14,6 +14,7 @@ from typing import Any
 
 from evolve.cli.waiting import Waiting
 from evolve.report.write import FILE as REPORT
+from evolve.runs.output import say
 from evolve.store.directory import EXR, Run
 from optics.numerics import device
 
@@ -80,10 +81,10 @@ def replay(arguments: Namespace) -> int:
         also = [form for form in BESIDE if getattr(arguments, form)]
         episode, paths = write_replay(run, arguments.candidate, arguments.seed, also, arguments.out)
     if arguments.json:
-        print(json.dumps({**episode_facts(episode), "files": [str(path) for path in paths]}, indent=1))
+        say(json.dumps({**episode_facts(episode), "files": [str(path) for path in paths]}, indent=1))
     else:
-        print(episode_table(episode))
-        print("\n".join(f"replay: {path}" for path in paths))
+        say(episode_table(episode))
+        say("\n".join(f"replay: {path}" for path in paths))
     open_page(paths[0], arguments)
     return 0
 
@@ -95,7 +96,7 @@ def report(arguments: Namespace) -> int:
         from evolve.report.write import write
 
         page = write(run, out=arguments.out, doing=wait.within)
-    print(json.dumps({"report": str(page)}) if arguments.json else f"report: {page}")
+    say(json.dumps({"report": str(page)}) if arguments.json else f"report: {page}")
     open_page(page, arguments)
     return 0
 
@@ -108,9 +109,9 @@ def export(arguments: Namespace) -> int:
 
         files = export_run(run, arguments.candidate, arguments.seed, arguments.out, wait.within)
     if arguments.json:
-        print(json.dumps({"exr": [str(file) for file in files]}, indent=1))
+        say(json.dumps({"exr": [str(file) for file in files]}, indent=1))
     else:
-        print(f"EXR files: {len(files)} in {files[0].parent}, the first: {files[0].name}")
+        say(f"EXR files: {len(files)} in {files[0].parent}, the first: {files[0].name}")
     return 0
 
 

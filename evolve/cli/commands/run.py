@@ -19,6 +19,7 @@ from evolve.config.run_config import ConfigError, RunConfig
 from evolve.genome.phenotype import repaired
 from evolve.runs.begin import RunRequest, prepare_run
 from evolve.runs.carry_on import Workers, carry_on, local_workers
+from evolve.runs.output import results, say
 from evolve.runs.progress import Bar, Events, Lines, Silent, Tally, Watchers, watcher
 from evolve.runs.resume import resuming
 from evolve.search.dask_executor import DaskExecutor
@@ -47,7 +48,7 @@ def start(arguments: Namespace) -> int:
         if not arguments.json:
             for note in notes:
                 _note(note)
-            print(f"{run.path}: {_plan(run.config)}", flush=True)
+            say(f"{run.path}: {_plan(run.config)}", flush=True)
         return _carry_on(run, arguments, scheduler)
 
 
@@ -61,7 +62,7 @@ def resume(arguments: Namespace) -> int:
         if not arguments.json:
             state = f"{len(run.candidates)} of {run.config.candidates} candidates are on record"
             done = f"all {run.config.candidates} candidates have been evaluated"
-            print(f"{run.path}: {state if unfinished else done}", flush=True)
+            say(f"{run.path}: {state if unfinished else done}", flush=True)
         return _carry_on(run, arguments, scheduler) if unfinished else _already_finished(run, arguments)
 
 
@@ -98,7 +99,7 @@ def _show(plan: RunPlan, as_json: bool) -> int:
     if not as_json:
         print("measuring this machine's pace ...", file=sys.stderr, flush=True)
     plan = plan.measured()
-    print(json.dumps(plan.record(), indent=1) if as_json else "\n".join(plan.lines()))
+    say(json.dumps(plan.record(), indent=1) if as_json else "\n".join(plan.lines()))
     return 0
 
 
@@ -136,7 +137,7 @@ def _carry_on(run: Run, arguments: Namespace, scheduler: Scheduler | None) -> in
         )
         return INTERRUPTED
     if shown.tally is not None and not arguments.json:
-        print(shown.tally.closing())
+        say(shown.tally.closing())
     return _finish(run, arguments)
 
 
@@ -149,9 +150,9 @@ def _already_finished(run: Run, arguments: Namespace) -> int:
     if not page.is_file() or not frames or harmed(run.path / EXR):
         return _finish(run, arguments)
     if not arguments.json:
-        print(f"nothing is left to do; report: {page}")
+        say(f"nothing is left to do; report: {page}")
     elif run.best is not None:
-        print(json.dumps(_finished_event(run, run.best, Products(page, frames))))
+        say(json.dumps(_finished_event(run, run.best, Products(page, frames))))
     open_page(page, arguments)
     return 0
 
@@ -159,7 +160,7 @@ def _already_finished(run: Run, arguments: Namespace) -> int:
 def _watcher(run: Run, workers: int, arguments: Namespace) -> Bar | Events | Lines | Silent:
     if arguments.quiet:
         return Silent(run, sys.stderr, workers)
-    return watcher(run, sys.stdout if arguments.json else sys.stderr, workers, arguments.json)
+    return watcher(run, results() if arguments.json else sys.stderr, workers, arguments.json)
 
 
 def _workers(
@@ -191,10 +192,10 @@ def _finish(run: Run, arguments: Namespace) -> int:
         print(f"evolve: every candidate failed; the last one: {failures[-1].failure}", file=sys.stderr)
         return 1
     if not arguments.json:
-        print("\n".join(_outcome(run, run.best, failures)))
-        print("writing report and EXR files ...", flush=True)
+        say("\n".join(_outcome(run, run.best, failures)))
+        say("writing report and EXR files ...", flush=True)
     made = finished_products(run, shown=not (arguments.json or arguments.quiet))
-    print(json.dumps(_finished_event(run, run.best, made)) if arguments.json else "\n".join(made.lines(run)))
+    say(json.dumps(_finished_event(run, run.best, made)) if arguments.json else "\n".join(made.lines(run)))
     open_page(made.report, arguments)
     return 0
 

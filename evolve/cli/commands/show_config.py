@@ -15,6 +15,7 @@ from evolve.config.run_config import SECTIONS, TASKS, RunConfig
 from evolve.config.task_code import LABEL
 from evolve.genome.genes import ALL_GENES, GENES, Gene
 from evolve.genome.interval import Interval
+from evolve.runs.output import say
 
 __all__ = ["config", "schema"]
 
@@ -25,10 +26,10 @@ def config(arguments: Namespace) -> int:
     """Print all settings of a run as TOML, or the schema of the settings as JSON."""
     if arguments.what == "schema":
         _refuse_for_schema(arguments)
-        print(json.dumps(schema(), indent=1))
+        say(json.dumps(schema(), indent=1))
         return 0
     chosen = assemble(arguments.task, arguments.preset, arguments.config, arguments.set, scale=arguments.scale)
-    print(to_toml(chosen), end="")
+    say(to_toml(chosen), end="")
     return 0
 
 

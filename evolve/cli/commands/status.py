@@ -17,7 +17,7 @@ from typing import Any
 
 from evolve.analysis.episode_failures import episode_failure_lines, episode_failures_of
 from evolve.config.task_code import names_code
-from evolve.runs.output import as_it_is
+from evolve.runs.output import as_it_is, results, say
 from evolve.search.successive_halving import finished
 from evolve.store.candidate import Candidate
 from evolve.store.directory import Run
@@ -57,13 +57,13 @@ def listing(arguments: Namespace) -> int:
     folders = [path for path in arguments.directory.iterdir() if os.path.exists(path / "config.toml")]
     found = [_standing_or_reason(path) for path in sorted(folders, key=lambda path: path.stat().st_mtime)]
     if arguments.json:
-        print(json.dumps(found, indent=1, allow_nan=False, default=vars))
+        say(json.dumps(found, indent=1, allow_nan=False, default=vars))
         return 0
     if not found:
-        print(f"{arguments.directory}: holds no runs")
+        say(f"{arguments.directory}: holds no runs")
     width = max((len(one["directory"]) for one in found), default=0)
     for one in found:
-        print(f"{one['directory']:<{width}}  {_in_one_line(one)}")
+        say(f"{one['directory']:<{width}}  {_in_one_line(one)}")
     return 0
 
 
@@ -89,13 +89,13 @@ def _show(arguments: Namespace, now: dict[str, Any]) -> None:
     With --watch, JSON is printed on one line, and a terminal is cleared before text is printed.
     """
     if arguments.json:
-        print(json.dumps(now, indent=None if arguments.watch else 2, allow_nan=False, default=vars), flush=True)
+        say(json.dumps(now, indent=None if arguments.watch else 2, allow_nan=False, default=vars), flush=True)
         return
     if now["notice"]:
         print(f"note: {now['notice']}", file=sys.stderr)
-    if arguments.watch and sys.stdout.isatty():
-        print("\x1b[H\x1b[2J", end="", file=as_it_is(sys.stdout))
-    print("\n".join(standing_lines(now)), flush=True)
+    if arguments.watch and results().isatty():
+        print("\x1b[H\x1b[2J", end="", file=as_it_is(results()))
+    say("\n".join(standing_lines(now)), flush=True)
 
 
 def standing(run: Run) -> dict[str, Any]:

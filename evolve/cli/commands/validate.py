@@ -12,6 +12,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from evolve.runs.output import say
 from optics.numerics import backend
 
 __all__ = ["doctor", "validate"]
@@ -58,7 +59,7 @@ def validate(arguments: Namespace) -> int:
     known = [_Proof(f"validation.{path.replace('/', '.')}", old) for path, old in paths.items()]
     proofs = [_found(name, {proof.name: proof for proof in known}) for name in arguments.proofs] or known
     if arguments.list:
-        print("\n".join(f"{proof.name:<26}{proof.question}" for proof in proofs))
+        say("\n".join(f"{proof.name:<26}{proof.question}" for proof in proofs))
         return 0
     backend.require()
     return _run(proofs)
@@ -89,11 +90,11 @@ def _run(proofs: list[_Proof]) -> int:
     from evolve.runs.progress import clock
 
     if len(proofs) > 1:
-        print(f"{len(proofs)} scripts; most take seconds, some take minutes", flush=True)
+        say(f"{len(proofs)} scripts; most take seconds, some take minutes", flush=True)
     failed, began = [], time.monotonic()
     for number, proof in enumerate(proofs, start=1):
-        print(f"{number}/{len(proofs)} {proof.name}, after {clock(time.monotonic() - began)}", flush=True)
+        say(f"{number}/{len(proofs)} {proof.name}, after {clock(time.monotonic() - began)}", flush=True)
         child = subprocess.run([sys.executable, "-m", proof.module], cwd=CHECKOUT, check=False)
         failed += [proof.name] if child.returncode else []
-    print(f"failed: {', '.join(failed)}" if failed else f"all {len(proofs)} passed")
+    say(f"failed: {', '.join(failed)}" if failed else f"all {len(proofs)} passed")
     return 1 if failed else 0

@@ -13,5 +13,6 @@ square_eyes: test_square_eyes.py
 task_choice: test_task_choice.py
 task_card: test_task_choice.py, test_run_config.py, test_lint.py
 task_code: test_task_choice.py
+task_errors: learning/test_hostile_tasks.py
 numbering: test_numbering.py
 """

@@ -4,6 +4,7 @@ assembly: test_arguments.py, test_env.py, test_vec_env.py, test_tasks_page.py
 parallel_env: test_parallel_env.py, test_pictures.py
 auxiliary: test_auxiliary.py
 one_environment: test_vec_env.py, test_pictures.py
+calls: test_calls.py
 env: test_env.py
 vec_env: test_vec_env.py, test_episode_infos.py, test_env.py, test_light_levels.py, test_handed_out.py
 vector_env: test_vector_env.py

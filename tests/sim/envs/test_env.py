@@ -242,7 +242,7 @@ def test_bad_options_are_named(options, named):
 def test_actions_of_another_shape_are_named():
     env = sim.make_env("detection", EYES, rays_per_receptor=1)
     env.reset(seed=0)
-    with pytest.raises(ValueError, match=r"actions have shape \(1, 3\): must be \(1, 2\)"):
+    with pytest.raises(ValueError, match=r"action has shape \(3,\): must be \(2,\)"):
         env.step(np.zeros(3))
 
 

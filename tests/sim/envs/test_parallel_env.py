@@ -100,11 +100,11 @@ def test_pictures():
     [
         ({"Prey": np.zeros(2)}, "actions: 'Predator' has none: must have one for each of Prey, Predator"),
         ({"Prey": np.zeros(2), "Predater": np.zeros(2)}, "actions: no animal 'Predater'; did you mean 'Predator'"),
-        ({"Prey": np.zeros(2), "Predator": np.zeros(3)}, r"actions: 'Predator' has shape \(3,\): must be \(2,\)"),
+        ({"Prey": np.zeros(2), "Predator": np.zeros(3)}, r"action of 'Predator' has shape \(3,\): must be \(2,\)"),
     ],
 )
 def test_bad_actions_are_refused(env, actions, words):
-    with pytest.raises(RuntimeError, match="the world has not begun: call reset first"):
+    with pytest.raises(RuntimeError, match="the worlds have not begun: call reset first"):
         env.step(actions)
     env.reset()
     with pytest.raises(ValueError, match=words):

@@ -35,5 +35,5 @@ def test_there_is_nothing_to_show_before_the_first_reset(maker):
 @pytest.mark.parametrize("mode", ["eyes", "rgb_array"])
 def test_an_encounter_that_has_not_begun_says_so(mode):
     env = sim.make_parallel_env(hunt(), render_mode=mode)
-    with pytest.raises(RuntimeError, match=r"^the world has not begun: call reset first$"):
+    with pytest.raises(RuntimeError, match=r"^the worlds have not begun: call reset first$"):
         env.render()

@@ -1,0 +1,30 @@
+"""Place of an error in the code of a user task."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+__all__ = ["MODULE", "described", "error_in_task"]
+
+MODULE = "rhabdom_task_"  # beginning of the names of modules that execute a user's file
+
+
+def error_in_task(error: BaseException) -> str | None:
+    """Return the message of an error in one line, with the method, line and file; None if no user task raised it.
+
+    The place is the innermost line of the user's file. Python calls the module itself "<module>".
+    """
+    place, trace = None, error.__traceback__
+    while trace is not None:
+        frame = trace.tb_frame
+        if str(frame.f_globals.get("__name__", "")).startswith(MODULE):
+            method = frame.f_code.co_name
+            where = "" if method == "<module>" else f"{method}, "
+            place = f"{where}line {trace.tb_lineno} of {Path(frame.f_code.co_filename).name}"
+        trace = trace.tb_next
+    return None if place is None else f"{place}: {described(error)}"
+
+
+def described(error: BaseException) -> str:
+    """Return the type and the message of an error in one line."""
+    return " ".join(f"{type(error).__name__}: {error}".split())
