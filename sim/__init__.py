@@ -38,7 +38,8 @@ if TYPE_CHECKING:
     from sim.envs.batch_task_checker import check_batch_task
     from sim.envs.env import make_env
     from sim.envs.registration import register_task
-    from sim.exr.files import View, read_exr, write_exr
+    from sim.exr.files import read_exr, write_exr
+    from sim.exr.view import View
     from sim.eyes.eyes import Eyes
     from sim.eyes.mounts import Mount, both_sides, fan, ring
     from sim.physics.array_worlds import ArrayWorlds
@@ -94,7 +95,7 @@ _HOME = {
     "make_vec_env": "sim.envs.assembly",
     "make_parallel_env": "sim.envs.assembly",
     "register_task": "sim.envs.registration",
-    "View": "sim.exr.files",
+    "View": "sim.exr.view",
     "read_exr": "sim.exr.files",
     "write_exr": "sim.exr.files",
 }

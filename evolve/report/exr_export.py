@@ -45,12 +45,13 @@ def export_episode(episode: Episode, directory: Path, doing: Doing = in_silence)
     exports of different episodes do not overwrite each other. The folder also contains a list of their checksums.
     """
     folder(directory)
-    files = []
+    files, (height, width) = [], episode.eyes.resolution
+    aspect = episode.eyes.field_aspect * height / width
     for frame, t in enumerate(episode.radiance_frames):
         path = directory / f"candidate{episode.candidate_id:06d}_seed{episode.seed}_t{t:04d}.exr"
         require_regular(path)
         doing(f"writing {path.name}", frame / len(episode.radiance_frames))
-        sim.write_exr(path, _views(episode, frame))
+        sim.write_exr(path, _views(episode, frame), pixel_aspect=aspect)
         files.append(path)
     list_checksums(directory, files)
     return files

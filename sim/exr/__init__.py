@@ -1,6 +1,7 @@
 """Spectral OpenEXR files of scenes and of signals.
 
-files            View, write_exr, read_exr: views in files that are written whole
+view             View: image of one eye
+files            write_exr, read_exr: views in files that are written whole
 spectral_layout  channels of the spectral layout, also those of other programs
 previews         previews in linear sRGB
 """

@@ -18,14 +18,12 @@ import io
 import json
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from optics.numerics.arguments import items, shown
-from optics.numerics.number_types import full_precision
+from optics.numerics.arguments import items, positive
 from sim.exr.previews import preview_of_receptors, preview_of_spectra
 from sim.exr.spectral_layout import (
     PREVIEW,
@@ -36,6 +34,7 @@ from sim.exr.spectral_layout import (
     fields_of_views,
     require_nanometres,
 )
+from sim.exr.view import View
 
 LAYOUT_VERSION = "1.0"
 UNITS = "W.m^-2.sr^-1"
@@ -52,78 +51,14 @@ class ExrError(ValueError):
     """A file that is incomplete, damaged, or without the spectral layout."""
 
 
-@dataclass(frozen=True)
-class View:
-    """Image of one eye.
-
-    name: name of the eye, such as "left"
-    wavelengths_nm: wavelengths of the bands of radiance and reflectance, (band,)
-    radiance: (band, y, x) float32, or None
-    receptors: (channel, y, x) float32, or None
-    rgb: (y, x, 3) float32 linear sRGB preview of the radiance, or of the reflectance in daylight; None: computed when
-        written
-    attributes: further values that JSON can represent, such as seed, time step or position
-    peaks_nm: peak wavelength of each receptor channel, (channel,); the preview shows the longest as red. None: channels
-        are in descending order of their peaks.
-    reflectance: reflectance or transmittance, (band, y, x) float32, or None
-    """
-
-    name: str
-    wavelengths_nm: np.ndarray = field(default_factory=lambda: np.empty(0))
-    radiance: np.ndarray | None = None
-    receptors: np.ndarray | None = None
-    rgb: np.ndarray | None = None
-    attributes: Mapping[str, Any] = field(default_factory=dict)
-    peaks_nm: Sequence[float] | np.ndarray | None = None
-    reflectance: np.ndarray | None = None
-
-    def __post_init__(self) -> None:
-        where = f"View {shown(self.name)}"
-        if not isinstance(self.name, str) or not self.name or not self.name.isprintable():
-            raise ValueError(f"{where}: its name must be printable text, and not empty")
-        if self.spectral is None and self.receptors is None:
-            raise ValueError(f"{where}: has neither radiance nor receptors, and no reflectance")
-        for label in ("radiance", "reflectance", "receptors", "rgb"):
-            image = full_precision(f"{where}: {label}", getattr(self, label))
-            object.__setattr__(self, label, image)
-            if label != "rgb" and image is not None and (len(_shape(image)) != 3 or 0 in image.shape):
-                raise ValueError(f"{where}: {label} {_kind(image)}: must be an array (band, y, x)")
-        require_nanometres(f"{where}: wavelengths_nm", self.wavelengths_nm)
-        if (spectral := self.spectral) is not None:
-            names = {channel(nm) for nm in self.wavelengths_nm}
-            if len(spectral) != len(self.wavelengths_nm) or len(names) != len(spectral):
-                raise ValueError(f"{where}: needs one distinct wavelength per band of {spectral.shape}")
-            if self.rgb is not None and _shape(self.rgb) != (*spectral.shape[1:], 3):
-                raise ValueError(f"{where}: rgb {_kind(self.rgb)}: must be an array (y, x, 3) like the radiance")
-            if self.reflectance is not None and self.reflectance.shape != spectral.shape:
-                raise ValueError(f"{where}: reflectance {_kind(self.reflectance)}: must have that of the radiance")
-        if self.peaks_nm is not None:
-            peaks = require_nanometres(f"{where}: peaks_nm", self.peaks_nm)
-            if self.receptors is None or peaks.shape != (len(self.receptors),):
-                what = "must be a finite number for each channel of receptors"
-                raise ValueError(f"{where}: peaks_nm = {shown(self.peaks_nm)}: {what}")
-
-    @property
-    def spectral(self) -> np.ndarray | None:
-        """The radiance if there is any, otherwise the reflectance."""
-        return self.reflectance if self.radiance is None else self.radiance
-
-
-def _shape(image: Any) -> tuple[int, ...]:
-    """Return the shape of an array of any library; () for other objects."""
-    return tuple(getattr(image, "shape", ()))
-
-
-def _kind(image: Any) -> str:
-    """Return the shape or the value of an image, for messages."""
-    return f"has shape {_shape(image)}" if hasattr(image, "shape") else f"is {shown(image)}"
-
-
-def write_exr(path: str | os.PathLike[str], views: Sequence[View]) -> None:
+def write_exr(path: str | os.PathLike[str], views: Sequence[View], pixel_aspect: float = 1.0) -> None:
     """Write views to an OpenEXR file, completely or not at all; an existing file is replaced.
 
+    pixel_aspect: width of a pixel divided by its height, with which viewers display the file
+
     Raises:
-        ValueError: there are no views, two views have the same name, or JSON cannot represent an attribute.
+        ValueError: pixel_aspect is not positive, there are no views, two views have the same name, or JSON cannot
+            represent an attribute.
         OSError: the file cannot be written.
     """
     import OpenEXR
@@ -141,6 +76,7 @@ def write_exr(path: str | os.PathLike[str], views: Sequence[View]) -> None:
         "type": OpenEXR.scanlineimage,
         "compression": OpenEXR.ZIP_COMPRESSION,
         "displayWindow": (np.zeros(2, np.int32), corner),
+        "pixelAspectRatio": positive("pixel_aspect", pixel_aspect, "1"),
     }
     parts = []
     for name, channels, attributes in spectral + receptors:

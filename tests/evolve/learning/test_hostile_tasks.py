@@ -139,10 +139,9 @@ def test_text_and_complex_numbers_of_a_batch_are_refused(tmp_path):
 
 
 def test_errors_outside_of_tasks_have_no_place():
-    try:
+    with pytest.raises(SystemExit) as caught:
         raise SystemExit(3)
-    except SystemExit as error:
-        assert error_in_task(error) is None
+    assert error_in_task(caught.value) is None
 
 
 def run(folder, named, *options):

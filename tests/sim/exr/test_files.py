@@ -11,7 +11,8 @@ from importlib.metadata import PackageNotFoundError, version
 import numpy as np
 import pytest
 
-from sim.exr.files import ExrError, View, _digest, read_exr, write_exr
+from sim.exr.files import ExrError, _digest, read_exr, write_exr
+from sim.exr.view import View
 
 NM = np.array([410.0, 450.125, 1640 / 3, 690.0])
 

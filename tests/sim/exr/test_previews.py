@@ -1,10 +1,12 @@
 """Previews of EXR files in plain viewers: daylight is white, and long wavelengths are red."""
 
 import numpy as np
+import OpenEXR
 import pytest
 
 from optics.spectra.bands import daylight
-from sim.exr.files import View, read_exr, write_exr
+from sim.exr.files import read_exr, write_exr
+from sim.exr.view import View
 from sim.scene.color import preview
 
 
@@ -76,3 +78,14 @@ def test_wavelengths_are_nanometres(wrong):
 def test_radiance_alone_has_no_peaks():
     with pytest.raises(ValueError, match=r"peaks_nm = \(500,\): must be a finite number for each channel of receptors"):
         View("eye", np.array([500.0]), np.ones((1, 2, 2)), peaks_nm=(500,))
+
+
+def test_viewers_show_high_pixels_as_high(tmp_path):
+    view = View("left", receptors=np.ones((3, 2, 4), np.float32))
+    for aspect in (1.0, 0.25):
+        write_exr(tmp_path / "eye.exr", [view], pixel_aspect=aspect)
+        header = OpenEXR.File(str(tmp_path / "eye.exr")).parts[0].header
+        assert header["pixelAspectRatio"] == aspect
+        np.testing.assert_array_equal(read_exr(tmp_path / "eye.exr")[0].receptors, view.receptors)
+    with pytest.raises(ValueError, match="pixel_aspect = 0: must be greater than 0"):
+        write_exr(tmp_path / "eye.exr", [view], pixel_aspect=0)

@@ -15,8 +15,9 @@ import pytest
 import optics
 import sim
 from optics.spectra.spectrum import daylight
-from sim.exr.files import ExrError, View, read_exr, write_exr
+from sim.exr.files import ExrError, read_exr, write_exr
 from sim.exr.spectral_layout import ExrWarning
+from sim.exr.view import View
 
 C = 299_792_458.0
 SPELLINGS = (

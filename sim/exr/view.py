@@ -1,0 +1,80 @@
+"""Image of one eye: spectral radiance or reflectance, and signals."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from optics.numerics.arguments import shown
+from optics.numerics.number_types import full_precision
+from sim.exr.spectral_layout import channel, require_nanometres
+
+
+@dataclass(frozen=True)
+class View:
+    """Image of one eye.
+
+    name: name of the eye, such as "left"
+    wavelengths_nm: wavelengths of the bands of radiance and reflectance, (band,)
+    radiance: (band, y, x) float32, or None
+    receptors: (channel, y, x) float32, or None
+    rgb: (y, x, 3) float32 linear sRGB preview of the radiance, or of the reflectance in daylight; None: computed when
+        written
+    attributes: further values that JSON can represent, such as seed, time step or position
+    peaks_nm: peak wavelength of each receptor channel, (channel,); the preview shows the longest as red. None: channels
+        are in descending order of their peaks.
+    reflectance: reflectance or transmittance, (band, y, x) float32, or None
+    """
+
+    name: str
+    wavelengths_nm: np.ndarray = field(default_factory=lambda: np.empty(0))
+    radiance: np.ndarray | None = None
+    receptors: np.ndarray | None = None
+    rgb: np.ndarray | None = None
+    attributes: Mapping[str, Any] = field(default_factory=dict)
+    peaks_nm: Sequence[float] | np.ndarray | None = None
+    reflectance: np.ndarray | None = None
+
+    def __post_init__(self) -> None:
+        where = f"View {shown(self.name)}"
+        if not isinstance(self.name, str) or not self.name or not self.name.isprintable():
+            raise ValueError(f"{where}: its name must be printable text, and not empty")
+        if self.spectral is None and self.receptors is None:
+            raise ValueError(f"{where}: has neither radiance nor receptors, and no reflectance")
+        for label in ("radiance", "reflectance", "receptors", "rgb"):
+            image = full_precision(f"{where}: {label}", getattr(self, label))
+            object.__setattr__(self, label, image)
+            if label != "rgb" and image is not None and (len(_shape(image)) != 3 or 0 in image.shape):
+                raise ValueError(f"{where}: {label} {_kind(image)}: must be an array (band, y, x)")
+        require_nanometres(f"{where}: wavelengths_nm", self.wavelengths_nm)
+        if (spectral := self.spectral) is not None:
+            names = {channel(nm) for nm in self.wavelengths_nm}
+            if len(spectral) != len(self.wavelengths_nm) or len(names) != len(spectral):
+                raise ValueError(f"{where}: needs one distinct wavelength per band of {spectral.shape}")
+            if self.rgb is not None and _shape(self.rgb) != (*spectral.shape[1:], 3):
+                raise ValueError(f"{where}: rgb {_kind(self.rgb)}: must be an array (y, x, 3) like the radiance")
+            if self.reflectance is not None and self.reflectance.shape != spectral.shape:
+                raise ValueError(f"{where}: reflectance {_kind(self.reflectance)}: must have that of the radiance")
+        if self.peaks_nm is not None:
+            peaks = require_nanometres(f"{where}: peaks_nm", self.peaks_nm)
+            if self.receptors is None or peaks.shape != (len(self.receptors),):
+                what = "must be a finite number for each channel of receptors"
+                raise ValueError(f"{where}: peaks_nm = {shown(self.peaks_nm)}: {what}")
+
+    @property
+    def spectral(self) -> np.ndarray | None:
+        """The radiance if there is any, otherwise the reflectance."""
+        return self.reflectance if self.radiance is None else self.radiance
+
+
+def _shape(image: Any) -> tuple[int, ...]:
+    """Return the shape of an array of any library; () for other objects."""
+    return tuple(getattr(image, "shape", ()))
+
+
+def _kind(image: Any) -> str:
+    """Return the shape or the value of an image, for messages."""
+    return f"has shape {_shape(image)}" if hasattr(image, "shape") else f"is {shown(image)}"
