@@ -5,6 +5,7 @@ arguments, since other tests cover them. An argument that is missing in the tabl
 """
 
 import argparse
+import io
 import os
 import re
 import shutil
@@ -25,6 +26,8 @@ from evolve.cli.commands.products import Products
 from evolve.cli.pace import Pace
 from evolve.cli.run_plan import RunPlan
 from evolve.runs import begin, carry_on
+from evolve.runs.progress import Lines
+from evolve.search import loop
 from evolve.store.directory import Run
 from optics.numerics import device
 from tests.evolve.cli.test_generations import Acute
@@ -151,8 +154,21 @@ class Executor(Acute):
         return None
 
 
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory):
+    """Return a folder with an unfinished run, three finished ones, an empty folder and a file of settings."""
+    folder = tmp_path_factory.mktemp("runs")
+    Run.create(folder / "begun", tiny("search.generations=1"))
+    for name, seed in (("done", 0), ("elsewhere", 1), ("again", 2)):
+        run = Run.create(folder / name, tiny("search.generations=1", f"seed={seed}"))
+        loop.evolve(run, Acute(), Lines(run, io.StringIO(), 1))
+    (folder / "empty").mkdir()
+    (folder / "settings.toml").write_text("seed = 9\n")
+    return folder
+
+
 @pytest.fixture
-def world(tmp_path, monkeypatch, call):
+def world(runs, tmp_path, monkeypatch, call):
     """Return a function that runs a command in a folder with runs, and returns all that it does."""
     log = []
 
@@ -187,11 +203,7 @@ def world(tmp_path, monkeypatch, call):
     monkeypatch.setattr(device, "make_ready", logged("device", None))
     monkeypatch.setattr(RunPlan, "measured", lambda self: RunPlan(*self_of(self), dict.fromkeys(self.animals, PACE)))
     monkeypatch.chdir(tmp_path)
-    Run.create("begun", tiny("search.generations=1"))
-    for name, seed in (("done", 0), ("elsewhere", 1), ("again", 2)):
-        assert call("run", "detection", *QUICK, "--seed", seed, "--out", name, "--quiet")[0] == 0
-    (tmp_path / "empty").mkdir()
-    (tmp_path / "settings.toml").write_text("seed = 9\n")
+    shutil.copytree(runs, tmp_path, dirs_exist_ok=True)
 
     def did(*given):
         log.clear()

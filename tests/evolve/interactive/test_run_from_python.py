@@ -1,9 +1,11 @@
 """`evolve.run` and the command produce the same record; notebooks are generated from pages, and can be run."""
 
+import inspect
 import os
 import runpy
 import subprocess
 import sys
+from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
@@ -177,3 +179,59 @@ def test_a_notebook_runs_as_jupyter_runs_it(tmp_path, monkeypatch):
         texts = [output.text for output in outputs if output.output_type == "stream" and output.name == "stdout"]
         assert not expected or agrees(expected, "".join(texts))
     assert Run.open(tmp_path / "runs" / "python").best is not None
+
+
+def _seen(call, monkeypatch, module, **given):
+    """Return what a call of `evolve.run` or `evolve.resume` passes on."""
+    seen = []
+
+    class Begun:
+        @classmethod
+        def open(cls, *passed):
+            seen.append(passed)
+            return cls()
+
+        def resume(self, *passed):
+            seen.append(passed)
+
+        @contextmanager
+        def create(self, kind, out):
+            seen.append(out)
+            yield self
+
+    class Watching:
+        def __init__(self, *passed):
+            seen.append(passed)
+
+        def carry_on(self, begun):
+            """Do nothing."""
+
+    with monkeypatch.context() as patch:
+        patch.setattr(module, "prepare_run", lambda request: seen.append(request) or Begun())
+        patch.setattr(module, "Callbacks", Watching)
+        patch.setattr(module, "OpenedRun", Begun)
+        call(**given)
+    return seen
+
+
+EXAMPLES = {
+    "task": "tracking",
+    "preset": "quick",
+    "settings": {"seed": 4},
+    "config": "settings.toml",
+    "scale": "laptop",
+    "start_from": "runs/first:3",
+    "out": "there",
+    "callbacks": (print,),
+    "progress": False,
+    "directory": "other",
+}
+
+
+@pytest.mark.parametrize(("call", "base"), [(evolve.run, {}), (evolve.resume, {"directory": "begun"})])
+def test_every_argument_reaches_the_run(call, base, monkeypatch):
+    module = sys.modules[call.__module__]
+    before = _seen(call, monkeypatch, module, **base)
+    assert _seen(call, monkeypatch, module, **base) == before
+    for name in inspect.signature(call).parameters:
+        assert _seen(call, monkeypatch, module, **base | {name: EXAMPLES[name]}) != before, name

@@ -17,6 +17,7 @@ from evolve.learning.animal_task import animal_task
 from evolve.learning.task_module import executed_task
 from evolve.learning.task_trial import UnusedSettingWarning, check_settings
 from optics.numerics import backend
+from sim.envs import world_pictures
 from sim.envs.prepared_task import PreparedTask
 from sim.tasks.task_settings import TaskSettings
 
@@ -105,7 +106,11 @@ QUICK = ("eye.optics=false", "genome.n_eyes.start=1")
 
 @pytest.fixture(scope="module", autouse=True)
 def _device():
+    """Let images of worlds be small: at full size, they would take most of the time."""
     backend.require()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(world_pictures, "PICTURE", (36, 48))
+        yield
 
 
 def written(folder, line):
@@ -135,7 +140,7 @@ def outputs(task):
         warnings.simplefilter("ignore", UserWarning)  # the failure that `terminated` provokes
         seen = worlds.reset()
         for _ in range(3):
-            found += [{name: part.tolist() for name, part in seen.items()}, worlds.get_images()[0].tolist()]
+            found += [{name: part.tolist() for name, part in seen.items()}, worlds.get_images()[0].tobytes()]
             seen, reward, done, _ = worlds.step(np.full((1, *worlds.action_space.shape), 0.5, np.float32))
             found += [reward.tolist(), done.tolist()]
     return found

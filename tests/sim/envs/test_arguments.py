@@ -65,7 +65,7 @@ def outputs(env, steps):
         for _ in range(steps):
             found += [
                 {name: part.tolist() for name, part in seen.items()},
-                [image.tolist() for image in env.get_images()],
+                [image.tobytes() for image in env.get_images()],
             ]
             seen, reward, done, _ = env.step(np.ones((env.num_envs, *env.action_space.shape), np.float32))
             found += [reward.tolist(), done.tolist()]
