@@ -7,6 +7,7 @@ import errno
 import os
 import shutil
 import signal
+import sys
 import time
 from pathlib import Path
 
@@ -32,6 +33,18 @@ def bowl(phenotype, config, seed, policy_path, progress):
     progress(config.learning.total_steps // 2, config.learning.total_steps)
     fitness = -abs(phenotype.fov_deg - BEST_FOV_DEG) + 1e-9 * (seed % 1000)
     return Evaluation(fitness, (fitness,) * config.evaluation.episodes, 0.5, config.learning.total_steps, 0.01)
+
+
+def prints_and_closes(phenotype, config, seed, policy_path, progress):
+    """Evaluate like `bowl`, but print in several ways, and let every third candidate end the program."""
+    print("noise")
+    os.write(1, b"noise\n")
+    os.system("echo noise")
+    sys.stdout.close()
+    sys.__stdout__.close()
+    if int(policy_path.stem) % 3 == 2:
+        sys.exit(5)
+    return bowl(phenotype, config, seed, policy_path, progress)
 
 
 def leaves_a_policy(phenotype, config, seed, policy_path, progress):

@@ -3,6 +3,7 @@
 RANDOM_STREAMS=20 python -m pytest tests/rhabdom/test_streams.py     tries twenty times the default number of commands
 """
 
+import json
 import os
 import random
 import subprocess
@@ -107,6 +108,19 @@ def test_a_run_continues_and_can_be_resumed_with_any_streams(tmp_path, broken):
     assert finished(run)
     for file in run.path.iterdir():
         assert not file.is_file() or b"candidate 0 (" not in file.read_bytes(), "a message is in a file of the run"
+
+
+def test_what_workers_print_does_not_reach_stdout(tmp_path):
+    program, settings = tmp_path / "driver.py", [part for text in SMALL for part in ("--set", text)]
+    program.write_text(DRIVER)
+    command = ["prints_and_closes", "run", "detection", "--workers", "1", *settings, "--out", str(tmp_path / "run")]
+    child = shell([sys.executable, str(program), *command, "--json"])
+    assert child.returncode == 0, child
+    events = [json.loads(line) for line in child.stdout.splitlines()]
+    failures = [event["failure"] for event in events if event["event"] == "evaluated"]
+    assert [failure is None for failure in failures] == [True, True, False, True]
+    assert failures[2].startswith("SystemExit: 5 (closed_form.py:")
+    assert child.stderr.count(b"noise\n") >= 4 * 2  # print works only until the stream below has been closed
 
 
 OWNED = """

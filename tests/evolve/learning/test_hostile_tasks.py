@@ -153,7 +153,7 @@ def run(folder, named, *options):
     )
 
 
-@pytest.mark.fast_cases(1)
+@pytest.mark.slow  # each run writes a report and EXR files; tests/rhabdom/test_streams.py has a faster case
 @pytest.mark.parametrize("number", range(6))
 def test_a_run_of_a_task_that_prints_and_closes_stdout_ends_well(tmp_path, number):
     """stdout contains valid JSON only; stderr contains what the task printed, in this process and in the workers."""
