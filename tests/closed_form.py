@@ -12,4 +12,5 @@ class ClosedForm:
         while jobs:
             job = jobs.popleft()
             steps = job.rung.ends[-1] if job.rung else job.config.learning.total_steps
-            yield job, Evaluation(fitness=-abs(job.phenotype.fov_deg - 70), steps=steps)
+            fitness = -abs(job.phenotype.fov_deg - 70)
+            yield job, Evaluation(fitness, (fitness,), steps=steps)

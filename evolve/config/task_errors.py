@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-__all__ = ["MODULE", "described", "error_in_task"]
+__all__ = ["MODULE", "error_in_task", "error_text"]
 
 MODULE = "rhabdom_task_"  # beginning of the names of modules that execute a user's file
 
@@ -22,9 +22,9 @@ def error_in_task(error: BaseException) -> str | None:
             where = "" if method == "<module>" else f"{method}, "
             place = f"{where}line {trace.tb_lineno} of {Path(frame.f_code.co_filename).name}"
         trace = trace.tb_next
-    return None if place is None else f"{place}: {described(error)}"
+    return None if place is None else f"{place}: {error_text(error)}"
 
 
-def described(error: BaseException) -> str:
+def error_text(error: BaseException) -> str:
     """Return the type and the message of an error in one line."""
     return " ".join(f"{type(error).__name__}: {error}".split())

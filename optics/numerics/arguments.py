@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from optics.numerics.autodiff import grad_enabled, is_differentiable, number, plain
-from optics.numerics.number_types import as_array, full_precision, resolved
+from optics.numerics.number_types import as_array, full_precision, readable
 
 __all__ = [
     "close_match",
@@ -102,7 +102,7 @@ def without_derivative(name: str, value: Any) -> Any:
         for entry in value:
             without_derivative(name, entry)
     elif isinstance(value, np.ma.MaskedArray):
-        resolved(name, value)
+        readable(name, value)
     elif getattr(value, "requires_grad", False) or (is_differentiable(value) and grad_enabled(value)):
         raise ValueError(f"{name} requires a derivative, but none is propagated through it: pass a plain number")
     return value

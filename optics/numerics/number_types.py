@@ -6,20 +6,20 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["as_array", "full_precision", "resolved"]
+__all__ = ["as_array", "full_precision", "readable"]
 
 HALF = "float16", "bfloat16", "complex32", "float8", "float6_", "float4_"  # starts of names of types
 DRJIT_HALF = "Float16", "f16"  # ends of names of Dr.Jit's types
 
 
-def resolved(name: str, value: Any) -> Any:
+def readable(name: str, value: Any) -> Any:
     """Return `value`, with PyTorch's lazy conjugation and negation carried out; ValueError if elements are masked.
 
     NumPy cannot read tensors that are marked as conjugate or negative, such as `tensor.conj()` and its imaginary part.
     It would use masked elements (numpy.ma) as data. Entries of lists and tuples are treated in the same way.
     """
     if isinstance(value, (list, tuple)):
-        entries = [resolved(name, entry) for entry in value]
+        entries = [readable(name, entry) for entry in value]
         return value if all(old is new for old, new in zip(value, entries, strict=True)) else entries
     if isinstance(value, np.ma.MaskedArray) and np.ma.is_masked(value):
         raise ValueError(f"{name} has masked elements: must be without them, so fill or remove them (numpy.ma)")
@@ -29,14 +29,14 @@ def resolved(name: str, value: Any) -> Any:
 
 
 def full_precision(name: str, value: Any) -> Any:
-    """Return `value` as `resolved` does; ValueError if it, or an entry of it, is in half precision or less.
+    """Return `value` as `readable` does; ValueError if it, or an entry of it, is in half precision or less.
 
     Near 1 µm, the step of float16 is 60 nm, a tenth of a wavelength.
     """
     kind = _half(value)
     if kind:
         raise ValueError(f"{name}: must be float32 or float64, not {kind}, whose steps near 1 µm are at least 60 nm")
-    return resolved(name, value)
+    return readable(name, value)
 
 
 def as_array(name: str, values: Any) -> np.ndarray:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from optics.numerics.arguments import is_sized, one_of, reals, shown, without_derivative
-from optics.numerics.number_types import resolved
+from optics.numerics.number_types import readable
 from optics.spectra.pigment import Pigment
 from optics.spectra.spectrum import LIMITS_NM, Spectrum, cone_fundamentals, daylight
 
@@ -69,7 +69,7 @@ class Receptors:
 
     def layout(self, resolution: tuple[int, int]) -> np.ndarray | None:
         """Type of every receptor, (h, w) int; None without a mosaic."""
-        resolved("resolution", resolution)
+        readable("resolution", resolution)
         if self.mosaic is None:
             return None
         tile = np.array(self.mosaic)
@@ -114,7 +114,7 @@ def _pigment(lambda_max_nm: Any) -> Pigment:
 
 def _mosaic(mosaic: Any, types: int) -> tuple[tuple[int, ...], ...]:
     try:
-        tile = np.array(resolved("mosaic", mosaic))
+        tile = np.array(readable("mosaic", mosaic))
         whole = tile.ndim == 2 and tile.size > 0 and bool(np.all(tile == tile.astype(int)))
     except (TypeError, ValueError, OverflowError):
         whole = False

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from optics.numerics.arguments import shown, without_derivative
-from optics.numerics.number_types import resolved
+from optics.numerics.number_types import readable
 
 CLOSED = "the environment is closed: make a new one"
 NOT_BEGUN = "the worlds have not begun: call reset first"
@@ -120,7 +120,7 @@ def one_worlds_action(name: str, action: Any, shape: tuple[int, ...]) -> np.ndar
 
 def _real(name: str, actions: Any) -> np.ndarray:
     """Return actions as float64. Half precision is accepted, because policies may compute in it."""
-    given = without_derivative(name, resolved(name, actions))
+    given = without_derivative(name, readable(name, actions))
     try:
         array = np.asarray(given)
         if array.dtype.kind in "biuf":

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from optics.numerics.number_types import resolved
+from optics.numerics.number_types import readable
 from sim.physics.mujoco_worlds import MODELS
 
 
@@ -26,7 +26,7 @@ def checked(state: Any, like: Mapping[str, np.ndarray]) -> Mapping[str, np.ndarr
     for name, array in like.items():
         if name not in state:
             continue
-        if np.shape(resolved(f"state: {name}", state[name])) != array.shape:
+        if np.shape(readable(f"state: {name}", state[name])) != array.shape:
             raise ValueError(f"state: {name} has shape {np.shape(state[name])}: must be {array.shape}")
     return state
 
@@ -39,7 +39,7 @@ def chosen_worlds(worlds: Any, n: int) -> np.ndarray:
     """
     if worlds is None:
         return np.arange(n)
-    chosen = np.atleast_1d(np.asarray(resolved("worlds", worlds)))
+    chosen = np.atleast_1d(np.asarray(readable("worlds", worlds)))
     if chosen.ndim != 1 or chosen.dtype.kind not in "iu" or ((chosen < 0) | (chosen >= n)).any():
         raise ValueError(f"worlds = {worlds!r:.80}: must be numbers of worlds, from 0 to {n - 1}")
     return chosen

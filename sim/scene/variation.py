@@ -15,7 +15,7 @@ import numpy as np
 from scipy.constants import c, h, k
 
 from optics.numerics.arguments import did_you_mean
-from optics.numerics.number_types import full_precision, resolved
+from optics.numerics.number_types import full_precision, readable
 from optics.spectra.spectrum import cie_1931, daylight
 
 DAYLIGHT = 6504.0  # [K] the correlated colour temperature of CIE D65
@@ -85,7 +85,7 @@ class Variation:
             elif what == TEMPERATURE:
                 found[name] = 1 / (1 / low + (1 / high - 1 / low) * random.random())
             else:
-                corners = np.asarray(resolved(name, (low, high)), float)
+                corners = np.asarray(readable(name, (low, high)), float)
                 drawn = corners[0] + (corners[1] - corners[0]) * random.random(corners.shape[1:])
                 found[name] = drawn if drawn.ndim else float(drawn)
         return found

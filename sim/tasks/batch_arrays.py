@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from optics.numerics.number_types import resolved
+from optics.numerics.number_types import readable
 from sim.tasks.outcome import Outcome
 
 __all__ = ["columns", "mapping", "not_finite", "require_outcome", "rows"]
@@ -72,7 +72,7 @@ def require_outcome(outcome: Outcome, n: int, learners: int) -> None:
         ValueError: an array has another shape, a reward is not finite, or the outcome names worlds that do not exist.
     """
     for name in ("terms", "terminated", "success", "over"):
-        resolved(f"judge: {name}", outcome.terms.terms if name == "terms" else getattr(outcome, name))
+        readable(f"judge: {name}", outcome.terms.terms if name == "terms" else getattr(outcome, name))
     size = n * learners
     shapes = outcome.terms.terms.shape[1:], outcome.terminated.shape, outcome.success.shape
     for name, shape in zip(("terms", "terminated", "success"), shapes, strict=True):
@@ -93,7 +93,7 @@ def require_outcome(outcome: Outcome, n: int, learners: int) -> None:
 
 
 def _array(where: str, returned: Any, kind: Any) -> np.ndarray:
-    returned = resolved(where, returned)
+    returned = readable(where, returned)
     try:
         given = np.asarray(returned)
         if given.dtype.kind in "biufO":  # NumPy would also convert text, such as "1.5", and drop imaginary parts

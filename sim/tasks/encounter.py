@@ -12,7 +12,7 @@ import mujoco
 import numpy as np
 
 from optics.numerics.arguments import did_you_mean, of_kind
-from optics.numerics.number_types import resolved
+from optics.numerics.number_types import readable
 from sim.physics.controls import actuator_names
 from sim.tasks.batch_task import BatchTask
 from sim.tasks.task import Task
@@ -66,7 +66,7 @@ class Frozen:
         try:
             predict = getattr(self.policy, "predict", None)
             found = self.policy(observation) if predict is None else predict(observation, deterministic=True)[0]
-            actions = np.asarray(resolved("actions", found), np.float32)
+            actions = np.asarray(readable("actions", found), np.float32)
         except KeyboardInterrupt:
             raise
         except BaseException as error:

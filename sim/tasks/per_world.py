@@ -180,7 +180,7 @@ class PerWorld(BatchTask):
 
 
 def _row(where: str, returned: object) -> np.ndarray:
-    returned = number_types.resolved(where, returned)
+    returned = number_types.readable(where, returned)
     try:
         given = np.asarray(returned)
         if given.dtype.kind in "biuf":

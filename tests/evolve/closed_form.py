@@ -119,7 +119,8 @@ def cannot_begin(phenotype, config, seed, policy_path, progress):
 
 def threads(phenotype, config, seed, policy_path, progress):
     """Return the number of threads that numerical libraries may use in a worker, as its fitness."""
-    return Evaluation(float(os.environ["OMP_NUM_THREADS"]))
+    threads = float(os.environ["OMP_NUM_THREADS"])
+    return Evaluation(threads, (threads,))
 
 
 KEPT = []  # objects that the worker keeps, like a cache
@@ -131,7 +132,7 @@ def leaves_gaps(phenotype, config, seed, policy_path, progress):
         held = int(next(line for line in status if line.startswith("RssAnon")).split()[1]) / 1000
     pieces = [bytes(50_000) for _ in range(4000)]
     KEPT.extend(pieces[::100])
-    return Evaluation(held)
+    return Evaluation(held, (held,))
 
 
 def unfit():

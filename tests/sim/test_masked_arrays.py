@@ -55,10 +55,11 @@ def test_tasks_and_animals_of_one_world():
 
 def test_actions():
     env = sim.make_vec_env(Prey(), n_envs=2)
+    env.reset()
     with pytest.raises(ValueError, match="actions has masked elements"):
         env.step_async(masked(np.zeros((2, *env.action_space.shape), np.float32), RNG))
     several = EncounterEnv.__new__(EncounterEnv)  # without its renderer
     several.agents, several.action_spaces = ["prey"], {"prey": env.action_space}
-    with pytest.raises(ValueError, match=r"actions: 'prey' has masked elements"):
+    with pytest.raises(ValueError, match=r"action of 'prey' has masked elements"):
         several._commanded({"prey": masked(np.zeros(env.action_space.shape), RNG)})
     env.close()

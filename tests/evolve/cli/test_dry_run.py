@@ -45,7 +45,7 @@ def test_the_measured_rollouts_are_the_shortest_of_whole_batches(seed, monkeypat
         for k in range(ROLLOUTS):
             progress((k + 1) * rollout, ROLLOUTS * rollout)
         policy.write_bytes(b"")
-        return Evaluation(1.0)
+        return Evaluation(1.0, (1.0,))
 
     monkeypatch.setattr(evolve.cli.pace, "evaluate_candidate", evaluate)
     batch, n_envs, n_steps = draw.choice([64, 1024]), draw.choice([16, 48, 128]), 8 * draw.randint(1, 40)

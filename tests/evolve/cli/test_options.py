@@ -65,6 +65,8 @@ OF_PRODUCTS = {
 }
 OF_ONE = {"candidate": (["--candidate", "0"], CHANGES), "seed": (["--seed", "3"], CHANGES)}
 OPEN = {"open": (["--open"], CHANGES)}
+DAMAGE = {"before_damage": (["--before-damage"], CHANGES)}  # in a run with a damaged record
+FILMS = {name: ([f"--{name}"], CHANGES) for name in ("rrd", "gif", "mp4")}
 JSON = {"json": (["--json"], CHANGES)}
 SETTINGS = {
     "task": (["tracking"], CHANGES),
@@ -83,14 +85,20 @@ TABLE = {
         "start_from": (["--from", "done"], CHANGES),
         "dry_run": (["--dry-run"], CHANGES),
     },
-    "resume": {"directory": (["done"], CHANGES), "task": OF_PRODUCTS["task"], **OF_RUNS},
-    "status": {"directory": (["begun"], CHANGES), **JSON, "watch": (["--json", "--watch"], CHANGES)},
+    "resume": {"directory": (["done"], CHANGES), "task": OF_PRODUCTS["task"], **DAMAGE, **OF_RUNS},
+    "status": {"directory": (["begun"], CHANGES), **DAMAGE, **JSON, "watch": (["--json", "--watch"], CHANGES)},
     "list": {"directory": (["empty"], CHANGES), **JSON},
-    "compare": {"directories": (["begun"], CHANGES), **JSON, "html": (["--html", "page.html"], CHANGES)},
-    "drift": {"directories": (["again"], CHANGES), "searches": (["--searches", "3"], CHANGES), **JSON},
-    "replay": {**OF_PRODUCTS, **OF_ONE, **OPEN, **{name: ([f"--{name}"], CHANGES) for name in ("rrd", "gif", "mp4")}},
-    "report": {**OF_PRODUCTS, **OPEN},
-    "export": {**OF_PRODUCTS, **OF_ONE},
+    "compare": {"directories": (["begun"], CHANGES), **DAMAGE, **JSON, "html": (["--html", "page.html"], CHANGES)},
+    "drift": {"directories": (["again"], CHANGES), "searches": (["--searches", "3"], CHANGES), **DAMAGE, **JSON},
+    "replay": {
+        **OF_PRODUCTS,
+        **DAMAGE,
+        **OF_ONE,
+        **OPEN,
+        **{name: ([f"--{name}"], CHANGES) for name in ("rrd", "gif", "mp4")},
+    },
+    "report": {**OF_PRODUCTS, **DAMAGE, **OPEN},
+    "export": {**OF_PRODUCTS, **DAMAGE, **OF_ONE},
     "demo": {"out": (["--out", "there"], CHANGES), **OPEN, **JSON, "quiet": (["--quiet"], CHANGES)},
     "validate": {"proofs": (["aliasing"], CHANGES), "list": (["--list"], CHANGES)},
     "doctor": JSON,
@@ -162,6 +170,8 @@ def runs(tmp_path_factory):
     for name, seed in (("done", 0), ("elsewhere", 1), ("again", 2)):
         run = Run.create(folder / name, tiny("search.generations=1", f"seed={seed}"))
         loop.evolve(run, Acute(), Lines(run, io.StringIO(), 1))
+    damaged = shutil.copytree(folder / "done", folder / "damaged") / "candidates.jsonl"
+    damaged.write_text(damaged.read_text() + "damage\n")
     (folder / "empty").mkdir()
     (folder / "settings.toml").write_text("seed = 9\n")
     return folder
@@ -198,7 +208,7 @@ def world(runs, tmp_path, monkeypatch, call):
     monkeypatch.setattr(begin, "Search", logged("search", None))
     monkeypatch.setattr(carry_on, "LocalExecutor", lambda _, count, prepare: Executor(log, "local", count))
     monkeypatch.setattr(commands.run, "local_workers", carry_on.local_workers)
-    monkeypatch.setattr(commands.run, "DaskExecutor", lambda scheduler: Executor(log, "dask"))
+    monkeypatch.setattr(commands.run, "DaskExecutor", lambda scheduler, note: Executor(log, "dask"))
     monkeypatch.setattr(commands.run.Scheduler, "require_answer", logged("answer", None))
     monkeypatch.setattr(device, "make_ready", logged("device", None))
     monkeypatch.setattr(RunPlan, "measured", lambda self: RunPlan(*self_of(self), dict.fromkeys(self.animals, PACE)))
@@ -263,6 +273,9 @@ def test_every_argument_has_an_effect_or_is_refused(command, world):
             changed = [*base[:place], *given, *base[place + 1 :]]
         if command == "config" and name == "what":
             changed = SCHEMA
+        if name == "before_damage":
+            changed = [*("damaged" if part in ("done", "begun") else part for part in base), *given]
+            assert world(*changed[:-1])[0] == 2
         check(world, changed, words, before)
 
 

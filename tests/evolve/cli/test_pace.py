@@ -89,7 +89,7 @@ class Clock:
                 self.now += 3.0
         self.now += 3.0  # the evaluation of the trained policy
         policy.write_bytes(b"1234567")
-        return Evaluation(1.0)
+        return Evaluation(1.0, (1.0,))
 
 
 @pytest.mark.parametrize(("n_epochs", "least_epochs"), [(10, 3), (10, 6), (5, 1)])

@@ -211,7 +211,7 @@ def test_dask_is_sent_the_text(tmp_path):
 
     def live(phenotype, config, *rest, progress):
         given.append(executed_task(config.choice.named_code).episode_steps)
-        return Evaluation(fitness=1.0)
+        return Evaluation(1.0, (1.0,))
 
     dask_worker._evaluate(live, pickle.loads(pickle.dumps(order)), lambda *_: None)
     assert given == [20]

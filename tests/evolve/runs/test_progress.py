@@ -42,7 +42,7 @@ def run(tmp_path):
 
 
 def add(run, identity, fitness, steps=1000, failure=None):
-    outcome = Evaluation(fitness, steps=steps, failure=failure)
+    outcome = Evaluation(fitness, (fitness,), steps=steps, failure=failure)
     run.append(
         Candidate.from_evaluation(
             Place.from_id(identity, 4), tuple(GENOME.tolist()), develop(GENOME, CONFIG), 1, outcome

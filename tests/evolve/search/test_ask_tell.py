@@ -37,7 +37,8 @@ class LastFirst:
     def run(self, jobs, progress) -> Iterator:
         while jobs:
             job = jobs.pop()
-            yield job, Evaluation(self.value(job.phenotype))
+            value = self.value(job.phenotype)
+            yield job, Evaluation(value, (value,))
 
 
 def plainly(config, value):

@@ -153,7 +153,8 @@ class Imagined:
                 self.busy += seconds
                 heapq.heappush(working, (self.now + seconds, job.id, job))
             self.now, _, job = heapq.heappop(working)
-            yield job, Evaluation(-abs(job.phenotype.fov_deg - 70))
+            fitness = -abs(job.phenotype.fov_deg - 70)
+            yield job, Evaluation(fitness, (fitness,))
 
     @property
     def utilisation(self):

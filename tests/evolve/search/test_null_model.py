@@ -26,7 +26,8 @@ class Chance:
 
     def run(self, jobs, progress=None):
         while jobs:
-            yield jobs.popleft(), Evaluation(self.chance.normal())
+            value = self.chance.normal()
+            yield jobs.popleft(), Evaluation(value, (value,))
 
 
 class Nobody:

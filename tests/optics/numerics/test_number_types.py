@@ -1,4 +1,4 @@
-"""Half precision is refused and lazy bits of PyTorch are resolved wherever arrays enter `optics`."""
+"""Half precision is refused and lazy bits of PyTorch are readable wherever arrays enter `optics`."""
 
 import functools
 
@@ -215,7 +215,7 @@ def test_other_containers_of_half_precision():
 def test_nothing_else_is_changed():
     """Values without lazy bits are returned as they are, and usual types are accepted."""
     for value in (1.0, "text", [1, [2.0, "x"]], (1, 2), None, torch.ones(2), np.ones(2), {"a": 1}):
-        assert number_types.resolved("x", value) is value
+        assert number_types.readable("x", value) is value
         assert number_types.full_precision("x", value) is value
     for dtype in (np.float32, np.float64, np.longdouble, np.int8, np.uint64, bool):
         assert optics.HeightMap(np.zeros((4, 4), dtype)).span == 0
