@@ -17,7 +17,7 @@ from optics.numerics.grid import Grid
 from optics.numerics.precision import precision
 from optics.numerics.quadrature import stepped_up
 
-__all__ = ["CAUTION", "path_rounding", "spot_check"]
+__all__ = ["CAUTION", "EFFORT", "path_rounding", "spot_check"]
 
 # Choice: safety factor on the estimate. From 40 points, the root mean square of the error is known only to within a
 # factor of about two. tests/optics/point_spread/test_robustness.py checks that the stated error bounds the true error.
