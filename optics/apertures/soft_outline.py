@@ -21,7 +21,7 @@ from optics.apertures.aperture import SoftAperture
 from optics.apertures.soft_edge import SoftEdge
 from optics.apertures.soft_polygon import TINY, radial_table, sides_share
 from optics.numerics.autodiff import Array
-from optics.numerics.cost import SOFT_EDGE_SAMPLE
+from optics.numerics.cost import SOFT_SIDE_SAMPLE
 from optics.numerics.precision import Precision, opaque
 from optics.numerics.quadrature import gauss_legendre, gauss_legendre_count
 
@@ -46,8 +46,7 @@ class SoftOutline(SoftAperture):
 
     @property
     def seconds_per_point(self) -> float:
-        pieces = len(self.segments) + 3 * len(_short(self.arcs))
-        return pieces * SOFT_EDGE_SAMPLE * (1 + self.edge.cycles)
+        return (len(self.segments) + 3 * len(_short(self.arcs))) * SOFT_SIDE_SAMPLE
 
     def transmittance(self, x: Array, y: Array, types: Precision) -> Array:
         import drjit as dr

@@ -24,7 +24,7 @@ import numpy as np
 from optics.apertures.aperture import SoftAperture
 from optics.apertures.soft_edge import SoftEdge
 from optics.numerics.autodiff import Array
-from optics.numerics.cost import SOFT_EDGE_SAMPLE
+from optics.numerics.cost import SOFT_SIDE_SAMPLE
 from optics.numerics.interpolation import Interpolant
 from optics.numerics.precision import Precision, opaque
 from optics.numerics.quadrature import gauss_legendre, gauss_legendre_count
@@ -44,7 +44,7 @@ class SoftPolygon(SoftAperture):
 
     @property
     def seconds_per_point(self) -> float:
-        return len(self.vertices) * SOFT_EDGE_SAMPLE * (1 + self.edge.cycles)
+        return len(self.vertices) * SOFT_SIDE_SAMPLE
 
     def transmittance(self, x: Array, y: Array, types: Precision) -> Array:
         return sides_share(self.edge, self.vertices, np.roll(self.vertices, -1, axis=0), x, y, types)

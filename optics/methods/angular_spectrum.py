@@ -13,7 +13,7 @@ from functools import cached_property
 from optics.elements.beam import Beam
 from optics.methods.fresnel import paraxial_integral
 from optics.methods.problem import Problem, PupilEdge
-from optics.methods.row_blocks import row_blocks
+from optics.methods.row_blocks import block_size, row_blocks
 from optics.methods.spectral_taper import Taper, tapers
 from optics.methods.spectrum_sampling import SpectrumSampling
 from optics.numerics.autodiff import Array, Scalar
@@ -145,12 +145,13 @@ def _timed(sampling: GridSampling, problem: Problem) -> GridSampling:
 def _spectrum_cost(how: GridSampling, dtype: str) -> tuple[float, float]:
     """Return the time [s] and the memory [bytes] of the sum from the pupil to the spectrum."""
     stored, spectrum = how.part(how.pupil), how.part(how.spectrum)
-    blocks = row_blocks(stored)
-    needed = how.sum_bytes(blocks[0][1], spectrum, dtype)
-    if how.even or len(blocks) == 1:
+    count, rows = block_size(stored)
+    block = Grid((rows, stored.shape[1]), stored.dx)
+    needed = how.sum_bytes(block, spectrum, dtype)
+    if how.even or count == 1:
         return how.sum_seconds(how.pupil, how.pupil_period, how.spectrum), needed
-    each = how.sum_seconds(blocks[0][1], how.pupil_period, how.spectrum)
-    return len(blocks) * (each + math.prod(spectrum.shape) * SPECTRUM_SAMPLE), needed
+    each = how.sum_seconds(block, how.pupil_period, how.spectrum)
+    return count * (each + math.prod(spectrum.shape) * SPECTRUM_SAMPLE), needed
 
 
 def _angular_spectrum(beam: Beam, problem: Problem, how: GridSampling, types: Precision) -> Field:

@@ -21,6 +21,7 @@ from optics.numerics.quadrature import stepped_up
 from optics.numerics.radial_profile import RadialProfile
 
 __all__ = [
+    "LANES",
     "MOST_DIGITS",
     "NodeSampling",
     "cached_nodes",

@@ -5,29 +5,36 @@ Memory then depends on the size of a block and of the spectrum, and not on the n
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 from optics.numerics.autodiff import Scalar
 from optics.numerics.field import Field
 from optics.numerics.grid import Grid
 from optics.numerics.precision import opaque
 
-__all__ = ["row_blocks", "with_rows_moved"]
+__all__ = ["block_size", "row_blocks", "with_rows_moved"]
 
 AT_ONCE = 2**24  # choice, limited by memory: largest number of samples of a block
 
 
-def row_blocks(grid: Grid) -> list[tuple[int, Grid]]:
-    """Return the first row and the samples of each block. A small grid is its own single block."""
+def block_size(grid: Grid) -> tuple[int, int]:
+    """Return the number of blocks, and the number of rows of each block except the last."""
     height, width = grid.shape
-    count = -(-height * width // AT_ONCE)
+    rows = -(-height // -(-height * width // AT_ONCE))
+    return -(-height // rows), rows
+
+
+def row_blocks(grid: Grid) -> Iterator[tuple[int, Grid]]:
+    """Yield the first row and the samples of each block. A small grid is its own single block."""
+    height, width = grid.shape
+    count, rows = block_size(grid)
     if count == 1:
-        return [(0, grid)]
-    rows = -(-height // count)
-    found = []
+        yield 0, grid
+        return
     for first in range(0, height, rows):
         here = min(rows, height - first)
         y = grid.centre[1] + (first + here // 2 - height // 2) * grid.dx
-        found.append((first, Grid((here, width), grid.dx, (grid.centre[0], y))))
-    return found
+        yield first, Grid((here, width), grid.dx, (grid.centre[0], y))
 
 
 def with_rows_moved(spectrum: Field, rows: int, period: Scalar, sign: int) -> Field:

@@ -36,6 +36,7 @@ __all__ = [
     "RAY",
     "RAY_BYTES",
     "SOFT_EDGE_SAMPLE",
+    "SOFT_SIDE_SAMPLE",
     "SPECTRUM_SAMPLE",
     "SYMMETRIC_BYTES",
     "WINDOW_SAMPLE",
@@ -65,6 +66,7 @@ FOLDED_SAMPLE = 5e-9  # sample of a sum that is computed from even and odd parts
 FFT_COPY = 8e-9  # copying a sample between Dr.Jit and SciPy
 PUPIL_SAMPLE = 1e-8  # optical path and phase, without the soft edge
 SOFT_EDGE_SAMPLE = 1e-8  # soft edge from a table along one edge
+SOFT_SIDE_SAMPLE = 2.5e-8  # soft edge of one straight side; an arc takes three times as long
 SPECTRUM_SAMPLE = 1e-8  # transfer function
 KERNEL_ENTRY = 2e-8  # entry of the slow factor between pupil and window
 FOURIER_ENTRY = 1e-8  # entry of the Fourier kernel between pupil and window, in NumPy

@@ -55,7 +55,7 @@ from optics.numerics.accuracy import (
     size_of,
 )
 from optics.numerics.cost import CALL, DFT_CALL, PAIRS_PER_SECOND, WINDOW_SAMPLE
-from optics.point_spread.window_cost import check_window, window_bytes, window_seconds
+from optics.point_spread.window_cost import check_seconds, check_window, window_bytes, window_seconds
 
 __all__ = ["APPROXIMATE", "EXACT", "FIELDS", "METHODS", "choose"]
 
@@ -185,8 +185,8 @@ def _sampling_error(problem: Problem) -> float:
 
 
 def _seconds(option: Sampling, problem: Problem) -> float:
-    """Return the time of the whole PSF: that of the method, and that of the window."""
-    return option.seconds + window_seconds(problem)
+    """Return the time of the whole PSF: that of the method, of the window, and of the check."""
+    return option.seconds + window_seconds(problem) + check_seconds(problem, option)
 
 
 def _bytes(option: Sampling, problem: Problem) -> float:

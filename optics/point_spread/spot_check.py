@@ -17,7 +17,7 @@ from optics.numerics.grid import Grid
 from optics.numerics.precision import precision
 from optics.numerics.quadrature import stepped_up
 
-__all__ = ["CAUTION", "path_rounding", "spot_check"]
+__all__ = ["CAUTION", "EFFORT", "path_rounding", "spot_check"]
 
 # Choice: safety factor on the estimate. From 40 points, the root mean square of the error is known only to within a
 # factor of about two. tests/optics/point_spread/test_robustness.py checks that the stated error bounds the true error.
@@ -27,6 +27,7 @@ CAUTION = 3.5
 # Choice: relative rounding error of a path, times 2π for the phase and 2 for the intensity, reduced by averaging over
 # the pupil. test_spot_check.py checks the value against sums in extended precision.
 WAVE_ROUNDING = 1.1e-16
+FINER_DETAIL = 1e-2  # choice: size of the detail that the check neglects, relative to that which the PSF neglects
 DIGITS_STEP = 0.25  # choice: digits of a rule are rounded to multiples of this, so that cached rules are used
 
 
@@ -84,7 +85,7 @@ def spot_check(beam: Beam, problem: Problem, image: np.ndarray, seconds: float) 
     if total == 0:
         return None
     darkness = _darkness(beam, problem, math.sqrt(total / image.size))
-    reference = _affordable(problem, darkness, seconds, image.size)
+    reference = _affordable(beam, problem, darkness, seconds)
     if reference.points < min(EFFORT.fewest, image.size):
         return None
     drawn, chance = _drawn(problem, image, reference.points)
@@ -123,15 +124,17 @@ def _darkness(beam: Beam, problem: Problem, mean: float) -> float:
     return max(0.0, 0.5 * math.log10(in_phase / mean))
 
 
-def _affordable(problem: Problem, darkness: float, seconds: float, samples: int) -> _DirectSum:
+def _affordable(beam: Beam, problem: Problem, darkness: float, seconds: float) -> _DirectSum:
     """Return the direct sum with as many points and digits as the time of the PSF allows."""
+    samples, fine = math.prod(problem.window.shape), _finer_detail(beam, problem)
     share = EFFORT.share if samples >= EFFORT.fewest else EFFORT.share_of_few
     pairs = max(share * seconds, EFFORT.seconds) * PAIRS_PER_SECOND["float32"]
-    wanted = min(EFFORT.points_along_radius if problem.symmetric else EFFORT.points, samples)
-    for spare in EFFORT.spare_digits:
+    along_radius = problem.symmetric and problem.window.centre == (0.0, 0.0)
+    wanted = min(EFFORT.points_along_radius if along_radius else EFFORT.points, samples)
+    for spare, detail in dict.fromkeys((spare, detail) for spare in EFFORT.spare_digits for detail in (fine, 0.0)):
         wished = spare - math.log10(problem.tolerance) + darkness
         digits = min(math.ceil(wished / DIGITS_STEP) * DIGITS_STEP, MOST_DIGITS)
-        cycles = stepped_up(turns(problem, digits))
+        cycles = stepped_up(turns(problem, digits) + detail)
         nodes = node_count(problem.aperture, cycles, digits) / (2 if problem.symmetric else 1)
         found = _DirectSum(int(min(wanted, pairs / nodes)), cycles, digits)
         if found.points == wanted:
@@ -139,15 +142,24 @@ def _affordable(problem: Problem, darkness: float, seconds: float, samples: int)
     return found
 
 
+def _finer_detail(beam: Beam, problem: Problem) -> float:
+    """Return the additional cycles per radius of detail in reliefs, wavefronts and masks that the check resolves.
+
+    A PSF neglects detail below a tenth of its tolerance. If the check neglected the same detail, it would not show the
+    resulting error.
+    """
+    fine = beam.pupil.bandwidth(beam.wavelength, FINER_DETAIL * problem.tolerance / 10)
+    return problem.radius * max(fine - problem.detail, 0.0)
+
+
 def _drawn(problem: Problem, image: np.ndarray, points: int) -> tuple[np.ndarray, np.ndarray]:
     """Return the flat indices of the points to compare, and the probability with which each was drawn.
 
     They are drawn at even steps of the cumulative probability, so that no likely point is omitted.
     """
-    if points == image.size:
-        chance = np.full(points, 1 / points)  # there are few points, so each is compared once
-    else:
-        chance = _chances(image.astype(np.float64), problem.window.shape)
+    # If there are few points, each is compared once.
+    even = np.full(points, 1 / points)
+    chance = even if points == image.size else _chances(image.astype(np.float64), problem.window)
     order = _in_order(problem.window) if problem.symmetric else np.arange(image.size)
     levels = (np.arange(points) + 0.5) / points
     drawn = order[np.searchsorted(np.cumsum(chance[order]), levels).clip(max=image.size - 1)]
@@ -173,7 +185,7 @@ def _exact(beam: Beam, problem: Problem, reference: _DirectSum, drawn: np.ndarra
 KINDS = 6  # kinds of points in `_chances`
 
 
-def _chances(bright: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
+def _chances(bright: np.ndarray, window: Grid) -> np.ndarray:
     """Return the probability with which each point is drawn, flat.
 
     It is the mean of six distributions. The first is uniform. The others are proportional to the intensity; to the
@@ -184,14 +196,17 @@ def _chances(bright: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
     proportional to its square root. If there is a bright focus, only the second distribution detects such an error. The
     errors of a focus of one sample lie next to it, so the square is spread over neighbouring samples. Phases change
     fastest at sides and corners, so quadratures fail there first, and within a few samples. The light of a slit reaches
-    the sides only in few places, and errors are large where the light is bright; hence the product.
+    the sides only in few places, and errors are large where the light is bright; hence the product. In a window off the
+    axis, phases change fastest at the sides that are farthest from the axis.
     """
-    height, width = shape
+    height, width = shape = window.shape
     squares = np.zeros((height + 2, width + 2))
     squares[1:-1, 1:-1] = np.square(bright).reshape(shape)
     rows = squares[:-2] + squares[1:-1] + squares[2:]
     near = (rows[:, :-2] + rows[:, 1:-1] + rows[:, 2:]).ravel()
-    rim, fixed = (_large_chances if bright.size > LARGE else _small_chances)(shape)
+    rim, fixed = (_large_chances if bright.size > LARGE else _small_chances)(
+        shape, (window.centre[0] / window.dx, window.centre[1] / window.dx)
+    )
     lit = bright * rim
     found = fixed + bright / bright.sum() + near / near.sum()
     return (found + lit / lit.sum() if lit.any() else found + fixed / 3) / KINDS
@@ -221,10 +236,14 @@ _small_order, _large_order = (lru_cache(maxsize=count)(_by_radius) for count in 
 # Choice: exponent of u², where u in [-1, 1] is the position across the window. u²⁴ has fallen to one half at 1 - |u| =
 # ln 2 / 24, a seventieth of the window's width from the side.
 STEEP = 12
+OUTWARDS = 2  # choice: exponent of the squared distance from the axis, for windows off the axis
 
 
-def _fixed_chances(shape: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
-    """Return the nearness of sides and corners, flat, and the sum of the three parts that do not depend on the PSF."""
+def _fixed_chances(shape: tuple[int, int], centre: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:
+    """Return the nearness of sides and corners, flat, and the sum of the three parts that do not depend on the PSF.
+
+    centre: position (x, y) of the window, in samples.
+    """
     height, width = shape
     y, x = (np.square(np.linspace(-1, 1, n)) if n > 1 else np.ones(1) for n in shape)
     # Both pairs of sides have the same weight, regardless of their lengths. One half of it is for the outermost samples
@@ -235,6 +254,11 @@ def _fixed_chances(shape: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
         sides += across[None, :] / (across.sum() * height) + along[:, None] / (along.sum() * width)
     corners = (np.add.outer(y, x) / 2) ** STEEP
     rim = sides.ravel() / 4 + corners.ravel() / corners.sum()
+    if centre != (0.0, 0.0):
+        away = Grid(shape, 1.0, centre)
+        squared = np.add.outer(np.square(away.y), np.square(away.x)).ravel()
+        far = rim * (squared / squared.max()) ** OUTWARDS
+        rim = (rim + far * (rim.sum() / far.sum())) / 2
     return rim, 1 / rim.size + rim
 
 

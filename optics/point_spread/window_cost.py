@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 
+from optics.methods.method_sampling import Sampling
 from optics.methods.problem import Problem
+from optics.methods.rayleigh_sommerfeld import LANES
 from optics.numerics.accuracy import MOST_BYTES, MOST_SECONDS, AccuracyError, size_of
 from optics.numerics.cost import (
     CHECK_BYTES,
@@ -13,10 +15,12 @@ from optics.numerics.cost import (
     ITEM_BYTES,
     OUTPUT_ARRAYS,
     OUTPUT_SAMPLE,
+    PAIRS_PER_SECOND,
 )
 from optics.numerics.grid import Grid
+from optics.point_spread.spot_check import EFFORT
 
-__all__ = ["check_window", "window_bytes", "window_seconds"]
+__all__ = ["check_seconds", "check_window", "window_bytes", "window_seconds"]
 
 
 def window_seconds(problem: Problem) -> float:
@@ -24,6 +28,20 @@ def window_seconds(problem: Problem) -> float:
     check = CHECK_SYMMETRIC_SAMPLE if problem.symmetric else CHECK_SAMPLE
     each = OUTPUT_SAMPLE[problem.dtype] + (0.0 if problem.reach is not None else check)
     return math.prod(problem.window.shape) * each
+
+
+def check_seconds(problem: Problem, sampling: Sampling) -> float:
+    """Return the time of the direct sum of the spot check, if the PSF is a direct sum itself [s].
+
+    Its nodes are about twice as many. For other methods, this time is a small part of that of the PSF.
+    """
+    if problem.reach is not None or sampling.method != "rayleigh_sommerfeld":
+        return 0.0
+    samples = math.prod(problem.window.shape)
+    points = max(min(EFFORT.points, samples), LANES)
+    needed = 2 * sampling.samples[0] * points / PAIRS_PER_SECOND["float64"]
+    slower = PAIRS_PER_SECOND["float32"] / PAIRS_PER_SECOND["float64"]
+    return needed if samples < EFFORT.fewest else min(needed, EFFORT.share * sampling.seconds * slower)
 
 
 def window_bytes(problem: Problem) -> float:

@@ -37,7 +37,7 @@ def test_blocks_of_rows_add_up_to_the_whole_pupil(method, height, dtype, monkeyp
     for share in rng.uniform(0.05, 0.9, 3):
         stored = sampling.part(sampling.pupil)
         monkeypatch.setattr(row_blocks, "AT_ONCE", int(share * np.prod(stored.shape)))
-        blocks = row_blocks.row_blocks(stored)
+        blocks = list(row_blocks.row_blocks(stored))
         assert len(blocks) > 1
         assert sum(block.shape[0] for _, block in blocks) == stored.shape[0]
         assert np.allclose(np.concatenate([block.y for _, block in blocks]), stored.y, atol=1e-15)
@@ -60,6 +60,13 @@ def test_memory_does_not_grow_with_the_rows_of_a_pupil(monkeypatch):
     monkeypatch.setattr(row_blocks, "AT_ONCE", int(np.prod(whole.pupil.shape)) // 16)
     parts = min(optics.methods.angular_spectrum.split_spectrum(problem), key=lambda each: each.seconds)
     assert parts.bytes < whole.bytes
+
+
+def test_pupils_far_beyond_the_limits_are_planned_at_once():
+    """X-rays of 1 pm need 10^14 samples: their blocks are counted, and not listed."""
+    assert row_blocks.block_size(Grid((10**9, 10**9), 1e-12))[0] > 10**7
+    with pytest.raises(optics.AccuracyError, match=r"needs \d+ samples across, .* GB and about .* s"):
+        optics.plan(Pupil(30e-6, thin_lens_focal_length=240e-6), 1e-12)
 
 
 @pytest.mark.slow

@@ -20,6 +20,6 @@ psf_result: test_psf.py, test_measure_errors.py
 spot_check: test_spot_check.py
 through_focus: test_through_focus.py
 vector_focus: test_vector_focus.py, test_foci.py
-window_cost: test_window_cost.py
+window_cost: test_window_cost.py, test_predicted_cost.py
 white: test_white.py
 """

@@ -72,7 +72,7 @@ def test_the_check_owns_up_to_what_its_own_sum_is_good_to(spare, monkeypatch):
     mean = np.sqrt(np.mean(np.square(image)))
     darkness = spot_check_module._darkness(beam, task, mean)
     assert darkness > 0.5
-    reference = spot_check_module._affordable(task, darkness, 1.0, image.size)
+    reference = spot_check_module._affordable(beam, task, darkness, 1.0)
     # The rules of nodes come in few steps, hence up to one step more.
     wished = spare - np.log10(task.tolerance) + darkness
     assert wished <= reference.digits <= wished + spot_check_module.DIGITS_STEP
@@ -115,7 +115,7 @@ def test_long_paths_round_more(seed):
     window = Grid((1, 8), 0.4 * airy, (airy * (0.0, 60.0)[seed % 2], airy * rng.uniform(0, 3)))
     beam = Beam(pupil, PointSource(), 550e-9, distance)
     task = Problem.from_beam(beam, window, 1e-9, "float64")
-    reference = spot_check_module._affordable(task, 3.0, 1.0, 8)
+    reference = spot_check_module._affordable(beam, task, 3.0, 1.0)
     image = spot_check_module._exact(beam, task, reference, np.arange(8))
     exact = in_extended_precision(pupil, 550e-9, distance, window.x, np.full(8, window.y[0]))
     error = np.linalg.norm(image - exact) / np.linalg.norm(exact)
@@ -137,5 +137,44 @@ def test_windows_with_few_samples_are_checked(samples):
     task = Problem.from_beam(beam, Grid((1, samples), 3e-6, (1e-4, 2e-4)), 1e-4)
     sampling = choose(task, "rayleigh_sommerfeld")[1]
     assert 2e5 < sampling.count < 5e6
-    reference = spot_check_module._affordable(task, 0.3, sampling.seconds, samples)
+    reference = spot_check_module._affordable(beam, task, 0.3, sampling.seconds)
     assert reference.points == samples
+
+
+def stated_and_actual(pupil, distance, window, tolerance):
+    """Return the stated and the actual error of a direct sum with the nodes for this tolerance."""
+    beam = Beam(pupil, PointSource(), 550e-9, distance)
+    task, fine = (Problem.from_beam(beam, window, *way) for way in ((tolerance, "float32"), (1e-7, "float64")))
+    sampling, better = (choose(each, "rayleigh_sommerfeld")[1] for each in (task, fine))
+    image, exact = (each.intensity(beam, fine).numpy() / beam.pupil.area for each in (sampling, better))
+    stated = spot_check(beam, task, image, sampling.seconds)
+    return stated, np.linalg.norm(image - exact) / np.linalg.norm(exact)
+
+
+@pytest.mark.parametrize("seed", [3, *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(4, 12))])
+def test_detail_that_a_psf_neglects_is_checked(seed):
+    """Detail of a height map that is smaller than a tenth of the tolerance needs no nodes of the PSF. The check had
+    neglected it, too, so that the error of a single sample was larger than stated."""
+    rng = np.random.default_rng(seed)
+    pupil = Pupil(10 ** rng.uniform(-5.3, -4.6), rng.random((12, 12)) * rng.uniform(1e-6, 7e-6), n=1.5)
+    distance = pupil.radius / rng.uniform(0.05, 0.3)
+    window = Grid((1, 1), 1e-6, tuple(rng.uniform(-1, 1, 2) * pupil.radius))
+    stated, actual = stated_and_actual(pupil, distance, window, 10 ** rng.uniform(-3.5, -2.5))
+    assert actual < 0.4 * stated
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_the_far_corner_of_a_window_off_the_axis_is_checked(seed):
+    """Quadratures fail where phases change fastest: at the corner that is farthest from the axis, and there alone."""
+    rng = np.random.default_rng(seed)
+    for _ in range(8):
+        inner = rng.uniform(0.3, 0.95)
+        aperture = optics.Annulus(inner) if rng.random() < 0.5 else optics.Slit(*rng.uniform(0.05, 1.2, 2))
+        pupil = Pupil(10 ** rng.uniform(-5, -4), aperture=aperture, thin_lens_focal_length=1e-3)
+        n, fresnel = int(rng.integers(9, 20)), 10 ** rng.uniform(-0.5, 1)
+        distance = pupil.radius**2 / 550e-9 / fresnel
+        half = pupil.radius * rng.uniform(0.3, 1) + 3 * 550e-9 * distance / (2 * pupil.radius)
+        half = min(half, distance)
+        window = Grid((n, n), 2 * half / n, tuple(rng.uniform(0.5, 1, 2) * half * rng.choice([-1, 1], 2)))
+        stated, actual = stated_and_actual(pupil, distance, window, 10 ** rng.uniform(-3, -1.7))
+        assert actual < 0.8 * stated

@@ -1,0 +1,102 @@
+"""Predicted times and memory against measured ones, for random problems and all methods."""
+
+import math
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+
+import optics
+from optics import AccuracyError, BSplineRelief, Grid, PointSource, Pupil
+from optics.elements.beam import Beam
+from optics.methods.problem import Problem
+from optics.point_spread.pictures import pictures
+from optics.point_spread.planner import METHODS, choose
+from optics.point_spread.request import Request
+from optics.point_spread.window_cost import window_bytes
+
+OPENINGS = (
+    optics.Circle(),
+    optics.Annulus(0.4),
+    optics.Slit(0.3, 0.6),
+    optics.Polygon.regular(6),
+    optics.union(optics.Disk(0.4, (0.3, 0.1)), optics.Disk(0.4, (-0.3, 0.2))),
+)
+
+
+def draw(rng):
+    """Return a random beam and problem."""
+    radius, na, wavelength = 10 ** rng.uniform(-5.5, -3), 10 ** rng.uniform(-2, -0.2), rng.uniform(4e-7, 7e-7)
+    distance = radius * math.sqrt(1 / na**2 - 1)
+    relief = BSplineRelief(rng.random((4, 4)) * 10 ** rng.uniform(-6.5, -5)) if rng.random() < 0.5 else None
+    lens = distance * rng.uniform(0.9, 1.2) if rng.random() < 0.5 else None
+    aperture = OPENINGS[rng.integers(len(OPENINGS))]
+    pupil = Pupil(radius, relief, thin_lens_focal_length=lens, aperture=aperture)
+    shape = tuple(int(n) for n in 2 ** rng.uniform(2, 11, 2))
+    dtype = str(rng.choice(["float32", "float64"]))
+    window = Grid(shape, wavelength / 2 / na * 10 ** rng.uniform(-1, 0.6))
+    beam = Beam(pupil, PointSource(), wavelength, distance)
+    return beam, Problem.from_beam(beam, window, 10 ** rng.uniform(-4.5, -1.5), dtype)
+
+
+def measured(beam, problem, method):
+    """Return the CPU time of a warm call divided by the predicted time; None unless both exceed a few hundredths."""
+    try:
+        plan = choose(problem, method)[0]
+        if not 0.04 < plan.seconds < 0.7:
+            return None
+        times = []
+        for _ in range(2):
+            start = time.process_time()
+            picture = pictures([Request(beam, problem, method)])[0]
+            picture.image.numpy()
+            times.append(time.process_time() - start)
+    except AccuracyError:
+        return None
+    return times[1] / plan.seconds if picture.plan.method == plan.method and times[1] > 0.05 else None
+
+
+@pytest.mark.slow
+def test_predicted_times_have_the_right_size():
+    """Relative to the median, which depends on the machine, nine of ten ratios lie within a factor of three."""
+    rng, ratios = np.random.default_rng(3), []
+    end = time.process_time() + 100
+    while time.process_time() < end and len(ratios) < 80:
+        beam, problem = draw(rng)
+        method = "auto" if rng.random() < 0.3 else str(rng.choice(list(METHODS)))
+        ratio = measured(beam, problem, method)
+        ratios += [] if ratio is None else [ratio]
+    assert len(ratios) > 10
+    spread = np.abs(np.log(np.array(ratios) / np.median(ratios)))
+    assert np.mean(spread < math.log(3)) > 0.9
+    assert spread.max() < math.log(8)
+
+
+MEASURE = r"""
+import pathlib, re, sys, numpy as np, optics
+shape, dtype, bent = eval(sys.argv[1])
+relief = optics.BSplineRelief(1e-7 * np.eye(4)) if bent else None
+pupil = optics.Pupil(30e-6, relief, thin_lens_focal_length=240e-6)
+ask = {"sensor_distance": 240e-6, "dtype": dtype}
+peak = []
+for size in ((16, 16), shape):
+    optics.psf(pupil, dx=2e-5 / max(size), shape=size, **ask).psf
+    peak.append(1024 * int(re.search(r"VmHWM:\s*(\d+)", pathlib.Path("/proc/self/status").read_text())[1]))
+print(peak[1] - peak[0])
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("bent", [False, True])
+@pytest.mark.parametrize(("shape", "dtype"), [((2500, 1500), "float32"), ((1200, 2000), "float64")])
+@pytest.mark.skipif(sys.platform != "linux", reason="reads Linux's /proc")
+def test_predicted_memory_has_the_right_size(shape, dtype, bent):
+    pupil = Pupil(30e-6, BSplineRelief(1e-7 * np.eye(4)) if bent else None, thin_lens_focal_length=240e-6)
+    beam = Beam(pupil, PointSource(), 550e-9, 240e-6)
+    problem = Problem.from_beam(beam, Grid(shape, 2e-5 / max(shape)), 1e-3, dtype)
+    predicted = choose(problem)[1].bytes + window_bytes(problem)
+    command = [sys.executable, "-c", MEASURE, repr((shape, dtype, bent))]
+    peak = float(subprocess.run(command, capture_output=True, check=True, text=True).stdout)
+    assert peak / 1.5 < predicted < 2.5 * peak
