@@ -2,8 +2,9 @@
 
 A line is a JSON object whose last field is its checksum: 16 hexadecimal digits of BLAKE2b over the previous checksum
 and the line without this field. A changed, removed, inserted or moved line therefore does not match its checksum; the
-probability that accidental damage is overlooked is 2^-64. Records of former versions have no checksums. If such a run
-is continued, the chain starts with the first new line, whose checksum also covers all earlier lines.
+probability that accidental damage is overlooked is 2^-64. Records written by earlier versions of the program have no
+checksums. If such a run is continued, the chain starts with the first new line, whose checksum also covers all earlier
+lines.
 """
 
 from __future__ import annotations

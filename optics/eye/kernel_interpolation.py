@@ -122,7 +122,7 @@ class NodeChoice:
 
 
 def worst_difference(terms: Sequence[tuple[float, np.ndarray]], samples_per_receptor: int) -> float:
-    """Return the largest |signal| of the kernel Σ share · kernel over all scenes with radiance in [0, 1].
+    """Return the largest absolute signal that Σ share · kernel can give for any scene with radiance in [0, 1].
 
     It is the sum over the positive part, or over the negative part, of the receptor's receptive field (kernel ⊗
     receptor aperture).

@@ -80,8 +80,8 @@ class Spot:
 
     centre: geometric image (x, y) [m].
     half: half the side [m] of the square around it that contains the light.
-    pitch: pitch [m] that resolves the light.
-    needs: requirements of each wavelength.
+    pitch: sampling pitch [m] that resolves the PSF.
+    needs: window and sampling that each wavelength requires.
     """
 
     centre: tuple[float, float]

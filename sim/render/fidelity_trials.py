@@ -62,7 +62,7 @@ class FidelityTrials:
         populations'.
 
         Raises:
-            NoRaysError: a receptor has no rays, when the returned function is called.
+            NoRaysError: raised by the returned function if a receptor has no rays.
         """
         truths: dict[int, list[np.ndarray]] = {}
         populations = self._populations(sampling)

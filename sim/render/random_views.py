@@ -23,7 +23,7 @@ class RandomViews:
     """Views of single eyes; the first axis is the view.
 
     position: position of the agent [m], (n, 2) · heading: [rad], (n,) · objects: centres [m], (n, k, 3)
-    eye: number of the eye that sees the view, (n,)
+    eye: index of the eye to which the view belongs, (n,)
     """
 
     position: np.ndarray
