@@ -47,7 +47,7 @@ NAMED = (
             "2 * 10.0 ** (darkness - reference.digits)",
             "2 * 10.0 ** (-reference.digits)",
         ),
-        ("the direct sum's own error is included", " + 2 * 10.0 ** (darkness - reference.digits)", ""),
+        ("the direct sum's own error is included", "shared = 2 * 10.0 ** (darkness - reference.digits)", "shared = 0"),
     ),
     *_mutants("optics/eye/kernel_interpolation.py", ("negative differences count", "in (1, -1)))", "in (1, 1)))")),
     *_mutants(

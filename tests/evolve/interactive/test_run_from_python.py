@@ -225,6 +225,7 @@ EXAMPLES = {
     "callbacks": (print,),
     "progress": False,
     "directory": "other",
+    "before_damage": True,
 }
 
 
