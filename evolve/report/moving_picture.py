@@ -87,9 +87,8 @@ def write_mp4(episode: Episode, path: Path) -> Path:
 def _frames(episode: Episode, stride: int) -> Iterator[Image.Image]:
     """Return the frames of an episode, at every `stride`-th time step."""
     eyes = display(episode.signals, episode.gain)
-    return (
-        _frame(_world(episode, time), eyes[time], episode.eyes.field_aspect) for time in range(0, len(episode), stride)
-    )
+    times, aspect = range(0, len(episode), stride), episode.eyes.field_aspect
+    return (_frame(_world(episode, time), eyes[time], aspect) for time in times)
 
 
 def _palette() -> Image.Image:

@@ -81,6 +81,6 @@ class RerunStream:
 def camera_frames(rotations: np.ndarray) -> np.ndarray:
     """Return the frames of eyes as right-handed frames of cameras, (..., 3, 3).
 
-    The columns of an eye's frame are (right, up, ahead), those of a camera's frame (right, down, ahead).
+    The columns of an eye's frame are (right, up, ahead). A camera's frame has the columns (right, down, ahead).
     """
     return rotations * np.array([1, -1, 1])

@@ -9,7 +9,6 @@ from typing import Any
 from evolve.analysis.statistics import gene_values
 from evolve.config.provenance import Source
 from evolve.config.run_config import RHABDOMS
-from evolve.genome.eye_config import VERTICAL_FOVS
 from evolve.genome.genes import ALL_GENES, INHERITED, SIDE, VERTICAL
 from evolve.store.directory import Run
 
@@ -35,7 +34,7 @@ def starts_from(text: str) -> Source:
     candidate = run.candidate(candidate_id)
     values = gene_values(candidate.phenotype)
     height = run.config.eye.vertical_fov
-    if height != VERTICAL_FOVS[-1]:
+    if height != "gene":
         values.pop(VERTICAL, None)
     values.pop(SIDE, None)  # height and width repeat its value, and also fit runs with eyes that are not square
     genome = {name: {"start": _exact(name, value)} for name, value in values.items() if not math.isnan(value)}
@@ -44,7 +43,7 @@ def starts_from(text: str) -> Source:
         tree["eye"] |= {name: getattr(run.config.eye, name) for name in AXES}
     if candidate.phenotype.rhabdom_diameter_um is not None:
         tree["eye"] |= {name: getattr(run.config.eye, name) for name in ("rhabdoms", *RHABDOMS)}
-    if height != VERTICAL_FOVS[0]:
+    if height != "receptors":
         tree["eye"]["vertical_fov"] = height
     if candidate.phenotype.lambda_max_nm is not None:
         tree["eye"]["receptors"] = INHERITED

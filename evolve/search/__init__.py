@@ -11,7 +11,7 @@ job                 Job: a candidate for an executor to evaluate
 local_executor      executor with processes on this machine
 worker              worker process of the local executor
 dask_executor       executor on a Dask cluster
-dask_connection     connection to a Dask scheduler, which waits no longer than the patience
+dask_connection     connection to a Dask scheduler, with a limited waiting time
 signs_of_life       time without signs of life of a Dask scheduler and its workers
 scheduler           address and certificates of a Dask scheduler
 dask_worker         evaluation of a candidate in a Dask worker

@@ -138,7 +138,8 @@ class Scheduler:
         """Return the reason of a failed connection in one line, with the remedy if encryption is the cause."""
         from distributed.comm.core import CommClosedError
 
-        if not isinstance(error, CommClosedError):
+        # Tornado raises a ValueError if the answer to the handshake is not TLS and arrives early.
+        if not isinstance(error, CommClosedError) and not (self.encrypted and isinstance(error, ValueError)):
             return (str(error) or type(error).__name__).splitlines()[0]
         if self.encrypted:
             return "the TLS handshake failed; the scheduler must use TLS, and its certificates must match these files"

@@ -63,7 +63,7 @@ def harmed(folder: Path) -> str | None:
 
 
 def _lines(folder: Path) -> list[str]:
-    """Return the lines of the list of checksums; [] if there is no list."""
+    """Return the lines of the list of checksums; [] without a list."""
     try:
         return read(folder / LISTED, LARGEST_LIST).decode(errors="replace").splitlines()
     except FileNotFoundError:

@@ -25,7 +25,7 @@ class Bitmap(ReadOnlyArrays):
 
     The pixels fill the pupil's square [-R, R]², and their edges are exact. Parts outside the pupil's circle are closed.
 
-    image: (n, n), (y, x), 1 (or True) where light passes, 0 (or False) elsewhere; rows grow with y.
+    image: (n, n), (y, x), 1 (or True) for open parts, 0 (or False) for closed ones; rows grow with y.
 
     Raises:
         ValueError: not square, more than 512 pixels along a side, more than 4,000 edges, or other values.

@@ -50,7 +50,7 @@ def _blurred(pairs: list[tuple[np.ndarray, Array]], shape: tuple[int, int], type
     for scene, kernel in lit:
         product = _spectrum(_flat(scene, types), scene.shape, period, types)
         product = product * _spectrum(kernel.array, kernel.shape, period, types)
-        total = product if total is None else Field(total.re + product.re, total.im + product.im, total.grid, types)
+        total = product if total is None else total + product
     assert total is not None
     return dft2(total, period, shape, 1, 1.0).re / period**2
 

@@ -273,7 +273,7 @@ def of_kind(name: str, value: Any, kind: type, example: str) -> Any:
 
 def _number(name: str, value: Any, carried: bool = False) -> float:
     # Derivatives of PyTorch would be lost even if those of Dr.Jit are propagated.
-    if not carried or getattr(value, "requires_grad", False) or isinstance(value, np.ma.MaskedArray):
+    if not carried or getattr(value, "requires_grad", False):
         without_derivative(name, value)
     value = full_precision(name, value)
     try:

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["as_array", "full_precision", "readable"]
+__all__ = ["as_array", "full_precision", "readable", "real_array"]
 
 HALF = "float16", "bfloat16", "complex32", "float8", "float6_", "float4_"  # starts of names of types
 DRJIT_HALF = "Float16", "f16"  # ends of names of Dr.Jit's types
@@ -48,6 +48,16 @@ def as_array(name: str, values: Any) -> np.ndarray:
         return np.asarray(None)
     full_precision(name, given)  # other containers, such as buffers and data frames
     return given
+
+
+def real_array(name: str, value: Any) -> np.ndarray | None:
+    """Return `value` as an array of real numbers of any precision; None if it is something else. See `readable`."""
+    value = readable(name, value)
+    try:
+        given = np.asarray(value)
+    except (TypeError, ValueError):
+        return None
+    return given if given.dtype.kind in "biuf" else None
 
 
 def _half(value: Any) -> str:

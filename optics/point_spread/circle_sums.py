@@ -2,7 +2,7 @@
 
 Sums over samples are integrals if frequencies that alias onto those of the intensity are removed. The weight of a
 sample at the distance ρ from the centre of a circle of radius R is therefore the circle, convolved with a kernel whose
-radial spectrum G is 1 at the intensity's frequencies and 0 at those that alias onto them:
+radial spectrum G is 1 at the intensity's frequencies, and 0 at frequencies that alias onto them:
 
     w(ρ, R) = 2π R ∫ G(f) J₁(2πRf) J₀(2πρf) df
 

@@ -45,7 +45,7 @@ def check_seconds(problem: Problem, sampling: Sampling) -> float:
 
 
 def window_bytes(problem: Problem) -> float:
-    """Return the memory of all arrays that are as large as the window, at their peak [bytes]."""
+    """Return the memory of all arrays of the size of the window, at their peak [bytes]."""
     each = OUTPUT_ARRAYS * ITEM_BYTES[problem.dtype] + (0.0 if problem.reach is not None else CHECK_BYTES)
     return math.prod(problem.window.shape) * each
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from optics.numerics.arguments import shown, without_derivative
-from optics.numerics.number_types import readable
+from optics.numerics.number_types import real_array
 
 CLOSED = "the environment is closed: make a new one"
 NOT_BEGUN = "the worlds have not begun: call reset first"
@@ -99,7 +99,10 @@ def actions_of(name: str, actions: Any, shape: tuple[int, ...]) -> np.ndarray:
         ValueError: the actions are not real numbers, are masked, or have another shape.
     """
     if not (type(actions) is np.ndarray and actions.dtype == np.float32):
-        exact, largest = _real(name, actions), np.finfo(np.float32).max
+        given = real_array(name, without_derivative(name, actions))  # policies may compute in half precision
+        if given is None:
+            raise ValueError(f"{name} = {shown(actions)}: must be real numbers")
+        exact, largest = given.astype(np.float64), np.finfo(np.float32).max
         actions = np.where(np.isinf(exact), exact, np.clip(exact, -largest, largest)).astype(np.float32)
     if actions.shape != shape:
         raise ValueError(f"{name} has shape {actions.shape}: must be {shape}")
@@ -116,15 +119,3 @@ def one_worlds_action(name: str, action: Any, shape: tuple[int, ...]) -> np.ndar
     if not np.isfinite(taken).all():
         raise ValueError(f"{name} = {shown(taken.tolist())}: must be finite")
     return taken
-
-
-def _real(name: str, actions: Any) -> np.ndarray:
-    """Return actions as float64. Half precision is accepted, because policies may compute in it."""
-    given = without_derivative(name, readable(name, actions))
-    try:
-        array = np.asarray(given)
-        if array.dtype.kind in "biuf":
-            return array.astype(np.float64)
-    except (TypeError, ValueError):
-        pass
-    raise ValueError(f"{name} = {shown(actions)}: must be real numbers")

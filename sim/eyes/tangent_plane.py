@@ -36,7 +36,8 @@ def tangent_size(eye: optics.Eye) -> tuple[float, float]:
 def parts_of(count: int, in_rows: bool, aspect: float = 1.0) -> tuple[int, int]:
     """Return the rows and columns of a receptor that is divided into this number of parts.
 
-    With `in_rows`, the parts are as nearly square as possible. A square receptor has at most as many rows as columns.
+    With `in_rows`, the shape of the parts is the nearest to a square. Of two equally good numbers of rows, the smaller
+    one is used.
 
     aspect: height of a receptor / its width
     """

@@ -180,14 +180,11 @@ class PerWorld(BatchTask):
 
 
 def _row(where: str, returned: object) -> np.ndarray:
-    returned = number_types.readable(where, returned)
-    try:
-        given = np.asarray(returned)
-        if given.dtype.kind in "biuf":
-            return given.astype(np.float32)
-    except (TypeError, ValueError):
-        pass
-    raise ValueError(f"{where} returned {shown(returned)}: must be finite numbers, (k,)")
+    """Return what a method returned as a float32 array; ValueError unless it consists of real numbers."""
+    given = number_types.real_array(where, returned)
+    if given is None:
+        raise ValueError(f"{where} returned {shown(returned)}: must be finite numbers, (k,)")
+    return given.astype(np.float32)
 
 
 def _in_mode(task: Task, mode: str) -> Task:

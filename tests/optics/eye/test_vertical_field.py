@@ -21,6 +21,7 @@ def tall(rows, columns, ratio, **changes):
     return Eye(resolution=(rows, columns), vertical_fov_deg=math.degrees(2 * math.atan(half)), **changes)
 
 
+@pytest.mark.fast_cases(4)
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("waveguide", [False, True])
 def test_high_receptors_are_rows_of_square_ones(seed, waveguide):

@@ -23,7 +23,7 @@ def random_state(task, seed):
     return world, state
 
 
-@pytest.mark.fast_cases(4)
+@pytest.mark.fast_cases(2)
 @pytest.mark.parametrize("task", ["detection", "maze", "navigation", "tracking"])
 @pytest.mark.parametrize("pupil", [None, LENS])
 @pytest.mark.parametrize(("rows", "ratio"), [(1, 4), (3, 2)])

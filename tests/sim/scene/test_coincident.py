@@ -86,6 +86,7 @@ def views(model):
 
 
 @pytest.mark.filterwarnings("ignore::sim.MirrorWarning")
+@pytest.mark.fast_cases(12)
 @pytest.mark.parametrize("bodies", ["still", "one body", "two bodies"])
 @pytest.mark.parametrize("kinds", SAME, ids=" and ".join)
 def test_the_geom_that_is_defined_last_is_visible(kinds, bodies):
@@ -113,6 +114,7 @@ def flush_boxes(seed):
     return model, np.stack([middle - half, middle + half], axis=1)
 
 
+@pytest.mark.fast_cases(2)
 @pytest.mark.parametrize("seed", range(4))
 def test_flush_faces_of_different_boxes_show_the_last(seed):
     model, places = flush_boxes(seed)

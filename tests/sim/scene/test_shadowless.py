@@ -76,6 +76,7 @@ PATHS = {
 
 
 @pytest.mark.filterwarnings("ignore::sim.MirrorWarning")
+@pytest.mark.fast_cases(6)
 @pytest.mark.parametrize("path", PATHS)
 @pytest.mark.parametrize("kind", LAMPS)
 def test_obstacles_outside_an_image_leave_it_unchanged(kind, path):
@@ -86,6 +87,7 @@ def test_obstacles_outside_an_image_leave_it_unchanged(kind, path):
 
 
 @pytest.mark.filterwarnings("ignore::sim.MirrorWarning")
+@pytest.mark.fast_cases(5)
 @pytest.mark.parametrize("path", PATHS)
 @pytest.mark.parametrize("kind", [kind for kind in LAMPS if kind != "headlight"])
 def test_other_lights_cast_shadows(kind, path):

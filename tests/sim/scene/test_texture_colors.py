@@ -104,6 +104,7 @@ def in_quick_image(model):
         return QuickCamera(model).picture(data, "top", 3 * model.ngeom, 3)[1, 1::3].astype(float) / 255
 
 
+@pytest.mark.fast_cases(2)
 @pytest.mark.parametrize("seed", range(2))
 @pytest.mark.parametrize("seen", [in_mirror, in_eye])
 def test_files_show_the_colours_of_rgba(seen, seed):
@@ -113,6 +114,7 @@ def test_files_show_the_colours_of_rgba(seen, seed):
     np.testing.assert_allclose(seen(model_of(tiles, True)), seen(model_of(tiles, False)), rtol=2e-3)
 
 
+@pytest.mark.fast_cases(3)
 @pytest.mark.parametrize("glow", [0.0, 0.6])
 @pytest.mark.parametrize("seen", [in_mirror, in_eye, in_quick_image])
 def test_grey_files_glow_and_are_displayed_like_rgba(seen, glow):
@@ -130,6 +132,7 @@ def test_levels_reflect_their_share_of_light(level, share):
     np.testing.assert_allclose(linear(model, 0, np.ones(3)), share, rtol=1e-3)
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("seed", range(2))
 def test_skies_of_files_show_the_light_of_builtin_skies(seed):
     rng = np.random.default_rng(seed)
@@ -187,6 +190,7 @@ def requests(folder, requested):
     }
 
 
+@pytest.mark.fast_cases(6)
 @pytest.mark.parametrize("kind", ["text", "spec", "attached", "file", "marked", "marked twice"])
 @pytest.mark.parametrize("requested", [True, False])
 def test_linear_light_must_be_requested(tmp_path, kind, requested):
