@@ -1,19 +1,22 @@
 """Cost of the automatic choice of samples over resolution, field of view and number of eyes
 
 Does the automatic choice ("auto") have a cliff, where a slightly different eye takes many more samples? It does not. In
-every setting it takes one to six areas per receptor, and the predicted error is within the tolerance.
+every setting it chooses areas, each of which averages the light over a part of a receptor. It needs one to six of them
+per receptor, and the predicted error is within the tolerance.
 
 **Method.** `sim.choose_fidelity` chooses samples for eyes with perfect lenses in detection, a maze and navigation. One
 property changes at a time: the number of receptors across, the field of view, or the number of eyes. Detection has
 square eyes. Mazes and navigation have eyes of a single row, as in the evolved animals. Then 64 worlds are rendered with
 the chosen samples.
 
-**Table.** The error is the predicted error, without the bound for the eyes' spectral bands, divided by the tolerance.
-Times are median CPU times of a frame per receptor, divided by the smallest such time of the same task. They are longer
-where eyes have few receptors, because work that is done once per world or per eye is then shared by few receptors.
+**Table.** The column *error* states the predicted error divided by the tolerance. It leaves out the bound that is due
+to the eyes' spectral bands. Times are the median CPU time per frame and receptor, relative to the smallest value of the
+same task. They are longer where eyes have few receptors, because work that is done once per world or per eye is then
+shared by few receptors.
 
-**Bounds.** No error is above 1, and no setting takes rays. Between neighbouring settings of a sweep over resolutions
-that differ by at most three receptors, the number of samples changes by at most a factor of three.
+**Bounds.** No error is above 1, and in no setting are single rays chosen instead of areas. In the sweep over
+resolutions, the number of samples changes by at most a factor of three between neighbouring settings that differ by at
+most three receptors.
 
     python -m validation.sim.automatic_choice [--out DIR] [--docs DIR]
 """
