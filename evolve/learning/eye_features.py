@@ -77,7 +77,7 @@ class EyeFeatures(BaseFeaturesExtractor):
         self.width = width
         self.n_inputs = retina[0] * math.prod(self.grid.shape)
         widths, shared = (self.n_inputs, *(width,) * ENCODER_LAYERS), wiring.shared_encoder
-        layers: list[nn.Module] = [AdaptedLinear(self.n_eyes, *widths[:2], shared), UNITS(inplace=True)]
+        layers: list[nn.Module] = [AdaptedLinear(self.n_eyes, widths[0], widths[1], shared), UNITS(inplace=True)]
         for inputs, outputs in itertools.pairwise(widths[1:]):
             layers += [PerEyeLinear(self.n_eyes, inputs, outputs, shared), UNITS(inplace=True)]
         self.encoder = nn.Sequential(*layers)
