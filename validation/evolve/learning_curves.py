@@ -220,7 +220,7 @@ def draw(rows: Sequence[Row], path: Path) -> None:
     for level, label in ((SOLVED, "solved"), (CHANCE, "chance")):
         axes.axhline(level, color=MUTED, lw=0.6, ls=":")
         axes.annotate(label, (0, level), fontsize=7, va="bottom")
-    axes.set(xlabel="steps [1000]", ylabel="goal first, share of episodes", ylim=(0, 1), xlim=(0, None))
+    axes.set(xlabel="steps [1000]", ylabel="fraction of episodes with the goal first", ylim=(0, 1), xlim=(0, None))
     axes.spines[["top", "right"]].set_visible(False)
     figure.savefig(path, dpi=150)
     pyplot.close(figure)
