@@ -10,7 +10,7 @@ halving saves time only if the early order resembles the final order. For this t
 x 1 to 15 x 15 receptors behind a perfect lens are drawn from the genome. They learn detection over four rungs, as in an
 evolutionary run, but no animal is stopped at a rung.
 
-**First table.** It compares the order of the animals on each rung with their order on the last rung. Cells state
+**First table.** The table compares the order of the animals on each rung with their order on the last rung. Cells state
 Spearman's rank correlation, and its 90 % confidence interval from a bootstrap over animals. In the column "32
 episodes", animals are ordered by the fitness that a run uses, from the evaluation episodes of each rung. In the column
 "128 episodes", they are ordered by the fitness of the same policies in more episodes, in other worlds. The last line

@@ -10,10 +10,10 @@ the weights about as far in less time. Both ways first reduce the optimiser step
 half as large as at first. Until then both ways are identical to the last bit. From then on, one way reduces the
 optimiser step further. The other way reduces the number of epochs instead, until `least_epochs` (3) of 10 are left.
 
-Each row compares the same training runs (task, seed, eyes) with a constant and with a falling number of epochs. A run
-has 500,000 steps, σ = 0.01, perfect lenses 45° wide, and networks of 64 units. In detection and tracking the animals
-have two eyes of 8 x 8 receptors, in navigation ten eyes of 1 x 4. All runs were made on the same machine, which did
-other work as well.
+Each row compares the same training runs (task, seed, eyes) with a constant and with a falling number of epochs. All
+runs have 500,000 steps, a receptor noise of σ = 0.01, eyes 45° wide with perfect lenses, and networks of 64 units. In
+detection and tracking the animals have two eyes of 8 x 8 receptors, in navigation ten eyes of 1 x 4. All runs were made
+on the same machine, which did other work as well.
 
 **Table.** "runs" is the number of training runs of each kind. "return" is the mean over all evaluations (96 episodes
 every 50,000 steps), which measures the area under the learning curve. Arrows lead from a constant to a falling number

@@ -1,7 +1,7 @@
 """Worker endurance: memory and open files over many candidates
 
-Do the memory and the open files of a worker stay constant over many candidates? Yes: a worker evaluated 300 candidates.
-Relative to the second quarter of them, memory in the last quarter is 1.00 and the number of open files is 1.00.
+Do the memory and the open files of a worker stay constant over many candidates? Yes: over 300 candidates, memory in the
+last quarter is 1.00 times the memory in the second quarter, and the ratio of open files is 1.00.
 
 **Method.** One worker evaluates many real candidates one after another, as in a run of a week. The candidates are drawn
 from the whole genome, so that eyes, kernels and brains differ between them. Each candidate is trained for a few steps

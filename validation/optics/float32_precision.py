@@ -1,6 +1,6 @@
 """Float32 precision: rounded phases and dark windows
 
-At which distance do float32 phases lose their digits, and when does `optics.psf` need float64? With float32 phases, the
+Up to which distance are phases in float32 accurate, and when does `optics.psf` need float64? With float32 phases, the
 error of the textbook angular spectrum method exceeds 1e-5 beyond 2 mm, 1e-3 beyond 0.1 m and 1 beyond 3 m. `optics.psf`
 in float32 stays below 1e-5 at every distance. It needs float64 only for windows far from the focus that receive very
 little light.

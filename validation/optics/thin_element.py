@@ -11,15 +11,15 @@ mask omits. The rays follow Snell's law and come from inside the glass of n = 1.
   α). The deviation by the mask is 1 % too small at α = 11° and 10 % too small at 30°. It does not depend on the side
   from which the light comes.
 - **Total reflection.** Beyond a slope of 41.8° no light leaves the glass, but the mask transmits light up to 63°. The
-  slope of a lens that consists of one relief cannot exceed this angle, so its NA is at most 0.45. The mask has no such
-  limit.
+  slope of a lens that consists of one relief therefore cannot exceed 41.8°, so its NA is at most 0.45. The mask has no
+  such limit.
 - **Fresnel reflection.** A surface reflects 4 % of the light at normal incidence, 10 % at 36° and 25 % at 40°. PSFs of
   `optics` do not include this loss.
 - **Thickness.** Real rays bend at the surface of the glass and not in the plane of the mask. A relief whose mask is an
   ideal lens is therefore not an ideal lens itself. Its Strehl ratio falls below 0.8 at NA = 1.16 (λ/f)^¼. Its focus
   spreads along the axis by several depths of field at this NA, and by more at a higher NA.
 - **Neighbouring ridges.** A sinusoidal corrugation starts to reflect totally if its depth is 0.28 of its period. From
-  0.30 on, some rays that have left the surface hit the next ridge.
+  0.30 of the period on, some rays that have left the surface hit the next ridge.
 
 The command computes the table:
 
