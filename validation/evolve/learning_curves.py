@@ -22,8 +22,8 @@ bound.
 
 An animal that stands still earns 0, and an animal with one eye learns little more than to stand still. Animals with ten
 eyes travel. They travel farther than a hand-written controller that receives the true distances of the walls in eleven
-directions and steers towards the largest free space. At 1.5 m/s, that controller gets 21.8 m far, with 2.6 actions in
-contact and a return of 2.8 ± 0.9. At 5 m/s it gets 25.6 m far, with a return of -14. The return of the animals with ten
+directions and steers towards the largest free space. At 1.5 m/s, that controller travels 21.8 m, with 2.6 actions in
+contact and a return of 2.8 ± 0.9. At 5 m/s it travels 25.6 m, with a return of -14. The return of the animals with ten
 eyes is about 0, because every action in contact costs as much as four metres earn. Their fitness, which selection uses,
 is above 0.
 

@@ -22,9 +22,9 @@ aperture. In `optics.psf` the user does not choose N: the function low-pass filt
 critical one. The last columns show the error of `optics.psf`, its predicted error and the method that it chose.
 
 **Second table.** A Gaussian beam spreads to the radius w (1/e² of intensity) and is propagated with shorter and shorter
-periods P. In the textbook's method the beam overlaps its own repetition. Its amplitude at the edge of the period is
-about exp(-(P/2w)²). The errors of `optics.propagate` with the same samples do not depend on P: they come only from
-rounding and from the tolerance.
+periods P. In the textbook's method the beam overlaps its own repetition. The amplitude of the beam at the edge of the
+period is about exp(-(P/2w)²). The errors of `optics.propagate` with the same samples do not depend on P: they come only
+from rounding and from the tolerance.
 
 **Limits.** The first table covers one aperture at one wavelength, at Fresnel numbers from 0.1 to 100.
 

@@ -17,10 +17,11 @@ The reference is Mitsuba's path tracer in 8 bands. Behind a lens, its image is c
 (`Eye.see`).
 
 **Speed.** The speed is the number of agent-steps per second of one core's CPU time, without physics. In an agent-step,
-all eyes of one agent are rendered once. The best of several interleaved rounds counts.
+all eyes of one agent are rendered once. All settings are measured in turns over several rounds, and the best round of
+each setting counts.
 
 **Settings.** The eyes are those of the published experiments. Each is rendered with a perfect lens, and behind a lens
-in focus whose pupil has a radius of a times half the retina's width. The following settings vary:
+in focus with a stated relative aperture a (pupil diameter / retina width). The following settings vary:
 
 - samples: rays traced in closed form, rays traced by Mitsuba, areas, or the reference renderer with few samples;
 - the number of samples per receptor;
