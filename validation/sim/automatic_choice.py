@@ -1,8 +1,8 @@
 """Cost of the automatic choice of samples over resolution, field of view and number of eyes
 
 Does the automatic choice ("auto") have a cliff, where a slightly different eye takes many more samples? It does not. In
-every setting it chooses areas, each of which averages the light over a part of a receptor. It needs one to six of them
-per receptor, and the predicted error is within the tolerance.
+every setting it chooses area sampling, in which each sample averages the light over a receptor or a part of it (an
+area). One to six areas per receptor are enough for a predicted error within the tolerance.
 
 **Method.** `sim.choose_fidelity` chooses samples for eyes with perfect lenses in detection, a maze and navigation. One
 property changes at a time: the number of receptors across, the field of view, or the number of eyes. Detection has
