@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from evolve.search.null_model import fitness_spread
 from evolve.store.atomic_files import write_whole
 from evolve.store.directory import Run
 from evolve.store.versions import commits, recorded
@@ -191,7 +192,10 @@ def _collect(chosen: Namespace, stem: Path, quantities: Quantities) -> None:
         metadata = [RunMetadata.from_run(run, group) for group, run in runs]
         furthest = {one.group: max(o.generations for o in metadata if o.group == one.group) for one in metadata}
         configs = {group: run.config for group, run in runs if quantities and furthest[group] > 0}
-        found = [row for g, config in configs.items() for row in drifted(config, g, quantities, furthest[g])]
+        found = []
+        for group, config in configs.items():
+            spread = fitness_spread([run for of, run in runs if of == group], furthest[group])
+            found += drifted(config, group, quantities, furthest[group], spread)
         here = Origin.here(sum(one.worker_hours for one in metadata), "worker")
         # All computations are complete here, so that an interruption is unlikely to leave inconsistent files.
         if quantities:

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 from evolve.config.checks import ConfigError, check_gene_use, check_values, quoted
 from evolve.config.settings import (
     SECTIONS,
+    CostsConfig,
     EvaluationConfig,
     EyeConfig,
     LearningConfig,
@@ -38,6 +39,7 @@ __all__ = [
     "SECTIONS",
     "TASKS",
     "ConfigError",
+    "CostsConfig",
     "EvaluationConfig",
     "EyeConfig",
     "GeneConfig",
@@ -77,6 +79,7 @@ class RunConfig:
     search: SearchConfig = field(default_factory=SearchConfig)
     learning: LearningConfig = field(default_factory=LearningConfig)
     evaluation: EvaluationConfig = field(default_factory=EvaluationConfig)
+    costs: CostsConfig = field(default_factory=CostsConfig)
     code: TaskCode | None = field(default=None, compare=False, repr=False)
 
     def __post_init__(self) -> None:

@@ -6,11 +6,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from evolve.config.costs import CostsConfig
 from evolve.genome.eye_config import EyeConfig, setting
 from evolve.genome.interval import Interval
 
 __all__ = [
     "SECTIONS",
+    "CostsConfig",
     "EvaluationConfig",
     "EyeConfig",
     "LearningConfig",
@@ -143,7 +145,7 @@ class LearningConfig:
 class EvaluationConfig:
     """Settings of the evaluation of fitness."""
 
-    episodes: int = setting(32, Interval(1, 10_000), "evaluation episodes whose mean return is the fitness")
+    episodes: int = setting(32, Interval(1, 10_000), "evaluation episodes whose mean return is the task fitness")
 
 
 SECTIONS: Mapping[str, type] = {
@@ -152,4 +154,5 @@ SECTIONS: Mapping[str, type] = {
     "search": SearchConfig,
     "learning": LearningConfig,
     "evaluation": EvaluationConfig,
+    "costs": CostsConfig,
 }

@@ -20,6 +20,7 @@ __all__ = ["config_change", "fingerprint", "origin", "present", "record_start", 
 
 FILE, CONFIG = "versions.json", "config.toml"
 LARGEST_FILE = 2**24  # bytes; thousands of starts
+NO_COSTS = ("per_receptor = 0.0", "per_eye = 0.0", "per_neuron = 0.0")  # lines of a config.toml
 PACKAGES = (
     "rhabdom",
     "numpy",
@@ -85,10 +86,11 @@ def fingerprint(config: str) -> str:
     """Return the fingerprint of a run's config.toml.
 
     The fingerprint ignores lines that do not influence training and evaluation: comments, the number of workers, and
-    the number of generations.
+    the number of generations. It also ignores costs of 0, which files of former versions lack.
     """
-    left_out = ("workers =", "generations =", "#")
+    left_out = ("workers =", "generations =", "#", "[costs]")
     lines = [line.strip() for line in config.splitlines() if line.strip() and not line.startswith(left_out)]
+    lines = [line for line in lines if line not in NO_COSTS]
     return hashlib.sha256("\n".join(lines).encode()).hexdigest()[:16]
 
 
