@@ -11,7 +11,8 @@ import numpy as np
 import torch
 
 import optics
-from evolve.analysis.statistics import acuity_cpd, succeeded, white_strehl
+from evolve.analysis.acuity import acuity_cpd
+from evolve.analysis.statistics import succeeded, white_strehl
 from evolve.analysis.vision import vision
 from evolve.config.run_config import EyeConfig, RunConfig
 from evolve.genome.phenotype import Phenotype

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from evolve.analysis.fitness_parts import fitness_label
 from evolve.analysis.statistics import generation_statistics
 from evolve.config.run_config import EyeConfig
 from evolve.interactive.callbacks import Callback, Callbacks
@@ -146,7 +147,7 @@ class OpenedRun(Run):
         generations = [row.generation for row in rows]
         axes.plot(generations, [row.median for row in rows], color="0.4", label="median")
         axes.plot(generations, [row.best_so_far for row in rows], "o-", label="best so far")
-        axes.set(xlabel="generation", ylabel="fitness (mean return)")
+        axes.set(xlabel="generation", ylabel=fitness_label(not self.config.costs.free))
         axes.xaxis.set_major_locator(MaxNLocator(integer=True))
         axes.legend(frameon=False)
         return axes

@@ -16,7 +16,8 @@ from typing import Any
 
 import numpy as np
 
-from evolve.analysis.statistics import acuity_cpd, gene_values, succeeded
+from evolve.analysis.acuity import acuity_cpd, acuity_vertical_cpd
+from evolve.analysis.statistics import gene_values, succeeded
 from evolve.config.run_config import RunConfig
 from evolve.genome.phenotype import Phenotype
 from evolve.report.comparison import differing_settings
@@ -100,8 +101,9 @@ class Drift:
 def drift_of(runs: Sequence[Run], searches: int = SEARCHES, done: Callable[[float], None] = lambda _: None) -> Drift:
     """Compare runs that differ only in their seeds with searches with random fitness (`evolve.search.null_model`).
 
-    The quantities are the genes that the search varies, the acuity [cycles/degree] and the number of receptors. Means
-    are taken over the last generations that all runs have completed.
+    The quantities are the genes that the search varies, the horizontal acuity [cycles/degree], the vertical one unless
+    receptors are square, and the number of positions of receptors. Means are taken over the last generations that all
+    runs have completed.
 
     searches: number of searches · done: function that is called with the share of completed searches
 
@@ -150,7 +152,8 @@ def _complete(run: Run) -> int:
 def _measured(animal: Phenotype, config: RunConfig) -> Mapping[str, float]:
     height, width = animal.resolution
     genes = {name: value for name, value in gene_values(animal, config.eye).items() if _open(name, config)}
-    return {**genes, "acuity_cpd": acuity_cpd(animal), "receptors": float(animal.n_eyes * height * width)}
+    upwards = {} if config.eye.vertical_fov == "receptors" else {"acuity_vertical_cpd": acuity_vertical_cpd(animal)}
+    return {**genes, "acuity_cpd": acuity_cpd(animal), **upwards, "receptors": float(animal.n_eyes * height * width)}
 
 
 def _open(name: str, config: RunConfig) -> bool:
