@@ -15,7 +15,7 @@ from evolve.report.hints import hint
 from evolve.report.markup import Html, duration, exact, html, joined, rounded, table
 from evolve.store.candidate import Candidate
 from evolve.store.directory import Run
-from evolve.store.versions import recorded
+from evolve.store.versions import machines, recorded
 
 __all__ = [
     "acuity_text",
@@ -195,6 +195,7 @@ def run_facts(run: Run) -> Html:
         "seed": run.config.seed,
         "workers": run.config.workers or "one per core",
         "commit": commit,
+        "machine": "; ".join(machines(run.path)) or "not recorded",
         "software": software,
     }
     if run.notice:
