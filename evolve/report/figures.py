@@ -71,6 +71,7 @@ def costs_figure(candidates: Sequence[Candidate]) -> Html:
             _generation_axis(axes, sorted({candidate.generation for candidate in candidates}))
             axes.set_ylabel(name)
         figure.axes[0].set_xlabel("")
+        figure.align_ylabels()
         last = best[-1][1]
         alt = f"Parts of the best fitness: task fitness {last.task_fitness:.3g}, costs {last.costs:.3g}."
         return inline(figure, "costs", alt)

@@ -172,7 +172,7 @@ class Candidate:
                 phenotype=Phenotype.from_json(record["phenotype"]),
                 fitness=-math.inf if record["fitness"] is None else real(record["fitness"], "fitness", _ANY),
                 returns=_reals(record, "returns", or_none=True, most=_MOST_RETURNS),
-                costs=real(record["costs"], "costs", Interval(0, _ANY.high)),
+                costs=_costs(record["costs"]),
                 success_rate=_real_or_none(record["success_rate"], "success_rate", Interval(0, 1)),
                 seconds=real(record["seconds"], "seconds", Interval(0, 1e300)),
                 curve=tuple(_point(entry) for entry in listed(record["curve"], "curve", 0, _LONGEST)),
@@ -211,6 +211,12 @@ _LONGEST = 1_000_000  # maximum number of entries of a list in a record
 _MOST_RETURNS = 10_000  # maximum number of evaluation episodes, see the settings
 # Maximum values in a record. The ranges of the settings limit ids and generations; random generators limit seeds.
 _COUNTS = {"id": 10**9, "generation": 10**5, "index": 10**4, "seed": 2**64 - 1, "steps": 10**12, "rung": 9}
+
+
+def _costs(value: Any) -> float:
+    if (costs := real(value, "costs", _ANY)) < 0:
+        raise ValueError(f"costs = {costs}: must be 0 or more")
+    return costs
 
 
 def _reals(record: dict[str, Any], name: str, or_none: bool = False, most: int = _LONGEST) -> tuple[float, ...]:
