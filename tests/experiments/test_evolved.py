@@ -16,6 +16,7 @@ from evolve.report.eye_figures import relief_heights
 from evolve.store.candidate import Candidate
 from evolve.store.directory import Run
 from evolve.store.evaluation import Evaluation
+from evolve.store.versions import machine
 from experiments import bending_light, brains_and_acuity, goals_shape_eyes, learning_through_holes
 from experiments.candidates import Row, full_return, parameters, rows_of
 from experiments.evolved import RunMetadata, Store, main
@@ -167,6 +168,7 @@ def test_runs_of_one_group_differ_in_their_seeds_alone(tmp_path, capsys):
     assert goals_shape_eyes.main([*collect, f"detection={tmp_path / 'b'}"]) == 0
     text = (tmp_path / "docs/goals_shape_eyes.md").read_text()
     assert "| detection, seed 1 | 2 | 1 of 2 | 0.0 |" in text
+    assert f"worker seconds on {machine()}; rhabdom at" in text
     assert goals_shape_eyes.main([*collect, f"detection={tmp_path / 'c'}"]) == 2
     assert "has other settings than the last run of group 'detection'" in capsys.readouterr().err
 
