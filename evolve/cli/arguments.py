@@ -218,17 +218,10 @@ def _add_products(commands: Commands) -> None:
         if name != "report":
             product.add_argument("--candidate", type=int, metavar="ID", help="candidate to play (default: the best)")
             product.add_argument("--seed", type=seed, default=0, help="seed of the episode (default: 0)")
-        if name == "export":
-            product.add_argument(
-                "--every", type=every, default=8, metavar="N", help="write a file at every N-th action (default: 8)"
-            )
+            shown, usual = ("write a file", 8) if name == "export" else ("with --rrd: record the scene", None)
+            said = f"{shown} at every N-th action (default: 8)"
+            product.add_argument("--every", type=every, default=usual, metavar="N", help=said)
         if name == "replay":
-            product.add_argument(
-                "--every",
-                type=every,
-                metavar="N",
-                help="with --rrd: scene at every N-th action (default: 8)",
-            )
             product.add_argument("--rrd", action="store_true", help="also write a recording for Rerun")
             product.add_argument("--gif", action="store_true", help="also write an animated GIF, for slides and pages")
             product.add_argument("--mp4", action="store_true", help="also write a video with one frame per action")

@@ -27,7 +27,7 @@ class CostsConfig:
 
     @property
     def free(self) -> bool:
-        """Whether all prices are 0."""
+        """True if all prices are 0."""
         return self == CostsConfig()
 
     def total(self, animal: Phenotype, eye: EyeConfig) -> float:
