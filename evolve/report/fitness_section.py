@@ -32,7 +32,7 @@ def fitness_section(run: Run) -> Html:
     if minus and best is not None:
         figures += figure(costs_figure(run.candidates), _costs_caption(run))
     caption = html(
-        "<b>Episodes solved.</b> Share of a candidate's evaluation episodes in which the task was solved (dots), "
+        "<b>Episodes solved.</b> Fraction of a candidate's evaluation episodes in which the task was solved (dots), "
         "{} mean of the generation.",
         key("muted"),
     )
