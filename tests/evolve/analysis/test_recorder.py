@@ -127,7 +127,7 @@ def test_replay_report_and_exr_show_it(path, call, tmp_path):
 
 @pytest.mark.slow
 def test_exr_files_of_a_user_task_have_run_and_poses(path, episode, tmp_path):
-    """The eyes are at the front of the cart, which moves along y, and look up or down by the evolved elevation."""
+    """The eyes are on an arc at the front of the cart, which moves along y, and are tilted by the evolved elevation."""
     run = Run.open(path)
     file = export_episode(run, episode, tmp_path / "exr")[1]
     views = sim.read_exr(file)
@@ -138,8 +138,9 @@ def test_exr_files_of_a_user_task_have_run_and_poses(path, episode, tmp_path):
         known = view.attributes
         assert (known["run_id"], known["settings"]) == (run_id(path), fingerprint(to_toml(run.config)))
         x, y, z = known["eye_position_m"]
-        assert (x, z) == pytest.approx((0.26, 0.32))
-        assert y == pytest.approx(episode.scene.positions[t, episode.scene.bodies.index("cart"), 1])
+        assert (x, z) == pytest.approx((0.26 * np.cos(azimuth), 0.32))
+        cart = episode.scene.positions[t, episode.scene.bodies.index("cart"), 1]
+        assert y - cart == pytest.approx(0.26 * np.sin(azimuth))
         level = np.cos(elevation)
         ahead = [level * np.cos(azimuth), level * np.sin(azimuth), np.sin(elevation)]
         np.testing.assert_allclose(known["eye_ahead"], ahead, atol=1e-9)
