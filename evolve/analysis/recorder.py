@@ -18,6 +18,7 @@ from evolve.learning.animal_task import animal_task
 from evolve.learning.policy import EyePolicy, TrainingDiverged, load_policy
 from evolve.store.directory import Run, RunError
 from evolve.store.policies import require_policy
+from optics.numerics.arguments import whole
 from sim.envs.prepared_task import PreparedTask
 from sim.envs.vec_env import EyesVecEnv
 from sim.scene.poses import Poses
@@ -25,8 +26,9 @@ from sim.scene.solids import Solid, solids_of
 from sim.tasks.simulation import Simulation
 from sim.worlds.ground_plan import GroundPlan
 
-__all__ = ["FINE_PIXELS", "Recorder", "record"]
+__all__ = ["EVERY", "FINE_PIXELS", "Recorder", "record"]
 
+EVERY, MOST_EVERY = 8, 1_000_000  # default and maximum number of actions between two recordings of radiance
 FINE_PIXELS = 60  # minimum number of pixels along the longer side of the radiance images
 FINE = {"rays": 16, "areas": 4, "edges": 16}  # samples per receptor or pixel behind a perfect lens
 MOST_PICTURES = 128  # maximum number of images for display, at equal intervals of time
@@ -38,7 +40,7 @@ class UnfitPolicy(ValueError):
 
 
 def record(
-    run: Run, candidate_id: int | None = None, seed: int = 0, radiance_every: int = 8, pictures: bool = False
+    run: Run, candidate_id: int | None = None, seed: int = 0, radiance_every: int = EVERY, pictures: bool = False
 ) -> Episode:
     """Record one evaluation episode of a candidate. The same arguments give the same episode, bit for bit.
 
@@ -49,7 +51,9 @@ def record(
     Raises:
         RunError: the candidate does not exist, or its policy is missing or damaged.
         ConfigError: the task is a user task, and its code has not been named.
+        ValueError: radiance_every is not a whole number from 1 to 1,000,000.
     """
+    radiance_every = whole("every", radiance_every, 1, MOST_EVERY)
     candidate = run.candidate(candidate_id)
     path = run.policy_path(candidate.id)
     require_policy(candidate, path)
@@ -78,7 +82,7 @@ class Recorder:
     phenotype: Phenotype
     config: RunConfig
     policy: EyePolicy
-    radiance_every: int = 8
+    radiance_every: int = EVERY
     pictures: bool = False
 
     def play(self, candidate_id: int, seed: int) -> Episode:

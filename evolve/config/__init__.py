@@ -5,6 +5,7 @@ settings       sections of RunConfig: default, range and effect of each setting
 assemble       RunConfig assembled from all sources of settings; later sources override earlier ones
 sources        presets, tasks, files and options as sources of settings
 provenance     location of a setting: file and line, or command-line option
+costs          CostsConfig: prices of eyes and brains, and the costs of an animal
 checks         type and range checks of single settings
 lint           warnings about settings that are allowed but odd
 relief_starts  start values for the genes of a pupil's relief

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 from evolve.config.checks import ConfigError, check_gene_use, check_values, quoted
 from evolve.config.settings import (
     SECTIONS,
+    CostsConfig,
     EvaluationConfig,
     EyeConfig,
     LearningConfig,
@@ -39,6 +40,7 @@ __all__ = [
     "SECTIONS",
     "TASKS",
     "ConfigError",
+    "CostsConfig",
     "EvaluationConfig",
     "EyeConfig",
     "GeneConfig",
@@ -80,6 +82,7 @@ class RunConfig:
     learning: LearningConfig = field(default_factory=LearningConfig)
     wiring: WiringConfig = field(default_factory=WiringConfig)
     evaluation: EvaluationConfig = field(default_factory=EvaluationConfig)
+    costs: CostsConfig = field(default_factory=CostsConfig)
     code: TaskCode | None = field(default=None, compare=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -89,15 +92,9 @@ class RunConfig:
                 raise ConfigError(f"{section} = {quoted(getattr(self, section))}: must be a {kind.__name__}", section)
             check_values(getattr(self, section), prefix=f"{section}.")
         self._check_task()
-        if self.eye.receptors not in (known := (*RECEPTORS, INHERITED)):
-            raise ConfigError(
-                f"eye.receptors = {self.eye.receptors!r}: must be one of {', '.join(known)}", "eye.receptors"
-            )
-        if self.eye.vertical_fov not in VERTICAL_FOVS:
-            raise ConfigError(
-                f"eye.vertical_fov = {self.eye.vertical_fov!r}: must be one of {', '.join(VERTICAL_FOVS)}",
-                "eye.vertical_fov",
-            )
+        for name, known in (("receptors", (*RECEPTORS, INHERITED)), ("vertical_fov", VERTICAL_FOVS)):
+            if (given := getattr(self.eye, name)) not in known:
+                raise ConfigError(f"eye.{name} = {given!r}: must be one of {', '.join(known)}", f"eye.{name}")
         self._check_light()
         self._check_rhabdoms()
         self._check_world()

@@ -6,11 +6,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from evolve.config.costs import CostsConfig
 from evolve.genome.eye_config import EyeConfig, setting
 from evolve.genome.interval import Interval
 
 __all__ = [
     "SECTIONS",
+    "CostsConfig",
     "EvaluationConfig",
     "EyeConfig",
     "LearningConfig",
@@ -165,7 +167,7 @@ DIRECT = WiringConfig()  # each receptor is an input of its eye's own encoder
 class EvaluationConfig:
     """Settings of the evaluation of fitness."""
 
-    episodes: int = setting(32, Interval(1, 10_000), "evaluation episodes whose mean return is the fitness")
+    episodes: int = setting(32, Interval(1, 10_000), "evaluation episodes whose mean return is the task fitness")
 
 
 SECTIONS: Mapping[str, type] = {
@@ -175,4 +177,5 @@ SECTIONS: Mapping[str, type] = {
     "learning": LearningConfig,
     "wiring": WiringConfig,
     "evaluation": EvaluationConfig,
+    "costs": CostsConfig,
 }
