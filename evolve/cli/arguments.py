@@ -219,6 +219,7 @@ def _add_products(commands: Commands) -> None:
             product.add_argument("--candidate", type=int, metavar="ID", help="candidate to play (default: the best)")
             product.add_argument("--seed", type=seed, default=0, help="seed of the episode (default: 0)")
         if name == "replay":
+            product.add_argument("--test", action="store_true", help="play in the test set of a family of layouts")
             product.add_argument("--rrd", action="store_true", help="also write a recording for Rerun")
             product.add_argument("--gif", action="store_true", help="also write an animated GIF, for slides and pages")
             product.add_argument("--mp4", action="store_true", help="also write a video with one frame per action")

@@ -13,8 +13,13 @@ from evolve.learning.animal_task import animal_task
 from evolve.learning.policy import EyePolicy
 from evolve.learning.ppo import Episodes, play
 from sim.envs.prepared_task import PreparedTask
+from sim.envs.vec_env import EyesVecEnv
 
-__all__ = ["final_episodes", "require_test_set"]
+__all__ = ["UnfitPolicy", "final_episodes", "require_fit", "require_test_set"]
+
+
+class UnfitPolicy(ValueError):
+    """The policy belongs to an animal with different eyes."""
 
 
 def final_episodes(
@@ -31,11 +36,24 @@ def final_episodes(
     Raises:
         ConfigError: the user task has not been named when the run was opened, or it fails at its start.
         TrainingDiverged: the policy's actions are not finite.
+        UnfitPolicy: the policy was trained with different eyes.
     """
     count = config.evaluation.episodes if episodes is None else episodes
     prepared = PreparedTask(animal_task(phenotype, config, "test"))
     with closing(prepared.vec_env(count, seed, phenotype.memory_frames)) as worlds:
+        require_fit(policy, worlds)
         return play(policy, worlds, seed)
+
+
+def require_fit(policy: EyePolicy, worlds: EyesVecEnv) -> None:
+    """Check that a policy was trained with the eyes of these worlds.
+
+    Raises:
+        UnfitPolicy: it was not.
+    """
+    own, here = (space["eyes"].shape for space in (policy.observation_space, worlds.observation_space))
+    if own != here:
+        raise UnfitPolicy(f"its eyes have the shape {own}, those of this animal {here} (memory, eye, channel, y, x)")
 
 
 def require_test_set(config: RunConfig) -> None:

@@ -8,8 +8,10 @@ from functools import partial
 
 from evolve.analysis.episode import Episode
 from evolve.analysis.genealogy import descent
+from evolve.analysis.held_out import held_out_episodes
 from evolve.analysis.statistics import acuity_cpd, champions, gene_values, generation_statistics, trajectory
 from evolve.analysis.vision import SCENES, Vision, vision
+from evolve.config.settings import FAMILY
 from evolve.genome.genes import CLUSTERS, Gene
 from evolve.report import tables
 from evolve.report.doing import Doing, in_silence
@@ -75,7 +77,10 @@ def animals_section(run: Run) -> Html:
 
 
 def numbers_section(run: Run) -> Html:
-    return section("numbers", "The run in numbers", tables.headline(run))
+    """Return the section with the main results; if there is a test set of layouts, the best candidate plays in it."""
+    has_test_set = run.config.world.layouts == FAMILY and run.best is not None
+    held_out = held_out_episodes(run).returns.tolist() if has_test_set else ()
+    return section("numbers", "The run in numbers", tables.headline(run, held_out))
 
 
 def fitness_section(run: Run) -> Html:

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
+import numpy as np
+
 from evolve.analysis.episode_failures import episode_failures_of
 from evolve.analysis.statistics import acuity_cpd, bootstrap_interval, gene_values, succeeded
 from evolve.config.assemble import to_toml
@@ -16,8 +20,11 @@ from evolve.store.versions import recorded
 __all__ = ["all_candidates", "best_genes", "episode_failures", "failures", "headline", "run_facts"]
 
 
-def headline(run: Run) -> Html:
-    """Return the main results of the run."""
+def headline(run: Run, held_out: Sequence[float] = ()) -> Html:
+    """Return the main results of the run.
+
+    held_out: returns of the best candidate's episodes in the test set of layouts; empty if the run has none
+    """
     failed = sum(not succeeded(c) for c in run.candidates)
     generations = len({c.generation for c in run.candidates})
     seconds = sum(c.seconds for c in run.candidates)
@@ -33,18 +40,17 @@ def headline(run: Run) -> Html:
         ("Evaluation time", duration(seconds), "training and evaluation, summed over workers"),
     ]
     if (best := run.best) is not None:
-        tiles = [*_best_tiles(best), *tiles]
+        tested = []
+        if len(held_out):
+            tested = [("Its return in the test layouts", rounded(float(np.mean(held_out)), 4), _spread(held_out))]
+        tiles = [*_best_tiles(best), *tested, *tiles]
     items = joined(html("<div><dt>{}</dt><dd>{}<small>{}</small></dd></div>", *tile) for tile in tiles)
     return html('<dl class="tiles">{}</dl>\n', items)
 
 
 def _best_tiles(best: Candidate) -> list[tuple[str | Html, str, str]]:
-    low, high = bootstrap_interval(best.returns)
-    spread = "a single episode"
-    if len(best.returns) > 1:
-        spread = f"mean of {len(best.returns)} episodes; 95 % interval {rounded(low)} to {rounded(high)}"
     return [
-        (html("Best {}", hint("fitness")), rounded(best.fitness, 4), spread),
+        (html("Best {}", hint("fitness")), rounded(best.fitness, 4), _spread(best.returns)),
         ("Best candidate", f"no. {best.id}", f"generation {best.generation}"),
         ("Episodes solved by the best", f"{rounded(100 * best.success_rate)} %", f"of {len(best.returns)}"),
         (
@@ -53,6 +59,14 @@ def _best_tiles(best: Candidate) -> list[tuple[str | Html, str, str]]:
             "cycles per degree, by sampling alone",
         ),
     ]
+
+
+def _spread(returns: Sequence[float]) -> str:
+    """Return the number of episodes and the interval of their mean return, in words."""
+    if len(returns) == 1:
+        return "a single episode"
+    low, high = bootstrap_interval(returns)
+    return f"mean of {len(returns)} episodes; 95 % interval {rounded(low)} to {rounded(high)}"
 
 
 def best_genes(run: Run, best: Candidate) -> Html:

@@ -79,7 +79,8 @@ def replay(arguments: Namespace) -> int:
         from evolve.report.replay import BESIDE, episode_facts, episode_table, write_replay
 
         also = [form for form in BESIDE if getattr(arguments, form)]
-        episode, paths = write_replay(run, arguments.candidate, arguments.seed, also, arguments.out)
+        mode = "test" if arguments.test else "evaluation"
+        episode, paths = write_replay(run, arguments.candidate, arguments.seed, also, arguments.out, mode)
     if arguments.json:
         say(json.dumps({**episode_facts(episode), "files": [str(path) for path in paths]}, indent=1))
     else:
