@@ -6,8 +6,8 @@ import itertools
 import math
 import tempfile
 from argparse import Namespace
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import asdict, dataclass, fields, replace
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -82,7 +82,8 @@ class Trained(Design):
 
     fitness, success_rate: means over evaluation episodes · episodes: number of these episodes
     steps: number of training steps · seconds: wall time of the worker
-    held_out, held_out_success_rate: means over as many episodes in the test set of layouts; NaN if none were played
+    held_out, held_out_success_rate: means over episodes in the test set of layouts
+    held_out_episodes: number of these episodes; 0: none were played
     """
 
     failed: int = 0
@@ -91,8 +92,9 @@ class Trained(Design):
     episodes: int = 0
     steps: int = 0
     seconds: float = 0.0
-    held_out: float = math.nan
-    held_out_success_rate: float = math.nan
+    held_out: float = 0.0
+    held_out_success_rate: float = 0.0
+    held_out_episodes: int = 0
 
     @property
     def design(self) -> Design:
@@ -108,24 +110,19 @@ class Trained(Design):
             episodes=len(outcome.returns),
             steps=outcome.steps,
             seconds=outcome.seconds,
-            **(outcome.means if isinstance(outcome, HeldOut) else {}),
+            **(outcome.test_columns if isinstance(outcome, HeldOut) else {}),
         )
 
 
 @dataclass(frozen=True)
 class HeldOut(Evaluation):
-    """Outcome of a training run, with means over episodes in the test set of layouts."""
+    """Outcome of a training run, with episodes in the test set of layouts."""
 
-    held_out: float = math.nan
-    held_out_success_rate: float = math.nan
-
-    @property
-    def means(self) -> dict[str, float]:
-        return {"held_out": self.held_out, "held_out_success_rate": self.held_out_success_rate}
+    test_columns: Mapping[str, Any] = field(default_factory=dict)
 
 
 def evaluate_and_test(
-    phenotype: Phenotype, config: RunConfig, seed: int, policy_path: Path, rung: TrainingRung | None, **how: Any
+    phenotype: Phenotype, config: RunConfig, seed: int, policy_path: Path, rung: TrainingRung | None = None, **how: Any
 ) -> Evaluation:
     """Train an animal, then play further episodes in the mode "test"; for use in a worker process.
 
@@ -138,8 +135,12 @@ def evaluate_and_test(
     from evolve.learning.policy import load_policy
 
     final = final_episodes(phenotype, config, load_policy(policy_path), seed)
-    means = {"held_out": float(final.returns.mean()), "held_out_success_rate": float(final.successes.mean())}
-    return HeldOut(**{f.name: getattr(outcome, f.name) for f in fields(Evaluation)}, **means)
+    columns = {
+        "held_out": float(final.returns.mean()),
+        "held_out_success_rate": float(final.successes.mean()),
+        "held_out_episodes": len(final.returns),
+    }
+    return HeldOut(**{f.name: getattr(outcome, f.name) for f in fields(Evaluation)}, test_columns=columns)
 
 
 def train_all(

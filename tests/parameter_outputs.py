@@ -61,11 +61,11 @@ def views(config, animal):
 
 
 def layouts(config, animal):
-    """Walls of the worlds in training, evaluation and test."""
+    """Walls and lengths of episodes of the worlds in training, evaluation and test."""
     found = []
     for where in (config.world.training, config.world.evaluation, config.world.test):
-        model = sim.build_world(config.task, **where).model
-        found.append((model.geom_pos.tobytes(), model.geom_size.tobytes()))
+        world = sim.build_world(config.task, **where)
+        found.append((world.episode_steps, world.model.geom_pos.tobytes(), world.model.geom_size.tobytes()))
     return found
 
 

@@ -24,6 +24,7 @@ from evolve.config.task_card import (
     OF_SLIDING_AGENTS,
     OF_USER_TASKS,
     OPTIONAL_GENES,
+    PATH_WIDTH,
     TaskCard,
     tasks_with,
 )
@@ -132,7 +133,7 @@ class RunConfig:
 
     def _check_world(self) -> None:
         """Check the settings of layouts, and that they are changed only for tasks that have them."""
-        self._check_settings((*OF_MAZES, *OF_COURSES, *OF_LAYOUTS))
+        self._check_settings((*OF_MAZES, *OF_COURSES, *OF_LAYOUTS, PATH_WIDTH))
         check_layouts(self.world)
 
     def _check_settings(self, keys: tuple[str, ...]) -> None:

@@ -47,6 +47,10 @@ class WorldConfig:
     test_layouts: int = setting(8, Interval(1, 100), "number of a family's layouts for final figures")
     layout_rows: int = setting(13, Interval(7, 31), "cells of a family's layouts along y, outer walls included; odd")
     layout_columns: int = setting(39, Interval(15, 99), "cells of a family's layouts along x; odd")
+    path_width: int = setting(3, Interval(1, 3), "width of the paths of a family's courses [cells]: 1 or 3")
+    layout_actions: int = setting(
+        0, Interval(0, 10**6), "actions after which an episode in a family's layouts is truncated; 0: 256"
+    )
     selection_set: str = setting(
         "selection",
         None,
@@ -92,8 +96,11 @@ class WorldConfig:
             from sim.worlds.layout_family import LayoutFamily  # loads MuJoCo, which `evolve list` does not need
 
             counts = {"n_training": self.training_layouts, "n_selection": self.selection_layouts}
-            size = {"rows": self.layout_rows, "columns": self.layout_columns}
-            family = LayoutFamily(self.family_seed, **counts, n_test=self.test_layouts, **size)
+            size = {"rows": self.layout_rows, "columns": self.layout_columns, "path_width": self.path_width}
+            steps = self.layout_actions or None
+            family = LayoutFamily(
+                self.family_seed, **counts, n_test=self.test_layouts, **size, episode_steps=steps
+            )
             layouts = getattr(family, name)
         return {"layouts": layouts, "wall_height": self.wall_height}
 

@@ -18,7 +18,7 @@ import numpy as np
 
 from optics.numerics.arguments import whole
 from optics.numerics.read_only import read_only
-from sim.worlds.course import Course
+from sim.worlds.course import MOST_STEPS, Course
 from sim.worlds.maze import draw_maze
 from sim.worlds.random_course import draw_course
 
@@ -27,6 +27,7 @@ __all__ = ["MOST_LAYOUTS", "SETS", "TASKS_WITH_LAYOUTS", "LayoutFamily", "Layout
 SETS = ("training", "selection", "test")
 MOST_LAYOUTS = 100  # largest allowed number of layouts in a set
 ROWS, COLUMNS = (7, 31), (15, 99)  # smallest and largest allowed number of cells
+PATH_WIDTHS = (1, 3)
 _MOST_SEED = 2**128
 _WALLS, _STRIPES = 0, 1  # purposes of a layout's random numbers
 
@@ -41,9 +42,11 @@ class LayoutFamily:
     n_training, n_selection, n_test: number of layouts in each set
     rows, columns: number of cells of a layout along y and x, including the outer wall; odd, because mazes have rooms in
         every second row and column
+    path_width: width of the paths of courses [cells], 1 or 3; corridors of mazes are always one cell wide
+    episode_steps: number of actions after which an episode is truncated; None: the task's default
 
     Raises:
-        ValueError: a number is out of range, or the size is even.
+        ValueError: a number is out of range, or the size or the width is even.
     """
 
     seed: int = 0
@@ -52,14 +55,18 @@ class LayoutFamily:
     n_test: int = 8
     rows: int = 13
     columns: int = 39
+    path_width: int = 3
+    episode_steps: int | None = None
 
     def __post_init__(self) -> None:
-        limits = {"seed": (0, _MOST_SEED), "rows": ROWS, "columns": COLUMNS}
+        limits = {"seed": (0, _MOST_SEED), "rows": ROWS, "columns": COLUMNS, "path_width": PATH_WIDTHS}
         limits |= {f"n_{name}": (1, MOST_LAYOUTS) for name in SETS}
+        if self.episode_steps is not None:
+            limits["episode_steps"] = (1, MOST_STEPS)
         for name, (low, high) in limits.items():
             number = whole(f"LayoutFamily: {name}", getattr(self, name), low, high)
             object.__setattr__(self, name, number)
-            if name in ("rows", "columns") and number % 2 == 0:
+            if name in ("rows", "columns", "path_width") and number % 2 == 0:
                 raise ValueError(f"LayoutFamily: {name} = {number}: must be odd, such as {number - 1}")
 
     @property
@@ -125,22 +132,26 @@ class LayoutSet:
         return [self.family.random(self.name, index, _STRIPES) for index in range(len(self))]
 
 
-def _maze(shape: tuple[int, int], rng: np.random.Generator) -> np.ndarray:
-    return read_only(draw_maze(shape, rng))
+def _course(family: LayoutFamily, rng: np.random.Generator) -> Course:
+    return draw_course((family.rows, family.columns), rng, family.path_width)
 
 
-_DRAW: Mapping[str, Callable[..., Any]] = MappingProxyType({"navigation": draw_course, "maze": _maze})
+def _maze(family: LayoutFamily, rng: np.random.Generator) -> np.ndarray:
+    return read_only(draw_maze((family.rows, family.columns), rng))
+
+
+_DRAW: Mapping[str, Callable[..., Any]] = MappingProxyType({"navigation": _course, "maze": _maze})
 TASKS_WITH_LAYOUTS = tuple(_DRAW)
 
 
 @lru_cache(maxsize=8)
 def _drawn(family: LayoutFamily, task: str) -> Mapping[str, tuple[Any, ...]]:
     """Return the layouts of all sets by name, after checking that their walls differ."""
-    draw, shape = _DRAW[task], (family.rows, family.columns)
+    draw = _DRAW[task]
     found: dict[str, tuple[Any, ...]] = {}
     known: dict[bytes, str] = {}
     for name in SETS:
-        layouts = tuple(draw(shape, family.random(name, i, _WALLS)) for i in range(family.number(name)))
+        layouts = tuple(draw(family, family.random(name, i, _WALLS)) for i in range(family.number(name)))
         for index, layout in enumerate(layouts):
             walls = layout.walls if isinstance(layout, Course) else layout
             first, here = known.setdefault(walls.tobytes(), f"{name} {index}"), f"{name} {index}"

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import scipy.ndimage
 
@@ -19,14 +21,15 @@ _EAST = (0, 1)
 _STEPS = ((1, 0), (1, 1), _EAST, (-1, 1), (-1, 0))
 
 
-def draw_course(shape: tuple[int, int], rng: np.random.Generator) -> Course:
+def draw_course(shape: tuple[int, int], rng: np.random.Generator, width: int = 3) -> Course:
     """Return a random course.
 
     Two centre lines lead from the same cell in the west to the goal in the east. Their straight parts have random
-    directions and lengths. The free cells are those of the centre lines and their four neighbours, so that an agent
-    can follow a path without touching a wall. Episodes start at the west end, and in training also along the path.
+    directions and lengths. The free cells are those of the centre lines and, on wide paths, their four neighbours.
+    Episodes start at the west end, and in training also along the path.
 
     shape: number of cells (rows, columns)
+    width: width of a path along x or y [cells]: 1 or 3
 
     Raises:
         ValueError: MOST_TRIES attempts give no course of this shape.
@@ -35,7 +38,7 @@ def draw_course(shape: tuple[int, int], rng: np.random.Generator) -> Course:
         row = int(rng.integers(2, shape[0] - 2))
         lines = [_center_line(row, shape, rng) for _ in range(PATHS)]
         try:
-            return Course(_drawing(lines, shape))
+            return Course(_drawing(lines, shape, width))
         except ValueError:  # the distance from a start falls by more than MOST_FALL between the two lines
             continue
     raise ValueError(f"no course of {shape[0]} x {shape[1]} cells after {MOST_TRIES} attempts")
@@ -72,12 +75,17 @@ def _hardly_falls(line: list[Cell]) -> bool:
     return bool((np.maximum.accumulate(later, axis=1) - later)[np.triu_indices(len(line))].max() <= MOST_FALL)
 
 
-def _drawing(lines: list[list[Cell]], shape: tuple[int, int]) -> str:
+def _drawing(lines: list[list[Cell]], shape: tuple[int, int], width: int) -> str:
     """Return the drawing of a course with these centre lines."""
-    walls = np.ones(shape, bool)
-    walls[tuple(np.concatenate(lines).T)] = False
-    free = scipy.ndimage.binary_dilation(~walls)
-    free[[0, -1]], free[:, [0, -1]] = False, False
+    free = np.zeros(shape, bool)
+    free[tuple(np.concatenate(lines).T)] = True
+    if width > 1:
+        free = scipy.ndimage.binary_dilation(free)
+        free[[0, -1]], free[:, [0, -1]] = False, False
+    else:
+        for line in lines:
+            for before, cell in pairwise(line):
+                free[before[0], cell[1]] = True  # around the corner of a diagonal step
     signs = np.where(free, ".", "#")
     signs[:, 1][free[:, 1]] = "S"
     entered = {column: row for row, column in reversed(lines[0])}  # the first cell of the line in each column

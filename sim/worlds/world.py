@@ -7,7 +7,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import mujoco
@@ -173,8 +173,10 @@ def _check_layouts(task: str, layouts: Any, alone: bool) -> None:
 
 def _family_layout(spec: mujoco.MjSpec, task: str, layouts: LayoutSet) -> Layout:
     if task == "navigation":
-        return navigation.add_layout(spec, layouts.courses, layouts.stripes())
-    return maze.add_layout(spec, layouts.mazes, layouts.stripes())
+        layout = navigation.add_layout(spec, layouts.courses, layouts.stripes())
+    else:
+        layout = maze.add_layout(spec, layouts.mazes, layouts.stripes())
+    return replace(layout, episode_steps=layouts.family.episode_steps)
 
 
 def _empty_world() -> mujoco.MjSpec:

@@ -30,13 +30,13 @@ def walls_of(layouts, task):
 
 
 @settings(max_examples=25, deadline=None)
-@given(st.integers(0, 2**64), st.integers(7, 15), st.integers(15, 45))
-def test_on_random_courses_the_distance_from_the_start_hardly_falls(seed, rows, columns):
+@given(st.integers(0, 2**64), st.integers(7, 15), st.integers(15, 45), st.sampled_from([1, 3]))
+def test_on_random_courses_the_distance_from_the_start_hardly_falls(seed, rows, columns, width):
     """The shortest path of every start is walked, which is independent of the course's own check."""
-    course = random_course.draw_course((rows, columns), np.random.default_rng(seed))
+    course = random_course.draw_course((rows, columns), np.random.default_rng(seed), width)
     assert course.walls.shape == (rows, columns)
-    assert len(course.starts) == 3
-    assert len(course.training_starts) == 3 + len(range(5, columns - 4, 5))
+    assert len(course.starts) == width
+    assert len(course.training_starts) == width + len(range(5, columns - 4, 5))
     for start in course.training_starts:
         assert falls_on_shortest_way(course, start) <= MOST_FALL
     assert np.isfinite(course.way[~course.walls]).all(), "a free cell has no path to the goal"
@@ -95,6 +95,14 @@ def test_agents_start_in_the_free_cells_of_every_layout(task):
         assert plan.bounds[1] < state.position[0, 1] < plan.bounds[3]
 
 
+def test_a_family_sets_the_length_of_episodes():
+    family = LayoutFamily(seed=3, n_training=1, n_selection=1, n_test=1, rows=9, columns=19, episode_steps=7)
+    simulation = Simulation(task_of(sim.build_world("maze", layouts=family.test), "test"), 1, 0)
+    simulation.reset()
+    ends = [bool(simulation.step(np.array([[-1.0, 0.0]])).truncated[0]) for _ in range(7)]
+    assert ends == 6 * [False] + [True]
+
+
 def test_layouts_do_not_depend_on_the_process_or_its_hash_seed():
     code = (
         "import hashlib; from sim.worlds.layout_family import LayoutFamily as F; "
@@ -110,7 +118,7 @@ def test_layouts_do_not_depend_on_the_process_or_its_hash_seed():
 
 def test_equal_layouts_are_refused(monkeypatch):
     """Courses drawn without chance are equal. The message names the two sets."""
-    draw = {"maze": lambda shape, rng: np.ones(shape, bool)}
+    draw = {"maze": lambda family, rng: np.ones((family.rows, family.columns), bool)}
     monkeypatch.setattr(layout_family, "_DRAW", draw)
     family = LayoutFamily(seed=99, n_training=1, n_selection=1, n_test=1)
     with pytest.raises(ValueError, match="layouts training 0 and selection 0 have the same walls: must differ; use"):
@@ -125,6 +133,8 @@ def test_equal_layouts_are_refused(monkeypatch):
         ({"rows": ROWS[0] - 2}, rf"rows = {ROWS[0] - 2}: must be a whole number in \[7, 31\]"),
         ({"columns": COLUMNS[1] + 2}, rf"columns = {COLUMNS[1] + 2}: must be a whole number in \[15, 99\]"),
         ({"rows": 12}, r"rows = 12: must be odd, such as 11"),
+        ({"path_width": 2}, r"path_width = 2: must be odd, such as 1"),
+        ({"episode_steps": 0}, r"episode_steps = 0: must be a whole number in"),
         ({"seed": -1}, r"seed = -1: must be a whole number"),
         ({"seed": "a"}, r"seed = 'a': must be a whole number"),
     ],
@@ -142,7 +152,7 @@ def test_families_of_impossible_numbers_are_refused(given, message):
         ("maze", {"layouts": SMALL.test, "mazes": 2}, "layouts: seed, mazes and course must be left out"),
         ("maze", {"layouts": SMALL.test, "seed": 2}, "layouts: seed, mazes and course must be left out"),
         ("navigation", {"layouts": SMALL.test, "course": "long"}, "layouts: seed, mazes and course must be left out"),
-        ("maze", {"wall_height": 0.3}, r"wall_height = 0\.3: must be in \[0\.4, 100"),
+        ("maze", {"wall_height": 0.3}, r"wall_height = 0\.3: must lie in \[0\.4, 100"),
         ("maze", {"wall_height": "high"}, "wall_height = 'high': must be a number"),
     ],
 )
