@@ -33,7 +33,9 @@ def check_layouts(world: WorldConfig) -> None:
     for key in (*OF_MAZES, *OF_COURSES) if is_family else (*OF_FAMILY, PATH_WIDTH):
         if (value := _value(world, key)) != _value(WorldConfig, key):
             said = str(value).lower() if isinstance(value, bool) else value
-            raise ConfigError(f"{key} = {said}: has no effect with world.layouts = {world.layouts}", key, "world.layouts")
+            raise ConfigError(
+                f"{key} = {said}: has no effect with world.layouts = {world.layouts}", key, "world.layouts"
+            )
     for key in ("world.layout_rows", "world.layout_columns", PATH_WIDTH):
         if (cells := _value(world, key)) % 2 == 0:
             raise ConfigError(f"{key} = {cells}: must be odd, such as {cells - 1}", key)

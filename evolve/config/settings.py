@@ -38,8 +38,8 @@ class WorldConfig:
     layouts: str = setting(
         "fixed",
         None,
-        "layouts of navigation and maze: fixed, as course, mazes and unseen determine; or family: random courses or mazes "
-        "in three sets without a common layout, for training, selection (early stopping and fitness) and test",
+        "layouts of navigation and maze: fixed, as course, mazes and unseen determine; or family: random courses or "
+        "mazes in three sets without a common layout, for training, selection (early stopping and fitness) and test",
     )
     family_seed: int = setting(0, Interval(0, 2**63 - 1), "seed of a family; the same layouts for all candidates")
     training_layouts: int = setting(8, Interval(1, 100), "number of a family's layouts for training")
@@ -98,9 +98,7 @@ class WorldConfig:
             counts = {"n_training": self.training_layouts, "n_selection": self.selection_layouts}
             size = {"rows": self.layout_rows, "columns": self.layout_columns, "path_width": self.path_width}
             steps = self.layout_actions or None
-            family = LayoutFamily(
-                self.family_seed, **counts, n_test=self.test_layouts, **size, episode_steps=steps
-            )
+            family = LayoutFamily(self.family_seed, **counts, n_test=self.test_layouts, **size, episode_steps=steps)
             layouts = getattr(family, name)
         return {"layouts": layouts, "wall_height": self.wall_height}
 

@@ -9,7 +9,20 @@ from evolve.config.task_code import LABEL
 from evolve.genome.genes import TILT
 from sim.worlds.catalog import TASKS
 
-__all__ = ["CARDS", "LAYOUTS", "OF_COURSES", "OF_FAMILY", "OF_LAYOUTS", "OF_MAZES", "OF_SLIDING_AGENTS", "OF_USER_TASKS", "PATH_WIDTH", "TaskCard", "card_of", "tasks_with"]
+__all__ = [
+    "CARDS",
+    "LAYOUTS",
+    "OF_COURSES",
+    "OF_FAMILY",
+    "OF_LAYOUTS",
+    "OF_MAZES",
+    "OF_SLIDING_AGENTS",
+    "OF_USER_TASKS",
+    "PATH_WIDTH",
+    "TaskCard",
+    "card_of",
+    "tasks_with",
+]
 
 # Settings that only some tasks have. OF_SLIDING_AGENTS are for tasks whose agent has a speed, a turning rate and
 # contact with walls.

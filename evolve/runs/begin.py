@@ -87,8 +87,8 @@ def prepare_run(request: RunRequest, tried: bool = True) -> PreparedRun:
         other processes then measure its pace, and try the task first
 
     Raises:
-        ConfigError: a setting is invalid, the optimizer is unknown, two random layouts are equal, or the user task fails
-            or has several mounts that no animal would use; the message is one line.
+        ConfigError: a setting is invalid, the optimizer is unknown, two random layouts are equal, or the user task
+            fails or has several mounts that no animal would use; the message is one line.
         RunError: the animal to start from does not exist.
         BackendError: Dr.Jit cannot find a usable LLVM library.
     """

@@ -102,6 +102,6 @@ def _starts(courses: Sequence[Course], training: bool) -> Starts:
     for number, course in enumerate(courses):
         cells = course.training_starts if training else course.starts
         north = (number - (len(courses) - 1) / 2) * len(course.walls) * CELL
-        positions.append(course.places(cells) + [0, north])
+        positions.append(course.places(cells) + np.array([0, north]))
         headings += [course.heading(cell) for cell in cells]
     return Starts(np.concatenate(positions), np.array(headings))

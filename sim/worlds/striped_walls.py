@@ -27,13 +27,15 @@ def add_striped_walls(spec: mujoco.MjSpec, walls: np.ndarray, rngs: Sequence[np.
     materials.add_texture(spec, "stripes", materials.stripes((8, 256), 2, axis=1))
     for i, period in enumerate(STRIPE_PERIODS):
         materials.add_textured(spec, f"stripes_{i}", "stripes", repeat=(2 / period, 1), uniform=True)
-    rows, boxes = len(walls) // len(rngs), []
+    rows, number = len(walls) // len(rngs), 0
     for part, rng in enumerate(rngs):
-        runs = merge_walls(walls[part * rows : (part + 1) * rows], LONGEST_WALL)
-        boxes += [(part * rows + row, *run, rng.integers(len(STRIPE_PERIODS))) for row, *run in runs]
-    for i, (row, column, n_rows, n_columns, frequency) in enumerate(boxes):
-        center = cell_centers(np.array(column + (n_columns - 1) / 2), np.array(row + (n_rows - 1) / 2), walls.shape)
-        add_wall(spec, f"wall_{i}", center, (n_columns * CELL, n_rows * CELL), f"stripes_{frequency}")
+        south = part * rows
+        for row, column, n_rows, n_columns in merge_walls(walls[south : south + rows], LONGEST_WALL):
+            at = np.array(column + (n_columns - 1) / 2), np.array(south + row + (n_rows - 1) / 2)
+            frequency = rng.integers(len(STRIPE_PERIODS))
+            size = n_columns * CELL, n_rows * CELL
+            add_wall(spec, f"wall_{number}", cell_centers(*at, walls.shape), size, f"stripes_{frequency}")
+            number += 1
 
 
 def merge_walls(walls: np.ndarray, longest: int) -> list[tuple[int, int, int, int]]:

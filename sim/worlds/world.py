@@ -101,8 +101,8 @@ def build_world(
         depend on it
     mazes: number of different mazes in the task "maze"; an episode starts in any of them
     course: course of navigation: "short", "long" (twice as long, with half as many actions) or a `sim.Course`
-    layouts: one set of a `sim.LayoutFamily` for navigation or mazes, instead of `seed`, `mazes` and `course`; an episode
-        starts in any of its layouts
+    layouts: one set of a `sim.LayoutFamily` for navigation or mazes, instead of `seed`, `mazes` and `course`; an
+        episode starts in any of its layouts
     wall_height: height of all walls [m], in [0.4, 100]; 0.5 in the published code
     eyes: eyes for which the agent gets cameras eye_0 ..., from left to right; None: no cameras
     spectra: spectra of materials and lights, by name ("wall", "floor", "light_0" ...). They add to the spectra that the

@@ -131,7 +131,10 @@ def test_a_user_task_can_tell_the_test_by_its_mode():
         (["world.layouts=family", "world.training_layouts=0"], r"world\.training_layouts = 0: must be in \[1, 100\]"),
         (["world.layouts=family", "world.layout_rows=12"], r"world\.layout_rows = 12: must be odd, such as 11"),
         (["world.layouts=family", "world.layout_columns=13"], r"world\.layout_columns = 13: must be in \[15, 99\]"),
-        (["world.layouts=family", "world.selection_set=test"], r"selection_set = 'test': must be one of selection, tra"),
+        (
+            ["world.layouts=family", "world.selection_set=test"],
+            r"selection_set = 'test': must be one of selection, tra",
+        ),
         (["world.layouts=family", "world.unseen=true"], r"world\.unseen = true: has no effect with world\.layouts = f"),
         (["world.family_seed=2"], r"world\.family_seed = 2: has no effect with world\.layouts = fixed"),
         (["world.wall_height=0.1"], r"world\.wall_height = 0\.1: must be in \[0\.4, 100\]"),
@@ -162,7 +165,9 @@ def test_limits_of_the_settings_are_those_of_families():
 
 
 def test_a_run_with_equal_layouts_does_not_start(monkeypatch):
-    monkeypatch.setattr(layout_family, "_DRAW", {"maze": lambda family, rng: np.ones((family.rows, family.columns), bool)})
+    monkeypatch.setattr(
+        layout_family, "_DRAW", {"maze": lambda family, rng: np.ones((family.rows, family.columns), bool)}
+    )
     layout_family._drawn.cache_clear()
     with pytest.raises(ConfigError, match="world: LayoutFamily: layouts training 0 and training 1 have the same walls"):
         check_layouts(config_of("maze", replace(SMALL, family_seed=77)))

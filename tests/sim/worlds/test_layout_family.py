@@ -75,9 +75,7 @@ def _boxes(world, extent):
     model = world.model
     geoms = [i for i in range(model.ngeom) if model.geom(i).name.startswith("wall")]
     shift = [0, extent / 2, 0]
-    return [
-        (*(model.geom_pos[i] + shift), *model.geom_size[i], model.mat(model.geom_matid[i]).name) for i in geoms
-    ]
+    return [(*(model.geom_pos[i] + shift), *model.geom_size[i], model.mat(model.geom_matid[i]).name) for i in geoms]
 
 
 @pytest.mark.parametrize("task", TASKS)
@@ -147,7 +145,11 @@ def test_families_of_impossible_numbers_are_refused(given, message):
 @pytest.mark.parametrize(
     ("task", "given", "message"),
     [
-        ("detection", {"layouts": SMALL.test}, "layouts: must be left out for 'detection', only 'navigation' and 'maze'"),
+        (
+            "detection",
+            {"layouts": SMALL.test},
+            "layouts: must be left out for 'detection', only 'navigation' and 'maze'",
+        ),
         ("maze", {"layouts": SMALL}, "layouts = .*: must be a kind of LayoutSet, such as sim.LayoutFamily"),
         ("maze", {"layouts": SMALL.test, "mazes": 2}, "layouts: seed, mazes and course must be left out"),
         ("maze", {"layouts": SMALL.test, "seed": 2}, "layouts: seed, mazes and course must be left out"),
