@@ -222,6 +222,7 @@ def _add_products(commands: Commands) -> None:
             said = f"{shown} at every N-th action (default: 8)"
             product.add_argument("--every", type=every, default=usual, metavar="N", help=said)
         if name == "replay":
+            product.add_argument("--test", action="store_true", help="play in the test set of a family of layouts")
             product.add_argument("--rrd", action="store_true", help="also write a recording for Rerun")
             product.add_argument("--gif", action="store_true", help="also write an animated GIF, for slides and pages")
             product.add_argument("--mp4", action="store_true", help="also write a video with one frame per action")
