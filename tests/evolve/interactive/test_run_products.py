@@ -50,7 +50,7 @@ def test_python_and_the_command_export_the_same_files(run, exported, recorded, c
 
 
 @pytest.mark.parametrize(
-    ("mode", "message"), [("training", "must be one of evaluation, test"), ("test", "layouts"), (3, "mode = 3")]
+    ("mode", "message"), [("training", "must be one of evaluation, test"), ("test", "has no test set"), (3, "mode = 3")]
 )
 def test_an_episode_in_another_mode_is_refused(run, mode, message):
     with pytest.raises(ConfigError, match=message):
