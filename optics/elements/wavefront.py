@@ -28,11 +28,11 @@ UM = 1e-6
 
 
 class Aberration(ABC):
-    """Lead [m] of a wavefront that leaves the pupil, over a circle or a square.
+    """A wavefront aberration over a circle or a square: the length [m] by which the wavefront is ahead.
 
     radius: radius of the circle or half side of the square [m]. None: equal to the pupil's radius.
 
-    scatters: True if the wavefront may send light into directions that do not follow from its slopes.
+    scatters: True if fine detail may scatter light into directions that do not follow from the slopes.
     """
 
     scatters: ClassVar[bool] = True
@@ -40,18 +40,18 @@ class Aberration(ABC):
 
     @abstractmethod
     def ahead(self, x: Array, y: Array, types: Precision) -> Array:
-        """Return the lead [m] at positions in units of the radius; flat Dr.Jit Float64 arrays."""
+        """Return the length [m] by which the wavefront is ahead at (x, y) [radii]; flat Dr.Jit Float64 arrays."""
 
     @abstractmethod
     def bandwidth(self, level: float) -> float:
-        """Return the frequency [cycles per radius] above which the wavefront's content is below `level` [m]."""
+        """Return the frequency [cycles per radius] above which the wavefront varies by less than `level` [m]."""
 
     def detail(self, level: float, part: float = 1.0) -> float:
-        """Return the frequency [cycles per radius] along x and y above which content is below `level` [m] rms.
+        """Return the frequency [cycles per radius] along x and y above which fine detail is below `level` [m] rms.
 
-        Content that the slopes already describe does not count.
+        Fine detail is the part of the wavefront that scatters light away from the rays that follow from its slopes.
 
-        part: the pupil's radius relative to the wavefront's.
+        part: radius of the pupil divided by that of the wavefront.
         """
         return self.bandwidth(level)
 

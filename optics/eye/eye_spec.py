@@ -38,7 +38,7 @@ class EyeSpec:
     `optics.Eye` documents the fields and adds PSFs, kernels and signals.
 
     Raises:
-        ValueError: names argument, value and valid range.
+        ValueError: an argument is outside its valid range, which the message states.
         AccuracyError: microvilli behind a pupil whose rays are too steep for the tolerance.
     """
 

@@ -21,7 +21,7 @@ def throughput(relative_aperture: Scalar, open_share: float = 1.0) -> Scalar:
     relative_aperture is a Dr.Jit array.
     """
     a = in_range("relative_aperture", relative_aperture, 0.0, 1.0 + 1e-9, carried=True)
-    if a > 1:  # due to rounding
+    if a > 1:  # rounding could exceed 1
         relative_aperture = relative_aperture * (1 / a)
     return relative_aperture * relative_aperture * open_share
 

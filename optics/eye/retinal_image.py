@@ -36,7 +36,10 @@ def blur(
 
 
 def _blurred(pairs: list[tuple[np.ndarray, Array]], shape: tuple[int, int], types: Precision) -> Array:
-    """Return one band as a flat array. The period of the sums is so long that wrapped parts land outside `shape`."""
+    """Return one band as a flat array.
+
+    The period of the transforms is long enough for wrapped parts to land outside `shape`.
+    """
     if all(kernel.shape == (1, 1) for _, kernel in pairs):
         return sum(_flat(centred(scene, shape), types) * kernel.array for scene, kernel in pairs)
     # Parts of the scene beyond the kernel's reach have no effect. Neither have parts of the kernel beyond the scene.
@@ -82,7 +85,7 @@ def _within(scene: tuple[int, ...], shape: tuple[int, int], kernel: tuple[int, .
 
 
 def _middle(kernel: tuple[int, ...], shape: tuple[int, int], scene: tuple[int, ...]) -> tuple[slice, slice]:
-    """Return slices of the part of the kernel through which some point of the scene affects the middle `shape`."""
+    """Return slices of the part of the kernel that contributes to the middle `shape`."""
     cuts = [max(0, k // 2 - (m + n) // 2) for k, m, n in zip(kernel, shape, scene, strict=True)]
     rows, columns = (slice(cut, k - cut) for cut, k in zip(cuts, kernel, strict=True))
     return rows, columns
@@ -118,7 +121,10 @@ def at_receptors(image: Array, samples_per_receptor: int, types: Precision) -> A
 
 
 def with_centre(kernel: Array) -> Array:
-    """Return a kernel (band, ky, kx) with odd ky and kx. Even sides are extended by one, a shift by half a cell."""
+    """Return a kernel (band, ky, kx) with odd ky and kx.
+
+    An even side is extended by one cell, which shifts the kernel by half a cell.
+    """
     odd = [(side + 1) % 2 for side in kernel.shape[1:]]
     return type(kernel)(np.pad(kernel.numpy(), ((0, 0), *((more, 0) for more in odd)))) if any(odd) else kernel
 

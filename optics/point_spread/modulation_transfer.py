@@ -30,7 +30,7 @@ ORIENTATIONS = 16
 MOST_ORIENTATIONS = 1024
 # Choice: fraction of the predicted error within which means over even and odd orientations must agree.
 PART = 0.1
-FINEST = 1e-5  # choice: the two means need not agree more closely than this
+FINEST = 1e-5  # choice: a smaller difference between the two means is always accepted
 DIGITS = 7.0  # choice: digits of sums over the PSF
 AT_A_TIME = 2**17  # choice: frequencies that are summed at once; with 64 cells each, they take some hundred megabytes
 
