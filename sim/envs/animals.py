@@ -50,7 +50,7 @@ class Animals:
                 _require_fit(other, senses)
 
     def seed(self, seed: int | tuple[int, ...]) -> None:
-        """Restart all random streams, from one seed or from a seed for each world."""
+        """Restart all random streams from one seed, or from one seed per world."""
         self.simulation.seed(seed)
         for senses in self.seeing:
             senses.restart()

@@ -20,7 +20,7 @@ from sim.worlds.world import World
 # steep enough to look over a wall behind the agent.
 BEHIND, ABOVE, AHEAD = 4.0, 5.0, 3.0
 FOVY_DEG = 50.0
-WAVELENGTHS = np.linspace(430e-9, 660e-9, 8)  # [m] of slow images, which Mitsuba traces
+WAVELENGTHS = np.linspace(430e-9, 660e-9, 8)  # [m] wavelengths of slow images, which Mitsuba traces
 SIZE = (360, 480)  # pixels (height, width)
 
 

@@ -1,4 +1,5 @@
-"""Observations of one agent in all worlds: noisy signals of its eyes, proprioception, its last action and others."""
+"""Observations of one agent in all worlds: noisy signals of its eyes, proprioception, its last action and other
+entries."""
 
 from __future__ import annotations
 
@@ -87,7 +88,7 @@ class Senses:
         return {**remembered, **self.other_entries(slice(None))}
 
     def preview(self, seen: Arrays, worlds: np.ndarray) -> Arrays:
-        """Return the memory of these worlds as if the new frames were added, without storing them.
+        """Return the memory that these worlds would have after the new frames, without storing the frames.
 
         seen: new frames of all worlds
         """
@@ -121,7 +122,7 @@ class Senses:
         return {**parts, **{name: array.copy() for name, array in self._told.items()}, "action": self.action.copy()}
 
     def set_state(self, state: Arrays) -> None:
-        """Restore what `get_state` returned."""
+        """Restore a state from `get_state`."""
         for k, (name, sight) in enumerate(self.sights.items()):
             sight.set_state(*(state[_part(k, name, what)] for what in ("remembered", "noise")))
         self.action = state["action"]

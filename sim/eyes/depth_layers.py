@@ -43,7 +43,7 @@ class DepthLayers:
         return tuple(1 / v if (v := far + place * (near - far)) > 0 else math.inf for place in places)
 
     def shares(self, vergence: Array) -> list[Array]:
-        """Return each layer's share of light, as Dr.Jit arrays that sum to 1.
+        """Return the fraction of the light that each layer receives, as Dr.Jit arrays that sum to 1.
 
         vergence: inverse distance 1/z from which the light comes [1/m]
         """

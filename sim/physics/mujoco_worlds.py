@@ -89,7 +89,7 @@ class MujocoWorlds:
         return {world: words for world in moving if (words := _broken(self.datas[world])) is not None}
 
     def require_places(self, world: int) -> None:
-        """Reset a world if its poses are not finite, since an attempt to render it would stop all worlds."""
+        """Reset a world if its poses are not finite, because rendering would then fail for all worlds."""
         data = self.datas[world]
         if not _has_place(data):
             mujoco.mj_resetData(data.model, data)

@@ -1,5 +1,7 @@
-"""The kernel of area sampling. Results that are the same for several areas of a world or of a column are computed once,
-beforehand."""
+"""The kernel of area sampling.
+
+Results that are the same for several areas, of a world or of a column, are computed once, in advance.
+"""
 
 from __future__ import annotations
 
@@ -23,7 +25,7 @@ from sim.tracing.areas.patch import Area
 
 @dataclass(frozen=True)
 class BorderInputs:
-    """Level directions to the borders that areas share.
+    """Horizontal directions to the borders between columns of areas.
 
     lanes: numbers of the borders of all eyes · sizes: number of borders of an eye, and number of eyes
     along: directions to the borders · sides: numbers of each area's left and right border
@@ -40,7 +42,8 @@ class AreaInputs(KernelInputs):
     """Inputs of an area kernel that are the same in every call, in addition to `KernelInputs`.
 
     extent: width and height of areas on the tangent plane · borders: None: areas share no borders
-    places: numbers of the places on the bodies of all worlds; None: light that bodies reflect is not followed
+    places: numbers of the points on the bodies of all worlds at which illumination is computed; None: bodies reflect no
+        light onto other surfaces
     """
 
     extent: Array | None = None
@@ -97,7 +100,7 @@ class AreaKernel(RayKernel):
         return self._areas.radiance(area, met, FrameState(bodies, inputs.tables, lane.world, lit), self.depth)
 
     def _lit(self, frame: Frame, inputs: AreaInputs) -> list[Array]:
-        """Return the share of each light that reaches each place of each world's bodies, flat (world, place)."""
+        """Return the fraction of each light that reaches each point of each world's bodies, flat (world, point)."""
         if inputs.places is None:
             return []
         world = inputs.places // self._areas.places

@@ -62,7 +62,7 @@ class Labels:
         return np.concatenate([scene.movers.geoms, geoms])[found].astype(np.int32)
 
     def flow(self, poses: Placed, later: Placed) -> np.ndarray:
-        """Return the optic flow from one moment to another, to the right and down [receptors].
+        """Return the optic flow between two moments, to the right and down [receptors].
 
         It is the motion on the retina of the point that each receptor's centre sees: (env, eye, 2, height, width)
         float32. It is NaN without a hit, or if the point is not in front of the eye at the later moment.

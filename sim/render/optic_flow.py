@@ -1,7 +1,7 @@
 """Optic flow: the motion of visible points on the retina, from geometry alone.
 
 A point on a rigid body moves with the body, and an eye moves with its own body (Longuet-Higgins & Prazdny 1980). The
-flow from one moment to another is exact, whatever happens between them.
+flow between two moments is exact for any motion between them.
 """
 
 from __future__ import annotations

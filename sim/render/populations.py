@@ -1,8 +1,8 @@
-"""Populations of views and receptors over which the errors of trials are taken.
+"""Populations of views and receptors for which the errors of trials are computed.
 
-There are two: any receptors in views from any place, and receptors that see an object in views with an object nearby.
-The second is separate because objects decide how an episode ends. Most receptors see floor and walls, and would hide
-errors at objects. All draws have fixed seeds, so the same world and eyes give the same populations.
+There are two: random receptors in views from random places, and receptors that see an object, in views with an object
+nearby. The second is separate because objects decide how an episode ends. Most receptors see floor and walls, and would
+hide errors at objects. All draws have fixed seeds, so the same world and eyes give the same populations.
 """
 
 from __future__ import annotations
@@ -16,15 +16,16 @@ from sim.render.random_views import RandomViews, near_views, on_objects, random_
 from sim.render.world_scene import WorldScene
 
 RECEPTORS = 24  # chosen: largest number of receptors of a population
-LEAST_WEIGHT = 1e-3  # weight of a receptor that sees an object in none of the views, compared with one of them
-ON_OBJECT = 0.02  # share of a receptor's field: a receptor sees an object that fills more than this share
+LEAST_WEIGHT = 1e-3  # weight of a receptor that sees an object in no view, relative to one that sees it in one
+ON_OBJECT = 0.02  # a receptor sees an object that fills more than this fraction of its field
 
 
 @dataclass(frozen=True)
 class Population:
-    """Views, and receptors that are tried in them.
+    """Views, and the receptors whose errors are computed in them.
 
-    receptors: their numbers, row by row · counted: whether each of them counts in each view, (view, receptor)
+    receptors: numbers of the receptors, row by row
+    counted: True if a receptor counts in a view, (view, receptor)
     """
 
     views: RandomViews
@@ -38,7 +39,7 @@ class Population:
 
 
 def everywhere(scene: WorldScene, views: int) -> Population:
-    """Return receptors drawn from all receptors, in this number of views from any place."""
+    """Return random receptors in this number of views from random places."""
     receptors = _drawn(np.ones(int(np.prod(scene.eyes.resolution))))
     counted = np.ones((views, len(receptors)), bool)
     return Population(random_views(scene.world, scene.eyes, views), receptors, counted)

@@ -80,7 +80,7 @@ class PreparedScene:
         return self.scene.variant
 
     def tell(self, light: str) -> None:
-        """Warn of features that are not rendered if this light is followed. Later calls do not warn again."""
+        """Warn once of features of the model that are not rendered with this kind of light."""
         if not self._is_told:
             self._is_told = True
             self.scene.tell_what_is_missing(light)
@@ -124,8 +124,10 @@ class PreparedScene:
 
     @property
     def _in_rows(self) -> bool:
-        """True if areas are divided into rows, too. Walls and floor have closed forms along columns of any height, but
-        the outlines of spheres need rows."""
+        """True if areas are divided into rows as well as columns.
+
+        Walls and floor have closed forms along columns of any height, but the outlines of spheres need rows.
+        """
         upright = self.tracers.upright
         return isinstance(upright, UprightScene) and len(upright.spheres) > 0
 
@@ -155,7 +157,7 @@ class PreparedScene:
         """
         if poses.n != n_envs:
             raise ValueError(f"poses of {poses.n} worlds, this renderer was built for n_envs = {n_envs}")
-        if isinstance(poses, MovedBodies):  # everything else is as in the model
+        if isinstance(poses, MovedBodies):  # all other quantities are as in the model
             self._check_finite(poses.positions)
             if poses.reference.n_bodies != self.model.nbody:
                 raise ValueError("poses of another model")

@@ -15,7 +15,7 @@ import numpy as np
 from sim.scene.tessellation import Triangles
 
 BORDER = 1  # texels around each face that repeat its edge, so that bilinear lookups do not bleed into its neighbours
-# For each face: the axis it faces and its sign, and the axes of the image's columns and rows with their signs.
+# For each face: its axis and sign, and the axes of the image's columns and rows with their signs.
 _MAJOR, _MAJOR_SIGN = np.array([0, 0, 1, 1, 2, 2]), np.array([1, -1, 1, -1, 1, -1])
 _COLUMN, _COLUMN_SIGN = np.array([2, 2, 0, 0, 0, 0]), np.array([-1, 1, 1, 1, 1, -1])
 _ROW, _ROW_SIGN = np.array([1, 1, 2, 2, 1, 1]), np.array([-1, -1, 1, -1, -1, -1])
@@ -103,7 +103,8 @@ def _cut(pieces: np.ndarray, side: np.ndarray) -> np.ndarray:
     side = np.where(np.abs(side) < 1e-9 * np.abs(side).max(initial=0), 0, side)
     crossed = (side.max(axis=1) > 0) & (side.min(axis=1) < 0)
     whole, cut, side = pieces[~crossed], pieces[crossed], side[crossed]
-    # Rotate each triangle so that its first corner is alone on its side (a corner on the seam counts with the others).
+    # Rotate each triangle until only its first corner is on its side of the seam. Corners on the seam belong to the
+    # other side.
     positive = (side > 0).sum(axis=1)
     lone = np.where(positive == 1, np.argmax(side, axis=1), np.argmin(side, axis=1))
     turn = (lone[:, None] + np.arange(3)) % 3

@@ -1,5 +1,4 @@
-"""Shapes that share a material, merged into one, because every shape of a Mitsuba scene adds time to every kernel
-launch."""
+"""Merging of shapes that share a material. Every shape of a Mitsuba scene makes kernel launches slower."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
 """`mirror(model)`: any MuJoCo model as a spectral Mitsuba scene that follows mjData.
 
 The scene contains all geoms with their materials and textures, lights, the skybox, and cameras. Faces are visible from
-the same side as in MuJoCo: a camera inside a body looks out of it. A single MirrorWarning names everything that cannot
-be mirrored.
+the same side as in MuJoCo, so a camera inside a body sees through its surface. One MirrorWarning names all features
+that cannot be mirrored.
 """
 
 from __future__ import annotations
@@ -108,8 +108,9 @@ class Mirror:
             warnings.warn(message, MirrorWarning, stacklevel=3)
 
     def sync(self, data: mujoco.MjData) -> None:
-        """Move everything, including cameras, to the poses in `data` (after mj_forward or mj_step). A scene in which
-        nothing moved is not rebuilt.
+        """Move all shapes, lights and cameras to the poses in `data` (after mj_forward or mj_step).
+
+        A scene in which nothing moved is not rebuilt.
 
         Raises:
             ValueError: the data of another model, or positions that are not finite.
@@ -201,7 +202,7 @@ class Mirror:
         return ids.reshape(height, width), depth.reshape(height, width)
 
     def _camera(self, view: Viewpoint, width: int, height: int) -> rays.Camera:
-        """Return the camera for a view. As in MuJoCo, planes are visible from both sides, and everything else only from
+        """Return the camera for a view. As in MuJoCo, planes are visible from both sides, and all other geoms only from
         outside."""
         planes = {g for g in self._parts if surfaces.geom_type(self.model, g) == mujoco.mjtGeom.mjGEOM_PLANE}
         closed = {f"geom_{g}_{k}" for g, parts in self._parts.items() if g not in planes for k in range(len(parts))}

@@ -1,7 +1,7 @@
 """Rays of a sensor through a scene, as in Mitsuba's film, but at given wavelengths and pixel centres.
 
-Faces that MuJoCo does not draw are skipped. The functions work on the types of the variant in force: whole wavefronts,
-or one ray at a time in a scalar variant.
+Faces that MuJoCo does not draw are skipped. The functions use the types of the active variant: whole wavefronts, or one
+ray at a time in a scalar variant.
 """
 
 from __future__ import annotations
@@ -123,7 +123,7 @@ class Camera:
         return si.shape.id(), np.array(ray(si.t), dtype=float)
 
     def _look(self, ray: Array) -> Array:
-        """Return the first visible intersection of the ray; moves the ray's origin past invisible inner faces."""
+        """Return the first visible intersection of the ray, and move the ray's origin past invisible inner faces."""
         si = self.scene.ray_intersect(ray)
         for _ in range(NESTED):
             inner = self._is_inner(si, ray)
@@ -199,7 +199,7 @@ def described(integrator: str | Mapping[str, Any]) -> Description:
 def _integrator(integrator: str | Mapping[str, Any]) -> MitsubaObject:
     description = described(integrator)
     if description["type"] == "direct" and {"emitter_samples", "shading_samples"} & description.keys():
-        # For point and directional lights, Mitsuba 3.9.1 adds these samples instead of averaging them.
+        # For point and directional lights, Mitsuba 3.9.1 adds several light samples instead of averaging them.
         raise ValueError('integrator "direct": its light samples cannot be set; take more spp')
     try:
         found = mi.load_dict(description)

@@ -67,8 +67,8 @@ class Outcome:
     terminated: whether the task ends the episode, (row,) bool
     success: whether the task is accomplished, (row,) bool
     failure: the worlds that could not continue, each with the reason; their episodes end
-    over: whether a world's episode ends for another reason than a row that is terminated, such as an animal that does
-        not learn, (world,) bool; None: False in all worlds
+    over: True if a world's episode ends although no row is terminated, for example because of an animal that does not
+        learn, (world,) bool; None: False in all worlds
     changed: worlds in which the task moved bodies after the action
     info: additional entries of each row's `info`; None: no additions
     proprioception: part of the observation that does not come from eyes, for each agent and by name, (world, number);

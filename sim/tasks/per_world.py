@@ -180,7 +180,7 @@ class PerWorld(BatchTask):
 
 
 def _row(where: str, returned: object) -> np.ndarray:
-    """Return what a method returned as a float32 array; ValueError unless it consists of real numbers."""
+    """Convert the return value of a method to a float32 array; ValueError unless it consists of real numbers."""
     given = number_types.real_array(where, returned)
     if given is None:
         raise ValueError(f"{where} returned {shown(returned)}: must be finite numbers, (k,)")
@@ -202,7 +202,7 @@ def _stacked(felt: Sequence[np.ndarray | None]) -> dict[str, np.ndarray]:
 
 
 def _told(error: BaseException) -> str:
-    """Return the message of an error; if it was raised in the user's file, with the function and line.
+    """Return the message of an error, with function and line if it was raised in the user's file.
 
     The error may be a SystemExit or another exception that would end the program. Only Ctrl-C is raised again.
     """

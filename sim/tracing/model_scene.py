@@ -1,6 +1,6 @@
 """A model in two parts: static geoms form one Mitsuba scene, and moving geoms are intersected separately.
 
-All surfaces are matt and opaque here. Gloss, mirrors and glass are left out, and a warning lists them.
+All surfaces are treated as matt and opaque. A warning lists gloss, mirrors and glass, which are not rendered.
 """
 
 from __future__ import annotations
@@ -41,11 +41,11 @@ class ModelScene:
     """The parts of a model that tracers need. Mitsuba's scenes are built on first use.
 
     model: the MuJoCo model · eye: determines the spectral bands · variant: Mitsuba's variant
-    geoms: ids of all visible geoms · looks: appearances of all these geoms
+    geoms: ids of all visible geoms · looks: appearances of these geoms
     moving: appearances that may change their place, size or colour
     bsdfs: one for every appearance; stored here, because a BSDFPtr does not keep its objects alive
     lights: all lights · spectra: measured spectra of materials and lights, by name
-    has_sky: whether rays without a hit reach a sky
+    has_sky: True if rays without a hit reach a sky
     glows: BSDFs whose reflectance is the radiance of a glowing geom, by appearance; such geoms count as movers
     varied: geoms whose size or colour differs between worlds, with the ids of the materials that each may have; they
         count as movers, although they may be static
@@ -96,8 +96,10 @@ class ModelScene:
         return _moves(self.model, look.geom) or look.geom in self.varied or look in self.glows
 
     def tell_what_is_missing(self, light: str = DIRECT) -> None:
-        """Warn (`sim.MirrorWarning`) of features that are not rendered if this part of the light is followed, and of
-        measured lights for which the eye has too few bands."""
+        """Warn (`sim.MirrorWarning`) of features that are not rendered with this level of light.
+
+        Also warn of measured lights for which the eye has too few bands.
+        """
         model = self.model
         of_sky = ["light of the sky on surfaces"] if light == DIRECT and self.has_sky else []
         missing = [*self._unlit, *of_sky, *inventory.left_out(model, self._seen, self._groups)]
@@ -145,8 +147,11 @@ class ModelScene:
         return bsdfs.matt(look.model, look.geom, to_uv, of_geom(look.model, look.geom, self.spectra))
 
     def _glow(self, look: Appearance, white: bool) -> MitsubaObject | None:
-        """Return a BSDF whose reflectance is the radiance of a glowing geom; None if the geom does not glow. The kernel
-        evaluates it like other BSDFs. If it is white, the kernel multiplies it by its world's colour."""
+        """Return a BSDF whose reflectance is the radiance of a glowing geom; None if the geom does not glow.
+
+        The kernel evaluates it like other BSDFs. If it is white, the kernel multiplies it by the colour in the lane's
+        world.
+        """
         to_uv, geom = shapes.uv_transform(look.model, look.geom), look.geom
         model = in_white(look.model, geom) if white else look.model
         radiance = lights.glow(model, geom, to_uv, of_geom(model, geom, self.spectra))
@@ -156,8 +161,11 @@ class ModelScene:
 
     @cached_property
     def told_apart(self) -> tuple[MitsubaObject, np.ndarray]:
-        """Mitsuba scene in which every static geom has its own shapes, and a table from the shapes' ids in Mitsuba to
-        geoms (-1 for unused ids). On a GPU, a ray reports only the id of the shape that it hits."""
+        """Mitsuba scene in which every static geom has its own shapes, and a table from shapes' ids to geoms.
+
+        The table contains -1 for unused ids. It is necessary because a ray on a GPU reports only the id of the shape
+        that it hits.
+        """
         with in_variant(self.variant):
             built = {name: shapes.build(part, pose, name, bsdf, None) for name, part, pose, bsdf in self._still_parts()}
             scene = mi.load_dict({"type": "scene", **built}, optimize=False)
@@ -191,7 +199,7 @@ def _outside() -> int:
 
 
 def _not_matt(model: mujoco.MjModel, looks: Sequence[Appearance], light: str) -> list[str]:
-    """Return descriptions of surface properties that are left out."""
+    """Return descriptions of surface properties that are not rendered."""
     materials = sorted({look.material for look in looks if look.material >= 0})
     glossy = [m for m in materials if bsdfs.has_gloss(model, m)]
     glowing = [m for m in materials if model.mat_emission[m] > 0 and light == DIRECT]

@@ -27,16 +27,18 @@ from sim.tracing.primitives import PRIMITIVES, Primitive
 from sim.tracing.world_rows import WorldRows
 
 _TYPES = mujoco.mjtGeom
-# Rows of four floats for each mover: a sphere around its origin; then, three times, an axis of its frame in the world
-# and one of its sizes. The sizes of a mesh are the centre of its cell in the atlas.
+# Rows of four floats for each mover: a sphere around its origin, then three times an axis of its frame in the world,
+# followed by one of its sizes. The sizes of a mesh are the centre of its cell in the atlas.
 ROWS = 4
 MESH = "mesh"
 
 
 @dataclass(frozen=True)
 class Hit:
-    """First hit of a ray. t: distance [m], infinite without a hit · which: number of the mover · normal: unit vector in
-    the world · uv: texture coordinates of meshes and planes."""
+    """First hit of a ray. t: distance [m], infinite without a hit · which: number of the mover
+
+    normal: unit vector in the world · uv: texture coordinates of meshes and planes
+    """
 
     t: Array
     which: Array
@@ -46,9 +48,9 @@ class Hit:
 
 @dataclass(frozen=True)
 class _Frame:
-    """A mover's frame. axes: its axes in the world (3 Vector3f) · origin: its origin in the world (Vector3f)
+    """A mover's frame. axes, origin: axes (3 Vector3f) and origin (Vector3f) of the frame in the world
 
-    size: its half sizes · reach: largest distance of its surface from its origin
+    size: half sizes of the mover · reach: largest distance of its surface from the origin
     """
 
     axes: tuple[Array, Array, Array]
@@ -57,11 +59,11 @@ class _Frame:
     reach: Array
 
     def taken(self, v: Array) -> Array:
-        """Return a direction of the world in the mover's frame."""
+        """Convert a direction from the world's frame to the mover's frame."""
         return mi.Vector3f(*(dr.dot(axis, v) for axis in self.axes))
 
     def given(self, v: Array) -> Array:
-        """Return a direction of the mover's frame in the world."""
+        """Convert a direction from the mover's frame to the world's frame."""
         return self.axes[0] * v.x + self.axes[1] * v.y + self.axes[2] * v.z
 
 
@@ -73,10 +75,10 @@ class MoverRows(WorldRows):
 
 
 class Movers:
-    """The moving geoms of a model, primitives first, by kind. A geom with drawn materials has a mover per appearance.
+    """The moving geoms ("movers") of a model: primitives by kind, then meshes. Each appearance of a geom is a mover.
 
     looks: appearance of each mover · geoms: geom id of each mover, (mover,)
-    atlas: all other movers · lifts: distances by which surfaces are moved outwards [m], by geom
+    atlas: the movers that are meshes · lifts: distances by which surfaces are moved outwards [m], by geom
     ends: number of the first mover of each kind, for the kernel
     """
 
@@ -115,7 +117,7 @@ class Movers:
 
     @property
     def apart(self) -> bool:
-        """True if movers are intersected in their own kernel, which no branch can contain: see `computed`."""
+        """True if movers are intersected in a separate kernel, which cannot be inside a branch (see `computed`)."""
         return self.atlas.scene is not None and on_gpu()
 
     @property
@@ -144,8 +146,7 @@ class Movers:
         return rows.reshape(poses.n, -1)
 
     def _absent(self, poses: Poses) -> np.ndarray | None:
-        """Return a mask of the appearances that a world does not show, (world or 1, mover); None if all worlds show
-        all."""
+        """Return a mask of the appearances that a world does not show, (world or 1, mover); None if there are none."""
         if not self._drawn.any():
             return None
         here = self._as_built if poses.geom_matid is None else poses.geom_matid
@@ -153,8 +154,8 @@ class Movers:
         return absent
 
     def _extents(self, poses: Poses) -> tuple[np.ndarray, np.ndarray]:
-        """Return the movers' half sizes (world or 1, mover, 3), a sphere's radius three times, and the largest distance
-        of each mover's surface from its origin [m], (world or 1, mover)."""
+        """Return the movers' half sizes (world or 1, mover, 3), three radii for a sphere, and the largest distance of
+        each surface from its origin [m], (world or 1, mover)."""
         if poses.geom_size is None:
             sizes = self._sizes[None].copy()
         else:

@@ -1,4 +1,4 @@
-"""Rows of four floats for everything that differs between worlds, which kernels read."""
+"""Rows of four floats that kernels read, for all values that differ between worlds."""
 
 from __future__ import annotations
 

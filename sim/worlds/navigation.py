@@ -76,7 +76,7 @@ def add_layout(spec: mujoco.MjSpec, rng: np.random.Generator, course: Course) ->
     """Add the walls of a course, with stripes drawn by `rng`."""
     rows, columns = course.walls.shape
     add_floor(spec, (columns * CELL, rows * CELL))
-    # Wall cells without an adjacent free cell are never visible, so they are left out.
+    # Wall cells without an adjacent free cell are never visible, so they are omitted.
     near = scipy.ndimage.binary_dilation(~course.walls, np.ones((3, 3)))
     add_striped_walls(spec, course.walls & near, rng)
     right, top = columns * CELL / 2 - CELL, rows * CELL / 2 - CELL
