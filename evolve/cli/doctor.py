@@ -67,8 +67,8 @@ def unsupported(platform_name: str = sys.platform) -> str | None:
 def examine() -> dict[str, object]:
     """Return the findings by name.
 
-    They are python, machine, packages, llvm (all libraries that were tried), variants, gpu, device, notes, and good
-    (whether everything works).
+    The names are python, machine, packages, llvm (all libraries that were tested), variants, gpu, device, notes, and
+    good (True if all works).
     """
     chosen, tried = backend.find(cached=False)
     environment = {**os.environ, backend.VARIABLE: chosen.path} if chosen else dict(os.environ)

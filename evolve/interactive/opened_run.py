@@ -58,7 +58,7 @@ class OpenedRun(Run):
 
     @property
     def best(self) -> OpenedCandidate | None:
-        """Candidate with the highest fitness, the earliest if several have it; None if none has succeeded."""
+        """Candidate with the highest fitness (the earliest of equals); None before a candidate has succeeded."""
         best = super().best
         return None if best is None else OpenedCandidate.of_run(best, self)
 

@@ -11,7 +11,7 @@ observed          entries of an observation other than the eyes' signals
 eye_features      encoder of each eye
 per_eye_layers    linear layers with separate weights per eye
 schedule          decrease of Adam's step size and of the passes over the samples during training
-training_rewards  scaling of rewards for the learner, with reduced costs at the start
+training_rewards  scaling of rewards for the learner, with lower costs at the start
 rollout_buffer    rollout buffer that stores each frame once
 adam              Adam optimizer on a single vector of all weights
 tensor_file       reading of tensors from a run's files

@@ -1,4 +1,4 @@
-"""The run's task with one animal in it; only this module resolves a task's name into an object."""
+"""The run's task with one animal in it. No other module converts a task's name to an object."""
 
 from __future__ import annotations
 

@@ -16,7 +16,7 @@ from torch import Tensor, nn
 __all__ = ["CONTRAST", "AdaptedLinear", "MemoryLinear", "PerEyeLinear"]
 
 DARK = 1e-6  # lower limit of the spread of signals, so that weights remain finite if all signals are equal
-CONTRAST = 0.4  # spread of normalised signals, chosen for 675 inputs per unit; with 1, learning was not faster
+CONTRAST = 0.4  # standard deviation of normalised signals, chosen for 675 inputs per unit; 1 was not faster
 
 
 class PerEyeLinear(nn.Module):
@@ -37,9 +37,9 @@ class AdaptedLinear(PerEyeLinear):
     """Linear layer on signals from which a running mean is subtracted, and which are divided by a running spread.
 
     Each receptor has its own mean, and each eye its own spread. Within a scene, signals vary little around their means,
-    and behind a small pupil all signals are small. Without normalisation, the means would saturate the units, and the
-    variations would have almost no effect. The normalisation is applied to weight and bias, so that it takes almost no
-    time.
+    and behind a small pupil all signals are small. Without normalisation, the means would saturate the units, and
+    variations around them would have almost no effect. The normalisation is applied to weight and bias, so that it
+    takes almost no time.
     """
 
     def __init__(self, n_eyes: int, inputs: int, outputs: int) -> None:

@@ -31,8 +31,8 @@ from evolve.store.atomic_files import write_whole
 
 FEELS = "feels"  # name of the proprioception of a `sim.Task` in observations
 LARGEST_COUNT = 4096  # upper limit of each number in the shape of a policy in a file; genes allow at most 512
-MOST_SIGNALS = 2**24  # upper limit of the signals in a policy's memory; genes allow at most half of it
-FIRST_SPREAD = 0.5  # standard deviation of an untrained policy's actions; with 1, a third would be clipped
+MOST_SIGNALS = 2**24  # upper limit for the number of signals in a policy's memory; genes allow at most half of it
+FIRST_SPREAD = 0.5  # standard deviation of an untrained policy's actions; with 1, a third of them would be clipped
 
 
 class TrainingDiverged(FloatingPointError):
@@ -43,7 +43,8 @@ class TrainingDiverged(FloatingPointError):
 class Brain:
     """Size of a brain.
 
-    neurons, layers: the actor and the critic have `layers` hidden layers of `neurons` units each · encoder: width of
+    neurons, layers: the actor and the critic have `layers` hidden layers of `neurons` units each
+    encoder: width of
         all layers of the eyes' encoders
     """
 

@@ -50,7 +50,7 @@ def executed_task(code: TaskCode, encoded_textures: bool = True) -> Task | Batch
 
 
 def _resolve_textures(task: Task | BatchTask) -> None:
-    """Let the textures that MuJoCo's compiler resolves to linear light contain it."""
+    """Request linear light for the textures that MuJoCo's compiler resolves to it."""
     try:
         task.model = with_compiled_color_spaces(task.model)
     except ValueError as error:
@@ -58,7 +58,7 @@ def _resolve_textures(task: Task | BatchTask) -> None:
 
 
 def _executed(code: TaskCode) -> ModuleType:
-    """Execute the code as a module. It has a unique name in `sys.modules`, where pickle and dataclasses look it up."""
+    """Execute the code as a module with a unique name in `sys.modules`, where pickle and dataclasses look it up."""
     name = f"{MODULE}{code.sha256[:16]}"
     module = ModuleType(name)
     module.__file__ = str(code.file)
@@ -73,7 +73,7 @@ def _executed(code: TaskCode) -> ModuleType:
         del sys.modules[name]
         raise ConfigError(f"{code.file.name}: {_told(error, code)}", "task") from error
     finally:
-        open_closed_streams()  # the code may have closed one
+        open_closed_streams()  # the code may have closed a stream
     return module
 
 

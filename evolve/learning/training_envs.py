@@ -21,7 +21,7 @@ class TrainingEnvs:
     selection: environments of the evaluations during training, which select the best policy
     test: environments of the final evaluation, which gives the fitness
 
-    The light is computed in the same way in all three. The first two are rendered with at most
+    Reflections of light are computed in the same way in all three. The first two are rendered with at most
     `learning.rays_per_receptor` rays for each receptor, because the noise of rendering averages out in learning.
     """
 
@@ -33,7 +33,8 @@ class TrainingEnvs:
 def worlds_of(phenotype: Phenotype, config: RunConfig, learning: int, evaluation: int) -> TrainingEnvs:
     """Return the environments of an animal.
 
-    learning: seed of the environments for training · evaluation: seed of the environments for selection and test
+    learning: seed of the environments for training
+    evaluation: seed of the environments for selection and test
 
     Raises:
         ConfigError: the user task has not been named when the run was opened, or it fails at its start.

@@ -26,7 +26,7 @@ def export_run(
     candidate_id: id of the candidate that plays; None: the best candidate
     seed: seed of the episode
     out: folder of the files; None for `exr/` in the run directory
-    doing: function that is called with the current step and the completed share of the work, in [0, 1]
+    doing: function that is called with the current step and the completed fraction of the work, in [0, 1]
 
     Raises:
         RunError: the candidate does not exist, or it has no policy.

@@ -55,8 +55,9 @@ class QuantityDrift:
 class Drift:
     """Comparison of runs with searches with random fitness.
 
-    of: number of runs · searches: number of searches
-    generations: generations over which means are taken, counted from 0
+    of: number of runs
+    searches: number of searches
+    generations: generations over which means are computed, counted from 0
     moved: quantities, with their values
     """
 
@@ -92,9 +93,10 @@ def drift_of(runs: Sequence[Run], searches: int = SEARCHES, done: Callable[[floa
     """Compare runs that differ only in their seeds with searches with random fitness (`evolve.search.null_model`).
 
     The quantities are the genes that the search varies, the acuity [cycles/degree] and the number of receptors. Means
-    are taken over the last generations that all runs have completed.
+    are over the last generations that all runs have completed.
 
-    searches: number of searches · done: function that is called with the share of completed searches
+    searches: number of searches
+    done: function that is called with the completed fraction of the searches
 
     Raises:
         RunError: the runs differ in settings other than their seeds, two runs have the same seed, or a run has no
@@ -148,9 +150,9 @@ def _open(name: str, config: RunConfig) -> bool:
 
 
 def _ends(run: Run, generations: range) -> dict[str, float]:
-    """Return the mean of each quantity over the successful candidates of these generations; NaN if none of them has it.
+    """Return the mean of each quantity over the successful candidates of these generations.
 
-    Quantities of which no candidate has a value have the value NaN.
+    It is NaN for a quantity that none of them has.
     """
     values: dict[str, list[float]] = defaultdict(list)
     for candidate in run.candidates:

@@ -70,7 +70,8 @@ def inline(figure: Figure, name: str, alt: str) -> Html:
 
     The page's policy does not allow styles in elements, so these are moved to the page's style sheet.
 
-    name: prefix of the ids in the element, unique on the page · alt: description of the figure for screen readers
+    name: prefix of the ids in the element, unique on the page
+    alt: description of the figure for screen readers
     """
     buffer = io.StringIO()
     with matplotlib.rc_context({"svg.hashsalt": name, "svg.fonttype": "none"}):

@@ -18,7 +18,7 @@ from evolve.store.directory import Run
 
 __all__ = ["Bar", "Events", "Lines", "Silent", "Tally", "Watchers", "clock", "watcher"]
 
-EVENT_S = 1.0  # minimum time between two events of one candidate's training
+EVENT_S = 1.0  # minimum time between two events of one candidate's training [s]
 
 
 class Tally:
@@ -64,7 +64,7 @@ class Tally:
 
     @property
     def utilisation(self) -> float:
-        """Share of the workers' time that was spent on evaluations which are now complete."""
+        """Fraction of the workers' time that was spent on evaluations that are now complete."""
         return self._busy / (self._workers * self.seconds)
 
     @property
@@ -217,7 +217,7 @@ class Bar(_Watcher):
 
 
 class Watchers:
-    """Watcher that passes each report on to several watchers."""
+    """Watcher that forwards each report to several watchers."""
 
     def __init__(self, watchers: Sequence[Any]) -> None:
         self._watchers = watchers

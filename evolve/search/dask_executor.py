@@ -50,8 +50,8 @@ class DaskExecutor:
     scheduler: the scheduler, or its address
     function: "module:name" of the function that evaluates a candidate; it takes the arguments of
         `evolve.learning.fitness.evaluate`
-    patience_s: maximum time without a sign of life of the scheduler, or of any worker [s]; a heartbeat is one, so an
-        evaluation may take longer
+    patience_s: maximum time without a sign of life of the scheduler, or of any worker [s]. Heartbeats are signs of
+        life, so an evaluation may take longer
     note: function that is called with one line if the run waits for a sign of life, or gives up a worker
     count: number of workers at the start
 

@@ -64,7 +64,7 @@ def null_model(
     searches: number of searches
     measure: function that returns quantities of an untrained animal. It returns the same names for all animals, with
         NaN for quantities that an animal lacks.
-    done: function that is called with the share of completed searches
+    done: function that is called with the completed fraction of the searches
     """
     found = []
     for i in range(searches):

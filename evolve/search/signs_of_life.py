@@ -37,7 +37,7 @@ class SignsOfLife:
         self._scheduler_s += seconds
 
     def answer(self, workers: Mapping[str, Mapping[str, Any]]) -> None:
-        """Take an answer of the scheduler into account.
+        """Record an answer of the scheduler.
 
         workers: address and description of each connected worker, as in the scheduler's `identity`
         """

@@ -13,7 +13,7 @@ from evolve.store.regular_files import StrangeFileError, opened
 
 __all__ = ["LockedError", "RunLock", "holder"]
 
-PATIENCE_S = 0.5  # time to wait for the lock, because `holder` in another process takes it for an instant
+PATIENCE_S = 0.5  # time to wait for the lock [s], because `holder` in another process takes it for an instant
 LONGEST = 400  # maximum length of the text in a lock file, which names a process and its machine [bytes]
 
 

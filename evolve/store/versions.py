@@ -19,7 +19,7 @@ from optics.numerics.device import device
 __all__ = ["config_change", "fingerprint", "origin", "present", "record_start", "recorded"]
 
 FILE, CONFIG = "versions.json", "config.toml"
-LARGEST_FILE = 2**24  # bytes; thousands of starts
+LARGEST_FILE = 2**24  # maximum size of the file [bytes], for thousands of starts
 PACKAGES = (
     "rhabdom",
     "numpy",

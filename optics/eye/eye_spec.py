@@ -126,7 +126,7 @@ class EyeSpec:
 
     @property
     def throughput(self) -> Scalar:
-        """Throughput: a², times the open share of the aperture's disk, times the mask's transmission."""
+        """Throughput: a², times the open fraction of the aperture's disk, times the mask's transmission."""
         return self.aperture_throughput * (1.0 if self.pupil is None else self.pupil.transmission)
 
     @property

@@ -64,7 +64,8 @@ class RayLight:
 class CameraInputs:
     """Inputs of kernels that are the same for every image of a mirror.
 
-    samples: positions within a pixel, in twos [pixels] · weights: irradiance from each directional light, in fours
+    samples: positions within a pixel, in twos [pixels]
+    weights: irradiance from each directional light, in fours
     closed: for each shape, True if a camera inside it sees through it
     bsdfs: not used by the kernel; a recording includes textures only if their BSDFs are among the inputs
     """
@@ -180,7 +181,7 @@ def _looked_out_of(scene: MitsubaObject, si: Array, ray: Array, closed: Array) -
 
 @dataclass(frozen=True)
 class _Axes:
-    """Frame of a camera. position: its position · directions: unit vectors to the right, up and ahead."""
+    """Frame of a camera: its position, and unit vectors to the right, up and ahead."""
 
     position: Array
     directions: tuple[Array, Array, Array]

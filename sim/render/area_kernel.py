@@ -27,8 +27,10 @@ from sim.tracing.areas.patch import Area
 class BorderInputs:
     """Horizontal directions to the borders between columns of areas.
 
-    lanes: numbers of the borders of all eyes · sizes: number of borders of an eye, and number of eyes
-    along: directions to the borders · sides: numbers of each area's left and right border
+    lanes: numbers of the borders of all eyes
+    sizes: number of borders of an eye, and number of eyes
+    along: directions to the borders
+    sides: numbers of each area's left and right border
     """
 
     lanes: Array
@@ -41,7 +43,8 @@ class BorderInputs:
 class AreaInputs(KernelInputs):
     """Inputs of an area kernel that are the same in every call, in addition to `KernelInputs`.
 
-    extent: width and height of areas on the tangent plane · borders: None: areas share no borders
+    extent: width and height of areas on the tangent plane
+    borders: None: areas share no borders
     places: numbers of the points on the bodies of all worlds at which illumination is computed; None: bodies reflect no
         light onto other surfaces
     """
@@ -54,7 +57,9 @@ class AreaInputs(KernelInputs):
 class AreaKernel(RayKernel):
     """A kernel that computes the light in areas.
 
-    areas: tracer · eyes: upright eyes · sensor: directions and extent of the areas
+    areas: tracer
+    eyes: upright eyes
+    sensor: directions and extent of the areas
     n_envs, n_eyes: numbers of worlds, and of eyes in each world
     """
 

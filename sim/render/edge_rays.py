@@ -32,7 +32,8 @@ class EdgeRays:
     """The sums of `RayKernel.sums` over many rays per receptor, estimated from fewer rays.
 
     kernel: kernel that follows the rays
-    sampling: sampling of the receptors · rays: number of rays for a receptor at an edge
+    sampling: sampling of the receptors
+    rays: number of rays for a receptor at an edge
     signals: contribution of a component to the signal of each type of receptor, (channel, component)
     noticed: largest difference between signals of rays that still count as equal
     """

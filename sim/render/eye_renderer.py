@@ -43,10 +43,12 @@ MOST_ENVS = 2**31 - 1
 class EyeRenderer:
     """A renderer of `n_envs` worlds of one scene with the same eyes.
 
-    scene: the model and its eyes · n_envs: number of worlds
+    scene: the model and its eyes
+    n_envs: number of worlds
     fidelity: samples, depth layers and light; its number of bands must equal that of the scene
     eye, mounts, model: the scene's eye, mounts and model
-    sensor: the sampled directions · tracer: the method of tracing rays, with its name, why, light and basis
+    sensor: the sampled directions
+    tracer: the method of tracing rays, with its name, why, light and basis
     brightest: signal of a white surface that faces all directional lights at once
 
     One warning (`sim.MirrorWarning`) lists features of the model that are not rendered. Others name lamps with spectral

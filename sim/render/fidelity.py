@@ -23,7 +23,8 @@ MOST_BANDS = 4096
 class Level:
     """The level that was chosen for one stage, and the reason.
 
-    stage, level: names of the stage and of the level · why: the reason
+    stage, level: names of the stage and of the level
+    why: the reason
     predicted_error: error of a signal (root mean square); None if unknown. For the eyes' own bands it is an upper
         bound: the largest error over measured reflectances and types of receptors. It may exceed the tolerance
     """

@@ -26,8 +26,10 @@ class FidelityWarning(UserWarning):
 class Samples:
     """The chosen samples: rays, areas or adaptive edge sampling.
 
-    kind: "rays", "areas" or "edges" · light, level: chosen levels of light and of samples
-    number: number of samples per receptor · enough: whether the error is at most the allowed one
+    kind: "rays", "areas" or "edges"
+    light, level: chosen levels of light and of samples
+    number: number of samples per receptor
+    enough: True if the error is at most the allowed one
     """
 
     kind: str

@@ -26,7 +26,9 @@ _GROUPS = (
 class Demand:
     """The least memory that rendering needs.
 
-    rays_per_receptor · worlds: number of worlds · eyes: number of eyes of one agent
+    rays_per_receptor: number of rays per receptor
+    worlds: number of worlds
+    eyes: number of eyes of one agent
     resolution: receptors (height, width) of an eye
     planes: components of light times depth layers, along every ray
     weights: planes of weights behind a pupil (bands times depth layers); 0 without a pupil

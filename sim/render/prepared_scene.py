@@ -34,8 +34,11 @@ Placed: TypeAlias = Poses | Sequence[mujoco.MjData] | mujoco.MjData | Any  # pos
 class PreparedScene:
     """A model in the spectral bands of given eyes. Nothing in it depends on the fidelity, except for the bands.
 
-    model: the MuJoCo model · eye: optics and retina, with its own bands · mounts: places of the eyes on the model
-    spectra, groups: see `sim.mirror` · varied: see `sim.ModelRenderer`
+    model: the MuJoCo model
+    eye: optics and retina, with its own bands
+    mounts: places of the eyes on the model
+    spectra, groups: see `sim.mirror`
+    varied: see `sim.ModelRenderer`
     tracer: method of tracing rays, see `sim.BatchedRenderer`
     stand: the body that the eyes are fixed to, if they stand upright on one; None: derived from the mounts
 

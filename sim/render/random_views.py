@@ -22,7 +22,9 @@ TRIES = 100
 class RandomViews:
     """Views of single eyes; the first axis is the view.
 
-    position: position of the agent [m], (n, 2) · heading: [rad], (n,) · objects: centres [m], (n, k, 3)
+    position: position of the agent [m], (n, 2)
+    heading: [rad], (n,)
+    objects: centres [m], (n, k, 3)
     eye: index of the eye to which the view belongs, (n,)
     """
 

@@ -31,8 +31,10 @@ SECOND = 3  # seed of the samples for a second reflection
 class KernelInputs:
     """Inputs of a kernel that are the same in every call.
 
-    lanes: numbers of the lanes · sizes: number of samples of an eye, number of eyes of a world, and number of lanes
-    along: directions of the samples · tables: the tracer's inputs
+    lanes: numbers of the lanes
+    sizes: number of samples of an eye, number of eyes of a world, and number of lanes
+    along: directions of the samples
+    tables: the tracer's inputs
     bounces: four numbers per sample, from which the directions of bounced light are computed; None: direct light only
     """
 
@@ -70,7 +72,9 @@ class Moving:
 class RayKernel:
     """A kernel that traces rays. Its body is recorded once, so only arrays that are passed to it may change.
 
-    tracer: intersects rays · eyes: generate rays · n_envs, n_eyes: numbers of worlds, and of eyes in each world
+    tracer: intersects rays
+    eyes: generate rays
+    n_envs, n_eyes: numbers of worlds, and of eyes in each world
     depth: layers among which light is divided
     """
 

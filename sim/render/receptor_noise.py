@@ -33,7 +33,8 @@ FEW = 8  # number of worlds of a second, narrower kernel
 class Normals:
     """Standard normal numbers, an array of shape `shape` per world and frame.
 
-    keys: one per world, (n,) uint64 · shape: shape of one world's receptors
+    keys: one per world, (n,) uint64
+    shape: shape of one world's receptors
     """
 
     def __init__(self, keys: np.ndarray, shape: tuple[int, ...]) -> None:

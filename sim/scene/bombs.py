@@ -1,4 +1,4 @@
-"""Checks before a model is built: whether it would exhaust the memory, and whether all its values are finite.
+"""Checks before a model is built: it must fit into memory, and all its values must be finite.
 
 A few lines of MJCF can request a million copies. The elements of the text are counted before MuJoCo compiles it, and
 the elements of a compiled model before Mitsuba receives it. Included files count, too.

@@ -148,7 +148,8 @@ class Mirror:
 
         camera: name or id of a camera of the model, or a Viewpoint
         integrator: a Mitsuba integrator: "direct", "path", ..., or its description, {"type": "path", "max_depth": 3}
-        spp: samples per pixel · seed: seed of the samples
+        spp: samples per pixel
+        seed: seed of the samples
         sampler: "independent", or "multijitter", which has less noise in images
 
         Units: a white Lambertian surface that faces a light of diffuse 1 has radiance D65(λ), 1 at 560 nm.

@@ -40,11 +40,11 @@ class AgentEvents:
     """Events during one action, per world.
 
     progress: progress as the task defines it [m], (n,)
-    goal: whether a goal was reached, (n,) bool
-    adversary: whether an adversary was reached, (n,) bool
-    adversary_first: whether an adversary was reached before any goal, (n,) bool
-    reached: whether each object was reached, (n, k) bool
-    terminated: whether the task ends the episode, (n,) bool
+    goal: True if a goal was reached, (n,) bool
+    adversary: True if an adversary was reached, (n,) bool
+    adversary_first: True if an adversary was reached before any goal, (n,) bool
+    reached: True for objects that were reached, (n, k) bool
+    terminated: True if the task ends the episode, (n,) bool
     """
 
     progress: np.ndarray
@@ -56,7 +56,7 @@ class AgentEvents:
 
     @property
     def any(self) -> np.ndarray:
-        """Array (n,) bool: whether a goal or an adversary was reached in each world."""
+        """True for worlds in which a goal or an adversary was reached, (n,) bool."""
         return self.goal | self.adversary
 
     def within(self, worlds: np.ndarray) -> AgentEvents:

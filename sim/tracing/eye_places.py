@@ -23,7 +23,8 @@ class NotLevelError(ValueError):
 class EyeFrames(NamedTuple):
     """Positions and orientations of all eyes in all worlds.
 
-    origins: pupils [m], (world, eye, 3) · rotations: columns (right, up, ahead), (world, eye, 3, 3)
+    origins: pupils [m], (world, eye, 3)
+    rotations: columns (right, up, ahead), (world, eye, 3, 3)
     """
 
     origins: np.ndarray
@@ -34,8 +35,10 @@ class EyeFrames(NamedTuple):
 class LevelStand:
     """Eyes that are fixed to one body, which moves and turns only in a horizontal plane.
 
-    body: id of the body · height: height of the body's origin [m]
-    origins: pupils in the body's frame [m], (eye, 3) · rotations: eyes' frames in the body's frame, (eye, 3, 3)
+    body: id of the body
+    height: height of the body's origin [m]
+    origins: pupils in the body's frame [m], (eye, 3)
+    rotations: eyes' frames in the body's frame, (eye, 3, 3)
     """
 
     body: int

@@ -30,7 +30,8 @@ _DIRECTIONAL, _POINT, _SPOT = "directional", "point", "spot"
 class ModelLight:
     """One light of a model.
 
-    light: id in the model; -1: the headlight of the observing eye · kind: "directional", "point" or "spot"
+    light: id in the model; -1: the headlight of the observing eye
+    kind: "directional", "point" or "spot"
     level: irradiance per band (band,) on a surface that faces the light, at a distance of 1 m from points and spots
     cutoff, exponent: for a spot, the cosine of its half angle, and the exponent of its falloff to the side
     direction: unit vector (3,) towards a directional light in the model's reference pose; None for other lights

@@ -40,11 +40,15 @@ _HERE = Path(__file__).parents[1]
 class ModelScene:
     """The parts of a model that tracers need. Mitsuba's scenes are built on first use.
 
-    model: the MuJoCo model · eye: determines the spectral bands · variant: Mitsuba's variant
-    geoms: ids of all visible geoms · looks: appearances of these geoms
+    model: the MuJoCo model
+    eye: determines the spectral bands
+    variant: Mitsuba's variant
+    geoms: ids of all visible geoms
+    looks: appearances of these geoms
     moving: appearances that may change their place, size or colour
     bsdfs: one for every appearance; stored here, because a BSDFPtr does not keep its objects alive
-    lights: all lights · spectra: measured spectra of materials and lights, by name
+    lights: all lights
+    spectra: measured spectra of materials and lights, by name
     has_sky: True if rays without a hit reach a sky
     glows: BSDFs whose reflectance is the radiance of a glowing geom, by appearance; such geoms count as movers
     varied: geoms whose size or colour differs between worlds, with the ids of the materials that each may have; they

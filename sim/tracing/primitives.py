@@ -27,7 +27,8 @@ PARALLEL = 1e-9
 class Primitive:
     """Functions for one kind of primitive. size: MuJoCo's sizes
 
-    hit: (origin, direction, size) -> distance · normal: (point, size) -> outward normal, not normalised
+    hit: (origin, direction, size) -> distance
+    normal: (point, size) -> outward normal, not normalised
     """
 
     hit: Callable[[Array, Array, Array], Array]

@@ -36,7 +36,8 @@ class Buffers(Protocol):
 class Tracer(Protocol):
     """A method of tracing rays.
 
-    name: one of TRACERS · why: reason for its choice
+    name: one of TRACERS
+    why: reason for its choice
     light: level of light, one of `lighting.LEVELS`
     basis: (component, band): radiance_b = sum_k basis[k, b] component_k
     """

@@ -24,7 +24,8 @@ NEVER_ZERO = 1e-9  # replaces smaller components of directions; this shifts no h
 class CellTables:
     """Tables of a grid's cells, row by row.
 
-    wall: number of the wall that fills the cell · top: height of this wall's top [m]
+    wall: number of the wall that fills the cell
+    top: height of this wall's top [m]
     stop: height [m] below which a ray stops in the cell
     """
 
@@ -36,7 +37,8 @@ class CellTables:
 class Footprints(Protocol):
     """A method of intersecting rays with walls.
 
-    how: description for reports · tables: the grid's cells, for the kernel; None: walls are tested one by one
+    how: description for reports
+    tables: the grid's cells, for the kernel; None: walls are tested one by one
     """
 
     how: str

@@ -29,8 +29,10 @@ class NoClosedForm(ValueError):
 class Walls:
     """Walls and floor of a world.
 
-    lower, upper: corners of the walls' footprints [m], (n, 2) · top: height of each wall's top [m], (n,)
-    floor: height of the floor [m] · floor_lower, floor_upper: corners of the floor [m], (2,)
+    lower, upper: corners of the walls' footprints [m], (n, 2)
+    top: height of each wall's top [m], (n,)
+    floor: height of the floor [m]
+    floor_lower, floor_upper: corners of the floor [m], (2,)
     uv: texture coordinates of faces, (SIDES n + 1, 2, 4): (u, v) = uv @ (x, y, z, 1); the floor comes last
     geoms: geom id of each face, (SIDES n + 1,)
     """

@@ -278,11 +278,11 @@ class AreaTracer:
         return now.bodies[: len(self._sphere_textures)]
 
 
-def _in_layers(depth: DepthLayers, vergence: Array, light: list[Array]) -> list[Array]:
+def _in_layers(depth: DepthLayers, inverse_distance: Array, light: list[Array]) -> list[Array]:
     """Divide light from the distance 1 / inverse_distance along the eye's axis among depth layers."""
     if depth.count == 1:
         return light
-    return [share * component for share in depth.shares(vergence) for component in light]
+    return [share * component for share in depth.shares(inverse_distance) for component in light]
 
 
 def _in_eights(rows: np.ndarray) -> np.ndarray:

@@ -88,7 +88,8 @@ class Piece:
 class Columns:
     """Pieces of walls behind areas, in a world of walls of one height.
 
-    top: height of the walls' tops [m] · face_ends: ends of all faces, for the kernel
+    top: height of the walls' tops [m]
+    face_ends: ends of all faces, for the kernel
     """
 
     def __init__(self, walls: Walls, footprints: Footprints) -> None:

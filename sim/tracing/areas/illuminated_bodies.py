@@ -33,7 +33,9 @@ class IlluminatedBodies:
     A row of the table contains the fractions of the lights at a place, in groups of four ("fours"). The first rows of
     each body also contain the spherical harmonics of the reflected light around it, one group of four per component.
 
-    shadows: shadows of walls · directions: directions towards the lights · radii: radii of the bodies [m]
+    shadows: shadows of walls
+    directions: directions towards the lights
+    radii: radii of the bodies [m]
     """
 
     def __init__(self, shadows: WallShadows, directions: list[list[float]], radii: list[float]) -> None:
@@ -51,7 +53,9 @@ class IlluminatedBodies:
         Walls block the light at all places. Other bodies block it only at places on a side, not at the place that
         represents the whole body.
 
-        place: row of a world's table · bodies: centres of the world's bodies · walls_around: see `WallShadows`
+        place: row of a world's table
+        bodies: centres of the world's bodies
+        walls_around: see `WallShadows`
         reflected: function that returns harmonics for a body's number, the number of a group of four, and the body's
             centre
         """

@@ -79,7 +79,8 @@ class LightNodes:
 class NodeTables:
     """Reflected light at the nodes.
 
-    cells: numbers of the free cells · floor, walls: light at their nodes, one array per component
+    cells: numbers of the free cells
+    floor, walls: light at their nodes, one array per component
     """
 
     cells: Array
@@ -90,7 +91,8 @@ class NodeTables:
 class NodeLight:
     """Light interpolated between nodes, from tables that are passed to each call.
 
-    nodes: nodes at which the light is known · components: number of components of light
+    nodes: nodes at which the light is known
+    components: number of components of light
     """
 
     def __init__(self, nodes: LightNodes, components: int) -> None:

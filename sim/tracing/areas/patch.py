@@ -15,7 +15,8 @@ class Area:
 
     It contains the directions (ahead + a right, up + b height) for |a| and |b| up to 1/2.
 
-    origin: the pupil (Point3f) · ahead, up: level part (Vector2f) and z of the direction to the rectangle's middle
+    origin: the pupil (Point3f)
+    ahead, up: level part (Vector2f) and z of the direction to the rectangle's middle
     right, height: whole width (Vector2f), and whole height
     """
 
@@ -29,7 +30,8 @@ class Area:
     def from_extent(cls, middle: Array, axis: Array, extent: tuple[Array, Array]) -> Area:
         """Return the area around a ray of an upright eye. Its x is horizontal, and its y is vertical.
 
-        middle: the ray, whose component along the eye's axis is 1 · axis: of the eye (Vector2f)
+        middle: the ray, whose component along the eye's axis is 1
+        axis: of the eye (Vector2f)
         extent: width and height on the tangent plane
         """
         width, height = extent

@@ -32,7 +32,8 @@ NEARLY_OPEN = 1e-4  # chosen: outlines that are more than about 100 times as lon
 class SphereTexture:
     """A texture that changes along one axis.
 
-    texture: its place in the tables · to_column: map column = to_column @ (u, v, 1)
+    texture: its place in the tables
+    to_column: map column = to_column @ (u, v, 1)
     frame: rotation from the sphere's axes to the world's, (3, 3)
     """
 
@@ -45,8 +46,10 @@ class SphereTexture:
 class Slice:
     """A slice of a sphere's visible part in an area.
 
-    share: fraction of the area that the slice fills · seen: direction of its middle
-    along, across: sides of the slice on the area's plane · patch: part of the sphere's surface in the slice
+    share: fraction of the area that the slice fills
+    seen: direction of its middle
+    along, across: sides of the slice on the area's plane
+    patch: part of the sphere's surface in the slice
     """
 
     share: Array

@@ -31,7 +31,8 @@ HALF_ULP = 2.0**-24  # largest relative error of a number that is rounded to flo
 class Texture:
     """The place of a texture in the kernel's tables.
 
-    first: number of the first texel · columns: number of columns
+    first: number of the first texel
+    columns: number of columns
     least_side: shorter sides of parallelograms are treated as this long [texels], see `Stripes.texture`
     """
 
@@ -56,7 +57,8 @@ class StripeTables:
 class Stripes:
     """Averages of textures along one axis.
 
-    reflectance: (texel, component) · places: first texel and number of columns of each texture, (texture, 2)
+    reflectance: (texel, component)
+    places: first texel and number of columns of each texture, (texture, 2)
 
     tables: for the kernel
     """
