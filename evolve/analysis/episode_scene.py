@@ -22,8 +22,9 @@ class EpisodeScene:
     solids: all visible geoms, in the frames of their bodies, with their appearance at the start of the episode
     bodies: names of the bodies; "body_<id>" for a body without a name
     positions (t, body, 3), rotations (t, body, 3, 3): poses of the bodies
-    eye_positions (t, eye, 3): positions of the pupils eye_rotations (t, eye, 3, 3): frames of the eyes, with columns
-    (right, up, ahead) path (t, 3): position of the animal: that of the body, site or camera that carries its first eye
+    eye_positions (t, eye, 3): positions of the pupils
+    eye_rotations (t, eye, 3, 3): frames of the eyes, with columns (right, up, ahead)
+    path (t, 3): position of the animal, which is that of the body, site or camera that carries its first eye
     headings (t,): heading of the animal from the world's x axis [rad]
     """
 

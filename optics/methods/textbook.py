@@ -41,7 +41,7 @@ def angular_spectrum_psf(path: np.ndarray, dx: float, radius: float, wavelength:
     path: (n, n), optical path [m] through the pupil at `positions(n, dx)`.
     dx: pitch [m]. It must be less than half the distance over which the phase changes by one wave. The width n dx must
         be several times the width of the pupil, because the transform repeats the field beyond this width.
-        radius, wavelength, distance: radius of the pupil, wavelength in air and distance of the plane [m].
+    radius, wavelength, distance: radius of the pupil, wavelength in air and distance of the plane [m].
     """
     x, y = positions(len(path), dx)
     # 1 inside, 0 outside; on the edge, about the covered fraction of a cell.
