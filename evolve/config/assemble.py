@@ -91,7 +91,7 @@ def _assembled(below: list[Source], asked: list[Source]) -> RunConfig:
     if not known_task:
         raise ConfigError(f"task: missing; must be one of {', '.join(TASKS)}")
     of_task = task_defaults(known_task[-1])
-    # A preset for this task overrides the task's settings; a general preset does not.
+    # A preset for this task overrides the task's settings, but they override a general preset.
     made_for_it = any(source.tree.get("task") == known_task[-1] for source in below)
     layers = [of_task, *below, *asked] if made_for_it else [*below, of_task, *asked]
     trees = [_checked(source) for source in layers]

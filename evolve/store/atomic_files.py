@@ -50,7 +50,7 @@ def write_whole(path: Path, content: bytes) -> None:
 
 
 def require_file_name(path: Path) -> None:
-    """Check that a file can be written at a path, which must not be "." or "/", or the path of anything but a file.
+    """Check that a file can be written at a path: it must have a file name, and be a regular file if it exists.
 
     Raises:
         StrangeFileError: the path is a link, FIFO, device or directory.

@@ -18,7 +18,7 @@ from optics.apertures.outline import TURN, Outline
 
 __all__ = ["Boundary", "boundary"]
 
-SHORTEST = 1e-9  # choice, radii: pieces that are shorter are left out
+SHORTEST = 1e-9  # choice, radii: shorter pieces are ignored
 COINCIDENT = 1e-11  # choice, radii: edges that are closer together count as one; rounding moves edges by 1e-15
 NEIGHBOURS = 1e-10  # choice, radii: pieces coincide only if their middles are closer together than this
 ASIDE = 1e-7  # choice, radii: an edge's two sides are tested at points at most this far from it

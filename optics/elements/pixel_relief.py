@@ -100,7 +100,7 @@ class PixelRelief(Relief):
 
 
 def _reach(power: np.ndarray, share: float) -> float:
-    """Return the frequency [cycles per aperture radius] beyond which at most this fraction of the power lies."""
+    """Return the frequency [cycles per radius] beyond which at most the fraction `share` of the power lies."""
     n = len(power)
     order = np.arange(-(n // 2) - n * REPETITIONS, n - n // 2 + n * REPETITIONS)
     sent = power[order % n] * np.sinc(order / n) ** 2

@@ -255,8 +255,8 @@ class Pupil:
     def scatter(self, wavelength: float, share: float) -> float:
         """Return the frequency [1/m] along x and y beyond which at most a fraction `share` of the light is scattered.
 
-        Jumps of a relief, masks and ripples scatter light away from geometrical rays. The frequencies from ripples are
-        at most their own plus those that correspond to their slopes (Carson's rule).
+        Jumps of a relief, masks and ripples scatter light away from geometrical rays. For ripples, the frequency is at
+        most that of the ripples plus the one that corresponds to their slopes (Carson's rule).
         """
         bends, found = self.bends(wavelength), 0.0
         rough = sum(p is not None and p.scatters for p in (self.height if bends else None, self.wavefront))

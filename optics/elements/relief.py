@@ -55,7 +55,7 @@ class Relief(ABC):
 
     @property
     def jump(self) -> float:
-        """Largest step [m] between neighbouring samples that is too steep for a smooth relief, else 0."""
+        """Largest step [m] between neighbouring samples if a smooth relief cannot represent it, else 0."""
         return 0.0
 
     @property

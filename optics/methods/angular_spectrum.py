@@ -216,7 +216,7 @@ def versine(s2: Array) -> Array:
 
 
 def _paraxial_rest(spectrum: Field, beam: Beam, problem: Problem, how: SpectrumSampling) -> Field:
-    """Return Fresnel's integral of the field in the relay plane: the split-off paraxial part."""
+    """Propagate the field from the relay plane to the window by Fresnel's integral, the paraxial part."""
     u = how.sum(spectrum, how.spectrum, how.output_period, how.relay, +1)
 
     def onto_window(u: Field, period: Scalar) -> Field:

@@ -24,8 +24,8 @@ __all__ = ["SLOPE_MARGIN", "Problem", "PupilEdge"]
 # Choice: factor on the steepest slope of a wavefront, because the grid of slopes may miss the steepest point.
 SLOPE_MARGIN = 1.02
 # Choice: amplitude ripple of the soft aperture and of the spectral taper, relative to the tolerance on intensity. The
-# relative error of the amplitude of edge-diffracted light is several ripples, and that of its intensity is twice as
-# large. In a window that contains no other light, the latter is half the tolerance.
+# relative error of the amplitude of edge-diffracted light is several ripples, and the relative error of its intensity
+# is twice as large: half the tolerance in a window that contains no other light.
 EDGE_RIPPLE_PER_TOLERANCE = 0.1
 BRIGHT_EDGE_RIPPLE_PER_TOLERANCE = 0.3
 

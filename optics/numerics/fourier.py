@@ -69,7 +69,7 @@ def dft2(
 
     The result is a Field on a grid of the given output pitch.
 
-    sign: sign of the exponent: -1 for the forward, +1 for the inverse transform. Neither is normalised.
+    sign: sign of the exponent: -1 for the forward, +1 for the inverse transform, both without normalisation.
     centre: (x, y) of the output's centre sample, in the unit of `pitch`.
     """
     grid = Grid(shape, pitch, centre)

@@ -161,7 +161,7 @@ class PupilSampling:
         return cls(pupil, source, Grid.square(across, pitch), soft, band)
 
     def transmitted(self, u: np.ndarray | float, settings: StepSettings) -> PlaneField:
-        """Return the field u on the grid times the pupil's transmittance (its conjugate backwards)."""
+        """Return the field u on the grid times the pupil's transmittance; backwards, times its conjugate."""
         import drjit as dr
 
         beam = Beam(self.pupil, self.source, settings.wavelength, math.inf)

@@ -134,8 +134,8 @@ def _gradient(sine: float) -> float:
 def evanescent(samples: int, dx: float, wavelength: float) -> np.ndarray:
     """Return the evanescent fraction of each cell of a spectrum, (samples, samples) in FFT order.
 
-    Waves outside the circle f = n/λ do not propagate. Within a cell that the circle cuts, it is approximated by a
-    straight edge. The error is of the order of the cell's width squared.
+    Waves outside the circle f = n/λ do not propagate. Within a cell, the circle is approximated by a straight edge. The
+    error is of the order of the cell's width squared.
     """
     f = np.fft.fftfreq(samples) * wavelength / dx
     share: np.ndarray = np.clip((np.hypot(f[None, :], f[:, None]) - 1) * samples * dx / wavelength + 0.5, 0, 1)

@@ -129,7 +129,7 @@ class MujocoWorlds:
 
 
 def _broken(data: mujoco.MjData) -> str | None:
-    """Return the reason why a world's physics broke down; None if it did not.
+    """Return the reason why a world's physics broke down, or None.
 
     MuJoCo has already reset a world that broke down, unless the model disables automatic resets.
     """

@@ -2,8 +2,8 @@
 
 The allowed error is half of the receptors' noise, which a brain could not distinguish. Every stage has levels, ordered
 by cost. The cheapest level whose predicted error is allowed is chosen, and stored with the reason. The available levels
-and their errors depend on the kind of scene (`world_fidelity`, `model_fidelity`). The rule by which a level is chosen
-does not.
+and their errors depend on the kind of scene (`world_fidelity`, `model_fidelity`). The rule for choosing a level is the
+same for all scenes.
 """
 
 from __future__ import annotations

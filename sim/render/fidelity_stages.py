@@ -20,7 +20,7 @@ from sim.tracing.lighting import BOUNCE, DIRECT
 from sim.worlds.world import World
 
 # Chosen: safety factor for errors measured in a few random views, because the error in agents' episodes may be larger
-# (tests/sim/render/test_fidelity.py compares the latter with the noise).
+# (tests/sim/render/test_fidelity.py compares the error in episodes with the noise).
 CAUTION = 1.2
 LAYERS = (1, 3, 5, 9)  # numbers of layers to try; each set of layers is a subset of the next
 NEAREST = 0.005  # chosen: quantile of the visible distances that counts as the nearest distance
@@ -75,8 +75,8 @@ def depth(trials: FidelityTrials, eye: optics.Eye, allowed: float) -> tuple[Dept
 def light(trials: FidelityTrials, sampling: EyeSampling, allowed: float) -> Level:
     """Return direct light if a second reflection adds little, otherwise light after one and two reflections.
 
-    In the second case, the error due to further reflections is estimated from a geometric series: the ratio of light
-    after three reflections to that after two is assumed to equal the ratio of the latter to direct light.
+    In the second case, the error due to further reflections is estimated from a geometric series: each further
+    reflection is assumed to have the same ratio to the one before as the second reflection has to direct light.
     """
     try:
         twice, direct = trials.reflected_twice(sampling)

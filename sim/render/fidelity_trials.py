@@ -145,7 +145,7 @@ class FidelityTrials:
     def reflected_twice(self, sampling: EyeSampling) -> tuple[float, float]:
         """Return root mean squares of the signals due to the second reflection and to direct light.
 
-        They are for the population in which the former is larger.
+        They are for the population in which the second reflection is larger.
 
         Raises:
             ValueError: light cannot be followed after the first reflection.

@@ -33,7 +33,7 @@ class Population:
     counted: np.ndarray
 
     def rms(self, error: np.ndarray) -> float:
-        """Return the root mean square of an error (view, channel, receptor) in the first views; 0 if none counts."""
+        """Return the root mean square of an error (view, channel, receptor) over receptors that count, else 0."""
         counted = np.broadcast_to(self.counted[: len(error), None], error.shape)
         return float(np.sqrt(np.mean(error[counted] ** 2))) if counted.any() else 0.0
 
@@ -62,8 +62,10 @@ def near_objects(scene: WorldScene, sampling: EyeSampling, views: int, rays: int
 
 
 def _drawn(weights: np.ndarray) -> np.ndarray:
-    """Return up to RECEPTORS numbers of receptors, in increasing order, with probabilities proportional to their
-    weights."""
+    """Draw up to RECEPTORS receptors with probabilities proportional to their weights.
+
+    Return their numbers in increasing order.
+    """
     chance = weights / weights.sum()
     return np.sort(np.random.default_rng(0).choice(len(weights), min(RECEPTORS, len(weights)), replace=False, p=chance))
 

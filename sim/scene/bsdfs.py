@@ -48,7 +48,7 @@ def bsdf(
     measured: Spectrum | None = None,
     mirrors: bool = True,
 ) -> MitsubaObject:
-    """Return a geom's BSDF (a Mitsuba object of the variant in force).
+    """Return a geom's BSDF (a Mitsuba object of the active variant).
 
     It is two-sided for planes and meshes, which may be open, and transparent according to the alpha of the geom's rgba.
 

@@ -16,7 +16,7 @@ PlacedPart = tuple[str, Part, np.ndarray, MitsubaObject]  # name, part, pose (4,
 
 
 def merged(parts: Iterable[PlacedPart], prefix: str) -> Description:
-    """Return Mitsuba shapes by name (of the variant in force).
+    """Return Mitsuba shapes (of the active variant) by name.
 
     Triangles of one material are merged into a shape with the name "<prefix>_<n>". Shapes that are not meshes keep
     their names.

@@ -66,7 +66,7 @@ def mirror(
 class Mirror:
     """A Mitsuba scene that mirrors a MuJoCo model.
 
-    model, variant: the arguments
+    model, variant: see `mirror`
     scene: mi.Scene; shape ids are "geom_<geom id>_<part>"
     geoms: ids of the geoms in the scene, (n,)
     spectra: spectra of materials and lights, by name
@@ -203,8 +203,7 @@ class Mirror:
         return ids.reshape(height, width), depth.reshape(height, width)
 
     def _camera(self, view: Viewpoint, width: int, height: int) -> rays.Camera:
-        """Return the camera for a view. As in MuJoCo, planes are visible from both sides, and all other geoms only from
-        outside."""
+        """Return the camera for a view. As in MuJoCo, only planes are visible from both sides."""
         planes = {g for g in self._parts if surfaces.geom_type(self.model, g) == mujoco.mjtGeom.mjGEOM_PLANE}
         closed = {f"geom_{g}_{k}" for g, parts in self._parts.items() if g not in planes for k in range(len(parts))}
         sensor = cameras.sensor(view, width, height, self._near())

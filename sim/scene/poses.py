@@ -1,4 +1,4 @@
-"""Poses of everything in many worlds of one model, with sizes, colours and materials."""
+"""Poses of all elements in many worlds of one model, with sizes, colours and materials."""
 
 from __future__ import annotations
 

@@ -29,7 +29,7 @@ def shadowless(light: Description) -> Description:
 
 @cache
 def _register(variant: str) -> None:
-    """Make the emitter known to the variant in force. Mitsuba's classes exist only after a variant is set."""
+    """Register the emitter with the active variant. Mitsuba's classes exist only after a variant is set."""
 
     class Shadowless(mi.Emitter):
         """An emitter that delegates to another one, and moves the sampled point."""
