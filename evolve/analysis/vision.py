@@ -32,8 +32,8 @@ class Vision:
 
     image_quality: area of the MTF above the noise, times throughput, in [0, 1]; see `optics.image_quality`
     contrast: MTF in white daylight at half the receptors' Nyquist frequency
-    psnr_db: peak signal-to-noise ratio of the eye's image, relative to the image of a perfect lens [dB]. Before, the
-        eye's image is scaled to the same brightness
+    psnr_db: peak signal-to-noise ratio of the eye's image, relative to the image of a perfect lens [dB]. The eye's
+        image is first scaled to the same brightness
     ssim: structural similarity of the same two images, in [-1, 1]; NaN for retinas narrower than three receptors
     """
 

@@ -115,7 +115,7 @@ def _short_life(config: RunConfig, animal: Phenotype, seed: int) -> Pace:
     """Time a training run of three short rollouts, followed by the evaluations.
 
     The first update has the full number of passes over the samples, and the second may have only half as many. The time
-    of a pass follows from the difference between their times.
+    of a pass follows from the difference between the times of the two updates.
     """
     short = _with_short_rollouts(config.learning)
     rollout = short.n_envs * short.n_steps

@@ -44,8 +44,7 @@ class Brain:
     """Size of a brain.
 
     neurons, layers: the actor and the critic have `layers` hidden layers of `neurons` units each
-    encoder: width of
-        all layers of the eyes' encoders
+    encoder: width of all layers of the eyes' encoders
     """
 
     neurons: int

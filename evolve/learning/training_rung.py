@@ -39,7 +39,7 @@ class TrainingRung:
     def owners(self, phenotype: Phenotype, config: RunConfig, seed: int) -> tuple[dict[str, Any], ...]:
         """Return the owner of each checkpoint, as JSON values: all inputs on which the state of training depends.
 
-        The settings are compared without the number of workers and of generations, which have no effect on it.
+        The numbers of workers and of generations are left out, because they have no effect on this state.
         """
         common = {
             "candidate": self.candidate,

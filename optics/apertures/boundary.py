@@ -157,9 +157,9 @@ def _cut_segments(pieces: Outline, points: np.ndarray) -> np.ndarray:
 
 
 def _near_segment(by_axis: list[np.ndarray], start: np.ndarray, end: np.ndarray) -> np.ndarray:
-    """Return the points (n, 2) within the range of x or of y of a segment, whichever is smaller.
+    """Return the points (n, 2) whose x or y lies within a segment's range. The axis with the smaller range counts.
 
-    by_axis: the points in the order of x, and in the order of y.
+    by_axis: all points sorted by x, and sorted by y.
     """
     axis = int(abs(end[1] - start[1]) < abs(end[0] - start[0]))
     low, high = sorted((start[axis], end[axis]))

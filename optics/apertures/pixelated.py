@@ -58,7 +58,7 @@ class PixelatedAperture(Aperture):
 
     def nodes_across(self, cycles: float, digits: float) -> int | None:
         """Nodes along a pixel that make rows and columns as accurate as `nodes`; None if there would be too many."""
-        # Upper bound of the fraction of the area that lies in cut pixels.
+        # Upper bound on the fraction of the area that lies in cut pixels.
         share = min(1.0, len(self._cut) * self._pitch**2 / self.area)
         turns = np.array(pi * cycles * self._pitch)
         across = max(

@@ -274,7 +274,7 @@ class HeightMap(Relief):
 
 
 def _spline_coefficients(samples: np.ndarray, margin: int) -> np.ndarray:
-    """Return B-spline coefficients c = s - s''/6 of a cubic spline s along axis 0, plus `margin` ones at either end."""
+    """Return B-spline coefficients c = s - s''/6 of a cubic spline s along axis 0, with `margin` more at either end."""
     from scipy.interpolate import make_interp_spline
 
     n = len(samples)

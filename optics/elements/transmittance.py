@@ -82,7 +82,7 @@ class GaussianMask(Mask):
         return math.sqrt(max(-math.log(level), 1.0)) / (math.pi * number(self.waist))
 
     def detail(self, light: float, radius: float) -> float:
-        """Return the frequency f beyond which the given fraction exp(-2π²w²f²) of the light lies."""
+        """Return the frequency f at which exp(-2π²w²f²), the fraction of the light beyond f, has the given value."""
         waist = number(self.waist)
         beam = (waist / radius) ** 2 / 2 * -math.expm1(-2 * (radius / waist) ** 2)
         return math.sqrt(max(-math.log(light / beam), 0.0) / 2) / (math.pi * waist)

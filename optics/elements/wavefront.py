@@ -63,7 +63,7 @@ class Aberration(ABC):
     @property
     @abstractmethod
     def span(self) -> float:
-        """Largest minus smallest value [m], or an upper bound of this difference."""
+        """Largest minus smallest value [m], or an upper bound on this difference."""
 
     @property
     def rotationally_symmetric(self) -> bool:
@@ -160,7 +160,7 @@ class Zernike(Aberration):
         return max(1.0, self.order / 2) if self.span > level or self.asks else 0.0
 
     def detail(self, level: float, part: float = 1.0) -> float:
-        """Return 0: a mode has n/2 cycles, and its slopes, which grow with n² at the rim, cover higher frequencies."""
+        """Return 0: a mode has only n/2 cycles, and its slopes require higher frequencies, in proportion to n²."""
         return 0.0
 
     @property

@@ -27,7 +27,7 @@ __all__ = ["check_rays", "microvilli_of", "polarised_error", "taken_by"]
 
 Tile = tuple[tuple[Microvilli, ...], ...]
 
-# Choice: upper bound of the integrated difference between the vector focus and this model, relative to the signal of a
+# Choice: upper bound on the integrated difference between the vector focus and this model, relative to the signal of a
 # white surface and to the squared sine of the steepest ray. The difference of a round pupil in focus is 0.54 to 0.59 up
 # to NA 0.5; see tests/optics/eye/test_polarization.py.
 STEEP = 0.62
@@ -54,7 +54,8 @@ def microvilli_of(given: Any) -> Tile | None:
 
 
 def polarised_error(pupil: Pupil, distance: float) -> float:
-    """Return a bound of the error of polarised signals due to oblique rays, relative to a white surface's signal.
+    """Return an upper bound on the error in polarised signals due to oblique rays, relative to a white surface's
+    signal.
 
     distance: distance [m] of the retina from the pupil.
     """

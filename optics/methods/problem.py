@@ -153,7 +153,7 @@ class Problem:
 
     @property
     def scalar_error(self) -> float:
-        """Upper bound of the error of scalar theory."""
+        """Upper bound on the error of scalar theory."""
         return scalar_theory_error(self.steepest_sine, self.spread)
 
     def soft_edge(self, band: float) -> PupilEdge:

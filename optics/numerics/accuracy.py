@@ -63,7 +63,7 @@ class Plan:
     samples: numbers of samples of the pupil (y, x), or numbers of nodes: (radial, angular), or (count, 1).
     padding: period of the pupil's transform divided by the number of its samples; 1 without a period.
     predicted_error: relative L2 error of the intensity over the window.
-    scalar_error: upper bound of the error of scalar theory, for light of any polarisation. It depends on the steepest
+    scalar_error: upper bound on the error of scalar theory, for light of any polarisation. It depends on the steepest
         ray and adds to `predicted_error`. All methods have it; only `optics.vector_focus` avoids it. The bound is valid
         for windows that contain the brightest point of the light, but not for windows that are dark everywhere.
     seconds: predicted time of a call with compiled kernels on two cores; 0 without a prediction.

@@ -53,8 +53,8 @@ def radiated(
 ) -> np.ndarray:
     """Return Ψ of each mode at points of a pupil, (mode, point), up to a constant phase.
 
-    end: position (x, y, z) [m] of the waveguide's end, relative to the pupil's centre. The waveguide's axis passes
-        through both points.
+    end: position (x, y, z) [m] of the waveguide's end, relative to the pupil's centre. The waveguide's axis joins these
+        two points.
     k: wavenumber [1/m] behind the pupil.
     """
     sine, phi, distance = _seen_from(x, y, end)

@@ -79,7 +79,7 @@ class DiskSum:
 
     @property
     def light_error(self) -> float:
-        """Upper bound of the error that the light's own error causes in an integral over the disk.
+        """Upper bound on the error that the light's own error causes in an integral over the disk.
 
         The bound follows from the Cauchy-Schwarz inequality.
         """

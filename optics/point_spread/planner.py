@@ -94,7 +94,7 @@ FOR_PIXELS: dict[str, Callable[[Problem], Sequence[Sampling]]] = {
 
 @dataclass(frozen=True)
 class Weighing:
-    """Lower bound of the time that a method takes. It is known before the method plans its samples.
+    """Lower bound on the time that a method takes. It is known before the method plans its samples.
 
     least: shortest possible time of a PSF [s].
     per_sample: time per sample of the window [s].

@@ -183,7 +183,8 @@ def _splines_and_slopes(t: np.ndarray) -> tuple[list[np.ndarray], list[np.ndarra
 
 
 def _sine(stack: _Stack, window: Grid, at: np.ndarray) -> np.ndarray:
-    """Return the sine ξ/c(ξ) along one axis. c² is z² + ξ², plus an average over the other axis and the window."""
+    """Return the sine ξ/c(ξ) along one axis. c² is z² + ξ² plus estimates of the mean squares of the other
+    coordinates."""
     elsewhere = np.square(stack.radius) / 4 + np.float32((0.4 * window.own_half_width) ** 2)
     found: np.ndarray = at / np.sqrt(np.square(stack.distance) + np.square(at) + elsewhere)
     return found

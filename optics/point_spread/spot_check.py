@@ -241,7 +241,8 @@ OUTWARDS = 2  # choice: exponent of the squared distance from the axis, for wind
 
 
 def _fixed_chances(shape: tuple[int, int], centre: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:
-    """Return the nearness of sides and corners, flat, and the sum of the three parts that do not depend on the PSF.
+    """Return the nearness of sides and corners, flat, and the sum of the three parts of the probabilities that do not
+    depend on the PSF.
 
     centre: position (x, y) of the window, in samples.
     """

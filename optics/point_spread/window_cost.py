@@ -33,8 +33,8 @@ def window_seconds(problem: Problem) -> float:
 def check_seconds(problem: Problem, sampling: Sampling) -> float:
     """Return the time [s] of the spot check of a PSF that is itself a direct sum; 0 for other PSFs.
 
-    The check has about twice as many nodes as the PSF. For other methods, the check takes a small part of the time of
-    the PSF.
+    The check has about twice as many nodes as the PSF. For other methods, the check's time is neglected, because it is
+    a small part of the PSF's time.
     """
     if problem.reach is not None or sampling.method != "rayleigh_sommerfeld":
         return 0.0

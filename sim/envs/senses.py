@@ -88,7 +88,7 @@ class Senses:
         return {**remembered, **self.other_entries(slice(None))}
 
     def preview(self, seen: Arrays, worlds: np.ndarray) -> Arrays:
-        """Return the memory that these worlds would have after the new frames, without storing the frames.
+        """Return the memory that these worlds would have after the new frames, which are not stored.
 
         seen: new frames of all worlds
         """

@@ -68,7 +68,7 @@ class BatchedRenderer(EyeRenderer):
 def in_whole_rays(fidelity: Fidelity, eye: optics.Eye) -> Fidelity:
     """Return the fidelity with a whole number of samples per receptor, unless receptors share their samples.
 
-    Behind a pupil, receptors share rays, and areas if there are fewer areas than receptors.
+    Receptors behind a pupil share rays. They share areas only if there are fewer areas than receptors.
     """
     asked = fidelity.rays_per_receptor
     if eye.pupil is None or (fidelity.samples == AREAS and asked >= 1):

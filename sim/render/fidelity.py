@@ -1,6 +1,7 @@
 """The fidelity with which a world is rendered for given eyes, and the reasons for it.
 
-A fidelity is chosen in four stages: bands, depth layers, light and samples.
+A fidelity is chosen in four stages: bands, depth layers, light and samples. The choices available in one stage, ordered
+by cost, are its levels.
 """
 
 from __future__ import annotations

@@ -94,7 +94,7 @@ class Stages(Protocol):
         """Return the eye's own bands, and their error."""
 
     def depth(self, allowed: float) -> tuple[DepthLayers, Level | None]:
-        """Return the depth layers for which the eye has a PSF, and their level; None without a choice of layers."""
+        """Return the depth layers for which the eye has a PSF, and the chosen level; None if there was no choice."""
 
     def light(self, depth: DepthLayers, allowed: float) -> Level:
         """Return the level of light: which reflections are followed."""
@@ -118,7 +118,7 @@ def cheapest(stages: Stages) -> Fidelity:
     levels = [level for level in (stages.bands(), depth_level, samples.light, samples.level) if level is not None]
     bands = stages.eye.bands
     found = Fidelity(samples.number, bands, depth, allowed, tuple(levels), samples.light.level, samples.kind)
-    # The bands are omitted: only an upper bound of their error is known, which may be much larger than the error.
+    # The bands are omitted: only an upper bound on their error is known, which may be much larger than the error.
     _warn_if_worse(levels[1:], allowed, together=shares is not None)
     return found
 

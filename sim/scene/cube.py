@@ -28,7 +28,7 @@ _HALVINGS = 12
 
 
 def padded(pixels: np.ndarray) -> np.ndarray:
-    """Return faces below each other (n w, w, 3) with a border around each: (n (w + 2), w + 2, 3)."""
+    """Return faces, stacked vertically (n w, w, 3), with a border around each: (n (w + 2), w + 2, 3)."""
     width = pixels.shape[1]
     faces = pixels.reshape(-1, width, width, 3)
     margin = (BORDER, BORDER)

@@ -41,7 +41,7 @@ class _OfWorld:
 
 
 class PerWorld(BatchTask):
-    """Batch task of a `sim.Task` and its `others`, or of a `sim.Encounter`, whose animals all learn.
+    """Batch task for one animal of a `sim.Task` and its `others`, or for all animals of a `sim.Encounter`.
 
     learners: tasks of the learning animals
     frozen: animals that do not learn

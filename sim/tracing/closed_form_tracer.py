@@ -62,7 +62,7 @@ def components_of(texels: np.ndarray, irradiance: np.ndarray) -> Components:
 
 
 def reflected_components_of(texels: np.ndarray, irradiance: np.ndarray) -> Components:
-    """Return components in which reflection multiplies each component of light by the same component of the texel."""
+    """Return components in which reflection multiplies light by a texel, component by component."""
     grey = texels.mean(axis=1, keepdims=True)
     if np.abs(texels - grey).max() <= GREY:
         few = components_of(np.tile(grey, texels.shape[1]), irradiance)

@@ -26,7 +26,7 @@ TURNED = 1e-6  # smallest change of a rotation that is not a rounding error
 class Spheres:
     """The moving spheres of a scene; only their positions differ between worlds.
 
-    radii: [m], (k,)
+    radii: radii [m], (k,)
     frames: rotation from each sphere's frame to the world's, (k, 3, 3)
     textured: True for spheres with a texture, (k,)
     names: names of the geoms

@@ -29,14 +29,13 @@ _KEEP_THEIR_WAY = (int(mujoco.mjtCamLight.mjCAMLIGHT_FIXED), int(mujoco.mjtCamLi
 
 @dataclass(frozen=True)
 class UprightScene:
-    """A model in closed form.
+    """A model as walls, a floor and spheres, whose intersections with a ray have a closed form.
 
     stand: the body that the eyes are fixed to
     walls: all walls and the floor
     lights: all lights
     spheres: all visible spheres
-    bodies: these spheres, followed by the eyes' own body if it is a sphere, which the
-        eyes do not see
+    bodies: these spheres, followed by the eyes' own body if it is a sphere, which the eyes do not see
     heights: heights of all bodies' centres in the reference pose [m], (body,)
     settled: True for bodies that keep this height, (body,)
     model: the MuJoCo model

@@ -110,7 +110,7 @@ class Columns:
         return self._piece(area, left, -half, edge), self._piece(area, right, edge, half)
 
     def first_faces(self, origin: Array, level: Array, cells: CellTables | None) -> Array:
-        """Return the number of the face that is hit in a level direction (Vector2f)."""
+        """Return the number of the face that a ray in a horizontal direction (Vector2f) hits."""
         ray = mi.Ray3f(origin, mi.Vector3f(level.x, level.y, 0))
         t, face, _ = self._footprints.hit(ray, cells)
         return dr.select(dr.isfinite(t), face, self._rim + self._side_of_floor(ray))

@@ -16,7 +16,7 @@ class Area:
     It contains the directions (ahead + a right, up + b height) for |a| and |b| up to 1/2.
 
     origin: the pupil (Point3f)
-    ahead, up: level part (Vector2f) and z of the direction to the rectangle's middle
+    ahead, up: horizontal part (Vector2f) and z of the direction to the rectangle's middle
     right, height: whole width (Vector2f), and whole height
     """
 
