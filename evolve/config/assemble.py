@@ -73,10 +73,10 @@ def assemble(
     """
     choice = None if task is None else TaskChoice.named(task)
     code = None if choice is None else choice.code
-    asked = [_asked_for(read_toml(file), code)] if file is not None else []
+    asked = [_user_settings(read_toml(file), code)] if file is not None else []
     if starts is not None:
         asked.append(starts)
-    asked += [_asked_for(read_assignment(text), code) for text in assignments]
+    asked += [_user_settings(read_assignment(text), code) for text in assignments]
     if choice is not None:
         asked.append(Source("", dict(choice.settings)))
     return replace(_assembled(preset_sources(preset, scale), asked), code=code)
@@ -119,7 +119,7 @@ def _read_back(written: Source) -> RunConfig:
     return _assembled([], [replace(written, tree=upgraded(written.tree))])
 
 
-def _asked_for(source: Source, code: TaskCode | None) -> Source:
+def _user_settings(source: Source, code: TaskCode | None) -> Source:
     """Return the settings of a user's file, which may be the config.toml of another run.
 
     The file must have a format whose settings still have the same meaning. It cannot select a user task, because only

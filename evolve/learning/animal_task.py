@@ -11,7 +11,7 @@ from evolve.config.run_config import RunConfig
 from evolve.genome.phenotype import Phenotype
 from evolve.learning.task_module import executed_task
 from sim.eyes.eyes import Eyes
-from sim.render.fidelity import Fidelity, fidelity_asked
+from sim.render.fidelity import Fidelity, requested_fidelity
 from sim.tasks.batch_task import BatchTask
 from sim.tasks.registry import task_of
 from sim.tasks.user_tasks import UserTask, batched, with_evolved_eyes
@@ -36,7 +36,7 @@ def animal_task(
         task = with_phenotype(executed_task(code, config.world.encoded_textures), phenotype, config, eyes)
         return batched(task).in_mode(mode)
     eyes, layout = eyes or phenotype.eyes(config.eye), getattr(config.world, mode)
-    asked = fidelity_asked(config.eye.rays_per_receptor, eyes)
+    asked = requested_fidelity(config.eye.rays_per_receptor, eyes)
     world = build_world(config.task, seed=layout["world_seed"], mazes=layout["mazes"], course=layout["course"])
     built_in = task_of(world, mode, eyes=eyes, fidelity=asked or AUTO)
     built_in.vary = config.world.vary

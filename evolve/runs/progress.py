@@ -148,13 +148,13 @@ class Events(_Watcher):
 
     def __init__(self, run: Run, out: TextIO, workers: int) -> None:
         super().__init__(run, out, workers)
-        self._told: dict[int, float] = {}
+        self._reported_at: dict[int, float] = {}
 
     def training(self, candidate_id: int, steps: int, planned: int) -> None:
         super().training(candidate_id, steps, planned)
         now = time.monotonic()
-        if now - self._told.get(candidate_id, -EVENT_S) >= EVENT_S:
-            self._told[candidate_id] = now
+        if now - self._reported_at.get(candidate_id, -EVENT_S) >= EVENT_S:
+            self._reported_at[candidate_id] = now
             self._write({"event": "training", "candidate": candidate_id, "steps": steps, "planned": planned})
 
     def evaluated(self, candidate: Candidate) -> None:

@@ -34,7 +34,7 @@ class RunLock:
         try:
             file = opened(self._path, "r+b", create=True)
         except OSError as error:
-            raise LockedError(f"{self._path.parent} cannot be written: {_told(error, self._path)}") from error
+            raise LockedError(f"{self._path.parent} cannot be written: {_message(error, self._path)}") from error
         deadline = time.monotonic() + PATIENCE_S
         while not _taken(file, fcntl.LOCK_EX):
             if time.monotonic() > deadline:
@@ -93,5 +93,5 @@ def _written(file: BinaryIO) -> str:
     return file.read(LONGEST).decode(errors="replace").strip() or "unknown"
 
 
-def _told(error: OSError, path: Path) -> str:
+def _message(error: OSError, path: Path) -> str:
     return f"{path.name} {error.strerror}" if isinstance(error, StrangeFileError) else str(error.strerror)

@@ -108,7 +108,7 @@ def _within(beam: Beam, spot: Spot, pitch: float, retina: Retina, guide: Guide) 
             _Cells(count, side / guide.focal, pitch / guide.focal, retina.tolerance)
             for count, side in zip(counts, retina.cell, strict=True)
         )
-        found, share = _seen(beam, spot, guide, rows, columns)
+        found, share = _accepted(beam, spot, guide, rows, columns)
         if share >= 1 - retina.tolerance or half == most:
             return found
         half *= WIDER
@@ -146,7 +146,7 @@ def _radius(waveguide: Waveguide, beam: Beam) -> float:
     return modes[0].radius * (1 + min(DEPTHS / modes[0].w, DEPTHS))
 
 
-def _seen(beam: Beam, spot: Spot, guide: Guide, rows: _Cells, columns: _Cells) -> tuple[np.ndarray, float]:
+def _accepted(beam: Beam, spot: Spot, guide: Guide, rows: _Cells, columns: _Cells) -> tuple[np.ndarray, float]:
     """Return E integrated over each cell, in terms of tangents, and the fraction of E that the cells contain."""
     from scipy.ndimage import map_coordinates
 

@@ -57,7 +57,7 @@ def radiated(
         two points.
     k: wavenumber [1/m] behind the pupil.
     """
-    sine, phi, distance = _seen_from(x, y, end)
+    sine, phi, distance = _in_guide_frame(x, y, end)
     function = (_along_axis if end[:2] == (0.0, 0.0) else _aside)(modes, sine, distance, k)
     excess = (x * x + y * y - 2 * (x * end[0] + y * end[1])) / (distance + math.hypot(*end))
     sphere = end[2] / distance**2 * np.exp(1j * k * excess)
@@ -98,7 +98,7 @@ def _aside(modes: tuple[Mode, ...], sine: np.ndarray, distance: np.ndarray, k: f
     return lambda mode: np.asarray(((by_sine @ table[mode]) * by_nearness).sum(axis=1))
 
 
-def _seen_from(x: np.ndarray, y: np.ndarray, end: tuple[float, float, float]) -> tuple[np.ndarray, ...]:
+def _in_guide_frame(x: np.ndarray, y: np.ndarray, end: tuple[float, float, float]) -> tuple[np.ndarray, ...]:
     """Return sin θ, φ and D of points of a pupil, in the frame of the waveguide's end.
 
     This frame is the pupil's frame, rotated along the shortest arc from the pupil's axis to the waveguide's axis.

@@ -126,7 +126,7 @@ def propagate(
         WRAP_RIPPLE_PER_TOLERANCE * tolerance,
         window.centre,
     )
-    how, planes = _with_room(sources, passage, (source, window), tolerance, precision(dtype))
+    how, planes = _with_padding(sources, passage, (source, window), tolerance, precision(dtype))
     out = np.stack([plane.u for plane in planes]).reshape(*given.shape[:-2], *window.shape)
     error = max(plane.error for plane in planes)
     if not error <= tolerance:
@@ -134,7 +134,7 @@ def propagate(
             f"tolerance = {tolerance:g}: the error reaches {error:.1g}, because too much of the light is near grazing "
             "incidence or too little of it hits the window; widen the tolerance or enlarge out_shape"
         )
-    plan = _plan(how, error, _untold(planes, tolerance), dtype)
+    plan = _plan(how, error, _sample_note(planes, tolerance), dtype)
     return PropagationResult(out, window.dx, plan, window, sources, how)
 
 
@@ -175,7 +175,7 @@ class _Carried:
     blur: float
 
 
-def _with_room(
+def _with_padding(
     sources: np.ndarray, passage: Passage, grids: tuple[Grid, Grid], tolerance: float, types: Precision
 ) -> tuple[TransformSampling, list[_Carried]]:
     """Return the planes, propagated with enough padding for the blur due to light at the Nyquist frequency.
@@ -275,7 +275,7 @@ def _free_space(how: TransformSampling, dtype: str) -> TransferFunction:
     return space
 
 
-def _untold(planes: list[_Carried], tolerance: float) -> str:
+def _sample_note(planes: list[_Carried], tolerance: float) -> str:
     """Return a note on the error of coarse input samples if it exceeds the tolerance, else an empty string.
 
     The predicted error does not include this error.
@@ -288,11 +288,11 @@ def _untold(planes: list[_Carried], tolerance: float) -> str:
     )
 
 
-def _plan(how: TransformSampling, error: float, untold: str, dtype: str) -> Plan:
+def _plan(how: TransformSampling, error: float, note: str, dtype: str) -> Plan:
     band = how.passage.band
     kept = f"band {band.kept * how.passage.wavelength:.2g} n/λ" if band.fade else "the whole spectrum of u"
     period = how.period * how.source.dx
-    why = f"period {period:.3g} m, {kept}" + ("; paraxial, as requested" if how.passage.paraxial else "") + untold
+    why = f"period {period:.3g} m, {kept}" + ("; paraxial, as requested" if how.passage.paraxial else "") + note
     spectrum = how.across, how.across
     seconds = predicted_seconds(how.source.shape, how.period, spectrum)
     seconds += predicted_seconds(spectrum, period / how.window.dx, how.window.shape)

@@ -176,14 +176,14 @@ def _blur_weights(how: TransformSampling, axis: int) -> np.ndarray:
     others = (np.arange(how.period) - how.period // 2) / (how.period * source.dx)
     far, aside = _walks(0.5 / source.dx, np.fft.ifftshift(others) if how.step else others, how)
     lit, seen = (grid.shape[axis] * grid.dx for grid in (source, window))
-    meets = _share_that_meets(aside, how, 1 - axis)
-    gap = np.maximum(how.period * source.dx - how.reach - np.where(meets > 0, far, 0), source.dx)
+    lands = _landing_fraction(aside, how, 1 - axis)
+    gap = np.maximum(how.period * source.dx - how.reach - np.where(lands > 0, far, 0), source.dx)
     comes_back = np.log1p(lit * seen / (gap * (gap + lit + seen))) / (4 * math.pi**2 * lit)  # (2)
-    weights: np.ndarray = 2 * comes_back * meets * source.dx / how.period
+    weights: np.ndarray = 2 * comes_back * lands * source.dx / how.period
     return weights
 
 
-def _share_that_meets(walks: np.ndarray, how: TransformSampling, axis: int) -> np.ndarray:
+def _landing_fraction(walks: np.ndarray, how: TransformSampling, axis: int) -> np.ndarray:
     """Return the fraction of a source's light that lands within the window's range along an axis (0 for y, 1 for x).
 
     The fraction is the overlap of two intervals of widths `lit` and `seen`, whose centres are `missed` apart.

@@ -17,7 +17,7 @@ from sim.envs.follow_camera import check_render_mode
 from sim.envs.prepared_task import PreparedTask
 from sim.envs.vec_env import EyesVecEnv
 from sim.eyes.eyes import Eyes
-from sim.render.fidelity import Fidelity, fidelity_asked
+from sim.render.fidelity import Fidelity, requested_fidelity
 from sim.tasks.batch_task import BatchTask
 from sim.tasks.encounter import Encounter
 from sim.tasks.eye_kinds import auxiliary_of
@@ -192,7 +192,7 @@ def _fidelity_of(
     asked = (
         rays_per_receptor
         if isinstance(rays_per_receptor, Fidelity)
-        else fidelity_asked(rays_per_receptor, _first(eyes))
+        else requested_fidelity(rays_per_receptor, _first(eyes))
     )
     if fidelity is None:
         return asked

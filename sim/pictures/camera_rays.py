@@ -127,7 +127,7 @@ class CameraRays:
         ray, axes = _ray(codes, pose, inputs.samples)
         si = scene.ray_intersect(ray, WANTED, COHERENT)
         if inside:
-            si = _looked_out_of(scene, si, ray, inputs.closed)
+            si = _through_inner_sides(scene, si, ray, inputs.closed)
         si.wavelengths = mi.Spectrum(*WAVELENGTHS_NM)
         light = self._direct_light(scene, si, codes, pose, inputs)
         rgb = [sum(float(w) * light[b] for b, w in enumerate(row)) for row in SRGB]
@@ -162,7 +162,7 @@ class CameraRays:
         return total
 
 
-def _looked_out_of(scene: MitsubaObject, si: Array, ray: Array, closed: Array) -> Array:
+def _through_inner_sides(scene: MitsubaObject, si: Array, ray: Array, closed: Array) -> Array:
     """Return the first hits of rays that pass through the inner sides of closed shapes."""
 
     def leaving(si: Array, ray: Array, turn: Array) -> Array:

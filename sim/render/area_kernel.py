@@ -79,11 +79,11 @@ class AreaKernel(RayKernel):
             self._areas.inputs,
             None,
             floats(np.array(self._extent)),
-            self._look_at_borders() if self._borders.shared else None,
+            self._border_inputs() if self._borders.shared else None,
             counted(self.n_envs * places) if places else None,
         )
 
-    def _look_at_borders(self) -> BorderInputs:
+    def _border_inputs(self) -> BorderInputs:
         n = len(self._borders.x)
         return BorderInputs(
             counted(self.n_envs * self.n_eyes * n),
@@ -100,7 +100,11 @@ class AreaKernel(RayKernel):
         width, height = (dr.gather(mi.Float, inputs.extent, i) for i in range(2))
         area = Area.from_extent(seen.ray, seen.axis.xy, (width, height))
         borders = inputs.borders
-        met = self._areas.met_by(area, inputs.tables) if borders is None else self._met_at(frame, inputs, borders, lane)
+        met = (
+            self._areas.border_faces(area, inputs.tables)
+            if borders is None
+            else self._shared_border_faces(frame, inputs, borders, lane)
+        )
         bodies = self._areas.bodies(frame.things, lane.world, seen.body)
         return self._areas.radiance(area, met, FrameState(bodies, inputs.tables, lane.world, lit), self.depth)
 
@@ -116,7 +120,9 @@ class AreaKernel(RayKernel):
         dr.eval(lit)
         return lit
 
-    def _met_at(self, frame: Frame, inputs: AreaInputs, borders: BorderInputs, lane: Lane) -> tuple[Array, Array]:
+    def _shared_border_faces(
+        self, frame: Frame, inputs: AreaInputs, borders: BorderInputs, lane: Lane
+    ) -> tuple[Array, Array]:
         """Return the faces at the left and right border of a lane's area."""
         faces = self._faces(frame, inputs, borders)
         n, eyes = (dr.gather(mi.UInt32, borders.sizes, i) for i in range(2))

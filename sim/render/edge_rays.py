@@ -45,7 +45,7 @@ class EdgeRays:
         self._kernel, self._rays, self._noticed = kernel, fine.rays_per_receptor, noticed
         self._beyond = beyond_rim_of(sampling.eye.resolution)
         self._signals = [[float(worth) for worth in channel] for channel in signals]
-        self._coarse, self._fine = FrozenKernel(self._look_once), FrozenKernel(self._look_again)
+        self._coarse, self._fine = FrozenKernel(self._render_all), FrozenKernel(self._render_edges)
         first = np.concatenate([sampling.sensor(FIRST).directions, sampling.beyond_rim(FIRST)])
         self._first, self._along = kernel.inputs(first), kernel.inputs(fine.directions)
 
@@ -92,7 +92,7 @@ class EdgeRays:
             found[:, *other] |= apart
         return found[:, 1:-1, 1:-1].ravel()
 
-    def _look_once(self, scenes: Any, frame: Frame, inputs: KernelInputs) -> tuple[Array, ...]:
+    def _render_all(self, scenes: Any, frame: Frame, inputs: KernelInputs) -> tuple[Array, ...]:
         """Return the sums over each receptor's rays, per component, and the spread of the rays' signals."""
         components = self._kernel.layers(scenes, frame, inputs)
         signals = [sum(w * c for w, c in zip(worth, components, strict=True)) for worth in self._signals]
@@ -103,7 +103,7 @@ class EdgeRays:
             spread = dr.maximum(spread, highest - lowest)
         return *_sums(components, FIRST), spread
 
-    def _look_again(self, scenes: Any, frame: Frame, inputs: KernelInputs) -> tuple[Array, ...]:
+    def _render_edges(self, scenes: Any, frame: Frame, inputs: KernelInputs) -> tuple[Array, ...]:
         """Return the sums over the rays of the receptors that are rendered again, per component."""
         components = self._kernel.layers(scenes, frame, inputs)
         dr.eval(components)

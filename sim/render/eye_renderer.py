@@ -65,7 +65,7 @@ class EyeRenderer:
         self.tracer: Tracer | AreaTracer
         self.tracer = (scene.areas if fidelity.samples == AREAS else scene.tracers.tracer_for)(fidelity.light)
         self._check_memory(n_envs, fidelity.rays_per_receptor)
-        scene.tell(fidelity.light)
+        scene.warn_once(fidelity.light)
         asked = fidelity.rays_per_receptor
         self.sensor: Sensor
         if fidelity.samples == AREAS:

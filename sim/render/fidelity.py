@@ -107,7 +107,7 @@ class Fidelity:
         return "\n".join("  ".join([*(c.ljust(w) for c, w in zip(r, widths, strict=False)), r[3]]) for r in rows)
 
 
-def fidelity_asked(rays_per_receptor: float | str, eyes: Eyes) -> Fidelity | None:
+def requested_fidelity(rays_per_receptor: float | str, eyes: Eyes) -> Fidelity | None:
     """Return the fidelity with this number of rays in direct light, or None for "auto", which is chosen later.
 
     Raises:

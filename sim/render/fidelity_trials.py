@@ -121,7 +121,7 @@ class FidelityTrials:
         """Return whether receptors that share areas, with this number per receptor, still have different signals."""
         return self._scene.may_share(sampling, per_receptor)
 
-    def areas_seen(self, sampling: EyeSampling, per_receptor: float) -> float:
+    def areas_of_field(self, sampling: EyeSampling, per_receptor: float) -> float:
         """Return the number of rendered areas per receptor. Behind a pupil, it includes areas around the receptors."""
         n = len(self._scene.area_trial(sampling, per_receptor, self._receptors[:1]).directions)
         return n / float(np.prod(self._eyes.resolution)) if self._eye.pupil else float(n)
@@ -223,7 +223,7 @@ class FidelityTrials:
             area = Area.from_extent(ray, axis, (width, height))
             world, bodies = dr.arange(mi.UInt32, n * len(views)) // n, [*np.moveaxis(views.objects, 1, 0), views.agents]
             now = FrameState([_points(b, n) for b in bodies], tracer.inputs, world, self._lit(tracer, bodies))
-            components = tracer.radiance(area, tracer.met_by(area, tracer.inputs), now, depth)
+            components = tracer.radiance(area, tracer.border_faces(area, tracer.inputs), now, depth)
             dr.eval(components)
             return [np.array(c) for c in components]
 

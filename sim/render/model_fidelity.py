@@ -107,7 +107,7 @@ class ModelStages:
     def __init__(self, scene: PreparedScene, moments: Poses, allowed: float, light: str) -> None:
         self.eye, self.allowed = scene.eye, allowed
         self._scene, self._moments, self._light = scene, moments, light
-        self._seen = cache(self._signals)
+        self._cached_signals = cache(self._signals)
 
     def _signals(self, rays: float, light: str) -> np.ndarray:
         """Return the signals at the moments, without noise."""
@@ -127,12 +127,12 @@ class ModelStages:
 
     def light(self, depth: DepthLayers, allowed: float) -> Level:
         """See `Stages`."""
-        return _light(self._light, lambda light: self._seen(_truth(self.eye), light), allowed)
+        return _light(self._light, lambda light: self._cached_signals(_truth(self.eye), light), allowed)
 
     def samples(self, depth: DepthLayers, light: Level, allowed: Allowed) -> Samples:
         """See `Stages`."""
         ladder, most = PERFECT if self.eye.pupil is None else SHARED, allowed.error
-        trials = tried(lambda rays: self._seen(rays, light.level), ladder, _truth(self.eye), most)
+        trials = tried(lambda rays: self._cached_signals(rays, light.level), ladder, _truth(self.eye), most)
         rays = next((n for n, error in trials.errors.items() if error <= most), max(trials.errors))
         enough = trials.errors[rays] <= most
         why = (

@@ -65,7 +65,7 @@ class PreparedScene:
             self._refuse_eyes_inside()
         self.tracers = Tracers(self.scene, self.places, tracer, stand)
         self._samplings: dict[DepthLayers, EyeSampling] = {}
-        self._is_told = False
+        self._has_warned = False
 
     @property
     def mounts(self) -> tuple[Mount, ...]:
@@ -82,11 +82,11 @@ class PreparedScene:
         """Mitsuba's variant."""
         return self.scene.variant
 
-    def tell(self, light: str) -> None:
+    def warn_once(self, light: str) -> None:
         """Warn once of features of the model that are not rendered with this kind of light."""
-        if not self._is_told:
-            self._is_told = True
-            self.scene.tell_what_is_missing(light)
+        if not self._has_warned:
+            self._has_warned = True
+            self.scene.warn_of_missing(light)
 
     def eye_rays(self, tracer: Tracer | AreaTracer, n_envs: int) -> EyeRays:
         """Return the eyes in `n_envs` worlds, in the form for this tracer."""

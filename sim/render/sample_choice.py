@@ -41,7 +41,7 @@ def fewest_samples(trials: FidelityTrials, sampling: EyeSampling, light: Level, 
     of_pupil = PUPIL_AREA_IN_ALL_LIGHT if light.level == BOUNCE else PUPIL_AREA
 
     def cost(areas: float) -> float:
-        return (PERFECT_LENS_AREA if perfect else of_pupil) * trials.areas_seen(sampling, areas)
+        return (PERFECT_LENS_AREA if perfect else of_pupil) * trials.areas_of_field(sampling, areas)
 
     left_out = light.predicted_error or 0
     # The part of the allowed error that the omitted light leaves. If nothing is left, no number of rays is enough.

@@ -125,30 +125,30 @@ def _touches(data: mujoco.MjData, points: np.ndarray, normals: np.ndarray, geom:
     above = 10 * apart
     for k in np.flatnonzero(near):
         found = np.zeros(3)
-        distance = _cast(data, geom, kind, points[k] + above * normals[k], -normals[k], found)
+        distance = _ray_distance(data, geom, kind, points[k] + above * normals[k], -normals[k], found)
         if abs(distance - above) <= apart and found @ normals[k] > ALIGNED:
             return True
     return False
 
 
-def _cast(
+def _ray_distance(
     data: mujoco.MjData, geom: int, kind: mujoco.mjtGeom, start: np.ndarray, direction: np.ndarray, normal: np.ndarray
 ) -> float:
     """Return the distance of a geom along a ray, negative for a miss, and write the normal there to `normal`."""
     if kind == _TYPES.mjGEOM_MESH:
         return float(mujoco.mj_rayMesh(data.model, data, geom, start, direction, normal))
     if kind == _TYPES.mjGEOM_SDF:  # MuJoCo ends the process if it casts a ray at the mesh of a signed distance field
-        return _cast_at_triangles(data, geom, start, direction, normal)
+        return _ray_distance_to_triangles(data, geom, start, direction, normal)
     if kind == _TYPES.mjGEOM_HFIELD:
         return float(mujoco.mj_rayHfield(data.model, data, geom, start, direction, normal))
     place, turn, size = data.geom_xpos[geom], data.geom_xmat[geom], data.model.geom_size[geom]
     return float(mujoco.mju_rayGeom(place, turn, size, start, direction, kind, normal))
 
 
-def _cast_at_triangles(
+def _ray_distance_to_triangles(
     data: mujoco.MjData, geom: int, start: np.ndarray, direction: np.ndarray, normal: np.ndarray
 ) -> float:
-    """Return the result of `_cast` for the triangles of a geom (Möller and Trumbore 1997)."""
+    """Return the result of `_ray_distance` for the triangles of a geom (Möller and Trumbore 1997)."""
     triangles, turn = shapes.untextured(data.model, geom), data.geom_xmat[geom].reshape(3, 3)
     o, d = (start - data.geom_xpos[geom]) @ turn, direction @ turn
     corners = triangles.vertices[triangles.faces]

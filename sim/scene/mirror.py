@@ -100,7 +100,7 @@ class Mirror:
             self.scene = self._build()
             self._params = mi.traverse(self.scene)
             self._names = rays.names_of(self.scene)
-        self._told_of_glass = False
+        self._has_warned_of_glass = False
         left_out = inventory.left_out(model, visible, groups) + left_out
         if left_out:
             warnings.warn(f"not mirrored: {'; '.join(left_out)}", MirrorWarning, stacklevel=3)
@@ -164,21 +164,21 @@ class Mirror:
         rays.check_size(width, height, spp)
         asked = rays.checked_wavelengths(wavelengths)
         if rays.described(integrator)["type"] == "direct":
-            self._tell_of_glass()
+            self._warn_of_glass()
         with in_variant(self.variant):
             self._aim_headlight(view)
             taken = self._camera(view, width, height)
             return taken.radiance(integrator, spp, asked, seed, sampler)
 
-    def _tell_of_glass(self) -> None:
+    def _warn_of_glass(self) -> None:
         """Warn once about transparent geoms. Mitsuba's `direct` treats a mask's opacity as part of its colour, and
         shows only emitters behind it."""
         glass = [int(g) for g in self.geoms if surfaces.rgba(self.model, int(g))[3] < 1]
-        if glass and not self._told_of_glass:
+        if glass and not self._has_warned_of_glass:
             listed = inventory.listed_geoms(self.model, glass)
             words = f"'direct' does not show what is behind the transparent {listed}: integrator='path' does"
             warnings.warn(words, MirrorWarning, stacklevel=3)
-        self._told_of_glass = True
+        self._has_warned_of_glass = True
 
     def viewpoint(self, camera: str | int | Viewpoint) -> Viewpoint:
         """Return the viewpoint of a camera of the model at the last `sync`."""

@@ -96,7 +96,7 @@ class PerWorld(BatchTask):
                 for animal in self.animals:
                     animal.reset(worlds.datas[world], rng)
             except BaseException as error:
-                raise RuntimeError(_told(error)) from error
+                raise RuntimeError(_message(error)) from error
 
     def take(self, worlds: MujocoWorlds, actions: np.ndarray, failed: Mapping[int, str]) -> Mapping[int, str]:
         found, first = dict[int, str](), 0
@@ -108,7 +108,7 @@ class PerWorld(BatchTask):
                     try:
                         animal.act(data, own[world])
                     except BaseException as error:
-                        found[world] = _told(error)
+                        found[world] = _message(error)
         return found
 
     def judge(self, worlds: MujocoWorlds, failed: Mapping[int, str]) -> Outcome:
@@ -125,7 +125,7 @@ class PerWorld(BatchTask):
                     judged.append(outcomes)
                     continue
                 except BaseException as error:
-                    failure[world] = _told(error)
+                    failure[world] = _message(error)
             worlds.require_places(world)
             # Terminated, not truncated: learners must not bootstrap from the state after a failure.
             worth = [{"failure": animal.failure_reward} if animal.failure_reward else {} for animal in self.learners]
@@ -145,7 +145,7 @@ class PerWorld(BatchTask):
             of_worlds = [self._felt(worlds.datas[world]) for world in chosen]
             return [_stacked(list(own)) for own in zip(*of_worlds, strict=True)]
         except BaseException as error:
-            raise RuntimeError(_told(error)) from error
+            raise RuntimeError(_message(error)) from error
 
     def _judged(self, data: mujoco.MjData) -> tuple[list[_OfWorld], bool]:
         """Return the outcome for every learner, and whether any animal ends the episode."""
@@ -201,7 +201,7 @@ def _stacked(felt: Sequence[np.ndarray | None]) -> dict[str, np.ndarray]:
     return {"feels": np.array([np.full(size, np.nan, np.float32) if row is None else row for row in felt])}
 
 
-def _told(error: BaseException) -> str:
+def _message(error: BaseException) -> str:
     """Return the message of an error, with function and line if it was raised in the user's file.
 
     The error may be a SystemExit or another exception that would end the program. Only Ctrl-C is raised again.

@@ -71,8 +71,8 @@ class ModelScene:
         self.model, self.eye, self.variant, self._groups = model, eye, default_variant(), groups
         self.spectra = resolve(model, spectra)
         in_bands, self._off = lights_in_bands(model, self.spectra, eye)
-        self._seen = surfaces.visible(model, groups)
-        self.geoms = [g for g in self._seen if shapes.has_shape(model, g)]
+        self._visible = surfaces.visible(model, groups)
+        self.geoms = [g for g in self._visible if shapes.has_shape(model, g)]
         surfaces.require_geoms(model, self.geoms)
         data = mujoco.MjData(model)
         mujoco.mj_forward(model, data)
@@ -99,14 +99,14 @@ class ModelScene:
     def _may_change(self, look: Appearance) -> bool:
         return _moves(self.model, look.geom) or look.geom in self.varied or look in self.glows
 
-    def tell_what_is_missing(self, light: str = DIRECT) -> None:
+    def warn_of_missing(self, light: str = DIRECT) -> None:
         """Warn (`sim.MirrorWarning`) of features that are not rendered with this level of light.
 
         Also warn of measured lights for which the eye has too few bands.
         """
         model = self.model
         of_sky = ["light of the sky on surfaces"] if light == DIRECT and self.has_sky else []
-        missing = [*self._unlit, *of_sky, *inventory.left_out(model, self._seen, self._groups)]
+        missing = [*self._unlit, *of_sky, *inventory.left_out(model, self._visible, self._groups)]
         missing += _not_matt(model, self.looks, light)
         told = [f"eyes do not see: {'; '.join(missing)}"] if missing else []
         for words in (*told, *filter(None, [self.coincidences.message(model)]), *self._off):
@@ -117,7 +117,7 @@ class ModelScene:
         """Snapshot of the model, with which worlds are compared."""
         model, groups = self.model, self._groups
         reachable = [g for g in range(model.ngeom) if model.geom_group[g] in groups and shapes.has_shape(model, g)]
-        hidden = [g for g in reachable if g not in self._seen]
+        hidden = [g for g in reachable if g not in self._visible]
         moving = np.array([look.geom for look in self.moving], int)
         fixed = [look.geom for look in self.moving if not is_resizable(look.model, look.geom)]
         return ModelSnapshot(model, self.geoms, hidden, moving, np.setdiff1d(moving, fixed), self.varied)
@@ -164,7 +164,7 @@ class ModelScene:
         return mi.load_dict({"type": "twosided", "inside": {"type": "diffuse", "reflectance": radiance}})
 
     @cached_property
-    def told_apart(self) -> tuple[MitsubaObject, np.ndarray]:
+    def one_shape_per_geom(self) -> tuple[MitsubaObject, np.ndarray]:
         """Mitsuba scene in which every static geom has its own shapes, and a table from shapes' ids to geoms.
 
         The table contains -1 for unused ids. It is necessary because a ray on a GPU reports only the id of the shape

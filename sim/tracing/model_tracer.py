@@ -171,7 +171,7 @@ class ModelTracer:
     def radiance(self, seen: EyeRay, there: Surroundings, samples: Array) -> tuple[list[Array], Array]:
         """Return the light along each ray, per band, and the distance to the visible surface [m]. The samples of a ray,
         two points on the unit square, determine its bounce rays (`lighting.spawn_bounce_ray`)."""
-        met = self._met(seen.ray, there)
+        met = self._first_hits(seen.ray, there)
         arrives = self._irradiance(met, seen.axis, there)
         if self.light == lighting.BOUNCE:
             reflected = self._returned(met, seen.axis, there, samples)
@@ -183,17 +183,17 @@ class ModelTracer:
         """Return the light that reaches each visible surface from a random direction (Lambert's cosine). It comes from
         the sky, from a glowing geom, or from a second surface that reflects light of lamps, sky and glowing geoms."""
         bounce_ray = lighting.spawn_bounce_ray(met.point, met.normal, mi.Point2f(samples.x, samples.y))
-        second = self._met(bounce_ray, there, met.seen)
+        second = self._first_hits(bounce_ray, there, met.seen)
         arrives = self._irradiance(second, axis, there)
         if self._scene.has_sky or self._glows:
             further = lighting.spawn_bounce_ray(second.point, second.normal, mi.Point2f(samples.z, samples.w))
-            last = self._met(further, there, second.seen)
+            last = self._first_hits(further, there, second.seen)
             emitted = self._emitted(last, there)
             arrives = [e + dr.pi * more for e, more in zip(arrives, emitted, strict=True)]
         found = self._sent(second, arrives, there)
         return [dr.select(met.seen, spectrum, 0) for spectrum in found]
 
-    def _met(self, ray: Array, there: Surroundings, active: Array | None = None) -> _SurfaceHit:
+    def _first_hits(self, ray: Array, there: Surroundings, active: Array | None = None) -> _SurfaceHit:
         """Return the first hits of rays."""
         movers = self._scene.movers
         active = mi.Bool(True) if active is None else active
@@ -232,7 +232,7 @@ class ModelTracer:
     def which(self, ray: Array, there: Surroundings) -> Array:
         """Return the number of the surface that each ray hits first. It is a mover's number, or the number of movers
         plus the Mitsuba id of a static shape (0 for none). Every static geom has its own shapes, see
-        `ModelScene.told_apart`."""
+        `ModelScene.one_shape_per_geom`."""
         movers, any_still = len(self._scene.movers), len(there.still.shapes()) > 0
         si = there.still.ray_intersect_preliminary(ray) if any_still else _nothing()
         far = dr.select(si.is_valid(), si.t, dr.inf)

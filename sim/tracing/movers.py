@@ -189,7 +189,7 @@ class Movers:
             found = self._nearest(ray, farthest, there)
             computed(found)
             return Hit(*found)
-        near = _may_meet(ray, there, 0)
+        near = _may_hit(ray, there, 0)
         found = dr.if_stmt((), near, lambda: self._nearest(ray, farthest, there), lambda: none)
         return Hit(*found)
 
@@ -200,7 +200,7 @@ class Movers:
             blocked = self._block(ray, farthest, there)
             computed(blocked)
             return blocked
-        near = _may_meet(ray, there, 0) & (farthest > 0)
+        near = _may_hit(ray, there, 0) & (farthest > 0)
         return dr.if_stmt((), near, lambda: self._block(ray, farthest, there), lambda: mi.Bool(False))
 
     def _nearest(self, ray: Array, farthest: Array, there: MoverRows) -> tuple[Array, ...]:
@@ -208,7 +208,7 @@ class Movers:
         for i, hit in self._kinds():
 
             def step(k: Array, t: Array, which: Array, hit: Callable[..., Array] = hit) -> tuple[Array, ...]:
-                found = _met(hit, ray, there, k)
+                found = _distance_to(hit, ray, there, k)
                 nearer = found < t
                 return k + 1, dr.select(nearer, found, t), dr.select(nearer, k, which)
 
@@ -221,7 +221,7 @@ class Movers:
         for i, hit in self._kinds():
 
             def step(k: Array, blocked: Array, hit: Callable[..., Array] = hit) -> tuple[Array, ...]:
-                return k + 1, blocked | (_met(hit, ray, there, k) < farthest)
+                return k + 1, blocked | (_distance_to(hit, ray, there, k) < farthest)
 
             _, blocked = _loop(i, there, step, blocked)
         return blocked
@@ -263,7 +263,7 @@ def _of_primitive(primitive: Primitive) -> Callable[..., Array]:
     return lambda o, d, frame: primitive.hit(o, d, frame.size)
 
 
-def _met(hit: Callable[..., Array], ray: Array, there: MoverRows, k: Array) -> Array:
+def _distance_to(hit: Callable[..., Array], ray: Array, there: MoverRows, k: Array) -> Array:
     """Return the distance to mover k along a ray [m]. A branch skips the intersection if a ray misses the sphere around
     the mover, as most rays and their neighbours do. The origin of an absent mover is NaN, so all rays miss it."""
 
@@ -271,7 +271,7 @@ def _met(hit: Callable[..., Array], ray: Array, there: MoverRows, k: Array) -> A
         frame = _frame(there, k)
         return hit(frame.taken(ray.o - frame.origin), frame.taken(ray.d), frame)
 
-    found: Array = dr.if_stmt((), _may_meet(ray, there, 1 + k * ROWS), within, lambda: mi.Float(dr.inf))
+    found: Array = dr.if_stmt((), _may_hit(ray, there, 1 + k * ROWS), within, lambda: mi.Float(dr.inf))
     return found
 
 
@@ -283,7 +283,7 @@ def _frame(there: MoverRows, k: Array) -> _Frame:
     return _Frame((a, b, c), mi.Vector3f(x, y, z), mi.Vector3f(*(four[3] for four in fours)), reach)
 
 
-def _may_meet(ray: Array, there: MoverRows, row: Array | int) -> Array:
+def _may_hit(ray: Array, there: MoverRows, row: Array | int) -> Array:
     """Return whether a ray hits the sphere of this row."""
     x, y, z, radius = there.four(row)
     way, square = mi.Vector3f(x, y, z) - ray.o, radius * radius

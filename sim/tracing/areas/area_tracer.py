@@ -114,7 +114,7 @@ class AreaTracer:
     ) -> list[Array]:
         """Return the mean radiance in each area, one array per component, for each depth layer.
 
-        met: faces at the area's left and right border, see `first_faces` and `met_by`
+        met: faces at the area's left and right border, see `first_faces` and `border_faces`
         """
         nothing = [0.0] * (depth.count * len(self.basis))
         pieces = self._columns.pieces(area, met, now.inputs.face_ends)
@@ -124,7 +124,7 @@ class AreaTracer:
         floor = partial(self._floor, area, pieces, now, depth)
         seen.append(only_where(pieces[0].floor_share + pieces[1].floor_share > 0, floor, nothing))
         spheres = []
-        for k, centre in enumerate(self._seen_bodies(now)):
+        for k, centre in enumerate(self._visible_bodies(now)):
             in_view = sphere_areas.may_see(area, centre, self._radii[k])
             sphere = partial(self._sphere, area, k, pieces, now, depth)
             spheres.append(only_where(in_view, sphere, [0.0] * 3 + nothing))
@@ -139,7 +139,7 @@ class AreaTracer:
         """Return the number of the wall's face that a ray in a horizontal direction (Vector2f) hits."""
         return self._columns.first_faces(origin, level, inputs.cells)
 
-    def met_by(self, area: Area, inputs: AreaTables) -> tuple[Array, Array]:
+    def border_faces(self, area: Area, inputs: AreaTables) -> tuple[Array, Array]:
         """Return the numbers of the faces at an area's left and right border."""
         left, right = (self.first_faces(area.origin, area.level(mi.Float(a)), inputs) for a in (-0.5, 0.5))
         return left, right
@@ -267,14 +267,14 @@ class AreaTracer:
         overlap at random."""
         way = now.bodies[k] - area.origin
         bare = mi.Float(1)
-        for j, other in enumerate(self._seen_bodies(now)):
+        for j, other in enumerate(self._visible_bodies(now)):
             if j != k:
                 towards = other - area.origin
                 nearer = dr.squared_norm(towards) < dr.squared_norm(way)
                 bare *= 1 - dr.select(nearer, sphere_areas.hidden_by(towards, self._radii[j], slice_), 0)
         return bare
 
-    def _seen_bodies(self, now: FrameState) -> list[Array]:
+    def _visible_bodies(self, now: FrameState) -> list[Array]:
         return now.bodies[: len(self._sphere_textures)]
 
 
