@@ -144,7 +144,7 @@ class LearningConfig:
 class WiringConfig:
     """Settings of the connections between the receptors of an eye and its encoder.
 
-    An axis of the retina with fewer receptors than `pool_side`, or more than `repeat_side`, is left as it is.
+    `pool_side` has no effect along an axis with fewer receptors, and `repeat_side` none along an axis with more.
     """
 
     shared_encoder: bool = setting(False, None, "all eyes have the same encoder, with the same weights")

@@ -43,7 +43,7 @@ class TrainingDiverged(FloatingPointError):
 
 @dataclass(frozen=True)
 class Brain:
-    """Size of a brain.
+    """Size and wiring of a brain.
 
     neurons, layers: the actor and the critic have `layers` hidden layers of `neurons` units each
     encoder: width of all layers of the eyes' encoders
@@ -118,8 +118,7 @@ class PolicyConfig:
 
         Raises:
             KeyError: an entry is missing.
-            TypeError: an entry is not a number.
-            ValueError: an entry is not a number.
+            TypeError, ValueError: an entry is not a number.
         """
         return cls(
             eyes=tuple(int(n) for n in stored["eyes"]),
