@@ -29,7 +29,7 @@ def animal_task(
     eyes: eyes that replace the animal's own
 
     Raises:
-        ConfigError: the user task has not been named when the run was opened, or its module cannot be executed.
+        ConfigError: the user task was not named when the run was opened, or its module cannot be executed.
         ValueError: the eyes that the task places differ from the animal's.
     """
     if (code := config.choice.named_code) is not None:

@@ -37,7 +37,7 @@ def worlds_of(phenotype: Phenotype, config: RunConfig, learning: int, evaluation
     evaluation: seed of the environments for selection and test
 
     Raises:
-        ConfigError: the user task has not been named when the run was opened, or it fails at its start.
+        ConfigError: the user task was not named when the run was opened, or its start fails.
     """
     memory, wanted, episodes = phenotype.memory_frames, config.learning, config.evaluation.episodes
     fine = PreparedTask(animal_task(phenotype, config))

@@ -85,7 +85,7 @@ class Zernike(Aberration):
     Webb, J. Refract. Surg. 18, S652, 2002.
 
     coefficients_um: {(n, m): [µm]}, or a vector [µm] by the index j = (n(n + 2) + m)/2, piston first.
-    radius: radius [m] of the circle to which the coefficients refer, at least the pupil's radius. None: equal to it.
+    radius: radius [m] of the circle to which the coefficients refer, at least the pupil's radius. None: this radius.
 
     A Dr.Jit vector, or Dr.Jit numbers in a dictionary, carry derivatives.
 
@@ -204,7 +204,7 @@ class WavefrontMap(Aberration):
 
     samples: W, (n, n), (y, x). Values are positive if the wavefront is ahead, as in Zernike: they are the negative of
         an optical path difference. They must be unwrapped. Outside the pupil they must also be finite and smooth.
-    radius: half side [m] of the square, at least the pupil's radius. None: equal to it.
+    radius: half side [m] of the square, at least the pupil's radius. None: the pupil's radius.
 
     A Dr.Jit tensor of samples carries derivatives.
 

@@ -73,10 +73,10 @@ class ModelSnapshot:
         }
 
     def refuse_differences(self, poses: Poses) -> None:
-        """Refuse differences of worlds from the model that the renderer cannot show.
+        """Refuse worlds that differ from the model in a way that the renderer cannot show.
 
         Raises:
-            ValueError: there is a difference.
+            ValueError: there is such a difference.
         """
         self._refuse_other_materials(poses)
         for what, name in (("size", "geom_size"), ("colour", "geom_rgba"), ("material", "geom_matid")):

@@ -105,7 +105,7 @@ def faces_of(model: mujoco.MjModel, texture: int) -> int:
 def image(model: mujoco.MjModel, texture: int) -> np.ndarray:
     """Return a texture's image (height, width, 3), as MuJoCo stores it, scaled to [0, 1], with row 0 at the top.
 
-    For a cube texture, the faces lie below each other, each with a border (`cube.padded`).
+    For a cube texture, the faces are stacked vertically, each with a border (`cube.padded`).
     """
     shape = model.tex_height[texture], model.tex_width[texture], model.tex_nchannel[texture]
     start = model.tex_adr[texture]

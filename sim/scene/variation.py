@@ -41,8 +41,8 @@ class Variation:
     """Ranges of the quantities that differ between episodes.
 
     ranges: (low, high) by name: "light", "color_temperature", and "NAME.size", "NAME.color" or "NAME.start" of objects.
-        Colours and points in space are three numbers each, with two opposite corners as (low, high). low = high is a
-        single value for all episodes. "NAME.material": names of materials; one is drawn.
+        For colours and points in space, low and high have three numbers each, and are opposite corners of a box. If low
+        = high, the value is the same in all episodes. "NAME.material": names of materials; one is drawn.
 
     Raises:
         ValueError: an unknown name, or an invalid range.

@@ -40,7 +40,7 @@ class TaskSettings:
         "color_temperature": colour temperature of white [K], with a uniformly distributed reciprocal.
         "GEOM.size": factor of a geom's size, with a uniformly distributed logarithm. MuJoCo's compiler recomputes mass
         and inertia.
-        "GEOM.color": colour of a geom. Red, green and blue are drawn independently between those of two colours. The
+        "GEOM.color": colour of a geom. Red, green and blue are each drawn between their values in two colours. The
         colour multiplies a texture.
         "GEOM.material": one of two or more materials of the model, given by their names, with its texture, colour and
         emission. The geom must not have an rgba of its own.

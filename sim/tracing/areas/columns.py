@@ -40,7 +40,7 @@ class Face:
 class Piece:
     """A wall's face in columns start <= a <= end of an area.
 
-    inverse_distance: 1/t at a = 0, and its slope along a [1/m]
+    inverse_distance: inverse of the face's distance at a = 0, and its slope along a [1/m]
     floor_share, wall_share, sky_share: fractions of the area that floor, wall and sky fill in these columns
     """
 
