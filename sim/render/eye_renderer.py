@@ -51,8 +51,8 @@ class EyeRenderer:
     tracer: the method of tracing rays, with its name, why, light and basis
     brightest: signal of a white surface that faces all directional lights at once
 
-    One warning (`sim.MirrorWarning`) lists features of the model that are not rendered. Others name lamps with spectral
-    lines for which the eye has too few bands.
+    One warning (`sim.MirrorWarning`) lists features of the model that are not rendered. Further warnings name lamps
+    with spectral lines for which the eye has too few bands.
 
     Raises:
         ValueError: n_envs below 1, more rays than fit into memory, or a fidelity that the scene does not support.

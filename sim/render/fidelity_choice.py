@@ -48,7 +48,7 @@ class Samples:
 class Allowed:
     """Allowed error of the samples (root mean square).
 
-    error: allowed error if some light is omitted, which uses a part of the tolerance
+    error: allowed error if some light is omitted, which also uses a part of the tolerance
     without_light: allowed error if no light is omitted
     """
 

@@ -1,8 +1,8 @@
 """Measured spectra that replace colours: reflectances of materials and emission of lights, by their names in the model.
 
 A material's spectrum replaces its rgba. A texture, which must be grey, still multiplies it. A light's spectrum replaces
-daylight and the light's colour. Its level is still the largest component of its diffuse colour. The glow of an emissive
-material has the spectrum that the material reflects in daylight.
+daylight and the light's colour. The strength of the light is still the largest component of its diffuse colour. The
+glow of an emissive material has the spectrum that the material reflects in daylight.
 """
 
 from __future__ import annotations
