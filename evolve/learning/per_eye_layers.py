@@ -109,7 +109,8 @@ class _Slide(torch.autograd.Function):
 
     @staticmethod
     def forward(ctx: Any, codes: Tensor, weight: Tensor, bias: Tensor) -> Tensor:
-        """Return the sum; codes (eye, code, frame, segment), weight (eye, output, code, lag), bias (eye, output, 1)."""
+        """Return the sum plus `bias` (eye, output, 1), for codes (eye, code, frame, segment), weight (eye, output,
+        code, lag)."""
         weights = weight.permute(3, 0, 1, 2).contiguous()
         total, *pieces = _slices(codes, len(weights))
         result = torch.baddbmm(bias, weights[0], total)

@@ -157,8 +157,8 @@ def _check_even(amplitude: np.ndarray, x: np.ndarray, y: np.ndarray, lit: np.nda
 def _circle(x: np.ndarray, y: np.ndarray) -> tuple[tuple[float, float], float]:
     """Return the centre and the radius of the circle around the points.
 
-    The circle is fitted to all corners of their convex hull, because on a grid with an even number of samples a single
-    sample can lie on the rim (least squares; Kåsa, IEEE Trans. Instrum. Meas. 25, 8, 1976).
+    The circle is a least-squares fit to all corners of the convex hull (Kåsa, IEEE Trans. Instrum. Meas. 25, 8, 1976).
+    All corners are used, because a single sample can lie on the rim if the grid has an even number of samples.
 
     Raises:
         ValueError: the hull is not a disk.

@@ -84,7 +84,7 @@ def walk(frequency: float, wavelength: float, z: float, paraxial: bool = False) 
 
 
 def kept_band(corner: float, wavelength: float, z: float, ripple: float, paraxial: bool = False) -> Band:
-    """Return the band for light that moves up to `corner` [m] to the side over the distance z.
+    """Return the band of the light whose sideways displacement over the distance z is at most `corner` [m].
 
     It is chosen for the shortest period of the transform. The result is `EVERYTHING` if no light may be faded.
     """

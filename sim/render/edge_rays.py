@@ -35,7 +35,7 @@ class EdgeRays:
     sampling: sampling of the receptors
     rays: number of rays for a receptor at an edge
     signals: contribution of a component to the signal of each type of receptor, (channel, component)
-    noticed: largest difference between signals of rays that still count as equal
+    noticed: rays whose signals differ by at most this amount count as equal
     """
 
     def __init__(

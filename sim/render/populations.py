@@ -46,11 +46,12 @@ def everywhere(scene: WorldScene, views: int) -> Population:
 
 
 def near_objects(scene: WorldScene, sampling: EyeSampling, views: int, rays: int) -> Population:
-    """Return receptors that see an object in this number of views with an object nearby.
+    """Return views near objects, and random receptors, counted in those views in which they see an object.
 
-    In a wide eye, an object fills few receptors. Receptors that often see an object are therefore more likely drawn.
+    In a wide eye, an object fills few receptors. Receptors that often see an object are therefore drawn more often.
 
-    rays: number of rays through all receptors that decide which of them see an object
+    views: number of views
+    rays: number of rays, through all receptors together, that test which receptors see an object
     """
     near, n = near_views(scene.world, scene.eyes, views), int(np.prod(scene.eyes.resolution))
     middles = BoxSampling(scene.eye).trial(1, np.arange(n))

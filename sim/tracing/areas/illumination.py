@@ -63,7 +63,7 @@ class FrameState:
 
 
 class Illumination:
-    """The light that reaches patches, directly or reflected, past walls and bodies.
+    """Direct and reflected light on patches, without the light that walls and bodies block.
 
     around: for each cell, which cells around it are walls, for the kernel
     bodies: the light on bodies
