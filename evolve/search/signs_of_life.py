@@ -21,7 +21,7 @@ class SignsOfLife:
 
     patience_s: maximum time without a sign of life [s]
     regular_s: maximum time between two answers of a scheduler that is alive [s]; if it was silent for longer, the
-        workers are not blamed for the difference
+        excess does not count as silence of the workers
     """
 
     patience_s: float
