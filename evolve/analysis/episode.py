@@ -39,6 +39,7 @@ class Episode:
 
     task, candidate_id, seed: name of the task, id of the candidate, and seed of the episode
     phenotype, eye, world: the animal, and the settings of its eyes and of the world
+    mode: "evaluation", or "test" if the episode takes place in the layouts of the test set
     commands: meaning of each element of an action
     action: in [-1, 1], (t, number)
     reward: reward of each action, (t,)
@@ -87,6 +88,7 @@ class Episode:
     pictures: Pictures | None = None
     failure: str | None = None
     world: WorldConfig = field(default_factory=WorldConfig)
+    mode: str = "evaluation"
 
     def __len__(self) -> int:
         """Return the number of actions."""

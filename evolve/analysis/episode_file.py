@@ -113,7 +113,7 @@ def _of_first_form(rest: dict[str, Any], arrays: dict[str, Any]) -> Episode:
         rest["task"] = task_then(rest["task"])
     rest["world"] = _checked_world(rest["world"])
     where, eyes = rest["world"].evaluation, rest["phenotype"].eyes(rest["eye"])
-    world = build_world(rest["task"], seed=where["world_seed"], mazes=where["mazes"], course=where["course"])
+    world = build_world(rest["task"], **where)
     task, position, heading = task_of(world, "evaluation", eyes=eyes), arrays["position"], arrays["heading"]
     objects, everyone = arrays.pop("objects"), np.arange(len(position))
     physics = task.physics(len(position), 1, None)

@@ -1,4 +1,4 @@
-"""Statistics per generation, gene trajectories, acuity, image quality and confidence intervals.
+"""Statistics per generation, gene trajectories, image quality and confidence intervals.
 
 All functions depend only on their arguments. The report and the comparisons of runs show the results.
 """
@@ -26,7 +26,6 @@ if TYPE_CHECKING:
 __all__ = [
     "GenerationStatistics",
     "Trajectory",
-    "acuity_cpd",
     "bootstrap_interval",
     "champions",
     "eye_image_quality",
@@ -185,20 +184,6 @@ def gene_values(phenotype: Phenotype, eye: EyeConfig | None = None) -> dict[str,
             **dict(zip(LAMBDA_MAX, phenotype.lambda_max_nm, strict=False)),
         }
     return values if eye is None else {name: value for name, value in values.items() if name in eye.genes}
-
-
-def acuity_cpd(phenotype: Phenotype) -> float:
-    """Return the acuity: the frequency of the finest grating that the animal's sampling resolves [cycles/degree].
-
-    It is 1 / (2 min(range/(n_eyes - 1), fov/width)), after Tiwary, Young et al. (2025). The first term is the angle
-    between neighbouring eyes, the second the angle between neighbouring receptors. The first term is omitted for a
-    single eye, or if all eyes look in the same direction.
-    """
-    between_receptors = phenotype.fov_deg / phenotype.resolution[1]
-    if phenotype.n_eyes == 1 or phenotype.placement_range_deg == 0:
-        return 1 / (2 * between_receptors)
-    between_eyes = phenotype.placement_range_deg / (phenotype.n_eyes - 1)
-    return 1 / (2 * min(between_eyes, between_receptors))
 
 
 def polychromatic(eye: optics.Eye, psf: optics.PSFResult) -> optics.PSFResult:

@@ -6,11 +6,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from evolve.config.costs import CostsConfig
 from evolve.genome.eye_config import EyeConfig, setting
 from evolve.genome.interval import Interval
 
 __all__ = [
+    "FAMILY",
     "SECTIONS",
+    "CostsConfig",
     "EvaluationConfig",
     "EyeConfig",
     "LearningConfig",
@@ -19,6 +22,8 @@ __all__ = [
     "WorldConfig",
     "setting",
 ]
+
+FAMILY = "family"  # value of world.layouts
 
 
 @dataclass(frozen=True)
@@ -33,6 +38,28 @@ class WorldConfig:
     )
     course: str = setting("short", None, "navigation's course: short, or long (twice the length, half the actions)")
     evaluation_course: str = setting("short", None, "navigation's course in evaluation")
+    layouts: str = setting(
+        "fixed",
+        None,
+        "layouts of navigation and maze: fixed, as course, mazes and unseen determine; or family: random courses or "
+        "mazes in three sets without a common layout, for training, selection (early stopping and fitness) and test",
+    )
+    family_seed: int = setting(0, Interval(0, 2**63 - 1), "seed of a family; the same layouts for all candidates")
+    training_layouts: int = setting(8, Interval(1, 100), "number of a family's layouts for training")
+    selection_layouts: int = setting(8, Interval(1, 100), "number of a family's layouts for selection")
+    test_layouts: int = setting(8, Interval(1, 100), "number of a family's layouts for final figures")
+    layout_rows: int = setting(13, Interval(7, 31), "cells of a family's layouts along y, outer walls included; odd")
+    layout_columns: int = setting(39, Interval(15, 99), "cells of a family's layouts along x; odd")
+    path_width: int = setting(3, Interval(1, 3), "width of the paths of a family's courses [cells]: 1 or 3")
+    layout_actions: int = setting(
+        0, Interval(0, 10**6), "actions after which an episode in a family's layouts is truncated; 0: 256"
+    )
+    selection_set: str = setting(
+        "selection",
+        None,
+        "a family's set for early stopping and fitness: selection; or training, which rewards memory of the layouts",
+    )
+    wall_height: float = setting(1.0, Interval(0.4, 100), "height of the walls [m]; 0.5 in the published code")
     least_light: float = setting(
         1.0,
         Interval(1e-6, 1),
@@ -48,13 +75,35 @@ class WorldConfig:
 
     @property
     def training(self) -> dict[str, Any]:
-        """Arguments of `sim.make_vec_env` that define the worlds in training."""
-        return {"mazes": self.mazes, "world_seed": 0, "course": self.course}
+        """Arguments of `sim.build_world` that define the worlds in training."""
+        return {"mazes": self.mazes, "seed": 0, "course": self.course, **self._walls("training")}
 
     @property
     def evaluation(self) -> dict[str, Any]:
-        """Arguments of `sim.make_vec_env` that define the worlds in which fitness is evaluated."""
-        return {"mazes": self.mazes, "world_seed": int(self.unseen), "course": self.evaluation_course}
+        """Arguments of `sim.build_world` that define the worlds in which fitness is evaluated."""
+        fixed = {"mazes": self.mazes, "seed": int(self.unseen), "course": self.evaluation_course}
+        return {**fixed, **self._walls(self.selection_set)}
+
+    @property
+    def test(self) -> dict[str, Any]:
+        """Arguments of `sim.build_world` that define the worlds of final figures.
+
+        Without a family, they are those in which fitness is evaluated.
+        """
+        return {**self.evaluation, **self._walls("test")}
+
+    def _walls(self, name: str) -> dict[str, Any]:
+        """Return the height of the walls, and the set of this name if there is a family."""
+        layouts = None
+        if self.layouts == FAMILY:
+            from sim.worlds.layout_family import LayoutFamily  # loads MuJoCo, which `evolve list` does not need
+
+            counts = {"n_training": self.training_layouts, "n_selection": self.selection_layouts}
+            size = {"rows": self.layout_rows, "columns": self.layout_columns, "path_width": self.path_width}
+            steps = self.layout_actions or None
+            family = LayoutFamily(self.family_seed, **counts, n_test=self.test_layouts, **size, episode_steps=steps)
+            layouts = getattr(family, name)
+        return {"layouts": layouts, "wall_height": self.wall_height}
 
     @property
     def vary(self) -> dict[str, tuple[float, float]] | None:
@@ -165,7 +214,7 @@ DIRECT = WiringConfig()  # each receptor is an input of its eye's own encoder
 class EvaluationConfig:
     """Settings of the evaluation of fitness."""
 
-    episodes: int = setting(32, Interval(1, 10_000), "evaluation episodes whose mean return is the fitness")
+    episodes: int = setting(32, Interval(1, 10_000), "evaluation episodes whose mean return is the task fitness")
 
 
 SECTIONS: Mapping[str, type] = {
@@ -175,4 +224,5 @@ SECTIONS: Mapping[str, type] = {
     "learning": LearningConfig,
     "wiring": WiringConfig,
     "evaluation": EvaluationConfig,
+    "costs": CostsConfig,
 }

@@ -4,7 +4,8 @@ Eyes sit on the equator of a head of radius `eye.head_radius`, and an eye is as 
 neighbouring eyes is placement range / (eyes - 1). All retinas are `eye.sensor_width` wide and filled with receptors,
 which are at least `eye.receptor_width` wide. If `eye.receptor_pitch` is above 0, the width of a retina is instead the
 number of receptors along its width times this pitch. Height takes no space on the head, but receptors are also at
-least `eye.receptor_width` high. A repair changes genes as little as possible.
+least `eye.receptor_width` high. A repair changes genes as little as possible. Costs (`evolve.config.costs`) apply to
+the repaired animal, in addition to these constraints.
 """
 
 from __future__ import annotations

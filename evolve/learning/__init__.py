@@ -1,8 +1,9 @@
 """Training run and evaluation of one animal.
 
 fitness           evaluate: training run and fitness of a candidate
+final_figures     returns in the layouts that no selection has used
 animal_task       a run's task with one animal in it
-training_envs     environments for training, selection and test
+training_envs     environments for training, selection and fitness
 task_module       execution of the code of a user task
 task_trial        short trial of a user task before a run
 ppo               PPO training, which stops early if returns no longer improve

@@ -25,7 +25,7 @@ def animal_task(
 ) -> BatchTask:
     """Return the run's task with this animal in it, for arrays of worlds.
 
-    mode: "training" or "evaluation", which may have different layouts of worlds
+    mode: "training", "evaluation" or "test", which may have different layouts of worlds
     eyes: eyes that replace the animal's own
 
     Raises:
@@ -37,8 +37,7 @@ def animal_task(
         return batched(task).in_mode(mode)
     eyes, layout = eyes or phenotype.eyes(config.eye), getattr(config.world, mode)
     asked = requested_fidelity(config.eye.rays_per_receptor, eyes)
-    world = build_world(config.task, seed=layout["world_seed"], mazes=layout["mazes"], course=layout["course"])
-    built_in = task_of(world, mode, eyes=eyes, fidelity=asked or AUTO)
+    built_in = task_of(build_world(config.task, **layout), mode, eyes=eyes, fidelity=asked or AUTO)
     built_in.vary = config.world.vary
     return built_in
 

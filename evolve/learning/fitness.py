@@ -110,7 +110,7 @@ def _live(
 ) -> tuple[Training, Episodes]:
     """Train, then play the evaluation episodes, which have new start poses and object positions.
 
-    The mazes of the evaluation are the same for all candidates of all runs. Failures of episodes are counted in
+    The layouts of the evaluation are the same for all candidates. Failures of episodes are counted in
     `failures`, even if learning diverges.
 
     entropy: seed of all random numbers
@@ -121,7 +121,7 @@ def _live(
     with (
         closing(places.training) as lessons,
         closing(places.selection) as checkpoints,
-        closing(places.test) as finals,
+        closing(places.fitness) as finals,
     ):
         brain = Brain(phenotype.neurons, phenotype.layers, phenotype.encoder, config.wiring)
         try:

@@ -1,6 +1,6 @@
-"""Checks of a user task before a run starts: settings that would have no effect, and a short trial.
+"""Checks before a run starts: random layouts, settings of a user task that would have no effect, and a short trial.
 
-A failure in the task would affect every animal of the run.
+A failure would affect every animal of the run.
 """
 
 from __future__ import annotations
@@ -14,6 +14,8 @@ import numpy as np
 
 from evolve.config.checks import AUTO, ConfigError
 from evolve.config.run_config import RunConfig
+from evolve.config.settings import FAMILY
+from evolve.config.task_card import OF_LAYOUTS
 from evolve.config.task_errors import error_in_task
 from evolve.genome.genotype import Genotype
 from evolve.genome.phenotype import develop
@@ -23,7 +25,7 @@ if TYPE_CHECKING:
     from sim.envs.vec_env import EyesVecEnv
     from sim.tasks.task_settings import TaskSettings
 
-__all__ = ["UnusedSettingWarning", "check_settings", "try_task"]
+__all__ = ["UnusedSettingWarning", "check_layouts", "check_settings", "try_task"]
 
 WORLDS, ACTIONS = 2, 4
 
@@ -77,6 +79,21 @@ def _unused(task: TaskSettings, config: RunConfig) -> Iterator[str]:
         yield f"fidelity has no effect: the run has eye.rays_per_receptor = {rays}"
     elif isinstance(fidelity, Fidelity) and rays == AUTO and fidelity.bands != bands:
         yield f"fidelity.bands = {fidelity.bands} has no effect: the run has eye.bands = {bands}"
+
+
+def check_layouts(config: RunConfig) -> None:
+    """Draw the random layouts of all sets, if the run has a family of them.
+
+    Raises:
+        ConfigError: two layouts have the same walls, or courses of this size cannot be drawn.
+    """
+    if config.world.layouts != FAMILY:
+        return
+    layouts = config.world.test["layouts"]
+    try:
+        _ = layouts.mazes if config.task == "maze" else layouts.courses
+    except ValueError as error:
+        raise ConfigError(f"world: {error}", *OF_LAYOUTS) from error
 
 
 def try_task(config: RunConfig) -> None:

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from types import TracebackType
 from typing import Any, TextIO
 
+from evolve.analysis.fitness_parts import fitness_text
 from evolve.config.numbering import Place
 from evolve.runs.output import as_it_is, printable
 from evolve.search.successive_halving import evaluations
@@ -138,7 +139,8 @@ class Lines(_Watcher):
 
     def evaluated(self, candidate: Candidate) -> None:
         super().evaluated(candidate)
-        outcome = f"failed ({candidate.failure})" if candidate.failure else f"fitness {candidate.fitness:.3g}"
+        fitness = fitness_text(candidate.fitness, candidate.costs, "{:.3g}".format)
+        outcome = f"failed ({candidate.failure})" if candidate.failure else f"fitness {fitness}"
         count = f"{len(self.run.in_order_of_finish)}/{self.tally.planned}"
         print(f"candidate {candidate.id} ({count}): {outcome}; {self.tally.summary()}", file=self.out, flush=True)
 
@@ -165,6 +167,8 @@ class Events(_Watcher):
             "generation": candidate.generation,
             "rung": candidate.rung,
             "fitness": None if candidate.failure else candidate.fitness,
+            "task_fitness": None if candidate.failure else candidate.task_fitness,
+            "costs": None if candidate.failure else candidate.costs,
             "failure": candidate.failure,
             "evaluated": len(self.run.in_order_of_finish),
             "planned": self.tally.planned,

@@ -198,7 +198,7 @@ class BatchTask(TaskSettings):
         return StreamsByWorld(seed, n, [len(agent.kinds) for agent in self.agents()])
 
     def in_mode(self, mode: str) -> Self:
-        """Return this task in the given mode, "training" or "evaluation"."""
+        """Return this task in the given mode, "training", "evaluation" or "test"."""
         if self.mode == mode:
             return self
         found = copy.copy(self)

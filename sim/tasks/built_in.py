@@ -75,7 +75,7 @@ class AgentTask(BatchTask):
     """A task in one of the built-in worlds, in which an agent slides over the floor between walls.
 
     world: the compiled world
-    mode: "training" or "evaluation", which selects the weights of the reward
+    mode: "training", "evaluation" or "test", which selects the weights of the reward
     eyes: eyes on the agent's equator, or a dictionary of several kinds of eyes by name; None: no eyes
     fidelity: fidelity of the eyes, or "auto"
     """

@@ -10,6 +10,7 @@ from contextlib import AbstractContextManager, contextmanager, nullcontext
 from typing import Any
 
 from evolve.analysis.episode_failures import episode_failure_lines, episode_failures_of
+from evolve.analysis.fitness_parts import fitness_text
 from evolve.cli.commands import INTERRUPTED
 from evolve.cli.commands.products import REPORT, Products, finished_products, open_page
 from evolve.cli.run_plan import RunPlan, steps_each
@@ -201,12 +202,14 @@ def _finish(run: Run, arguments: Namespace) -> int:
 
 
 def _finished_event(run: Run, best: Candidate, made: Products) -> dict[str, Any]:
-    return {"event": "finished", "best": best.id, "fitness": best.fitness, **made.record(run)}
+    parts = {"fitness": best.fitness, "task_fitness": best.task_fitness, "costs": best.costs}
+    return {"event": "finished", "best": best.id, **parts, **made.record(run)}
 
 
 def _outcome(run: Run, best: Candidate, failures: list[Candidate]) -> list[str]:
     """Return lines about the best candidate, failed candidates, failed episodes and repaired genomes."""
-    lines = [f"best: candidate {best.id}, fitness {best.fitness:.4g}, success rate {best.success_rate:.0%}"]
+    fitness = fitness_text(best.fitness, best.costs)
+    lines = [f"best: candidate {best.id}, fitness {fitness}, success rate {best.success_rate:.0%}"]
     if failures:
         lines.append(
             f"failed: {len(failures)} of {len(run.candidates)} candidates; the last one: {failures[-1].failure}"
