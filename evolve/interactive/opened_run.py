@@ -102,7 +102,7 @@ class OpenedRun(Run):
 
         Raises:
             RunError: the candidate does not exist, or its policy is missing or damaged.
-            ConfigError: the run has no test set, or the code of its user task has not been named.
+            ConfigError: the run has no test set, or the user has not named the code of its task.
         """
         from evolve.analysis.held_out import held_out_episodes
 
