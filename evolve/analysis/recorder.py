@@ -1,4 +1,4 @@
-"""Recording of episodes: a candidate plays an episode, whose scenes are also rendered behind a perfect lens."""
+"""Recording of episodes. A candidate plays an episode, and its views are also rendered through a perfect lens."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ from sim.worlds.ground_plan import GroundPlan
 __all__ = ["EVERY", "FINE_PIXELS", "Recorder", "damage_named", "record", "trained_policy"]
 
 EVERY, MOST_EVERY = 8, 1_000_000  # default and maximum number of actions between two recordings of radiance
-FINE_PIXELS = 60  # minimum number of pixels along the longer side of the radiance images
+FINE_PIXELS = 60  # smallest number of pixels along the longer side of the radiance images
 FINE = {"rays": 16, "areas": 4, "edges": 16}  # samples per receptor or pixel behind a perfect lens
 MOST_PICTURES = 128  # maximum number of images for display, at equal intervals of time
 MODES = ("evaluation", "test")  # modes of recorded episodes
@@ -51,13 +51,13 @@ def record(
     """Record one evaluation episode of a candidate. The same arguments give the same episode, bit for bit.
 
     candidate_id: id of the candidate; None: the best candidate
-    radiance_every: number of actions from one recording of the scene's radiance to the next
-    pictures: whether to render images for display; for tasks without a ground plan, they are always rendered
+    radiance_every: number of actions between two recordings of the scene's radiance
+    pictures: True to render images for display; for tasks without a ground plan, they are always rendered
     mode: "evaluation", or "test" for the layouts of the test set
 
     Raises:
         RunError: the candidate does not exist, or its policy is missing or damaged.
-        ConfigError: the mode is unknown, the run has no test set, or the code of its user task has not been named.
+        ConfigError: the mode is unknown, the run has no test set, or the user has not named the code of its task.
         ValueError: radiance_every is not a whole number from 1 to 1,000,000.
     """
     radiance_every = whole("every", radiance_every, 1, MOST_EVERY)
@@ -76,11 +76,11 @@ def trained_policy(run: Run, candidate: Candidate) -> EyePolicy:
 
     Raises:
         RunError: the policy is missing or damaged.
-        ConfigError: the task is a user task, and its code has not been named.
+        ConfigError: the task is a user task, and the user has not named its code.
     """
     path = run.policy_path(candidate.id)
     require_policy(candidate, path)
-    _ = run.config.choice.named_code  # raises an error now if the user task has not been named
+    _ = run.config.choice.named_code  # refuses, before any work, a user task that the user has not named
     try:
         return load_policy(path)
     except ValueError as error:
@@ -185,10 +185,12 @@ class Recorder:
 class _Beginning:
     """State at the start of an episode.
 
-    It is read at the start, because after the end of the episode the environment immediately starts the next episode.
+    It is stored in advance, because the environment starts the next episode as soon as one ends.
 
-    observation, info: values after the reset · light: factors by which light is multiplied, (1, band) float32
-    solids: visible geoms · plan: plan of the world from above; None if the task has none
+    observation, info: values after the reset
+    light: factors by which light is multiplied, (1, band) float32
+    solids: visible geoms
+    plan: plan of the world from above; None if the task has none
     """
 
     observation: dict[str, np.ndarray]
@@ -218,7 +220,7 @@ def _model(physics: Any) -> mujoco.MjModel:
 def _play(
     policy: EyePolicy, worlds: EyesVecEnv, begun: _Beginning, pictures: bool
 ) -> tuple[list[Poses], dict[str, Any]]:
-    """Play one episode; return the poses before each action, and those fields of `Episode` that follow from playing."""
+    """Play one episode. Return the poses before each action, and the fields of `Episode` that this determines."""
     poses, rows, taken = list[Poses](), list[tuple[Any, ...]](), list[np.ndarray]()
     observation, infos, done, solved = begun.observation, [begun.info], False, None
     every = max(1, -(-worlds.simulation.episode_steps // MOST_PICTURES))

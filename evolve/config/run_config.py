@@ -55,11 +55,11 @@ __all__ = [
 ]
 
 RHABDOMS = ("rhabdom_index", "rhabdom_surround", "rhabdom_length", "rhabdom_absorption")
-# Limits of the numerical aperture of rhabdoms; that of a fly's rhabdom is 0.25. Below the lower limit a rhabdom guides
-# almost no light, and above the upper limit it has hundreds of modes.
+# Limits of the numerical aperture of rhabdoms. A fly's rhabdom has 0.25. Below the lower limit a rhabdom guides almost
+# no light, and above the upper limit it has hundreds of modes.
 LEAST_STEP, MOST_STEP = 0.2, 0.5
-# [lx s] smallest allowed exposure. A receptor that sees white through a pupil with relative aperture 1 then absorbs
-# some 30 photons. With fewer photons, the approximation of shot noise fails.
+# [lx s] smallest allowed exposure. A receptor that sees a white surface through a pupil with relative aperture 1 then
+# absorbs some 30 photons. With fewer photons, the approximation of shot noise fails.
 LEAST_EXPOSURE = 2e-4
 
 

@@ -64,7 +64,7 @@ class OpenedRun(Run):
 
     @property
     def best(self) -> OpenedCandidate | None:
-        """Candidate with the highest fitness, the earliest if several have it; None if none has succeeded."""
+        """Candidate with the highest fitness (the earliest of equals); None before a candidate has succeeded."""
         best = super().best
         return None if best is None else OpenedCandidate.of_run(best, self)
 
@@ -102,7 +102,7 @@ class OpenedRun(Run):
 
         Raises:
             RunError: the candidate does not exist, or its policy is missing or damaged.
-            ConfigError: the run has no test set, or the code of its user task has not been named.
+            ConfigError: the run has no test set, or the user has not named the code of its task.
         """
         from evolve.analysis.held_out import held_out_episodes
 

@@ -218,9 +218,11 @@ def _makers(run: Run, episode: Episode | None) -> Iterator[tuple[str, Callable[[
 
 
 def _within(doing: Doing, done: int, of: int, what: str, share: float) -> None:
-    """Report progress within a section as a share of the whole page.
+    """Report progress within a section as a fraction of the whole page.
 
-    done: number of completed sections · of: number of all sections · share: completed share of the current section
+    done: number of completed sections
+    of: number of all sections
+    share: completed fraction of the current section
     """
     doing(what, (done + share) / of)
 
@@ -229,7 +231,7 @@ def render(run: Run, episode: Episode | None, doing: Doing = in_silence) -> byte
     """Return the whole page.
 
     episode: an episode of the best candidate; None if no candidate has succeeded
-    doing: function that is called with the current step and the completed share of the work, in [0, 1]
+    doing: function that is called with the current step and the completed fraction of the work, in [0, 1]
     """
     makers = list(_makers(run, episode))
     parts = []

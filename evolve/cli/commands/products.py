@@ -50,8 +50,8 @@ def finished_products(run: Run, shown: bool, replay: bool = False) -> Products:
 
     The report is written last, so its existence shows that all files are complete.
 
-    shown: whether to show a progress bar
-    replay: whether to also write a page that plays the episode
+    shown: True to show a progress bar
+    replay: True to also write a page that plays the episode
     """
     with Waiting(3 + replay, shown) as wait:
         wait.step("the best agent plays an episode")
