@@ -97,9 +97,8 @@ class PolicyConfig:
     def record(self) -> dict[str, Any]:
         """Return the shape as JSON values.
 
-        The record of a run contains a hash of each policy file. A policy must therefore be written with the same bytes
-        by all versions. Former versions had neither a list of other entries nor a choice of wiring, so their form is
-        used for shapes that they could describe.
+        The record of a run contains a hash of each policy file, so all versions must write the same bytes. The form of
+        versions without a list of other entries and without a choice of wiring is used where it is sufficient.
         """
         values = {name: value for name, value in asdict(self).items() if name != "beside"}
         if self.wiring == DIRECT:
@@ -118,7 +117,8 @@ class PolicyConfig:
 
         Raises:
             KeyError: an entry is missing.
-            TypeError, ValueError: an entry is not a number.
+            TypeError: an entry is not a number.
+            ValueError: an entry is not a number.
         """
         return cls(
             eyes=tuple(int(n) for n in stored["eyes"]),
