@@ -57,7 +57,7 @@ def _best_tiles(best: Candidate) -> list[tuple[str | Html, str, str]]:
     if len(best.returns) > 1:
         spread = f"mean of {len(best.returns)} episodes; 95 % interval {rounded(low)} to {rounded(high)}"
     if best.costs:
-        spread = f"task fitness {rounded(best.task_fitness, 4)} − costs {rounded(best.costs, 4)}; {spread}"
+        spread = f"task fitness {rounded(best.task_fitness, 4)}, costs {rounded(best.costs, 4)}; {spread}"
     return [
         (html("Best {}", hint("fitness")), rounded(best.fitness, 4), spread),
         ("Best candidate", f"no. {best.id}", f"generation {best.generation}"),
