@@ -8,7 +8,7 @@ __all__ = ["acuity_cpd", "acuity_vertical_cpd"]
 
 
 def acuity_cpd(phenotype: Phenotype) -> float:
-    """Return the horizontal acuity: the frequency of the finest upright grating that is resolved [cycles/degree].
+    """Return the horizontal acuity: the frequency of the finest vertical grating that is resolved [cycles/degree].
 
     It is 1 / (2 min(range/(n_eyes - 1), fov/width)), after Tiwary, Young et al. (2025). The first term is the angle
     between neighbouring eyes, the second the angle between neighbouring receptors. With a single eye, or if all eyes
@@ -22,7 +22,7 @@ def acuity_cpd(phenotype: Phenotype) -> float:
 
 
 def acuity_vertical_cpd(phenotype: Phenotype) -> float:
-    """Return the vertical acuity: the frequency of the finest level grating that is resolved [cycles/degree].
+    """Return the vertical acuity: the frequency of the finest horizontal grating that is resolved [cycles/degree].
 
     It is 1 / (2 vertical fov/height). Square receptors have the same spacing as along the width, fov/width. Eyes are
     placed side by side, so their number has no effect.

@@ -41,7 +41,7 @@ __all__ = [
 Floats = NDArray[np.float64]
 SPREAD = (0.1, 0.9)  # quantiles between which a population's spread is shown
 PERCENTILE_RESAMPLES = 2000
-RESAMPLED_AT_ONCE = 2**20  # samples drawn at once, which limits the memory
+RESAMPLED_AT_ONCE = 2**20  # largest number of samples that are drawn at once; it limits the memory
 
 
 @dataclass(frozen=True)
@@ -117,7 +117,7 @@ def generation_statistics(candidates: Sequence[Candidate]) -> list[GenerationSta
 
 
 def trajectory(candidates: Sequence[Candidate], value: Callable[[Phenotype], float]) -> Trajectory:
-    """Return a quantity over the generations: its spread in each population, and its value in the best so far.
+    """Return a quantity over the generations: its spread in each population, and its value in the champion.
 
     value: function that returns the quantity of a phenotype
     """
@@ -149,7 +149,7 @@ def gene_values(phenotype: Phenotype, eye: EyeConfig | None = None) -> dict[str,
     Optical genes are present only if optics are on, and spectral genes only if receptors are inherited. For receptor
     types that the animal lacks, the peak wavelengths are NaN.
 
-    eye: settings of a run's eyes; only genes of this run are returned, such as an eighth of a symmetric relief's
+    eye: settings of a run's eyes. Only genes that this run has are returned, such as an eighth of a symmetric relief's
         heights, or one side of a square eye. None: all values are returned
     """
     height, width = phenotype.resolution
@@ -187,15 +187,15 @@ def gene_values(phenotype: Phenotype, eye: EyeConfig | None = None) -> dict[str,
 
 
 def polychromatic(eye: optics.Eye, psf: optics.PSFResult) -> optics.PSFResult:
-    """Return the PSF in white daylight, (1, y, x), with bands weighted by the mean sensitivity of the channels."""
+    """Return the PSF in white daylight, (1, y, x). Bands are weighted by the mean sensitivity of the channels."""
     return psf.mean(_of_daylight(eye))
 
 
 def white_strehl(eye: optics.Eye, psf: optics.PSFResult) -> float:
-    """Return the Strehl ratio in white daylight; NaN if the PSF's window does not contain the peak.
+    """Return the Strehl ratio in white daylight; NaN if the PSF's window does not contain the maximum.
 
-    The reference is the PSF of an aperture of the same width without aberrations at any wavelength, in the same light.
-    Its peak is higher than at the mean wavelength, because peaks are proportional to 1/λ².
+    The reference is the PSF of the same aperture without aberrations at any wavelength, in the same light. Its maximum
+    is higher than that at the mean wavelength, because maxima are proportional to 1/λ².
     """
     import optics
 
@@ -206,7 +206,7 @@ def white_strehl(eye: optics.Eye, psf: optics.PSFResult) -> float:
 
 
 def _of_daylight(eye: optics.Eye) -> NDArray[np.float64]:
-    """Return the share of each band in the mean response of the receptor channels to white daylight; the sum is 1."""
+    """Return the fraction of each band in the receptors' mean response to white daylight. Fractions sum to 1."""
     from optics.spectra.bands import daylight
 
     weights = eye.spectral_bands.weights.mean(axis=0) * daylight(eye.spectral_bands.wavelengths)

@@ -1,7 +1,7 @@
 """Scalars of a run for TensorBoard: fitness over the generations, learning curves of training runs, and genes.
 
-TensorBoard's own writer writes them into the folder `tensorboard/` of the run directory. All scalars can be derived
-from the record. When a run is continued, the files are therefore deleted and written again.
+TensorBoard's own writer writes them to the folder `tensorboard/` of the run directory. All scalars follow from the
+record, so the files are deleted and written again when a run is continued.
 """
 
 from __future__ import annotations

@@ -20,14 +20,14 @@ from evolve.interactive.summary import animal_as_html, run_as_html
 from evolve.interactive.table import candidate_table
 from evolve.runs.resume import resuming
 from evolve.store.candidate import Candidate
-from evolve.store.directory import Run, RunError
-from evolve.store.policies import require_policy
+from evolve.store.directory import Run
 
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+    from evolve.learning.ppo import Episodes
     from sim.tasks.encounter import Frozen
     from sim.tasks.task import Task
 
@@ -64,7 +64,7 @@ class OpenedRun(Run):
 
     @property
     def best(self) -> OpenedCandidate | None:
-        """Candidate with the highest fitness, the earliest if several have it; None if none has succeeded."""
+        """Candidate with the highest fitness (the earliest of equals); None before a candidate has succeeded."""
         best = super().best
         return None if best is None else OpenedCandidate.of_run(best, self)
 
@@ -86,18 +86,27 @@ class OpenedRun(Run):
             RunError: the candidate does not exist, or its policy is missing or damaged.
             ValueError: the eyes that the task places differ from those of the candidate.
         """
+        from evolve.analysis.recorder import trained_policy
         from evolve.learning.animal_task import with_phenotype
-        from evolve.learning.policy import load_policy
         from sim.tasks.encounter import Frozen
 
         candidate = self.candidate(candidate_id)
-        path = self.policy_path(candidate.id)
-        require_policy(candidate, path)
-        try:
-            policy = load_policy(path)
-        except ValueError as error:
-            raise RunError(str(error)) from error
-        return Frozen(with_phenotype(task, candidate.phenotype, self.config), policy)
+        return Frozen(with_phenotype(task, candidate.phenotype, self.config), trained_policy(self, candidate))
+
+    def held_out(self, candidate_id: int | None = None, seed: int = 0, episodes: int | None = None) -> Episodes:
+        """Return evaluation episodes in the test set of layouts, which neither training nor selection has used.
+
+        candidate_id: id of the candidate; None: the best candidate
+        seed: seed of the episodes
+        episodes: number of episodes; None: the run's setting `evaluation.episodes`
+
+        Raises:
+            RunError: the candidate does not exist, or its policy is missing or damaged.
+            ConfigError: the run has no test set, or the user has not named the code of its task.
+        """
+        from evolve.analysis.held_out import held_out_episodes
+
+        return held_out_episodes(self, candidate_id, seed, episodes)
 
     def resume(self, callbacks: Sequence[Callback] = (), progress: bool = True) -> None:
         """Continue an interrupted run to its end. A finished run stays unchanged. See `evolve.run` for the arguments.
@@ -175,6 +184,7 @@ class OpenedRun(Run):
         every: int | None = None,
         also: Collection[str] = (),
         out: Path | str | None = None,
+        mode: str = "evaluation",
     ) -> list[Path]:
         """Play an episode of a candidate, write a page that shows it, and return the paths of the page and other files.
 
@@ -185,16 +195,17 @@ class OpenedRun(Run):
         every: number of actions from one image of the scene to the next in a recording for Rerun; None: 8
         also: formats of additional files next to the page: "rrd" (a recording for Rerun), "gif" and "mp4"
         out: path of the page; None: a name in the run directory
+        mode: "evaluation", or "test" for the layouts of the test set
 
         Raises:
             RunError: the candidate does not exist, or its policy is missing or damaged.
-            ConfigError: an argument is invalid, a program that `also` needs is not installed, or the code of the user
-                task has not been named when the run was opened.
+            ConfigError: an argument is invalid, a program that `also` needs is not installed, the run has no test set,
+                or the code of the user task has not been named when the run was opened.
             ValueError: `every` is not a whole number from 1 to 1,000,000.
         """
         from evolve.report.replay import write_replay
 
-        return write_replay(self, candidate_id, _seed(seed), every, also, _path(out))[1]
+        return write_replay(self, candidate_id, _seed(seed), every, also, _path(out), mode)[1]
 
     def export(
         self, candidate_id: int | None = None, seed: int = 0, *, every: int = 8, out: Path | str | None = None

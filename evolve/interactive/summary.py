@@ -13,7 +13,7 @@ from evolve.store.directory import Run
 
 __all__ = ["animal_as_html", "run_as_html"]
 
-SHOWN = 12  # number of generations shown, the latest ones
+SHOWN = 12  # number of the latest generations that are shown
 
 
 def run_as_html(run: Run) -> Html:

@@ -34,7 +34,7 @@ def export_run(
     seed: seed of the episode
     every: number of actions from one file to the next
     out: folder of the files; None for `exr/` in the run directory
-    doing: function that is called with the current step and the completed share of the work, in [0, 1]
+    doing: function that is called with the current step and the completed fraction of the work, in [0, 1]
 
     Raises:
         RunError: the candidate does not exist, or it has no policy.

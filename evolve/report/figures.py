@@ -30,7 +30,7 @@ __all__ = [
 ]
 
 SIZE = (370, 260)
-DASHES = ("-", "--", ":", "-.")  # line styles; the second is used if there are more lines than colours, and so on
+DASHES = ("-", "--", ":", "-.")  # line styles; after the last colour, the colours are repeated with the next style
 Generations = Sequence[int] | NDArray[np.int64]
 
 
@@ -143,7 +143,7 @@ def vision_figure(name: str, label: str, generations: Sequence[int], values: Seq
 
 
 def success_figure(candidates: Sequence[Candidate]) -> Html:
-    """Draw the share of evaluation episodes that were solved, over the generations."""
+    """Draw the fraction of evaluation episodes that were solved, over the generations."""
     with drawing(*SIZE) as figure:
         axes = figure.subplots()
         _candidates(axes, candidates, [100 * c.success_rate for c in candidates])
@@ -184,7 +184,8 @@ def gene_figure(
 ) -> Html:
     """Draw the values of one gene over the generations.
 
-    limits: range of the vertical axis; None: the range of the values · whole: whether its ticks are integers
+    limits: range of the vertical axis; None: the range of the values
+    whole: True if its ticks are integers
     """
     with drawing(250, 165, font=10.5) as figure:
         axes = figure.subplots()

@@ -58,8 +58,10 @@ class QuantityDrift:
 class Drift:
     """Comparison of runs with searches with random fitness.
 
-    of: number of runs · searches: number of searches · costs: whether the searches subtract costs
-    generations: generations over which means are taken, counted from 0
+    of: number of runs
+    searches: number of searches
+    costs: True if the searches subtract costs
+    generations: generations over which means are computed, counted from 0
     moved: quantities, with their values
     """
 
@@ -102,10 +104,11 @@ def drift_of(runs: Sequence[Run], searches: int = SEARCHES, done: Callable[[floa
     """Compare runs that differ only in their seeds with searches with random fitness (`evolve.search.null_model`).
 
     The quantities are the genes that the search varies, the horizontal acuity [cycles/degree], the vertical one unless
-    receptors are square, and the number of positions of receptors. Means are taken over the last generations that all
-    runs have completed.
+    receptors are square, and the number of positions of receptors. Means are over the last generations that all runs
+    have completed.
 
-    searches: number of searches · done: function that is called with the share of completed searches
+    searches: number of searches
+    done: function that is called with the completed fraction of the searches
 
     Raises:
         RunError: the runs differ in settings other than their seeds, two runs have the same seed, or a run has no
@@ -161,9 +164,9 @@ def _open(name: str, config: RunConfig) -> bool:
 
 
 def _ends(run: Run, generations: range) -> dict[str, float]:
-    """Return the mean of each quantity over the successful candidates of these generations; NaN if none of them has it.
+    """Return the mean of each quantity over the successful candidates of these generations.
 
-    Quantities of which no candidate has a value have the value NaN.
+    It is NaN for a quantity that none of them has.
     """
     values: dict[str, list[float]] = defaultdict(list)
     for candidate in run.candidates:

@@ -13,7 +13,7 @@ from evolve.store.directory import Run
 
 __all__ = ["lineup"]
 
-MOST = 60  # maximum number of animals on a page; if there are more, a selection is spread evenly over them
+MOST = 60  # maximum number of animals on a page; if there are more, evenly spaced ones are selected
 
 
 def lineup(run: Run) -> Html:

@@ -9,8 +9,10 @@ from functools import partial
 from evolve.analysis.acuity import acuity_cpd, acuity_vertical_cpd
 from evolve.analysis.episode import Episode
 from evolve.analysis.fitness_parts import any_costs, fitness_text
+from evolve.analysis.held_out import held_out_episodes
 from evolve.analysis.statistics import champions, gene_values, trajectory
 from evolve.analysis.vision import SCENES, Vision, vision
+from evolve.config.settings import FAMILY
 from evolve.genome.genes import CLUSTERS, Gene
 from evolve.report import tables
 from evolve.report.doing import Doing, in_silence
@@ -72,7 +74,10 @@ def animals_section(run: Run) -> Html:
 
 
 def numbers_section(run: Run) -> Html:
-    return section("numbers", "The run in numbers", tables.headline(run))
+    """Return the section with the main results; if there is a test set of layouts, the best candidate plays in it."""
+    has_test_set = run.config.world.layouts == FAMILY and run.best is not None
+    held_out = held_out_episodes(run).returns.tolist() if has_test_set else ()
+    return section("numbers", "The run in numbers", tables.headline(run, held_out))
 
 
 def genes_section(run: Run) -> Html:
@@ -213,9 +218,11 @@ def _makers(run: Run, episode: Episode | None) -> Iterator[tuple[str, Callable[[
 
 
 def _within(doing: Doing, done: int, of: int, what: str, share: float) -> None:
-    """Report progress within a section as a share of the whole page.
+    """Report progress within a section as a fraction of the whole page.
 
-    done: number of completed sections · of: number of all sections · share: completed share of the current section
+    done: number of completed sections
+    of: number of all sections
+    share: completed fraction of the current section
     """
     doing(what, (done + share) / of)
 
@@ -224,7 +231,7 @@ def render(run: Run, episode: Episode | None, doing: Doing = in_silence) -> byte
     """Return the whole page.
 
     episode: an episode of the best candidate; None if no candidate has succeeded
-    doing: function that is called with the current step and the completed share of the work, in [0, 1]
+    doing: function that is called with the current step and the completed fraction of the work, in [0, 1]
     """
     makers = list(_makers(run, episode))
     parts = []

@@ -28,6 +28,7 @@ def write_replay(
     every: int | None = None,
     also: Collection[str] = (),
     out: Path | None = None,
+    mode: str = "evaluation",
 ) -> tuple[Episode, list[Path]]:
     """Record an episode, write a page that plays it, and return the episode and the paths of all files.
 
@@ -36,11 +37,12 @@ def write_replay(
     every: number of actions from one image of the scene to the next in a recording for Rerun; None: 8
     also: formats of additional files next to the page: "rrd" (a recording for rerun), "gif" and "mp4"
     out: path of the page; None: a name in the run directory
+    mode: "evaluation", or "test" for the layouts of the test set
 
     Raises:
         RunError: the candidate does not exist, or it has no policy.
         ConfigError: rerun or ffmpeg is needed but not installed, `out` has the ending of an additional file, a format
-            is unknown, or `every` is given without "rrd".
+            is unknown, `every` is given without "rrd", or the run has no test set.
         StrangeFileError: `out` is not a regular file, for example a directory.
         ValueError: `every` is not a whole number from 1 to 1,000,000.
     """
@@ -54,7 +56,7 @@ def write_replay(
         require_rerun()
     if "mp4" in also:
         require_ffmpeg()
-    episode = record(run, candidate_id, seed, EVERY if every is None else every)
+    episode = record(run, candidate_id, seed, EVERY if every is None else every, mode=mode)
     page = write_page(run, episode, out)
     return episode, [page, *(BESIDE[form](episode, page.with_suffix(f".{form}")) for form in BESIDE if form in also)]
 
@@ -69,7 +71,8 @@ def _require_page(out: Path) -> None:
 
 def write_page(run: Run, episode: Episode, out: Path | None = None) -> Path:
     """Write the page that plays an episode of a run, to `out` or into the run directory, and return its path."""
-    path = out or run.path / f"replay_candidate{episode.candidate_id:06d}_seed{episode.seed}.html"
+    test = "_test" if episode.mode == "test" else ""
+    path = out or run.path / f"replay_candidate{episode.candidate_id:06d}_seed{episode.seed}{test}.html"
     if out is not None:  # a run directory that was deleted meanwhile must not reappear
         path.parent.mkdir(parents=True, exist_ok=True)
     return write_player(episode, path)
@@ -81,6 +84,7 @@ def episode_facts(episode: Episode) -> dict[str, Any]:
         "task": episode.task,
         "candidate": episode.candidate_id,
         "episode seed": episode.seed,
+        **({"layouts": "test set"} if episode.mode == "test" else {}),
         "actions": len(episode),
         "return": float(episode.reward.sum()),
         "terms": {name: float(term.sum()) for name, term in episode.reward_terms.items()},

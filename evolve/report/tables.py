@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from evolve.analysis.acuity import acuity_cpd, acuity_vertical_cpd
 from evolve.analysis.episode_failures import episode_failures_of
-from evolve.analysis.fitness_parts import any_costs, fitness_interval
-from evolve.analysis.statistics import gene_values, succeeded
+from evolve.analysis.fitness_parts import any_costs
+from evolve.analysis.statistics import bootstrap_interval, gene_values, succeeded
 from evolve.config.assemble import to_toml
 from evolve.genome.genes import ALL_GENES
 from evolve.genome.phenotype import Phenotype
@@ -29,8 +31,11 @@ __all__ = [
 ]
 
 
-def headline(run: Run) -> Html:
-    """Return the main results of the run."""
+def headline(run: Run, held_out: Sequence[float] = ()) -> Html:
+    """Return the main results of the run.
+
+    held_out: returns of the best candidate's episodes in the test set of layouts; empty if the run has none
+    """
     failed = sum(not succeeded(c) for c in run.candidates)
     generations = len({c.generation for c in run.candidates})
     seconds = sum(c.seconds for c in run.candidates)
@@ -46,20 +51,17 @@ def headline(run: Run) -> Html:
         ("Evaluation time", duration(seconds), "training and evaluation, summed over workers"),
     ]
     if (best := run.best) is not None:
-        tiles = [*_best_tiles(best), *tiles]
+        tested = []
+        if len(held_out):
+            tested = [("Its return in the test layouts", rounded(float(np.mean(held_out)), 4), _spread(held_out))]
+        tiles = [*_best_tiles(best), *tested, *tiles]
     items = joined(html("<div><dt>{}</dt><dd>{}<small>{}</small></dd></div>", *tile) for tile in tiles)
     return html('<dl class="tiles">{}</dl>\n', items)
 
 
 def _best_tiles(best: Candidate) -> list[tuple[str | Html, str, str]]:
-    low, high = fitness_interval(best)
-    spread = "a single episode"
-    if len(best.returns) > 1:
-        spread = f"mean of {len(best.returns)} episodes; 95 % interval {rounded(low)} to {rounded(high)}"
-    if best.costs:
-        spread = f"task fitness {rounded(best.task_fitness, 4)}, costs {rounded(best.costs, 4)}; {spread}"
     return [
-        (html("Best {}", hint("fitness")), rounded(best.fitness, 4), spread),
+        (html("Best {}", hint("fitness")), rounded(best.fitness, 4), _best_spread(best)),
         ("Best candidate", f"no. {best.id}", f"generation {best.generation}"),
         ("Episodes solved by the best", f"{rounded(100 * best.success_rate)} %", f"of {len(best.returns)}"),
         (
@@ -68,6 +70,22 @@ def _best_tiles(best: Candidate) -> list[tuple[str | Html, str, str]]:
             f"cycles per degree{_directions([best])}, by sampling alone",
         ),
     ]
+
+
+def _best_spread(best: Candidate) -> str:
+    """Return the parts of the fitness if there are costs, and the interval of the fitness, in words."""
+    spread = _spread(best.returns, best.costs)
+    if not best.costs:
+        return spread
+    return f"task fitness {rounded(best.task_fitness, 4)}, costs {rounded(best.costs, 4)}; {spread}"
+
+
+def _spread(returns: Sequence[float], costs: float = 0.0) -> str:
+    """Return the number of episodes and the interval of their mean return minus costs, in words."""
+    if len(returns) == 1:
+        return "a single episode"
+    low, high = (end - costs for end in bootstrap_interval(returns))
+    return f"mean of {len(returns)} episodes; 95 % interval {rounded(low)} to {rounded(high)}"
 
 
 def best_genes(run: Run, best: Candidate) -> Html:

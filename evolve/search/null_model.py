@@ -73,7 +73,7 @@ def null_model(
     searches: number of searches
     measure: function that returns quantities of an untrained animal. It returns the same names for all animals, with
         NaN for quantities that an animal lacks.
-    done: function that is called with the share of completed searches
+    done: function that is called with the completed fraction of the searches
     spread: standard deviation of task fitness in each generation, from `fitness_spread`. It is needed only if there
         are costs, because optimizers use only the order of fitness values.
 

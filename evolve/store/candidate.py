@@ -122,7 +122,7 @@ class Candidate:
             return self._failed(failure)._restored()
 
     def _failed(self, failure: str, **kept: Any) -> Candidate:
-        """Return the candidate as failed. Of its outcome, only the fields `kept` remain."""
+        """Return the candidate as failed. Only the fields `kept` of its outcome remain."""
         return replace(self, **{**vars(Evaluation.failed(failure)), **kept}, policy=None, costs=0.0)
 
     def _restored(self) -> Candidate:
@@ -131,7 +131,7 @@ class Candidate:
             candidate = Candidate.from_line(self.to_line())
         except TypeError as error:
             raise ValueError(str(error)) from error
-        # NaN does not equal itself. Only a failed candidate can have it as its success rate.
+        # NaN does not equal itself. It can occur only as the success rate of a failed candidate.
         return candidate if math.isfinite(candidate.success_rate) else replace(candidate, success_rate=0.0)
 
     def to_line(self) -> str:
@@ -159,7 +159,7 @@ class Candidate:
         """
         record = parsed(line)
         if isinstance(record, dict):
-            # Records of the first versions lack these fields, and an empty list of failures is never written.
+            # Records of the first versions lack these fields. An empty list of failures is never written.
             record = {"parents": [], "rung": 0, "policy": None, "mishaps": [], "costs": 0.0, **record}
         names = [KEYS.get(f.name, f.name) for f in fields(cls)]
         task_fitness = record.pop("task_fitness", None) if isinstance(record, dict) else None

@@ -32,7 +32,7 @@ __all__ = [
 ]
 
 FILE, CONFIG = "versions.json", "config.toml"
-LARGEST_FILE = 2**24  # bytes; thousands of starts
+LARGEST_FILE = 2**24  # maximum size of the file [bytes], for thousands of starts
 NO_COSTS = ("per_receptor = 0.0", "per_eye = 0.0", "per_neuron = 0.0")  # lines of a config.toml
 PACKAGES = (
     "rhabdom",
@@ -102,8 +102,11 @@ def run_id(run: Path) -> str:
 def provenance(run: Path) -> dict[str, Any]:
     """Return values that identify a run in files that are made from it; unknown values are missing.
 
-    run: name of the run directory · run_id: see `run_id` · settings: fingerprint of its config.toml
-    run_commits: commits of rhabdom that started or resumed the run · commit: commit of this code
+    run: name of the run directory
+    run_id: see `run_id`
+    settings: fingerprint of its config.toml
+    run_commits: commits of rhabdom that started or resumed the run
+    commit: commit of this code
     """
     known = {
         "run": run.resolve().name,

@@ -50,8 +50,8 @@ def finished_products(run: Run, shown: bool, replay: bool = False) -> Products:
 
     The report is written last, so its existence shows that all files are complete.
 
-    shown: whether to show a progress bar
-    replay: whether to also write a page that plays the episode
+    shown: True to show a progress bar
+    replay: True to also write a page that plays the episode
     """
     with Waiting(3 + replay, shown) as wait:
         wait.step("the best agent plays an episode")
@@ -79,8 +79,9 @@ def replay(arguments: Namespace) -> int:
         from evolve.report.replay import BESIDE, episode_facts, episode_table, write_replay
 
         also = [form for form in BESIDE if getattr(arguments, form)]
+        mode = "test" if arguments.test else "evaluation"
         asked = (arguments.candidate, arguments.seed, arguments.every)
-        episode, paths = write_replay(run, *asked, also, arguments.out)
+        episode, paths = write_replay(run, *asked, also, arguments.out, mode)
     if arguments.json:
         say(json.dumps({**episode_facts(episode), "files": [str(path) for path in paths]}, indent=1))
     else:

@@ -44,7 +44,7 @@ def start(arguments: Namespace) -> int:
         return _show(RunPlan.from_config(prepared.config, prepared.directory(arguments.out)), arguments.json)
     notes = (
         [] if arguments.json or arguments.quiet else lint(prepared.config)
-    )  # may build the task's world, which takes time, so this is done before the run directory exists
+    )  # this may build the task's world, which takes time, so it precedes the run directory
     with prepared.create(Run, arguments.out) as run:
         if not arguments.json:
             for note in notes:
@@ -124,7 +124,7 @@ class _Shown:
 def _carry_on(run: Run, arguments: Namespace, scheduler: Scheduler | None) -> int:
     """Continue a locked run to its end.
 
-    After Ctrl-C, print how to continue. The files need no further writing, because the record is always complete.
+    After Ctrl-C, print how to continue. No file needs to be written then, because the record is always complete.
     """
     shown = _Shown(arguments)
     try:

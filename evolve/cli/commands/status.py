@@ -28,7 +28,7 @@ from evolve.store.lock import holder
 __all__ = ["listing", "standing", "standing_lines", "status"]
 
 WATCH_S = 2.0  # [s] interval between two readings
-SHOWN = 12  # number of generations shown, the latest ones
+SHOWN = 12  # number of the latest generations that are shown
 
 
 def status(arguments: Namespace) -> int:
@@ -53,7 +53,7 @@ def _read(arguments: Namespace) -> dict[str, Any]:
 
 
 def listing(arguments: Namespace) -> int:
-    """Print one line for each run in a directory, the latest last. For an unreadable run, print the reason."""
+    """Print one line for each run in a directory, the latest last. For an unreadable run, it states the reason."""
     # os.path.exists returns False for an unreadable folder, which cannot be a run of this user. pathlib would raise.
     folders = [path for path in arguments.directory.iterdir() if os.path.exists(path / "config.toml")]
     found = [_standing_or_reason(path) for path in sorted(folders, key=lambda path: path.stat().st_mtime)]
@@ -71,7 +71,7 @@ def listing(arguments: Namespace) -> int:
 def _standing_or_reason(path: Path) -> dict[str, Any]:
     try:
         return {name: value for name, value in standing(Run.open(path)).items() if name != "generations"}
-    except Exception as error:  # one directory, whatever it contains, must not hide the others
+    except Exception as error:  # an error in one directory must not hide the others
         reason = str(error) or type(error).__name__
         return {"directory": str(path), "state": "unreadable", "reason": shortened(" ".join(reason.split()))}
 

@@ -95,7 +95,7 @@ TABLE = {
         **DAMAGE,
         **OF_ONE,
         **OPEN,
-        **{name: ([f"--{name}"], CHANGES) for name in ("rrd", "gif", "mp4")},
+        **{name: ([f"--{name}"], CHANGES) for name in ("test", "rrd", "gif", "mp4")},
         "every": (["--every", "4"], CHANGES),  # test_run_products: refused without --rrd
     },
     "report": {**OF_PRODUCTS, **DAMAGE, **OPEN},

@@ -27,7 +27,7 @@ def recorded(episode, monkeypatch):
     """Replace the recording of an episode by the one with seed 3; return the list of requests."""
     requests = []
 
-    def record(run, candidate_id, seed, every):
+    def record(run, candidate_id, seed, every, mode="evaluation"):
         requests.append((run.path, candidate_id, seed, every))
         return episode
 
@@ -47,6 +47,14 @@ def test_python_and_the_command_export_the_same_files(run, exported, recorded, c
     evolve.Run.open(run.path).export(out=tmp_path / "default")
     assert call("export", run.path, "--quiet", "--candidate", 0, "--out", tmp_path / "default")[0] == 0
     assert recorded == [(run.path, None, 3, 64), (run.path, None, 0, 8), (run.path, 0, 0, 8)]
+
+
+@pytest.mark.parametrize(
+    ("mode", "message"), [("training", "must be one of evaluation, test"), ("test", "has no test set"), (3, "mode = 3")]
+)
+def test_an_episode_in_another_mode_is_refused(run, mode, message):
+    with pytest.raises(ConfigError, match=message):
+        evolve.Run.open(run.path).replay(mode=mode)
 
 
 def test_files_identify_the_run(run, exported):

@@ -26,7 +26,9 @@ def test_the_error_is_that_of_the_receptors_that_bounced_light_reaches(sign):
     found = level(1, sign * 0.5 * ALLOWED)
     assert (found.level, found.predicted_error) == (lighting.DIRECT, pytest.approx(0.5 * ALLOWED))
     assert level(1, sign * 1.5 * ALLOWED).level == lighting.BOUNCE
-    assert level(1, sign * 0.25, allowed=0.25).level == lighting.DIRECT  # numbers without rounding; the limit is allowed
+    assert (
+        level(1, sign * 0.25, allowed=0.25).level == lighting.DIRECT
+    )  # numbers without rounding; the limit is allowed
 
 
 def test_the_root_mean_square_counts():
@@ -34,7 +36,10 @@ def test_the_root_mean_square_counts():
     bounce = np.zeros((1, 1, 3, 1, 2))
     bounce[..., 0, :, 0], bounce[..., 0, :, 1] = 1.3 * ALLOWED, 0.5 * ALLOWED
     found = _light("auto", {lighting.BOUNCE: bounce, lighting.DIRECT: np.zeros_like(bounce)}.__getitem__, ALLOWED)
-    assert (found.level, found.predicted_error) == (lighting.DIRECT, pytest.approx(ALLOWED * math.hypot(1.3, 0.5) / math.sqrt(2)))
+    assert (found.level, found.predicted_error) == (
+        lighting.DIRECT,
+        pytest.approx(ALLOWED * math.hypot(1.3, 0.5) / math.sqrt(2)),
+    )
 
 
 def test_receptors_at_the_limit_of_a_uniform_field():
