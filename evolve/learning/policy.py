@@ -118,7 +118,8 @@ class PolicyConfig:
 
         Raises:
             KeyError: an entry is missing.
-            TypeError, ValueError: an entry is not a number.
+            TypeError: an entry has the wrong type or is unknown.
+            ValueError: an entry has an impossible value.
         """
         return cls(
             eyes=tuple(int(n) for n in stored["eyes"]),
