@@ -4,6 +4,7 @@ statistics: test_statistics.py, test_genealogy.py
 vision: test_vision.py
 episode_failures: test_episode_failures.py
 genealogy: test_genealogy.py
+held_out: learning/test_final_figures.py
 recorder: test_recorder.py, test_episode.py
 episode: test_episode.py, test_recorder.py
 episode_scene: report/test_rerun_bodies.py

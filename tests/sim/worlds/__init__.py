@@ -7,6 +7,8 @@ foraging: test_foraging.py
 course: test_course.py
 navigation: test_course.py
 maze: test_world.py
+random_course: test_layout_family.py
+layout_family: test_layout_family.py
 striped_walls: test_world.py, test_course.py
 layout: test_world.py
 materials: test_world.py
