@@ -125,6 +125,14 @@ def budget_stages(config, animal):
         return [(candidate.id, candidate.rung, candidate.steps) for candidate in run.in_order_of_finish]
 
 
+def charges(config, animal):
+    """Fitness of the candidates of a run, after costs."""
+    with TemporaryDirectory() as folder:
+        run = Run.create(Path(folder) / "run", config)
+        carry(run, ClosedForm(), mock.Mock())
+        return [(candidate.id, candidate.fitness) for candidate in run.candidates]
+
+
 def hired(config, animal):
     """Number of workers that a run starts."""
     with TemporaryDirectory() as folder, mock.patch.object(carry_on, "LocalExecutor") as executor:

@@ -20,6 +20,7 @@ from evolve.genome.phenotype import develop
 from optics.numerics import backend
 from tests.parameter_outputs import (
     budget_stages,
+    charges,
     hired,
     history,
     layouts,
@@ -156,6 +157,9 @@ FIELDS = {
     "wiring.pool_side": Case("wiring.pool_side=1", life, ("genome.resolution_width.start=3", *PERFECT)),
     "wiring.repeat_side": Case("wiring.repeat_side=5", life),
     "evaluation.episodes": Case("evaluation.episodes=2", views),
+    "costs.per_receptor": Case("costs.per_receptor=0.5", charges),
+    "costs.per_eye": Case("costs.per_eye=0.5", charges),
+    "costs.per_neuron": Case("costs.per_neuron=0.5", charges),
     "genome.GENE.open": Case("genome.fov_deg.open=false", history),
     "genome.GENE.low": Case("genome.fov_deg.low=20", history),
     "genome.GENE.high": Case("genome.fov_deg.high=90", history),

@@ -21,7 +21,7 @@ def held_out_episodes(
 
     Raises:
         RunError: the candidate does not exist, or its policy is missing or damaged.
-        ConfigError: the run has no test set, or the code of its user task has not been named.
+        ConfigError: the run has no test set, or the user has not named the code of its task.
     """
     require_test_set(run.config)
     candidate = run.candidate(candidate_id)

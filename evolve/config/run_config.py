@@ -10,6 +10,7 @@ from evolve.config.checks import ConfigError, check_gene_use, check_values, quot
 from evolve.config.layout_checks import check_layouts
 from evolve.config.settings import (
     SECTIONS,
+    CostsConfig,
     EvaluationConfig,
     EyeConfig,
     LearningConfig,
@@ -42,6 +43,7 @@ __all__ = [
     "SECTIONS",
     "TASKS",
     "ConfigError",
+    "CostsConfig",
     "EvaluationConfig",
     "EyeConfig",
     "GeneConfig",
@@ -53,11 +55,11 @@ __all__ = [
 ]
 
 RHABDOMS = ("rhabdom_index", "rhabdom_surround", "rhabdom_length", "rhabdom_absorption")
-# Limits of the numerical aperture of rhabdoms; that of a fly's rhabdom is 0.25. Below the lower limit a rhabdom guides
-# almost no light, and above the upper limit it has hundreds of modes.
+# Limits of the numerical aperture of rhabdoms. A fly's rhabdom has 0.25. Below the lower limit a rhabdom guides almost
+# no light, and above the upper limit it has hundreds of modes.
 LEAST_STEP, MOST_STEP = 0.2, 0.5
-# [lx s] smallest allowed exposure. A receptor that sees white through a pupil with relative aperture 1 then absorbs
-# some 30 photons. With fewer photons, the approximation of shot noise fails.
+# [lx s] smallest allowed exposure. A receptor that sees a white surface through a pupil with relative aperture 1 then
+# absorbs some 30 photons. With fewer photons, the approximation of shot noise fails.
 LEAST_EXPOSURE = 2e-4
 
 
@@ -83,6 +85,7 @@ class RunConfig:
     learning: LearningConfig = field(default_factory=LearningConfig)
     wiring: WiringConfig = field(default_factory=WiringConfig)
     evaluation: EvaluationConfig = field(default_factory=EvaluationConfig)
+    costs: CostsConfig = field(default_factory=CostsConfig)
     code: TaskCode | None = field(default=None, compare=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -92,15 +95,9 @@ class RunConfig:
                 raise ConfigError(f"{section} = {quoted(getattr(self, section))}: must be a {kind.__name__}", section)
             check_values(getattr(self, section), prefix=f"{section}.")
         self._check_task()
-        if self.eye.receptors not in (known := (*RECEPTORS, INHERITED)):
-            raise ConfigError(
-                f"eye.receptors = {self.eye.receptors!r}: must be one of {', '.join(known)}", "eye.receptors"
-            )
-        if self.eye.vertical_fov not in VERTICAL_FOVS:
-            raise ConfigError(
-                f"eye.vertical_fov = {self.eye.vertical_fov!r}: must be one of {', '.join(VERTICAL_FOVS)}",
-                "eye.vertical_fov",
-            )
+        for name, known in (("receptors", (*RECEPTORS, INHERITED)), ("vertical_fov", VERTICAL_FOVS)):
+            if (given := getattr(self.eye, name)) not in known:
+                raise ConfigError(f"eye.{name} = {given!r}: must be one of {', '.join(known)}", f"eye.{name}")
         self._check_light()
         self._check_rhabdoms()
         self._check_world()

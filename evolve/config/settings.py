@@ -6,12 +6,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from evolve.config.costs import CostsConfig
 from evolve.genome.eye_config import EyeConfig, setting
 from evolve.genome.interval import Interval
 
 __all__ = [
     "FAMILY",
     "SECTIONS",
+    "CostsConfig",
     "EvaluationConfig",
     "EyeConfig",
     "LearningConfig",
@@ -32,7 +34,7 @@ class WorldConfig:
     unseen: bool = setting(
         False,
         None,
-        "evaluate in other mazes than those of training; selection and early stopping use them: they are not held out",
+        "evaluate in other mazes than in training; they also serve for selection and early stopping: not held out",
     )
     course: str = setting("short", None, "navigation's course: short, or long (twice the length, half the actions)")
     evaluation_course: str = setting("short", None, "navigation's course in evaluation")
@@ -61,14 +63,14 @@ class WorldConfig:
     least_light: float = setting(
         1.0,
         Interval(1e-6, 1),
-        "darkest light of an episode, as a share of daylight; each episode draws its light between this and 1",
+        "lowest light level, relative to daylight; each episode draws its level between this and 1",
     )
 
     encoded_textures: bool = setting(
         True,
         None,
-        "textures contain display colours, unless the model requests linear light; if false, those that MuJoCo's "
-        "compiler resolves to linear light contain it, as in runs without this setting",
+        "textures contain display colours, unless the model requests linear light; if false, MuJoCo's "
+        "compiler decides which textures contain linear light, as in runs without this setting",
     )
 
     @property
@@ -120,8 +122,8 @@ class SearchConfig:
     active: bool = setting(
         False,
         None,
-        "CMA also learns from the worse half of a population; if the fittest are at the end of a gene's range, its "
-        "steps then grow without bound",
+        "CMA also learns from the worse half of a population; its steps then grow without bound if the "
+        "fittest candidates are at the end of a gene's range",
     )
     steady_state: bool = setting(
         False, None, "propose a new candidate as soon as one has been evaluated; if false, generation by generation"
@@ -132,7 +134,7 @@ class SearchConfig:
     promoted: float = setting(
         0.5,
         Interval(0, 0.9, open_low=True),
-        "share of candidates that continue after a rung; also a rung's budget as a share of the next rung's",
+        "fraction of candidates that continue after a rung; also a rung's steps as a fraction of the next rung's",
     )
 
 
@@ -148,17 +150,17 @@ class LearningConfig:
     least_epochs: int = setting(
         3,
         Interval(1, 1000),
-        "minimum number of passes, which fall to it after the step size has halved; n_epochs or more: constant passes",
+        "minimum number of passes, reached after the step size has halved; n_epochs or more: constant number of passes",
     )
     learning_rate: float = setting(
         3e-3,
         Interval(0, 1, open_low=True),
-        "initial step size of Adam; brains of more than 64 units use √(64 / units) of it",
+        "initial step size of Adam; multiplied by √(64 / units) for brains with more than 64 units per layer",
     )
     decay_after: int = setting(
         75_000,
         Interval(1, 10**10),
-        "steps after which learning slows down as 1/steps: Adam's step size falls to half, then the passes decrease",
+        "steps after which learning slows down as 1/steps: first Adam's step size falls to half, then the passes do",
     )
     gamma: float = setting(0.9, Interval(0, 1), "discount per step")
     gae_lambda: float = setting(
@@ -168,17 +170,17 @@ class LearningConfig:
     first_speed: float = setting(
         0.5,
         Interval(0, 1, open_low=True),
-        "mean speed of the untrained policy, and twice its spread, as a fraction of the top speed",
+        "mean speed of the untrained policy, as a fraction of the top speed; its standard deviation is half of it",
     )
     contact_ramp: int = setting(
         0,
         Interval(0, 10**10),
-        "steps until contact has its full cost: a tenth of it for the first third, then rising exponentially",
+        "steps until contact has its full cost; the cost is a tenth for the first third, then rises exponentially",
     )
     rays_per_receptor: float = setting(
         8.0,
         Interval(0, 4096, open_low=True),
-        "maximum rays, or areas, per receptor and frame in training and in its checkpoints",
+        "maximum number of rays, or areas, per receptor and frame during training and its evaluations",
     )
     least_return: float = setting(
         0.0, Interval(-1e6, 0), "a training episode is truncated when its return falls to this value; 0: never"
@@ -191,7 +193,7 @@ class LearningConfig:
 class WiringConfig:
     """Settings of the connections between the receptors of an eye and its encoder.
 
-    An axis of the retina with fewer receptors than `pool_side`, or more than `repeat_side`, is left as it is.
+    `pool_side` has no effect along an axis with fewer receptors, and `repeat_side` none along an axis with more.
     """
 
     shared_encoder: bool = setting(False, None, "all eyes have the same encoder, with the same weights")
@@ -212,7 +214,7 @@ DIRECT = WiringConfig()  # each receptor is an input of its eye's own encoder
 class EvaluationConfig:
     """Settings of the evaluation of fitness."""
 
-    episodes: int = setting(32, Interval(1, 10_000), "evaluation episodes whose mean return is the fitness")
+    episodes: int = setting(32, Interval(1, 10_000), "evaluation episodes whose mean return is the task fitness")
 
 
 SECTIONS: Mapping[str, type] = {
@@ -222,4 +224,5 @@ SECTIONS: Mapping[str, type] = {
     "learning": LearningConfig,
     "wiring": WiringConfig,
     "evaluation": EvaluationConfig,
+    "costs": CostsConfig,
 }

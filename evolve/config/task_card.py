@@ -52,8 +52,8 @@ class TaskCard:
     aim: end of the sentence "Eyes and brains evolved ..."
     settings: settings that this task has and some other tasks do not have
     genes: genes that this task has and some other tasks do not have
-    grey: whether all surfaces of its world reflect all wavelengths equally; None: unknown
-    has_file: whether the task is a class in a user's file
+    grey: True if all surfaces of its world reflect all wavelengths equally; None: unknown
+    has_file: True if the task is a class in a user's file
     """
 
     name: str

@@ -13,7 +13,7 @@ eye_features      encoder of each eye
 per_eye_layers    linear layers for each eye, with its own or with shared weights
 regridding        averaging and repetition of signals before the encoder
 schedule          decrease of Adam's step size and of the passes over the samples during training
-training_rewards  scaling of rewards for the learner, with reduced costs at the start
+training_rewards  scaling of rewards for the learner, with lower costs at the start
 rollout_buffer    rollout buffer that stores each frame once
 adam              Adam optimizer on a single vector of all weights
 tensor_file       reading of tensors from a run's files

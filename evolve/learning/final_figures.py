@@ -34,7 +34,7 @@ def final_episodes(
     episodes: number of episodes; None: `evaluation.episodes`
 
     Raises:
-        ConfigError: the user task has not been named when the run was opened, or it fails at its start.
+        ConfigError: the user task was not named when the run was opened, or its start fails.
         TrainingDiverged: the policy's actions are not finite.
         UnfitPolicy: the policy was trained with different eyes.
     """

@@ -37,8 +37,8 @@ class UnusedSettingWarning(UserWarning):
 def check_settings(config: RunConfig) -> None:
     """Refuse a user task with mounts that no animal would use, and warn about each other setting without effect.
 
-    The default `place` spreads an animal's eyes around a single mount. Recorded runs are not checked, so that they can
-    be continued and replayed with the eyes that they have.
+    The default `place` spreads an animal's eyes around a single mount. Recorded runs are not checked, so they can
+    always be continued and replayed with their eyes.
 
     Warns:
         UnusedSettingWarning: the genome or the run determines a value that the task also defines.
@@ -111,7 +111,7 @@ def try_task(config: RunConfig) -> None:
     try:
         task = PreparedTask(animal_task(animal, config))
         with closing(task.vec_env(WORLDS, config.seed, animal.memory_frames)) as worlds, warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # the failure is reported as an error instead
+            warnings.simplefilter("ignore")  # the warning is superfluous, because the failure is reported as an error
             failure = _failure(worlds)
     except KeyboardInterrupt:
         raise
@@ -122,7 +122,7 @@ def try_task(config: RunConfig) -> None:
         said = str(error) if isinstance(error, ConfigError) else f"{config.task}: {place or error}"
         raise ConfigError(" ".join(said.split()), "task") from error
     finally:
-        open_closed_streams()  # the task may have closed one
+        open_closed_streams()  # the task may have closed a stream
     if failure is not None:
         raise ConfigError(f"{config.task}: {failure}", "task")
 

@@ -21,7 +21,7 @@ class TrainingEnvs:
     selection: environments of the evaluations during training, which select the best policy
     fitness: environments of the evaluation after training, which gives the fitness, in the layouts of `selection`
 
-    The light is computed in the same way in all three. The first two are rendered with at most
+    Reflections of light are computed in the same way in all three. The first two are rendered with at most
     `learning.rays_per_receptor` rays for each receptor, because the noise of rendering averages out in learning.
     """
 
@@ -33,10 +33,11 @@ class TrainingEnvs:
 def worlds_of(phenotype: Phenotype, config: RunConfig, learning: int, evaluation: int) -> TrainingEnvs:
     """Return the environments of an animal.
 
-    learning: seed of the environments for training · evaluation: seed of the environments for selection and fitness
+    learning: seed of the environments for training
+    evaluation: seed of the environments for selection and fitness
 
     Raises:
-        ConfigError: the user task has not been named when the run was opened, or it fails at its start.
+        ConfigError: the user task was not named when the run was opened, or its start fails.
     """
     memory, wanted, episodes = phenotype.memory_frames, config.learning, config.evaluation.episodes
     fine = PreparedTask(animal_task(phenotype, config))

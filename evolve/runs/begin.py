@@ -83,8 +83,8 @@ class PreparedRun:
 def prepare_run(request: RunRequest, tried: bool = True) -> PreparedRun:
     """Collect the settings of a run, and check that the run can start on this machine. Nothing is written.
 
-    tried: whether to build the search and to try the user task in this process; False if the run is only planned:
-        other processes then measure its pace, and try the task first
+    tried: True to build the search and to try the user task in this process. False if the run is only planned: other
+        processes then try the task and measure its pace
 
     Raises:
         ConfigError: a setting is invalid, the optimizer is unknown, two random layouts are equal, or the user task
@@ -95,7 +95,7 @@ def prepare_run(request: RunRequest, tried: bool = True) -> PreparedRun:
     starts = starts_from(request.start_from) if request.start_from else None
     config = assemble(request.task, request.preset, request.config, request.assignments, starts, request.scale)
     if tried or config.search.optimizer not in OWN:  # importing nevergrad takes seconds
-        Search(config)  # raises an error for an unknown optimizer
+        Search(config)  # refuses an unknown optimizer
     device.make_ready()
     if tried:
         check_settings(config)

@@ -63,7 +63,7 @@ def check_mode(mode: str) -> None:
     """Check that a mode is one of MODES.
 
     Raises:
-        ValueError: it is not.
+        ValueError: the mode is unknown.
     """
     one_of("mode", mode, MODES)
 

@@ -19,7 +19,7 @@ from sim.worlds.layout import CELL, cell_centers
 
 Cell = tuple[int, int]  # row, column
 
-# [m] largest allowed decrease of the distance from the start on the way from any reachable position to the goal.
+# [m] largest allowed decrease of the distance from the start, on the way from any reachable position to the goal
 MOST_FALL = 1.5
 GOAL_COLUMNS = 3  # the goal consists of the free cells in the last columns before the outer wall
 LOOK_AHEAD = 3  # number of cells of the shortest path from which its direction is computed
@@ -160,7 +160,7 @@ class Course:
         return ease
 
     def _ahead(self, start: Cell) -> set[Cell]:
-        """Return the cells on all paths from the start on which every step shortens the remaining path to the goal."""
+        """Return the cells of all paths on which every step from the start shortens the remaining path to the goal."""
         seen, waiting = {start}, [start]
         while waiting:
             cell = waiting.pop()

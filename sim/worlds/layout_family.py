@@ -99,7 +99,8 @@ class LayoutFamily:
 class LayoutSet:
     """One set of a family: an argument of `sim.build_world` and `sim.make_vec_env`.
 
-    family: the family · name: "training", "selection" or "test"
+    family: the family
+    name: "training", "selection" or "test"
     """
 
     family: LayoutFamily

@@ -82,7 +82,7 @@ def add_layout(spec: mujoco.MjSpec, courses: Sequence[Course], rngs: Sequence[np
     walls = np.concatenate([course.walls for course in courses])
     rows, columns = walls.shape
     add_floor(spec, (columns * CELL, rows * CELL))
-    # Wall cells without an adjacent free cell are never visible, so they are left out.
+    # Wall cells without an adjacent free cell are never visible, so they are omitted.
     near = scipy.ndimage.binary_dilation(~walls, np.ones((3, 3)))
     add_striped_walls(spec, walls & near, rngs)
     right, top = columns * CELL / 2 - CELL, rows * CELL / 2 - CELL
