@@ -20,4 +20,5 @@ checkpoint: test_checkpoint.py, search/test_successive_halving.py
 checkpoint_file: test_checkpoint.py, search/test_successive_halving.py
 training_rung: search/test_successive_halving.py
 animal_task: test_task_module.py, test_fitness.py, test_textures_of_runs.py
+final_figures: test_final_figures.py, experiments/test_eyes_for_tasks.py
 """

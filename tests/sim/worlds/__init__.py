@@ -9,6 +9,8 @@ random_course: test_layout_family.py
 layout_family: test_layout_family.py
 navigation: test_course.py
 maze: test_world.py
+random_course: test_layout_family.py
+layout_family: test_layout_family.py
 striped_walls: test_world.py, test_course.py
 layout: test_world.py
 materials: test_world.py
