@@ -98,7 +98,7 @@ def _at_edge(request: Request) -> float:
     step, radius = 1e-4, request.problem.radius
 
     def waves(dx: float, dy: float) -> np.ndarray:
-        x, y = (types.Float64(padded_for_packets(at * radius)) for at in (places + (dx, dy)).T)
+        x, y = (types.Float64(padded_for_packets(at * radius)) for at in (places + np.array([dx, dy])).T)
         return plain(beam.waves(x, y, types))
 
     per_wave = request.problem.wavelength / (2 * step * radius)
@@ -147,7 +147,10 @@ def _summed(request: Request, unsure: float = 1.0) -> float | None:
         return None
     types = precision("float64")
     x, y = (types.Float64(padded_for_packets(at)) for at in (nodes.x, nodes.y))
-    waves, u = beam.waves(x * problem.radius, y * problem.radius, types), types.Float64(padded_for_packets(nodes.weight))
+    waves, u = (
+        beam.waves(x * problem.radius, y * problem.radius, types),
+        types.Float64(padded_for_packets(nodes.weight)),
+    )
     if beam.pupil.mask is not None:
         u = u * beam.pupil.amplitude(x, y, types)
     spectrum = _spectrum(x, y, waves, u, *(highest * at for at in (seen.x, seen.y)))

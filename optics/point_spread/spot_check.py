@@ -17,7 +17,7 @@ from optics.numerics.grid import Grid
 from optics.numerics.precision import precision
 from optics.numerics.quadrature import stepped_up
 
-__all__ = ["CAUTION", "EFFORT", "path_rounding", "spot_check"]
+__all__ = ["CAUTION", "EFFORT", "exact_psf", "path_rounding", "spot_check"]
 
 # Choice: safety factor on the estimate. From 40 points, the root mean square of the error is known only to within a
 # factor of about two. tests/optics/point_spread/test_robustness.py checks that the stated error bounds the true error.
@@ -166,13 +166,31 @@ def _drawn(problem: Problem, image: np.ndarray, points: int) -> tuple[np.ndarray
     return drawn, chance[drawn]
 
 
+def exact_psf(
+    beam: Beam, problem: Problem, x: np.ndarray, y: np.ndarray, bright: float, seconds: float
+) -> tuple[np.ndarray, float] | None:
+    """Return the PSF at points (x, y) [m] by the direct sum, and its relative error where it is `bright` [1/m²].
+
+    The result is None if the sum would take longer than a check of a PSF that takes `seconds`.
+    """
+    darkness = _darkness(beam, problem, bright)
+    reference = _affordable(beam, problem, darkness, seconds)
+    if problem.reach is not None or reference.points < min(x.size, math.prod(problem.window.shape)):
+        return None
+    error = 2 * 10.0 ** (darkness - reference.digits) + path_rounding(problem, darkness)
+    return _at_points(beam, problem, reference, x, y), error
+
+
 def _exact(beam: Beam, problem: Problem, reference: _DirectSum, drawn: np.ndarray) -> np.ndarray:
     """Return the exact PSF at the drawn points, by the direct sum in float64."""
+    row, column = np.divmod(drawn, problem.window.shape[1])
+    return _at_points(beam, problem, reference, problem.window.x[column], problem.window.y[row])
+
+
+def _at_points(beam: Beam, problem: Problem, reference: _DirectSum, x: np.ndarray, y: np.ndarray) -> np.ndarray:
     import drjit as dr
 
-    row, column = np.divmod(drawn, problem.window.shape[1])
     types = precision("float64")
-    x, y = problem.window.x[column], problem.window.y[row]
     if problem.symmetric:
         x, y = np.hypot(x, y), np.zeros_like(y)
     rule = problem.aperture, reference.cycles, reference.digits, problem.symmetric
