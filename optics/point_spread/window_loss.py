@@ -19,7 +19,7 @@ __all__ = ["ErrorCauses", "spectrum_of_loss"]
 # of the window; factor on the estimate; number of steps between frequencies below which all lost light may matter.
 FADES = (0.5, 0.7)
 INNER = (0.5, 0.7, 0.9)
-CAUTION = 1.5
+CAUTION = 1.0
 NEAR_ZERO = 2.0
 
 
