@@ -39,14 +39,16 @@ class Effort:
     points_along_radius: number of points of a rotationally symmetric PSF.
     fewest: number of points below which the estimate is useless.
     spare_digits: digits of the direct sum in addition to the requested accuracy. The first affordable value is used.
-    share: time of the check relative to the time of the PSF. share_of_few: the same for windows with fewer than
-        `fewest` samples. Without a check, the error of the only sample of a window may be as large as its bound.
+    share: time of the check relative to the time of the PSF. share_of_few: the same for windows with fewer than `few`
+        samples. Of a direct sum over so few samples, `share` affords fewer than `fewest` points. Without a check, the
+        error may be as large as its bound.
     seconds: time [s] that every check may take.
     """
 
     points: int = 40
     points_along_radius: int = 20
     fewest: int = 8
+    few: int = 54
     spare_digits: tuple[float, ...] = (7.0, 4.0)
     share: float = 0.3
     share_of_few: float = 1.0
@@ -127,7 +129,7 @@ def _darkness(beam: Beam, problem: Problem, mean: float) -> float:
 def _affordable(beam: Beam, problem: Problem, darkness: float, seconds: float) -> _DirectSum:
     """Return the direct sum with as many points and digits as the time of the PSF allows."""
     samples, fine = math.prod(problem.window.shape), _finer_detail(beam, problem)
-    share = EFFORT.share if samples >= EFFORT.fewest else EFFORT.share_of_few
+    share = EFFORT.share if samples >= EFFORT.few else EFFORT.share_of_few
     pairs = max(share * seconds, EFFORT.seconds) * PAIRS_PER_SECOND["float32"]
     along_radius = problem.symmetric and problem.window.centre == (0.0, 0.0)
     wanted = min(EFFORT.points_along_radius if along_radius else EFFORT.points, samples)
