@@ -184,8 +184,8 @@ def test_the_far_corner_of_a_window_off_the_axis_is_checked(seed):
 def test_direct_sums_of_few_samples_are_checked(shape):
     """A check of eight points was too long for them, so that their plans stated half the tolerance."""
     rng = np.random.default_rng(sum(shape))
-    distance = 3e-3
-    pupil = optics.Pupil(0.6e-3, optics.BSplineRelief(rng.random((4, 4)) * 2e-6))
+    distance = 1.5e-3
+    pupil = optics.Pupil(0.35e-3, optics.BSplineRelief(rng.random((4, 4)) * 2e-6))
     asked = {"sensor_distance": distance, "dx": 1e-6, "shape": shape, "method": "rayleigh_sommerfeld"}
     found = optics.psf(pupil, **asked)
     exact = optics.psf(pupil, **asked, tolerance=1e-8, dtype="float64")
