@@ -114,7 +114,7 @@ def _row(run: Run, group: str, candidate: Candidate, champion: bool) -> Row:
         fitness=candidate.fitness,
         success_rate=candidate.success_rate,
         episodes=len(candidate.returns),
-        parameters=parameters(PolicyConfig(shape, animal.neurons, animal.layers, animal.encoder)),
+        parameters=parameters(PolicyConfig(shape, animal.neurons, animal.layers, animal.encoder, wiring=config.wiring)),
         full_return=full_return(config.task, config.world.evaluation_course),
         **anatomy(animal, config.eye),
         **(_seen(config, animal) if champion and animal.relative_aperture is not None else {}),

@@ -35,6 +35,9 @@ class Design:
 
     relative_aperture: pupil diameter / retina width of eyes with a paraboloid of glass; 0: eyes with perfect lenses
     glass_power: power of the glass, 1 in focus (see experiments.glass)
+    vertical_fov_deg: 0: receptors are square
+    features: features per eye, the width of its encoder; 0: a quarter of the neurons
+    own: settings of this design alone, "section.name=value" separated by spaces
     """
 
     task: str
@@ -49,6 +52,9 @@ class Design:
     neurons: int = 64
     relative_aperture: float = 0.0
     glass_power: float = 0.0
+    vertical_fov_deg: float = 0.0
+    features: int = 0
+    own: str = ""
 
     @property
     def animal(self) -> Phenotype:
@@ -59,7 +65,8 @@ class Design:
             resolution=(self.height, self.width),
             memory_frames=self.memory_frames,
             neurons=self.neurons,
-            encoder=math.ceil(self.neurons / NEURONS_PER_FEATURE),
+            encoder=self.features or math.ceil(self.neurons / NEURONS_PER_FEATURE),
+            vertical_fov_deg=self.vertical_fov_deg or None,
             **self._optics(),
         )
 
@@ -72,7 +79,7 @@ class Design:
     def config(self, settings: Sequence[str]) -> RunConfig:
         """Return the configuration of a run in which this animal could be a candidate."""
         own = (f"eye.optics={str(self.relative_aperture > 0).lower()}", f"eye.noise_sigma={self.noise_sigma}")
-        return assemble(self.task, assignments=(*own, *settings))
+        return assemble(self.task, assignments=(*own, *settings, *self.own.split()))
 
 
 @dataclass(frozen=True)

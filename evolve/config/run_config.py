@@ -13,6 +13,7 @@ from evolve.config.settings import (
     EyeConfig,
     LearningConfig,
     SearchConfig,
+    WiringConfig,
     WorldConfig,
     setting,
 )
@@ -44,6 +45,7 @@ __all__ = [
     "LearningConfig",
     "RunConfig",
     "SearchConfig",
+    "WiringConfig",
     "WorldConfig",
 ]
 
@@ -76,6 +78,7 @@ class RunConfig:
     genome: Mapping[str, GeneConfig] = field(default_factory=lambda: _default_genome())
     search: SearchConfig = field(default_factory=SearchConfig)
     learning: LearningConfig = field(default_factory=LearningConfig)
+    wiring: WiringConfig = field(default_factory=WiringConfig)
     evaluation: EvaluationConfig = field(default_factory=EvaluationConfig)
     code: TaskCode | None = field(default=None, compare=False, repr=False)
 

@@ -15,6 +15,7 @@ __all__ = [
     "EyeConfig",
     "LearningConfig",
     "SearchConfig",
+    "WiringConfig",
     "WorldConfig",
     "setting",
 ]
@@ -140,6 +141,27 @@ class LearningConfig:
 
 
 @dataclass(frozen=True)
+class WiringConfig:
+    """Settings of the connections between the receptors of an eye and its encoder.
+
+    An axis of the retina with fewer receptors than `pool_side`, or more than `repeat_side`, is left as it is.
+    """
+
+    shared_encoder: bool = setting(False, None, "all eyes have the same encoder, with the same weights")
+    pool_side: int = setting(
+        0, Interval(0, 256), "signals are averaged to a grid of this many rows and columns before the encoder; 0: never"
+    )
+    repeat_side: int = setting(
+        0,
+        Interval(0, 256),
+        "signals, averaged or not, are then repeated on a grid of this many rows and columns; 0: never",
+    )
+
+
+DIRECT = WiringConfig()  # each receptor is an input of its eye's own encoder
+
+
+@dataclass(frozen=True)
 class EvaluationConfig:
     """Settings of the evaluation of fitness."""
 
@@ -151,5 +173,6 @@ SECTIONS: Mapping[str, type] = {
     "world": WorldConfig,
     "search": SearchConfig,
     "learning": LearningConfig,
+    "wiring": WiringConfig,
     "evaluation": EvaluationConfig,
 }

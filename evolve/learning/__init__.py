@@ -9,7 +9,8 @@ ppo               PPO training, which stops early if returns no longer improve
 policy            policy of an animal (actor and critic), and its storage in files
 observed          entries of an observation other than the eyes' signals
 eye_features      encoder of each eye
-per_eye_layers    linear layers with separate weights per eye
+per_eye_layers    linear layers for each eye, with its own or with shared weights
+regridding        averaging and repetition of signals before the encoder
 schedule          decrease of Adam's step size and of the passes over the samples during training
 training_rewards  scaling of rewards for the learner, with reduced costs at the start
 rollout_buffer    rollout buffer that stores each frame once

@@ -122,7 +122,7 @@ def _live(
         closing(places.selection) as checkpoints,
         closing(places.test) as finals,
     ):
-        brain = Brain(phenotype.neurons, phenotype.layers, phenotype.encoder)
+        brain = Brain(phenotype.neurons, phenotype.layers, phenotype.encoder, config.wiring)
         try:
             training = train(Worlds(lessons, checkpoints), brain, config.learning, weights, progress, begun)
             return training, play(training.policy, finals, seeds[1])

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 
 import numpy as np
 import torch
@@ -103,7 +103,7 @@ class AdaptingPPO(PPO):
             vf_coef=config.value_weight,
             seed=seed,
             device="cpu",
-            policy_kwargs={**asdict(brain), "first_actions": first_actions(self.task, config)},
+            policy_kwargs={"brain": brain, "first_actions": first_actions(self.task, config)},
             rollout_buffer_class=FrameRolloutBuffer,
             rollout_buffer_kwargs={"seed": seed},
         )

@@ -92,7 +92,7 @@ def fitness_section(run: Run) -> Html:
     )
     figures = figure(fitness_figure(rows, run.candidates), caption)
     caption = html(
-        "<b>Episodes solved.</b> Share of a candidate's evaluation episodes in which the task was solved (dots), "
+        "<b>Episodes solved.</b> Fraction of a candidate's evaluation episodes in which the task was solved (dots), "
         "{} mean of the generation.",
         key("muted"),
     )
