@@ -42,7 +42,8 @@ LEAST_LIGHT = 1e-2
 SPREAD = 1.1  # choice: error of the intensity divided by the spread of the phase; see test_population.py
 TURNS = 1.3  # choice: ratio of successive numbers of samples; similar pupils then share a plan
 STACK = 2_000_000  # choice, limited by memory: samples of pupils in a stack
-SECONDS = 3e-4  # approximate time per PSF
+# Time per PSF [s]: of its plan, and per sample of pupils and Fourier kernels, and of the window.
+OWN_SECONDS, PER_SAMPLE, PER_OUTPUT = 5e-5, 2e-8, 1.7e-7
 RINGS = 12  # choice: number of rings of the window for which the error is predicted
 SLOPES = np.linspace(-1, 1, 9) * (1 + EDGE_REACH)  # positions where the slope of a relief is evaluated
 PER_ORDER = 4  # choice: positions per order at which the slope of a wavefront is evaluated
@@ -82,15 +83,21 @@ def population_pictures(
             errors = np.where(_light(samples, masks) < LEAST_LIGHT, math.inf, errors)
             for index, image, error in zip(part, images, errors, strict=True):
                 if error <= tolerance:
-                    yield index, image, _plan(members[index], samples, float(error), leaving[index])
+                    yield index, image, _plan(members[index], samples, window, float(error), leaving[index])
 
 
-def _plan(member: Member, samples: _Samples, error: float, leaving: float) -> Plan:
+def _plan(member: Member, samples: _Samples, window: Grid, error: float, leaving: float) -> Plan:
     shape, radius = (samples.at.size, samples.at.size), member.pupil.radius
     sine = steepest_sine(radius, number(member.distance), leaving)
     scalar = scalar_theory_error(sine, light_spread(member.pupil))
     why = "one of a population: rank 1, not spot-checked"
-    return Plan("low_rank", shape, "float32", error, why, SECONDS, scalar_error=scalar)
+    return Plan("low_rank", shape, "float32", error, why, _seconds(samples.at.size, window), scalar_error=scalar)
+
+
+def _seconds(across: int, window: Grid) -> float:
+    """Return the approximate time per PSF [s]."""
+    samples = across**2 + across * sum(window.shape)
+    return OWN_SECONDS + samples * PER_SAMPLE + math.prod(window.shape) * PER_OUTPUT
 
 
 @dataclass(frozen=True, eq=False)
