@@ -91,13 +91,9 @@ def _plan(member: Member, samples: _Samples, window: Grid, error: float, leaving
     sine = steepest_sine(radius, number(member.distance), leaving)
     scalar = scalar_theory_error(sine, light_spread(member.pupil))
     why = "one of a population: rank 1, not spot-checked"
-    return Plan("low_rank", shape, "float32", error, why, _seconds(samples.at.size, window), scalar_error=scalar)
-
-
-def _seconds(across: int, window: Grid) -> float:
-    """Return the approximate time per PSF [s]."""
-    samples = across**2 + across * sum(window.shape)
-    return OWN_SECONDS + samples * PER_SAMPLE + math.prod(window.shape) * PER_OUTPUT
+    entries = shape[0] * (shape[0] + sum(window.shape))
+    seconds = OWN_SECONDS + entries * PER_SAMPLE + math.prod(window.shape) * PER_OUTPUT
+    return Plan("low_rank", shape, "float32", error, why, seconds, scalar_error=scalar)
 
 
 @dataclass(frozen=True, eq=False)
