@@ -42,8 +42,7 @@ LEAST_LIGHT = 1e-2
 SPREAD = 1.1  # choice: error of the intensity divided by the spread of the phase; see test_population.py
 TURNS = 1.3  # choice: ratio of successive numbers of samples; similar pupils then share a plan
 STACK = 2_000_000  # choice, limited by memory: samples of pupils in a stack
-# Time per PSF [s]: of its plan, and per sample of pupils and Fourier kernels, and of the window.
-OWN_SECONDS, PER_SAMPLE, PER_OUTPUT = 5e-5, 2e-8, 1.7e-7
+OWN_SECONDS, PER_SAMPLE, PER_OUTPUT = 5e-5, 2e-8, 1.7e-7  # times [s] per PSF, entry and output
 RINGS = 12  # choice: number of rings of the window for which the error is predicted
 SLOPES = np.linspace(-1, 1, 9) * (1 + EDGE_REACH)  # positions where the slope of a relief is evaluated
 PER_ORDER = 4  # choice: positions per order at which the slope of a wavefront is evaluated

@@ -212,7 +212,7 @@ def _vertex(result: PSFResult, index: int) -> Peak:
         peak = peak + dr.select(curved, rise, 0)
         if curved[0]:
             steps = (byy * gx - bxy * gy) / determinant, (bxx * gy - bxy * gx) / determinant
-            at = tuple(place + number(step) * result.dx for place, step in zip(at, steps, strict=True))
+            at = at[0] + number(steps[0]) * result.dx, at[1] + number(steps[1]) * result.dx
     around = float(np.linalg.norm(image)) / float(image[row, column])
     plan = result.plans[index if len(result.plans) > 1 else 0]
     # Error for a cosine at the cutoff frequency whose peak lies halfway between samples.
@@ -235,9 +235,11 @@ def _measured_error(result: PSFResult, index: int, peak: Peak) -> float:
     asked = result.requests if result.shares is not None else result.requests[index : index + 1]
     shares = np.ones(1) if result.shares is None else result.shares
     sums = [exact_psf(each.beam, each.problem, x, y, number(peak.value), each.planned()[1].seconds) for each in asked]
-    if any(one is None for one in sums):
+    known = [one for one in sums if one is not None]
+    if len(known) < len(sums):
         return peak.error
-    exact, errors = (sum(share * one[part] for share, one in zip(shares, sums, strict=True)) for part in (0, 1))
+    exact = np.sum([share * values for share, (values, _) in zip(shares, known, strict=True)], axis=0)
+    errors = sum(share * error for share, (_, error) in zip(shares, known, strict=True))
     there = replace(result, tensor=exact.reshape(1, 3, 3), dx=pitch, centre=peak.at, shares=None, requests=())
     truth = number(_vertex(there, 0).value)
     off = abs(number(peak.value) / truth - 1) + errors + PARABOLOID_ERROR / CLOSER**4
