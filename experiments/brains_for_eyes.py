@@ -12,7 +12,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from evolve.analysis.statistics import acuity_cpd
+from evolve.analysis.acuity import acuity_cpd
 from experiments import designed
 from experiments.brains_and_acuity import label
 from experiments.designed import Design, Trained

@@ -29,7 +29,7 @@ from evolve.learning.regridding import Regridding
 __all__ = ["UNITS", "EyeFeatures"]
 
 ENCODER_LAYERS = 3  # two hidden layers, and a layer that returns the code of a frame
-FARTHEST = 10.0  # limit of normalised proprioception; 1 is one spread from the mean
+FARTHEST = 10.0  # limit of normalised proprioception, in standard deviations from the mean
 UNITS = nn.LeakyReLU  # units of all hidden layers; the gradient of a leaky unit is never 0
 
 
@@ -59,10 +59,10 @@ class Felt(nn.Module):
 class EyeFeatures(BaseFeaturesExtractor):
     """Features of an observation: `width` numbers for each eye, followed by the observation's other entries.
 
-    All layers are `width` wide, too. An observation may have one of two forms, which give the same features.
-    Environments return stacked frames: `eyes` (sample, memory, eye, channel, height, width). Rollout buffers store each
-    frame once: `frames` (memory - 1 + step, segment, eye, channel, height, width) and `age` (step, segment), the number
-    of steps since the first frame of the episode. Samples are then (step, segment) flattened.
+    All layers have the same width. An observation may have one of two forms, which give the same features. Environments
+    return stacked frames: `eyes` (sample, memory, eye, channel, height, width). Rollout buffers store each frame once:
+    `frames` (memory - 1 + step, segment, eye, channel, height, width) and `age` (step, segment), the number of steps
+    since the first frame of the episode. Samples are then (step, segment) flattened.
 
     At the start of an episode, the memory is not yet full. As in sim's environments, the first frame of the episode
     fills the missing places.

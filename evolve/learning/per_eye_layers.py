@@ -16,7 +16,7 @@ from torch import Tensor, nn
 __all__ = ["CONTRAST", "AdaptedLinear", "MemoryLinear", "PerEyeLinear"]
 
 DARK = 1e-6  # lower limit of the spread of signals, so that weights remain finite if all signals are equal
-CONTRAST = 0.4  # spread of normalised signals, chosen for 675 inputs per unit; with 1, learning was not faster
+CONTRAST = 0.4  # standard deviation of normalised signals, chosen for 675 inputs per unit; 1 was not faster
 
 
 class PerEyeLinear(nn.Module):
@@ -49,8 +49,8 @@ class AdaptedLinear(PerEyeLinear):
 
     Each receptor has its own mean, and each eye its own spread, even if the eyes share their weights. Within a scene,
     signals vary little around their means, and behind a small pupil all signals are small. Without normalisation, the
-    means would saturate the units, and the variations would have almost no effect. The normalisation is applied to
-    weight and bias, so that it takes almost no time.
+    means would saturate the units, and variations around them would have almost no effect. The normalisation is
+    applied to weight and bias, so that it takes almost no time.
     """
 
     def __init__(self, n_eyes: int, inputs: int, outputs: int, shared: bool = False) -> None:
@@ -109,7 +109,8 @@ class _Slide(torch.autograd.Function):
 
     @staticmethod
     def forward(ctx: Any, codes: Tensor, weight: Tensor, bias: Tensor) -> Tensor:
-        """Return the sum; codes (eye, code, frame, segment), weight (eye, output, code, lag), bias (eye, output, 1)."""
+        """Return the sum plus `bias` (eye, output, 1), for codes (eye, code, frame, segment), weight (eye, output,
+        code, lag)."""
         weights = weight.permute(3, 0, 1, 2).contiguous()
         total, *pieces = _slices(codes, len(weights))
         result = torch.baddbmm(bias, weights[0], total)

@@ -33,8 +33,8 @@ from evolve.store.atomic_files import write_whole
 
 FEELS = "feels"  # name of the proprioception of a `sim.Task` in observations
 LARGEST_COUNT = 4096  # upper limit of each number in the shape of a policy in a file; genes allow at most 512
-MOST_SIGNALS = 2**24  # upper limit of the signals in a policy's memory; genes allow at most half of it
-FIRST_SPREAD = 0.5  # standard deviation of an untrained policy's actions; with 1, a third would be clipped
+MOST_SIGNALS = 2**24  # upper limit for the number of signals in a policy's memory; genes allow at most half of it
+FIRST_SPREAD = 0.5  # standard deviation of an untrained policy's actions; with 1, a third of them would be clipped
 
 
 class TrainingDiverged(FloatingPointError):
@@ -43,10 +43,11 @@ class TrainingDiverged(FloatingPointError):
 
 @dataclass(frozen=True)
 class Brain:
-    """Size of a brain.
+    """Size and wiring of a brain.
 
-    neurons, layers: the actor and the critic have `layers` hidden layers of `neurons` units each · encoder: width of
-        all layers of the eyes' encoders · wiring: connections between receptors and encoders
+    neurons, layers: the actor and the critic have `layers` hidden layers of `neurons` units each
+    encoder: width of all layers of the eyes' encoders
+    wiring: connections between receptors and encoders
     """
 
     neurons: int
@@ -117,8 +118,8 @@ class PolicyConfig:
 
         Raises:
             KeyError: an entry is missing.
-            TypeError: an entry is not a number.
-            ValueError: an entry is not a number.
+            TypeError: an entry has the wrong type or is unknown.
+            ValueError: an entry has an impossible value.
         """
         return cls(
             eyes=tuple(int(n) for n in stored["eyes"]),

@@ -20,7 +20,7 @@ class Regridding:
 
     shape: rows and columns of the inputs
 
-    The map is no module, because it has nothing to learn and nothing to store.
+    It is not a PyTorch module, because it has no parameters and no state.
     """
 
     def __init__(self, retina: tuple[int, int], wiring: WiringConfig) -> None:
@@ -38,15 +38,16 @@ class Regridding:
 
 
 def _axis(n: int, pool_side: int, repeat_side: int) -> np.ndarray:
-    """Return the weights of `n` receptors along an axis of the retina in the inputs along this axis, (input, n)."""
+    """Return the matrix (input, n) that maps the signals of `n` receptors along an axis to the inputs along this
+    axis."""
     pooled = _averages(n, min(pool_side or n, n))
     return _repeats(len(pooled), max(repeat_side, len(pooled))) @ pooled
 
 
 def _averages(n: int, side: int) -> np.ndarray:
-    """Return the averages over `side` equal intervals of an axis with `n` receptors, (side, n).
+    """Return the matrix (side, n) that averages `n` receptors over `side` equal intervals of their axis.
 
-    Each receptor counts by the fraction of the interval that it covers.
+    The weight of a receptor is the fraction of the interval that it covers.
     """
     receptor, interval = (
         side * np.arange(n),

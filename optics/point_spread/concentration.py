@@ -23,7 +23,7 @@ __all__ = ["encircled_energy"]
 
 RIPPLE = 1e-5  # choice: ripple of the circle's spectrum
 CELLS = 20.0  # choice: error of a circle's edge between cells, in units of the ripple
-SPREAD = 0.1  # choice: smallest share of the error of all light in the window that a circle may have
+SPREAD = 0.1  # choice: lower limit of the error in a circle, as a fraction of the error in the whole window
 FINE = 1 / 3  # choice: coarsest pitch for circles in units of 1/cutoff; finer pitches need less area beyond a circle
 
 
@@ -37,10 +37,11 @@ def encircled_energy(
 
     The result for a `WhitePSF` is (type, radius). It is a weighted sum over samples. The weights are the circle,
     convolved with a kernel whose spectrum is 1 at all frequencies of the intensity and 0 at frequencies that alias onto
-    them. The sum therefore equals the integral over the sharp circle. It includes samples beyond the circle. They are
+    them. The sum therefore equals the integral over the sharp circle. It includes samples beyond the circle, which are
     computed if the window does not contain them.
 
-    centre: None for the middle of the PSF's window. with_error: whether to return (value, predicted error).
+    centre: None for the middle of the PSF's window.
+    with_error: True to return (value, predicted error).
 
     Raises:
         ValueError: a radius is negative or extends beyond the window.
@@ -71,7 +72,7 @@ def encircled_energy(
     total = to_user(types.Tensor(sums * seen.dx**2, (seen.tensor.shape[0], wanted.size)))
     if not with_error:
         return total
-    # The error of the PSF may be anywhere in the window, even if the circle is dark.
+    # The PSF's error may be concentrated in the circle, even if the circle is dark.
     share = np.maximum(plain(total), SPREAD * plain(seen.window_sums)[:, None]) / plain(seen.window_sums)[:, None]
     bright = np.pi * wanted**2 * seen.psf.max(axis=(1, 2))[:, None]
     return total, seen.sum_error[:, None] * share + RIPPLE * (CELLS if kernel is None else np.minimum(bright, 1.0))
@@ -80,11 +81,12 @@ def encircled_energy(
 def _around(
     result: PSFResult, middle: tuple[float, float], radius: float, edge: float
 ) -> tuple[PSFResult, SoftEdge | None]:
-    """Return a PSF whose samples suffice for sums within a circle, and the kernel; None for means over cells.
+    """Return a PSF whose samples suffice for sums within a circle, and the kernel (None for means over cells).
 
     Samples are fine enough, and they extend beyond the circle by the reach of the kernel.
 
-    radius: radius [m] of the circle. edge: distance [m] from its centre to the outermost samples.
+    radius: radius [m] of the circle.
+    edge: distance [m] from its centre to the outermost samples.
     """
     if result.holds_cells:
         return result, None

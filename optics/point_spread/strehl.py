@@ -27,16 +27,16 @@ CLOSER = 4.0  # choice: factor by which points of the direct sum around a peak a
 LOBES = 0.4  # choice: coarsest pitch in units of 1/cutoff at which samples miss no lobe
 BETWEEN = 1 / 16  # choice: pitch in units of 1/cutoff at which the spline is evaluated
 MOST_SPLINED = 20_000  # choice, limited by time: number of brightest samples around which the spline is evaluated
-NOT_YET = 0.9  # choice: factor on the lower bound of samples next to the peak, because the PSF has errors, too
-CLIMBS = 8  # choice: most windows, each moved to the brightest sample of the previous one
+NOT_YET = 0.9  # choice: factor on the lower bound for samples next to the maximum, since the PSF itself has errors
+CLIMBS = 8  # choice: largest number of windows in the search, each moved to the brightest sample of the previous one
 NEIGHBOURHOOD = 9  # choice: samples along a side of such a window
 PARABOLOID_ERROR = 3e-5
-OF_A_MASK = 1e-6  # choice: neglected level of a mask's spectrum for the peak without aberration
-DIGITS = 10.0  # choice: digits of the peak without aberration
+OF_A_MASK = 1e-6  # choice: neglected level of a mask's spectrum, for the maximum without aberration
+DIGITS = 10.0  # choice: digits of the maximum without aberration
 
 
 def strehl_ratio(result: PSFResult | Mixture, with_error: bool = False) -> Any:
-    """Return the peak of the PSF relative to the peak of the same aperture without aberration, (wavelength,).
+    """Return the maximum of the PSF relative to that of the same aperture without aberration, (wavelength,).
 
     The result for a `WhitePSF` is (type,). The wave without aberration is spherical and converges on the point where
     the axis hits the sensor. Its field at this point is, with L = √(z² + r²),
@@ -44,15 +44,15 @@ def strehl_ratio(result: PSFResult | Mixture, with_error: bool = False) -> Any:
         U = ∫ z/(2πL²) (1/L - ik) dξ
 
     the first Rayleigh-Sommerfeld integral of exp(-ikL(r)). Its modulus for a circle is |1 - z/L - ikz ln(L/z)|. The
-    peak of the PSF is the maximum near the brightest sample. If the samples are too coarse, finer samples are computed
-    there. The peak of a mean over wavelengths (`PSFResult.mean`) is divided by the mean of the peaks without
-    aberration.
+    maximum is searched near the brightest sample. If the samples are too coarse, finer samples are computed there. The
+    maximum of a mean over wavelengths (`PSFResult.mean`) is divided by the mean of the maxima without aberration.
 
-    with_error: whether to return (value, predicted error), each (wavelength,).
+    with_error: True to return (value, predicted error), each (wavelength,).
 
     Raises:
-        AccuracyError: the peak lies outside the window; the PSF is brighter at a point outside, at which rays land; or
-            the samples are too coarse and finer ones cannot be computed. The message states sufficient samples.
+        AccuracyError: the maximum lies outside the window; the PSF is brighter at a point outside, where rays land; or
+            the samples are too coarse and finer ones cannot be computed. The message states which samples are
+            sufficient.
     """
     import drjit as dr
 
@@ -77,7 +77,7 @@ def strehl_ratio(result: PSFResult | Mixture, with_error: bool = False) -> Any:
 
 
 def _unaberrated(result: PSFResult, wavelengths: np.ndarray) -> Array:
-    """Return the peak of the same aperture without aberration, (wavelength,), flat."""
+    """Return the maximum of the PSF of the same aperture without aberration, (wavelength,), flat."""
     import drjit as dr
 
     types = precision("float64")
@@ -130,9 +130,10 @@ def _peak(result: PSFResult, index: int) -> Peak:
 def _brightest(result: PSFResult, index: int) -> tuple[float, float]:
     """Return the point (x, y) at which the spline through the samples is brightest.
 
-    The brightest sample need not belong to the highest lobe. A non-negative function with a peak p and no frequency
-    beyond the cutoff f is at least p cos²(πfd) at a distance d < 1/(2f) from the peak (M. Riesz 1914). All samples with
-    at least this value, for the largest distance of a sample from the peak, are therefore searched.
+    The brightest sample need not belong to the highest lobe. A non-negative function with the maximum p and no
+    frequency beyond the cutoff f is at least p cos²(πfd) at a distance d < 1/(2f) from the maximum (M. Riesz 1914). The
+    sample nearest the maximum therefore has at least this value, with d the largest possible distance of that sample.
+    All samples above it are searched.
     """
     from scipy.ndimage import map_coordinates, spline_filter
 

@@ -2,7 +2,7 @@
 
 How many steps does it take to learn the tasks? Animals with two eyes of 15 x 15 receptors solve detection after 86,016
 and 143,360 steps (23 and 40 CPU seconds, two seeds) and tracking after 159,744. An animal with a single receptor stays
-at chance. In the maze, no animal reaches the goal within these budgets.
+at chance. In the maze, no animal reaches the goal by the end of its training run.
 
 **Method.** Each row is a training run with `evolve.learning.ppo` in a built-in world. Every 50,000 steps the policy is
 evaluated without exploration, in 100 episodes in worlds that were not used for training. Detection counts as solved if
@@ -17,8 +17,8 @@ if it reaches an object at all, this object is the goal in one of three cases.
 
 **Second table.** For the maze, the table states the distance from the start at which an episode ends, and the return of
 the episode. The return is 0.25 per metre, minus 1 for every action in contact with a wall. The fitness is 1.5 per
-metre, minus 2 for every such action. Means have 95 % confidence intervals. The interval of the fitness is an upper
-bound.
+metre, minus 2 for every such action. Means have 95 % confidence intervals. The stated width of the interval of the
+fitness is an upper bound, so the actual interval may be narrower.
 
 An animal that stands still earns 0, and an animal with one eye learns little more than to stand still. Animals with ten
 eyes travel. They travel farther than a hand-written controller that receives the true distances of the walls in eleven
@@ -34,8 +34,8 @@ is above 0.
   defaults.
 - The other rows use 128 worlds x 32 steps, 10 epochs, leaky rectifiers, and segments of 8 steps. Their learning rate is
   3e-3. After 75,000 steps (in mazes after 200,000), it falls in inverse proportion to the number of steps. In these
-  runs the number of epochs is constant. The present learner reduces the number of epochs before the learning rate
-  (`fewer_epochs`).
+  runs the number of epochs is constant. In the present learner, the learning rate first falls to half, and then the
+  number of epochs falls instead (`fewer_epochs`).
 
 **Bounds.** Two eyes of 15 x 15 receptors solve detection and tracking. A single receptor is not better than chance. In
 the maze, animals with ten eyes have a higher fitness and travel farther than animals with one eye.
