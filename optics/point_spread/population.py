@@ -29,6 +29,7 @@ from optics.numerics.grid import Grid
 from optics.numerics.interpolation import cubic_bsplines
 from optics.numerics.precision import precision
 from optics.point_spread.population_members import Member, powers
+from optics.point_spread.window_cost import population_seconds
 
 __all__ = ["population_pictures"]
 
@@ -43,11 +44,10 @@ LEAST_LIGHT = 1e-2
 SPREAD = 1.1  # choice: error of the intensity divided by the spread of the phase; see test_population.py
 TURNS = 1.3  # choice: ratio of successive numbers of samples; similar pupils then share a plan
 STACK = 2_000_000  # choice, limited by memory: samples of pupils in a stack
-OWN_SECONDS, PER_SAMPLE, PER_OUTPUT = 5e-5, 2e-8, 1.7e-7  # times [s] per PSF, entry and output
 RINGS = 12  # choice: number of rings of the window for which the error is predicted
 SLOPES = np.linspace(-1, 1, 9) * (1 + EDGE_REACH)  # positions where the slope of a relief is evaluated
-PER_ORDER = 4  # choice: positions per order at which the slope of a wavefront is evaluated
-STEP = 1e-4  # choice [radii]: step of the differences that give a wavefront's slope
+# Choices for the slope of a wavefront: positions per order at which it is evaluated, and step of differences [radii].
+PER_ORDER, STEP = 4, 1e-4
 
 
 def population_pictures(
@@ -87,12 +87,11 @@ def population_pictures(
 
 
 def _plan(member: Member, samples: _Samples, window: Grid, error: float, leaving: float) -> Plan:
-    shape, radius = (samples.at.size, samples.at.size), member.pupil.radius
-    sine = steepest_sine(radius, number(member.distance), leaving)
+    shape = samples.at.size, samples.at.size
+    sine = steepest_sine(member.pupil.radius, number(member.distance), leaving)
     scalar = scalar_theory_error(sine, light_spread(member.pupil))
+    seconds = population_seconds(shape[0], window)
     why = "one of a population: rank 1, not spot-checked"
-    entries = shape[0] * (shape[0] + sum(window.shape))
-    seconds = OWN_SECONDS + entries * PER_SAMPLE + math.prod(window.shape) * PER_OUTPUT
     return Plan("low_rank", shape, "float32", error, why, seconds, scalar_error=scalar)
 
 
