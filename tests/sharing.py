@@ -28,6 +28,7 @@ SHARING = {
         *("tests/test_architecture.py", "tests/test_conventions.py", "tests/rhabdom/test_dependencies.py"),
         *("tests/test_docs.py::test_paths", "tests/test_docs.py::test_names"),
     ),
+    "the prose of all files": ("tests/test_plain_english.py",),
     "the built site": tuple(f"tests/test_docs.py::test_{name}" for name in ("site", "menus", "reference")),
 }
 
