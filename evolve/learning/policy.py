@@ -17,10 +17,10 @@ import safetensors
 import safetensors.torch
 import torch
 from gymnasium import spaces
-from stable_baselines3.common.distributions import Distribution
+from stable_baselines3.common.distributions import DiagGaussianDistribution, Distribution
 from stable_baselines3.common.policies import MultiInputActorCriticPolicy
 from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
-from torch import Tensor
+from torch import Tensor, nn
 
 from evolve.genome.phenotype import FORMER_ENCODER
 from evolve.learning.adam import Adam
@@ -147,6 +147,16 @@ class _Within(torch.autograd.Function):
         return gradient * torch.where(gradient < 0, mean < 1, mean > -1)
 
 
+class _Gaussian(DiagGaussianDistribution):
+    """SB3's distribution of actions, whose initial spread is not computed.
+
+    Arithmetic on the "meta" device of `_require_shape` would import torch's compiler, which takes a second.
+    """
+
+    def proba_distribution_net(self, latent_dim: int, log_std_init: float = 0.0) -> tuple[nn.Module, nn.Parameter]:
+        return nn.Linear(latent_dim, self.action_dim), nn.Parameter(torch.full((self.action_dim,), log_std_init))
+
+
 class EyePolicy(MultiInputActorCriticPolicy):
     """Actor and critic of stable-baselines3 (SB3), whose inputs are EyeFeatures.
 
@@ -179,7 +189,11 @@ class EyePolicy(MultiInputActorCriticPolicy):
         with torch.no_grad():
             means, spreads = zip(*(first_actions or [(0.0, FIRST_SPREAD)] * self.config.actions), strict=True)
             self.action_net.bias.copy_(torch.tensor(means))
-            self.log_std.copy_(torch.tensor(spreads).log())
+            self.log_std.copy_(torch.tensor(spreads, device="cpu").log())
+
+    def _build(self, lr_schedule: Any) -> None:
+        self.action_dist = _Gaussian(self.action_dist.action_dim)
+        super()._build(lr_schedule)
 
     def extract_features(
         self, obs: dict[str, Tensor], features_extractor: BaseFeaturesExtractor | None = None
