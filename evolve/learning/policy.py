@@ -192,7 +192,7 @@ class EyePolicy(MultiInputActorCriticPolicy):
             self.log_std.copy_(torch.tensor(spreads, device="cpu").log())
 
     def _build(self, lr_schedule: Any) -> None:
-        self.action_dist = _Gaussian(self.action_dist.action_dim)
+        self.action_dist = _Gaussian(self.action_space.shape[0])
         super()._build(lr_schedule)
 
     def extract_features(

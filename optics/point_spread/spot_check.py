@@ -177,8 +177,8 @@ def _exact(beam: Beam, problem: Problem, reference: _DirectSum, drawn: np.ndarra
         x, y = np.hypot(x, y), np.zeros_like(y)
     rule = problem.aperture, reference.cycles, reference.digits, problem.symmetric
     with dr.suspend_grad():
-        at = (types.Float64(padded_for_packets(each)) for each in (x, y))
-        field = direct_sum(beam, rule, *at, types)
+        x, y = (types.Float64(padded_for_packets(each)) for each in (x, y))
+        field = direct_sum(beam, rule, x, y, types)
         exact: np.ndarray = field.intensity.numpy() / beam.pupil.area
     return exact
 
