@@ -32,7 +32,7 @@ MOST_NODES = 32
 
 @dataclass(frozen=True)
 class PixelatedAperture(Aperture):
-    """An opening over which a wave jumps at the borders of count x count square pixels that fill [-1, 1]²."""
+    """An opening tiled by count x count square pixels that fill [-1, 1]². The integrand may jump at their borders."""
 
     opening: Aperture
     count: int
@@ -58,7 +58,7 @@ class PixelatedAperture(Aperture):
 
     def nodes_across(self, cycles: float, digits: float) -> int | None:
         """Nodes along a pixel that make rows and columns as accurate as `nodes`; None if there would be too many."""
-        # Upper bound of the share of the area that lies in cut pixels.
+        # Upper bound on the fraction of the area that lies in cut pixels.
         share = min(1.0, len(self._cut) * self._pitch**2 / self.area)
         turns = np.array(pi * cycles * self._pitch)
         across = max(

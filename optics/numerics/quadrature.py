@@ -18,8 +18,8 @@ from optics.numerics.bessel import bessel_j
 
 __all__ = ["gauss_legendre", "gauss_legendre_count", "harmonics", "stepped_up"]
 
-NEWTON_STEPS = 10  # far more than convergence needs
-DEBYE_STEPS = 3  # choice: one more step rarely changes the rounded order
+NEWTON_STEPS = 10  # iterations, far more than convergence needs
+DEBYE_STEPS = 3  # choice: iterations; one more rarely changes the rounded order
 STEPS = 16  # choice: values per octave in `stepped_up`; on average, cycles increase by half a step (2 %)
 
 
