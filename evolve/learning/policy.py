@@ -17,15 +17,16 @@ import safetensors
 import safetensors.torch
 import torch
 from gymnasium import spaces
-from stable_baselines3.common.distributions import DiagGaussianDistribution, Distribution
+from stable_baselines3.common.distributions import Distribution
 from stable_baselines3.common.policies import MultiInputActorCriticPolicy
 from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
-from torch import Tensor, nn
+from torch import Tensor
 
 from evolve.config.checks import check_values
 from evolve.config.settings import DIRECT, WiringConfig
 from evolve.genome.phenotype import FORMER_ENCODER
 from evolve.learning.adam import Adam
+from evolve.learning.distribution import Gaussian, Within
 from evolve.learning.eye_features import UNITS, EyeFeatures
 from evolve.learning.observed import CONTACT, Entry, entries_of, known_beside_eyes
 from evolve.learning.tensor_file import read_tensors
@@ -147,36 +148,6 @@ def _entries(stored: Mapping[str, Any]) -> tuple[Entry, ...]:
     return (CONTACT,)
 
 
-class _Within(torch.autograd.Function):
-    """Means of actions whose gradients never move them beyond the bounds -1 and 1.
-
-    Actions beyond the bounds are clipped. If the mean is far outside, all actions are clipped to the same value.
-    Exploration then has no effect, and no gradient would move the mean back (Hausknecht and Stone 2016, section 5.2,
-    "zeroing gradients").
-    """
-
-    @staticmethod
-    def forward(ctx: Any, mean: Tensor) -> Tensor:
-        ctx.save_for_backward(mean)
-        return mean.clone()
-
-    @staticmethod
-    def backward(ctx: Any, gradient: Tensor) -> Tensor:
-        (mean,) = ctx.saved_tensors
-        # Gradient descent increases the mean if the gradient is negative.
-        return gradient * torch.where(gradient < 0, mean < 1, mean > -1)
-
-
-class _Gaussian(DiagGaussianDistribution):
-    """SB3's distribution of actions, whose initial spread is not computed.
-
-    Arithmetic on the "meta" device of `_require_shape` would import torch's compiler, which takes a second.
-    """
-
-    def proba_distribution_net(self, latent_dim: int, log_std_init: float = 0.0) -> tuple[nn.Module, nn.Parameter]:
-        return nn.Linear(latent_dim, self.action_dim), nn.Parameter(torch.full((self.action_dim,), log_std_init))
-
-
 class EyePolicy(MultiInputActorCriticPolicy):
     """Actor and critic of stable-baselines3 (SB3), whose inputs are EyeFeatures.
 
@@ -210,7 +181,7 @@ class EyePolicy(MultiInputActorCriticPolicy):
             self.log_std.copy_(torch.tensor(spreads, device="cpu").log())
 
     def _build(self, lr_schedule: Any) -> None:
-        self.action_dist = _Gaussian(self.action_space.shape[0])
+        self.action_dist = Gaussian(self.action_space.shape[0])
         super()._build(lr_schedule)
 
     def extract_features(
@@ -222,7 +193,7 @@ class EyePolicy(MultiInputActorCriticPolicy):
     def _get_action_dist_from_latent(self, latent_pi: Tensor) -> Distribution:
         if not torch.isfinite(latent_pi).all():
             raise TrainingDiverged("policy's actions not finite")
-        mean = _Within.apply(self.action_net(latent_pi))
+        mean = Within.apply(self.action_net(latent_pi))
         return self.action_dist.proba_distribution(mean, self.log_std)
 
 
