@@ -14,7 +14,7 @@ from optics.methods.rayleigh_sommerfeld import MOST_DIGITS, direct_sum, node_cou
 from optics.numerics.accuracy import FLOAT_NOISE
 from optics.numerics.cost import PAIRS_PER_SECOND
 from optics.numerics.grid import Grid
-from optics.numerics.precision import precision
+from optics.numerics.precision import padded_for_packets, precision
 from optics.numerics.quadrature import stepped_up
 
 __all__ = ["CAUTION", "EFFORT", "exact_psf", "path_rounding", "spot_check"]
@@ -197,7 +197,8 @@ def _at_points(beam: Beam, problem: Problem, reference: _DirectSum, x: np.ndarra
         x, y = np.hypot(x, y), np.zeros_like(y)
     rule = problem.aperture, reference.cycles, reference.digits, problem.symmetric
     with dr.suspend_grad():
-        field = direct_sum(beam, rule, types.Float64(x), types.Float64(y), types)
+        x, y = (types.Float64(padded_for_packets(each)) for each in (x, y))
+        field = direct_sum(beam, rule, x, y, types)
         exact: np.ndarray = field.intensity.numpy() / beam.pupil.area
     return exact
 

@@ -15,7 +15,7 @@ from optics.numerics.accuracy import AccuracyError
 from optics.numerics.arguments import flag
 from optics.numerics.autodiff import Array, number, to_user
 from optics.numerics.grid import Grid
-from optics.numerics.precision import opaque, precision
+from optics.numerics.precision import opaque, padded_for_packets, precision
 from optics.point_spread.mixture import Mixture, a_mixture, flat
 from optics.point_spread.psf_result import PSFResult
 from optics.point_spread.spot_check import exact_psf
@@ -88,7 +88,7 @@ def _unaberrated(result: PSFResult, wavelengths: np.ndarray) -> Array:
     nodes = result.pupil.aperture.nodes(0.5 + bends + poles, DIGITS)
     radius, z = opaque(types, result.pupil.aperture_radius), opaque(types, result.sensor_distance)
     weight = types.Float(nodes.weight)
-    slant = dr.sqrt(z * z + radius * radius * types.Float(nodes.x**2 + nodes.y**2))
+    slant = dr.sqrt(z * z + radius * radius * types.Float(padded_for_packets(nodes.x**2 + nodes.y**2)))
     size = weight * z / (2 * np.pi * slant * slant)
     wavenumber = types.Float(
         np.array([2 * np.pi * result.pupil.index_behind(at) / at for at in map(float, wavelengths)])
