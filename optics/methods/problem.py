@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
+from itertools import pairwise
 
 from optics.apertures.aperture import EDGE_REACH, Aperture, SoftAperture
 from optics.apertures.pixelated import PixelatedAperture
 from optics.elements.beam import Beam
+from optics.elements.derivative_knots import DerivativeKnots, carries_derivatives, derivative_knots
 from optics.elements.source import PointSource
 from optics.elements.wavefront_slopes import Slopes
+from optics.methods.derivative_cells import derivative_cells
 from optics.methods.rays import Rays
 from optics.methods.scalar_theory import ROUND, light_spread, scalar_theory_error, steepest_sine
 from optics.numerics.arguments import in_range, positive
@@ -27,6 +30,7 @@ SLOPE_MARGIN = 1.02
 # relative error of the amplitude of edge-diffracted light is several ripples, and that of its intensity is twice as
 # large. In a window that contains no other light, the latter is half the tolerance.
 EDGE_RIPPLE_PER_TOLERANCE = 0.1
+DETAIL_PART = 0.1  # choice: phase [rad] of neglected detail, relative to the tolerance
 BRIGHT_EDGE_RIPPLE_PER_TOLERANCE = 0.3
 
 
@@ -51,6 +55,9 @@ class Problem:
     masked: whether a mask scatters light to places that rays do not predict. Approximations then cannot predict their
         error.
     spread: spread of the light over the pupil, see `light_spread`.
+    differentiated: whether the PSF carries derivatives.
+    knots: cells that derivatives by the samples of maps require; None if no such derivatives are requested.
+    other_detail: `detail` without that of these maps.
     """
 
     aperture: Aperture
@@ -71,10 +78,17 @@ class Problem:
     medium_n: float = 1.0
     spread: float = ROUND
     even: bool = False
+    differentiated: bool = False
+    knots: DerivativeKnots | None = None
+    other_detail: float = 0.0
 
     @classmethod
-    def from_beam(cls, beam: Beam, window: Grid, tolerance: float, dtype: str = "float32") -> Problem:
+    def from_beam(
+        cls, beam: Beam, window: Grid, tolerance: float, dtype: str = "float32", derivatives: bool = True
+    ) -> Problem:
         """Return the problem for a beam that passes a pupil and arrives at a window.
+
+        derivatives: whether the samples must also be suitable for the derivatives that the beam carries.
 
         Raises:
             ValueError: the distance is not positive, the tolerance is not in [1e-12, 0.5], or the dtype is invalid.
@@ -83,7 +97,10 @@ class Problem:
         tolerance = in_range("tolerance", tolerance, 1e-12, 0.5)
         precision(dtype)
         source = PointSource(number(beam.source.distance), beam.source.angle)
-        return _problem(Beam(beam.pupil, source, beam.wavelength, distance), window, tolerance, dtype)
+        plain = Beam(beam.pupil, source, beam.wavelength, distance)
+        if not (derivatives and carries_derivatives(beam)):
+            return _problem(plain, window, tolerance, dtype)
+        return _differentiated(plain, window, tolerance, dtype, derivative_knots(beam.pupil, beam.wavelength))
 
     @cached_property
     def turning(self) -> float:
@@ -110,6 +127,28 @@ class Problem:
         if self.pixelated is not None:
             return None
         return Rays.from_slopes(self.slopes, self.aperture, self.distance, self.medium_n)
+
+    def cells(self, band: float | None = None) -> PixelatedAperture | None:
+        """Return the aperture with nodes in the cells between knots that are suitable for derivatives.
+
+        The result is None if there would be too many cells.
+
+        band: highest frequency [1/m] in the pupil's plane of the light that must be resolved. None: the light that
+            arrives at any point of the window, as in `turning`.
+        """
+        assert self.knots is not None
+        # Nodes lie beyond the rim by at most the diagonal of a cell that the rim cuts.
+        margin = math.sqrt(2) * max(b - a for a, b in pairwise(self.knots.borders))
+        towards = (self.window, self.distance, self.medium_n) if band is None else None
+        slopes = self.slopes.spread(margin, towards)
+        cycles = self.radius * (slopes / (self.wavelength * self.medium_n) + self.other_detail + (band or 0.0))
+        opening = self.aperture.opening if isinstance(self.aperture, PixelatedAperture) else self.aperture
+        return derivative_cells(opening, self.knots, cycles, self.tolerance)
+
+    @property
+    def divided(self) -> bool:
+        """True if the aperture must be divided, into the pixels of a relief or into the cells between knots."""
+        return self.pixelated is not None or self.knots is not None
 
     @property
     def pixelated(self) -> PixelatedAperture | None:
@@ -188,13 +227,23 @@ class PupilEdge:
 
 
 @lru_cache(maxsize=256)
+def _differentiated(
+    beam: Beam, window: Grid, tolerance: float, dtype: str, knots: DerivativeKnots | None
+) -> Problem:
+    found = replace(_problem(beam, window, tolerance, dtype), differentiated=True, knots=knots)
+    if knots is None:
+        return found
+    others = knots.without_maps(beam.pupil)
+    return replace(found, other_detail=others.bandwidth(beam.wavelength, DETAIL_PART * tolerance))
+
+
+@lru_cache(maxsize=256)
 def _problem(beam: Beam, window: Grid, tolerance: float, dtype: str) -> Problem:
     pupil, wavelength, distance = beam.pupil, beam.wavelength, beam.distance
     slopes = pupil.slopes(wavelength, beam.source)
     pixels = pupil.pixels if pupil.bends(wavelength) else 0
     on_axis = beam.source.angle == (0.0, 0.0)
-    # Choice: a tenth of the tolerance, as an error of the phase [rad].
-    detail = pupil.bandwidth(wavelength, tolerance / 10)
+    detail = pupil.bandwidth(wavelength, DETAIL_PART * tolerance)
     return Problem(
         aperture=PixelatedAperture(pupil.aperture, pixels) if pixels else pupil.aperture,
         radius=pupil.radius,

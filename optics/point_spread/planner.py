@@ -140,14 +140,16 @@ def choose(problem: Problem, method: str = "auto", most_seconds: float = MOST_SE
         ValueError: unknown method.
         AccuracyError: no sampling within the limits on memory and time meets the tolerance.
     """
-    asked = {"auto": tuple(METHODS), "exact": tuple(EXACT), "field": FIELDS}.get(method, (method,))
+    # Approximations predict the error of the intensity, and not that of its derivatives.
+    everything = tuple(EXACT if problem.differentiated else METHODS)
+    asked = {"auto": everything, "exact": tuple(EXACT), "field": FIELDS}.get(method, (method,))
     if asked[0] not in METHODS:
         raise ValueError(f"method = {method!r}: must be 'auto', 'exact' or one of {', '.join(METHODS)}")
     _check_dtype(problem)
     check_window(problem.window, problem.dtype)
     allowed = _model_tolerance(problem) if method == "auto" else math.inf
     outputs = math.prod(problem.window.shape)
-    known = METHODS if problem.pixelated is None else FOR_PIXELS
+    known = FOR_PIXELS if problem.divided else METHODS
     weighed: dict[str, Sampling] = {}
     best: Sampling | None = None
     for name in sorted(set(asked) & set(known), key=list(WEIGHING).index):
