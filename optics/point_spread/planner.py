@@ -218,10 +218,23 @@ def _plan(problem: Problem, best: Sampling, weighed: dict[str, Sampling], most_s
         f"Fresnel number {problem.fresnel_number:.3g}, sine of the steepest ray kept "
         f"{problem.band() * problem.wavelength:.2g}; "
         + ("cheapest method that meets the tolerance" if len(weighed) > 1 else "requested")
+        + _why_for_derivatives(problem, best)
     )
     error = _sampling_error(problem) + best.model_error
     sampled = best.method, best.samples, problem.dtype, error, why, _seconds(best, problem)
-    return Plan(*sampled, tuple(options), best.padding, problem.scalar_error)
+    derivatives = problem.tolerance if problem.differentiated and not best.model_error else None
+    return Plan(*sampled, tuple(options), best.padding, problem.scalar_error, derivatives)
+
+
+def _why_for_derivatives(problem: Problem, best: Sampling) -> str:
+    """Return the part of a plan's reason that concerns derivatives; empty if none are requested."""
+    if not problem.differentiated:
+        return ""
+    if best.model_error:
+        return "; an approximation predicts no error of derivatives"
+    if problem.knots is None:
+        return "; derivatives exclude approximations"
+    return f"; derivatives by the samples of maps need nodes in each cell between knots ({problem.knots.maps})"
 
 
 def _verdict(option: Sampling, best: Sampling, problem: Problem, most_seconds: float) -> str:
@@ -238,6 +251,11 @@ def _verdict(option: Sampling, best: Sampling, problem: Problem, most_seconds: f
 
 def _refusal(problem: Problem, found: list[Sampling], most_seconds: float, method: str) -> str:
     width = 2 * problem.window.half_width
+    if not found and problem.knots is not None:
+        return (
+            f"method = {method!r}: cannot compute derivatives by the samples of maps ({problem.knots.maps}); use "
+            f"method='auto' or one of {', '.join(FOR_PIXELS)}"
+        )
     if not found and problem.pixelated is not None:
         return (
             "this method cannot sample a pixelated relief within its limits; use method='auto' or one of "
@@ -253,8 +271,9 @@ def _refusal(problem: Problem, found: list[Sampling], most_seconds: float, metho
         )
     least = min(found, key=lambda option: option.seconds)
     across = f"{least.samples[0]} nodes" if least.samples[1] == 1 else f"{max(least.samples)} samples across"
+    purpose = "" if problem.knots is None else f" for derivatives by the samples of maps ({problem.knots.maps})"
     return (
-        f"tolerance = {problem.tolerance:g} needs {across}, {size_of(_bytes(least, problem))} and about "
+        f"tolerance = {problem.tolerance:g}{purpose} needs {across}, {size_of(_bytes(least, problem))} and about "
         f"{_seconds(least, problem):.2g} s by {least.method}; the limits are {size_of(MOST_BYTES)} and "
         f"{most_seconds:g} s: widen the tolerance, shrink the window ({width:.3g} m) or the pupil (radius "
         f"{problem.radius:.3g} m, Fresnel number {problem.fresnel_number:.3g})"
