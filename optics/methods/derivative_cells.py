@@ -9,7 +9,9 @@ up to degree n - 1 over the open part.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from functools import lru_cache
+from itertools import count
 
 import numpy as np
 
@@ -19,7 +21,7 @@ from optics.elements.derivative_knots import DerivativeKnots
 
 __all__ = ["NODES_PART", "derivative_cells"]
 
-NODES_PART = 0.5  # choice: part of the tolerance that the nodes in the cells may use
+NODES_PART = 0.7  # choice: part of the tolerance that the nodes in the cells may use
 MOST_NODES = 12  # choice: largest number of nodes along a cell; wider cells are divided
 MOST_CELLS = 4096  # choice, limited by memory: largest number of cells along a side
 # Chebyshev coefficients of a cubic spline through a single sample: root mean square over the cells between its knots,
@@ -27,8 +29,8 @@ MOST_CELLS = 4096  # choice, limited by memory: largest number of cells along a 
 SPLINE = (1.0, 0.970, 0.150, 0.076)
 # Choice: the error of cut cells is T^CUT_POWER, where T is the sum of the coefficients from degree n on. The power lies
 # between 1, for weights that are exact up to degree n - 1, and 2, for cells of which hardly anything is cut off. Both
-# errors are upper bounds, of which about a quarter is reached. test_gradients.py compares with exact derivatives.
-CUT_POWER, REACHED = 1.8, 0.25
+# errors are upper bounds, of which about a tenth is reached. test_gradients.py compares with exact derivatives.
+CUT_POWER, REACHED = 1.8, 0.1
 WAVES = np.concatenate([[0.0], np.geomspace(0.01, 40.0, 120)])  # values of z in the table of errors
 DEGREES = 96  # number of degrees in this table, above which all coefficients are negligible
 
@@ -43,16 +45,23 @@ def derivative_cells(
 
     cycles: local frequencies [cycles per R] of the integrand at points that are evenly spread over the opening.
     """
-    borders = knots.borders
-    while len(borders) <= MOST_CELLS:
-        cells = PixelatedAperture.between(opening, borders)
+    for halvings in count():
+        cells = _divided(opening, knots.borders, halvings)
+        if cells.count > MOST_CELLS:
+            return None
         errors = _errors(math.pi * cells.widest * cycles, knots.splines, cells.cut_share)
         enough = np.flatnonzero(errors <= NODES_PART * tolerance)
         if enough.size:
-            return PixelatedAperture.between(opening, borders, int(enough[0]) + 1)
-        middles = (np.add(borders[:-1], borders[1:]) / 2).tolist()
-        borders = tuple(sorted((*borders, *middles)))
+            return replace(cells, fixed=int(enough[0]) + 1)
     return None
+
+
+@lru_cache(maxsize=64)
+def _divided(opening: Aperture, borders: tuple[float, ...], halvings: int) -> PixelatedAperture:
+    """Return the cells between these borders, after each has been halved a number of times."""
+    parts = 2**halvings
+    places = np.interp(np.arange((len(borders) - 1) * parts + 1) / parts, np.arange(len(borders)), borders)
+    return PixelatedAperture.between(opening, tuple(places.tolist()))
 
 
 def _errors(z: np.ndarray, splines: int, cut_share: float) -> np.ndarray:

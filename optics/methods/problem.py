@@ -7,6 +7,8 @@ from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from itertools import pairwise
 
+import numpy as np
+
 from optics.apertures.aperture import EDGE_REACH, Aperture, SoftAperture
 from optics.apertures.pixelated import PixelatedAperture
 from optics.elements.beam import Beam
@@ -31,6 +33,9 @@ SLOPE_MARGIN = 1.02
 # large. In a window that contains no other light, the latter is half the tolerance.
 EDGE_RIPPLE_PER_TOLERANCE = 0.1
 DETAIL_PART = 0.1  # choice: phase [rad] of neglected detail, relative to the tolerance
+# Choice: factor by which detail is finer if derivatives by single numbers are requested. Such a derivative can be a
+# small difference, as that by the focal length of a lens in focus, to which the detail contributes most.
+FINER_DETAIL = 10.0
 BRIGHT_EDGE_RIPPLE_PER_TOLERANCE = 0.3
 
 
@@ -137,13 +142,26 @@ class Problem:
             arrives at any point of the window, as in `turning`.
         """
         assert self.knots is not None
-        # Nodes lie beyond the rim by at most the diagonal of a cell that the rim cuts.
-        margin = math.sqrt(2) * max(b - a for a, b in pairwise(self.knots.borders))
-        towards = (self.window, self.distance, self.medium_n) if band is None else None
-        slopes = self.slopes.spread(margin, towards)
+        slopes = self._turning_slopes if band is None else self._slopes
         cycles = self.radius * (slopes / (self.wavelength * self.medium_n) + self.other_detail + (band or 0.0))
         opening = self.aperture.opening if isinstance(self.aperture, PixelatedAperture) else self.aperture
         return derivative_cells(opening, self.knots, cycles, self.tolerance)
+
+    @cached_property
+    def _slopes(self) -> np.ndarray:
+        """Slopes of the wavefront at the nodes of cells, see `Slopes.spread`."""
+        return self.slopes.spread(self._beyond_rim)
+
+    @cached_property
+    def _turning_slopes(self) -> np.ndarray:
+        """The same for the combined phase of pupil and path."""
+        return self.slopes.spread(self._beyond_rim, (self.window, self.distance, self.medium_n))
+
+    @property
+    def _beyond_rim(self) -> float:
+        """Distance [R] beyond the rim up to which nodes lie: the diagonal of the largest cell that the rim cuts."""
+        assert self.knots is not None
+        return math.sqrt(2) * max(after - before for before, after in pairwise(self.knots.borders))
 
     @property
     def divided(self) -> bool:
@@ -230,7 +248,8 @@ class PupilEdge:
 def _differentiated(
     beam: Beam, window: Grid, tolerance: float, dtype: str, knots: DerivativeKnots | None
 ) -> Problem:
-    found = replace(_problem(beam, window, tolerance, dtype), differentiated=True, knots=knots)
+    part = DETAIL_PART / (1 if knots else FINER_DETAIL)
+    found = replace(_problem(beam, window, tolerance, dtype, part), differentiated=True, knots=knots)
     if knots is None:
         return found
     others = knots.without_maps(beam.pupil)
@@ -238,12 +257,12 @@ def _differentiated(
 
 
 @lru_cache(maxsize=256)
-def _problem(beam: Beam, window: Grid, tolerance: float, dtype: str) -> Problem:
+def _problem(beam: Beam, window: Grid, tolerance: float, dtype: str, part: float = DETAIL_PART) -> Problem:
     pupil, wavelength, distance = beam.pupil, beam.wavelength, beam.distance
     slopes = pupil.slopes(wavelength, beam.source)
     pixels = pupil.pixels if pupil.bends(wavelength) else 0
     on_axis = beam.source.angle == (0.0, 0.0)
-    detail = pupil.bandwidth(wavelength, DETAIL_PART * tolerance)
+    detail = pupil.bandwidth(wavelength, part * tolerance)
     return Problem(
         aperture=PixelatedAperture(pupil.aperture, pixels) if pixels else pupil.aperture,
         radius=pupil.radius,
