@@ -251,10 +251,16 @@ def _verdict(option: Sampling, best: Sampling, problem: Problem, most_seconds: f
 
 def _refusal(problem: Problem, found: list[Sampling], most_seconds: float, method: str) -> str:
     width = 2 * problem.window.half_width
-    if not found and problem.knots is not None:
+    if not found and problem.knots is not None and method in {*METHODS} - {*FOR_PIXELS}:
         return (
             f"method = {method!r}: cannot compute derivatives by the samples of maps ({problem.knots.maps}); use "
             f"method='auto' or one of {', '.join(FOR_PIXELS)}"
+        )
+    if not found and problem.knots is not None:
+        return (
+            f"tolerance = {problem.tolerance:g}: derivatives by the samples of maps ({problem.knots.maps}) need too "
+            f"many nodes: widen the tolerance, or shrink the window ({width:.3g} m) or the pupil (radius "
+            f"{problem.radius:.3g} m)"
         )
     if not found and problem.pixelated is not None:
         return (
