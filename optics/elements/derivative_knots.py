@@ -46,7 +46,8 @@ class DerivativeKnots:
 
     def without_maps(self, pupil: Pupil) -> Pupil:
         """Return the pupil without the maps. The cells resolve them, so that their bandwidth does not matter."""
-        return replace(pupil, **dict.fromkeys(self.names))
+        without: dict[str, Any] = dict.fromkeys(self.names)
+        return replace(pupil, **without)
 
 
 def derivative_knots(pupil: Pupil, wavelength: float) -> DerivativeKnots | None:

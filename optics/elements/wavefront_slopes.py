@@ -81,7 +81,8 @@ class Slopes(ReadOnlyArrays):
     def spread(self, margin: float, towards: tuple[Grid, float, float] | None = None) -> np.ndarray:
         """Return slopes at points that are evenly spread over the disk.
 
-        The points extend beyond the rim by a margin [radii], but not beyond the square around the disk. Their slopes are sorted into groups of equal size, each of which is represented by its largest slope.
+        The points extend beyond the rim by a margin [radii], but not beyond the square around the disk. Their slopes
+        are sorted into groups of equal size, each of which is represented by its largest slope.
 
         towards: window, its distance [m] and the refractive index. The slopes are then upper bounds of those of the
             paths to any point of the window, see `turning`. None: slopes of the wavefront alone.

@@ -245,9 +245,7 @@ class PupilEdge:
 
 
 @lru_cache(maxsize=256)
-def _differentiated(
-    beam: Beam, window: Grid, tolerance: float, dtype: str, knots: DerivativeKnots | None
-) -> Problem:
+def _differentiated(beam: Beam, window: Grid, tolerance: float, dtype: str, knots: DerivativeKnots | None) -> Problem:
     part = DETAIL_PART / (1 if knots else FINER_DETAIL)
     found = replace(_problem(beam, window, tolerance, dtype, part), differentiated=True, knots=knots)
     if knots is None:

@@ -102,11 +102,12 @@ class NodeSampling:
 
 def nodes(problem: Problem) -> list[NodeSampling]:
     """Return a sampling whose nodes resolve the combined phase of pupil and path."""
-    aperture, (cycles, digits) = problem.aperture, node_rule(problem)
+    (cycles, digits), aperture = node_rule(problem), problem.aperture
     if problem.knots is not None:
-        aperture, cycles = problem.cells(), 0.0  # the cells have a fixed number of nodes
-    if aperture is None:
-        return []
+        cells = problem.cells()
+        if cells is None:
+            return []
+        aperture, cycles = cells, 0.0  # the cells have a fixed number of nodes
     count = node_count(aperture, cycles, digits)
     line, outputs = None, math.prod(problem.window.shape)
     if problem.symmetric:

@@ -26,8 +26,8 @@ from tests.optics.point_spread.exact_gradients import (
 
 SCENE = Scene()
 WEIGHT = np.random.default_rng(1).standard_normal(SCENE.shape)
-# Path [m] per unit of the samples, and a sample that has an effect of a fraction of a wave.
-PATHS = {"height": (SCENE.n - 1, 0.4e-6), "pixels": (SCENE.n - 1, 0.4e-6), "wavefront": (-1.0, 0.2e-6)}
+# Path [m] per unit of the samples, and a sample whose path is a fraction of a wave.
+PATHS = {"height": (SCENE.n - 1, 0.2e-6), "pixels": (SCENE.n - 1, 0.2e-6), "wavefront": (-1.0, 0.1e-6)}
 MAPS = {"height": HeightMap, "pixels": PixelRelief, "wavefront": WavefrontMap, "mask": MaskMap}
 
 
@@ -67,7 +67,7 @@ def pupil_with(name):
 @lru_cache(maxsize=4)
 def samples(name, values, n):
     x, y = np.meshgrid(lines_of_knots(n), lines_of_knots(n))
-    unit = 0.75 if name == "mask" else PATHS[name][1]
+    unit = 0.7 if name == "mask" else PATHS[name][1]
     least = 0.7 if name == "mask" else 0.0  # a jumping mask would exceed 1 between samples
     return {
         "zeros": np.zeros((n, n)),
@@ -80,7 +80,7 @@ def samples(name, values, n):
 @lru_cache(maxsize=4)
 def exact_gradient(name, values, n):
     lines, basis = (lines_of_pixels(n), pixel) if name == "pixels" else (lines_of_knots(n), spline)
-    nodes = disk_nodes(lines, 9 if n < 16 else 6)
+    nodes = disk_nodes(lines, {8: 9, 32: 7, 64: 6}[n])
     across, along = basis(n, nodes[0]), basis(n, nodes[1])
     here = np.einsum("pi,ij,pj->p", along, samples(name, values, n), across, optimize=True)
     factor = PATHS[name][0] if name in PATHS else 0.0
@@ -152,7 +152,7 @@ NUMBERS = {"radius": 25e-6, "distance": 240e-6, "n": 1.5, "focal_length": 240e-6
 @pytest.mark.parametrize("height", [0.0, 1e-9, 0.3e-6])
 @pytest.mark.parametrize("name", sorted(NUMBERS))
 def test_derivatives_by_single_numbers(name, height, tolerance):
-    """Of every sample of the PSF, as for a random functional. The height of 1 nm is below what a PSF itself needs."""
+    """The derivative of every sample of the PSF is compared. A PSF itself would neglect the height of 1 nm."""
     import drjit as dr
 
     relief = np.random.default_rng(4).random((12, 12)) * height
@@ -210,13 +210,13 @@ def test_maps_with_different_knots(reach):
 
 
 def test_only_enabled_gradients_need_nodes():
-    types = precision("float64")
-    plain, tensor = (pupil_with("height")(values) for values in (np.zeros((32, 32)), types.Tensor64(np.zeros((32, 32)))))
+    import drjit as dr
+
+    flat = np.zeros((32, 32))
+    plain, tensor = map(pupil_with("height"), (flat, precision("float64").Tensor64(flat)))
     plans = [optics.psf(pupil, [SCENE.wavelength], **view(1e-2)).plan for pupil in (plain, tensor)]
     assert plans[0].samples == plans[1].samples
     assert plans[0].derivative_error is None
-    import drjit as dr
-
     asked = pupil_with("height")(asking(np.zeros((32, 32))))
     with dr.suspend_grad():
         assert optics.psf(asked, [SCENE.wavelength], **view(1e-2)).plan.samples == plans[0].samples
@@ -242,8 +242,10 @@ def test_methods_without_nodes_between_knots_are_refused(method):
 
 @pytest.mark.parametrize(
     ("radius", "message"),
-    [(5e-3, r"derivatives by the samples of maps \(height: 8 x 8\) need too many nodes: widen the tolerance"),
-     (4e-4, r"for derivatives by the samples of maps \(height: 8 x 8\) needs \d+ samples across")],
+    [
+        (5e-3, r"derivatives by the samples of maps \(height: 8 x 8\) need too many nodes: widen the tolerance"),
+        (4e-4, r"for derivatives by the samples of maps \(height: 8 x 8\) needs \d+ samples across"),
+    ],
 )
 def test_nodes_beyond_the_limits_are_refused(radius, message):
     pupil = Pupil(radius, HeightMap(asking(np.zeros((8, 8)))))
