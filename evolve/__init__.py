@@ -18,6 +18,7 @@ _HOME = {
     "SearchConfig": "evolve.config.run_config",
     "LearningConfig": "evolve.config.run_config",
     "EvaluationConfig": "evolve.config.run_config",
+    "CostsConfig": "evolve.config.run_config",
     "ConfigError": "evolve.config.run_config",
     "GENES": "evolve.genome.genes",
     "Gene": "evolve.genome.genes",

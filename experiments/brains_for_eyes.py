@@ -12,7 +12,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from evolve.analysis.statistics import acuity_cpd
+from evolve.analysis.acuity import acuity_cpd
 from experiments import designed
 from experiments.brains_and_acuity import label
 from experiments.designed import Design, Trained
@@ -230,7 +230,7 @@ def draw(rows: Sequence[Trained], path: Path) -> None:
         place.set(title=_of_task(task, mine), xlabel="acuity [cycles/°]")
         label(place.xaxis, place.get_xlim())
         label(place.yaxis, place.get_ylim())
-    axes[0, 0].set_ylabel("share of episodes missed")
+    axes[0, 0].set_ylabel("fraction of episodes missed")
     figure.legend(handles=_key(), loc="outside lower center", ncols=7, frameon=False)
     figure.suptitle(_message(rows))
     save(figure, path)

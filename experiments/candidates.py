@@ -11,7 +11,8 @@ import numpy as np
 import torch
 
 import optics
-from evolve.analysis.statistics import acuity_cpd, succeeded, white_strehl
+from evolve.analysis.acuity import acuity_cpd
+from evolve.analysis.statistics import succeeded, white_strehl
 from evolve.analysis.vision import vision
 from evolve.config.run_config import EyeConfig, RunConfig
 from evolve.genome.phenotype import Phenotype
@@ -37,6 +38,7 @@ class Row:
 
     group: task, or variant of an experiment, that the run belongs to
     phase: number of times that genes have opened since the first generation
+    fitness: task fitness, which contains no costs
     episodes: number of evaluation episodes; fitness and success rate are means over them
     cpd: acuity [cycles/degree]
     parameters: number of parameters of the trained policy, including the critic
@@ -111,10 +113,10 @@ def _row(run: Run, group: str, candidate: Candidate, champion: bool) -> Row:
         phase=sum(0 < at <= candidate.generation for at in openings),
         index=candidate.index,
         failed=int(not succeeded(candidate)),
-        fitness=candidate.fitness,
+        fitness=candidate.task_fitness,
         success_rate=candidate.success_rate,
         episodes=len(candidate.returns),
-        parameters=parameters(PolicyConfig(shape, animal.neurons, animal.layers, animal.encoder)),
+        parameters=parameters(PolicyConfig(shape, animal.neurons, animal.layers, animal.encoder, wiring=config.wiring)),
         full_return=full_return(config.task, config.world.evaluation_course),
         **anatomy(animal, config.eye),
         **(_seen(config, animal) if champion and animal.relative_aperture is not None else {}),

@@ -6,14 +6,15 @@ import itertools
 import math
 import tempfile
 from argparse import Namespace
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import asdict, dataclass, fields, replace
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
 
 from evolve.config.assemble import assemble
 from evolve.config.run_config import EyeConfig, RunConfig
 from evolve.genome.phenotype import NEURONS_PER_FEATURE, Phenotype
+from evolve.learning.training_rung import TrainingRung
 from evolve.search.job import Job
 from evolve.search.local_executor import LocalExecutor
 from evolve.search.worker import evaluate_candidate, prepare_device
@@ -23,7 +24,7 @@ from experiments.glass import paraboloid
 from experiments.page import Page, exit_code, parser
 from experiments.store import Origin, read_rows, write_rows
 
-__all__ = ["Design", "Experiment", "Trained", "crossed", "main", "train_all"]
+__all__ = ["Design", "Experiment", "HeldOut", "Trained", "crossed", "evaluate_and_test", "main", "train_all"]
 
 
 INDEX = 1.9  # refractive index of glass; strong lenses then stay within the maximum height of reliefs
@@ -35,6 +36,9 @@ class Design:
 
     relative_aperture: pupil diameter / retina width of eyes with a paraboloid of glass; 0: eyes with perfect lenses
     glass_power: power of the glass, 1 in focus (see experiments.glass)
+    vertical_fov_deg: 0: receptors are square
+    features: features per eye, the width of its encoder; 0: a quarter of the neurons
+    own: settings of this design alone, "section.name=value" separated by spaces
     """
 
     task: str
@@ -49,6 +53,9 @@ class Design:
     neurons: int = 64
     relative_aperture: float = 0.0
     glass_power: float = 0.0
+    vertical_fov_deg: float = 0.0
+    features: int = 0
+    own: str = ""
 
     @property
     def animal(self) -> Phenotype:
@@ -59,7 +66,8 @@ class Design:
             resolution=(self.height, self.width),
             memory_frames=self.memory_frames,
             neurons=self.neurons,
-            encoder=math.ceil(self.neurons / NEURONS_PER_FEATURE),
+            encoder=self.features or math.ceil(self.neurons / NEURONS_PER_FEATURE),
+            vertical_fov_deg=self.vertical_fov_deg or None,
             **self._optics(),
         )
 
@@ -72,7 +80,7 @@ class Design:
     def config(self, settings: Sequence[str]) -> RunConfig:
         """Return the configuration of a run in which this animal could be a candidate."""
         own = (f"eye.optics={str(self.relative_aperture > 0).lower()}", f"eye.noise_sigma={self.noise_sigma}")
-        return assemble(self.task, assignments=(*own, *settings))
+        return assemble(self.task, assignments=(*own, *settings, *self.own.split()))
 
 
 @dataclass(frozen=True)
@@ -81,6 +89,8 @@ class Trained(Design):
 
     fitness, success_rate: means over evaluation episodes · episodes: number of these episodes
     steps: number of training steps · seconds: wall time of the worker
+    held_out, held_out_success_rate: means over episodes in the test set of layouts
+    held_out_episodes: number of these episodes; 0: none were played
     """
 
     failed: int = 0
@@ -89,6 +99,9 @@ class Trained(Design):
     episodes: int = 0
     steps: int = 0
     seconds: float = 0.0
+    held_out: float = 0.0
+    held_out_success_rate: float = 0.0
+    held_out_episodes: int = 0
 
     @property
     def design(self) -> Design:
@@ -104,10 +117,42 @@ class Trained(Design):
             episodes=len(outcome.returns),
             steps=outcome.steps,
             seconds=outcome.seconds,
+            **(outcome.test_columns if isinstance(outcome, HeldOut) else {}),
         )
 
 
-def train_all(designs: Iterable[Design], settings: Sequence[str], path: Path, workers: int = 0) -> list[Trained]:
+@dataclass(frozen=True)
+class HeldOut(Evaluation):
+    """Outcome of a training run, with episodes in the test set of layouts."""
+
+    test_columns: Mapping[str, Any] = field(default_factory=dict)
+
+
+def evaluate_and_test(
+    phenotype: Phenotype, config: RunConfig, seed: int, policy_path: Path, rung: TrainingRung | None = None, **how: Any
+) -> Evaluation:
+    """Train an animal, then play further episodes in the mode "test"; for use in a worker process.
+
+    In tasks without layouts, these episodes differ from those of the fitness by their starts and objects only.
+    """
+    outcome = evaluate_candidate(phenotype, config, seed, policy_path, rung, **how)
+    if outcome.failure is not None:
+        return outcome
+    from evolve.learning.final_figures import final_episodes
+    from evolve.learning.policy import load_policy
+
+    final = final_episodes(phenotype, config, load_policy(policy_path), seed)
+    columns = {
+        "held_out": float(final.returns.mean()),
+        "held_out_success_rate": float(final.successes.mean()),
+        "held_out_episodes": len(final.returns),
+    }
+    return HeldOut(**{f.name: getattr(outcome, f.name) for f in fields(Evaluation)}, test_columns=columns)
+
+
+def train_all(
+    designs: Iterable[Design], settings: Sequence[str], path: Path, workers: int = 0, tested: bool = False
+) -> list[Trained]:
     """Return the rows of all designs in their order, after training the missing ones.
 
     Each row is written as soon as it is complete. After an interruption, a repeated call trains only the designs that
@@ -115,12 +160,13 @@ def train_all(designs: Iterable[Design], settings: Sequence[str], path: Path, wo
 
     settings: "section.name=value" for all designs, in addition to the tasks' settings
     workers: number of processes; 0: one per core
+    tested: whether each trained animal also plays in the test set of layouts
     """
     designs = list(designs)
     known = {row.design: row for row in read_rows(Trained, path)}
     goes_on = bool(known)
     waiting = dict(enumerate(design for design in designs if design not in known))
-    team = LocalExecutor(evaluate_candidate, workers, prepare_device)
+    team = LocalExecutor(evaluate_and_test if tested else evaluate_candidate, workers, prepare_device)
     with tempfile.TemporaryDirectory() as folder, team as executor:
         jobs = [
             Job(number, design.animal, design.config(settings), design.seed, Path(folder) / f"{number}.safetensors")
@@ -154,6 +200,7 @@ class Experiment:
 
     name: name of page and data · text: help text · designs: all training runs · settings: settings of all of them
     page: function of the stored rows, their origin and the written answer
+    tested: whether each trained animal also plays in the test set of layouts
     """
 
     name: str
@@ -161,6 +208,7 @@ class Experiment:
     designs: Callable[[], list[Design]]
     settings: Sequence[str]
     page: Callable[[Sequence[Trained], Origin, str], Page]
+    tested: bool = False
 
 
 def main(experiment: Experiment, arguments: Sequence[str] | None = None) -> int:
@@ -178,7 +226,7 @@ def _made(experiment: Experiment, chosen: Namespace) -> None:
     data.parent.mkdir(parents=True, exist_ok=True)
     said = data.with_suffix(".txt")
     if chosen.compute:
-        train_all(experiment.designs(), experiment.settings, data, chosen.workers)
+        train_all(experiment.designs(), experiment.settings, data, chosen.workers, experiment.tested)
     rows = read_rows(Trained, data)
     if not rows:
         raise ValueError(f"{data} holds no animals; train some with --compute")

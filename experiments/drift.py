@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -52,18 +52,24 @@ class Drift:
 
 
 def drifted(
-    config: RunConfig, group: str, quantities: Mapping[str, Callable[[Row], float]], generations: int
+    config: RunConfig,
+    group: str,
+    quantities: Mapping[str, Callable[[Row], float]],
+    generations: int,
+    spread: Sequence[float] = (),
 ) -> list[Drift]:
     """Return the null model of SEEDS searches with these settings and this number of generations.
 
     Quantities that need a training run are omitted.
+
+    spread: see `evolve.search.null_model.null_model`
     """
 
     def measure(animal: Phenotype) -> dict[str, float]:
         row = _row(animal, config.eye)
         return {name: value(row) for name, value in quantities.items()}
 
-    model, rows = null_model(config, measure, generations, SEEDS), []
+    model, rows = null_model(config, measure, generations, SEEDS, spread=spread), []
     for name, means in model.means.items():
         if np.isfinite(means).any(axis=0).all():
             rows += [_drift(group, name, generation, means[:, generation]) for generation in range(generations)]

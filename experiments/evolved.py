@@ -7,9 +7,10 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from evolve.search.null_model import fitness_spread
 from evolve.store.atomic_files import write_whole
 from evolve.store.directory import Run
-from evolve.store.versions import commits, recorded
+from evolve.store.versions import commits
 from experiments.candidates import Row, complete, rows_of
 from experiments.drift import Drift, drifted, of_the_end
 from experiments.means import last_mean
@@ -191,13 +192,16 @@ def _collect(chosen: Namespace, stem: Path, quantities: Quantities) -> None:
         metadata = [RunMetadata.from_run(run, group) for group, run in runs]
         furthest = {one.group: max(o.generations for o in metadata if o.group == one.group) for one in metadata}
         configs = {group: run.config for group, run in runs if quantities and furthest[group] > 0}
-        found = [row for g, config in configs.items() for row in drifted(config, g, quantities, furthest[g])]
-        here = Origin.here(sum(one.worker_hours for one in metadata), "worker")
+        found = []
+        for group, config in configs.items():
+            spread = fitness_spread([run for of, run in runs if of == group], furthest[group])
+            found += drifted(config, group, quantities, furthest[group], spread)
+        made = Origin.from_runs([run.path for _, run in runs], sum(one.worker_hours for one in metadata))
         # All computations are complete here, so that an interruption is unlikely to leave inconsistent files.
         if quantities:
             write_rows(found, _beside(stem, "drift"))
         write_rows(metadata, _beside(stem, "runs"))
-        replace(here, versions=recorded(runs[0][1].path) or here.versions).write(stem.with_suffix(".json"))
+        made.write(stem.with_suffix(".json"))
         write_rows(rows, stem.with_suffix(".csv"))
         if _text(stem.with_suffix(".csv")) != before:
             answer.unlink(missing_ok=True)  # the answer refers to the former numbers

@@ -104,7 +104,9 @@ def _draw_lights(place: Any, rows: Sequence[Trained]) -> None:
         error = [[one.mean - one.low for one in ahead], [one.high - one.mean for one in ahead]]
         place.errorbar(list(crossings), y, error, color=COLORS[task], marker="o", capsize=3, label=task)
     place.axhline(0, color="#777777", lw=0.6)
-    place.set(xscale="log", xlabel="noise σ of a receptor (dimmer light: →)", ylabel="two of 15 minus ten of 4")
+    place.set(
+        xscale="log", xlabel="noise σ of a receptor (dimmer light: →)", ylabel="fitness, two of 15 minus ten of 4"
+    )
     place.set_title(f"navigators with rows:\n{light_message(crossings)}", fontsize=11)
     place.legend(fontsize=8, frameon=False)
 
@@ -158,6 +160,6 @@ def _draw_difference(place: Any, rows: Sequence[Trained]) -> None:
         )
     place.axhline(0, color="#777777", lw=0.6)
     place.set_xticks(range(len(kinds)), list(kinds), fontsize=9)
-    place.set(ylabel="two of 15 minus ten of 4", xlim=(-0.5, len(kinds) - 0.5))
+    place.set(ylabel="fitness, two of 15 minus ten of 4", xlim=(-0.5, len(kinds) - 0.5))
     place.set_title("bright light:\nthe difference in both designs", fontsize=11)
     place.legend(fontsize=8, frameon=False)

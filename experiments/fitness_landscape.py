@@ -97,7 +97,7 @@ def opening(config: RunConfig) -> int:
 
 def _life(candidate: Candidate, eye: EyeConfig) -> Life:
     animal = candidate.phenotype
-    return Life(animal.relative_aperture or math.nan, blur(animal, eye), candidate.fitness)
+    return Life(animal.relative_aperture or math.nan, blur(animal, eye), candidate.task_fitness)
 
 
 def fitted(lives: Sequence[Life]) -> Landscape:

@@ -161,7 +161,7 @@ def message(store: Store) -> str:
         group: [float(v.mean()) for v in last_values(store.group(group), QUANTITIES[TOGETHER])] for group in CONTRASTED
     }
     if all(ends.values()) and max(ends["navigation"]) < min(ends["detection"]):
-        return "Fine eyes evolve for detection, coarse eyes for navigation if fine eyes are low (control: lower row)"
+        return "Fine eyes evolve for detection, coarse eyes for navigation, where fine eyes have a low field of view"
     return "Evolution from one photoreceptor in each task"
 
 

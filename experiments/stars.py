@@ -34,8 +34,8 @@ def pupils() -> dict[str, optics.Pupil]:
     bent = optics.BSplineRelief.paraboloid(0.0, curvature, RADIUS).control_points
     rough = np.random.default_rng(3).standard_normal((4, 4))
     return {
-        "hole": optics.Pupil(RADIUS),
-        "hexagonal hole": optics.Pupil(RADIUS, aperture=optics.Polygon.regular(6)),
+        "round aperture": optics.Pupil(RADIUS),
+        "hexagonal aperture": optics.Pupil(RADIUS, aperture=optics.Polygon.regular(6)),
         "slit": optics.Pupil(RADIUS, aperture=optics.Slit(0.5, 1.9)),
         "rough glass": optics.Pupil(RADIUS, optics.BSplineRelief(4e-6 * rough), n=1.5),
         "lens": optics.Pupil(RADIUS, **lens),

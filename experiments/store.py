@@ -5,20 +5,19 @@ from __future__ import annotations
 import csv
 import io
 import json
-import os
-import platform
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, TypeVar, get_type_hints
 
 from evolve.store.atomic_files import write_whole
-from evolve.store.versions import present
+from evolve.store.versions import machine, machines, present, recorded
 
 __all__ = ["DATA", "RECORDS", "Origin", "read_rows", "write_rows"]
 
 DATA = Path("docs/results/data")
 RECORDS = Path(__file__).parent / "records"  # settings of runs, and a line per candidate
+UNKNOWN = {"commit": "unknown", "python": "unknown"}  # versions of a run without versions.json
 Row = TypeVar("Row")
 
 
@@ -71,7 +70,16 @@ class Origin:
     @classmethod
     def here(cls, hours: float, whose: str = "core") -> Origin:
         """Return the origin of numbers that this process computes."""
-        return cls(hours, f"{_processor()}, {os.cpu_count()} cores", present(), whose)
+        return cls(hours, machine(), present(), whose)
+
+    @classmethod
+    def from_runs(cls, runs: Sequence[Path], hours: float) -> Origin:
+        """Return the origin of the records of runs: their machines, and the versions at the start of the first run.
+
+        hours: wall time in worker hours
+        """
+        on = dict.fromkeys(name for run in runs for name in machines(run))
+        return cls(hours, "; ".join(on) or "an unknown machine", recorded(runs[0]) or UNKNOWN, "worker")
 
     @classmethod
     def read(cls, path: Path) -> Origin:
@@ -100,19 +108,9 @@ class Origin:
         took = f"{self.hours / (least or 1 / 3600):.2g} {self.whose} {unit}"
         commits = ", ".join(_short(commit) for commit in (*self.earlier, self.versions["commit"]))
         python = self.versions["python"]
-        return f"{took} on {self.machine}; rhabdom at {commits}, Python {python}, {packages}."
+        software = ", ".join(filter(None, (f"rhabdom at {commits}", f"Python {python}", packages)))
+        return f"{took} on {self.machine}; {software}."
 
 
 def _short(commit: str) -> str:
     return f"{commit[:10]} with changes" if commit.endswith("+") else commit[:10]
-
-
-def _processor() -> str:
-    """Return the processor's name if the system provides it."""
-    try:
-        for line in Path("/proc/cpuinfo").read_text().splitlines():
-            if line.startswith("model name"):
-                return line.partition(":")[2].strip()
-    except OSError:
-        pass
-    return platform.processor() or platform.machine()

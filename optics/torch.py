@@ -28,7 +28,7 @@ __all__ = ["PointSpread", "psf"]
 def psf(
     heights: torch.Tensor, *, radius: Any, n: Any = 1.5, pupil: dict[str, Any] | None = None, **view: Any
 ) -> torch.Tensor:
-    """Differentiable `optics.psf` of a relief, as a function of its heights.
+    """Return `optics.psf` of a relief as a torch tensor that is differentiable with respect to the heights.
 
     heights: heights [m]. A (4, 4) tensor holds the control points of a BSplineRelief. A square tensor of any other size
         holds the samples of a HeightMap.
@@ -50,7 +50,7 @@ def psf(
     place = _place()
     if view.get("field"):
         raise ValueError("field: only `optics.psf` returns it; this function returns the intensity")
-    precision(view.get("dtype", "float32"))  # raises an error for other types
+    precision(view.get("dtype", "float32"))  # refuses other types
 
     @dr.wrap(source="torch", target="drjit")
     def spread(heights: Array, radius: Scalar, n: Scalar) -> Array:

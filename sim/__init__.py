@@ -59,11 +59,13 @@ if TYPE_CHECKING:
     from sim.tasks.outcome import Outcome, RewardTerms
     from sim.tasks.task import Task
     from sim.worlds.course import Course
+    from sim.worlds.layout_family import LayoutFamily
     from sim.worlds.world import World, build_world
 
 _HOME = {
     "Eyes": "sim.eyes.eyes",
     "Course": "sim.worlds.course",
+    "LayoutFamily": "sim.worlds.layout_family",
     "World": "sim.worlds.world",
     "build_world": "sim.worlds.world",
     "Mirror": "sim.scene.mirror",
@@ -111,6 +113,7 @@ __all__ = [
     "Fidelity",
     "FidelityWarning",
     "Frozen",
+    "LayoutFamily",
     "Mirror",
     "MirrorWarning",
     "ModelRenderer",

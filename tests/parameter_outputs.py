@@ -60,6 +60,15 @@ def views(config, animal):
     return found
 
 
+def layouts(config, animal):
+    """Walls and lengths of episodes of the worlds in training, evaluation and test."""
+    found = []
+    for where in (config.world.training, config.world.evaluation, config.world.test):
+        world = sim.build_world(config.task, **where)
+        found.append((world.episode_steps, world.model.geom_pos.tobytes(), world.model.geom_size.tobytes()))
+    return found
+
+
 def rides(config, animal):
     """Rewards and ends of training episodes. The animals go straight on at full speed, mostly into a wall."""
     lessons, *others = vars(worlds_of(animal, config, 7, 8)).values()
@@ -114,6 +123,14 @@ def budget_stages(config, animal):
         run = Run.create(Path(folder) / "run", config)
         carry(run, ClosedForm(), mock.Mock())
         return [(candidate.id, candidate.rung, candidate.steps) for candidate in run.in_order_of_finish]
+
+
+def charges(config, animal):
+    """Fitness of the candidates of a run, after costs."""
+    with TemporaryDirectory() as folder:
+        run = Run.create(Path(folder) / "run", config)
+        carry(run, ClosedForm(), mock.Mock())
+        return [(candidate.id, candidate.fitness) for candidate in run.candidates]
 
 
 def hired(config, animal):

@@ -20,8 +20,10 @@ from evolve.genome.phenotype import develop
 from optics.numerics import backend
 from tests.parameter_outputs import (
     budget_stages,
+    charges,
     hired,
     history,
+    layouts,
     life,
     own_sight,
     point_image,
@@ -78,6 +80,10 @@ STAGNANT = ("learning.learning_rate=1e-30", "learning.total_steps=256", "learnin
 FOCUSED = ("eye.receptor_pitch=4e-6",)
 GUIDED = ("eye.rhabdoms=true", *FOCUSED)
 HIGH = ("eye.vertical_fov=gene", *PERFECT)
+OF_FAMILY = (
+    *("world.layouts=family", "world.training_layouts=1", "world.selection_layouts=1", "world.test_layouts=1"),
+    *("world.layout_rows=9", "world.layout_columns=17", *PERFECT),
+)
 NAVIGATING = ("genome.resolution_height.start=1", "eye.rays_per_receptor=1", *PERFECT)
 FIELDS = {
     "task": Case("task=tracking", rides),
@@ -109,6 +115,17 @@ FIELDS = {
     "world.unseen": Case("world.unseen=true", views, NAVIGATING, "maze"),
     "world.course": Case("world.course=long", views, NAVIGATING, "navigation"),
     "world.evaluation_course": Case("world.evaluation_course=long", views, NAVIGATING, "navigation"),
+    "world.layouts": Case("world.layouts=family", views, NAVIGATING, "navigation"),
+    "world.family_seed": Case("world.family_seed=1", layouts, OF_FAMILY, "maze"),
+    "world.training_layouts": Case("world.training_layouts=2", layouts, OF_FAMILY, "maze"),
+    "world.selection_layouts": Case("world.selection_layouts=2", layouts, OF_FAMILY, "maze"),
+    "world.test_layouts": Case("world.test_layouts=2", layouts, OF_FAMILY, "maze"),
+    "world.layout_rows": Case("world.layout_rows=11", layouts, OF_FAMILY, "maze"),
+    "world.layout_columns": Case("world.layout_columns=19", layouts, OF_FAMILY, "maze"),
+    "world.layout_actions": Case("world.layout_actions=8", layouts, OF_FAMILY, "maze"),
+    "world.path_width": Case("world.path_width=1", layouts, OF_FAMILY, "navigation"),
+    "world.selection_set": Case("world.selection_set=training", layouts, OF_FAMILY, "maze"),
+    "world.wall_height": Case("world.wall_height=0.5", views),
     "world.least_light": Case("world.least_light=0.01", views),
     "world.encoded_textures": Case("world.encoded_textures=false", own_sight, task=TEXTURED),
     "search.optimizer": Case("search.optimizer=mutation", history),
@@ -136,7 +153,13 @@ FIELDS = {
     "learning.least_return": Case("learning.least_return=-0.5", rides),
     "learning.eval_interval": Case("learning.eval_interval=32", life),
     "learning.patience": Case("learning.patience=1", life, STAGNANT),
+    "wiring.shared_encoder": Case("wiring.shared_encoder=true", life, ("genome.n_eyes.start=2", *PERFECT)),
+    "wiring.pool_side": Case("wiring.pool_side=1", life, ("genome.resolution_width.start=3", *PERFECT)),
+    "wiring.repeat_side": Case("wiring.repeat_side=5", life),
     "evaluation.episodes": Case("evaluation.episodes=2", views),
+    "costs.per_receptor": Case("costs.per_receptor=0.5", charges),
+    "costs.per_eye": Case("costs.per_eye=0.5", charges),
+    "costs.per_neuron": Case("costs.per_neuron=0.5", charges),
     "genome.GENE.open": Case("genome.fov_deg.open=false", history),
     "genome.GENE.low": Case("genome.fov_deg.low=20", history),
     "genome.GENE.high": Case("genome.fov_deg.high=90", history),

@@ -22,7 +22,8 @@ __all__ = ["Episode", "Pictures"]
 class Pictures:
     """Images for display.
 
-    times: time step of each image, (picture,) · pixels: uint8 sRGB, (picture, y, x, 3)
+    times: time step of each image, (picture,)
+    pixels: uint8 sRGB, (picture, y, x, 3)
     """
 
     times: np.ndarray
@@ -31,19 +32,22 @@ class Pictures:
 
 @dataclass(frozen=True)
 class Episode:
-    """Recording of one evaluation episode. In the shapes of arrays, the axis t is time.
+    """Recording of one evaluation episode. In the shapes of arrays, t is the time step.
 
     Row t of the arrays contains the signals at time t, the action that followed, and the results of this action:
     rewards and other entries of the observation.
 
     task, candidate_id, seed: name of the task, id of the candidate, and seed of the episode
     phenotype, eye, world: the animal, and the settings of its eyes and of the world
-    commands: meaning of each element of an action · action: in [-1, 1], (t, number)
-    reward: reward of each action, (t,) · reward_terms: name -> (t,); 0 in steps in which the task did not return the
-        term
-    counted: for some reward terms, the title under which steps with this term are counted; see `sim.BatchTask`
-    beside: other entries of the observation, name -> (t, number), such as "contact" or "feels"
-    seconds: duration of one action [s] · solved: whether the episode counts as solved
+    mode: "evaluation", or "test" if the episode takes place in the layouts of the test set
+    commands: meaning of each element of an action
+    action: in [-1, 1], (t, number)
+    reward: reward of each action, (t,)
+    reward_terms: terms of the reward by name, (t,) each; 0 in steps in which the task did not return the term
+    counted: for some terms, the title of the number of steps in which they are not 0; see `sim.BatchTask`
+    beside: other entries of the observation by name, (t, number) each, such as "contact" or "feels"
+    seconds: duration of one action [s]
+    solved: True if the episode counts as solved
     failure: message of the failure that ended the episode; None without a failure
     signals: receptor signals with noise, (t, eye, channel, height, width)
     perfect_signals: signals of the same receptors behind a perfect lens, without noise, in the same shape
@@ -53,7 +57,8 @@ class Episode:
     azimuths [rad], elevations_deg: viewing direction of each eye in the frame of its body, site or camera, (eye,)
     scene: shapes and poses of bodies, and poses of eyes
     position (t, 2) [m], heading (t,) [rad]: pose of the animal on the ground before the action
-    plan: plan of the world from above; None if the task has none · pictures: images for display; None if not recorded
+    plan: plan of the world from above; None if the task has none
+    pictures: images for display; None if not recorded
     """
 
     task: str
@@ -83,6 +88,7 @@ class Episode:
     pictures: Pictures | None = None
     failure: str | None = None
     world: WorldConfig = field(default_factory=WorldConfig)
+    mode: str = "evaluation"
 
     def __len__(self) -> int:
         """Return the number of actions."""
@@ -96,7 +102,7 @@ class Episode:
 
     @property
     def eyes(self) -> sim.Eyes:
-        """Design of the animal's eyes; their directions and poses are in `azimuths` and `scene`."""
+        """Design of the animal's eyes. Their directions and poses are in `azimuths` and `scene`."""
         return self.phenotype.eyes(self.eye)
 
     @property

@@ -15,8 +15,9 @@ __all__ = ["EpisodeFailure", "episode_failure_lines", "episode_failures_of"]
 class EpisodeFailure:
     """A kind of failure, which ended one or more episodes.
 
-    said: message of the failure · episodes: number of episodes that it ended · candidates: number of candidates with
-        such episodes
+    said: message of the failure
+    episodes: number of episodes that it ended
+    candidates: number of candidates with such episodes
     """
 
     said: str

@@ -39,7 +39,7 @@ FORM = 2  # number of the current format
 # hundred.
 MOST_BYTES = 2**31
 PARTS = {"scene": EpisodeScene, "plan": GroundPlan, "pictures": Pictures}
-BY_NAME = {"term": "reward_terms", "beside": "beside"}  # prefix of arrays in a file -> attribute, a dictionary
+BY_NAME = {"term": "reward_terms", "beside": "beside"}  # prefix of arrays -> attribute of Episode
 
 
 def save_episode(episode: Episode, path: Path | str) -> None:
@@ -79,7 +79,7 @@ def load_episode(path: Path | str) -> Episode:
     try:
         arrays = _arrays(path)
         rest = parsed(str(arrays.pop("rest")))
-        eye = EyeConfig(**{"pupil_turned": True, **rest["eye"]})  # files without this setting are older than it
+        eye = EyeConfig(**{"pupil_turned": True, **rest["eye"]})  # this setting is newer than files without it
         rest |= {"phenotype": Phenotype.from_json(rest["phenotype"]), "eye": eye}
         if (form := rest.pop("form", 1)) not in (1, FORM):
             raise ValueError(f"its form is {form!r}: must be at most {FORM}")
@@ -113,7 +113,7 @@ def _of_first_form(rest: dict[str, Any], arrays: dict[str, Any]) -> Episode:
         rest["task"] = task_then(rest["task"])
     rest["world"] = _checked_world(rest["world"])
     where, eyes = rest["world"].evaluation, rest["phenotype"].eyes(rest["eye"])
-    world = build_world(rest["task"], seed=where["world_seed"], mazes=where["mazes"], course=where["course"])
+    world = build_world(rest["task"], **where)
     task, position, heading = task_of(world, "evaluation", eyes=eyes), arrays["position"], arrays["heading"]
     objects, everyone = arrays.pop("objects"), np.arange(len(position))
     physics = task.physics(len(position), 1, None)
@@ -149,8 +149,8 @@ def _checked_world(stored: Mapping[str, Any]) -> WorldConfig:
 def _solved(goal: np.ndarray, adversary: np.ndarray, adversary_first: np.ndarray | None) -> bool:
     """Return whether the first object reached was a goal.
 
-    goal, adversary: whether an action reached a goal or an adversary, (t,)
-    adversary_first: whether the adversary came first, if an action reached both, (t,); None if unknown
+    goal, adversary: True for actions that reached a goal or an adversary, (t,)
+    adversary_first: True for actions that reached an adversary before a goal, (t,); None if unknown
     """
     first = goal if adversary_first is None else goal & ~adversary_first
     return bool(first[goal | adversary][:1].any())
@@ -169,7 +169,7 @@ def _arrays(path: Path | str) -> dict[str, Any]:
 
 
 def _taken(arrays: dict[str, Any], prefix: str) -> dict[str, Any]:
-    """Remove the arrays whose names start with `prefix`, and return them by the rest of their names."""
+    """Remove the arrays whose names start with `prefix`, and return them by their names without the prefix."""
     return {name.removeprefix(prefix): arrays.pop(name) for name in list(arrays) if name.startswith(prefix)}
 
 

@@ -22,8 +22,9 @@ class EpisodeScene:
     solids: all visible geoms, in the frames of their bodies, with their appearance at the start of the episode
     bodies: names of the bodies; "body_<id>" for a body without a name
     positions (t, body, 3), rotations (t, body, 3, 3): poses of the bodies
-    eye_positions (t, eye, 3): positions of the pupils · eye_rotations (t, eye, 3, 3): columns (right, up, ahead)
-    path (t, 3): position of the animal, which is that of the body, site or camera on which the first eye is mounted
+    eye_positions (t, eye, 3): positions of the pupils
+    eye_rotations (t, eye, 3, 3): frames of the eyes, with columns (right, up, ahead)
+    path (t, 3): position of the animal, which is that of the body, site or camera that carries its first eye
     headings (t,): heading of the animal from the world's x axis [rad]
     """
 
@@ -42,7 +43,9 @@ class EpisodeScene:
     ) -> EpisodeScene:
         """Return the scene of an episode.
 
-        model: the model · solids: its visible geoms · mounts: position and direction of each eye
+        model: the model
+        solids: its visible geoms
+        mounts: position and direction of each eye
         poses: poses before each action; their first axis is time instead of worlds
         """
         places, frames = zip(*(_eye(model, mount, poses) for mount in mounts), strict=True)

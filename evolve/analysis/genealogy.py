@@ -1,4 +1,4 @@
-"""Lines of descent. A candidate may have several parents; its line of descent follows the parent nearest to it."""
+"""Lines of descent. If a candidate has several parents, its line of descent follows the one with the nearest genome."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ __all__ = ["descent", "nearest_parent"]
 
 
 def nearest_parent(candidate: Candidate, known: Mapping[int, Candidate]) -> Candidate | None:
-    """Return the parent on record whose genome has the least Euclidean distance, or None if no parent is on record.
+    """Return the recorded parent with the smallest Euclidean distance between genomes; None if no parent is recorded.
 
     If several parents have the same distance, the earliest is returned. Candidates of CMA-ES have many parents, because
     CMA-ES samples a generation around the mean of the better half of the previous generation.

@@ -1,10 +1,11 @@
-"""Recording of episodes: a candidate plays an episode, whose scenes are also rendered behind a perfect lens."""
+"""Recording of episodes. A candidate plays an episode, and its views are also rendered through a perfect lens."""
 
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import mujoco
@@ -12,12 +13,16 @@ import numpy as np
 
 from evolve.analysis.episode import Episode, Pictures
 from evolve.analysis.episode_scene import EpisodeScene
+from evolve.config.checks import ConfigError, quoted
 from evolve.config.run_config import RunConfig
 from evolve.genome.phenotype import Phenotype
 from evolve.learning.animal_task import animal_task
+from evolve.learning.final_figures import UnfitPolicy, require_fit, require_test_set
 from evolve.learning.policy import EyePolicy, TrainingDiverged, load_policy
+from evolve.store.candidate import Candidate
 from evolve.store.directory import Run, RunError
 from evolve.store.policies import require_policy
+from optics.numerics.arguments import whole
 from sim.envs.prepared_task import PreparedTask
 from sim.envs.vec_env import EyesVecEnv
 from sim.scene.poses import Poses
@@ -25,42 +30,72 @@ from sim.scene.solids import Solid, solids_of
 from sim.tasks.simulation import Simulation
 from sim.worlds.ground_plan import GroundPlan
 
-__all__ = ["FINE_PIXELS", "Recorder", "record"]
+__all__ = ["EVERY", "FINE_PIXELS", "Recorder", "damage_named", "record", "trained_policy"]
 
-FINE_PIXELS = 60  # minimum number of pixels along the longer side of the radiance images
+EVERY, MOST_EVERY = 8, 1_000_000  # default and maximum number of actions between two recordings of radiance
+FINE_PIXELS = 60  # smallest number of pixels along the longer side of the radiance images
 FINE = {"rays": 16, "areas": 4, "edges": 16}  # samples per receptor or pixel behind a perfect lens
 MOST_PICTURES = 128  # maximum number of images for display, at equal intervals of time
+MODES = ("evaluation", "test")  # modes of recorded episodes
 ELSEWHERE = ("eyes", "previous_action")  # entries of an observation that an episode stores under other names
 
 
-class UnfitPolicy(ValueError):
-    """The policy belongs to an animal with different eyes."""
-
-
 def record(
-    run: Run, candidate_id: int | None = None, seed: int = 0, radiance_every: int = 8, pictures: bool = False
+    run: Run,
+    candidate_id: int | None = None,
+    seed: int = 0,
+    radiance_every: int = EVERY,
+    pictures: bool = False,
+    mode: str = "evaluation",
 ) -> Episode:
     """Record one evaluation episode of a candidate. The same arguments give the same episode, bit for bit.
 
     candidate_id: id of the candidate; None: the best candidate
-    radiance_every: number of actions from one recording of the scene's radiance to the next
-    pictures: whether to render images for display; for tasks without a ground plan, they are always rendered
+    radiance_every: number of actions between two recordings of the scene's radiance
+    pictures: True to render images for display; for tasks without a ground plan, they are always rendered
+    mode: "evaluation", or "test" for the layouts of the test set
 
     Raises:
         RunError: the candidate does not exist, or its policy is missing or damaged.
-        ConfigError: the task is a user task, and its code has not been named.
+        ConfigError: the mode is unknown, the run has no test set, or the user has not named the code of its task.
+        ValueError: radiance_every is not a whole number from 1 to 1,000,000.
     """
+    radiance_every = whole("every", radiance_every, 1, MOST_EVERY)
+    if mode not in MODES:
+        raise ConfigError(f"mode = {quoted(mode)}: must be one of {', '.join(MODES)}")
+    if mode == "test":
+        require_test_set(run.config)
     candidate = run.candidate(candidate_id)
+    recorder = Recorder(candidate.phenotype, run.config, trained_policy(run, candidate), radiance_every, pictures, mode)
+    with damage_named(run.policy_path(candidate.id)):
+        return recorder.play(candidate.id, seed)
+
+
+def trained_policy(run: Run, candidate: Candidate) -> EyePolicy:
+    """Return the policy of a candidate.
+
+    Raises:
+        RunError: the policy is missing or damaged.
+        ConfigError: the task is a user task, and the user has not named its code.
+    """
     path = run.policy_path(candidate.id)
     require_policy(candidate, path)
-    _ = run.config.choice.named_code  # raises an error now if the user task has not been named
+    _ = run.config.choice.named_code  # refuses, before any work, a user task that the user has not named
     try:
-        policy = load_policy(path)
+        return load_policy(path)
     except ValueError as error:
         raise RunError(str(error)) from error
-    recorder = Recorder(candidate.phenotype, run.config, policy, radiance_every, pictures)
+
+
+@contextlib.contextmanager
+def damage_named(path: Path) -> Iterator[None]:
+    """Name the file of a policy whose episodes cannot be played.
+
+    Raises:
+        RunError: the policy belongs to another animal, or its actions are not finite.
+    """
     try:
-        return recorder.play(candidate.id, seed)
+        yield
     except UnfitPolicy as error:
         raise RunError(f"{path} is another animal's: {error}") from error
     except TrainingDiverged as error:
@@ -72,14 +107,15 @@ class Recorder:
     """Recorder of episodes that an animal plays.
 
     phenotype, config, policy: the animal, the settings of its run, and its policy
-    radiance_every, pictures: see `record`
+    radiance_every, pictures, mode: see `record`
     """
 
     phenotype: Phenotype
     config: RunConfig
     policy: EyePolicy
-    radiance_every: int = 8
+    radiance_every: int = EVERY
     pictures: bool = False
+    mode: str = "evaluation"
 
     def play(self, candidate_id: int, seed: int) -> Episode:
         """Play one episode, and return its recording. The same arguments give the same episode.
@@ -89,10 +125,10 @@ class Recorder:
             TrainingDiverged: the policy's actions are not finite.
         """
         animal, config = self.phenotype, self.config
-        prepared = PreparedTask(animal_task(animal, config))
+        prepared = PreparedTask(animal_task(animal, config, self.mode))
         task, mounts = prepared.task, prepared.task.agents()[0].kinds[0].mounts
         with contextlib.closing(prepared.vec_env(1, seed, animal.memory_frames, render_mode="rgb_array")) as worlds:
-            _require_fit(self.policy, worlds)
+            require_fit(self.policy, worlds)
             begun = _Beginning.from_env(worlds)
             taken = self.pictures or begun.plan is None
             poses, columns = _play(self.policy, worlds, begun, taken)
@@ -106,6 +142,7 @@ class Recorder:
             phenotype=animal,
             eye=config.eye,
             world=config.world,
+            mode=self.mode,
             commands=task.commands(),
             counted=dict(task.counted),
             seconds=seconds,
@@ -131,7 +168,7 @@ class Recorder:
         fine = replace(perfect, resolution=(factor * height, factor * width))
         fidelity = replace(prepared.fidelity, rays_per_receptor=FINE[prepared.fidelity.samples])
         receptors, pictures = (
-            PreparedTask(animal_task(self.phenotype, self.config, eyes=eyes), fidelity).renderer(simulation)
+            PreparedTask(animal_task(self.phenotype, self.config, self.mode, eyes), fidelity).renderer(simulation)
             for eyes in (perfect, fine)
         )
         frames, lit = np.arange(0, len(poses), self.radiance_every), light[0, :, None, None, None, None]
@@ -148,10 +185,12 @@ class Recorder:
 class _Beginning:
     """State at the start of an episode.
 
-    It is read at the start, because after the end of the episode the environment immediately starts the next episode.
+    It is stored in advance, because the environment starts the next episode as soon as one ends.
 
-    observation, info: values after the reset · light: factors by which light is multiplied, (1, band) float32
-    solids: visible geoms · plan: plan of the world from above; None if the task has none
+    observation, info: values after the reset
+    light: factors by which light is multiplied, (1, band) float32
+    solids: visible geoms
+    plan: plan of the world from above; None if the task has none
     """
 
     observation: dict[str, np.ndarray]
@@ -178,16 +217,10 @@ def _model(physics: Any) -> mujoco.MjModel:
     return model
 
 
-def _require_fit(policy: EyePolicy, worlds: EyesVecEnv) -> None:
-    own, here = (space["eyes"].shape for space in (policy.observation_space, worlds.observation_space))
-    if own != here:
-        raise UnfitPolicy(f"its eyes have the shape {own}, those of this animal {here} (memory, eye, channel, y, x)")
-
-
 def _play(
     policy: EyePolicy, worlds: EyesVecEnv, begun: _Beginning, pictures: bool
 ) -> tuple[list[Poses], dict[str, Any]]:
-    """Play one episode; return the poses before each action, and those fields of `Episode` that follow from playing."""
+    """Play one episode. Return the poses before each action, and the fields of `Episode` that this determines."""
     poses, rows, taken = list[Poses](), list[tuple[Any, ...]](), list[np.ndarray]()
     observation, infos, done, solved = begun.observation, [begun.info], False, None
     every = max(1, -(-worlds.simulation.episode_steps // MOST_PICTURES))

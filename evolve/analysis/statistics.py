@@ -1,4 +1,4 @@
-"""Statistics per generation, gene trajectories, acuity, image quality and confidence intervals.
+"""Statistics per generation, gene trajectories, image quality and confidence intervals.
 
 All functions depend only on their arguments. The report and the comparisons of runs show the results.
 """
@@ -26,7 +26,6 @@ if TYPE_CHECKING:
 __all__ = [
     "GenerationStatistics",
     "Trajectory",
-    "acuity_cpd",
     "bootstrap_interval",
     "champions",
     "eye_image_quality",
@@ -42,7 +41,7 @@ __all__ = [
 Floats = NDArray[np.float64]
 SPREAD = (0.1, 0.9)  # quantiles between which a population's spread is shown
 PERCENTILE_RESAMPLES = 2000
-RESAMPLED_AT_ONCE = 2**20  # samples drawn at once, which limits the memory
+RESAMPLED_AT_ONCE = 2**20  # largest number of samples that are drawn at once; it limits the memory
 
 
 @dataclass(frozen=True)
@@ -118,7 +117,7 @@ def generation_statistics(candidates: Sequence[Candidate]) -> list[GenerationSta
 
 
 def trajectory(candidates: Sequence[Candidate], value: Callable[[Phenotype], float]) -> Trajectory:
-    """Return a quantity over the generations: its spread in each population, and its value in the best so far.
+    """Return a quantity over the generations: its spread in each population, and its value in the champion.
 
     value: function that returns the quantity of a phenotype
     """
@@ -150,7 +149,7 @@ def gene_values(phenotype: Phenotype, eye: EyeConfig | None = None) -> dict[str,
     Optical genes are present only if optics are on, and spectral genes only if receptors are inherited. For receptor
     types that the animal lacks, the peak wavelengths are NaN.
 
-    eye: settings of a run's eyes; only genes of this run are returned, such as an eighth of a symmetric relief's
+    eye: settings of a run's eyes. Only genes that this run has are returned, such as an eighth of a symmetric relief's
         heights, or one side of a square eye. None: all values are returned
     """
     height, width = phenotype.resolution
@@ -187,30 +186,16 @@ def gene_values(phenotype: Phenotype, eye: EyeConfig | None = None) -> dict[str,
     return values if eye is None else {name: value for name, value in values.items() if name in eye.genes}
 
 
-def acuity_cpd(phenotype: Phenotype) -> float:
-    """Return the acuity: the frequency of the finest grating that the animal's sampling resolves [cycles/degree].
-
-    It is 1 / (2 min(range/(n_eyes - 1), fov/width)), after Tiwary, Young et al. (2025). The first term is the angle
-    between neighbouring eyes, the second the angle between neighbouring receptors. With a single eye, or if all eyes
-    look in the same direction, only the second term counts, because no angle separates the eyes.
-    """
-    between_receptors = phenotype.fov_deg / phenotype.resolution[1]
-    if phenotype.n_eyes == 1 or phenotype.placement_range_deg == 0:
-        return 1 / (2 * between_receptors)
-    between_eyes = phenotype.placement_range_deg / (phenotype.n_eyes - 1)
-    return 1 / (2 * min(between_eyes, between_receptors))
-
-
 def polychromatic(eye: optics.Eye, psf: optics.PSFResult) -> optics.PSFResult:
-    """Return the PSF in white daylight, (1, y, x), with bands weighted by the mean sensitivity of the channels."""
+    """Return the PSF in white daylight, (1, y, x). Bands are weighted by the mean sensitivity of the channels."""
     return psf.mean(_of_daylight(eye))
 
 
 def white_strehl(eye: optics.Eye, psf: optics.PSFResult) -> float:
-    """Return the Strehl ratio in white daylight; NaN if the PSF's window does not contain the peak.
+    """Return the Strehl ratio in white daylight; NaN if the PSF's window does not contain the maximum.
 
-    The reference is the PSF of an aperture of the same width without aberrations at any wavelength, in the same light.
-    Its peak is higher than at the mean wavelength, because peaks are proportional to 1/λ².
+    The reference is the PSF of the same aperture without aberrations at any wavelength, in the same light. Its maximum
+    is higher than that at the mean wavelength, because maxima are proportional to 1/λ².
     """
     import optics
 
@@ -221,7 +206,7 @@ def white_strehl(eye: optics.Eye, psf: optics.PSFResult) -> float:
 
 
 def _of_daylight(eye: optics.Eye) -> NDArray[np.float64]:
-    """Return the share of each band in the mean response of the receptor channels to white daylight; the sum is 1."""
+    """Return the fraction of each band in the receptors' mean response to white daylight. Fractions sum to 1."""
     from optics.spectra.bands import daylight
 
     weights = eye.spectral_bands.weights.mean(axis=0) * daylight(eye.spectral_bands.wavelengths)

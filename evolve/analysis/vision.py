@@ -20,7 +20,7 @@ from sim.tasks.simulation import Simulation
 
 __all__ = ["Vision", "ssim", "vision"]
 
-SCENES = 16  # number of scenes, which are starts of episodes and the same for all eyes
+SCENES = 16  # number of scenes; they are starts of episodes, and the same for all eyes
 RAYS = 16  # number of rays per receptor
 WINDOW = 7  # width of the window in which structural similarity is computed [receptors]
 Floats = NDArray[np.floating]
@@ -32,8 +32,8 @@ class Vision:
 
     image_quality: area of the MTF above the noise, times throughput, in [0, 1]; see `optics.image_quality`
     contrast: MTF in white daylight at half the receptors' Nyquist frequency
-    psnr_db: peak signal-to-noise ratio of the eye's image relative to the image of a perfect lens [dB]; the eye's image
-        is first scaled to the same brightness
+    psnr_db: peak signal-to-noise ratio of the eye's image, relative to the image of a perfect lens [dB]. The eye's
+        image is first scaled to the same brightness
     ssim: structural similarity of the same two images, in [-1, 1]; NaN for retinas narrower than three receptors
     """
 

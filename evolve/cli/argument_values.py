@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import argparse
 
-__all__ = ["searches", "seed"]
+__all__ = ["every", "searches", "seed"]
 
 MOST_SEARCHES = 100_000  # as in evolve.report.gene_drift, whose import takes seconds
+MOST_EVERY = 1_000_000  # as in evolve.analysis.recorder
 LONGEST = 4000  # maximum number of digits; Python converts at most 4,300
 
 
@@ -14,6 +15,13 @@ def seed(text: str) -> int:
     """Return the seed in the text of an argument."""
     if not text.isdecimal() or len(text) > LONGEST:
         raise argparse.ArgumentTypeError(f"{text[:40]!r}: must be a whole number, 0 or more")
+    return int(text)
+
+
+def every(text: str) -> int:
+    """Return the number of actions between two images in the text of an argument."""
+    if not text.isdecimal() or len(text) > LONGEST or not 1 <= int(text) <= MOST_EVERY:
+        raise argparse.ArgumentTypeError(f"{text[:40]!r}: must be a whole number from 1 to {MOST_EVERY:,}")
     return int(text)
 
 

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NoReturn, TypeAlias
 
-from evolve.cli.argument_values import searches, seed
+from evolve.cli.argument_values import every, searches, seed
 from evolve.runs.output import say
 
 __all__ = ["SHELLS", "build_parser", "parse"]
@@ -40,7 +40,7 @@ EXAMPLES = {
     "drift": "  evolve drift runs/first\n  evolve drift runs/seed-0 runs/seed-1 --searches 1000\n",
     "replay": "  evolve replay runs/first --open\n  evolve replay runs/first --candidate 12 --seed 3\n",
     "report": "  evolve report runs/first --open\n",
-    "export": "  evolve export runs/first --candidate 12 --out frames\n",
+    "export": "  evolve export runs/first --candidate 12 --out frames\n  evolve export runs/first --every 1\n",
     "list": "  evolve list\n  evolve list /data/runs --json\n",
     "validate": "  evolve validate --list\n  evolve validate psf_error_prediction aliasing\n",
     "config": "  evolve config show detection --preset quick\n  evolve config schema > settings.schema.json\n",
@@ -218,7 +218,11 @@ def _add_products(commands: Commands) -> None:
         if name != "report":
             product.add_argument("--candidate", type=int, metavar="ID", help="candidate to play (default: the best)")
             product.add_argument("--seed", type=seed, default=0, help="seed of the episode (default: 0)")
+            shown, usual = ("write a file", 8) if name == "export" else ("with --rrd: record the scene", None)
+            said = f"{shown} at every N-th action (default: 8)"
+            product.add_argument("--every", type=every, default=usual, metavar="N", help=said)
         if name == "replay":
+            product.add_argument("--test", action="store_true", help="play in the test set of a family of layouts")
             product.add_argument("--rrd", action="store_true", help="also write a recording for Rerun")
             product.add_argument("--gif", action="store_true", help="also write an animated GIF, for slides and pages")
             product.add_argument("--mp4", action="store_true", help="also write a video with one frame per action")
@@ -252,7 +256,7 @@ def _add_voice(command: argparse.ArgumentParser) -> None:
 def _add_tables(commands: Commands) -> None:
     """Add the commands that list tasks, presets, genes and settings, or check results and the installation."""
     validate = _command(
-        commands, "validate", "validate.validate", "run the validation scripts of a checkout, which check and draw"
+        commands, "validate", "validate.validate", "run the validation scripts of a checkout, which check results"
     )
     validate.add_argument("proofs", nargs="*", metavar="NAME", help="scripts to run (default: all)")
     validate.add_argument("--list", action="store_true", help="list the scripts by name, and run none")
@@ -262,7 +266,7 @@ def _add_tables(commands: Commands) -> None:
     genes = _command(commands, "genes", "listings.genes", "list the genes")
     for command in (doctor, tasks, presets, genes):
         command.add_argument("--json", action="store_true", help="print JSON")
-    config = _command(commands, "config", "show_config.config", "show settings: all of a run's, or the schema of them")
+    config = _command(commands, "config", "show_config.config", "show all settings of a run, or their schema")
     config.add_argument("what", choices=("show", "schema"), help="show: as TOML, for --config; schema: as JSON schema")
     _add_settings(config)
     completion = _command(commands, "completion", "completion.completion", "print a shell's completion of this command")

@@ -67,8 +67,8 @@ def unsupported(platform_name: str = sys.platform) -> str | None:
 def examine() -> dict[str, object]:
     """Return the findings by name.
 
-    They are python, machine, packages, llvm (all libraries that were tried), variants, gpu, device, notes, and good
-    (whether everything works).
+    The names are python, machine, packages, llvm (all libraries that were tested), variants, gpu, device, notes, and
+    good (True if all works).
     """
     chosen, tried = backend.find(cached=False)
     environment = {**os.environ, backend.VARIABLE: chosen.path} if chosen else dict(os.environ)
@@ -132,7 +132,7 @@ def _render(variants: list[str], environment: dict[str, str]) -> dict[str, str]:
 
 
 def print_findings(as_json: bool = False) -> int:
-    """Print the findings; return 0 if everything that `evolve run` needs works, else 2."""
+    """Print the findings; return 0 if all parts that `evolve run` needs work, else 2."""
     findings = examine()
     if as_json:
         say(json.dumps(findings, indent=2))

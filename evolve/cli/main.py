@@ -39,7 +39,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 print(f"note: encoding {encoding}: cannot write text; UTF-8 is used", file=sys.stderr)
             return _outcome(given)
     except BrokenPipeError:
-        return 0  # the reader of a pipe has ended, for example in `evolve genes | head`
+        return 0  # the program that reads the output has ended, for example in `evolve genes | head`
 
 
 def _outcome(arguments: Sequence[str]) -> int:

@@ -26,8 +26,8 @@ from evolve.search.worker import evaluate_candidate, prepare_device
 
 __all__ = ["Pace", "measure_pace"]
 
-# Number of rollouts in a measurement. Three are the minimum from which the times for start, step and pass can be
-# computed separately. PLAYS evaluations follow the last rollout: one for the learning curve, and one for the fitness.
+# Number of rollouts in a measurement. With fewer than three, the times for start, step and pass cannot be computed
+# separately. PLAYS evaluations follow the last rollout: one for the learning curve, and one for the fitness.
 ROLLOUTS, PLAYS = 3, 2
 
 DIED = (
@@ -114,8 +114,8 @@ def _slowest(paces: list[Pace]) -> Pace:
 def _short_life(config: RunConfig, animal: Phenotype, seed: int) -> Pace:
     """Time a training run of three short rollouts, followed by the evaluations.
 
-    The first update has the full number of passes over the samples, and the second may have only half of it. The
-    difference between their times is the time of the passes.
+    The first update has the full number of passes over the samples, and the second may have only half as many. The time
+    of a pass follows from the difference between the times of the two updates.
     """
     short = _with_short_rollouts(config.learning)
     rollout = short.n_envs * short.n_steps
@@ -154,7 +154,7 @@ def _short_life(config: RunConfig, animal: Phenotype, seed: int) -> Pace:
 def _with_short_rollouts(learning: LearningConfig) -> LearningConfig:
     """Return the settings with the shortest rollouts that consist of whole batches.
 
-    The time per step is nearly the same, because an update takes a time for each batch.
+    The time per step hardly changes, because an update takes a constant time per batch.
     """
     whole_batches = math.lcm(learning.batch_size, learning.n_envs) // learning.n_envs
     return replace(learning, n_steps=max(2, min(learning.n_steps, whole_batches)))

@@ -49,13 +49,13 @@ class RunPlan:
         return cls(config, directory, config.workers or cores())
 
     def measured(self) -> RunPlan:
-        """Return the plan with the paces measured on this machine. The measurement takes a few seconds."""
+        """Return the plan with the paces of this machine, which are measured in a few seconds."""
         paces = measure_pace(self.config, self.animals, self.workers)
         return RunPlan(self.config, self.directory, self.workers, paces)
 
     @property
     def animals(self) -> dict[str, Phenotype]:
-        """Two animals that represent all others: one with the start values, and one with the middles of all ranges."""
+        """Two animals that represent all others: one with the start values, and one in the middle of all ranges."""
         genotype = Genotype(self.config.genome)
         middle = np.full(genotype.dimension, 0.5)
         return {"start": develop(genotype.start, self.config), "middle": develop(middle, self.config)}

@@ -1,7 +1,7 @@
 """Scalars of a run for TensorBoard: fitness over the generations, learning curves of training runs, and genes.
 
-TensorBoard's own writer writes them into the folder `tensorboard/` of the run directory. All scalars can be derived
-from the record. When a run is continued, the files are therefore deleted and written again.
+TensorBoard's own writer writes them to the folder `tensorboard/` of the run directory. All scalars follow from the
+record, so the files are deleted and written again when a run is continued.
 """
 
 from __future__ import annotations
@@ -12,7 +12,8 @@ import time
 from pathlib import Path
 from typing import Any
 
-from evolve.analysis.statistics import acuity_cpd, gene_values, generation_statistics
+from evolve.analysis.acuity import acuity_cpd, acuity_vertical_cpd
+from evolve.analysis.statistics import gene_values, generation_statistics
 from evolve.search.job import ExecutorError
 from evolve.search.successive_halving import complete
 from evolve.store.candidate import Candidate
@@ -59,9 +60,12 @@ class TensorBoardWriter:
         """
         if candidate.failure is None:
             values = {"fitness": candidate.fitness, "success_rate": candidate.success_rate}
+            if not self._run.config.costs.free:
+                values |= {"task_fitness": candidate.task_fitness, "costs": candidate.costs}
             genes = {
                 **gene_values(candidate.phenotype, self._run.config.eye),
                 "acuity_cpd": acuity_cpd(candidate.phenotype),
+                "acuity_vertical_cpd": acuity_vertical_cpd(candidate.phenotype),
             }
             values |= {f"genes/{name}": value for name, value in genes.items() if math.isfinite(value)}
             self._add("candidates", values, candidate.id)

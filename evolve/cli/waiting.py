@@ -15,7 +15,7 @@ class Waiting:
     """Progress bar over steps of unknown duration. It is used as a context manager.
 
     steps: number of steps
-    shown: whether the bar is shown
+    shown: True to show the bar
     out: output stream; None: stderr
     """
 

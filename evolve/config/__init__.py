@@ -3,9 +3,11 @@
 run_config     RunConfig: the configuration of a run
 settings       sections of RunConfig: default, range and effect of each setting
 assemble       RunConfig assembled from all sources of settings; later sources override earlier ones
-sources        presets, tasks, files and options as sources of settings
+sources        sources of settings: presets, tasks, files and options
 provenance     location of a setting: file and line, or command-line option
+costs          CostsConfig: prices of eyes and brains, and the costs of an animal
 checks         type and range checks of single settings
+layout_checks  checks of the settings of layouts
 lint           warnings about settings that are allowed but odd
 relief_starts  start values for the genes of a pupil's relief
 formats        formats of config.toml, and conversion of former ones

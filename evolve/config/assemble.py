@@ -39,7 +39,7 @@ from evolve.genome.genes import (
 __all__ = ["assemble", "from_text", "from_toml", "to_toml"]
 
 Tree = dict[str, Any]
-# Genes that only eyes with a certain setting have: kind of eyes, setting and its value.
+# Genes that exist only with a certain setting: kind of eyes, setting and its value.
 OF_SETTINGS = {
     RHABDOM: ("with rhabdoms", "eye.rhabdoms", "true"),
     VERTICAL: ("whose height evolves", "eye.vertical_fov", "gene"),
@@ -57,7 +57,7 @@ def assemble(
     starts: Source | None = None,
     scale: str | None = None,
 ) -> RunConfig:
-    """Return a run's configuration, assembled from all sources. `task` and `assignments` override all other sources.
+    """Return a run's configuration, assembled from all sources. `task` and `assignments` override the others.
 
     task: one of TASKS, or FILE.py:CLASS; None: the task that the preset or the file names
     preset: name of a preset; None: no preset
@@ -73,10 +73,10 @@ def assemble(
     """
     choice = None if task is None else TaskChoice.named(task)
     code = None if choice is None else choice.code
-    asked = [_asked_for(read_toml(file), code)] if file is not None else []
+    asked = [_user_settings(read_toml(file), code)] if file is not None else []
     if starts is not None:
         asked.append(starts)
-    asked += [_asked_for(read_assignment(text), code) for text in assignments]
+    asked += [_user_settings(read_assignment(text), code) for text in assignments]
     if choice is not None:
         asked.append(Source("", dict(choice.settings)))
     return replace(_assembled(preset_sources(preset, scale), asked), code=code)
@@ -91,7 +91,7 @@ def _assembled(below: list[Source], asked: list[Source]) -> RunConfig:
     if not known_task:
         raise ConfigError(f"task: missing; must be one of {', '.join(TASKS)}")
     of_task = task_defaults(known_task[-1])
-    # A preset made for this task overrides the task's settings; a general preset does not.
+    # A preset for this task overrides the task's settings, but they override a general preset.
     made_for_it = any(source.tree.get("task") == known_task[-1] for source in below)
     layers = [of_task, *below, *asked] if made_for_it else [*below, of_task, *asked]
     trees = [_checked(source) for source in layers]
@@ -119,10 +119,10 @@ def _read_back(written: Source) -> RunConfig:
     return _assembled([], [replace(written, tree=upgraded(written.tree))])
 
 
-def _asked_for(source: Source, code: TaskCode | None) -> Source:
+def _user_settings(source: Source, code: TaskCode | None) -> Source:
     """Return the settings of a user's file, which may be the config.toml of another run.
 
-    The file must have a format whose settings have the same meaning today. It cannot select a user task, because only
+    The file must have a format whose settings still have the same meaning. It cannot select a user task, because only
     the command line may name code that is executed.
     """
     if names_code(source.tree.get("task")) and code is None:
@@ -168,7 +168,7 @@ def _checked(source: Source) -> Tree:
 def _blamed(error: ConfigError, layers: Iterable[Source]) -> str:
     """Return the locations of contradicting settings as text, such as " (mine.toml, line 3; --set ...)".
 
-    If several sources contain a setting, the location is that of the value that is in effect.
+    If several sources contain a setting, the location is that of the effective value.
     """
     won = [next((at for s in reversed(list(layers)) if (at := s.place(key))), None) for key in error.keys]
     places = list(dict.fromkeys(place for place in won if place))

@@ -26,7 +26,7 @@ __all__ = [
 ]
 
 SHOWN = 200  # maximum number of characters of a value in a message
-MOST_LISTED = 36  # maximum number of words listed in a message: all genes or tasks fit, but not all settings
+MOST_LISTED = 36  # maximum number of words listed in a message; all genes or tasks fit, but not all settings
 
 
 class ConfigError(ValueError):

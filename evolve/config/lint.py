@@ -11,7 +11,7 @@ __all__ = ["coarse_bands", "idle_genes", "idle_settings", "idle_starts", "lint"]
 
 PEAKS = 17  # number of peak wavelengths of a pigment that are tested over the range of an open gene
 SHOWN = 4  # maximum number of gene names in a line
-# Possible error of the reference, which has 64 bands, as a fraction of the signal of white. Smaller errors are ignored.
+# Possible error of the reference with 64 bands, relative to the signal of a white surface. Smaller errors are ignored.
 LEAST_ERROR = 1e-3
 
 
@@ -25,7 +25,7 @@ def coarse_bands(config: RunConfig) -> list[str]:
 
     The error is computed for the measured spectra of the task's world.
     """
-    if config.card.grey is not False:  # reflectances are unknown or equal at all wavelengths
+    if config.card.grey is not False:  # reflectances are unknown, or the same at all wavelengths
         return []
     from sim.scene.band_error import band_error, measured
     from sim.worlds.world import build_world
@@ -46,10 +46,7 @@ def coarse_bands(config: RunConfig) -> list[str]:
 
 
 def _most_light(config: RunConfig) -> float:
-    """Return the signal of a receptor that sees white through the widest pupil that animals may have.
-
-    The signal without a pupil is 1.
-    """
+    """Return the signal of a white surface behind the widest pupil of any animal (1 without a pupil)."""
     use = config.genome["relative_aperture"]
     return float(use.high if use.open else use.start) ** 2 if config.eye.optics else 1.0
 
@@ -63,7 +60,7 @@ def _types(config: RunConfig) -> list[str | tuple[float, ...]]:
     """Return the sets of receptors for which the error is computed.
 
     If the spectral genes determine the receptors, each open gene in turn takes values over its range, while the others
-    keep their start values. If all genes varied together, the largest error would be larger: a third larger in the
+    keep their start values. The largest error for any combination of genes may be larger. It is a third larger in the
     preset `ultraviolet`, whose peaks lie far apart.
     """
     if config.eye.receptors != INHERITED:
@@ -107,8 +104,8 @@ def idle_settings(config: RunConfig) -> list[str]:
     notes, search, eye = [], config.search, config.eye
     for name, gene in config.genes.items():
         use, alike = config.genome[name], [other for other in config.genes.values() if other.cluster == gene.cluster]
-        # If all genes of a cluster have the same value, the value was set for the whole cluster and is meant for its
-        # open genes. The closed genes of the cluster then cause no warning.
+        # If all genes of a cluster have the same value, it was set for the whole cluster, but only its open genes need
+        # it. The closed genes then cause no warning.
         together = {config.genome[other.name].opens_at for other in alike} == {use.opens_at}
         if use.opens_at and not use.open and not gene.default.open and not together:
             notes.append(f"genome.{name}.opens_at has no effect: the gene is frozen; set genome.{name}.open = true")

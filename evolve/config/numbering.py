@@ -9,7 +9,7 @@ __all__ = ["Place", "generation_ids"]
 
 @dataclass(frozen=True)
 class Place:
-    """Place of a candidate in a search: the candidate `id` is number `index` of `generation`. All count from 0."""
+    """Place of a candidate in a search: number `index` of `generation`, and `id` in the run. All start from 0."""
 
     id: int
     generation: int

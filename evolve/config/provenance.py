@@ -32,7 +32,7 @@ class Source:
     def place(self, key: str) -> str | None:
         """Return the location of `key` in this source, such as "mine.toml, line 7"; None if the source does not set it.
 
-        key: dotted name; the setting of a gene may also be the setting of its cluster or family
+        key: dotted name. A gene's setting may also be set for its cluster or family
         """
         for path in _spellings(key):
             if not _holds(self.tree, path):
@@ -61,7 +61,7 @@ def _line_of(text: str, path: list[str]) -> int | None:
     contains it. Bisection therefore finds the smallest n.
     """
     lines = text.splitlines(keepends=True)
-    low, high = 0, len(lines)  # the setting is absent from the first `low` lines and present in the first `high`
+    low, high = 0, len(lines)  # the first `low` lines do not contain the setting; the first `high` lines do
     while high - low > 1:
         middle = (low + high) // 2
         cut, tree = _parsed_from(lines, middle)
@@ -77,7 +77,7 @@ def _line_of(text: str, path: list[str]) -> int | None:
 def _parsed_from(lines: list[str], count: int) -> tuple[int, Tree | None]:
     """Return the smallest number of lines, at least `count`, that can be parsed, and the settings in these lines.
 
-    Lines that end within a value of several lines cannot be parsed.
+    Lines that end in the middle of a multi-line value cannot be parsed.
     """
     for cut in range(count, min(count + LONGEST_VALUE, len(lines)) + 1):
         try:

@@ -7,21 +7,26 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 from evolve.config.checks import ConfigError, check_gene_use, check_values, quoted
+from evolve.config.layout_checks import check_layouts
 from evolve.config.settings import (
     SECTIONS,
+    CostsConfig,
     EvaluationConfig,
     EyeConfig,
     LearningConfig,
     SearchConfig,
+    WiringConfig,
     WorldConfig,
     setting,
 )
 from evolve.config.task_card import (
     OF_COURSES,
+    OF_LAYOUTS,
     OF_MAZES,
     OF_SLIDING_AGENTS,
     OF_USER_TASKS,
     OPTIONAL_GENES,
+    PATH_WIDTH,
     TaskCard,
     tasks_with,
 )
@@ -32,27 +37,29 @@ from evolve.genome.eye_config import VERTICAL_FOVS
 from evolve.genome.genes import CLUSTERS, GENES, INHERITED, Gene, GeneConfig
 from evolve.genome.interval import Interval
 from optics.spectra.receptors import RECEPTORS
-from sim.worlds.catalog import COURSES, TASKS
+from sim.worlds.catalog import TASKS
 
 __all__ = [
     "SECTIONS",
     "TASKS",
     "ConfigError",
+    "CostsConfig",
     "EvaluationConfig",
     "EyeConfig",
     "GeneConfig",
     "LearningConfig",
     "RunConfig",
     "SearchConfig",
+    "WiringConfig",
     "WorldConfig",
 ]
 
 RHABDOMS = ("rhabdom_index", "rhabdom_surround", "rhabdom_length", "rhabdom_absorption")
-# Limits of the numerical aperture of rhabdoms; that of a fly's rhabdom is 0.25. Below the lower limit a rhabdom guides
-# almost no light, and above the upper limit it has hundreds of modes.
+# Limits of the numerical aperture of rhabdoms. A fly's rhabdom has 0.25. Below the lower limit a rhabdom guides almost
+# no light, and above the upper limit it has hundreds of modes.
 LEAST_STEP, MOST_STEP = 0.2, 0.5
-# [lx s] smallest allowed exposure. A receptor that sees white through a pupil with relative aperture 1 then absorbs
-# some 30 photons. With fewer photons, the approximation of shot noise fails.
+# [lx s] smallest allowed exposure. A receptor that sees a white surface through a pupil with relative aperture 1 then
+# absorbs some 30 photons. With fewer photons, the approximation of shot noise fails.
 LEAST_EXPOSURE = 2e-4
 
 
@@ -76,7 +83,9 @@ class RunConfig:
     genome: Mapping[str, GeneConfig] = field(default_factory=lambda: _default_genome())
     search: SearchConfig = field(default_factory=SearchConfig)
     learning: LearningConfig = field(default_factory=LearningConfig)
+    wiring: WiringConfig = field(default_factory=WiringConfig)
     evaluation: EvaluationConfig = field(default_factory=EvaluationConfig)
+    costs: CostsConfig = field(default_factory=CostsConfig)
     code: TaskCode | None = field(default=None, compare=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -86,15 +95,9 @@ class RunConfig:
                 raise ConfigError(f"{section} = {quoted(getattr(self, section))}: must be a {kind.__name__}", section)
             check_values(getattr(self, section), prefix=f"{section}.")
         self._check_task()
-        if self.eye.receptors not in (known := (*RECEPTORS, INHERITED)):
-            raise ConfigError(
-                f"eye.receptors = {self.eye.receptors!r}: must be one of {', '.join(known)}", "eye.receptors"
-            )
-        if self.eye.vertical_fov not in VERTICAL_FOVS:
-            raise ConfigError(
-                f"eye.vertical_fov = {self.eye.vertical_fov!r}: must be one of {', '.join(VERTICAL_FOVS)}",
-                "eye.vertical_fov",
-            )
+        for name, known in (("receptors", (*RECEPTORS, INHERITED)), ("vertical_fov", VERTICAL_FOVS)):
+            if (given := getattr(self.eye, name)) not in known:
+                raise ConfigError(f"eye.{name} = {given!r}: must be one of {', '.join(known)}", f"eye.{name}")
         self._check_light()
         self._check_rhabdoms()
         self._check_world()
@@ -129,11 +132,9 @@ class RunConfig:
         self._check_settings((*OF_SLIDING_AGENTS, *OF_USER_TASKS))
 
     def _check_world(self) -> None:
-        """Check the courses, and that settings of mazes and courses are changed only for tasks that have them."""
-        for name in ("course", "evaluation_course"):
-            if (course := getattr(self.world, name)) not in COURSES:
-                raise ConfigError(f"world.{name} = {course!r}: must be one of {', '.join(COURSES)}", f"world.{name}")
-        self._check_settings((*OF_MAZES, *OF_COURSES))
+        """Check the settings of layouts, and that they are changed only for tasks that have them."""
+        self._check_settings((*OF_MAZES, *OF_COURSES, *OF_LAYOUTS, PATH_WIDTH))
+        check_layouts(self.world)
 
     def _check_settings(self, keys: tuple[str, ...]) -> None:
         """Check that the task has these settings, or that they have their default values."""
@@ -142,8 +143,8 @@ class RunConfig:
             default = getattr(SECTIONS[section], name)
             if key not in self.card.settings and getattr(getattr(self, section), name) != default:
                 others = tasks_with(key)
-                kind = "built-in tasks" if others else "user tasks"
-                whose = f"the task {others[0]}" if len(others) == 1 else kind
+                named = " and ".join(others) if len(others) < len(TASKS) else "built-in tasks"
+                whose = f"the task {others[0]}" if len(others) == 1 else named or "user tasks"
                 raise ConfigError(f"{key}: is for {whose}, not for {self.task}", key, "task")
 
     def _check_light(self) -> None:

@@ -6,18 +6,24 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from evolve.config.costs import CostsConfig
 from evolve.genome.eye_config import EyeConfig, setting
 from evolve.genome.interval import Interval
 
 __all__ = [
+    "FAMILY",
     "SECTIONS",
+    "CostsConfig",
     "EvaluationConfig",
     "EyeConfig",
     "LearningConfig",
     "SearchConfig",
+    "WiringConfig",
     "WorldConfig",
     "setting",
 ]
+
+FAMILY = "family"  # value of world.layouts
 
 
 @dataclass(frozen=True)
@@ -28,32 +34,76 @@ class WorldConfig:
     unseen: bool = setting(
         False,
         None,
-        "evaluate in other mazes than those of training; selection and early stopping use them: they are not held out",
+        "evaluate in other mazes than in training; they also serve for selection and early stopping: not held out",
     )
     course: str = setting("short", None, "navigation's course: short, or long (twice the length, half the actions)")
     evaluation_course: str = setting("short", None, "navigation's course in evaluation")
+    layouts: str = setting(
+        "fixed",
+        None,
+        "layouts of navigation and maze: fixed, as course, mazes and unseen determine; or family: random courses or "
+        "mazes in three sets without a common layout, for training, selection (early stopping and fitness) and test",
+    )
+    family_seed: int = setting(0, Interval(0, 2**63 - 1), "seed of a family; the same layouts for all candidates")
+    training_layouts: int = setting(8, Interval(1, 100), "number of a family's layouts for training")
+    selection_layouts: int = setting(8, Interval(1, 100), "number of a family's layouts for selection")
+    test_layouts: int = setting(8, Interval(1, 100), "number of a family's layouts for final figures")
+    layout_rows: int = setting(13, Interval(7, 31), "cells of a family's layouts along y, outer walls included; odd")
+    layout_columns: int = setting(39, Interval(15, 99), "cells of a family's layouts along x; odd")
+    path_width: int = setting(3, Interval(1, 3), "width of the paths of a family's courses [cells]: 1 or 3")
+    layout_actions: int = setting(
+        0, Interval(0, 10**6), "actions after which an episode in a family's layouts is truncated; 0: 256"
+    )
+    selection_set: str = setting(
+        "selection",
+        None,
+        "a family's set for early stopping and fitness: selection; or training, which rewards memory of the layouts",
+    )
+    wall_height: float = setting(1.0, Interval(0.4, 100), "height of the walls [m]; 0.5 in the published code")
     least_light: float = setting(
         1.0,
         Interval(1e-6, 1),
-        "darkest light of an episode, as a share of daylight; each episode draws its light between this and 1",
+        "lowest light level, relative to daylight; each episode draws its level between this and 1",
     )
 
     encoded_textures: bool = setting(
         True,
         None,
-        "textures contain display colours, unless the model requests linear light; if false, those that MuJoCo's "
-        "compiler resolves to linear light contain it, as in runs without this setting",
+        "textures contain display colours, unless the model requests linear light; if false, MuJoCo's "
+        "compiler decides which textures contain linear light, as in runs without this setting",
     )
 
     @property
     def training(self) -> dict[str, Any]:
-        """Arguments of `sim.make_vec_env` that define the worlds in training."""
-        return {"mazes": self.mazes, "world_seed": 0, "course": self.course}
+        """Arguments of `sim.build_world` that define the worlds in training."""
+        return {"mazes": self.mazes, "seed": 0, "course": self.course, **self._walls("training")}
 
     @property
     def evaluation(self) -> dict[str, Any]:
-        """Arguments of `sim.make_vec_env` that define the worlds in which fitness is evaluated."""
-        return {"mazes": self.mazes, "world_seed": int(self.unseen), "course": self.evaluation_course}
+        """Arguments of `sim.build_world` that define the worlds in which fitness is evaluated."""
+        fixed = {"mazes": self.mazes, "seed": int(self.unseen), "course": self.evaluation_course}
+        return {**fixed, **self._walls(self.selection_set)}
+
+    @property
+    def test(self) -> dict[str, Any]:
+        """Arguments of `sim.build_world` that define the worlds of final figures.
+
+        Without a family, they are those in which fitness is evaluated.
+        """
+        return {**self.evaluation, **self._walls("test")}
+
+    def _walls(self, name: str) -> dict[str, Any]:
+        """Return the height of the walls, and the set of this name if there is a family."""
+        layouts = None
+        if self.layouts == FAMILY:
+            from sim.worlds.layout_family import LayoutFamily  # loads MuJoCo, which `evolve list` does not need
+
+            counts = {"n_training": self.training_layouts, "n_selection": self.selection_layouts}
+            size = {"rows": self.layout_rows, "columns": self.layout_columns, "path_width": self.path_width}
+            steps = self.layout_actions or None
+            family = LayoutFamily(self.family_seed, **counts, n_test=self.test_layouts, **size, episode_steps=steps)
+            layouts = getattr(family, name)
+        return {"layouts": layouts, "wall_height": self.wall_height}
 
     @property
     def vary(self) -> dict[str, tuple[float, float]] | None:
@@ -72,8 +122,8 @@ class SearchConfig:
     active: bool = setting(
         False,
         None,
-        "CMA also learns from the worse half of a population; if the fittest are at the end of a gene's range, its "
-        "steps then grow without bound",
+        "CMA also learns from the worse half of a population; its steps then grow without bound if the "
+        "fittest candidates are at the end of a gene's range",
     )
     steady_state: bool = setting(
         False, None, "propose a new candidate as soon as one has been evaluated; if false, generation by generation"
@@ -84,7 +134,7 @@ class SearchConfig:
     promoted: float = setting(
         0.5,
         Interval(0, 0.9, open_low=True),
-        "share of candidates that continue after a rung; also a rung's budget as a share of the next rung's",
+        "fraction of candidates that continue after a rung; also a rung's steps as a fraction of the next rung's",
     )
 
 
@@ -100,17 +150,17 @@ class LearningConfig:
     least_epochs: int = setting(
         3,
         Interval(1, 1000),
-        "minimum number of passes, which fall to it after the step size has halved; n_epochs or more: constant passes",
+        "minimum number of passes, reached after the step size has halved; n_epochs or more: constant number of passes",
     )
     learning_rate: float = setting(
         3e-3,
         Interval(0, 1, open_low=True),
-        "initial step size of Adam; brains of more than 64 units use √(64 / units) of it",
+        "initial step size of Adam; multiplied by √(64 / units) for brains with more than 64 units per layer",
     )
     decay_after: int = setting(
         75_000,
         Interval(1, 10**10),
-        "steps after which learning slows down as 1/steps: Adam's step size falls to half, then the passes decrease",
+        "steps after which learning slows down as 1/steps: first Adam's step size falls to half, then the passes do",
     )
     gamma: float = setting(0.9, Interval(0, 1), "discount per step")
     gae_lambda: float = setting(
@@ -120,17 +170,17 @@ class LearningConfig:
     first_speed: float = setting(
         0.5,
         Interval(0, 1, open_low=True),
-        "mean speed of the untrained policy, and twice its spread, as a fraction of the top speed",
+        "mean speed of the untrained policy, as a fraction of the top speed; its standard deviation is half of it",
     )
     contact_ramp: int = setting(
         0,
         Interval(0, 10**10),
-        "steps until contact has its full cost: a tenth of it for the first third, then rising exponentially",
+        "steps until contact has its full cost; the cost is a tenth for the first third, then rises exponentially",
     )
     rays_per_receptor: float = setting(
         8.0,
         Interval(0, 4096, open_low=True),
-        "maximum rays, or areas, per receptor and frame in training and in its checkpoints",
+        "maximum number of rays, or areas, per receptor and frame during training and its evaluations",
     )
     least_return: float = setting(
         0.0, Interval(-1e6, 0), "a training episode is truncated when its return falls to this value; 0: never"
@@ -140,10 +190,31 @@ class LearningConfig:
 
 
 @dataclass(frozen=True)
+class WiringConfig:
+    """Settings of the connections between the receptors of an eye and its encoder.
+
+    `pool_side` has no effect along an axis with fewer receptors, and `repeat_side` none along an axis with more.
+    """
+
+    shared_encoder: bool = setting(False, None, "all eyes have the same encoder, with the same weights")
+    pool_side: int = setting(
+        0, Interval(0, 256), "signals are averaged to a grid of this many rows and columns before the encoder; 0: never"
+    )
+    repeat_side: int = setting(
+        0,
+        Interval(0, 256),
+        "signals, averaged or not, are then repeated on a grid of this many rows and columns; 0: never",
+    )
+
+
+DIRECT = WiringConfig()  # each receptor is an input of its eye's own encoder
+
+
+@dataclass(frozen=True)
 class EvaluationConfig:
     """Settings of the evaluation of fitness."""
 
-    episodes: int = setting(32, Interval(1, 10_000), "evaluation episodes whose mean return is the fitness")
+    episodes: int = setting(32, Interval(1, 10_000), "evaluation episodes whose mean return is the task fitness")
 
 
 SECTIONS: Mapping[str, type] = {
@@ -151,5 +222,7 @@ SECTIONS: Mapping[str, type] = {
     "world": WorldConfig,
     "search": SearchConfig,
     "learning": LearningConfig,
+    "wiring": WiringConfig,
     "evaluation": EvaluationConfig,
+    "costs": CostsConfig,
 }

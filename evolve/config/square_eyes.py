@@ -1,4 +1,4 @@
-"""Square eyes, which have one gene for both sides. Equal settings of height and width apply to this gene."""
+"""Square eyes have one gene for both sides. Equal settings of height and width apply to this gene."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ __all__ = ["no_such_side", "with_square_eyes"]
 def with_square_eyes(source: Source, eye: EyeConfig) -> Source:
     """Return the source; for square eyes, equal settings of height and width are moved to the gene for both sides.
 
-    A task or a preset may be written for eyes with one row of receptors. If a user selects square eyes instead, the
-    task's settings of height and width are ignored, and the preset's width applies to both sides.
+    A task or a preset may be written for eyes with one row of receptors. If a user selects square eyes, the task's
+    settings of height and width are ignored, and the preset's width applies to both sides.
     """
     genes = source.tree.get("genome", {})
     if eye.square and not source.name:

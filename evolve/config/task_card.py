@@ -9,13 +9,36 @@ from evolve.config.task_code import LABEL
 from evolve.genome.genes import TILT
 from sim.worlds.catalog import TASKS
 
-__all__ = ["CARDS", "OF_COURSES", "OF_SLIDING_AGENTS", "OF_USER_TASKS", "TaskCard", "card_of", "tasks_with"]
+__all__ = [
+    "CARDS",
+    "LAYOUTS",
+    "OF_COURSES",
+    "OF_FAMILY",
+    "OF_LAYOUTS",
+    "OF_MAZES",
+    "OF_SLIDING_AGENTS",
+    "OF_USER_TASKS",
+    "PATH_WIDTH",
+    "TaskCard",
+    "card_of",
+    "tasks_with",
+]
 
 # Settings that only some tasks have. OF_SLIDING_AGENTS are for tasks whose agent has a speed, a turning rate and
 # contact with walls.
-OF_SLIDING_AGENTS = ("world.least_light", "learning.first_speed", "learning.contact_ramp", "learning.least_return")
+OF_SLIDING_AGENTS = (
+    *("world.least_light", "world.wall_height", "learning.first_speed", "learning.contact_ramp"),
+    "learning.least_return",
+)
 OF_MAZES = ("world.mazes", "world.unseen")
 OF_COURSES = ("world.course", "world.evaluation_course")
+PATH_WIDTH = "world.path_width"  # of a family's courses
+OF_FAMILY = (
+    *("world.family_seed", "world.training_layouts", "world.selection_layouts", "world.test_layouts"),
+    *("world.layout_rows", "world.layout_columns", "world.layout_actions", "world.selection_set"),
+)
+LAYOUTS = "world.layouts"
+OF_LAYOUTS = (LAYOUTS, *OF_FAMILY)
 OF_USER_TASKS = ("world.encoded_textures",)  # built-in worlds have no image files
 OPTIONAL_GENES = (TILT,)  # genes that only some tasks have
 
@@ -29,8 +52,8 @@ class TaskCard:
     aim: end of the sentence "Eyes and brains evolved ..."
     settings: settings that this task has and some other tasks do not have
     genes: genes that this task has and some other tasks do not have
-    grey: whether all surfaces of its world reflect all wavelengths equally; None: unknown
-    has_file: whether the task is a class in a user's file
+    grey: True if all surfaces of its world reflect all wavelengths equally; None: unknown
+    has_file: True if the task is a class in a user's file
     """
 
     name: str
@@ -54,10 +77,10 @@ def _built_in(name: str, *settings: str) -> TaskCard:
 CARDS = {
     card.name: card
     for card in (
-        _built_in("navigation", *OF_COURSES),
+        _built_in("navigation", *OF_COURSES, *OF_LAYOUTS, PATH_WIDTH),
         _built_in("detection"),
         _built_in("tracking"),
-        _built_in("maze", *OF_MAZES),
+        _built_in("maze", *OF_MAZES, *OF_LAYOUTS),
         _built_in("foraging"),
     )
 }

@@ -4,7 +4,8 @@ Eyes sit on the equator of a head of radius `eye.head_radius`, and an eye is as 
 neighbouring eyes is placement range / (eyes - 1). All retinas are `eye.sensor_width` wide and filled with receptors,
 which are at least `eye.receptor_width` wide. If `eye.receptor_pitch` is above 0, the width of a retina is instead the
 number of receptors along its width times this pitch. Height takes no space on the head, but receptors are also at
-least `eye.receptor_width` high. A repair changes genes as little as possible.
+least `eye.receptor_width` high. A repair changes genes as little as possible. Costs (`evolve.config.costs`) apply to
+the repaired animal, in addition to these constraints.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ Values = dict[str, float]
 Uses = Mapping[str, GeneConfig]
 Pair = tuple[float, float]
 Contradiction = tuple[str, tuple[str, ...]]
-SLACK = 1e-9  # tolerance for rounding, so that eyes in contact do not count as overlapping
+SLACK = 1e-9  # tolerance for rounding errors: eyes in contact must not count as overlapping
 
 
 def retina_width(receptors: float, sizes: EyeConfig) -> float:
@@ -84,8 +85,8 @@ def fitted(values: Values, uses: Uses, sizes: EyeConfig) -> Values:
 def _with_high_receptors(values: Values, uses: Uses, sizes: EyeConfig) -> Values:
     """Return the genes that change so that receptors are at least `eye.receptor_width` high.
 
-    The number of rows is reduced. If the lowest number does not fit, the vertical field of view grows to its highest
-    value at most, and then the horizontal field shrinks, which makes a retina of the same width higher.
+    The number of rows is reduced. If the lowest number does not fit, the vertical field of view grows up to its highest
+    value. If that is not enough, the horizontal field shrinks, which makes a retina of the same width higher.
     """
     vertical = vertical_fov(values, sizes)
     if vertical is None:
@@ -143,9 +144,8 @@ def _thinned(asked: Pair, least: Pair, range_deg: float, sizes: EyeConfig) -> Pa
     number, evolution would drift towards animals in which the other number is large. Selection, not the repair, should
     choose between eyes and receptors.
 
-    The required space depends on the gaps between eyes, of which there is one fewer than eyes. The ratio of the numbers
-    of eyes is therefore computed from the mean of both counts, eyes - 0.5. This preserves the proportion of eyes to
-    receptors best.
+    The required space depends on the number of gaps between eyes, eyes - 1. The ratio is therefore computed from the
+    mean of the numbers of eyes and of gaps, eyes - 0.5. This preserves the proportion of eyes to receptors best.
     """
     (eyes, receptors), (fewest_eyes, fewest) = asked, least
     counts = range(int(fewest), int(receptors) + 1)

@@ -88,13 +88,13 @@ class Gene:
         return "Gaussian" if self.kind == "real" else "±1"
 
     def decode(self, u: float, use: GeneConfig) -> float:
-        """Return the gene's value at the coordinate u in [0, 1]; all values of an integer gene have equal shares."""
+        """Return the gene's value at the coordinate u in [0, 1]. Values of an integer gene occupy equal intervals."""
         if self.kind == "real":
             return use.low + u * (use.high - use.low)
         return min(use.low + float(np.floor(u * (use.high - use.low + 1))), use.high)
 
     def encode(self, value: float, use: GeneConfig) -> float:
-        """Return the coordinate u of a value, the inverse of `decode`; for an integer, the middle of its share."""
+        """Return the coordinate u of a value, the inverse of `decode`; for an integer, the middle of its interval."""
         if self.kind == "real":
             return (value - use.low) / (use.high - use.low)
         return (value - use.low + 0.5) / (use.high - use.low + 1)
@@ -160,7 +160,8 @@ def _optics(relief_points: int) -> list[Gene]:
     shapes = ", ".join(f"{number} {name}" for number, name in enumerate(APERTURE_SHAPES))
     last = len(APERTURE_SHAPES) - 1
     return [
-        # Below 0.01 (a radius of 1 µm in an eye 200 µm wide), the pupil would be as narrow as the wavelength of light.
+        # Below 0.01 (a radius of 1 µm in an eye 200 µm wide), the pupil would be about as narrow as the wavelength of
+        # light.
         gene("relative_aperture", REAL, (0.01, 1), (0.01, 1, 0.5), "", "pupil diameter / retina width"),
         *(
             gene(f"doe_{i}{j}", REAL, (0, 1), (0, 1, 0.5), "relief height", f"relief control point ({i}, {j})")

@@ -24,10 +24,10 @@ if TYPE_CHECKING:
 __all__ = ["FORMER_ENCODER", "Phenotype", "develop", "repaired"]
 
 ANNULUS_INNER = 0.5  # inner radius of an annulus, in pupil radii
-SLIT_ASPECT = 4.0  # height of an upright slit / its width
-# The width of the encoders (the first layers, one per eye) is proportional to that of the brain, so that a small brain
-# does not get large encoders. A brain of 64 neurons has encoders of 16. Wider encoders take longer to compute, and did
-# not learn faster (docs/measurements/learning.md).
+SLIT_ASPECT = 4.0  # height of an upright slit divided by its width
+# The width of the encoders (the first layers, one per eye) is proportional to that of the brain, so that small brains
+# have small encoders. A brain of 64 neurons has encoders of 16. Wider encoders take longer to compute, and did not
+# learn faster (docs/measurements/learning.md).
 NEURONS_PER_FEATURE = 4
 FORMER_ENCODER = 16  # width of the encoders of animals whose record does not state it
 

@@ -2,26 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import os
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, fields
 from pathlib import Path
-from typing import TYPE_CHECKING
+from types import NoneType
+from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from evolve.analysis.fitness_parts import fitness_label
 from evolve.analysis.statistics import generation_statistics
+from evolve.config.checks import ConfigError, quoted
 from evolve.config.run_config import EyeConfig
 from evolve.interactive.callbacks import Callback, Callbacks
 from evolve.interactive.summary import animal_as_html, run_as_html
 from evolve.interactive.table import candidate_table
 from evolve.runs.resume import resuming
 from evolve.store.candidate import Candidate
-from evolve.store.directory import Run, RunError
-from evolve.store.policies import require_policy
+from evolve.store.directory import Run
 
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+    from evolve.learning.ppo import Episodes
     from sim.tasks.encounter import Frozen
     from sim.tasks.task import Task
 
@@ -58,7 +64,7 @@ class OpenedRun(Run):
 
     @property
     def best(self) -> OpenedCandidate | None:
-        """Candidate with the highest fitness, the earliest if several have it; None if none has succeeded."""
+        """Candidate with the highest fitness (the earliest of equals); None before a candidate has succeeded."""
         best = super().best
         return None if best is None else OpenedCandidate.of_run(best, self)
 
@@ -80,18 +86,27 @@ class OpenedRun(Run):
             RunError: the candidate does not exist, or its policy is missing or damaged.
             ValueError: the eyes that the task places differ from those of the candidate.
         """
+        from evolve.analysis.recorder import trained_policy
         from evolve.learning.animal_task import with_phenotype
-        from evolve.learning.policy import load_policy
         from sim.tasks.encounter import Frozen
 
         candidate = self.candidate(candidate_id)
-        path = self.policy_path(candidate.id)
-        require_policy(candidate, path)
-        try:
-            policy = load_policy(path)
-        except ValueError as error:
-            raise RunError(str(error)) from error
-        return Frozen(with_phenotype(task, candidate.phenotype, self.config), policy)
+        return Frozen(with_phenotype(task, candidate.phenotype, self.config), trained_policy(self, candidate))
+
+    def held_out(self, candidate_id: int | None = None, seed: int = 0, episodes: int | None = None) -> Episodes:
+        """Return evaluation episodes in the test set of layouts, which neither training nor selection has used.
+
+        candidate_id: id of the candidate; None: the best candidate
+        seed: seed of the episodes
+        episodes: number of episodes; None: the run's setting `evaluation.episodes`
+
+        Raises:
+            RunError: the candidate does not exist, or its policy is missing or damaged.
+            ConfigError: the run has no test set, or the user has not named the code of its task.
+        """
+        from evolve.analysis.held_out import held_out_episodes
+
+        return held_out_episodes(self, candidate_id, seed, episodes)
 
     def resume(self, callbacks: Sequence[Callback] = (), progress: bool = True) -> None:
         """Continue an interrupted run to its end. A finished run stays unchanged. See `evolve.run` for the arguments.
@@ -146,7 +161,7 @@ class OpenedRun(Run):
         generations = [row.generation for row in rows]
         axes.plot(generations, [row.median for row in rows], color="0.4", label="median")
         axes.plot(generations, [row.best_so_far for row in rows], "o-", label="best so far")
-        axes.set(xlabel="generation", ylabel="fitness (mean return)")
+        axes.set(xlabel="generation", ylabel=fitness_label(not self.config.costs.free))
         axes.xaxis.set_major_locator(MaxNLocator(integer=True))
         axes.legend(frameon=False)
         return axes
@@ -161,5 +176,72 @@ class OpenedRun(Run):
 
         return write(self)
 
+    def replay(
+        self,
+        candidate_id: int | None = None,
+        seed: int = 0,
+        *,
+        every: int | None = None,
+        also: Collection[str] = (),
+        out: Path | str | None = None,
+        mode: str = "evaluation",
+    ) -> list[Path]:
+        """Play an episode of a candidate, write a page that shows it, and return the paths of the page and other files.
+
+        The files are those of the command `evolve replay`.
+
+        candidate_id: id of the candidate; None: the best candidate
+        seed: seed of the episode
+        every: number of actions from one image of the scene to the next in a recording for Rerun; None: 8
+        also: formats of additional files next to the page: "rrd" (a recording for Rerun), "gif" and "mp4"
+        out: path of the page; None: a name in the run directory
+        mode: "evaluation", or "test" for the layouts of the test set
+
+        Raises:
+            RunError: the candidate does not exist, or its policy is missing or damaged.
+            ConfigError: an argument is invalid, a program that `also` needs is not installed, the run has no test set,
+                or the code of the user task has not been named when the run was opened.
+            ValueError: `every` is not a whole number from 1 to 1,000,000.
+        """
+        from evolve.report.replay import write_replay
+
+        return write_replay(self, candidate_id, _seed(seed), every, also, _path(out), mode)[1]
+
+    def export(
+        self, candidate_id: int | None = None, seed: int = 0, *, every: int = 8, out: Path | str | None = None
+    ) -> list[Path]:
+        """Play an episode of a candidate, write the views of its eyes as spectral EXR files, and return their paths.
+
+        The files are those of the command `evolve export`; `sim.read_exr` reads them.
+
+        candidate_id: id of the candidate; None: the best candidate
+        seed: seed of the episode
+        every: number of actions from one file to the next
+        out: folder of the files; None: `exr` in the run directory
+
+        Raises:
+            RunError: the candidate does not exist, or its policy is missing or damaged.
+            ConfigError: an argument is invalid, or the code of the user task has not been named when the run was
+                opened.
+            ValueError: `every` is not a whole number from 1 to 1,000,000.
+        """
+        from evolve.report.exr_export import export_run
+
+        return export_run(self, candidate_id, _seed(seed), every, _path(out))
+
     def _repr_html_(self) -> str:
         return run_as_html(self).markup
+
+
+def _seed(seed: Any) -> int:
+    """Return the seed of an episode after a check."""
+    if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
+        raise ConfigError(f"seed = {quoted(seed)}: must be a whole number, 0 or more")
+    return int(seed)
+
+
+def _path(out: Any) -> Path | None:
+    """Return the path of a file or folder after a check."""
+    if not isinstance(out, str | os.PathLike | NoneType):
+        raise ConfigError(f"out = {quoted(out)}: must be a path")
+    return None if out is None else Path(out)

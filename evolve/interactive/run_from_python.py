@@ -45,7 +45,7 @@ def run(
     out: run directory; None: runs/TASK-PRESET-N
     callbacks: functions that are called as callback(run, candidate) after every evaluated candidate; an exception ends
         the run
-    progress: whether to print the progress to stderr
+    progress: True to print the progress to stderr
 
     Raises:
         ConfigError: a setting or an argument is invalid; the message is one line.
@@ -75,10 +75,10 @@ def resume(
 
     directory: directory of a run that was started with the command or from Python
     task: "FILE.py:CLASS" if the run has a user task, whose code runs only if you name it here; else None
-    before_damage: whether to continue from the lines of the record before the first damaged one; a copy is kept
+    before_damage: True to continue from the lines of the record before the first damaged one; a copy is kept
     callbacks: functions that are called as callback(run, candidate) after every evaluated candidate; an exception ends
         the run
-    progress: whether to print the progress to stderr
+    progress: True to print the progress to stderr
 
     Raises:
         ConfigError: an argument or the configuration is invalid, or the user task has not been named, has changed or

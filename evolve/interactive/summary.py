@@ -4,15 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from evolve.analysis.statistics import acuity_cpd, generation_statistics
+from evolve.analysis.fitness_parts import fitness_text
+from evolve.analysis.statistics import generation_statistics
 from evolve.report.markup import Html, html, joined, rounded
-from evolve.report.tables import field_of_view
+from evolve.report.tables import acuity_text, field_of_view
 from evolve.store.candidate import Candidate
 from evolve.store.directory import Run
 
 __all__ = ["animal_as_html", "run_as_html"]
 
-SHOWN = 12  # number of generations shown, the latest ones
+SHOWN = 12  # number of the latest generations that are shown
 
 
 def run_as_html(run: Run) -> Html:
@@ -20,7 +21,7 @@ def run_as_html(run: Run) -> Html:
     facts = {
         "task": run.config.task,
         "candidates": f"{len(run.candidates)} of {run.config.candidates} evaluated",
-        "best": "none yet" if run.best is None else f"no. {run.best.id}, fitness {rounded(run.best.fitness)}",
+        "best": "none yet" if run.best is None else f"no. {run.best.id}, fitness {_fitness(run.best)}",
     }
     rows = [
         (str(row.generation), rounded(row.best), rounded(row.median), str(row.failed))
@@ -34,13 +35,17 @@ def animal_as_html(candidate: Candidate) -> Html:
     animal = candidate.phenotype
     height, width = animal.resolution
     facts = {
-        "fitness": candidate.failure or rounded(candidate.fitness),
+        "fitness": candidate.failure or _fitness(candidate),
         "episodes solved": "–" if candidate.failure else f"{100 * candidate.success_rate:.0f} %",
         "eyes": f"{animal.n_eyes} of {height} × {width} receptors, {field_of_view(animal)}",
-        "acuity": f"{rounded(acuity_cpd(animal))} cycles per degree",
+        "acuity": acuity_text(animal, "cycles per degree"),
         "brain": f"{animal.layers} layers of {animal.neurons} neurons, {animal.memory_frames} frames of memory",
     }
     return _facts(f"candidate {candidate.id}, generation {candidate.generation}", facts)
+
+
+def _fitness(candidate: Candidate) -> str:
+    return fitness_text(candidate.fitness, candidate.costs, rounded)
 
 
 def _facts(title: str, facts: dict[str, str]) -> Html:

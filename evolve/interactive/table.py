@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from evolve.analysis.statistics import acuity_cpd, gene_values
+from evolve.analysis.acuity import acuity_cpd, acuity_vertical_cpd
+from evolve.analysis.statistics import gene_values
 from evolve.store.candidate import Candidate
 
 if TYPE_CHECKING:
@@ -15,14 +16,15 @@ if TYPE_CHECKING:
 
 __all__ = ["candidate_table", "drift_table"]
 
-OUTCOME = ("generation", "index", "fitness", "success_rate", "steps", "seconds", "seed", "failure", "parents")
+FITNESS = ("fitness", "task_fitness", "costs")
+OUTCOME = ("generation", "index", *FITNESS, "success_rate", "steps", "seconds", "seed", "failure", "parents")
 
 
 def candidate_table(candidates: Sequence[Candidate]) -> pd.DataFrame:
     """Return a table with one row per candidate, indexed by its id.
 
-    The columns are the outcome, the acuity [cycles/degree], and the values of all genes that the animal expresses. For
-    a failed candidate, the fitness is NaN and `failure` contains the reason.
+    The columns are the outcome, the acuities [cycles/degree], and the values of all genes that the animal expresses.
+    For a failed candidate, fitness, task fitness and costs are NaN, and `failure` contains the reason.
     """
     import pandas as pd
 
@@ -46,5 +48,7 @@ def drift_table(drift: Drift) -> pd.DataFrame:
 def _row(candidate: Candidate) -> dict[str, object]:
     outcome = {name: getattr(candidate, name) for name in OUTCOME}
     if candidate.failure is not None:
-        outcome["fitness"] = float("nan")
-    return {**outcome, "acuity_cpd": acuity_cpd(candidate.phenotype), **gene_values(candidate.phenotype)}
+        outcome |= dict.fromkeys(FITNESS, float("nan"))
+    animal = candidate.phenotype
+    acuities = {"acuity_cpd": acuity_cpd(animal), "acuity_vertical_cpd": acuity_vertical_cpd(animal)}
+    return {**outcome, **acuities, **gene_values(animal)}

@@ -1,4 +1,4 @@
-"""The run's task with one animal in it; only this module resolves a task's name into an object."""
+"""The run's task with one animal in it. No other module converts a task's name to an object."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from evolve.config.run_config import RunConfig
 from evolve.genome.phenotype import Phenotype
 from evolve.learning.task_module import executed_task
 from sim.eyes.eyes import Eyes
-from sim.render.fidelity import Fidelity, fidelity_asked
+from sim.render.fidelity import Fidelity, requested_fidelity
 from sim.tasks.batch_task import BatchTask
 from sim.tasks.registry import task_of
 from sim.tasks.user_tasks import UserTask, batched, with_evolved_eyes
@@ -25,20 +25,19 @@ def animal_task(
 ) -> BatchTask:
     """Return the run's task with this animal in it, for arrays of worlds.
 
-    mode: "training" or "evaluation", which may have different layouts of worlds
+    mode: "training", "evaluation" or "test", which may have different layouts of worlds
     eyes: eyes that replace the animal's own
 
     Raises:
-        ConfigError: the user task has not been named when the run was opened, or its module cannot be executed.
+        ConfigError: the user task was not named when the run was opened, or its module cannot be executed.
         ValueError: the eyes that the task places differ from the animal's.
     """
     if (code := config.choice.named_code) is not None:
         task = with_phenotype(executed_task(code, config.world.encoded_textures), phenotype, config, eyes)
         return batched(task).in_mode(mode)
     eyes, layout = eyes or phenotype.eyes(config.eye), getattr(config.world, mode)
-    asked = fidelity_asked(config.eye.rays_per_receptor, eyes)
-    world = build_world(config.task, seed=layout["world_seed"], mazes=layout["mazes"], course=layout["course"])
-    built_in = task_of(world, mode, eyes=eyes, fidelity=asked or AUTO)
+    asked = requested_fidelity(config.eye.rays_per_receptor, eyes)
+    built_in = task_of(build_world(config.task, **layout), mode, eyes=eyes, fidelity=asked or AUTO)
     built_in.vary = config.world.vary
     return built_in
 

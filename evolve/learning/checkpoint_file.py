@@ -20,7 +20,7 @@ __all__ = ["CheckpointError", "CheckpointWarning", "metadata_of", "owned", "read
 
 LENGTH_BYTES = 8  # size of the number at the start of a safetensors file, which is the length of its header [bytes]
 ENTRY = "training"  # entry of the metadata with all numbers; safetensors writes several entries in random order
-BLANK = "0" * 64  # the text in place of the checksum while the checksum is computed
+BLANK = "0" * 64  # text that stands in for the checksum while it is computed
 OTHERS = {"rung": "another rung", "ends": "rungs of other lengths", "settings": "other settings"}
 
 

@@ -1,9 +1,9 @@
 """Encoder of the eyes' signals for actor and critic: a multilayer perceptron per eye over a memory of frames.
 
-Each eye has its own weights. The same encoder is applied to each frame in memory: three layers of width w map the
-signals of a frame to its code of w numbers. One further layer then maps the codes of all frames, `memory` x w numbers,
-to the w features of the eye. The features of all eyes are joined with the other entries of the observation:
-proprioception and the previous action.
+Each eye has its own weights, unless `wiring.shared_encoder` is set. The same encoder is applied to each frame in
+memory: three layers of width w map the signals of a frame to its code of w numbers. One further layer then maps the
+codes of all frames, `memory` x w numbers, to the w features of the eye. The features of all eyes are joined with the
+other entries of the observation: proprioception and the previous action.
 
 Units are leaky rectifiers. With tanh, the agent needed a third more samples to learn detection, and each unit took ten
 times longer to compute. The receptors adapt: the first layer subtracts the running mean of the signals, and divides by
@@ -21,13 +21,15 @@ from gymnasium import spaces
 from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
 from torch import Tensor, nn
 
+from evolve.config.settings import DIRECT, WiringConfig
 from evolve.learning.observed import entries_of, known_beside_eyes
 from evolve.learning.per_eye_layers import DARK, AdaptedLinear, MemoryLinear, PerEyeLinear
+from evolve.learning.regridding import Regridding
 
 __all__ = ["UNITS", "EyeFeatures"]
 
 ENCODER_LAYERS = 3  # two hidden layers, and a layer that returns the code of a frame
-FARTHEST = 10.0  # limit of normalised proprioception; 1 is one spread from the mean
+FARTHEST = 10.0  # limit of normalised proprioception, in standard deviations from the mean
 UNITS = nn.LeakyReLU  # units of all hidden layers; the gradient of a leaky unit is never 0
 
 
@@ -57,28 +59,29 @@ class Felt(nn.Module):
 class EyeFeatures(BaseFeaturesExtractor):
     """Features of an observation: `width` numbers for each eye, followed by the observation's other entries.
 
-    All layers are `width` wide, too. An observation may have one of two forms, which give the same features.
-    Environments return stacked frames: `eyes` (sample, memory, eye, channel, height, width). Rollout buffers store each
-    frame once: `frames` (memory - 1 + step, segment, eye, channel, height, width) and `age` (step, segment), the number
-    of steps since the first frame of the episode. Samples are then (step, segment) flattened.
+    All layers have the same width. An observation may have one of two forms, which give the same features. Environments
+    return stacked frames: `eyes` (sample, memory, eye, channel, height, width). Rollout buffers store each frame once:
+    `frames` (memory - 1 + step, segment, eye, channel, height, width) and `age` (step, segment), the number of steps
+    since the first frame of the episode. Samples are then (step, segment) flattened.
 
     At the start of an episode, the memory is not yet full. As in sim's environments, the first frame of the episode
     fills the missing places.
     """
 
-    def __init__(self, observation_space: spaces.Dict, width: int) -> None:
+    def __init__(self, observation_space: spaces.Dict, width: int, wiring: WiringConfig = DIRECT) -> None:
         self.memory, self.n_eyes, *retina = observation_space["eyes"].shape
+        self.grid = Regridding((retina[1], retina[2]), wiring)
         beside = known_beside_eyes(observation_space)
         super().__init__(observation_space, width * self.n_eyes + sum(beside.values()))
         self.beside = tuple(beside)
         self.width = width
-        self.n_receptors = math.prod(retina)
-        widths = (self.n_receptors, *(width,) * ENCODER_LAYERS)
-        layers: list[nn.Module] = [AdaptedLinear(self.n_eyes, *widths[:2]), UNITS(inplace=True)]
+        self.n_inputs = retina[0] * math.prod(self.grid.shape)
+        widths, shared = (self.n_inputs, *(width,) * ENCODER_LAYERS), wiring.shared_encoder
+        layers: list[nn.Module] = [AdaptedLinear(self.n_eyes, widths[0], widths[1], shared), UNITS(inplace=True)]
         for inputs, outputs in itertools.pairwise(widths[1:]):
-            layers += [PerEyeLinear(self.n_eyes, inputs, outputs), UNITS(inplace=True)]
+            layers += [PerEyeLinear(self.n_eyes, inputs, outputs, shared), UNITS(inplace=True)]
         self.encoder = nn.Sequential(*layers)
-        self.temporal = nn.Sequential(MemoryLinear(self.n_eyes, self.memory, width, width), UNITS(inplace=True))
+        self.temporal = nn.Sequential(MemoryLinear(self.n_eyes, self.memory, width, width, shared), UNITS(inplace=True))
         self.normalised = tuple(entry.name for entry in entries_of(observation_space) if entry.normalised)
         sizes = [beside[name] for name in self.normalised]
         self.felt = Felt(sum(sizes)) if sizes else None
@@ -106,8 +109,8 @@ class EyeFeatures(BaseFeaturesExtractor):
         return self.encoder(self._signals(frames)).unflatten(2, (a, b))
 
     def _signals(self, frames: Tensor) -> Tensor:
-        """Return frames (..., eye, channel, height, width) as (eye, receptors, sample)."""
-        return frames.reshape(-1, self.n_eyes, self.n_receptors).permute(1, 2, 0)
+        """Return frames (..., eye, channel, height, width) as the encoders' inputs (eye, inputs, sample)."""
+        return self.grid(frames).reshape(-1, self.n_eyes, self.n_inputs).permute(1, 2, 0)
 
     def adapt(self, frames: Tensor, beside: Mapping[str, Tensor] | None = None) -> None:
         """Update the running means and spreads with further observations.

@@ -73,7 +73,7 @@ def _live_until(
 ) -> tuple[Training, Episodes]:
     """Train to the end of this rung, starting from the latest usable checkpoint, and play the evaluation episodes.
 
-    Failures of episodes since this checkpoint are counted in `failures`.
+    Failures of episodes after this checkpoint are counted in `failures`.
     """
     owners = rung.owners(phenotype, config, seed)
     begun, first = None, 0
@@ -110,19 +110,20 @@ def _live(
 ) -> tuple[Training, Episodes]:
     """Train, then play the evaluation episodes, which have new start poses and object positions.
 
-    The mazes of the evaluation are the same for all candidates of all runs. Failures of episodes are counted in
+    The layouts of the evaluation are the same for all candidates. Failures of episodes are counted in
     `failures`, even if learning diverges.
 
-    entropy: seed of all random numbers · begun: checkpoint from which to continue
+    entropy: seed of all random numbers
+    begun: checkpoint from which to continue
     """
     weights, *seeds = (int(s) for s in np.random.SeedSequence(entropy).generate_state(3))
     places = worlds_of(phenotype, config, *seeds)
     with (
         closing(places.training) as lessons,
         closing(places.selection) as checkpoints,
-        closing(places.test) as finals,
+        closing(places.fitness) as finals,
     ):
-        brain = Brain(phenotype.neurons, phenotype.layers, phenotype.encoder)
+        brain = Brain(phenotype.neurons, phenotype.layers, phenotype.encoder, config.wiring)
         try:
             training = train(Worlds(lessons, checkpoints), brain, config.learning, weights, progress, begun)
             return training, play(training.policy, finals, seeds[1])

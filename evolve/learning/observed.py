@@ -19,7 +19,8 @@ EYES, LAST = "eyes", "previous_action"
 class Entry:
     """An entry of an observation.
 
-    name: key in the observation · size: number of elements
+    name: key in the observation
+    size: number of elements
     low, high: limits of each element; if both are infinite, a policy normalises the entry
     """
 

@@ -16,41 +16,53 @@ from torch import Tensor, nn
 __all__ = ["CONTRAST", "AdaptedLinear", "MemoryLinear", "PerEyeLinear"]
 
 DARK = 1e-6  # lower limit of the spread of signals, so that weights remain finite if all signals are equal
-CONTRAST = 0.4  # spread of normalised signals, chosen for 675 inputs per unit; with 1, learning was not faster
+CONTRAST = 0.4  # standard deviation of normalised signals, chosen for 675 inputs per unit; 1 was not faster
 
 
 class PerEyeLinear(nn.Module):
-    """Linear layer with separate weights for each eye: (eye, inputs, sample) -> (eye, outputs, sample)."""
+    """Linear layer for each eye: (eye, inputs, sample) -> (eye, outputs, sample).
 
-    def __init__(self, n_eyes: int, inputs: int, outputs: int) -> None:
+    shared: all eyes have the same weights; otherwise each eye has its own
+    """
+
+    def __init__(self, n_eyes: int, inputs: int, outputs: int, shared: bool = False) -> None:
         super().__init__()
-        self.weight = nn.Parameter(torch.empty(n_eyes, outputs, inputs))
-        self.bias = nn.Parameter(torch.zeros(n_eyes, outputs, 1))
+        sets = 1 if shared else n_eyes
+        self.n_eyes = n_eyes
+        self.weight = nn.Parameter(torch.empty(sets, outputs, inputs))
+        self.bias = nn.Parameter(torch.zeros(sets, outputs, 1))
         for weight in self.weight.data:
             nn.init.orthogonal_(weight, gain=math.sqrt(2))
 
+    @property
+    def weights(self) -> tuple[Tensor, Tensor]:
+        """Return weights (eye, outputs, inputs) and biases (eye, outputs, 1), views of the same numbers if shared."""
+        return self.weight.expand(self.n_eyes, -1, -1), self.bias.expand(self.n_eyes, -1, -1)
+
     def forward(self, x: Tensor) -> Tensor:
-        return torch.baddbmm(self.bias, self.weight, x)
+        weight, bias = self.weights
+        return torch.baddbmm(bias, weight, x)
 
 
 class AdaptedLinear(PerEyeLinear):
     """Linear layer on signals from which a running mean is subtracted, and which are divided by a running spread.
 
-    Each receptor has its own mean, and each eye its own spread. Within a scene, signals vary little around their means,
-    and behind a small pupil all signals are small. Without normalisation, the means would saturate the units, and the
-    variations would have almost no effect. The normalisation is applied to weight and bias, so that it takes almost no
-    time.
+    Each receptor has its own mean, and each eye its own spread, even if the eyes share their weights. Within a scene,
+    signals vary little around their means, and behind a small pupil all signals are small. Without normalisation, the
+    means would saturate the units, and variations around them would have almost no effect. The normalisation is
+    applied to weight and bias, so that it takes almost no time.
     """
 
-    def __init__(self, n_eyes: int, inputs: int, outputs: int) -> None:
-        super().__init__(n_eyes, inputs, outputs)
+    def __init__(self, n_eyes: int, inputs: int, outputs: int, shared: bool = False) -> None:
+        super().__init__(n_eyes, inputs, outputs, shared)
         self.register_buffer("mean", torch.zeros(n_eyes, inputs, 1))
         self.register_buffer("variance", torch.ones(n_eyes, 1, 1))
         self.register_buffer("seen", torch.zeros(1))  # number of frames
 
     def forward(self, x: Tensor) -> Tensor:
-        weight = CONTRAST * self.weight * torch.rsqrt(self.variance + DARK**2)
-        return torch.baddbmm(self.bias - weight @ self.mean, weight, x)
+        weight, bias = self.weights
+        weight = CONTRAST * weight * torch.rsqrt(self.variance + DARK**2)
+        return torch.baddbmm(bias - weight @ self.mean, weight, x)
 
     @torch.no_grad()
     def adapt(self, x: Tensor) -> None:
@@ -70,8 +82,8 @@ class AdaptedLinear(PerEyeLinear):
 class MemoryLinear(PerEyeLinear):
     """Linear layer on the codes of `memory` frames: (eye, code, memory, sample) -> (eye, outputs, sample)."""
 
-    def __init__(self, n_eyes: int, memory: int, code: int, outputs: int) -> None:
-        super().__init__(n_eyes, code * memory, outputs)
+    def __init__(self, n_eyes: int, memory: int, code: int, outputs: int, shared: bool = False) -> None:
+        super().__init__(n_eyes, code * memory, outputs, shared)
         self.memory = memory
 
     def forward(self, codes: Tensor) -> Tensor:
@@ -84,7 +96,8 @@ class MemoryLinear(PerEyeLinear):
 
         The result is (eye, outputs, sample), with samples (step, segment) flattened.
         """
-        return _Slide.apply(codes, self.weight.unflatten(2, (-1, self.memory)), self.bias)
+        weight, bias = self.weights
+        return _Slide.apply(codes, weight.unflatten(2, (-1, self.memory)), bias)
 
 
 class _Slide(torch.autograd.Function):
@@ -96,7 +109,8 @@ class _Slide(torch.autograd.Function):
 
     @staticmethod
     def forward(ctx: Any, codes: Tensor, weight: Tensor, bias: Tensor) -> Tensor:
-        """Return the sum; codes (eye, code, frame, segment), weight (eye, output, code, lag), bias (eye, output, 1)."""
+        """Return the sum plus `bias` (eye, output, 1), for codes (eye, code, frame, segment), weight (eye, output,
+        code, lag)."""
         weights = weight.permute(3, 0, 1, 2).contiguous()
         total, *pieces = _slices(codes, len(weights))
         result = torch.baddbmm(bias, weights[0], total)

@@ -22,6 +22,8 @@ from stable_baselines3.common.policies import MultiInputActorCriticPolicy
 from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
 from torch import Tensor
 
+from evolve.config.checks import check_values
+from evolve.config.settings import DIRECT, WiringConfig
 from evolve.genome.phenotype import FORMER_ENCODER
 from evolve.learning.adam import Adam
 from evolve.learning.eye_features import UNITS, EyeFeatures
@@ -31,8 +33,8 @@ from evolve.store.atomic_files import write_whole
 
 FEELS = "feels"  # name of the proprioception of a `sim.Task` in observations
 LARGEST_COUNT = 4096  # upper limit of each number in the shape of a policy in a file; genes allow at most 512
-MOST_SIGNALS = 2**24  # upper limit of the signals in a policy's memory; genes allow at most half of it
-FIRST_SPREAD = 0.5  # standard deviation of an untrained policy's actions; with 1, a third would be clipped
+MOST_SIGNALS = 2**24  # upper limit for the number of signals in a policy's memory; genes allow at most half of it
+FIRST_SPREAD = 0.5  # standard deviation of an untrained policy's actions; with 1, a third of them would be clipped
 
 
 class TrainingDiverged(FloatingPointError):
@@ -41,15 +43,17 @@ class TrainingDiverged(FloatingPointError):
 
 @dataclass(frozen=True)
 class Brain:
-    """Size of a brain.
+    """Size and wiring of a brain.
 
-    neurons, layers: the actor and the critic have `layers` hidden layers of `neurons` units each · encoder: width of
-        all layers of the eyes' encoders
+    neurons, layers: the actor and the critic have `layers` hidden layers of `neurons` units each
+    encoder: width of all layers of the eyes' encoders
+    wiring: connections between receptors and encoders
     """
 
     neurons: int
     layers: int = 2
     encoder: int = FORMER_ENCODER
+    wiring: WiringConfig = DIRECT
 
 
 @dataclass(frozen=True)
@@ -57,7 +61,7 @@ class PolicyConfig:
     """Shape of a policy, from which it can be built again.
 
     eyes: shape of the observation's `eyes` (memory, eye, channel, height, width)
-    neurons, layers, encoder: see `Brain`
+    neurons, layers, encoder, wiring: see `Brain`
     actions: number of elements of an action
     beside: entries of the observation other than the eyes' signals and the previous action
     """
@@ -68,12 +72,19 @@ class PolicyConfig:
     encoder: int = FORMER_ENCODER
     actions: int = 2
     beside: tuple[Entry, ...] = (CONTACT,)
+    wiring: WiringConfig = DIRECT
 
     @classmethod
-    def from_space(cls, space: spaces.Dict, neurons: int, layers: int, encoder: int) -> PolicyConfig:
+    def from_space(cls, space: spaces.Dict, brain: Brain) -> PolicyConfig:
         """Return the shape of a policy for these observations."""
         actions = known_beside_eyes(space)["previous_action"]
-        return cls(tuple(space["eyes"].shape), neurons, layers, encoder, actions, entries_of(space))
+        sizes = (brain.neurons, brain.layers, brain.encoder)
+        return cls(tuple(space["eyes"].shape), *sizes, actions, entries_of(space), brain.wiring)
+
+    @property
+    def brain(self) -> Brain:
+        """Size of the policy's brain."""
+        return Brain(self.neurons, self.layers, self.encoder, self.wiring)
 
     def observation_space(self) -> spaces.Dict:
         """Return the observation space of sim's environments with these eyes."""
@@ -87,10 +98,12 @@ class PolicyConfig:
         """Return the shape as JSON values.
 
         The record of a run contains a hash of each policy file. A policy must therefore be written with the same bytes
-        by all versions. Former versions had no list of other entries, so their form is used for shapes that they could
-        describe.
+        by all versions. Former versions had neither a list of other entries nor a choice of wiring, so their form is
+        used for shapes that they could describe.
         """
         values = {name: value for name, value in asdict(self).items() if name != "beside"}
+        if self.wiring == DIRECT:
+            del values["wiring"]
         if self.beside == (CONTACT,) and self.actions == 2:
             del values["actions"]
             return values
@@ -105,8 +118,7 @@ class PolicyConfig:
 
         Raises:
             KeyError: an entry is missing.
-            TypeError: an entry is not a number.
-            ValueError: an entry is not a number.
+            TypeError, ValueError: an entry is not a number.
         """
         return cls(
             eyes=tuple(int(n) for n in stored["eyes"]),
@@ -115,7 +127,14 @@ class PolicyConfig:
             encoder=int(stored.get("encoder", FORMER_ENCODER)),
             actions=int(stored.get("actions", 2)),
             beside=_entries(stored),
+            wiring=_wiring(stored.get("wiring", {})),
         )
+
+
+def _wiring(stored: Mapping[str, Any]) -> WiringConfig:
+    wiring = WiringConfig(**stored)
+    check_values(wiring, prefix="wiring.")
+    return wiring
 
 
 def _entries(stored: Mapping[str, Any]) -> tuple[Entry, ...]:
@@ -150,7 +169,7 @@ class _Within(torch.autograd.Function):
 class EyePolicy(MultiInputActorCriticPolicy):
     """Actor and critic of stable-baselines3 (SB3), whose inputs are EyeFeatures.
 
-    neurons, layers, encoder: see `Brain`
+    brain: size of the brain
     first_actions: mean and standard deviation of each element of the untrained policy's actions; None: 0 and
         FIRST_SPREAD
     """
@@ -161,21 +180,19 @@ class EyePolicy(MultiInputActorCriticPolicy):
         action_space: spaces.Box,
         lr_schedule: Any,
         *,
-        neurons: int,
-        layers: int = 2,
-        encoder: int = FORMER_ENCODER,
+        brain: Brain,
         first_actions: Sequence[tuple[float, float]] | None = None,
         **kwargs: Any,
     ) -> None:
         kwargs |= {
             "features_extractor_class": EyeFeatures,
-            "features_extractor_kwargs": {"width": encoder},
-            "net_arch": [neurons] * layers,
+            "features_extractor_kwargs": {"width": brain.encoder, "wiring": brain.wiring},
+            "net_arch": [brain.neurons] * brain.layers,
             "activation_fn": UNITS,
             "optimizer_class": Adam,
         }
         super().__init__(observation_space, action_space, lr_schedule, **kwargs)
-        self.config = PolicyConfig.from_space(observation_space, neurons, layers, encoder)
+        self.config = PolicyConfig.from_space(observation_space, brain)
         with torch.no_grad():
             means, spreads = zip(*(first_actions or [(0.0, FIRST_SPREAD)] * self.config.actions), strict=True)
             self.action_net.bias.copy_(torch.tensor(means))
@@ -197,8 +214,7 @@ class EyePolicy(MultiInputActorCriticPolicy):
 def build_policy(config: PolicyConfig, learning_rate: float = 1e-3) -> EyePolicy:
     """Return an untrained policy; its random weights depend on torch's global random state."""
     action_space = spaces.Box(-1.0, 1.0, (config.actions,), np.float32)
-    shape: dict[str, Any] = {"neurons": config.neurons, "layers": config.layers, "encoder": config.encoder}
-    return EyePolicy(config.observation_space(), action_space, lambda _: learning_rate, **shape)
+    return EyePolicy(config.observation_space(), action_space, lambda _: learning_rate, brain=config.brain)
 
 
 def save_policy(policy: EyePolicy, path: Path | str) -> None:

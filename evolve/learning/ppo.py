@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 
 import numpy as np
 import torch
@@ -35,9 +35,9 @@ from evolve.learning.schedule import first_step_size, schedule
 from evolve.learning.training_rewards import RewardsInUnits, ramped_share
 from sim.tasks.batch_task import BatchTask
 
-# Per rollout, the logarithm of the rewards' unit moves by this share towards the logarithm of the returns' spread.
+# fraction of the distance by which, per rollout, log(unit of rewards) moves towards log(spread of returns)
 UNIT_RATE = 0.2
-SPEED = "speed"  # name of the command whose first values follow from `learning.first_speed`
+SPEED = "speed"  # name of the command whose initial values follow from `learning.first_speed`
 VERDICTS = {True: 1, False: -1, None: 0}
 FLAT = 1e-6  # lower limit of the returns' spread, so that it is never 0
 
@@ -64,7 +64,8 @@ class Training:
 class Episodes:
     """Results of one complete episode in each world.
 
-    returns (world,): sum of rewards · verdicts (world,): +1 solved, -1 not solved, 0 undecided, see `BatchTask.solved`
+    returns: sum of rewards, (world,)
+    verdicts: +1 solved, -1 not solved, 0 undecided, see `BatchTask.solved`, (world,)
     """
 
     returns: np.ndarray
@@ -103,7 +104,7 @@ class AdaptingPPO(PPO):
             vf_coef=config.value_weight,
             seed=seed,
             device="cpu",
-            policy_kwargs={**asdict(brain), "first_actions": first_actions(self.task, config)},
+            policy_kwargs={"brain": brain, "first_actions": first_actions(self.task, config)},
             rollout_buffer_class=FrameRolloutBuffer,
             rollout_buffer_kwargs={"seed": seed},
         )
@@ -112,8 +113,8 @@ class AdaptingPPO(PPO):
     def _update_learning_rate(self, optimizers: Adam) -> None:
         """Set the step size and the number of passes of the next update.
 
-        In SB3, both would depend on the share of the planned steps. Here they depend on the number of steps so far, so
-        that the course of training is independent of its planned length.
+        In SB3, both would depend on the completed fraction of the planned steps. Here they depend on the number of
+        steps so far, so that the course of training is independent of its planned length.
         """
         self.n_epochs, share = schedule(self.config, self.num_timesteps)
         optimizers.param_groups[0]["lr"] = self.learning_rate * share
@@ -151,8 +152,8 @@ class AdaptingPPO(PPO):
         """Adapt the unit of rewards to the spread of returns (Pop-Art: van Hasselt et al. 2016, eq. 5).
 
         The critic is rescaled, so that its predictions remain the same in the rewards' original units. A rollout
-        without rewards does not change the unit: its returns are only the critic's own discounted predictions, so that
-        the unit would shrink without limit.
+        without rewards does not change the unit. Its returns consist of the critic's own discounted predictions, so the
+        unit would otherwise shrink without limit.
         """
         if not self.env.paid:
             return
@@ -230,8 +231,8 @@ def train(
     """Train a policy. On one machine, the same arguments give the same policy, bit for bit.
 
     After every `eval_interval` steps, the policy plays one episode in each of the evaluation worlds. Training ends
-    after `patience` evaluations without a better mean return, or after `total_steps`. The policy at the evaluation with
-    the highest mean return is returned; if several are equal, the earliest of them.
+    after `patience` evaluations without a better mean return, or after `total_steps`. The result is the policy at the
+    evaluation with the highest mean return (the earliest of equals).
 
     begun: checkpoint from which to continue; its steps count towards `total_steps`
 

@@ -46,7 +46,7 @@ class FrameRolloutBuffer(RolloutBuffer):
         self.beside = {name: np.zeros((worlds, steps, size), np.float32) for name, size in sizes.items()}
 
     def compute_returns_and_advantage(self, last_values: Tensor, dones: np.ndarray) -> None:
-        """Compute returns and advantages. Overflow is reported when the learner finds that the loss is not finite."""
+        """Compute returns and advantages without NumPy's warnings of overflow; the learner checks the loss."""
         with np.errstate(over="ignore", invalid="ignore"):
             super().compute_returns_and_advantage(last_values, dones)
 

@@ -11,7 +11,7 @@ __all__ = ["first_step_size", "mean_passes", "schedule"]
 # Number of units in a hidden layer up to which the configured step size is used
 # (docs/concepts/learning.md#learning-rate-of-large-networks).
 UNITS_AT_FULL_STEP = 64
-# Once the step size has fallen to this share of its initial value, the passes decrease
+# After the step size has fallen to this fraction of its initial value, the number of passes decreases
 # (docs/validation/fewer_epochs.md).
 SMALL_STEP = 0.5
 
@@ -19,8 +19,8 @@ SMALL_STEP = 0.5
 def first_step_size(asked: float, neurons: int) -> float:
     """Return Adam's initial step size for a brain with `neurons` units in each hidden layer.
 
-    A layer sums over the units of the previous layer, so the effect of a step on its output grows with their number.
-    Above UNITS_AT_FULL_STEP units, the step size is therefore proportional to one over the root of this number.
+    A layer sums over the units of the previous layer, so the effect of a step on its output grows with the number of
+    units. Above UNITS_AT_FULL_STEP units, the step size is therefore proportional to 1/√units.
 
     asked: configured step size
     """
@@ -28,12 +28,12 @@ def first_step_size(asked: float, neurons: int) -> float:
 
 
 def schedule(config: LearningConfig, steps: int) -> tuple[int, float]:
-    """Return the number of passes over the samples in the update after `steps`, and the share of the initial step size.
+    """Return the number of passes over the samples in the update after `steps`, and the relative step size.
 
     The change of the weights in an update is roughly proportional to the number of passes times the step size. After
     `decay_after` steps, this product falls as 1/steps. First, the step size falls to half its initial value. Then the
-    number of passes falls instead, which also saves time. After the number of passes has reached `least_epochs`, the
-    step size falls again.
+    number of passes falls instead, which also saves time. After it has reached `least_epochs`, the step size falls
+    again. The step size is returned relative to its initial value.
     """
     left = min(1.0, config.decay_after / steps)
     passes = max(min(config.least_epochs, config.n_epochs), math.ceil(config.n_epochs * min(1.0, left / SMALL_STEP)))

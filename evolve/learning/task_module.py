@@ -46,11 +46,11 @@ def executed_task(code: TaskCode, encoded_textures: bool = True) -> Task | Batch
     except KeyboardInterrupt:
         raise
     except BaseException as error:  # for example SystemExit, which would end this process
-        raise ConfigError(f"{code.label}: {_told(error, code)}", "task") from error
+        raise ConfigError(f"{code.label}: {_message(error, code)}", "task") from error
 
 
 def _resolve_textures(task: Task | BatchTask) -> None:
-    """Let the textures that MuJoCo's compiler resolves to linear light contain it."""
+    """Request linear light for the textures that MuJoCo's compiler resolves to it."""
     try:
         task.model = with_compiled_color_spaces(task.model)
     except ValueError as error:
@@ -58,7 +58,7 @@ def _resolve_textures(task: Task | BatchTask) -> None:
 
 
 def _executed(code: TaskCode) -> ModuleType:
-    """Execute the code as a module. It has a unique name in `sys.modules`, where pickle and dataclasses look it up."""
+    """Execute the code as a module with a unique name in `sys.modules`, where pickle and dataclasses look it up."""
     name = f"{MODULE}{code.sha256[:16]}"
     module = ModuleType(name)
     module.__file__ = str(code.file)
@@ -71,14 +71,14 @@ def _executed(code: TaskCode) -> ModuleType:
         raise
     except BaseException as error:
         del sys.modules[name]
-        raise ConfigError(f"{code.file.name}: {_told(error, code)}", "task") from error
+        raise ConfigError(f"{code.file.name}: {_message(error, code)}", "task") from error
     finally:
-        open_closed_streams()  # the code may have closed one
+        open_closed_streams()  # the code may have closed a stream
     return module
 
 
-def _told(error: BaseException, code: TaskCode) -> str:
+def _message(error: BaseException, code: TaskCode) -> str:
     """Return the message of an error. If the user's file caused the error, the message starts with the line number."""
     lines = [frame.lineno for frame in traceback.extract_tb(error.__traceback__) if frame.filename == str(code.file)]
-    said = " ".join(f"{type(error).__name__}: {error}".split())
-    return f"line {lines[-1]}: {said}" if lines else said
+    text = " ".join(f"{type(error).__name__}: {error}".split())
+    return f"line {lines[-1]}: {text}" if lines else text

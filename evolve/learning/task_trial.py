@@ -1,6 +1,6 @@
-"""Checks of a user task before a run starts: settings that would have no effect, and a short trial.
+"""Checks before a run starts: random layouts, settings of a user task that would have no effect, and a short trial.
 
-A failure in the task would affect every animal of the run.
+A failure would affect every animal of the run.
 """
 
 from __future__ import annotations
@@ -14,6 +14,8 @@ import numpy as np
 
 from evolve.config.checks import AUTO, ConfigError
 from evolve.config.run_config import RunConfig
+from evolve.config.settings import FAMILY
+from evolve.config.task_card import OF_LAYOUTS
 from evolve.config.task_errors import error_in_task
 from evolve.genome.genotype import Genotype
 from evolve.genome.phenotype import develop
@@ -23,7 +25,7 @@ if TYPE_CHECKING:
     from sim.envs.vec_env import EyesVecEnv
     from sim.tasks.task_settings import TaskSettings
 
-__all__ = ["UnusedSettingWarning", "check_settings", "try_task"]
+__all__ = ["UnusedSettingWarning", "check_layouts", "check_settings", "try_task"]
 
 WORLDS, ACTIONS = 2, 4
 
@@ -35,8 +37,8 @@ class UnusedSettingWarning(UserWarning):
 def check_settings(config: RunConfig) -> None:
     """Refuse a user task with mounts that no animal would use, and warn about each other setting without effect.
 
-    The default `place` spreads an animal's eyes around a single mount. Recorded runs are not checked, so that they can
-    be continued and replayed with the eyes that they have.
+    The default `place` spreads an animal's eyes around a single mount. Recorded runs are not checked, so they can
+    always be continued and replayed with their eyes.
 
     Warns:
         UnusedSettingWarning: the genome or the run determines a value that the task also defines.
@@ -79,6 +81,21 @@ def _unused(task: TaskSettings, config: RunConfig) -> Iterator[str]:
         yield f"fidelity.bands = {fidelity.bands} has no effect: the run has eye.bands = {bands}"
 
 
+def check_layouts(config: RunConfig) -> None:
+    """Draw the random layouts of all sets, if the run has a family of them.
+
+    Raises:
+        ConfigError: two layouts have the same walls, or courses of this size cannot be drawn.
+    """
+    if config.world.layouts != FAMILY:
+        return
+    layouts = config.world.test["layouts"]
+    try:
+        _ = layouts.mazes if config.task == "maze" else layouts.courses
+    except ValueError as error:
+        raise ConfigError(f"world: {error}", *OF_LAYOUTS) from error
+
+
 def try_task(config: RunConfig) -> None:
     """Build the user task with the run's first animal, and take a few random actions; skip built-in tasks.
 
@@ -94,7 +111,7 @@ def try_task(config: RunConfig) -> None:
     try:
         task = PreparedTask(animal_task(animal, config))
         with closing(task.vec_env(WORLDS, config.seed, animal.memory_frames)) as worlds, warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # the failure is reported as an error instead
+            warnings.simplefilter("ignore")  # the warning is superfluous, because the failure is reported as an error
             failure = _failure(worlds)
     except KeyboardInterrupt:
         raise
@@ -105,7 +122,7 @@ def try_task(config: RunConfig) -> None:
         said = str(error) if isinstance(error, ConfigError) else f"{config.task}: {place or error}"
         raise ConfigError(" ".join(said.split()), "task") from error
     finally:
-        open_closed_streams()  # the task may have closed one
+        open_closed_streams()  # the task may have closed a stream
     if failure is not None:
         raise ConfigError(f"{config.task}: {failure}", "task")
 

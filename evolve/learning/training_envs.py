@@ -1,4 +1,4 @@
-"""Environments of one animal: for training, for selection of its best policy, and for the test of its fitness."""
+"""Environments of one animal: for training, for selection of its best policy, and for the evaluation of its fitness."""
 
 from __future__ import annotations
 
@@ -15,28 +15,29 @@ __all__ = ["TrainingEnvs", "worlds_of"]
 
 @dataclass(frozen=True)
 class TrainingEnvs:
-    """Environments for training, selection and test, all with the same light.
+    """Environments for training, selection and fitness, all with the same light.
 
     training: environments in which the policy is trained
     selection: environments of the evaluations during training, which select the best policy
-    test: environments of the final evaluation, which gives the fitness
+    fitness: environments of the evaluation after training, which gives the fitness, in the layouts of `selection`
 
-    The light is computed in the same way in all three. The first two are rendered with at most
+    Reflections of light are computed in the same way in all three. The first two are rendered with at most
     `learning.rays_per_receptor` rays for each receptor, because the noise of rendering averages out in learning.
     """
 
     training: EyesVecEnv
     selection: EyesVecEnv
-    test: EyesVecEnv
+    fitness: EyesVecEnv
 
 
 def worlds_of(phenotype: Phenotype, config: RunConfig, learning: int, evaluation: int) -> TrainingEnvs:
     """Return the environments of an animal.
 
-    learning: seed of the environments for training · evaluation: seed of the environments for selection and test
+    learning: seed of the environments for training
+    evaluation: seed of the environments for selection and fitness
 
     Raises:
-        ConfigError: the user task has not been named when the run was opened, or it fails at its start.
+        ConfigError: the user task was not named when the run was opened, or its start fails.
     """
     memory, wanted, episodes = phenotype.memory_frames, config.learning, config.evaluation.episodes
     fine = PreparedTask(animal_task(phenotype, config))
@@ -48,5 +49,5 @@ def worlds_of(phenotype: Phenotype, config: RunConfig, learning: int, evaluation
     return TrainingEnvs(
         training=school.vec_env(wanted.n_envs, learning, memory, least_return=wanted.least_return or None),
         selection=coarse.vec_env(episodes, evaluation, memory),
-        test=fine.vec_env(episodes, evaluation, memory),
+        fitness=fine.vec_env(episodes, evaluation, memory),
     )

@@ -10,7 +10,7 @@ from stable_baselines3.common.vec_env.base_vec_env import VecEnvStepReturn
 
 __all__ = ["RewardsInUnits", "ramped_share", "terms_of"]
 
-FIRST_SHARE = 0.1  # share of the cost of contact at the start; with a third, agents learnt to turn on the spot
+FIRST_SHARE = 0.1  # initial fraction of the cost of contact; with a third, agents learnt to turn on the spot
 
 
 class RewardsInUnits(VecEnvWrapper):
@@ -20,7 +20,7 @@ class RewardsInUnits(VecEnvWrapper):
 
     unit: unit of rewards
     shares: weights of reward terms, by name; other terms have the weight 1
-    paid: whether a reward differed from 0 since `paid` was last set to False
+    paid: True if a reward has differed from 0 since `paid` was last set to False
     """
 
     def __init__(self, worlds: VecEnv) -> None:
@@ -44,13 +44,13 @@ class RewardsInUnits(VecEnvWrapper):
 
 
 def ramped_share(steps: int, ramp: int) -> float:
-    """Return the share of its full cost that a reward term has after `steps`.
+    """Return the weight of a reward term after `steps`, as a fraction of its final weight.
 
-    The share is FIRST_SHARE for the first third of the ramp, and then rises exponentially to 1. If contact has its full
-    cost from the start, agents learn to stand still before they can steer, because standing still costs nothing. They
-    then never learn to steer.
+    It is FIRST_SHARE for the first third of the ramp, and then rises exponentially to 1. If contact has its full cost
+    from the start, agents learn to stand still before they can steer, because standing still costs nothing. They then
+    never learn to steer.
 
-    ramp: number of steps after which the share is 1
+    ramp: number of steps after which the fraction is 1
     """
     if steps >= ramp:
         return 1.0

@@ -37,9 +37,9 @@ class TrainingRung:
         return len(self.ends) - 1
 
     def owners(self, phenotype: Phenotype, config: RunConfig, seed: int) -> tuple[dict[str, Any], ...]:
-        """Return the owner of each checkpoint, as JSON values: everything on which the state of training depends.
+        """Return the owner of each checkpoint, as JSON values: all inputs on which the state of training depends.
 
-        The settings are compared without the number of workers and of generations, which have no effect on it.
+        The numbers of workers and of generations are left out, because they have no effect on this state.
         """
         common = {
             "candidate": self.candidate,
@@ -51,7 +51,7 @@ class TrainingRung:
         return tuple({**common, "rung": number, "ends": list(self.ends[: number + 1])} for number in numbers)
 
     def set_aside_unusable(self, phenotype: Phenotype, config: RunConfig, seed: int) -> None:
-        """Set aside the checkpoints of earlier rungs that cannot be used, until one is found that can.
+        """Set aside unusable checkpoints of earlier rungs, from the latest back to the first usable one.
 
         Raises:
             OSError: a checkpoint is not a regular file, or cannot be renamed.

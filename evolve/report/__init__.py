@@ -3,6 +3,7 @@
 write            report of a run: one HTML file
 doing            progress messages while files are written
 page             sections of the report
+fitness_section  section on fitness and its parts
 tables           tables of the report
 lineup           cards of the first and the best animal, with a slider through the generations between them
 agent_figure     drawing of an animal's head and eyes

@@ -8,7 +8,9 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from evolve.analysis.statistics import acuity_cpd, bootstrap_interval, generation_statistics
+from evolve.analysis.acuity import acuity_cpd, acuity_vertical_cpd
+from evolve.analysis.fitness_parts import fitness_interval
+from evolve.analysis.statistics import generation_statistics
 from evolve.report.figures import comparison_figure
 from evolve.report.markup import document, duration, figure, html, section, table
 from evolve.store.atomic_files import write_whole
@@ -16,7 +18,9 @@ from evolve.store.directory import Run
 
 __all__ = ["comparison_lines", "differing_settings", "run_summary", "write_page"]
 
-OF_THE_BEST = ("best candidate", "fitness", "95 % interval", "success rate", "acuity [cpd]")
+PARTS = ("task fitness", "costs")
+UPWARDS = "vertical acuity [cpd]"
+OF_THE_BEST = ("best candidate", "fitness", *PARTS, "95 % interval", "success rate", "acuity [cpd]", UPWARDS)
 
 
 def run_summary(run: Run) -> dict[str, Any]:
@@ -26,7 +30,7 @@ def run_summary(run: Run) -> dict[str, Any]:
     also None if it has played a single episode.
     """
     best = run.best
-    interval = None if best is None else bootstrap_interval(best.returns)
+    interval = None if best is None else fitness_interval(best)
     return {
         "run": str(run.path),
         "task": run.config.task,
@@ -36,9 +40,12 @@ def run_summary(run: Run) -> dict[str, Any]:
         "best": None if best is None else best.id,
         "generation": None if best is None else best.generation,
         "fitness": None if best is None else best.fitness,
+        "task_fitness": None if best is None else best.task_fitness,
+        "costs": None if best is None else best.costs,
         "fitness_interval": None if interval is None or math.isnan(interval[0]) else interval,
         "success_rate": None if best is None else best.success_rate,
         "acuity_cpd": None if best is None else acuity_cpd(best.phenotype),
+        "acuity_vertical_cpd": None if best is None else acuity_vertical_cpd(best.phenotype),
         "steps": sum(candidate.steps for candidate in run.candidates),
         "hours": sum(candidate.seconds for candidate in run.candidates) / 3600,
         "best_so_far": [
@@ -60,8 +67,7 @@ def differing_settings(runs: Sequence[Run]) -> dict[str, list[Any]]:
 
 def comparison_lines(runs: Sequence[Run]) -> list[str]:
     """Return the comparison as a table for a terminal, with a row per quantity and a column per run."""
-    columns = [_column(run_summary(run)) for run in runs]
-    rows = [(name, *(column[name] for column in columns)) for name in columns[0]]
+    rows = [(name, *values) for name, values in _rows(runs).items()]
     settings = [(name, *(_shown(value) for value in row)) for name, row in differing_settings(runs).items()]
     rows += [("settings that differ", *("" for _ in runs)), *settings] if settings else []
     widths = [max(len(row[place]) for row in rows) for place in range(len(runs) + 1)]
@@ -73,18 +79,34 @@ def write_page(runs: Sequence[Run], path: Path) -> None:
 
     The file is written completely or not at all.
     """
-    columns = [_column(run_summary(run)) for run in runs]
-    rows = [[name, *(column[name] for column in columns)] for name in list(columns[0])[1:]]
+    columns = _rows(runs)
+    names = columns.pop("run")
+    rows = [[name, *values] for name, values in columns.items()]
     rows += [[name, *(_shown(v) for v in row)] for name, row in differing_settings(runs).items()]
     curves = {str(run.path): generation_statistics(run.candidates) for run in runs}
     caption = html("<b>Best fitness so far</b> over the generations, a line per run.")
     drawn = figure(comparison_figure({name: rows for name, rows in curves.items() if rows}), caption)
-    found = table(["", *(column["run"] for column in columns)], rows, "comparison")
+    found = table(["", *names], rows, "comparison")
     body = html("<header><h1>{} runs</h1></header>\n", len(runs)) + section(
         "runs", "Side by side", html('<div class="wide">{}</div>\n{}', drawn, found)
     )
     path.parent.mkdir(parents=True, exist_ok=True)
     write_whole(path, document("runs side by side", body))
+
+
+def _rows(runs: Sequence[Run]) -> dict[str, list[str]]:
+    """Return the values of the runs' summaries as text, by name of the table's row.
+
+    Rows in which no run differs from a simpler one are omitted: the parts of fitness if no run has costs, and the
+    vertical acuity if it equals the horizontal one.
+    """
+    columns = [_column(run_summary(run)) for run in runs]
+    rows = {name: [column[name] for column in columns] for name in columns[0]}
+    if all(run.config.costs.free for run in runs):
+        rows = {name: values for name, values in rows.items() if name not in PARTS}
+    if rows[UPWARDS] == rows["acuity [cpd]"]:
+        del rows[UPWARDS]
+    return rows
 
 
 def _column(one: Mapping[str, Any]) -> dict[str, str]:
@@ -101,10 +123,10 @@ def _column(one: Mapping[str, Any]) -> dict[str, str]:
     interval = one["fitness_interval"]
     values = (
         f"{one['best']}, generation {one['generation']}",
-        f"{one['fitness']:.4g}",
+        *(f"{one[name]:.4g}" for name in ("fitness", "task_fitness", "costs")),
         "-" if interval is None else f"{interval[0]:.4g} to {interval[1]:.4g}",
         f"{one['success_rate']:.0%}",
-        f"{one['acuity_cpd']:.3g}",
+        *(f"{one[name]:.3g}" for name in ("acuity_cpd", "acuity_vertical_cpd")),
     )
     return column | dict(zip(OF_THE_BEST, values, strict=True))
 

@@ -28,7 +28,7 @@ __all__ = ["DECADES", "WhiteLight", "eye_figures", "middle_of_psf", "relief_heig
 SIZE = (370, 310)
 PIXELS = 161  # maximum number of pixels along a side of an image; more would be invisible on the page
 DECADES = 4  # range of the PSF's logarithmic colour scale [powers of ten]
-SHOWN_POWER = 0.98  # share of the PSF's light that lies within the image
+SHOWN_POWER = 0.98  # fraction of the PSF's light that lies within the image
 
 
 @dataclass(frozen=True)
@@ -67,7 +67,7 @@ def eye_figures(phenotype: Phenotype, config: EyeConfig) -> Html:
 
 
 def _or_why_not(name: str, draw: Callable[[WhiteLight], Html], light: WhiteLight) -> Html:
-    """Return a figure; if the PSF cannot be computed accurately enough, return a line that says so."""
+    """Return a figure, or a line of text if the PSF cannot be computed accurately enough."""
     try:
         return draw(light)
     except optics.AccuracyError as error:

@@ -1,4 +1,4 @@
-"""Figures of a whole run: fitness, success and genes over the generations, descent, and learning curves."""
+"""Figures of a whole run: fitness, costs, success and genes over the generations, descent, and learning curves."""
 
 from __future__ import annotations
 
@@ -9,8 +9,9 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import ArrayLike, NDArray
 
+from evolve.analysis.fitness_parts import any_costs, fitness_interval, fitness_label
 from evolve.analysis.genealogy import descent, nearest_parent
-from evolve.analysis.statistics import GenerationStatistics, Trajectory, bootstrap_interval, champions, succeeded
+from evolve.analysis.statistics import GenerationStatistics, Trajectory, champions, succeeded
 from evolve.report.markup import Html
 from evolve.report.svg import drawing, inline, label
 from evolve.report.theme import ACCENT, LINE, LINES, MUTED, VERMILLION
@@ -18,6 +19,7 @@ from evolve.store.candidate import Candidate
 
 __all__ = [
     "comparison_figure",
+    "costs_figure",
     "fitness_figure",
     "gene_figure",
     "genealogy_figure",
@@ -28,7 +30,7 @@ __all__ = [
 ]
 
 SIZE = (370, 260)
-DASHES = ("-", "--", ":", "-.")  # line styles; the second is used if there are more lines than colours, and so on
+DASHES = ("-", "--", ":", "-.")  # line styles; after the last colour, the colours are repeated with the next style
 Generations = Sequence[int] | NDArray[np.int64]
 
 
@@ -42,10 +44,37 @@ def fitness_figure(rows: Sequence[GenerationStatistics], candidates: Sequence[Ca
         _confidence(axes, candidates)
         axes.plot(generations, [r.best_so_far for r in rows], color=ACCENT, lw=2, marker="o", ms=4)
         _generation_axis(axes, generations)
-        axes.set_ylabel("fitness (mean return)")
+        axes.set_ylabel(fitness_label(any_costs(candidates)))
         last = rows[-1]
         alt = f"Fitness over {len(rows)} generations: best {last.best_so_far:.3g}, last median {last.median:.3g}."
         return inline(figure, "fitness", alt)
+
+
+def costs_figure(candidates: Sequence[Candidate]) -> Html:
+    """Draw the two parts of fitness, task fitness above costs: of each candidate, and of the best so far.
+
+    Raises:
+        ValueError: no candidate has succeeded.
+    """
+    best = champions(candidates)
+    if not best:
+        raise ValueError("no candidate has succeeded: one is needed")
+    parts = {
+        "task fitness": [candidate.task_fitness for candidate in candidates],
+        "costs": [candidate.costs for candidate in candidates],
+    }
+    ends = {"task fitness": [one.task_fitness for _, one in best], "costs": [one.costs for _, one in best]}
+    with drawing(SIZE[0], 300) as figure:
+        for axes, (name, values) in zip(figure.subplots(2, sharex=True), parts.items(), strict=True):
+            _candidates(axes, candidates, values)
+            axes.plot([generation for generation, _ in best], ends[name], color=ACCENT, lw=2, marker="o", ms=4)
+            _generation_axis(axes, sorted({candidate.generation for candidate in candidates}))
+            axes.set_ylabel(name)
+        figure.axes[0].set_xlabel("")
+        figure.align_ylabels()
+        last = best[-1][1]
+        alt = f"Parts of the best fitness: task fitness {last.task_fitness:.3g}, costs {last.costs:.3g}."
+        return inline(figure, "costs", alt)
 
 
 def comparison_figure(curves: Mapping[str, Sequence[GenerationStatistics]]) -> Html:
@@ -90,7 +119,7 @@ def genealogy_figure(candidates: Sequence[Candidate], best: Candidate) -> Html:
         line = [candidate for candidate in descent(best, candidates) if succeeded(candidate)]
         axes.plot(*zip(*map(place, line), strict=True), color=ACCENT, lw=2, marker="o", ms=4)
         _generation_axis(axes, sorted({candidate.generation for candidate in candidates}))
-        axes.set_ylabel("fitness (mean return)")
+        axes.set_ylabel(fitness_label(any_costs(candidates)))
         return inline(figure, "genealogy", f"Descent of candidate {best.id} over {len(line)} generations of its line.")
 
 
@@ -114,7 +143,7 @@ def vision_figure(name: str, label: str, generations: Sequence[int], values: Seq
 
 
 def success_figure(candidates: Sequence[Candidate]) -> Html:
-    """Draw the share of evaluation episodes that were solved, over the generations."""
+    """Draw the fraction of evaluation episodes that were solved, over the generations."""
     with drawing(*SIZE) as figure:
         axes = figure.subplots()
         _candidates(axes, candidates, [100 * c.success_rate for c in candidates])
@@ -155,7 +184,8 @@ def gene_figure(
 ) -> Html:
     """Draw the values of one gene over the generations.
 
-    limits: range of the vertical axis; None: the range of the values · whole: whether its ticks are integers
+    limits: range of the vertical axis; None: the range of the values
+    whole: True if its ticks are integers
     """
     with drawing(250, 165, font=10.5) as figure:
         axes = figure.subplots()
@@ -226,10 +256,10 @@ def _candidates(axes: Axes, candidates: Sequence[Candidate], values: Sequence[fl
 
 
 def _confidence(axes: Axes, candidates: Sequence[Candidate]) -> None:
-    """Draw the 95 % bootstrap interval of the best fitness so far, from the returns of the candidate's episodes."""
+    """Draw the 95 % interval of the best fitness so far."""
     best = [(generation, champion) for generation, champion in champions(candidates) if champion.returns]
     if best:
-        low, high = zip(*(bootstrap_interval(champion.returns) for _, champion in best), strict=True)
+        low, high = zip(*(fitness_interval(champion) for _, champion in best), strict=True)
         axes.fill_between([generation for generation, _ in best], low, high, color=ACCENT, alpha=0.15, lw=0)
 
 

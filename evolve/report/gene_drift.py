@@ -1,6 +1,8 @@
 """Test for selection: comparison of final gene values between runs and searches with random fitness.
 
-If the values in the runs are within the range of these searches, the genes may have changed by chance (drift).
+If the values in the runs are within the range of these searches, the genes may have changed by chance (drift). If the
+runs have costs, the searches subtract them from a random task fitness (`evolve.search.null_model`). The test then
+shows selection by the task, and not by the costs.
 """
 
 from __future__ import annotations
@@ -14,12 +16,13 @@ from typing import Any
 
 import numpy as np
 
-from evolve.analysis.statistics import acuity_cpd, gene_values, succeeded
+from evolve.analysis.acuity import acuity_cpd, acuity_vertical_cpd
+from evolve.analysis.statistics import gene_values, succeeded
 from evolve.config.run_config import RunConfig
 from evolve.genome.phenotype import Phenotype
 from evolve.report.comparison import differing_settings
 from evolve.search import successive_halving
-from evolve.search.null_model import last_generations, null_model, p_value
+from evolve.search.null_model import fitness_spread, last_generations, null_model, p_value
 from evolve.store.directory import Run, RunError
 
 __all__ = ["Drift", "QuantityDrift", "drift_of"]
@@ -55,8 +58,10 @@ class QuantityDrift:
 class Drift:
     """Comparison of runs with searches with random fitness.
 
-    of: number of runs · searches: number of searches
-    generations: generations over which means are taken, counted from 0
+    of: number of runs
+    searches: number of searches
+    costs: True if the searches subtract costs
+    generations: generations over which means are computed, counted from 0
     moved: quantities, with their values
     """
 
@@ -64,11 +69,18 @@ class Drift:
     generations: range
     searches: int
     moved: tuple[QuantityDrift, ...]
+    costs: bool = False
+
+    @property
+    def random(self) -> str:
+        """Fitness of the searches, as text."""
+        return "task fitness minus costs" if self.costs else "fitness"
 
     def as_plain_values(self) -> dict[str, Any]:
         """Return the comparison as JSON values."""
         first, last = self.generations[0], self.generations[-1]
-        return {"generations": [first, last], "searches": self.searches, "moved": [asdict(one) for one in self.moved]}
+        moved = [asdict(one) for one in self.moved]
+        return {"generations": [first, last], "searches": self.searches, "random": self.random, "moved": moved}
 
     def lines(self) -> list[str]:
         """Return the comparison as a table for a terminal."""
@@ -82,7 +94,7 @@ class Drift:
         return [
             *table,
             f"Means over candidates of generations {first} to {last}; null model: {self.searches} searches with random "
-            "fitness.",
+            f"{self.random}.",
             f"p is two-sided and at least {2 / (self.searches + 1):.2g}; by chance alone it is below 0.05 in one of "
             "twenty rows.",
         ]
@@ -91,10 +103,12 @@ class Drift:
 def drift_of(runs: Sequence[Run], searches: int = SEARCHES, done: Callable[[float], None] = lambda _: None) -> Drift:
     """Compare runs that differ only in their seeds with searches with random fitness (`evolve.search.null_model`).
 
-    The quantities are the genes that the search varies, the acuity [cycles/degree] and the number of receptors. Means
-    are taken over the last generations that all runs have completed.
+    The quantities are the genes that the search varies, the horizontal acuity [cycles/degree], the vertical one unless
+    receptors are square, and the number of positions of receptors. Means are over the last generations that all runs
+    have completed.
 
-    searches: number of searches · done: function that is called with the share of completed searches
+    searches: number of searches
+    done: function that is called with the completed fraction of the searches
 
     Raises:
         RunError: the runs differ in settings other than their seeds, two runs have the same seed, or a run has no
@@ -105,7 +119,8 @@ def drift_of(runs: Sequence[Run], searches: int = SEARCHES, done: Callable[[floa
         raise ValueError(f"searches = {searches}: must be from 2 to {MOST_SEARCHES:,}")
     _require_alike(runs)
     config, generations = runs[0].config, min(_complete(run) for run in runs)
-    model = null_model(config, lambda animal: _measured(animal, config), generations, searches, done)
+    spread = fitness_spread(runs, generations)
+    model = null_model(config, lambda animal: _measured(animal, config), generations, searches, done, spread)
     last, moved = last_generations(config, generations)[-1], []
     run_ends = [_ends(run, last) for run in runs]
     for quantity in model.means:
@@ -113,7 +128,7 @@ def drift_of(runs: Sequence[Run], searches: int = SEARCHES, done: Callable[[floa
         if all(map(math.isfinite, found)) and ends.size and np.ptp(ends) > 0:
             low, median, high = (float(q) for q in np.quantile(ends, [0.025, 0.5, 0.975]))
             moved.append(QuantityDrift(quantity, tuple(found), low, median, high, p_value(found, ends)))
-    return Drift(len(runs), last, searches, tuple(moved))
+    return Drift(len(runs), last, searches, tuple(moved), not config.costs.free)
 
 
 def _require_alike(runs: Sequence[Run]) -> None:
@@ -140,7 +155,8 @@ def _complete(run: Run) -> int:
 def _measured(animal: Phenotype, config: RunConfig) -> Mapping[str, float]:
     height, width = animal.resolution
     genes = {name: value for name, value in gene_values(animal, config.eye).items() if _open(name, config)}
-    return {**genes, "acuity_cpd": acuity_cpd(animal), "receptors": float(animal.n_eyes * height * width)}
+    upwards = {} if config.eye.vertical_fov == "receptors" else {"acuity_vertical_cpd": acuity_vertical_cpd(animal)}
+    return {**genes, "acuity_cpd": acuity_cpd(animal), **upwards, "receptors": float(animal.n_eyes * height * width)}
 
 
 def _open(name: str, config: RunConfig) -> bool:
@@ -148,9 +164,9 @@ def _open(name: str, config: RunConfig) -> bool:
 
 
 def _ends(run: Run, generations: range) -> dict[str, float]:
-    """Return the mean of each quantity over the successful candidates of these generations; NaN if none of them has it.
+    """Return the mean of each quantity over the successful candidates of these generations.
 
-    Quantities of which no candidate has a value have the value NaN.
+    It is NaN for a quantity that none of them has.
     """
     values: dict[str, list[float]] = defaultdict(list)
     for candidate in run.candidates:

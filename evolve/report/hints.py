@@ -8,7 +8,7 @@ __all__ = ["MEANINGS", "hint"]
 
 # docs/glossary.md also explains these terms. The sentences here must be understandable without any other definition.
 MEANINGS = {
-    "fitness": "mean return of an animal's evaluation episodes after training; higher is better",
+    "fitness": "mean return of an animal's evaluation episodes after training, minus costs, if any; higher is better",
     "candidate": "one genome of the run with the animal that develops from it, trained and evaluated",
     "generation": "the candidates that are proposed together, based on the fitness of earlier ones",
     "genome": "the numbers that evolution varies; they determine an animal's eyes and brain",

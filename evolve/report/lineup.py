@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from evolve.analysis.statistics import acuity_cpd, champions
+from evolve.analysis.fitness_parts import fitness_text
+from evolve.analysis.statistics import champions
 from evolve.learning.animal_task import azimuths
 from evolve.report.agent_figure import agent_figure
 from evolve.report.markup import Html, html, joined, rounded
-from evolve.report.tables import field_of_view
+from evolve.report.tables import acuity_text, field_of_view
 from evolve.store.candidate import Candidate
 from evolve.store.directory import Run
 
 __all__ = ["lineup"]
 
-MOST = 60  # maximum number of animals on a page; if there are more, a selection is spread evenly over them
+MOST = 60  # maximum number of animals on a page; if there are more, evenly spaced ones are selected
 
 
 def lineup(run: Run) -> Html:
@@ -56,10 +57,10 @@ def _card(run: Run, generation: int, candidate: Candidate, name: str) -> Html:
     height, width = animal.resolution
     facts = {
         "candidate": str(candidate.id),
-        "fitness": rounded(candidate.fitness),
+        "fitness": fitness_text(candidate.fitness, candidate.costs, rounded),
         "episodes solved": f"{100 * candidate.success_rate:.0f} %",
         "eyes": f"{animal.n_eyes} of {height} × {width}, {field_of_view(animal)}",
-        "acuity": f"{rounded(acuity_cpd(animal))} cycles/degree",
+        "acuity": acuity_text(animal, "cycles/degree"),
         "brain": f"{animal.neurons} neurons, {animal.memory_frames} frames",
     }
     rows = joined(html("<dt>{}</dt><dd>{}</dd>", key, value) for key, value in facts.items())

@@ -137,7 +137,9 @@ def table(
 ) -> Html:
     """Return a table that can be scrolled sideways.
 
-    name: id of the table · highlight: number of the row that is emphasised; None: no row · ids: id of each row
+    name: id of the table
+    highlight: number of the row that is emphasised; None: no row
+    ids: id of each row
     """
     head = joined(html('<th scope="col">{}</th>', cell) for cell in header)
     body = joined(

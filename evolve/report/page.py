@@ -6,23 +6,23 @@ import math
 from collections.abc import Callable, Iterator
 from functools import partial
 
+from evolve.analysis.acuity import acuity_cpd, acuity_vertical_cpd
 from evolve.analysis.episode import Episode
-from evolve.analysis.genealogy import descent
-from evolve.analysis.statistics import acuity_cpd, champions, gene_values, generation_statistics, trajectory
+from evolve.analysis.fitness_parts import any_costs, fitness_text
+from evolve.analysis.held_out import held_out_episodes
+from evolve.analysis.statistics import champions, gene_values, trajectory
 from evolve.analysis.vision import SCENES, Vision, vision
+from evolve.config.settings import FAMILY
 from evolve.genome.genes import CLUSTERS, Gene
 from evolve.report import tables
 from evolve.report.doing import Doing, in_silence
 from evolve.report.eye_figures import eye_figures
 from evolve.report.figures import (
-    fitness_figure,
     gene_figure,
-    genealogy_figure,
-    learning_figure,
     relief_figure,
-    success_figure,
     vision_figure,
 )
+from evolve.report.fitness_section import POPULATION, fitness_section
 from evolve.report.hints import hint
 from evolve.report.lineup import lineup
 from evolve.report.markup import Html, contents, document, figure, html, joined, key, rounded, section
@@ -33,7 +33,6 @@ from evolve.store.directory import Run
 
 __all__ = ["render"]
 
-POPULATION = html("{} 10–90 % of the population, {} its median", key("muted band"), key("muted"))
 VISION = {
     "image quality": ("IQ", "image_quality", "area of the MTF above the noise, times throughput"),
     "contrast": ("MTF", "contrast", "at half the receptors’ Nyquist frequency, in white daylight"),
@@ -75,41 +74,10 @@ def animals_section(run: Run) -> Html:
 
 
 def numbers_section(run: Run) -> Html:
-    return section("numbers", "The run in numbers", tables.headline(run))
-
-
-def fitness_section(run: Run) -> Html:
-    """Return the section with fitness and success over the generations, and the learning curves."""
-    if not run.candidates:
-        return section("fitness", "Fitness", html("<p>No candidate has been evaluated yet.</p>\n"))
-    rows = generation_statistics(run.candidates)
-    caption = html(
-        "<b>{} over generations.</b> {} best so far and, pale, the 95 % bootstrap interval of its mean return; "
-        '{}; a dot per candidate, <span class="vermillion">×</span> failed. Fitness is the mean return of {} '
-        "evaluation episodes after training. The best of many candidates is partly best by chance (selection bias); "
-        "the interval does not include that.",
-        *(hint("fitness", "Fitness"), key("accent"), POPULATION, run.config.evaluation.episodes),
-    )
-    figures = figure(fitness_figure(rows, run.candidates), caption)
-    caption = html(
-        "<b>Episodes solved.</b> Share of a candidate's evaluation episodes in which the task was solved (dots), "
-        "{} mean of the generation.",
-        key("muted"),
-    )
-    figures += figure(success_figure(run.candidates), caption)
-    if (best := run.best) is not None:
-        caption = html(
-            "<b>Learning.</b> Mean evaluation return while a candidate trains: {} the best (no. {}), {} the others.",
-            *(key("accent"), best.id, key("muted")),
-        )
-        figures += figure(learning_figure(run.candidates, best), caption)
-        caption = html(
-            "<b>Genealogy.</b> Each candidate and the nearest of its parents (click one for its row in the table); "
-            "{} the line of candidate {}: {}.",
-            *(key("accent"), best.id, ", ".join(str(c.id) for c in descent(best, run.candidates))),
-        )
-        figures += figure(genealogy_figure(run.candidates, best), caption)
-    return section("fitness", "Fitness", html('<div class="figures">{}</div>\n', figures))
+    """Return the section with the main results; if there is a test set of layouts, the best candidate plays in it."""
+    has_test_set = run.config.world.layouts == FAMILY and run.best is not None
+    held_out = held_out_episodes(run).returns.tolist() if has_test_set else ()
+    return section("numbers", "The run in numbers", tables.headline(run, held_out))
 
 
 def genes_section(run: Run) -> Html:
@@ -151,12 +119,16 @@ def _dimensionless(gene: Gene) -> str:
 
 
 def _acuity(run: Run) -> Html:
-    path = trajectory(run.candidates, acuity_cpd)
+    path, upwards = (trajectory(run.candidates, acuity) for acuity in (acuity_cpd, acuity_vertical_cpd))
     caption = html(
         "<b>{}</b>: finest grating that the sampling allows, 1 / (2 min(placement range / (eyes − 1), fov / width))",
         hint("acuity"),
     )
-    return figure(gene_figure("acuity", "cycles / degree", path, None), caption)
+    drawn = figure(gene_figure("acuity", "cycles / degree", path, None), caption)
+    if all(acuity_cpd(c.phenotype) == acuity_vertical_cpd(c.phenotype) for c in run.candidates):
+        return drawn
+    caption = html("<b>vertical acuity</b>: the same for level gratings, 1 / (2 vertical fov / height)")
+    return drawn + figure(gene_figure("vertical-acuity", "cycles / degree", upwards, None), caption)
 
 
 def _relief(run: Run, genes: list[Gene]) -> Html:
@@ -196,8 +168,9 @@ def vision_section(run: Run, doing: Doing) -> Html:
 
 def candidates_section(run: Run) -> Html:
     """Return the section with the tables of all candidates and of failures."""
+    what = "Task fitness" if any_costs(run.candidates) else "Fitness"
     intro = html(
-        "<p>Fitness is the mean return of the evaluation episodes; lowest and highest are single episodes.</p>\n"
+        "<p>{} is the mean return of the evaluation episodes; lowest and highest are single episodes.</p>\n", what
     )
     everybody = tables.all_candidates(run) + tables.failures(run)
     return section("candidates", "Candidates", intro + everybody + tables.episode_failures(run))
@@ -212,7 +185,11 @@ def best_section(run: Run, best: Candidate, episode: Episode) -> Html:
     content = html(
         "<p>{} {} of {} {}, {} {}.</p>\n{}<h3>Views</h3>\n{}<h3>Genes</h3>\n{}",
         *(hint("candidate", "Candidate"), best.id, hint("generation"), best.generation),
-        *(hint("fitness"), rounded(best.fitness, 4), eye_figures(best.phenotype, run.config.eye)),
+        *(
+            hint("fitness"),
+            fitness_text(best.fitness, best.costs, partial(rounded, digits=4)),
+            eye_figures(best.phenotype, run.config.eye),
+        ),
         *(what_it_sees(episode), tables.best_genes(run, best)),
     )
     return section("best", "The best eye", content)
@@ -241,9 +218,11 @@ def _makers(run: Run, episode: Episode | None) -> Iterator[tuple[str, Callable[[
 
 
 def _within(doing: Doing, done: int, of: int, what: str, share: float) -> None:
-    """Report progress within a section as a share of the whole page.
+    """Report progress within a section as a fraction of the whole page.
 
-    done: number of completed sections · of: number of all sections · share: completed share of the current section
+    done: number of completed sections
+    of: number of all sections
+    share: completed fraction of the current section
     """
     doing(what, (done + share) / of)
 
@@ -252,7 +231,7 @@ def render(run: Run, episode: Episode | None, doing: Doing = in_silence) -> byte
     """Return the whole page.
 
     episode: an episode of the best candidate; None if no candidate has succeeded
-    doing: function that is called with the current step and the completed share of the work, in [0, 1]
+    doing: function that is called with the current step and the completed fraction of the work, in [0, 1]
     """
     makers = list(_makers(run, episode))
     parts = []

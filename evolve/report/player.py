@@ -211,7 +211,7 @@ def _kept(episode: Episode) -> np.ndarray:
 
 
 def _events(episode: Episode, kept: np.ndarray) -> list[tuple[int, str]]:
-    """Return (frame, "goal" or "adversary") for each object that was reached, with the first frame after this."""
+    """Return (frame, "goal" or "adversary") for each object that was reached; frame: the first frame after this."""
     found = [
         (int(np.searchsorted(kept, time)), name)
         for name in EVENTS
@@ -221,5 +221,5 @@ def _events(episode: Episode, kept: np.ndarray) -> list[tuple[int, str]]:
 
 
 def _rounded(values: np.ndarray, decimals: int = 3) -> Any:
-    """Return nested lists of rounded numbers; in the drawing, a millimetre is invisible."""
+    """Return nested lists of rounded numbers. In the drawing, a millimetre is invisible."""
     return np.round(np.asarray(values, dtype=np.float64), decimals).tolist()

@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from evolve.analysis.episode import Episode
-from evolve.analysis.recorder import record
-from evolve.config.checks import ConfigError
+from evolve.analysis.recorder import EVERY, record
+from evolve.config.checks import ConfigError, quoted
 from evolve.report.moving_picture import require_ffmpeg, write_gif, write_mp4
 from evolve.report.player import write_player
 from evolve.report.rerun_recording import write_recording
@@ -22,27 +22,41 @@ BESIDE: Mapping[str, Callable[[Any, Path], Path]] = {"rrd": write_recording, "gi
 
 
 def write_replay(
-    run: Run, candidate_id: int | None = None, seed: int = 0, also: Collection[str] = (), out: Path | None = None
+    run: Run,
+    candidate_id: int | None = None,
+    seed: int = 0,
+    every: int | None = None,
+    also: Collection[str] = (),
+    out: Path | None = None,
+    mode: str = "evaluation",
 ) -> tuple[Episode, list[Path]]:
     """Record an episode, write a page that plays it, and return the episode and the paths of all files.
 
     candidate_id: id of the candidate that plays; None: the best candidate
     seed: seed of the episode
+    every: number of actions from one image of the scene to the next in a recording for Rerun; None: 8
     also: formats of additional files next to the page: "rrd" (a recording for rerun), "gif" and "mp4"
     out: path of the page; None: a name in the run directory
+    mode: "evaluation", or "test" for the layouts of the test set
 
     Raises:
         RunError: the candidate does not exist, or it has no policy.
-        ConfigError: rerun or ffmpeg is needed but not installed, or `out` has the ending of an additional file.
+        ConfigError: rerun or ffmpeg is needed but not installed, `out` has the ending of an additional file, a format
+            is unknown, `every` is given without "rrd", or the run has no test set.
         StrangeFileError: `out` is not a regular file, for example a directory.
+        ValueError: `every` is not a whole number from 1 to 1,000,000.
     """
+    if isinstance(also, str) or not set(also) <= set(BESIDE):
+        raise ConfigError(f"also = {quoted(also)}: must be a list of {', '.join(BESIDE)}")
+    if every is not None and "rrd" not in also:
+        raise ConfigError(f"every = {quoted(every)}: needs rrd, because only recordings for Rerun show the scene")
     if out is not None:
         _require_page(out)
     if "rrd" in also:
         require_rerun()
     if "mp4" in also:
         require_ffmpeg()
-    episode = record(run, candidate_id, seed)
+    episode = record(run, candidate_id, seed, EVERY if every is None else every, mode=mode)
     page = write_page(run, episode, out)
     return episode, [page, *(BESIDE[form](episode, page.with_suffix(f".{form}")) for form in BESIDE if form in also)]
 
@@ -57,7 +71,8 @@ def _require_page(out: Path) -> None:
 
 def write_page(run: Run, episode: Episode, out: Path | None = None) -> Path:
     """Write the page that plays an episode of a run, to `out` or into the run directory, and return its path."""
-    path = out or run.path / f"replay_candidate{episode.candidate_id:06d}_seed{episode.seed}.html"
+    test = "_test" if episode.mode == "test" else ""
+    path = out or run.path / f"replay_candidate{episode.candidate_id:06d}_seed{episode.seed}{test}.html"
     if out is not None:  # a run directory that was deleted meanwhile must not reappear
         path.parent.mkdir(parents=True, exist_ok=True)
     return write_player(episode, path)
@@ -69,6 +84,7 @@ def episode_facts(episode: Episode) -> dict[str, Any]:
         "task": episode.task,
         "candidate": episode.candidate_id,
         "episode seed": episode.seed,
+        **({"layouts": "test set"} if episode.mode == "test" else {}),
         "actions": len(episode),
         "return": float(episode.reward.sum()),
         "terms": {name: float(term.sum()) for name, term in episode.reward_terms.items()},

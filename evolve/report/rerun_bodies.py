@@ -15,7 +15,7 @@ from sim.worlds.ground_plan import GroundPlan
 __all__ = ["EYES", "draw_bodies", "draw_goal_region"]
 
 BODIES, EYES = ("world", "bodies"), ("world", "eyes")
-GOAL, GOAL_HEIGHT = (0, 158, 115), 0.01  # green; half height [m]
+GOAL, GOAL_HEIGHT = (0, 158, 115), 0.01  # colour (green) and half height [m] of the goal region
 
 
 def draw_bodies(to: RerunStream, scene: EpisodeScene, eyes: sim.Eyes) -> None:

@@ -62,12 +62,12 @@ def _write(to: RerunStream, episode: Episode) -> None:
     draw_bodies(to, episode.scene, episode.eyes)
     if episode.plan is not None:
         draw_goal_region(to, episode.plan)
-    _look(to, episode)
-    _count(to, episode)
+    _log_images(to, episode)
+    _log_numbers(to, episode)
     _end(to, episode)
 
 
-def _look(to: RerunStream, episode: Episode) -> None:
+def _log_images(to: RerunStream, episode: Episode) -> None:
     """Log, before each action, the signals of each eye, those behind a perfect lens, and the scene if recorded."""
     rr, weights = to.rr, episode.eyes.eye().spectral_bands.weights
     gain = episode.gain
@@ -82,7 +82,7 @@ def _look(to: RerunStream, episode: Episode) -> None:
                 to.log(t, ("scene", name), rr.Image(display(scene)))
 
 
-def _count(to: RerunStream, episode: Episode) -> None:
+def _log_numbers(to: RerunStream, episode: Episode) -> None:
     """Log numbers over time: rewards by term, commands, and other entries of the observation."""
     numbers: dict[tuple[str, ...], np.ndarray] = {("reward",): episode.reward}  # its terms are below it
     numbers |= {("reward", name): term for name, term in episode.reward_terms.items()}

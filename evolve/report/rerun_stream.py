@@ -33,7 +33,9 @@ def require_rerun() -> Any:
 class RerunStream:
     """Writer of a recording.
 
-    rr: the package rerun · stream: an rr.RecordingStream · seconds: duration of one action [s]
+    rr: the package rerun
+    stream: an rr.RecordingStream
+    seconds: duration of one action [s]
 
     An entity is specified by the parts of its path, such as ("world", "goal"), because names may contain any
     characters.

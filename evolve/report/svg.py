@@ -70,7 +70,8 @@ def inline(figure: Figure, name: str, alt: str) -> Html:
 
     The page's policy does not allow styles in elements, so these are moved to the page's style sheet.
 
-    name: prefix of the ids in the element, unique on the page · alt: description of the figure for screen readers
+    name: prefix of the ids in the element, unique on the page
+    alt: description of the figure for screen readers
     """
     buffer = io.StringIO()
     with matplotlib.rc_context({"svg.hashsalt": name, "svg.fonttype": "none"}):
@@ -85,10 +86,10 @@ def inline(figure: Figure, name: str, alt: str) -> Html:
     text = re.sub(r"^<svg[^>]*>", "", text)
     text = re.sub("#[0-9a-f]{6}", lambda colour: VARIABLES.get(colour[0], colour[0]), text)
     opening = html('<svg {} role="img" aria-label="{}">', Html(view_box[0]), alt)
-    return opening + _with_looks(_with_own_ids(text, name))
+    return opening + _without_inline_styles(_with_own_ids(text, name))
 
 
-def _with_looks(text: str) -> Html:
+def _without_inline_styles(text: str) -> Html:
     """Replace the attributes `style` by `data-look`. The figure's text cannot match, because its quotes are escaped."""
     pieces = re.split(r' style="([^"]*)"', text)
     return joined(html(" {}", style(unescape(piece))) if at % 2 else Html(piece) for at, piece in enumerate(pieces))

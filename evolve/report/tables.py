@@ -2,8 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
+import numpy as np
+
+from evolve.analysis.acuity import acuity_cpd, acuity_vertical_cpd
 from evolve.analysis.episode_failures import episode_failures_of
-from evolve.analysis.statistics import acuity_cpd, bootstrap_interval, gene_values, succeeded
+from evolve.analysis.fitness_parts import any_costs
+from evolve.analysis.statistics import bootstrap_interval, gene_values, succeeded
 from evolve.config.assemble import to_toml
 from evolve.genome.genes import ALL_GENES
 from evolve.genome.phenotype import Phenotype
@@ -11,13 +17,25 @@ from evolve.report.hints import hint
 from evolve.report.markup import Html, duration, exact, html, joined, rounded, table
 from evolve.store.candidate import Candidate
 from evolve.store.directory import Run
-from evolve.store.versions import recorded
+from evolve.store.versions import machines, recorded
 
-__all__ = ["all_candidates", "best_genes", "episode_failures", "failures", "headline", "run_facts"]
+__all__ = [
+    "acuity_text",
+    "all_candidates",
+    "best_genes",
+    "episode_failures",
+    "failures",
+    "field_of_view",
+    "headline",
+    "run_facts",
+]
 
 
-def headline(run: Run) -> Html:
-    """Return the main results of the run."""
+def headline(run: Run, held_out: Sequence[float] = ()) -> Html:
+    """Return the main results of the run.
+
+    held_out: returns of the best candidate's episodes in the test set of layouts; empty if the run has none
+    """
     failed = sum(not succeeded(c) for c in run.candidates)
     generations = len({c.generation for c in run.candidates})
     seconds = sum(c.seconds for c in run.candidates)
@@ -33,26 +51,41 @@ def headline(run: Run) -> Html:
         ("Evaluation time", duration(seconds), "training and evaluation, summed over workers"),
     ]
     if (best := run.best) is not None:
-        tiles = [*_best_tiles(best), *tiles]
+        tested = []
+        if len(held_out):
+            tested = [("Its return in the test layouts", rounded(float(np.mean(held_out)), 4), _spread(held_out))]
+        tiles = [*_best_tiles(best), *tested, *tiles]
     items = joined(html("<div><dt>{}</dt><dd>{}<small>{}</small></dd></div>", *tile) for tile in tiles)
     return html('<dl class="tiles">{}</dl>\n', items)
 
 
 def _best_tiles(best: Candidate) -> list[tuple[str | Html, str, str]]:
-    low, high = bootstrap_interval(best.returns)
-    spread = "a single episode"
-    if len(best.returns) > 1:
-        spread = f"mean of {len(best.returns)} episodes; 95 % interval {rounded(low)} to {rounded(high)}"
     return [
-        (html("Best {}", hint("fitness")), rounded(best.fitness, 4), spread),
+        (html("Best {}", hint("fitness")), rounded(best.fitness, 4), _best_spread(best)),
         ("Best candidate", f"no. {best.id}", f"generation {best.generation}"),
         ("Episodes solved by the best", f"{rounded(100 * best.success_rate)} %", f"of {len(best.returns)}"),
         (
             html("Its {}", hint("acuity")),
-            f"{rounded(acuity_cpd(best.phenotype))} cpd",
-            "cycles per degree, by sampling alone",
+            f"{_acuities(best.phenotype)} cpd",
+            f"cycles per degree{_directions([best])}, by sampling alone",
         ),
     ]
+
+
+def _best_spread(best: Candidate) -> str:
+    """Return the parts of the fitness if there are costs, and the interval of the fitness, in words."""
+    spread = _spread(best.returns, best.costs)
+    if not best.costs:
+        return spread
+    return f"task fitness {rounded(best.task_fitness, 4)} − costs {rounded(best.costs, 4)}; {spread}"
+
+
+def _spread(returns: Sequence[float], costs: float = 0.0) -> str:
+    """Return the number of episodes and the interval of their mean return minus costs, in words."""
+    if len(returns) == 1:
+        return "a single episode"
+    low, high = (end - costs for end in bootstrap_interval(returns))
+    return f"mean of {len(returns)} episodes; 95 % interval {rounded(low)} to {rounded(high)}"
 
 
 def best_genes(run: Run, best: Candidate) -> Html:
@@ -79,21 +112,24 @@ def _gene_row(run: Run, names: list[str], values: dict[str, float]) -> list[str 
 
 def all_candidates(run: Run) -> Html:
     """Return a table with a row for each candidate, sorted by id; the row of the best candidate is emphasised."""
+    costs, acuity = any_costs(run.candidates), f"acuity{_directions(run.candidates)} [cpd]"
     header = [
-        *("no.", "gener\u00adation", "fitness", "lowest", "highest", "solved [%]"),
-        *("eyes", "placement [°]", "fov [°]", "receptors (h × w)", "acuity [cpd]"),
+        *("no.", "gener\u00adation", "fitness", *(("task fitness", "costs") if costs else ())),
+        *("lowest return" if costs else "lowest", "highest return" if costs else "highest", "solved [%]"),
+        *("eyes", "placement [°]", "fov [°]", "receptors (h × w)", acuity),
         *("aperture a", "index n", "memory", "neurons", "steps [k]", "minutes"),
     ]
     best = run.best
     place = next((i for i, c in enumerate(run.candidates) if best is not None and c.id == best.id), None)
     ids = [f"candidate-{c.id}" for c in run.candidates]
-    return table(header, [_candidate_row(c) for c in run.candidates], "all-candidates", place, ids)
+    return table(header, [_candidate_row(c, costs) for c in run.candidates], "all-candidates", place, ids)
 
 
-def _candidate_row(candidate: Candidate) -> list[str]:
+def _candidate_row(candidate: Candidate, costs: bool) -> list[str]:
     good = succeeded(candidate)
-    outcome = [candidate.fitness, min(candidate.returns), max(candidate.returns)] if good and candidate.returns else []
-    shown = [rounded(value) for value in outcome] or ["failed", "–", "–"]
+    parts = [candidate.fitness, *([candidate.task_fitness, candidate.costs] if costs else [])]
+    outcome = [*parts, min(candidate.returns), max(candidate.returns)] if good and candidate.returns else []
+    shown = [rounded(value) for value in outcome] or ["failed", *["–"] * (len(parts) + 1)]
     solved = rounded(100 * candidate.success_rate) if good else "–"
     effort = [rounded(candidate.steps / 1000), rounded(candidate.seconds / 60)]
     return [str(candidate.id), str(candidate.generation), *shown, solved, *_traits(candidate.phenotype), *effort]
@@ -111,6 +147,27 @@ def _fields(phenotype: Phenotype) -> str:
     return " × ".join(map(rounded, fields))
 
 
+def acuity_text(animal: Phenotype, unit: str) -> str:
+    """Return the acuity of an animal with its unit, for each direction if the two differ."""
+    across, up = _both_acuities(animal)
+    return f"{across} {unit}" if across == up else f"{across} {unit} horizontally, {up} vertically"
+
+
+def _both_acuities(animal: Phenotype) -> tuple[str, str]:
+    return rounded(acuity_cpd(animal)), rounded(acuity_vertical_cpd(animal))
+
+
+def _acuities(animal: Phenotype) -> str:
+    """Return the acuity (horizontal × vertical); a single number if they are equal."""
+    return " × ".join(dict.fromkeys(_both_acuities(animal)))
+
+
+def _directions(candidates: Sequence[Candidate]) -> str:
+    """Return the order of the two acuities for a heading; "" if they are equal in all candidates."""
+    differ = any(len(set(_both_acuities(candidate.phenotype))) > 1 for candidate in candidates)
+    return ", horizontal × vertical" if differ else ""
+
+
 def _traits(phenotype: Phenotype) -> list[str]:
     height, width = phenotype.resolution
     aperture, index = (
@@ -118,7 +175,7 @@ def _traits(phenotype: Phenotype) -> list[str]:
     )
     return [
         *(str(phenotype.n_eyes), rounded(phenotype.placement_range_deg), _fields(phenotype)),
-        *(f"{height} × {width}", rounded(acuity_cpd(phenotype)), aperture, index),
+        *(f"{height} × {width}", _acuities(phenotype), aperture, index),
         *(str(phenotype.memory_frames), str(phenotype.neurons)),
     ]
 
@@ -156,6 +213,7 @@ def run_facts(run: Run) -> Html:
         "seed": run.config.seed,
         "workers": run.config.workers or "one per core",
         "commit": commit,
+        "machine": "; ".join(machines(run.path)) or "not recorded",
         "software": software,
     }
     if run.notice:

@@ -23,7 +23,7 @@ def write(run: Run, episode: Episode | None = None, out: Path | None = None, doi
 
     episode: an episode of the best candidate; None: an episode is played now
     out: path of the file; None: `report.html` in the run directory
-    doing: function that is called with the current step and the completed share of the work, in [0, 1]
+    doing: function that is called with the current step and the completed fraction of the work, in [0, 1]
 
     Raises:
         ValueError: the best candidate's policy is missing or damaged.

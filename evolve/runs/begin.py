@@ -11,7 +11,7 @@ from typing import TypeVar
 
 from evolve.config.assemble import assemble
 from evolve.config.run_config import RunConfig
-from evolve.learning.task_trial import check_settings, try_task
+from evolve.learning.task_trial import check_layouts, check_settings, try_task
 from evolve.runs.start_from import starts_from
 from evolve.search.optimizers import OWN
 from evolve.search.search import Search
@@ -83,22 +83,23 @@ class PreparedRun:
 def prepare_run(request: RunRequest, tried: bool = True) -> PreparedRun:
     """Collect the settings of a run, and check that the run can start on this machine. Nothing is written.
 
-    tried: whether to build the search and to try the user task in this process; False if the run is only planned:
-        other processes then measure its pace, and try the task first
+    tried: True to build the search and to try the user task in this process. False if the run is only planned: other
+        processes then try the task and measure its pace
 
     Raises:
-        ConfigError: a setting is invalid, the optimizer is unknown, or the user task fails or has several mounts
-            that no animal would use; the message is one line.
+        ConfigError: a setting is invalid, the optimizer is unknown, two random layouts are equal, or the user task
+            fails or has several mounts that no animal would use; the message is one line.
         RunError: the animal to start from does not exist.
         BackendError: Dr.Jit cannot find a usable LLVM library.
     """
     starts = starts_from(request.start_from) if request.start_from else None
     config = assemble(request.task, request.preset, request.config, request.assignments, starts, request.scale)
     if tried or config.search.optimizer not in OWN:  # importing nevergrad takes seconds
-        Search(config)  # raises an error for an unknown optimizer
+        Search(config)  # refuses an unknown optimizer
     device.make_ready()
     if tried:
         check_settings(config)
+        check_layouts(config)
         try_task(config)
     origin = starts.name.removeprefix("--from ") if starts else None
     return PreparedRun(config, request.preset.removesuffix(f"-{config.task}"), origin)
@@ -108,11 +109,12 @@ def check_task(config: RunConfig) -> list[Warning | str]:
     """Check the settings of the user task, try it, and return each warning once; for use in a worker process.
 
     Raises:
-        ConfigError: see `check_settings` and `try_task`.
+        ConfigError: see `check_settings`, `check_layouts` and `try_task`.
     """
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         check_settings(config)
+        check_layouts(config)
         try_task(config)
     own = [warning for warning in caught if warning.category.__module__.split(".")[0] in ("optics", "sim", "evolve")]
     return list({str(warning.message): warning.message for warning in own}.values())

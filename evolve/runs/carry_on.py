@@ -1,4 +1,5 @@
-"""Evaluation of all candidates that are missing in a run, by an executor; watchers show the progress."""
+"""Evaluation of all candidates that are missing in a run. An executor evaluates them, and watchers show the
+progress."""
 
 from __future__ import annotations
 
@@ -38,9 +39,9 @@ def carry_on(
 
     After an exception, the record is intact, and the run can be resumed.
 
-    watched: function that returns the watcher, from the run and the number of workers; it is called after the executor
-        has started
-    workers: function that returns the executor, from the settings of the run
+    watched: function of the run and the number of workers that returns the watcher; it is called after the executor has
+        started
+    workers: function of the run's settings that returns the executor
 
     Raises:
         RunError: the record cannot be written, or this search proposes other candidates than those on record.

@@ -62,9 +62,9 @@ class Voice(OwnedStream):
     """A text stream that writes to another stream, with control characters escaped.
 
     stream: the stream that receives the text
-    patient: whether to continue without output after a fault. False: if the reader has closed the pipe, a
-        BrokenPipeError ends the command, and other faults raise an OSError
-    obeyed: whether control characters are written unchanged; True for a progress bar, which needs them
+    patient: True to continue without output after a fault. False: if the reader has closed the pipe, a BrokenPipeError
+        ends the command, and other faults raise an OSError
+    obeyed: True to write control characters unchanged, which a progress bar needs
     name: name of the stream in the error, and in the note of a patient stream; None: faults other than a closed pipe
         are not reported
     """
@@ -107,7 +107,8 @@ def voices(patient: bool, private: bool = False) -> Iterator[None]:
     """Replace stdout and stderr by Voices within the context.
 
     patient: see `Voice`; stderr is always patient
-    private: whether only `say` writes to stdout, and everything else to stderr. False: `print` writes to stdout, too
+    private: True if only `say` writes to stdout, and all other output goes to stderr. False: `print` writes to stdout,
+        too
     """
     before = sys.stdout, sys.stderr
     sys.stderr = cast(TextIO, Voice(before[1], patient=True))
@@ -140,7 +141,7 @@ def _results_on(stream: TextIO) -> Iterator[None]:
 
 
 def as_it_is(stream: TextIO) -> TextIO:
-    """Return a stream that writes to the same place, but does not escape control characters."""
+    """Return a stream that writes to the same destination, but does not escape control characters."""
     if not isinstance(stream, Voice):
         return stream
     return cast(TextIO, Voice(stream.stream, stream.patient, obeyed=True, name=stream.name))

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from types import TracebackType
 from typing import Any, TextIO
 
+from evolve.analysis.fitness_parts import fitness_text
 from evolve.config.numbering import Place
 from evolve.runs.output import as_it_is, printable
 from evolve.search.successive_halving import evaluations
@@ -18,7 +19,7 @@ from evolve.store.directory import Run
 
 __all__ = ["Bar", "Events", "Lines", "Silent", "Tally", "Watchers", "clock", "watcher"]
 
-EVENT_S = 1.0  # minimum time between two events of one candidate's training
+EVENT_S = 1.0  # minimum time between two events of one candidate's training [s]
 
 
 class Tally:
@@ -64,7 +65,7 @@ class Tally:
 
     @property
     def utilisation(self) -> float:
-        """Share of the workers' time that was spent on evaluations which are now complete."""
+        """Fraction of the workers' time that was spent on evaluations that are now complete."""
         return self._busy / (self._workers * self.seconds)
 
     @property
@@ -138,7 +139,8 @@ class Lines(_Watcher):
 
     def evaluated(self, candidate: Candidate) -> None:
         super().evaluated(candidate)
-        outcome = f"failed ({candidate.failure})" if candidate.failure else f"fitness {candidate.fitness:.3g}"
+        fitness = fitness_text(candidate.fitness, candidate.costs, "{:.3g}".format)
+        outcome = f"failed ({candidate.failure})" if candidate.failure else f"fitness {fitness}"
         count = f"{len(self.run.in_order_of_finish)}/{self.tally.planned}"
         print(f"candidate {candidate.id} ({count}): {outcome}; {self.tally.summary()}", file=self.out, flush=True)
 
@@ -148,13 +150,13 @@ class Events(_Watcher):
 
     def __init__(self, run: Run, out: TextIO, workers: int) -> None:
         super().__init__(run, out, workers)
-        self._told: dict[int, float] = {}
+        self._reported_at: dict[int, float] = {}
 
     def training(self, candidate_id: int, steps: int, planned: int) -> None:
         super().training(candidate_id, steps, planned)
         now = time.monotonic()
-        if now - self._told.get(candidate_id, -EVENT_S) >= EVENT_S:
-            self._told[candidate_id] = now
+        if now - self._reported_at.get(candidate_id, -EVENT_S) >= EVENT_S:
+            self._reported_at[candidate_id] = now
             self._write({"event": "training", "candidate": candidate_id, "steps": steps, "planned": planned})
 
     def evaluated(self, candidate: Candidate) -> None:
@@ -165,6 +167,8 @@ class Events(_Watcher):
             "generation": candidate.generation,
             "rung": candidate.rung,
             "fitness": None if candidate.failure else candidate.fitness,
+            "task_fitness": None if candidate.failure else candidate.task_fitness,
+            "costs": None if candidate.failure else candidate.costs,
             "failure": candidate.failure,
             "evaluated": len(self.run.in_order_of_finish),
             "planned": self.tally.planned,
@@ -217,7 +221,7 @@ class Bar(_Watcher):
 
 
 class Watchers:
-    """Watcher that passes each report on to several watchers."""
+    """Watcher that forwards each report to several watchers."""
 
     def __init__(self, watchers: Sequence[Any]) -> None:
         self._watchers = watchers

@@ -33,7 +33,7 @@ def resuming(run: Run, note: Callable[[str], Any] = _ignore) -> Iterator[bool]:
         LockedError: another process is working on the run.
         RunError: the record is damaged or cannot be written, config.toml has changed since the run was opened, or the
             run has a former format.
-        ConfigError: the user task has not been named when the run was opened, or the task fails.
+        ConfigError: the user task was not named when the run was opened, or the task fails.
         BackendError: Dr.Jit cannot find a usable LLVM library.
     """
     device.make_ready()

@@ -14,7 +14,7 @@ from evolve.store.directory import Run
 
 __all__ = ["starts_from"]
 
-# Settings that are the units and the axes of optical genes.
+# Settings that determine the units and the axes of optical genes.
 AXES = ("sensor_width", "receptor_pitch", "relief_height", "pupil_turned")
 
 
@@ -36,7 +36,7 @@ def starts_from(text: str) -> Source:
     height = run.config.eye.vertical_fov
     if height != "gene":
         values.pop(VERTICAL, None)
-    values.pop(SIDE, None)  # height and width repeat its value, and also fit runs with eyes that are not square
+    values.pop(SIDE, None)  # height and width repeat its value, for eyes that are not square
     genome = {name: {"start": _exact(name, value)} for name, value in values.items() if not math.isnan(value)}
     tree: dict[str, Any] = {"genome": genome, "eye": {}}
     if candidate.phenotype.relief is not None:

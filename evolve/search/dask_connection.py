@@ -19,9 +19,9 @@ from evolve.search.signs_of_life import SCHEDULER, SignsOfLife
 __all__ = ["LISTEN_S", "Connection", "ConnectionLost"]
 
 CONNECT_S = 8.0
-LISTEN_S = 0.5  # interval between checks
-QUESTION_S = 5.0  # maximum interval between questions to the scheduler, whose answer lists all workers
-NOTICE_S = 10.0  # maximum silence before a note states the missing sign of life
+LISTEN_S = 0.5  # interval between checks [s]
+QUESTION_S = 5.0  # maximum interval between requests to the scheduler for a list of all workers [s]
+NOTICE_S = 10.0  # time without a sign of life after which a note is printed [s]
 Events = Callable[[Any], Any]
 
 
@@ -31,7 +31,7 @@ class ConnectionLost(Exception):
 
 @dataclass
 class Connection:
-    """Connection to a scheduler, which is asked regularly which workers are alive.
+    """Connection to a scheduler, which regularly requests a list of the living workers.
 
     patience_s: maximum time without a sign of life of the scheduler, or of any worker [s]
     note: function that is called with one line if the run waits for a sign of life
@@ -64,7 +64,7 @@ class Connection:
         return bool(self.client.status != "running")
 
     def restore(self) -> None:
-        """Connect again, which is attempted until the patience is exhausted.
+        """Connect again, with repeated attempts until the patience is exhausted.
 
         Dask's client also reconnects, but gives up after seconds, so a new client replaces it.
         """
@@ -84,7 +84,7 @@ class Connection:
             time.sleep(LISTEN_S / 10)
 
     def check(self) -> None:
-        """Take signs of life into account that have arrived since the last check, and ask for new ones."""
+        """Record signs of life that have arrived since the last check, and request new ones."""
         if self._question is not None and self._question.done():
             question, self._question = self._question, None
             if not question.cancelled() and question.exception() is None:
@@ -96,7 +96,8 @@ class Connection:
         self._pass_time(2 * LISTEN_S)
 
     def ask(self, call: Callable[[], Awaitable[Any]], timeout: float = math.inf) -> Any:
-        """Return the result of a call of Dask, which may take as long as there are signs of life.
+        """Return the result of a call of Dask. By default, its duration is unlimited while the connection shows signs
+        of life.
 
         Raises:
             ConnectionLost: the connection was lost during the call.
@@ -155,7 +156,7 @@ class Connection:
     def _pass_time(self, longest: float) -> None:
         """Add the time since the last check, note a long silence, and raise an error at the end of the patience.
 
-        longest: limit of the time that is added; this process may have been stopped meanwhile [s]
+        longest: limit of the added time [s], because this process may have been stopped meanwhile
         """
         before, self._checked = self._checked, time.monotonic()
         self.signs.wait(min(self._checked - before, longest))

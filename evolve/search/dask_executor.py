@@ -50,8 +50,8 @@ class DaskExecutor:
     scheduler: the scheduler, or its address
     function: "module:name" of the function that evaluates a candidate; it takes the arguments of
         `evolve.learning.fitness.evaluate`
-    patience_s: maximum time without a sign of life of the scheduler, or of any worker [s]; a heartbeat is one, so an
-        evaluation may take longer
+    patience_s: maximum time without a sign of life of the scheduler, or of any worker [s]. Heartbeats are signs of
+        life, so an evaluation may take longer
     note: function that is called with one line if the run waits for a sign of life, or gives up a worker
     count: number of workers at the start
 
@@ -66,7 +66,7 @@ class DaskExecutor:
     count: int = 0
     _name: str = field(default_factory=lambda: f"rhabdom-{uuid.uuid4().hex[:12]}")
     _connection: Any = None
-    _told: SimpleQueue[list[int]] = field(default_factory=SimpleQueue)
+    _reports: SimpleQueue[list[int]] = field(default_factory=SimpleQueue)
 
     def __post_init__(self) -> None:
         if isinstance(self.scheduler, str):
@@ -74,7 +74,7 @@ class DaskExecutor:
         self._scheduler, self._address = self.scheduler, self.scheduler.address
 
     def __enter__(self) -> DaskExecutor:
-        self._connection = Connection(self._scheduler, self.patience_s, self.note, self._name, self._told.put)
+        self._connection = Connection(self._scheduler, self.patience_s, self.note, self._name, self._reports.put)
         try:
             self._connection.require_worker()
         except BaseException:
@@ -107,7 +107,7 @@ class DaskExecutor:
                     under_way.clear()
                 with contextlib.suppress(ConnectionLost):
                     yield from self._round(waiting, under_way)
-                self._tell(progress)
+                self._report(progress)
         finally:
             self._withdraw(under_way)
 
@@ -200,10 +200,10 @@ class DaskExecutor:
             write_whole(trial.job.rung.checkpoints[-1], checkpoint)
         return outcome
 
-    def _tell(self, progress: Progress | None) -> None:
+    def _report(self, progress: Progress | None) -> None:
         with contextlib.suppress(Empty):
             while True:
-                report = self._told.get_nowait()
+                report = self._reports.get_nowait()
                 if progress is not None:
                     progress(*report)
 

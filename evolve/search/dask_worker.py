@@ -30,7 +30,7 @@ from evolve.store.versions import present
 
 __all__ = ["Order", "UnfitWorker", "decode", "encode", "evaluate"]
 
-COUNTER_S = 20.0  # time limit for the scheduler's answer
+COUNTER_S = 20.0  # time limit for the scheduler's answer [s]
 Reply = tuple[str, bytes, bytes]
 _one_at_a_time = threading.Lock()
 _prepared = False

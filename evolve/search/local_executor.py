@@ -24,7 +24,7 @@ __all__ = ["ExecutorError", "Job", "LocalExecutor", "Progress", "cores"]
 # Several processes share the cores, so each process uses one thread. Numerical libraries read these variables when they
 # are imported.
 ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")
-STOPPING_S = 5.0  # time after which a process that does not end is killed
+STOPPING_S = 5.0  # time after which a process that does not end is killed [s]
 KILLED = "by SIGKILL"
 OUT_OF_MEMORY = (
     f"the worker of candidate {{}} was killed {ATTEMPTS} times (SIGKILL), probably because memory ran out; use fewer "

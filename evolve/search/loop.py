@@ -123,6 +123,7 @@ def _write_down(run: Run, proposal: Proposal, job: Job, outcome: Evaluation, wat
         candidate = replace(candidate, rung=job.rung.number)
         if (before := run.on_record(candidate.id, candidate.rung - 1)) is not None:
             candidate = _after(before, candidate)
+    candidate = candidate.charged(run.config.costs.total(job.phenotype, run.config.eye))
     if candidate.failure is None:
         candidate = replace(candidate, policy=digest(job.policy_path))
     run.append(candidate)

@@ -1,8 +1,11 @@
-"""Null model of a search: the same search with random fitness.
+"""Null model of a search: the same search with random task fitness.
 
 The values of genes can change without any selection for them. A gene that starts near one end of its range can only
 move away from this end, and selection by random fitness also moves genes. The final values of a run are therefore
 evidence of selection only if they lie outside the range of the null model.
+
+Costs also select: with a price per receptor, even random task fitness leads to few receptors. The null model therefore
+subtracts the costs from its random task fitness. A result outside its range is evidence that the task selects.
 """
 
 from __future__ import annotations
@@ -19,8 +22,9 @@ from numpy.typing import NDArray
 from evolve.config.run_config import RunConfig
 from evolve.genome.phenotype import Phenotype, develop
 from evolve.search.search import Proposal, Search
+from evolve.store.directory import Run
 
-__all__ = ["FIRST_SEED", "LAST", "SEVERAL", "NullModel", "last_generations", "null_model", "p_value"]
+__all__ = ["FIRST_SEED", "LAST", "SEVERAL", "NullModel", "fitness_spread", "last_generations", "null_model", "p_value"]
 
 Floats = NDArray[np.float64]
 Measure: TypeAlias = "Callable[[Phenotype], Mapping[str, float]]"
@@ -56,29 +60,61 @@ class NullModel:
 
 
 def null_model(
-    config: RunConfig, measure: Measure, generations: int, searches: int, done: Callable[[float], None] = lambda _: None
+    config: RunConfig,
+    measure: Measure,
+    generations: int,
+    searches: int,
+    done: Callable[[float], None] = lambda _: None,
+    spread: Sequence[float] = (),
 ) -> NullModel:
-    """Run searches with these settings, but with random fitness and other seeds.
+    """Run searches with these settings, but with random task fitness and other seeds.
 
     generations: number of generations of each search
     searches: number of searches
     measure: function that returns quantities of an untrained animal. It returns the same names for all animals, with
         NaN for quantities that an animal lacks.
-    done: function that is called with the share of completed searches
+    done: function that is called with the completed fraction of the searches
+    spread: standard deviation of task fitness in each generation, from `fitness_spread`. It is needed only if there
+        are costs, because optimizers use only the order of fitness values.
+
+    Raises:
+        ValueError: there are costs, and `spread` has fewer values than generations.
     """
+    if not config.costs.free and len(spread) < generations:
+        raise ValueError(f"spread has {len(spread)} values: must be {generations}, one for each generation")
     found = []
     for i in range(searches):
-        found.append(_search(replace(config, seed=FIRST_SEED + i), measure, generations))
+        found.append(_search(replace(config, seed=FIRST_SEED + i), measure, generations, spread))
         done((i + 1) / searches)
     names = found[0].keys()
     means, counts = ({name: np.array([one[name][part] for one in found]) for name in names} for part in (0, 1))
     return NullModel(means, counts)
 
 
-def _search(config: RunConfig, measure: Measure, generations: int) -> dict[str, tuple[list[float], list[int]]]:
+def fitness_spread(runs: Sequence[Run], generations: int) -> list[float]:
+    """Return the standard deviation of task fitness within each generation, pooled over the runs.
+
+    A generation in which no run has two successful candidates has the pooled value of all generations.
+    """
+    squares, free = np.zeros(generations), np.zeros(generations)
+    for run in runs:
+        for generation in range(generations):
+            members = run.generation(generation)
+            values = np.array([one.task_fitness for one in members if one.failure is None])
+            if values.size > 1:
+                squares[generation] += np.square(values - values.mean()).sum()
+                free[generation] += values.size - 1
+    overall = squares.sum() / max(free.sum(), 1)
+    variances = np.divide(squares, free, out=np.full(generations, overall), where=free > 0)
+    return [float(spread) for spread in np.sqrt(variances)]
+
+
+def _search(
+    config: RunConfig, measure: Measure, generations: int, spread: Sequence[float]
+) -> dict[str, tuple[list[float], list[int]]]:
     """Return, for each quantity, its mean in each generation and the number of candidates that have it."""
     found: dict[str, tuple[list[float], list[int]]] = {}
-    for proposals in _proposals(config, generations):
+    for proposals in _proposals(config, generations, spread):
         measured = [measure(develop(proposal.vector, config)) for proposal in proposals]
         for name in measured[0]:
             finite = [value for one in measured if math.isfinite(value := one[name])]
@@ -88,23 +124,32 @@ def _search(config: RunConfig, measure: Measure, generations: int) -> dict[str, 
     return found
 
 
-def _proposals(config: RunConfig, generations: int) -> Iterator[list[Proposal]]:
+def _proposals(config: RunConfig, generations: int, spread: Sequence[float]) -> Iterator[list[Proposal]]:
     """Yield the proposals of one generation after the other, and report a random fitness for each proposal.
 
     In the steady state, a fitness is reported before each new proposal, as in a run.
     """
     search, chance = Search(config), np.random.default_rng(config.seed)
+
+    def fitness(proposal: Proposal) -> float:
+        drawn = chance.normal()
+        if config.costs.free:
+            return drawn
+        costs = config.costs.total(develop(proposal.vector, config), config.eye)
+        return spread[proposal.place.generation] * drawn - costs
+
     if not config.search.steady_state:
         for _ in range(generations):
             proposals = search.propose_generation()
             yield proposals
-            search.tell([(proposal.id, chance.normal()) for proposal in proposals])
+            search.tell([(proposal.id, fitness(proposal)) for proposal in proposals])
         return
     size = config.search.population
     proposals = [search.propose() for _ in range(size)]
     under_way = deque(proposals)
     while len(proposals) < generations * size:
-        search.tell([(under_way.popleft().id, chance.normal())])
+        proposal = under_way.popleft()
+        search.tell([(proposal.id, fitness(proposal))])
         proposals.append(search.propose())
         under_way.append(proposals[-1])
     for generation in range(generations):

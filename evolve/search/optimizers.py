@@ -75,7 +75,7 @@ class Mutation:
     def __init__(self, space: Space, search: SearchConfig) -> None:
         self._space, self._sigma = space, search.sigma
         self._parents = max(1, search.population // 4)
-        self._told: deque[tuple[int, float]] = deque(maxlen=2 * search.population)
+        self._received: deque[tuple[int, float]] = deque(maxlen=2 * search.population)
         self._genomes: dict[int, Floats] = {}
 
     def ask(self, candidate_id: int) -> tuple[Floats, tuple[int, ...]]:
@@ -91,10 +91,10 @@ class Mutation:
         return self._genomes[candidate_id], () if parent is None else (parent,)
 
     def tell(self, candidate_id: int, fitness: float) -> None:
-        self._told.append((candidate_id, fitness))
+        self._received.append((candidate_id, fitness))
 
     def _parent(self, chance: np.random.Generator) -> int | None:
-        best = sorted(self._told, key=lambda told: (-told[1], told[0]))[: self._parents]
+        best = sorted(self._received, key=lambda pair: (-pair[1], pair[0]))[: self._parents]
         return best[int(chance.integers(len(best)))][0] if best else None
 
 
@@ -155,7 +155,7 @@ class CMA(Named):
         super().__init__(space, search)
         self._population = search.population
         self._better_half: tuple[int, ...] = ()
-        self._told: list[tuple[int, float]] = []
+        self._received: list[tuple[int, float]] = []
 
     def _build(self, space: Space, search: SearchConfig) -> Any:
         from nevergrad.optimization.optimizerlib import ParametrizedCMA
@@ -172,10 +172,10 @@ class CMA(Named):
 
     def tell(self, candidate_id: int, fitness: float) -> None:
         super().tell(candidate_id, fitness)
-        self._told.append((candidate_id, fitness))
-        if len(self._told) == self._population:
-            best = sorted(self._told, key=lambda told: (-told[1], told[0]))[: self._population // 2]
-            self._better_half, self._told = tuple(sorted(candidate_id for candidate_id, _ in best)), []
+        self._received.append((candidate_id, fitness))
+        if len(self._received) == self._population:
+            best = sorted(self._received, key=lambda pair: (-pair[1], pair[0]))[: self._population // 2]
+            self._better_half, self._received = tuple(sorted(candidate_id for candidate_id, _ in best)), []
 
     def _parents(self, candidate: Any) -> tuple[int, ...]:
         return self._better_half

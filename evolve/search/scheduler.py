@@ -21,9 +21,9 @@ from evolve.search.job import ExecutorError
 __all__ = ["Scheduler", "close"]
 
 ADDRESS = re.compile(r"(?:(?P<protocol>tcp|tls)://)?(?P<host>\[[0-9A-Fa-f:.%\w]+\]|[^\s:/\[\]]+):(?P<port>\d{1,5})")
-ANSWER_S = 5.0  # time limit for an answer, enough for a scheduler that is just starting
-RETRY_S = 0.25  # interval between attempts to connect
-CLOSE_S = 2.0  # time limit for closing a connection, which a silent scheduler does not confirm
+ANSWER_S = 5.0  # time limit for an answer [s], enough for a scheduler that is just starting
+RETRY_S = 0.25  # interval between attempts to connect [s]
+CLOSE_S = 2.0  # time limit for closing a connection [s], which a silent scheduler does not confirm
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,7 @@ class SignsOfLife:
 
     patience_s: maximum time without a sign of life [s]
     regular_s: maximum time between two answers of a scheduler that is alive [s]; if it was silent for longer, the
-        workers are not blamed for the difference
+        excess does not count as silence of the workers
     """
 
     patience_s: float
@@ -37,7 +37,7 @@ class SignsOfLife:
         self._scheduler_s += seconds
 
     def answer(self, workers: Mapping[str, Mapping[str, Any]]) -> None:
-        """Take an answer of the scheduler into account.
+        """Record an answer of the scheduler.
 
         workers: address and description of each connected worker, as in the scheduler's `identity`
         """

@@ -36,8 +36,9 @@ NO_MEMORY = ("allocate memory", "out of memory", "bad_alloc", "bad allocation") 
 class Message:
     """Message from a worker to its executor.
 
-    kind: "progress": content is (steps trained, steps planned) · "done": content is the Evaluation · "unfit": content
-        is the reason why the worker cannot evaluate candidates · "died": the pipe is closed, and there is no content
+    kind: one of four kinds. "progress": the content is (steps trained, steps planned). "done": it is the Evaluation.
+        "unfit": it is the reason why the worker cannot evaluate candidates. "died": the pipe is closed, and there is no
+        content
     """
 
     kind: Literal["progress", "done", "unfit", "died"]
@@ -59,7 +60,7 @@ def work(connection: Connection, evaluate: Callable[..., Evaluation], prepare: C
             arguments = connection.recv()
         except EOFError:
             return
-        send_all_to_stderr()  # again, because a task may have closed or replaced the streams
+        send_all_to_stderr()  # repeated, because a task may have closed or replaced the streams
         try:
             outcome = evaluated(evaluate, arguments, lambda *steps: connection.send(Message("progress", steps)))
         except (OSError, MemoryError) as error:
@@ -140,7 +141,7 @@ def evaluated(
     except KeyboardInterrupt:
         raise
     except BaseException as error:
-        place = error_in_task(error)  # a task may raise anything, such as SystemExit or an OSError
+        place = error_in_task(error)  # a task may raise any exception, such as SystemExit or an OSError
         if isinstance(error, MemoryError | ConfigError) or (isinstance(error, OSError) and place is None):
             raise
         if isinstance(error, RuntimeError) and any(words in str(error) for words in NO_MEMORY):
@@ -165,7 +166,7 @@ def _give_back_memory() -> None:
     small for the next arrays. Dr.Jit keeps the kernels of every shape of eye in memory; after they have been freed, it
     reloads them from disk if they are needed again.
     """
-    gc.collect()  # must come first: it frees frozen functions, which refer to kernels
+    gc.collect()  # this must precede the next call, because it frees frozen functions, which refer to kernels
     if (drjit := sys.modules.get("drjit")) is not None and multiprocessing.parent_process() is not None:
         drjit.flush_kernel_cache()
         drjit.flush_malloc_cache()

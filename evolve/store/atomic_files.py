@@ -16,7 +16,7 @@ POLICIES, TRAININGS = "policies", "trainings"  # folders of a run
 
 
 def sweep(folder: Path) -> None:
-    """Remove unfinished files of killed processes. Files of running processes, such as a replay, are left alone."""
+    """Remove unfinished files of killed processes. Files of running processes, such as a replay, are not touched."""
     for path in folder.glob(f".*{UNFINISHED}"):
         if not _lives(path.name.removesuffix(UNFINISHED).rpartition(".")[2]):
             path.unlink(missing_ok=True)
@@ -39,7 +39,7 @@ def write_whole(path: Path, content: bytes) -> None:
     """Write a file atomically. Readers find either the old or the new content, even after a crash of the machine.
 
     If the folder `policies` or `trainings` of a run is missing, it is created. The run directory itself is not created,
-    so that a run that was deleted meanwhile does not reappear.
+    because a run that was deleted meanwhile must not reappear.
 
     Raises:
         StrangeFileError: the path is a link, FIFO, device or directory.
@@ -50,7 +50,7 @@ def write_whole(path: Path, content: bytes) -> None:
 
 
 def require_file_name(path: Path) -> None:
-    """Check that a file can be written at a path, which must not be "." or "/", or the path of anything but a file.
+    """Check that a file can be written at a path: it must have a file name, and be a regular file if it exists.
 
     Raises:
         StrangeFileError: the path is a link, FIFO, device or directory.

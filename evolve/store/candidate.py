@@ -28,6 +28,8 @@ class Candidate:
     `Evaluation` describes the fields that both classes have.
 
     id, generation, index: see `Place`
+    fitness: task fitness minus costs, which the search maximises; -inf if the candidate failed
+    costs: costs of eyes and brain (`evolve.config.costs`); 0 for a failed candidate
     seed: seed of training and evaluation
     parents: ids of the candidates from which the search derived the genome; () if there are none
     rung: rung after which the candidate was evaluated, counted from 0; steps and seconds include all earlier rungs
@@ -51,6 +53,7 @@ class Candidate:
     rung: int = 0
     policy: str | None = None
     episode_failures: tuple[tuple[str, int], ...] = ()
+    costs: float = 0.0
 
     def __repr__(self) -> str:
         """Return a short description, because a record may contain thousands of candidates."""
@@ -63,6 +66,11 @@ class Candidate:
     def place(self) -> Place:
         """Place of the candidate in the search."""
         return Place(self.id, self.generation, self.index)
+
+    @property
+    def task_fitness(self) -> float:
+        """Mean of `returns`, which contains no costs."""
+        return self.fitness + self.costs
 
     @property
     def vector(self) -> NDArray[np.float64]:
@@ -81,13 +89,19 @@ class Candidate:
     ) -> Candidate:
         """Return the candidate at `place` with its outcome, as a record can store it (see `recordable`).
 
-        If its fitness is not finite, it counts as failed.
+        If its fitness is not finite, it counts as failed. Its costs are 0; `charged` subtracts them.
         """
         if outcome.failure is None and not math.isfinite(outcome.fitness):
             outcome = Evaluation.failed(f"fitness is {outcome.fitness}", outcome.seconds)
         found = {f.name: getattr(outcome, f.name) for f in fields(Evaluation)}
         candidate = cls(**vars(place), genome=genome, phenotype=phenotype, seed=seed, **found, parents=parents)
         return candidate.recordable()
+
+    def charged(self, costs: float) -> Candidate:
+        """Return the candidate after subtracting costs from its fitness. A failed candidate is unchanged."""
+        if self.failure is not None or not costs:
+            return self
+        return replace(self, fitness=self.fitness - costs, costs=self.costs + costs)
 
     def recordable(self) -> Candidate:
         """Return the candidate as a record restores it: text is escaped, and infinity in a list becomes NaN.
@@ -108,8 +122,8 @@ class Candidate:
             return self._failed(failure)._restored()
 
     def _failed(self, failure: str, **kept: Any) -> Candidate:
-        """Return the candidate as failed. Of its outcome, only the fields `kept` remain."""
-        return replace(self, **{**vars(Evaluation.failed(failure)), **kept}, policy=None)
+        """Return the candidate as failed. Only the fields `kept` of its outcome remain."""
+        return replace(self, **{**vars(Evaluation.failed(failure)), **kept}, policy=None, costs=0.0)
 
     def _restored(self) -> Candidate:
         """Return the candidate after writing and reading, or raise a ValueError that states the reason."""
@@ -117,16 +131,21 @@ class Candidate:
             candidate = Candidate.from_line(self.to_line())
         except TypeError as error:
             raise ValueError(str(error)) from error
-        # NaN does not equal itself. Only a failed candidate can have it as its success rate.
+        # NaN does not equal itself. It can occur only as the success rate of a failed candidate.
         return candidate if math.isfinite(candidate.success_rate) else replace(candidate, success_rate=0.0)
 
     def to_line(self) -> str:
         """Return the candidate as a line of JSON.
 
-        Numbers can be restored bit for bit. NaN and infinity become null, and text that is not valid is escaped.
+        Numbers can be restored bit for bit. NaN and infinity become null, and text that is not valid is escaped. If
+        there are costs, the line contains them and the task fitness; otherwise, it has the keys of former versions.
         """
         record = {KEYS.get(name, name): value for name, value in vars(self).items()}
         record["phenotype"] = self.phenotype.to_json()
+        if self.costs:
+            record["task_fitness"] = self.task_fitness
+        else:
+            del record["costs"]
         if not self.episode_failures:
             del record["mishaps"]
         return json.dumps(_json_value(record), allow_nan=False) + "\n"
@@ -140,9 +159,10 @@ class Candidate:
         """
         record = parsed(line)
         if isinstance(record, dict):
-            # Records of the first versions lack these fields, and an empty list of failures is never written.
-            record = {"parents": [], "rung": 0, "policy": None, "mishaps": [], **record}
+            # Records of the first versions lack these fields. An empty list of failures is never written.
+            record = {"parents": [], "rung": 0, "policy": None, "mishaps": [], "costs": 0.0, **record}
         names = [KEYS.get(f.name, f.name) for f in fields(cls)]
+        task_fitness = record.pop("task_fitness", None) if isinstance(record, dict) else None
         if not isinstance(record, dict) or sorted(record) != sorted(names):
             raise ValueError(f"wrong fields: must hold exactly {', '.join(names)}")
         try:
@@ -152,6 +172,7 @@ class Candidate:
                 phenotype=Phenotype.from_json(record["phenotype"]),
                 fitness=-math.inf if record["fitness"] is None else real(record["fitness"], "fitness", _ANY),
                 returns=_reals(record, "returns", or_none=True, most=_MOST_RETURNS),
+                costs=_costs(record["costs"]),
                 success_rate=_real_or_none(record["success_rate"], "success_rate", Interval(0, 1)),
                 seconds=real(record["seconds"], "seconds", Interval(0, 1e300)),
                 curve=tuple(_point(entry) for entry in listed(record["curve"], "curve", 0, _LONGEST)),
@@ -168,11 +189,15 @@ class Candidate:
         except TypeError as error:
             raise ValueError(f"a value has the wrong type ({error})") from error
         candidate._require_success()
+        if task_fitness != (candidate.task_fitness if candidate.costs else None):
+            raise ValueError("task_fitness: must be fitness + costs if there are costs, else absent")
         return candidate
 
     def _require_success(self) -> None:
-        """Check that the candidate has a fitness and returns, unless it has failed."""
+        """Check that the candidate has a fitness and returns, unless it has failed. Failed candidates have no costs."""
         if self.failure is not None:
+            if self.costs:
+                raise ValueError("costs: must be 0 or absent if the candidate failed")
             return
         if not math.isfinite(self.fitness):
             raise ValueError("fitness = null: must be a number, or failure must state the reason")
@@ -186,6 +211,12 @@ _LONGEST = 1_000_000  # maximum number of entries of a list in a record
 _MOST_RETURNS = 10_000  # maximum number of evaluation episodes, see the settings
 # Maximum values in a record. The ranges of the settings limit ids and generations; random generators limit seeds.
 _COUNTS = {"id": 10**9, "generation": 10**5, "index": 10**4, "seed": 2**64 - 1, "steps": 10**12, "rung": 9}
+
+
+def _costs(value: Any) -> float:
+    if (costs := real(value, "costs", _ANY)) < 0:
+        raise ValueError(f"costs = {costs}: must be 0 or more")
+    return costs
 
 
 def _reals(record: dict[str, Any], name: str, or_none: bool = False, most: int = _LONGEST) -> tuple[float, ...]:

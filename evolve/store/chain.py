@@ -27,7 +27,7 @@ class Chain:
 
     last: checksum after these lines; b"" before the first line
     unchecked: number of lines without a checksum, which precede all others
-    begun: whether a line had a checksum
+    begun: True if a line had a checksum
     """
 
     last: bytes = b""
@@ -61,7 +61,7 @@ class Chain:
 
 
 def sealed_record(lines: Iterable[str]) -> bytes:
-    """Return the content of a record with these lines, which have no checksums yet."""
+    """Return the content of a record: these lines, each with its checksum."""
     content, chain = [], Chain()
     for line in lines:
         content.append(chain.sealed(line.encode()))
@@ -75,8 +75,9 @@ def without_checksum(line: bytes) -> bytes:
 
 
 def _split(line: bytes) -> tuple[bytes, bytes | None]:
-    """Return a line without its checksum, and the checksum; None if it has none. Quotation marks in texts are escaped,
-    so the name of the field cannot be part of a text.
+    """Return a line without its checksum, and the checksum; None if it has none.
+
+    Quotation marks in texts are escaped, so the name of the field cannot be part of a text.
     """
     body, field, rest = line.rpartition(FIELD)
     if not field or REST.fullmatch(rest) is None:

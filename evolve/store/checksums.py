@@ -13,7 +13,7 @@ from evolve.store.regular_files import read
 __all__ = ["digest", "harmed", "list_checksums"]
 
 LISTED = "SHA256SUMS"  # name of the list, whose form is that of sha256sum: "checksum  name"
-LARGEST_LIST = 2**24  # bytes; 150,000 files
+LARGEST_LIST = 2**24  # maximum size of a list [bytes], for 150,000 files
 MOST_BYTES = 2**32  # maximum size of all files whose checksums are compared at once [bytes]
 ENTRY = re.compile(r"([0-9a-f]{64})  ([^/\n]+\.exr)")
 SHOWN = 5  # maximum number of names in a message

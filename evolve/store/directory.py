@@ -72,7 +72,7 @@ class Run:
                 folder(path / POLICIES)
                 opened(path / CANDIDATES, "ab", create=True).close()
                 text = to_toml(config).encode()
-                (path / VERSIONS).unlink(missing_ok=True)  # may be left by a process that was killed at this point
+                (path / VERSIONS).unlink(missing_ok=True)  # a process that was killed at this point may have left them
                 record_start(path, 0, origin, text)
                 write_whole(path / CONFIG, text)
         except OSError as error:
@@ -85,7 +85,7 @@ class Run:
 
         task: "FILE.py:CLASS", if the run has a user task. The code of a user task is executed only if the task is named
             here. It is needed to continue the run and to let its animals play.
-        before_damage: whether to use only the lines of the record before the first damaged line, if there is one
+        before_damage: True to use only the lines of the record before the first damaged line, if there is one
 
         Raises:
             RunError: the directory contains no run, or a line of its record is invalid; the message names the file and
@@ -200,8 +200,10 @@ class Run:
 
     @property
     def notice(self) -> str | None:
-        """Message about damage, in one line: lines of the record that were left out, lost policies, a config.toml that
-        has changed since the last start, and EXR files that do not match their checksums. None if there is none.
+        """Message about damage, in one line; None if there is none.
+
+        It lists ignored lines of the record, lost policies, a config.toml that has changed since the last start, and
+        EXR files that do not match their checksums.
         """
         found = (
             self.record.notice,

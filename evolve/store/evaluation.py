@@ -19,7 +19,7 @@ class Evaluation:
 
     fitness: mean of `returns`; -inf if the candidate failed
     returns: return of each evaluation episode
-    success_rate: share of the evaluation episodes that were solved
+    success_rate: fraction of the evaluation episodes that were solved
     steps: number of agent steps in training
     seconds: wall-clock time of training and evaluation
     curve: learning curve, (training steps, mean return of the evaluation episodes) at each evaluation

@@ -13,7 +13,7 @@ from evolve.store.regular_files import StrangeFileError, opened
 
 __all__ = ["LockedError", "RunLock", "holder"]
 
-PATIENCE_S = 0.5  # time to wait for the lock, because `holder` in another process takes it for an instant
+PATIENCE_S = 0.5  # time to wait for the lock [s], because `holder` in another process takes it for an instant
 LONGEST = 400  # maximum length of the text in a lock file, which names a process and its machine [bytes]
 
 
@@ -34,7 +34,7 @@ class RunLock:
         try:
             file = opened(self._path, "r+b", create=True)
         except OSError as error:
-            raise LockedError(f"{self._path.parent} cannot be written: {_told(error, self._path)}") from error
+            raise LockedError(f"{self._path.parent} cannot be written: {_message(error, self._path)}") from error
         deadline = time.monotonic() + PATIENCE_S
         while not _taken(file, fcntl.LOCK_EX):
             if time.monotonic() > deadline:
@@ -93,5 +93,5 @@ def _written(file: BinaryIO) -> str:
     return file.read(LONGEST).decode(errors="replace").strip() or "unknown"
 
 
-def _told(error: OSError, path: Path) -> str:
+def _message(error: OSError, path: Path) -> str:
     return f"{path.name} {error.strerror}" if isinstance(error, StrangeFileError) else str(error.strerror)

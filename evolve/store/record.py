@@ -22,7 +22,7 @@ from evolve.store.regular_files import opened, require_size
 
 __all__ = ["Record", "RunError"]
 
-LARGEST_RECORD, LONGEST_LINE = 2**31, 2**25  # bytes; a line of a candidate has some thousands
+LARGEST_RECORD, LONGEST_LINE = 2**31, 2**25  # maximum length of a line [bytes]; a candidate's line has some thousands
 Lines = dict[tuple[int, int], Candidate]  # (candidate id, rung) -> the candidate after this rung
 
 
@@ -36,9 +36,9 @@ class Record:
 
     lines: candidates by (id, rung), in the order of the file
     candidates: candidates in the order of their ids, each as recorded after the last rung that it has reached
-    notice: message about lines that were left out: an unfinished last line, for example after a power failure, or all
-        lines from a damaged one on; None without such lines
-    before_damage: whether only the lines before the first damaged line are used; otherwise, damage is an error
+    notice: message about ignored lines; None without such lines. They are an unfinished last line, for example after a
+        power failure, or a damaged line and all lines after it
+    before_damage: True if only the lines before the first damaged line are used; otherwise, damage is an error
     """
 
     path: Path
@@ -54,7 +54,7 @@ class Record:
     def read(cls, path: Path, config: RunConfig, before_damage: bool = False) -> Record:
         """Read a record, and check each line: its values, its agreement with `config` and earlier lines, its checksum.
 
-        before_damage: whether to use only the lines before the first damaged line, if there is one
+        before_damage: True to use only the lines before the first damaged line, if there is one
 
         Raises:
             RunError: the file cannot be read, or a line is damaged; the message names the file and the line.
@@ -95,7 +95,7 @@ class Record:
         return False
 
     def _leave_out(self, damage: str) -> None:
-        """Leave out a damaged line and all lines after it.
+        """Ignore a damaged line and all lines after it.
 
         Raises:
             RunError: `before_damage` is false.
@@ -137,7 +137,7 @@ class Record:
         self.candidates = _with(self.candidates, candidate)
 
     def cut_off_unused(self) -> None:
-        """Remove the lines that were left out from the file. If they include a damaged line, keep a copy of the file.
+        """Remove ignored lines from the file. If they include a damaged line, keep a copy of the file.
 
         Raises:
             RunError: the file cannot be written.

@@ -42,7 +42,7 @@ class StrangeFileError(OSError):
 def opened(path: Path, mode: Literal["rb", "r+b", "ab"] = "rb", create: bool = False) -> BinaryIO:
     """Open a run's file in the mode "rb", "r+b" or "ab". None of these modes truncates the file.
 
-    create: whether to create the file if it is missing
+    create: True to create the file if it is missing
 
     Raises:
         StrangeFileError: the path is not a regular file, or a file opened for writing has several hard links.
@@ -132,7 +132,7 @@ def sync_folder(path: Path) -> None:
     try:
         os.fsync(descriptor)
     except OSError as error:
-        if error.errno not in (errno.EINVAL, errno.ENOTSUP):  # other errors than the lack of this operation
+        if error.errno not in (errno.EINVAL, errno.ENOTSUP):  # an error other than the lack of this operation
             raise
     finally:
         os.close(descriptor)
@@ -143,7 +143,7 @@ def _descriptor(path: Path, flags: int, alone: bool = False) -> int:
 
     The check follows the opening, so that the file cannot be replaced between the two.
 
-    alone: whether a file with several hard links is refused
+    alone: True to refuse a file with several hard links
     """
     descriptor = os.open(path, flags | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC, 0o644)
     found = os.fstat(descriptor)

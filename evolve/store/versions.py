@@ -1,9 +1,10 @@
-"""Versions of the software and fingerprints of the settings, recorded at each start of a run."""
+"""Versions of the software, the machine and fingerprints of the settings, recorded at each start of a run."""
 
 from __future__ import annotations
 
 import hashlib
 import json
+import os
 import platform
 import subprocess
 from datetime import UTC, datetime
@@ -16,10 +17,23 @@ from evolve.store.atomic_files import write_whole
 from evolve.store.regular_files import read
 from optics.numerics.device import device
 
-__all__ = ["config_change", "fingerprint", "origin", "present", "record_start", "recorded"]
+__all__ = [
+    "commits",
+    "config_change",
+    "fingerprint",
+    "machine",
+    "machines",
+    "origin",
+    "present",
+    "provenance",
+    "record_start",
+    "recorded",
+    "run_id",
+]
 
 FILE, CONFIG = "versions.json", "config.toml"
-LARGEST_FILE = 2**24  # bytes; thousands of starts
+LARGEST_FILE = 2**24  # maximum size of the file [bytes], for thousands of starts
+NO_COSTS = ("per_receptor = 0.0", "per_eye = 0.0", "per_neuron = 0.0")  # lines of a config.toml
 PACKAGES = (
     "rhabdom",
     "numpy",
@@ -58,6 +72,52 @@ def commits(run: Path) -> list[str]:
     return list(dict.fromkeys(commit for commit in known if commit))
 
 
+def machine() -> str:
+    """Return the processor and the number of cores of this machine, such as "AMD EPYC, 2 cores"."""
+    return f"{_processor()}, {os.cpu_count()} cores"
+
+
+def machines(run: Path) -> list[str]:
+    """Return the machines that started or resumed a run, in order, each once.
+
+    Records of former versions state only the architecture, such as x86_64.
+    """
+    found = []
+    for start in _starts(run):
+        architecture = start["versions"].get("machine", "a machine")
+        found.append(str(start.get("processor", f"{architecture}, processor not recorded")))
+    return list(dict.fromkeys(found))
+
+
+def run_id(run: Path) -> str:
+    """Return the id of a run, which does not depend on its directory: 16 hexadecimal digits of a SHA-256.
+
+    It is computed from the first start of the run, with its time, settings and versions. It is "" if no start is
+    recorded.
+    """
+    starts = _starts(run)
+    return hashlib.sha256(json.dumps(starts[0], sort_keys=True).encode()).hexdigest()[:16] if starts else ""
+
+
+def provenance(run: Path) -> dict[str, Any]:
+    """Return values that identify a run in files that are made from it; unknown values are missing.
+
+    run: name of the run directory
+    run_id: see `run_id`
+    settings: fingerprint of its config.toml
+    run_commits: commits of rhabdom that started or resumed the run
+    commit: commit of this code
+    """
+    known = {
+        "run": run.resolve().name,
+        "run_id": run_id(run),
+        "settings": fingerprint(read(run / CONFIG, LARGEST_TOML).decode()),
+        "run_commits": commits(run),
+        "commit": _commit(),
+    }
+    return {name: value for name, value in known.items() if value}
+
+
 def config_change(run: Path, candidates: int) -> str | None:
     """Return a message if a run's config.toml has changed since the last start of the run; None otherwise.
 
@@ -85,10 +145,11 @@ def fingerprint(config: str) -> str:
     """Return the fingerprint of a run's config.toml.
 
     The fingerprint ignores lines that do not influence training and evaluation: comments, the number of workers, and
-    the number of generations.
+    the number of generations. It also ignores costs of 0, which files of former versions lack.
     """
-    left_out = ("workers =", "generations =", "#")
+    left_out = ("workers =", "generations =", "#", "[costs]")
     lines = [line.strip() for line in config.splitlines() if line.strip() and not line.startswith(left_out)]
+    lines = [line for line in lines if line not in NO_COSTS]
     return hashlib.sha256("\n".join(lines).encode()).hexdigest()[:16]
 
 
@@ -108,6 +169,7 @@ def record_start(run: Path, candidates: int, origin: str | None = None, config: 
         "time": datetime.now(UTC).isoformat(timespec="seconds"),
         "candidates": candidates,
         **_checksums(read(run / CONFIG, LARGEST_TOML) if config is None else config),
+        "processor": machine(),
         "versions": present(),
     }
     if origin is not None:
@@ -128,6 +190,17 @@ def _starts(run: Path) -> list[dict[str, Any]]:
         return [start for start in starts if isinstance(start["versions"], dict)]
     except (OSError, ValueError, KeyError, TypeError, RecursionError):
         return []
+
+
+def _processor() -> str:
+    """Return the processor's name if the system provides it."""
+    try:
+        for line in Path("/proc/cpuinfo").read_text().splitlines():
+            if line.startswith("model name"):
+                return line.partition(":")[2].strip()
+    except OSError:
+        pass
+    return platform.processor() or platform.machine()
 
 
 def _commit() -> str:

@@ -28,7 +28,8 @@ class Bitmap(ReadOnlyArrays):
     image: (n, n), (y, x), 1 (or True) for open parts, 0 (or False) for closed ones; rows grow with y.
 
     Raises:
-        ValueError: not square, more than 512 pixels along a side, more than 4,000 edges, or other values.
+        ValueError: image is not square, has more than 512 pixels along a side or more than 4,000 edges, or contains a
+            value other than 0 and 1.
     """
 
     image: Any
@@ -61,7 +62,7 @@ class Bitmap(ReadOnlyArrays):
 
 
 def _runs(image: np.ndarray) -> np.ndarray:
-    """Return the edges between rows as segments (n, 2, 2) of two ends (x, y), joined where they continue."""
+    """Return the edges between rows as segments (n, 2, 2), each with two ends (x, y). Adjoining edges are merged."""
     n = len(image)
     # Between rows, (n + 1, n): 1 if only the row at larger y is open, -1 if only the other one is.
     changes = np.diff(np.pad(image, ((1, 1), (0, 0))).astype(int), axis=0)

@@ -18,15 +18,15 @@ from optics.apertures.outline import TURN, Outline
 
 __all__ = ["Boundary", "boundary"]
 
-SHORTEST = 1e-9  # choice, radii: pieces that are shorter are left out
+SHORTEST = 1e-9  # choice, radii: shorter pieces are ignored
 COINCIDENT = 1e-11  # choice, radii: edges that are closer together count as one; rounding moves edges by 1e-15
 NEIGHBOURS = 1e-10  # choice, radii: pieces coincide only if their middles are closer together than this
-ASIDE = 1e-7  # choice, radii: largest distance from an edge of the two points that test what is open on either side
+ASIDE = 1e-7  # choice, radii: an edge's two sides are tested at points at most this far from it
 PARALLEL = 1e-12
-# Choice: position on a piece at which a line of the final check crosses it, and most lines.
+# Choice: the final check compares along lines. Position on a piece where its line crosses it; largest number of lines.
 ALONG, MOST_LINES = 0.3819660, 200
 NARROW = 1e-6  # choice, radii: narrower gaps are not compared with `contains`
-TOUCHING = 1e-9  # choice, squared shares: a near miss counts as an intersection; the only effect is one more cut
+TOUCHING = 1e-9  # choice, squared, relative to the radius: a near miss counts as an intersection, which only adds a cut
 
 Contains = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
@@ -94,7 +94,7 @@ def boundary(pieces: Outline, contains: Contains) -> Boundary:
 def _check(outline: Outline, pieces: Outline, contains: Contains) -> None:
     """Compare the outline with `contains` along lines through all pieces.
 
-    Area and quadrature use the outline alone. They would not reveal that a shape was lost.
+    Area and quadrature use the outline alone, so they would not reveal a missing shape.
 
     Raises:
         ValueError: outline and `contains` differ at some point.
@@ -122,7 +122,7 @@ def _check(outline: Outline, pieces: Outline, contains: Contains) -> None:
 def _edges(middle: np.ndarray, left: np.ndarray, pieces: Outline, contains: Contains) -> tuple[np.ndarray, np.ndarray]:
     """Return a mask of the pieces that belong to the boundary, and a mask of pieces with the opening on their right.
 
-    Pieces of the boundary lie between open and closed areas. Of coinciding pieces, only the first belongs to it.
+    Pieces of the boundary lie between open and closed areas. If several pieces coincide, only the first is kept.
 
     Both sides of a piece are tested at points that are closer to the piece than any other edge, however narrow the gap
     between the two edges.
@@ -157,9 +157,9 @@ def _cut_segments(pieces: Outline, points: np.ndarray) -> np.ndarray:
 
 
 def _near_segment(by_axis: list[np.ndarray], start: np.ndarray, end: np.ndarray) -> np.ndarray:
-    """Return the points (n, 2) within the range of x or of y of a segment, whichever is smaller.
+    """Return the points (n, 2) whose x or y lies within a segment's range. The axis with the smaller range counts.
 
-    by_axis: the points in the order of x, and in the order of y.
+    by_axis: all points sorted by x, and sorted by y.
     """
     axis = int(abs(end[1] - start[1]) < abs(end[0] - start[0]))
     low, high = sorted((start[axis], end[axis]))

@@ -35,7 +35,7 @@ MOST_NODES = 32
 
 @dataclass(frozen=True)
 class PixelatedAperture(Aperture):
-    """An opening with a smooth integrand in each of count x count pixels that fill [-1, 1]².
+    """An opening tiled by count x count pixels that fill [-1, 1]². The integrand may jump or bend at their borders.
 
     borders: ascending borders between pixels, from -1 to 1, the same along x and along y. None: all pixels are squares
         of the same size.

@@ -34,7 +34,7 @@ class SoftEdge:
     def cheapest(
         cls, passband: float, ripple: float, widest_reach: float, half_widths: tuple[float, float] = (1.0, 1.0)
     ) -> SoftEdge:
-        """Return the kernel whose transition needs the fewest samples over an aperture of these half widths.
+        """Return the kernel that needs the fewest samples for an aperture with these half widths.
 
         Let t be the width of the transition, h_x and h_y the half widths, s = h_x + h_y, and b = β/π = reach · t. The
         number of samples is proportional to (h_x + b/t) (h_y + b/t) (2 passband + t)². It is smallest at the only

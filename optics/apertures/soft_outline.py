@@ -107,8 +107,8 @@ class _Arc:
 
         The part of the arc within the kernel's reach is centred on the point's direction φ and has the half angle τ.
 
-        φ is shifted by whole turns until it lies less than one turn before the arc's middle. The part around φ or
-        around φ + 2π may overlap either end of the arc.
+        φ is shifted by whole turns until it lies less than one turn before the arc's middle. The arc may then overlap
+        the part around φ, the part around φ + 2π, or both.
         """
         import drjit as dr
 

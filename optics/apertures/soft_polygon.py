@@ -80,8 +80,9 @@ class _Line:
 
     d is the signed length of the perpendicular from the point.
 
-    Beyond the reach it is an angle. The whole chord within the reach comes from the profile of a half-plane, whose edge
-    is infinite. A piece that ends within the reach contributes ∫ d H(r) dt.
+    Parts of the line beyond the kernel's reach contribute the angle that they subtend. If the line passes through the
+    reach, the whole chord contributes a value tabulated for a half-plane. A piece that ends within the reach
+    contributes ∫ d H(r) dt.
     """
 
     def __init__(self, edge: SoftEdge, types: Precision) -> None:
@@ -97,7 +98,7 @@ class _Line:
         self.count = dr.opaque(types.Index, half)
 
     def between(self, d: Array, start: Array, end: Array) -> Array:
-        """Contribution from `start` to `end` at the signed distance d, positive inside."""
+        """Contribution of the line from `start` to `end` at the signed distance d, which is positive inside."""
         import drjit as dr
 
         near = dr.abs(d) < self.reach
@@ -107,7 +108,7 @@ class _Line:
         return self._to(end, d, near, half, chord, zero) - self._to(start, d, near, half, chord, zero)
 
     def _to(self, s: Array, d: Array, near: Array, half: Array, chord: Array, zero: Array) -> Array:
-        """W(d, s); `chord` is half the share of the whole chord, and 0 where the line is out of reach."""
+        """W(d, s). `chord` is half the contribution of the whole chord; it is 0 if the line is out of reach."""
         import drjit as dr
 
         within = near & (dr.abs(s) < half)

@@ -17,11 +17,11 @@ __all__ = ["ExitPupil", "read_exit_pupil"]
 
 MM, UM = 1e-3, 1e-6
 SECTORS, ROUND = 8, 0.9  # choice: each of 8 sectors must contain light out to 0.9 of the pupil's radius
-FULL = 0.8  # choice: the hull of the samples must fill this share of their circle. A hexagon fills 0.83, a square 0.64.
+FULL = 0.8  # choice: fraction of the circle that the samples' hull must fill. A hexagon fills 0.83, a square 0.64.
 NOT_ROUND = "the pupil is not round: only circles can be read"
 RAYS_PER_MODE = 3  # choice
 LIT = 1e-3  # choice: intensity from which on a sample counts as illuminated, relative to the brightest sample
-# Of samples that are partly covered by the rim, those with more than half of the amplitude have their centre inside.
+# If the rim covers part of a sample, the sample's centre lies inside when it keeps more than half of the amplitude.
 HALF = 0.5
 EVEN = 0.1  # choice: tolerance on amplitudes within ROUND of the radius, relative to their median
 # Choice: a central disk of 0.4 of the radius must contain at least 0.25 of the rays that an even distribution would
@@ -34,7 +34,7 @@ class ExitPupil:
     """An exit pupil with its wavefront.
 
     pupil: an ideal lens focused on the centre of the reference sphere, with the wavefront as Zernike modes.
-    distance: distance [m] to that centre, the image position of the other program.
+    distance: distance [m] from the pupil to that centre, which is the image position in the other program.
     rms: root mean square of the wavefront [m] without piston and tilt.
     residual: root mean square [m] of the difference between wavefront and fit.
     """
@@ -80,10 +80,10 @@ def read_exit_pupil(
 
 
 def _of_rays(system: Any, wavelength: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
-    """Return x and y on the tangent plane, the wave's lead there, and the radius of the reference sphere, all in m.
+    """Return points (x, y) on the tangent plane, the wavefront there, and the radius of the reference sphere, all in m.
 
-    The plane touches the reference sphere where the chief ray intersects it. A point of the sphere in direction θ is
-    mapped to R tan θ on the plane, with R the sphere's radius.
+    The plane touches the reference sphere at the chief ray. A point of the sphere in direction θ is mapped to R tan θ
+    on the plane, with R the sphere's radius. The wavefront is positive if it is ahead of the sphere.
     """
     x, y, z, opd, intensity = _alike(system)
     places = np.stack([x, y, z]) * MM
@@ -126,7 +126,7 @@ def _centre(places: np.ndarray, radius: float) -> np.ndarray:
 
 
 def _of_samples(system: Any, wavelength: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return positions x and y on the pupil's plane and the wave's lead there, the negative of its phase. All in m."""
+    """Return positions x and y on the pupil's plane and the wavefront there, the negative of the phase. All in m."""
     data, own = complexes("data", system.data), _one("wavelength", system.wavelength)
     pitch = positive("dx", _one("dx", system.dx), "mm") * MM
     if data.ndim != 2 or data.size == 0 or not np.isfinite(data).all():
@@ -157,8 +157,8 @@ def _check_even(amplitude: np.ndarray, x: np.ndarray, y: np.ndarray, lit: np.nda
 def _circle(x: np.ndarray, y: np.ndarray) -> tuple[tuple[float, float], float]:
     """Return the centre and the radius of the circle around the points.
 
-    The circle is fitted to all corners of their convex hull, because on a grid with an even number of samples a single
-    sample can lie on the rim (least squares; Kåsa, IEEE Trans. Instrum. Meas. 25, 8, 1976).
+    The circle is a least-squares fit to all corners of the convex hull (Kåsa, IEEE Trans. Instrum. Meas. 25, 8, 1976).
+    All corners are used, because a single sample can lie on the rim if the grid has an even number of samples.
 
     Raises:
         ValueError: the hull is not a disk.

@@ -9,14 +9,14 @@ import numpy as np
 
 __all__ = ["band_of", "power_beyond", "reach_of"]
 
-CUBIC = 4  # coefficients of one B-spline patch along an axis; slopes alone describe such a patch well
+CUBIC = 4  # coefficients of a cubic polynomial along an axis; slopes alone describe such a surface well
 
 
 def band_of(samples: np.ndarray, level: float) -> float:
-    """Return the frequency [cycles per half a side] above which the content of the samples is below `level` (rms).
+    """Return the frequency [cycles per half a side] above which the samples vary by less than `level` (rms).
 
-    Interpolation by cubic splines repeats content of frequency f at frequencies around multiples of the sampling rate.
-    These copies are weaker by the fourth power of the ratio of f to their frequency.
+    Interpolation by cubic splines repeats a component of frequency f around multiples of the sampling rate. A copy at
+    the frequency F is weaker by the factor (f/F)⁴.
     """
     n = len(samples)
     if n < 4:
@@ -34,13 +34,13 @@ def band_of(samples: np.ndarray, level: float) -> float:
 
 
 def power_beyond(samples: np.ndarray) -> np.ndarray:
-    """Return mean squares (n,) of the samples' content beyond increasing frequencies.
+    """Return the samples' power spectrum, summed from each frequency upwards: mean squares (n,).
 
-    Entry k is for frequencies along x or y of at least k/4 cycles per half a side.
+    Entry k contains all components whose frequency along x or along y is at least k/4 cycles per half a side.
 
-    The best-fitting bicubic polynomial is subtracted first, because it bends light according to its slopes and scatters
-    no light. The transform is a cosine transform. Its even continuation has no jumps, so the ends of the samples add no
-    detail.
+    The best-fitting bicubic polynomial is subtracted first: it bends light according to its slopes and scatters none. A
+    cosine transform is used, because its even continuation has no jumps. The ends of the samples therefore add no high
+    frequencies.
     """
     from scipy.fft import dctn
 
@@ -56,9 +56,9 @@ def power_beyond(samples: np.ndarray) -> np.ndarray:
 
 
 def reach_of(beyond: np.ndarray, level: float) -> float:
-    """Return the frequency [cycles per half a side] beyond which the content is below `level` (rms).
+    """Return the frequency [cycles per half a side] beyond which the samples vary by less than `level` (rms).
 
-    beyond: see `power_beyond`.
+    beyond: result of `power_beyond`.
     """
     more = np.flatnonzero(beyond > level**2)
     return float(more[-1]) / 4 if more.size else 0.0

@@ -59,7 +59,7 @@ class HumanEye:
         mm), a Zernike, or None.
 
     Raises:
-        ValueError: names argument, value and valid range.
+        ValueError: an argument is outside its valid range, which the message states.
     """
 
     aperture_radius: float = 1.5e-3
@@ -162,7 +162,7 @@ def mean_human_mtf(cycles_per_degree: Any, pupil_diameter: float) -> np.ndarray:
     pupil_diameter: d [m], 2 to 6 mm.
 
     Raises:
-        ValueError: names argument, value and valid range.
+        ValueError: an argument is outside its valid range, which the message states.
     """
     u = _not_negative(cycles_per_degree)
     d = in_range("pupil_diameter", pupil_diameter, 2e-3, 6e-3) * 1e3

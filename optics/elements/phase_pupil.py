@@ -26,7 +26,7 @@ NOT_BOTH = {"height": "a pupil has a phase or a relief", "n": "a phase has no re
 
 @dataclass(frozen=True)
 class SamePhase(Dispersion):
-    """A material in which a height causes the same phase at every wavelength, whatever surrounds it."""
+    """A material in which a height causes the same phase at every wavelength and in every surrounding medium."""
 
     def step(self, wavelength: float, before: float) -> Scalar:
         return wavelength / (2 * math.pi * METRES_PER_RADIAN)
@@ -43,8 +43,8 @@ def phase_pupil(aperture_radius: Scalar, phase: Any, *, pixels: bool = False, **
     aperture_radius: R [m].
     phase: φ [rad], (n, n), (y, x), samples at cell centres over the pupil's square [-R, R]². A Dr.Jit tensor carries
         derivatives.
-    pixels: whether each sample fills its square cell. Phases may then jump, for example by 2π. Otherwise cubic splines
-        join the samples, which must be unwrapped.
+    pixels: True if each sample fills its square cell, so that phases may jump, for example by 2π. False if cubic
+        splines join the samples, which must then be unwrapped.
     more: further arguments of `Pupil`, apart from height and n.
 
     Raises:

@@ -15,7 +15,7 @@ from optics.numerics.precision import Precision
 
 __all__ = ["PixelRelief"]
 
-REPETITIONS = 32  # choice: repetitions of the pixels' spectrum that count; at most 1/(π² 32) of the light lies beyond
+REPETITIONS = 32  # choice: repetitions of the pixels' spectrum to include; at most 1/(π² 32) of the light lies beyond
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,14 +61,14 @@ class PixelRelief(Relief):
         return 0.0
 
     def scatter(self, turns: float, opening: Aperture, share: float) -> float:
-        """Return the frequency [cycles per aperture radius] beyond which at most a share of the light is scattered.
+        """Return the frequency [cycles per radius] beyond which at most a fraction `share` of the light is scattered.
 
-        The frequency is along x and y. The distribution of the light is the discrete transform over the pixels. It is
-        repeated, and weighted with sinc² of a pixel's width.
+        The limit holds for frequencies along x and along y. The power spectrum behind the pupil is that of the samples
+        (a discrete Fourier transform), repeated periodically and multiplied by sinc², the power spectrum of one pixel.
 
-        turns: waves per metre of height [1/m].
+        turns: phase in waves per metre of height [1/m].
         opening: aperture of the pupil.
-        share: share of the light that passes the opening.
+        share: this fraction, relative to the light that passes the opening.
         """
         n = len(self._heights)
         centres = (np.arange(n) + 0.5) * 2 / n - 1
@@ -100,7 +100,7 @@ class PixelRelief(Relief):
 
 
 def _reach(power: np.ndarray, share: float) -> float:
-    """Return the frequency [cycles per aperture radius] beyond which at most this share of the power lies."""
+    """Return the frequency [cycles per radius] beyond which at most the fraction `share` of the power lies."""
     n = len(power)
     order = np.arange(-(n // 2) - n * REPETITIONS, n - n // 2 + n * REPETITIONS)
     sent = power[order % n] * np.sinc(order / n) ** 2

@@ -47,13 +47,13 @@ class Pupil:
         `union`, `difference` or `intersection` of shapes.
     wavefront: W [m in vacuum], the same at every wavelength. Zernike or WavefrontMap, over at least the pupil's circle.
     mask: M, the transmitted amplitude: GaussianMask or MaskMap. A PSF is relative to the light that falls on the open
-        aperture, so light absorbed by a mask reduces its sum.
+        aperture, so absorption in a mask reduces the PSF's sum.
 
     Radius, height, n, focal length and the numbers of W and M may be Dr.Jit arrays (tensors for maps) that carry
     derivatives.
 
     Raises:
-        ValueError: names argument, value and valid range.
+        ValueError: an argument is outside its valid range, which the message states.
     """
 
     aperture_radius: Scalar
@@ -118,7 +118,7 @@ class Pupil:
 
     @property
     def transmission(self) -> Scalar:
-        """Share of the light on the open aperture that the mask transmits. It carries derivatives; 1 without a mask."""
+        """Fraction of the light on the open aperture that the mask transmits (1 without a mask), with derivatives."""
         # Nothing is cached: a graph allows one backward pass, and gradients of Dr.Jit numbers may be enabled later.
         if is_differentiable(self.aperture_radius) or not (self.mask is None or self.mask.plain):
             import drjit as dr
@@ -241,7 +241,7 @@ class Pupil:
         return total
 
     def slopes(self, wavelength: float, source: PointSource) -> Slopes:
-        """Return the gradient of the path over the disk and its soft edge. Pixels of a relief count as level."""
+        """Return the gradient of the path over the disk and its soft edge. A relief's square pixels have no slope."""
         # The path depends on the wavelength only through these indices. Equal indices therefore give equal slopes.
         indices = number(self.index_step(wavelength)), self.index_before(wavelength), self.index_behind(wavelength)
         same = self._first_with.setdefault(indices, wavelength)
@@ -249,19 +249,19 @@ class Pupil:
 
     @cached_property
     def _first_with(self) -> dict[tuple[float, float, float], float]:
-        """First wavelength that was requested, for each set of indices."""
+        """For each set of refractive indices, the first wavelength that was requested."""
         return {}
 
     def scatter(self, wavelength: float, share: float) -> float:
-        """Return the frequency [1/m] along x and y beyond which at most a share of the light is scattered off its rays.
+        """Return the frequency [1/m] along x and y beyond which at most a fraction `share` of the light is scattered.
 
-        Light is scattered by a relief's jumps, by masks, and by ripples. The frequency of light from ripples is at most
-        the sum of their own frequency and the frequency that corresponds to their slopes (Carson's rule).
+        Jumps of a relief, masks and ripples scatter light away from geometrical rays. For ripples, the frequency is at
+        most that of the ripples plus the one that corresponds to their slopes (Carson's rule).
         """
         bends, found = self.bends(wavelength), 0.0
         rough = sum(p is not None and p.scatters for p in (self.height if bends else None, self.wavefront))
         each = share / max(1, rough + (self.mask is not None))
-        of_disk = each * self.aperture.area / math.pi  # samples cover the whole disk, but light only the opening
+        of_disk = each * self.aperture.area / math.pi  # mean over the disk, not the opening
         turns, level = number(self.index_step(wavelength)) / wavelength, math.sqrt(of_disk) / (2 * math.pi)  # waves
         if bends and isinstance(self.height, PixelRelief):
             found += self.height.scatter(turns, self.aperture, each) / self.radius
@@ -274,7 +274,7 @@ class Pupil:
         return found if self.mask is None else found + self.mask.detail(light, self.radius)
 
     def bandwidth(self, wavelength: float, tolerance: float) -> float:
-        """Return the frequency [1/m] above which the content of phase [rad] and mask amplitude is below `tolerance`.
+        """Return the frequency [1/m] above which phase [rad] and mask amplitude vary by less than `tolerance`.
 
         Jumps between pixels are excluded, because they are sampled separately.
         """

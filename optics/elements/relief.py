@@ -29,7 +29,7 @@ FEWEST_FOR_JUMPS = 16  # choice: fewest samples along a side of a relief with ju
 class Relief(ABC):
     """A height map [m] over the pupil."""
 
-    scatters = True  # the relief may send light into directions that do not follow from its slopes
+    scatters = True  # True if fine detail may scatter light into directions that do not follow from the slopes
 
     @abstractmethod
     def height(self, x: Array, y: Array, types: Precision) -> Array:
@@ -37,10 +37,10 @@ class Relief(ABC):
 
     @abstractmethod
     def bandwidth(self, level: float) -> float:
-        """Return the frequency [cycles per aperture radius] above which the relief's content is below `level` [m]."""
+        """Return the frequency [cycles per aperture radius] above which the relief varies by less than `level` [m]."""
 
     def detail(self, level: float) -> float:
-        """Return the frequency [cycles per radius] above which content that slopes do not describe is below `level`."""
+        """Return the frequency [cycles per radius] above which detail that scatters light is below `level` [m]."""
         return self.bandwidth(level)
 
     @property
@@ -55,7 +55,7 @@ class Relief(ABC):
 
     @property
     def jump(self) -> float:
-        """Largest step [m] between neighbouring samples that a smooth relief cannot resolve; 0 for none."""
+        """Largest step [m] between neighbouring samples if a smooth relief cannot represent it, else 0."""
         return 0.0
 
     @property
@@ -112,7 +112,7 @@ class BSplineRelief(Relief):
         - 3) a and the knot spacing δ = 2a.
 
         Raises:
-            ValueError: names argument, value and valid range.
+            ValueError: an argument is outside its valid range, which the message states.
         """
         finite("height", height), finite("curvature", curvature), positive("radius", radius)
         greville = (2 * np.arange(4) - 3) * radius
@@ -191,7 +191,7 @@ class HeightMap(Relief):
 
     @property
     def jump(self) -> float:
-        """Largest step between neighbours if at least half the span, as in a wrapped lens with many samples; else 0."""
+        """Largest step [m] between neighbours; 0 if it is at most half the span, unlike that of a wrapped lens."""
         many = len(self._heights) >= FEWEST_FOR_JUMPS
         steepest = max(np.abs(np.diff(self._heights, axis=axis)).max() for axis in (0, 1)) if many else 0.0
         return float(steepest) if steepest > self.span / 2 else 0.0
@@ -245,7 +245,7 @@ class HeightMap(Relief):
         return found
 
     def _cell(self, position: Array, n: int, width: int, types: Precision) -> tuple[Array, list[Array]]:
-        """Return the index of the first of the four coefficients that matter at a position, and their four weights."""
+        """Return the index of the first of the four spline coefficients at a position, and the weights of all four."""
         import drjit as dr
 
         half, shift = dr.opaque(types.Float64, n / 2), dr.opaque(types.Float64, self._margin - 0.5)
@@ -257,7 +257,7 @@ class HeightMap(Relief):
         return band_of(self._heights, level)
 
     def detail(self, level: float, part: float = 1.0) -> float:
-        """Return `Relief.detail` of a central square. part: its half side, also the unit of length of the frequency."""
+        """Return `Relief.detail` of a central square with the half side `part`, in cycles per half side."""
         return reach_of(_power_beyond(self, min(part, 1.0)), level)
 
     @property
@@ -274,7 +274,7 @@ class HeightMap(Relief):
 
 
 def _spline_coefficients(samples: np.ndarray, margin: int) -> np.ndarray:
-    """Return B-spline coefficients c = s - s''/6 of a cubic spline s along axis 0, `margin` more at either end."""
+    """Return B-spline coefficients c = s - s''/6 of a cubic spline s along axis 0, with `margin` more at either end."""
     from scipy.interpolate import make_interp_spline
 
     n = len(samples)

@@ -29,12 +29,13 @@ class Mask(ABC):
 
     @abstractmethod
     def bandwidth(self, level: float, radius: float) -> float:
-        """Return the spatial frequency [1/m] above which the mask's content is below `level`."""
+        """Return the spatial frequency [1/m] above which the mask's amplitude varies by less than `level`."""
 
     def detail(self, light: float, radius: float) -> float:
         """Return the frequency [1/m] along x and y beyond which the mask scatters at most a given amount of light.
 
-        light: this amount, as a mean over the disk of a pupil of this radius [m]. All incident light is 1.
+        light: this amount, averaged over the disk of the pupil, in units of the incident light.
+        radius: radius of the pupil [m].
         """
         return self.bandwidth(math.sqrt(light), radius)
 
@@ -81,7 +82,7 @@ class GaussianMask(Mask):
         return math.sqrt(max(-math.log(level), 1.0)) / (math.pi * number(self.waist))
 
     def detail(self, light: float, radius: float) -> float:
-        """Return the frequency f beyond which a share exp(-2π²w²f²) of the light lies."""
+        """Return the frequency f at which exp(-2π²w²f²), the fraction of the light beyond f, has the given value."""
         waist = number(self.waist)
         beam = (waist / radius) ** 2 / 2 * -math.expm1(-2 * (radius / waist) ** 2)
         return math.sqrt(max(-math.log(light / beam), 0.0) / 2) / (math.pi * waist)
@@ -127,7 +128,7 @@ class MaskMap(Mask):
         if (most := self._most()) > 1 + OVERSHOOT:
             raise ValueError(
                 f"samples jump, so that the spline through them reaches {most:.3g}: must be smooth amplitudes within "
-                "[-1, 1]; hard edges are apertures, as difference(Circle(), Disk(0.3))"
+                "[-1, 1]; for hard edges use an aperture, such as difference(Circle(), Disk(0.3))"
             )
 
     def _most(self) -> float:

@@ -28,11 +28,11 @@ UM = 1e-6
 
 
 class Aberration(ABC):
-    """Lead [m] of a wavefront that leaves the pupil, over a circle or a square.
+    """A wavefront aberration over a circle or a square: the length [m] by which the wavefront is ahead.
 
     radius: radius of the circle or half side of the square [m]. None: equal to the pupil's radius.
 
-    scatters: True if the wavefront may send light into directions that do not follow from its slopes.
+    scatters: True if fine detail may scatter light into directions that do not follow from the slopes.
     """
 
     scatters: ClassVar[bool] = True
@@ -40,18 +40,18 @@ class Aberration(ABC):
 
     @abstractmethod
     def ahead(self, x: Array, y: Array, types: Precision) -> Array:
-        """Return the lead [m] at positions in units of the radius; flat Dr.Jit Float64 arrays."""
+        """Return the length [m] by which the wavefront is ahead at (x, y) [radii]; flat Dr.Jit Float64 arrays."""
 
     @abstractmethod
     def bandwidth(self, level: float) -> float:
-        """Return the frequency [cycles per radius] above which the wavefront's content is below `level` [m]."""
+        """Return the frequency [cycles per radius] above which the wavefront varies by less than `level` [m]."""
 
     def detail(self, level: float, part: float = 1.0) -> float:
-        """Return the frequency [cycles per radius] along x and y above which content is below `level` [m] rms.
+        """Return the frequency [cycles per radius] along x and y above which fine detail is below `level` [m] rms.
 
-        Content that the slopes already describe does not count.
+        Fine detail is the part of the wavefront that scatters light away from the rays that follow from its slopes.
 
-        part: the pupil's radius relative to the wavefront's.
+        part: radius of the pupil divided by that of the wavefront.
         """
         return self.bandwidth(level)
 
@@ -63,7 +63,7 @@ class Aberration(ABC):
     @property
     @abstractmethod
     def span(self) -> float:
-        """Largest minus smallest value [m], or an upper bound of this difference."""
+        """Largest minus smallest value [m], or an upper bound on this difference."""
 
     @property
     def rotationally_symmetric(self) -> bool:
@@ -85,7 +85,7 @@ class Zernike(Aberration):
     Webb, J. Refract. Surg. 18, S652, 2002.
 
     coefficients_um: {(n, m): [µm]}, or a vector [µm] by the index j = (n(n + 2) + m)/2, piston first.
-    radius: radius [m] of the circle to which the coefficients refer, at least the pupil's radius. None: equal to it.
+    radius: radius [m] of the circle to which the coefficients refer, at least the pupil's radius. None: this radius.
 
     A Dr.Jit vector, or Dr.Jit numbers in a dictionary, carry derivatives.
 
@@ -160,7 +160,7 @@ class Zernike(Aberration):
         return max(1.0, self.order / 2) if self.span > level or self.asks else 0.0
 
     def detail(self, level: float, part: float = 1.0) -> float:
-        """Return 0: a mode has n/2 cycles, and its slopes, which grow with n² at the rim, cover higher frequencies."""
+        """Return 0: a mode has only n/2 cycles, and its slopes require higher frequencies, in proportion to n²."""
         return 0.0
 
     @property
@@ -204,7 +204,7 @@ class WavefrontMap(Aberration):
 
     samples: W, (n, n), (y, x). Values are positive if the wavefront is ahead, as in Zernike: they are the negative of
         an optical path difference. They must be unwrapped. Outside the pupil they must also be finite and smooth.
-    radius: half side [m] of the square, at least the pupil's radius. None: equal to it.
+    radius: half side [m] of the square, at least the pupil's radius. None: the pupil's radius.
 
     A Dr.Jit tensor of samples carries derivatives.
 

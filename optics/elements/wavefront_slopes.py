@@ -37,7 +37,7 @@ def _derivative(values: np.ndarray, step: float) -> np.ndarray:
 
 
 def _total(points: np.ndarray, to: list[np.ndarray], bend: tuple[float, float]) -> np.ndarray:
-    """Return |∇L + n (ξ - x) / D| between points of the pupil and target points, (target, point).
+    """Return |∇L + n (ξ - x) / D| for points ξ of the pupil and x of a plane at the distance D from ξ, (target, point).
 
     points: x, y, ∂L/∂x and ∂L/∂y of points of the pupil.
     to: x and y of the target points.
@@ -101,10 +101,10 @@ class Slopes(ReadOnlyArrays):
         return found
 
     def turning(self, distance: float, window: Grid, medium_n: float) -> tuple[float, float]:
-        """Return the largest slope |∇L + n (ξ - x) / D| of paths through the pupil and on to any point of the window.
+        """Return the largest slope |∇L + n (ξ - x) / D| of paths through points ξ of the pupil to points x of a window.
 
-        The window lies in a plane at `distance` [m]. The first of the two values is for the disk and its soft edge, the
-        second for the disk alone.
+        D is the distance between the points. The window lies in a plane at `distance` [m]. The first value is for the
+        disk and its soft edge, the second for the disk alone.
         """
         soft = self.distance_from_axis <= (1 + EDGE_REACH) * self.radius
         x, y = np.broadcast_arrays(self.grid.x[None, :], self.grid.y[:, None])
@@ -120,7 +120,8 @@ class Slopes(ReadOnlyArrays):
         ]
         bend = medium_n, distance
         to_centre = _total(points, [at[0] for at in around], bend)
-        # Between points of the window, slopes differ by at most n times the distance of the points over z.
+        # The slopes to two points of the window differ by at most n times the distance between these points, divided by
+        # z.
         most = medium_n * outermost / distance
         found = []
         for some in (slice(None), inside):

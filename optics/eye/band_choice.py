@@ -30,17 +30,18 @@ def choose_bands(
 ) -> SpectralBands:
     """Return the fewest bands that keep the predicted error of a receptor's signal within the tolerance.
 
-    The number is a power of two. The error is relative to the signal of white and is the sum of two terms:
+    The number is a power of two. The error is relative to the signal that a white surface gives. It is the sum of two
+    terms:
 
-    - The error for coloured surfaces: the largest difference from a quadrature to 1 nm, for reflectances (1 + cos(2π
-      λ/Λ + φ))/2 of any phase φ. Λ is the width of the receptors' range of wavelengths.
-    - The error of the kernels: the largest difference, over all scenes, between the kernels of white light that result
-      from n and from 2n bands.
+    - The error for coloured surfaces, compared with bands of 1 nm. It is the largest error for reflectances (1 +
+        cos(2πλ/Λ + φ))/2 of any phase φ, where Λ is the width of the receptors' range of wavelengths.
+    - The error of the kernels for white light: the largest difference, over all scenes, between the signals with n and
+        with 2n bands.
 
     kernels: function of wavelengths that returns kernels (wave, ky, kx), with samples_per_receptor cells along each
         side of a receptor. None: the kernel is the same for all wavelengths.
-    white: share of the signal of white that is transmitted by kernels wide enough to contain all light. None: the share
-    that the given kernels transmit.
+    white: fraction of the signal of a white surface that remains behind kernels wide enough to contain all light. None:
+        the fraction that remains behind the given kernels.
 
     Raises:
         AccuracyError: the error with 32 bands exceeds the tolerance.
@@ -68,9 +69,9 @@ def choose_bands(
 
 
 def _reflectance_error(chosen: SpectralBands, exact: SpectralBands, range_nm: tuple[float, float]) -> float:
-    """Return the largest error over all phases and channels: half the error of Σ w d e^{2πiλ/Λ}, as a modulus.
+    """Return the largest error for coloured surfaces over all phases φ and all channels.
 
-    w are the bands' weights and d is daylight.
+    It is half the modulus of the error of Σ w d e^{2πiλ/Λ}, with the bands' weights w and daylight d.
     """
     period = (range_nm[1] - range_nm[0]) * 1e-9
 

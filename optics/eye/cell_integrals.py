@@ -121,8 +121,8 @@ def _collocation(samples: int, degree: int) -> tuple[int, int, np.ndarray]:
 def _primitive(knots: np.ndarray, degree: int, at: np.ndarray, times: int) -> np.ndarray:
     """Return integrals (place, B-spline) of B-splines from the first knot, integrated once or twice.
 
-    The integral of B_j is a sum of B-splines of the next degree, from j on, times a share of the width of B_j (de Boor,
-    A Practical Guide to Splines, ch. X).
+    The integral of B_j is the sum of the B-splines of the next degree with index j or higher, times a fraction of the
+    width of B_j (de Boor, A Practical Guide to Splines, ch. X).
     """
     knots = np.concatenate([knots[:1]] * times + [knots] + [knots[-1:]] * times)
     found: np.ndarray = _bsplines(knots, degree + times, at).toarray()

@@ -61,15 +61,15 @@ class Eye(EyeSpec):
     pupil_turned: True if the pupil is rotated by 180° about the axis. The axes of `psf` are then those of the pupil.
     vertical_fov_deg: vertical field of view [degrees], 0.001 to 170, which determines the height of the receptors.
         None: receptors are square, and the height of the retina follows from the number of rows.
-    tolerance: relative L2 error of the PSF. It is also the error, relative to the signal of white, that each automatic
-        choice may cause in a receptor's signal.
+    tolerance: relative L2 error of the PSF. It is also the largest error that each automatic choice may cause in a
+        receptor's signal, relative to the signal that a white surface gives.
     dtype: "float32" or "float64", the type of PSF, kernel and signals.
 
     All parameters of the pupil, fov_deg and distances z may be Dr.Jit arrays that carry derivatives. Results that
     depend on such arrays are Dr.Jit tensors. All other results are NumPy arrays.
 
     Raises:
-        ValueError: names argument, value and valid range.
+        ValueError: an argument is outside its valid range, which the message states.
         AccuracyError: microvilli behind a pupil whose rays are too steep for the tolerance.
     """
 
@@ -77,7 +77,7 @@ class Eye(EyeSpec):
     def white_signal(self) -> Scalar:
         """Signal of a receptor that sees white everywhere, averaged over receptor types.
 
-        It is the throughput or, with waveguides, the share of the light that they absorb.
+        It is the throughput or, with waveguides, the fraction of the light that they absorb.
         """
         if self.waveguide is None:
             return self.throughput
@@ -116,12 +116,12 @@ class Eye(EyeSpec):
         enough to lose less than the tolerance (limits: see `receptive_field`). The kernel of the perfect lens is 1 x 1
         with the value 1.
 
-        The kernel is for light from the centre of each scene cell. Signals are then a² Σ_b weights[c, b] (kernel_b ⊗
-        radiance_b), averaged over each receptor's cells. `see` assumes light from all over each cell instead (see
-        `sight`).
+        The kernel treats the light of each scene cell as coming from its centre. Signals are then a² Σ_b weights[c, b]
+        (kernel_b ⊗ radiance_b), averaged over each receptor's cells. By default, `see` assumes light from all over each
+        cell instead (see `light_from` of `sight`).
 
-        With waveguides, the kernel is the share of the light from each cell, averaged over the cell, that a receptor
-        accepts. The cells lie around the receptor's direction. Signals are then not averaged over the receptor. ky and
+        With waveguides, the kernel is the fraction of each scene cell's light that a receptor accepts, averaged over
+        the cell. The cells lie around the receptor's direction. Signals are then not averaged over the receptor. ky and
         kx are even if samples_per_receptor is even. The sum of the kernel is relative to a square that absorbs all
         light.
 
@@ -164,14 +164,14 @@ class Eye(EyeSpec):
             the fewest within the tolerance.
         field_zones: number of kernels across the width of the field; or "auto". With 1, the kernel on the axis is used
             for the whole retina.
-        tolerance: largest error of a receptor's signal, relative to the signal of white, for any scene at most as
-            bright as white (None: the eye's tolerance).
+        tolerance: largest error of a receptor's signal, relative to the signal of a white surface, for any scene at
+            most as bright as white (None: the eye's tolerance).
         light_from: "cells" is exact for images whose radiance is constant within each cell. "centres" treats all light
-            of a cell as coming from its centre. It suits cells that contain means of finer detail, such as rendered
-            images. For these, its error is less than half that of "cells", O(samples_per_receptor^-2).
+            of a cell as coming from its centre. It suits cells whose radiance is the mean of finer detail, as in
+            rendered images. Its error is then less than half that of "cells", which is O(samples_per_receptor^-2).
 
         Raises:
-            ValueError: names argument, value and valid range.
+            ValueError: an argument is outside its valid range, which the message states.
             AccuracyError: see `optics.psf`, or the tolerance requires more kernels than the limit.
         """
         within = self.tolerance if tolerance is None else in_range("tolerance", tolerance, 1e-6, 0.5)
@@ -206,8 +206,8 @@ class Eye(EyeSpec):
 
         radiance: radiance (band, Y, X) of the scene's cells. A receptor consists of s x s cells of its own shape, with
             s = samples_per_receptor. Radiance is constant within each cell (for the alternative, see `light_from` of
-            `Eye.sight`). The scene is centred on the axis and dark outside. Its smallest size is h s x w s cells;
-            larger scenes exceed this height and this width by even numbers.
+            `Eye.sight`). The scene is centred on the axis and dark outside. It has at least h s x w s cells. A larger
+            scene must exceed this height and this width by even numbers.
         rng: random generator of the noise; None for signals without noise. Noise carries no derivative.
         z: distance [m] of the scene along the axis, a number or one per cell (Y, X).
         sight: kernels from `Eye.sight` with the same samples_per_receptor; None computes them. Objects outside its

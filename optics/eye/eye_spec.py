@@ -38,7 +38,7 @@ class EyeSpec:
     `optics.Eye` documents the fields and adds PSFs, kernels and signals.
 
     Raises:
-        ValueError: names argument, value and valid range.
+        ValueError: an argument is outside its valid range, which the message states.
         AccuracyError: microvilli behind a pupil whose rays are too steep for the tolerance.
     """
 
@@ -126,12 +126,13 @@ class EyeSpec:
 
     @property
     def throughput(self) -> Scalar:
-        """Throughput: a², times the open share of the aperture's disk, times the mask's transmission."""
+        """Throughput: a², times the open fraction of the aperture's disk, times the mask's transmission."""
         return self.aperture_throughput * (1.0 if self.pupil is None else self.pupil.transmission)
 
     @property
     def aperture_throughput(self) -> Scalar:
-        """Throughput without the mask. Signals are kernels times this; the kernels contain the mask's transmission."""
+        """Throughput without the mask, by which signals from kernels are multiplied. Kernels contain the mask's
+        transmission."""
         return throughput(self.relative_aperture, 1.0 if self.pupil is None else self.pupil.aperture.area / math.pi)
 
     @property

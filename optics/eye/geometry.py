@@ -62,8 +62,8 @@ def check_pupil(pupil: Pupil | None, width: float, full_aperture: float | None) 
     name, widest = ("sensor_width", width) if full_aperture is None else ("full_aperture", full_aperture)
     if 2 * number(pupil.aperture_radius) > widest * (1 + 1e-9):
         raise ValueError(
-            f"pupil.aperture_radius = {pupil.radius:g}: must be at most {name} / 2 = {widest / 2:g} m (of a patch of "
-            "retina, full_aperture says how wide a whole eye's pupil may be)"
+            f"pupil.aperture_radius = {pupil.radius:g}: must be at most {name} / 2 = {widest / 2:g} m (for a patch of "
+            "the retina, pass the diameter of the whole eye's widest pupil as full_aperture)"
         )
 
 

@@ -1,10 +1,10 @@
-"""Receptive fields of receptors that are waveguides: the share of the light on the pupil that their modes accept.
+"""Receptive fields of receptors that are waveguides: the fraction of the light on the pupil that their modes accept.
 
-Let E(v) be the share of a point source's light on the pupil that a waveguide accepts and absorbs, if the source is
-imaged at the position v [m] relative to the waveguide. If a receptor takes the area A of the retina, its kernel is
-E(v)/A, integrated over cells. For comparison, the signal of a square that absorbs all light is the mean over its area.
-The waveguide stands where the ray through the pupil's centre hits the retina, and points at that centre. The kernel of
-a source at the position u, for a receptor at r, has the argument r - u = -v, so that it is E rotated by 180°.
+A point source is imaged at the position v [m] relative to a waveguide. Let E(v) be the fraction of its light on the
+pupil that the waveguide accepts and absorbs. If a receptor occupies the area A of the retina, its kernel is E(v)/A,
+integrated over cells. For comparison, the signal of a square that absorbs all light is the mean over its area. The
+waveguide stands where the ray through the pupil's centre hits the retina, and points at that centre. The kernel of a
+source at the position u, for a receptor at r, has the argument r - u = -v, so that it is E rotated by 180°.
 """
 
 from __future__ import annotations
@@ -72,7 +72,7 @@ def check_guide(waveguide: Waveguide | None, pupil: Pupil | None, receptor: tupl
 
 
 def guided_kernel(pupil: Pupil, retina: Retina, z: Scalar, direction: tuple[float, float], guide: Guide) -> Array:
-    """Return the share of light that a receptor accepts from every cell around its direction: Dr.Jit (band, ky, kx).
+    """Return the fraction of light that a receptor accepts from each cell around its direction: Dr.Jit (band, ky, kx).
 
     ky and kx are even if `guide.cells` is even. The orientation is that of `receptive_field.visual_kernel`, which also
     documents the other arguments.
@@ -94,9 +94,9 @@ def guided_kernel(pupil: Pupil, retina: Retina, z: Scalar, direction: tuple[floa
 
 
 def _within(beam: Beam, spot: Spot, pitch: float, retina: Retina, guide: Guide) -> np.ndarray:
-    """Return E over the cells of a window that contains all of E, except for a share of at most the tolerance.
+    """Return E over the cells of a window that contains all of E, except for a fraction of at most the tolerance.
 
-    The window grows until it does. It is never wider than the light of `spot` and the waveguide together.
+    The window is widened until this holds. It is never wider than the light of `spot` and the waveguide together.
     """
     most = spot.half + _radius(guide.waveguide, beam)
     diffracted = guide.focal * beam.wavelength / (beam.pupil.radius * beam.pupil.index_before(beam.wavelength))
@@ -108,7 +108,7 @@ def _within(beam: Beam, spot: Spot, pitch: float, retina: Retina, guide: Guide) 
             _Cells(count, side / guide.focal, pitch / guide.focal, retina.tolerance)
             for count, side in zip(counts, retina.cell, strict=True)
         )
-        found, share = _seen(beam, spot, guide, rows, columns)
+        found, share = _accepted(beam, spot, guide, rows, columns)
         if share >= 1 - retina.tolerance or half == most:
             return found
         half *= WIDER
@@ -146,8 +146,8 @@ def _radius(waveguide: Waveguide, beam: Beam) -> float:
     return modes[0].radius * (1 + min(DEPTHS / modes[0].w, DEPTHS))
 
 
-def _seen(beam: Beam, spot: Spot, guide: Guide, rows: _Cells, columns: _Cells) -> tuple[np.ndarray, float]:
-    """Return E integrated over each cell, in terms of tangents, and the share of the total that the cells contain."""
+def _accepted(beam: Beam, spot: Spot, guide: Guide, rows: _Cells, columns: _Cells) -> tuple[np.ndarray, float]:
+    """Return E integrated over each cell, in terms of tangents, and the fraction of E that the cells contain."""
     from scipy.ndimage import map_coordinates
 
     middle = [math.tan(angle) for angle in beam.source.angle]

@@ -49,7 +49,7 @@ class KernelBank:
     averaged: bool = True
 
     def shares(self, shape: tuple[int, int], z: Any) -> list[Any]:
-        """Return the share (Y, X) of each node in every cell of a scene, one array per node.
+        """Return the interpolation weight (Y, X) of each node in every cell of a scene, one array per node.
 
         z: distances [m], a number or (Y, X).
 
@@ -132,7 +132,7 @@ def prepare(
         the retina.
     counts: number of depth layers, and of zones across the longer side of the retina; or "auto".
     averaged: True if a receptor's signal is the mean over its cells.
-    white: function that returns the share of the signal of white that the kernels transmit.
+    white: function that returns the fraction of the signal of a white surface that the kernels transmit.
     """
     s, depths = samples_per_receptor, _Range.from_distances(z)
     layers, zones = (
@@ -179,7 +179,7 @@ def _choices(
 
 
 def _rest(tolerance: float, spent: float | None) -> float | None:
-    """Return the remainder of a tolerance; None if nothing was used."""
+    """Return the remainder of a tolerance, or None if no part of it was used."""
     return tolerance - spent if spent else None
 
 

@@ -20,8 +20,8 @@ from optics.numerics.interpolation import linear_weights
 
 __all__ = ["Choice", "NodeChoice", "nodes", "worst_difference"]
 
-MOST_CHECKS = 8  # choice: number of kernels with which the error of a node count is measured
-CAUTION = 1.3  # choice: safety factor on this error, because the worst place may lie between the measured ones
+MOST_CHECKS = 8  # choice: largest number of kernels between nodes that are computed to measure the interpolation error
+CAUTION = 1.3  # choice: safety factor on this error, which may be larger at positions that are not measured
 Place = tuple[float, ...]
 
 
@@ -29,8 +29,8 @@ Place = tuple[float, ...]
 class Choice:
     """The chosen number of nodes for one stage ("depth" or "field"), with the reason.
 
-    predicted_error: error of a receptor's signal, relative to the signal of white, for any scene at most as bright as
-        white. None if the user requested the number.
+    predicted_error: error of a receptor's signal, relative to the signal of a white surface, for any scene at most as
+        bright as white. None if the user requested the number.
     """
 
     stage: str
@@ -72,8 +72,8 @@ class NodeChoice:
 
     kernel_at: function that returns the kernel at a place in [-1, 1]^axes.
     candidates: numbers of nodes to try, in ascending order.
-    white: function that returns the share of the signal of white that the kernels transmit. Errors are relative to this
-        share. It is less than 1 behind masks and with waveguides. With waveguides, a kernel has to be computed for it.
+    white: function that returns the fraction of the signal of a white surface that the kernels transmit. It is less
+        than 1 behind masks and with waveguides. Errors are relative to it. With waveguides, it requires a kernel.
     """
 
     stage: str
@@ -105,7 +105,7 @@ class NodeChoice:
         )
 
     def error(self, counts: tuple[int, ...]) -> float:
-        """Return the largest interpolation error of a signal with these nodes, relative to the signal of white."""
+        """Return the largest interpolation error with these nodes, relative to the signal of a white surface."""
         coarse = _places(nodes(n) for n in counts)
         worst = 0.0
         for place in checks(counts):
@@ -122,12 +122,12 @@ class NodeChoice:
 
 
 def worst_difference(terms: Sequence[tuple[float, np.ndarray]], samples_per_receptor: int) -> float:
-    """Return the largest absolute signal that Σ share · kernel can give for any scene with radiance in [0, 1].
+    """Return the largest absolute signal that Σ weight · kernel can give for any scene with radiance in [0, 1].
 
-    It is the sum over the positive part, or over the negative part, of the receptor's receptive field (kernel ⊗
-    receptor aperture).
+    It is the sum over the positive values of the receptive field (kernel ⊗ receptor aperture), or over the negative
+    values, whichever is larger.
 
-    terms: pairs of share and kernel (band, ky, kx).
+    terms: pairs of a weight and a kernel (band, ky, kx).
     """
     sides = np.max([kernel.shape for _, kernel in terms], axis=0)
     total = np.zeros(sides)

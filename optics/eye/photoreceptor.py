@@ -15,13 +15,13 @@ MOST_PHOTONS = 1e18  # counts of photons must fit into 64-bit integers
 
 
 def throughput(relative_aperture: Scalar, open_share: float = 1.0) -> Scalar:
-    """Return the throughput: a² times the open share of the aperture's disk.
+    """Return the throughput: a² times the open fraction of the aperture's disk.
 
     This is the pupil's open area divided by the area of the widest pupil. The result is a Dr.Jit array if
     relative_aperture is a Dr.Jit array.
     """
     a = in_range("relative_aperture", relative_aperture, 0.0, 1.0 + 1e-9, carried=True)
-    if a > 1:  # due to rounding
+    if a > 1:  # rounding could exceed 1
         relative_aperture = relative_aperture * (1 / a)
     return relative_aperture * relative_aperture * open_share
 

@@ -2,7 +2,7 @@
 
 If rays are nearly parallel to the axis, light has the same polarisation on the retina as at the pupil. Consider light
 of radiance I with a degree of polarisation p and an angle ψ. Microvilli with the azimuth φ and the dichroic ratio d
-then absorb the amount of unpolarised light of the same radiance, times
+then absorb as much as in unpolarised light of the same radiance, times
 
     1 + p (d - 1)/(d + 1) cos 2(ψ - φ),
 
@@ -27,9 +27,9 @@ __all__ = ["check_rays", "microvilli_of", "polarised_error", "taken_by"]
 
 Tile = tuple[tuple[Microvilli, ...], ...]
 
-# Choice: upper bound of the integrated difference between the vector focus and this model, relative to the signal of
-# white and to the squared sine of the steepest ray. The difference of a round pupil in focus is 0.54 to 0.59 up to NA
-# 0.5; see tests/optics/eye/test_polarization.py.
+# Choice: upper bound on the integrated difference between the vector focus and this model, relative to the signal of a
+# white surface and to the squared sine of the steepest ray. The difference of a round pupil in focus is 0.54 to 0.59 up
+# to NA 0.5; see tests/optics/eye/test_polarization.py.
 STEEP = 0.62
 
 
@@ -54,7 +54,8 @@ def microvilli_of(given: Any) -> Tile | None:
 
 
 def polarised_error(pupil: Pupil, distance: float) -> float:
-    """Return an upper bound of the error of polarised signals due to oblique rays, relative to the signal of white.
+    """Return an upper bound on the error in polarised signals due to oblique rays, relative to a white surface's
+    signal.
 
     distance: distance [m] of the retina from the pupil.
     """
@@ -63,7 +64,7 @@ def polarised_error(pupil: Pupil, distance: float) -> float:
 
 
 def check_rays(pupil: Pupil | None, distance: float, tolerance: float) -> None:
-    """Raise an AccuracyError if the error of polarised signals, relative to that of white, exceeds the tolerance."""
+    """Raise an AccuracyError if the bound of `polarised_error` exceeds the tolerance."""
     error = 0.0 if pupil is None else polarised_error(pupil, distance)
     if pupil is not None and error > tolerance:
         sine = pupil.radius / math.hypot(pupil.radius, distance)
@@ -77,7 +78,7 @@ def check_rays(pupil: Pupil | None, distance: float, tolerance: float) -> None:
 def taken_by(
     tile: Tile | None, resolution: tuple[int, int], radiance: np.ndarray, polarization: Any
 ) -> list[tuple[np.ndarray, Any]]:
-    """Return the Stokes parameters I, Q and U of a radiance (band, Y, X), each with its weight in receptors.
+    """Return the Stokes parameters I, Q and U of a radiance (band, Y, X), each with its weight in the signals.
 
     A weight is a number, or an array (h, w) with one entry per receptor.
 

@@ -64,8 +64,8 @@ class _WindowNeeds:
 
     half_window: half side [m] of the window around the geometric image.
     pitch: pitch [m] that resolves the PSF.
-    band: frequency [1/m] above which the spectrum contains less light than the tolerance.
-    half_of_rays: half side [m] of a window that contains the end points of rays, without diffraction.
+    band: frequency [1/m] above which the spectrum of the PSF is below the tolerance.
+    half_of_rays: half side [m] of a window that contains the hit points of rays, without diffraction.
     """
 
     half_window: float
@@ -91,7 +91,7 @@ class Spot:
 
     @property
     def half_of_rays(self) -> float:
-        """Half the side [m] of the square that contains the end points of rays, without diffraction."""
+        """Half the side [m] of the square that contains the hit points of rays, without diffraction."""
         return min(self.half, max(need.half_of_rays for need in self.needs))
 
     def window(self, pitch: float, beside: int = 0) -> Grid:
@@ -214,10 +214,10 @@ def perfect_psf(retina: Retina, radius: float) -> PSFResult:
 def _needs(beam: Beam, retina: Retina, centre: tuple[float, float]) -> _WindowNeeds:
     """Return the window and samples that the light of one wavelength requires.
 
-    The window may lose a share of the light equal to the tolerance. One half of it is for rays that end outside the
-    window, the other half for diffraction at the pupil's edge. If masks, pixels or fine detail scatter light, they use
-    half of the rays' half. Diffraction adds spatial frequencies, which are sines divided by λ. It therefore increases
-    the sine of a ray's angle θ by λ times these frequencies. The ray then ends at z tan θ.
+    The fraction of the light that the window loses may equal the tolerance. Half of it is for diffraction at the
+    pupil's edge, and half for rays that hit the retina outside the window. If masks, pixels or fine detail scatter
+    light, they use half of the rays' half. A spatial frequency is a sine divided by λ. Diffraction therefore increases
+    the sine of a ray's angle θ by λ times the added frequency, and the ray hits the retina at z tan θ.
 
     centre: geometric image (x, y) [m].
     """
@@ -226,7 +226,7 @@ def _needs(beam: Beam, retina: Retina, centre: tuple[float, float]) -> _WindowNe
     scattered = pupil.scatter(beam.wavelength, retina.tolerance / 4)
     diffracted = _beyond_edge(pupil, retina.tolerance / 2) + scattered
     half = WIDEST_TANGENT * z + radius
-    # In the worst case a mask transmits only the rays that end farthest away.
+    # In the worst case a mask transmits only the rays that land farthest away.
     share = retina.tolerance * number(pupil.transmission) / (4 if scattered else 2)
     shadow = _half_side(pupil.slopes(beam.wavelength, beam.source), (z, beam.index), centre, 1 - share)
     if math.isfinite(shadow):
@@ -243,7 +243,7 @@ def _needs(beam: Beam, retina: Retina, centre: tuple[float, float]) -> _WindowNe
 
 @lru_cache(maxsize=64)
 def _half_side(slopes: Slopes, behind: tuple[float, float], centre: tuple[float, float], share: float) -> float:
-    """Return the half side [m] of the square about `centre` that contains this share of the rays' end points.
+    """Return the half side [m] of the square about `centre` that contains this fraction of the rays' hit points.
 
     Results are cached, because all wavelengths have the same slopes if the glass has no dispersion.
 
@@ -255,14 +255,14 @@ def _half_side(slopes: Slopes, behind: tuple[float, float], centre: tuple[float,
 
 
 def _beyond_edge(pupil: Pupil, share: float) -> float:
-    """Return the frequency δ [1/m] beyond which an aperture's hard edge diffracts a given share of the light.
+    """Return the frequency δ [1/m] beyond which an aperture's hard edge diffracts a given fraction of the light.
 
     δ is measured from the geometric direction of the light.
 
     The squared spectrum of a straight edge, integrated over frequencies above f, is 1/(2π²f) per length of the edge. An
-    aperture of perimeter P and area A thus diffracts the share P/(2π²Aδ) of its light beyond δ. For a disk this is
-    1/(π²Rδ), as in the Airy pattern (Born & Wolf, §8.5.2). The share is larger behind a mask that is brighter along the
-    edge than on average.
+    aperture of perimeter P and area A thus diffracts the fraction P/(2π²Aδ) of its light beyond δ. For a disk this is
+    1/(π²Rδ), as in the Airy pattern (Born & Wolf, §8.5.2). The fraction is larger behind a mask that is brighter along
+    the edge than on average.
     """
     opening = pupil.aperture
     return _rim(pupil) * opening.outline.length / (2 * math.pi**2 * opening.area * pupil.radius * share)
@@ -286,5 +286,5 @@ def _rim(pupil: Pupil) -> float:
 
 
 def _cells_within(half: float, cell: float) -> int:
-    """Return the odd number of cells, with one centred on the image, that cover ± half."""
+    """Return the odd number of cells that cover ±half around the image, with one cell centred on it."""
     return 2 * math.ceil(max(half / cell - 0.5, 0) - 1e-6) + 1

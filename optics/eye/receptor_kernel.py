@@ -39,7 +39,10 @@ def receptor_kernel(eye: EyeSpec, retina: Retina, z: Scalar, direction: tuple[fl
 
 
 def white_share(kernels: np.ndarray, bands: SpectralBands) -> float:
-    """Return the share of white's signal in daylight that kernels (band, ky, kx) transmit, averaged over channels."""
+    """Return the fraction of a white surface's signal in daylight that kernels (band, ky, kx) transmit.
+
+    It is averaged over channels.
+    """
     seen = kernels.sum(axis=(1, 2)) * daylight(bands.wavelengths)
     return float((bands.weights @ seen).mean())
 

@@ -19,7 +19,7 @@ __all__ = ["at_receptors", "blur", "centred", "receptor_average", "with_centre"]
 def blur(
     scenes: Sequence[np.ndarray], kernels: Sequence[np.ndarray | Array], shape: tuple[int, int], types: Precision
 ) -> Array:
-    """Return the middle `shape` of Σ_l Σ_u kernels[l][b, u] scenes[l][b, v - u], Dr.Jit (band, *shape).
+    """Return the middle part of Σ_l Σ_u kernels[l][b, u] scenes[l][b, v - u], Dr.Jit (band, *shape).
 
     scenes: arrays (band, Y, X). Scenes are dark outside.
     kernels: one tensor or array (band, ky, kx) per scene, with odd ky and kx.
@@ -36,10 +36,14 @@ def blur(
 
 
 def _blurred(pairs: list[tuple[np.ndarray, Array]], shape: tuple[int, int], types: Precision) -> Array:
-    """Return one band as a flat array. The period of the sums is so long that wrapped parts land outside `shape`."""
+    """Return one band as a flat array.
+
+    The period of the transforms is long enough for wrapped parts to land outside the middle part.
+    """
     if all(kernel.shape == (1, 1) for _, kernel in pairs):
         return sum(_flat(centred(scene, shape), types) * kernel.array for scene, kernel in pairs)
-    # Parts of the scene beyond the kernel's reach have no effect. Neither have parts of the kernel beyond the scene.
+    # Parts of the scene beyond the kernel's reach have no effect, and parts of the kernel beyond the scene have none
+    # either.
     lit = [
         (centred(scene, _within(scene.shape, shape, kernel.shape)), kernel[_middle(kernel.shape, shape, scene.shape)])
         for scene, kernel in pairs
@@ -73,7 +77,7 @@ def _flat(array: np.ndarray, types: Precision) -> Array:
 
 
 def _within(scene: tuple[int, ...], shape: tuple[int, int], kernel: tuple[int, ...]) -> tuple[int, int]:
-    """Return the size of the part of the scene that affects the middle `shape`.
+    """Return the size of the part of the scene that affects the middle part of the image, whose size is `shape`.
 
     It is at most the scene's size and has the same parity.
     """
@@ -82,14 +86,14 @@ def _within(scene: tuple[int, ...], shape: tuple[int, int], kernel: tuple[int, .
 
 
 def _middle(kernel: tuple[int, ...], shape: tuple[int, int], scene: tuple[int, ...]) -> tuple[slice, slice]:
-    """Return slices of the part of the kernel through which some point of the scene affects the middle `shape`."""
+    """Return slices of the part of the kernel that contributes to the middle part of the image."""
     cuts = [max(0, k // 2 - (m + n) // 2) for k, m, n in zip(kernel, shape, scene, strict=True)]
     rows, columns = (slice(cut, k - cut) for cut, k in zip(cuts, kernel, strict=True))
     return rows, columns
 
 
 def centred(image: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
-    """Return the middle `shape` of (…, Y, X).
+    """Return the middle part, of size `shape`, of an image (…, Y, X).
 
     Raises:
         ValueError: the margins on both sides are not equal.
@@ -118,7 +122,10 @@ def at_receptors(image: Array, samples_per_receptor: int, types: Precision) -> A
 
 
 def with_centre(kernel: Array) -> Array:
-    """Return a kernel (band, ky, kx) with odd ky and kx. Even sides are extended by one, a shift by half a cell."""
+    """Return a kernel (band, ky, kx) with odd ky and kx.
+
+    An even side is extended by one cell, which shifts the kernel by half a cell.
+    """
     odd = [(side + 1) % 2 for side in kernel.shape[1:]]
     return type(kernel)(np.pad(kernel.numpy(), ((0, 0), *((more, 0) for more in odd)))) if any(odd) else kernel
 

@@ -1,4 +1,4 @@
-"""Signals of an eye's receptors for a scene, which the eye's kernels blur, with or without noise."""
+"""Signals of an eye's receptors for a scene: convolution with the eye's kernels, quantum catch, and noise."""
 
 from __future__ import annotations
 
@@ -20,7 +20,8 @@ __all__ = ["signals", "with_noise"]
 def signals(eye: EyeSpec, parts: Sequence[tuple[np.ndarray, Any]], bank: KernelBank, s: int, z: Any) -> Array:
     """Return the signals (channel, h, w) without noise.
 
-    parts: components of the light, (band, Y, X), each with its weight in receptors, a number or (h, w).
+    parts: components of the light, (band, Y, X), each with its weight in the signals, a number or one per receptor (h,
+        w).
     s: samples_per_receptor.
     z: see `Eye.see`.
     """

@@ -32,7 +32,7 @@ class Description:
     """Limits of an eye in white daylight, near its axis. Frequencies [cycles/degree] are in the visual field.
 
     relative_aperture: a, the pupil's diameter relative to that of a pupil with a throughput of 1.
-    throughput: a², times the open share of the aperture's disk, times the mask's transmission.
+    throughput: a², times the open fraction of the aperture's disk, times the mask's transmission.
     f_number: f/2R. f is the focal length that relates a distance x on the retina to the angle x/f; it is n₀/n times the
         distance to the retina. The brightness of the image is proportional to 1/f_number².
     wavelength: mean wavelength [m] of daylight, weighted by the receptors.

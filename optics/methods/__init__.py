@@ -21,7 +21,7 @@ fresnel              approximate: Fresnel and Fraunhofer, with their predicted e
 geometric            approximate: density of rays; the pinhole
 smythe               vector fields from fields that scalar methods propagate
 vector_sum           vector fields about a focus, as a sum of plane waves
-scalar_theory        upper bound of the error of scalar theory
+scalar_theory        upper bound on the error of scalar theory
 rays                 end points of rays in geometrical optics
 pupil_sampling       samples of the pupil for matrix products
 sine_samples         samples of the pupil that are evenly spaced in the sines of rays to the window

@@ -36,7 +36,7 @@ __all__ = [
 
 @dataclass(frozen=True)
 class GridSampling(SpectrumSampling):
-    """Spectrum of a pupil with a soft edge on a grid. pupil_period: number of its samples per period."""
+    """Spectrum of a pupil with a soft edge on a grid. pupil_period: number of the pupil's samples per period."""
 
     method: str
     edge: PupilEdge
@@ -84,7 +84,7 @@ def split_spectrum(problem: Problem) -> list[GridSampling]:
 
 
 def _samplings(problem: Problem, method: str) -> list[GridSampling]:
-    """Return samplings for tapers with increasing blur, up to the first that costs more than the one before.
+    """Return samplings for tapers with increasing blur, up to the first sampling that costs more than its predecessor.
 
     Tapers with little blur need more frequencies, and tapers with much blur a longer period. The cost therefore has a
     single minimum.
@@ -216,7 +216,7 @@ def versine(s2: Array) -> Array:
 
 
 def _paraxial_rest(spectrum: Field, beam: Beam, problem: Problem, how: SpectrumSampling) -> Field:
-    """Return Fresnel's integral of the field in the relay plane: the split-off paraxial part."""
+    """Propagate the field from the relay plane to the window by Fresnel's integral, the paraxial part."""
     u = how.sum(spectrum, how.spectrum, how.output_period, how.relay, +1)
 
     def onto_window(u: Field, period: Scalar) -> Field:

@@ -31,7 +31,7 @@ __all__ = ["FarFieldSampling", "far_field"]
 
 MOST_DIRECTIONS = 4096  # choice, limited by memory: largest number of directions along an axis
 STEEPEST_CORNER = 0.95  # choice: largest sine towards a corner of the window
-GRAZING = 0.98  # choice: largest sine of directions that interpolation at the rim of the window reads
+GRAZING = 0.98  # choice: largest sine among the directions that interpolation at the window's rim needs
 TRIED = 41  # choice: test positions between nodes, for each of 8 points on the rim
 # Choice: numbers of nodes along an axis to try.
 CHEBYSHEV_NODES = (1, 2, 3, 4, 5, 6, 8, 10, 12, 16)
@@ -89,7 +89,7 @@ def far_field(problem: Problem) -> list[FarFieldSampling]:
     pitch = 1 / (problem.turning + edge.stopband)
     pupil = Grid.square(2 * math.ceil(edge.outermost / pitch) + 1, pitch)
     oversampling = math.pi / _step(problem.ripple / 2)  # relative to the Nyquist rate of the field
-    # Interpolation reads directions beyond the rim of the window, but they must not reach grazing incidence.
+    # Interpolation needs directions beyond the window's rim, but they must not reach grazing incidence.
     finest = problem.wavelength * max(TAPS / (GRAZING - sine), TAPS / (GRAZING - corner))
     if finest / pitch >= MOST_DIRECTIONS:
         return []

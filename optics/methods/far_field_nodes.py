@@ -1,4 +1,4 @@
-"""Nodes of the window at which the slow factor of the far field is evaluated: the fewest that represent all nodes.
+"""Nodes of the window at which the far field's slow factor is evaluated: the fewest from which all others follow.
 
 The slow factor is interpolated between nodes, which are Chebyshev points in angle. Its values at most of these nodes
 are, within the tolerance, linear combinations of its values at a few of them. This is an interpolative decomposition

@@ -22,9 +22,9 @@ from optics.numerics.precision import opaque, precision
 
 __all__ = ["ParaxialSampling", "fraunhofer", "fresnel", "paraxial_integral"]
 
-RAYS, ENDS = 48, 24  # choice: number of rays at whose origins (RAYS) and ends (ENDS) the neglected phase is evaluated
+RAYS, ENDS = 48, 24  # choice: numbers of ray origins and of hit points at which the neglected phase is evaluated
 # Choice, in radii of a ray's first Fresnel zone: light from within this distance of the ray's origin adds up coherently
-# at its end.
+# at its hit point.
 ZONES = 3.0
 ROUNDING = 1e-15  # rounding error of sums of numbers near 1
 MUCH = 0.7  # choice: above this error, the field is unrelated to the exact field
@@ -104,8 +104,8 @@ def model_error(problem: Problem, curved: bool) -> float:
 
         q = (D/z)² e^{-ik(D - z - d²/2z)},   d = |x - ξ|, D = √(d² + z²)   (d² without ξ² in Fraunhofer's),
 
-    for light that arrives at the ends of rays. Light that adds up coherently at the end of a ray comes from a few
-    Fresnel zones around the ray's origin, or from the whole aperture if several rays may end in the same point. A phase
+    for light that arrives at the hit points of rays. Light that adds up coherently at a hit point comes from a few
+    Fresnel zones around the ray's origin, or from the whole aperture if several rays may hit the same point. A phase
     that is common to all this light causes no error.
     """
     rays = problem.rays
@@ -134,9 +134,9 @@ def model_error(problem: Problem, curved: bool) -> float:
 
 
 def _misplaced(problem: Problem) -> float:
-    """Return the error of Fraunhofer's integral if it shrinks a wide shadow to a spot.
+    """Return the error of Fraunhofer's integral for wide shadows, which the integral wrongly shrinks to a spot.
 
-    The error follows from the brightness of the spot relative to that of the exact light.
+    It follows from the brightness of the spot, relative to that of the exact light.
     """
     rays, cell = problem.rays, problem.window.dx**2
     assert rays is not None
@@ -148,8 +148,8 @@ def _misplaced(problem: Problem) -> float:
 def _places(problem: Problem, ends: Rays) -> tuple[np.ndarray, np.ndarray]:
     """Return the points of the window at which the error is evaluated.
 
-    They are the ends of rays, and points at a distance of one diffraction width from the ends. Points outside the
-    window are moved to its rim.
+    They are the hit points of rays, and points one diffraction width away from these. Points outside the window are
+    moved to its rim.
     """
     width = 0.6 * problem.wavelength * problem.distance / problem.radius  # close to Airy's first dark ring at 0.61
     window = problem.window

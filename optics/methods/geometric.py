@@ -35,7 +35,7 @@ class NoDerivativesError(ValueError):
 
 @dataclass(frozen=True)
 class RaySampling:
-    """Rays at nodes that are fitted to the edge. model_error: error of the intensity due to rays instead of waves."""
+    """Rays from nodes that are fitted to the edge. model_error: error of the intensity, since rays replace waves."""
 
     rule: tuple[Aperture, float, float]
     count: int
@@ -79,7 +79,7 @@ class RaySampling:
 
 @dataclass(frozen=True)
 class PinholeSampling:
-    """A PSF with all light in the cell where the ray through the pupil's centre ends."""
+    """A PSF with all light in the cell that the ray through the pupil's centre hits."""
 
     model_error: float
     seconds: float = CALL["pinhole"]
@@ -118,8 +118,8 @@ def geometric(problem: Problem) -> list[RaySampling]:
     """Return a sampling with enough rays for a smooth image.
 
     Every ray is spread by a quadratic B-spline over the window's cells. The spectrum of the spline falls like (πf
-    dx)⁻³, so it is negligible beyond f = error^(-1/3)/(π dx). The rays are dense enough for this frequency: their ends
-    are closer together than the window's pitch.
+    dx)⁻³, so it is negligible beyond f = error^(-1/3)/(π dx). The rays are dense enough for this frequency: their hit
+    points are closer together than the window's pitch.
     """
     rays = problem.rays
     if rays is None:
@@ -138,8 +138,8 @@ def geometric(problem: Problem) -> list[RaySampling]:
 def pinhole(problem: Problem) -> list[PinholeSampling]:
     """Return the sampling that puts all light into one sample.
 
-    However small the exact PSF is, the error relative to it is total, because its samples are intensities at points and
-    not means over cells. "auto" therefore never chooses this method.
+    The error is predicted as 100 %, even for a very small exact PSF, because samples of the exact PSF are intensities
+    at points and not means over cells. "auto" therefore never chooses this method.
     """
     if problem.pixelated is not None:
         return []
@@ -168,8 +168,8 @@ def _landings(beam: Beam, x: Array, y: Array, types: Precision) -> tuple[Array, 
 def _splat(x: Array, y: Array, weight: Array, problem: Problem, types: Precision) -> Array:
     """Return the weights that land in each cell of the window, divided by the area of a cell.
 
-    Each weight is spread over 3 x 3 cells by a quadratic B-spline. The nine shares add up to 1, so power is lost only
-    beyond the rim of the window.
+    A quadratic B-spline spreads each weight over 3 x 3 cells. The nine parts add up to the weight, so power is lost
+    only beyond the rim of the window.
     """
     import drjit as dr
 
@@ -201,11 +201,11 @@ def _ray_error(problem: Problem) -> float:
     """Return the relative L2 error of the ray density.
 
     The error is due to the fringes along the rim of the shadow, which are as wide as a Fresnel zone or a cell. The
-    error is total if rays cross, or if their ends are concentrated in an area that is smaller than diffraction or cells
-    allow.
+    error is 1 if rays cross, or if their hit points are concentrated in an area that is smaller than diffraction or
+    cells allow.
 
-    If the rays magnify the pupil by m, an edge produces the pattern of an edge without a lens at the distance z/m,
-    magnified by m. The reason is that a quadratic phase only scales Fresnel's integral (Goodman, eq. 4-17).
+    If the rays magnify the pupil by m, the fringes of an edge are those at the distance z/m without a lens, magnified
+    by m. The reason is that a quadratic phase only scales Fresnel's integral (Goodman, eq. 4-17).
     """
     rays, cell = problem.rays, problem.window.dx**2
     assert rays is not None

@@ -23,7 +23,7 @@ from optics.numerics.precision import Precision, opaque, padded_for_packets, pre
 
 __all__ = ["LowRankSampling", "low_rank"]
 
-# Choice: ranks to try.
+# Choice: ranks to try, in ascending order.
 RANKS = (1, 2, 3, 4, 5, 6, 7, 8, 10, 12, 14, 16, 20, 24)
 # Choice: allowed error of the slow factor at the pupil's rim, relative to the tolerance; see test_low_rank.py.
 RANK_RIPPLE = 0.4
@@ -36,7 +36,8 @@ MOST_BYTES = 288_000_000  # choice, limited by memory: largest matrix between pu
 class LowRankSampling:
     """Samples of the pupil, and the rank of the slow factor over the window.
 
-    rank: number of Chebyshev points per axis of the window. half_width: their range about the window's centre [m].
+    rank: number of Chebyshev points per axis of the window.
+    half_width: distance [m] from the window's centre within which these points lie.
     scale: distance c [m] in the Fourier kernel e^{-ik ξ·u/c}, with u the position in the window. It is 1 if samples are
         sines.
     """
@@ -112,16 +113,16 @@ def _sampling(problem: Problem, pupil: PupilSamples, half: float, scale: float) 
         + inner * (height + columns) * FOURIER_ENTRY
     )
     item = ITEM_BYTES[problem.dtype]
-    # Matrix between pupil and window, pupil, Fourier kernels while they are computed, and products.
+    # Memory of the matrix between pupil and window, the pupil, the Fourier kernels (while computed), and the products.
     needed = 4 * item * inner * inner + 8 * item * len(pupil.at) ** 2 + 40 * inner * (height + columns)
     needed += 4 * item * columns * (inner + height)
     return LowRankSampling(pupil, rank, half, scale, seconds, needed)
 
 
 def _rank(problem: Problem, pupil: PupilSamples, half: float, scale: float, most: int) -> int | None:
-    """Return the number of Chebyshev points along an axis that interpolate the slow factor, or None.
+    """Return the number of Chebyshev points per axis that interpolate the slow factor; None if `most` are too few.
 
-    Interpolation is tested for points on the rim of the soft aperture. None: no rank up to `most` is sufficient.
+    Interpolation is tested for points on the rim of the soft aperture.
     """
     angle = np.linspace(0, 2 * np.pi, 8, endpoint=False)[:, None]
     rim = pupil.outermost * np.cos(angle), pupil.outermost * np.sin(angle)
@@ -185,9 +186,9 @@ def _low_rank(beam: Beam, problem: Problem, how: LowRankSampling, types: Precisi
 
     A phase that cancels in the intensity is omitted. G varies slowly with x, so L_a interpolates it. u is the position
     in the window relative to its centre, and s is ξ/c or the sines of the samples. For each axis, the sums over the
-    points of interpolation and over ξ are combined: the field is A_y W A_xᵀ, two matrix products. A_x does not change
-    if window and samples are both mirrored. Along x, the matrices are therefore split into even and odd parts, which
-    halves the first product.
+    points of interpolation and over ξ are combined. The field is then A_y W A_xᵀ, two matrix products. A_x does not
+    change if window and samples are both mirrored, so the matrices are split into even and odd parts along x. This
+    halves the cost of the first product.
     """
     window = problem.window
     across_y = _fourier(sample_positions(window.shape[0], window.dx), problem, how)

@@ -1,8 +1,8 @@
 """The angular spectrum of a pupil of pixels. Sums over nodes within pixels replace the transform of a grid.
 
 To compute the spectrum up to a given frequency, the nodes must resolve this frequency within each pixel. Jumps between
-pixels also diffract light to higher frequencies, but this light needs no samples. All further steps are the same as for
-other pupils (`angular_spectrum`).
+pixels also diffract light to higher frequencies, which the nodes need not resolve. All further steps are the same as
+for other pupils (`angular_spectrum`).
 """
 
 from __future__ import annotations

@@ -29,8 +29,8 @@ __all__ = ["SLOPE_MARGIN", "Problem", "PupilEdge"]
 # Choice: factor on the steepest slope of a wavefront, because the grid of slopes may miss the steepest point.
 SLOPE_MARGIN = 1.02
 # Choice: amplitude ripple of the soft aperture and of the spectral taper, relative to the tolerance on intensity. The
-# relative error of the amplitude of edge-diffracted light is several ripples, and that of its intensity is twice as
-# large. In a window that contains no other light, the latter is half the tolerance.
+# relative error of the amplitude of edge-diffracted light is several ripples, and the relative error of its intensity
+# is twice as large: half the tolerance in a window that contains no other light.
 EDGE_RIPPLE_PER_TOLERANCE = 0.1
 DETAIL_PART = 0.1  # choice: phase [rad] of neglected detail, relative to the tolerance
 # Choice: factor by which detail is finer if derivatives by single numbers are requested. Such a derivative can be a
@@ -50,15 +50,16 @@ class Problem:
     phase_band: highest spatial frequency [1/m] in the pupil's phase, over the disk and its soft edge.
     phase_band_inside: the same over the disk alone, because a relief may be steep in the soft edge.
     detail: bandwidth [1/m] of the phase that the slopes of the wavefront do not include.
-    symmetric: whether the light behind the pupil is rotationally symmetric. even: whether it is even in x and in y.
+    symmetric: True if the light behind the pupil is rotationally symmetric.
+    even: True if it is even in x and in y.
     widest_band: frequency [1/m] beyond which light may be omitted (infinite: all light that reaches the window counts).
     reach: distance [m] from the axis within which all light lies, except for a fraction of the tolerance. Samples
         beyond it may be wrong, and edge-diffracted light may be less accurate (None: the whole window must be
         accurate).
     slopes: slopes of the wavefront.
     medium_n: refractive index behind the pupil.
-    masked: whether a mask scatters light to places that rays do not predict. Approximations then cannot predict their
-        error.
+    masked: True if a mask scatters light to places that rays do not predict, so that approximations cannot predict
+        their error.
     spread: spread of the light over the pupil, see `light_spread`.
     differentiated: whether the PSF carries derivatives.
     knots: cells that derivatives by the samples of maps require; None if no such derivatives are requested.
@@ -181,7 +182,7 @@ class Problem:
     @property
     def fade_ripple(self) -> float:
         """Allowed amplitude error of light beyond the band."""
-        return self.ripple if self.reach is None else 0.1  # choice: beyond the band there is hardly any light
+        return self.ripple if self.reach is None else 0.1  # choice: there is hardly any light beyond it
 
     @property
     def outermost(self) -> float:
@@ -193,9 +194,9 @@ class Problem:
 
     @property
     def waves(self) -> float:
-        """Largest number of waves in a phase before whole waves are subtracted.
+        """Largest phase, in waves, before whole waves are subtracted.
 
-        It contains the waves of the longest path, and those that the steepest slope adds up to over the radius.
+        It is the longest path plus the steepest slope times the radius, both in waves.
         """
         reach = self.radius + self.window.half_diagonal
         path = reach**2 / (math.hypot(reach, self.distance) + self.distance) / self.wavelength
@@ -209,7 +210,7 @@ class Problem:
 
     @property
     def scalar_error(self) -> float:
-        """Upper bound of the error of scalar theory."""
+        """Upper bound on the error of scalar theory."""
         return scalar_theory_error(self.steepest_sine, self.spread)
 
     def soft_edge(self, band: float) -> PupilEdge:

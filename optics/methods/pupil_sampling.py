@@ -99,8 +99,8 @@ class PixelSamples:
     def outermost(self) -> float:
         """Distance from the axis [m] beyond which the pupil is dark.
 
-        Pixels that the edge cuts also have nodes outside the aperture, but with the weight of the open part alone. The
-        edge itself lies within the radius.
+        Pixels that the edge cuts also have nodes outside the aperture, but the weights integrate over the open part
+        alone. The edge itself lies within the radius.
         """
         return self.radius * (1 + math.sqrt(2) * self.aperture.widest)
 

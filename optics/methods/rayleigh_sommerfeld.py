@@ -35,7 +35,7 @@ __all__ = [
 MOST_DIGITS = 14.0  # choice: most digits that can be requested of float64 sums, whose numbers have 16
 # Choice: digits beyond the tolerance. They are few, because the rule resolves the highest frequency everywhere.
 SPARE_DIGITS = 0.5
-ON_AXIS = 1e-9  # rounding: points closer to the x axis than this share of the radius lie on it
+ON_AXIS = 1e-9  # rounding: points closer to the x axis than this fraction of the radius lie on it
 # Choice, limited by memory: numbers of nodes up to which 128 or 16 rules are cached. Of larger rules, one is cached.
 SMALL_RULE, LARGE_RULE = 5000, 2**20
 AT_ONCE = 2**22  # choice, limited by memory: number of nodes that are summed at once
@@ -158,8 +158,8 @@ def node_count(aperture: Aperture, cycles: float, digits: float) -> int:
 def cached_nodes(aperture: Aperture, cycles: float, digits: float, halved: bool = False) -> Nodes:
     """Return the nodes of an aperture, from a cache if possible.
 
-    halved: whether to return only nodes on one side of the x axis. This is for mirror-symmetric pupils and points on
-        the x axis, for which both sides contribute the same.
+    halved: True to return only the nodes on one side of the x axis, for mirror-symmetric pupils and points on the x
+        axis. Both sides then contribute the same.
     """
     count = aperture.node_count(cycles, digits) or LARGE_RULE
     rules = _small_rules if count <= SMALL_RULE else _large_rules if count <= LARGE_RULE else _largest_rule

@@ -1,4 +1,4 @@
-"""Rays of a pupil in geometrical optics. Approximate methods predict their errors from the rays' end points."""
+"""Rays of a pupil in geometrical optics. Approximate methods predict their errors from the rays' hit points."""
 
 from __future__ import annotations
 
@@ -76,11 +76,11 @@ class Rays:
 
     @property
     def image_area(self) -> float:
-        """Area [m²] that the rays' ends cover, see `disk_area`."""
+        """Area [m²] that the rays' hit points cover, see `disk_area`."""
         return disk_area(self.to_x, self.to_y)
 
     def densest(self) -> list[tuple[float, float]]:
-        """Return two points (x, y): the median of the rays' ends, and their mean in the cell with the most rays."""
+        """Return two points (x, y): the median of the hit points, and their mean within the cell with the most rays."""
         counts, x, y = np.histogram2d(self.to_x, self.to_y, CELLS)
         i, j = np.unravel_index(counts.argmax(), counts.shape)
         within = (self.to_x >= x[i]) & (self.to_x <= x[i + 1]) & (self.to_y >= y[j]) & (self.to_y <= y[j + 1])
@@ -107,18 +107,18 @@ def disk_area(x: np.ndarray, y: np.ndarray) -> float:
 def brightness(area: float, cell: float) -> float:
     """Return the sum of squared samples of a PSF, times the area `cell` [m²] of a sample.
 
-    The PSF is a unit power that diffraction has spread over `area` [m²].
+    The PSF has unit power, which diffraction has spread over `area` [m²].
 
-    The result is 1/area. If samples are so coarse that one may hit the peak of the PSF without resolving it, the result
-    is that for the peak alone (the peak of the Airy pattern is π²/4 times the mean over its area).
+    The result is 1/area. If samples are so coarse that one may hit the PSF's maximum without resolving it, the maximum
+    alone determines the result (that of the Airy pattern is π²/4 times the mean over its area).
     """
     area = max(area, 1e-30)
     return max(1.0, (math.pi**2 / 4) ** 2 * cell / area) / area
 
 
 def mismatch(wrong: float, exact: float) -> float:
-    """Return the relative L2 error, with a margin, if wrong light replaces the exact light and hardly overlaps it.
+    """Return the relative L2 error, with a margin, of a PSF that hardly overlaps the exact PSF.
 
-    wrong, exact: brightness of the wrong and of the exact light, see `brightness`.
+    wrong, exact: `brightness` of this PSF and of the exact one.
     """
     return MARGIN * math.sqrt(1 + wrong / exact)

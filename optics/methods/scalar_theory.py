@@ -1,4 +1,4 @@
-"""An upper bound of the error of scalar theory, which can be computed before the PSF.
+"""An upper bound on the error of scalar theory. It is computed before the PSF.
 
 Let the unit vectors of two rays differ by Δs. The contrast of their interference is the product e·e' of their fields'
 directions. To second order in Δs it is 1 - Δs²/4 in unpolarised light, 1 - (Δs·p)²/2 in light polarised along p, and 1
@@ -57,7 +57,7 @@ def steepest_sine(radius: float, distance: float, leaving: float) -> float:
 
 
 def scalar_theory_error(sine: float, spread: float = ROUND) -> float:
-    """Return an upper bound of the relative L2 error of scalar theory's intensity if rays with up to this sine meet.
+    """Return an upper bound on the relative L2 error of the scalar intensity for rays with sines up to `sine`.
 
     The bound is valid for light of any polarisation. The window must contain the brightest point of the light and a few
     samples around it.
@@ -90,5 +90,5 @@ def _open_spread(aperture: Aperture) -> float:
 
 def _spread(nodes: Nodes, weight: np.ndarray) -> float:
     xx, yy, xy = (float(weight @ part) for part in (nodes.x**2, nodes.y**2, nodes.x * nodes.y))
-    total = float(weight.sum())  # it is 0 behind a mask that transmits no light
+    total = float(weight.sum())  # the weights sum to 0 behind a mask that transmits no light
     return float(np.linalg.eigvalsh([[xx, xy], [xy, yy]])[-1]) / total if total else 0.0

@@ -124,7 +124,8 @@ def _middle(centre: tuple[float, float], distance: float) -> tuple[float, float]
 def sine_samples(problem: Problem) -> SineSamples | None:
     """Return the fewest samples that resolve the combined phase of pupil and path.
 
-    The result is None if even spacing in sines is too uneven in the pupil, or if the grid would be too large.
+    The result is None if samples that are evenly spaced in sines are too uneven in the pupil, or if the grid would be
+    too large.
 
     The distance of two points in the pupil is at most z/cos³θ times the distance of their sines. The number of cycles
     per unit of sine is therefore the number of cycles per metre times this factor.

@@ -13,7 +13,7 @@ __all__ = ["FADES", "TAPER_END_SINE", "Taper", "tapers"]
 
 # Choice: sine at which the taper must end at the latest, because z tan θ has no bound at grazing incidence.
 TAPER_END_SINE = 0.9995
-# Choice: blurs to try, relative to the sum of the sizes of pupil and window.
+# Choice: blurs to try, relative to the size of the pupil plus that of the window.
 FADES = (0.03, 0.06, 0.12, 0.25, 0.5, 1.0, 2.0, 4.0)
 
 

@@ -28,7 +28,7 @@ class SpectrumSampling:
     taper: taper that fades the spectrum out.
     period: width [m] after which the field in the pupil's plane repeats. The spectrum's samples are 1/period apart.
     output_period: number of samples per period in the plane where the last transform starts (split) or ends (whole).
-    even: whether the field is even in x and y. A quarter of each plane is then sufficient.
+    even: True if the field is even in x and y. A quarter of each plane is then sufficient.
     """
 
     method: str

@@ -21,8 +21,9 @@ def positions(samples: int, dx: float) -> tuple[np.ndarray, np.ndarray]:
 def lens_path(x: np.ndarray, y: np.ndarray, focal_length: float) -> np.ndarray:
     """Return the optical path [m] through an ideal lens.
 
-    The path through (x, y) is shorter than the path through the centre by the same amount by which the distance from
-    (x, y) to the focus is longer. For a small pupil, it is -r²/2f relative to the centre (Goodman, eq. 5-10).
+    The lens makes all paths to the focus equally long: its path is shorter at (x, y) by the amount by which the
+    distance from (x, y) to the focus is longer. For a small pupil, it is -r²/2f relative to the centre (Goodman, eq.
+    5-10).
     """
     return focal_length - np.sqrt(x**2 + y**2 + focal_length**2)
 
@@ -39,8 +40,8 @@ def angular_spectrum_psf(path: np.ndarray, dx: float, radius: float, wavelength:
 
     path: (n, n), optical path [m] through the pupil at `positions(n, dx)`.
     dx: pitch [m]. It must be less than half the distance over which the phase changes by one wave. The width n dx must
-        be several times the width of the pupil, because the transform repeats the field beyond this width. radius,
-        wavelength, distance: radius of the pupil, wavelength in air and distance of the plane [m].
+        be several times the width of the pupil, because the transform repeats the field beyond this width.
+    radius, wavelength, distance: radius of the pupil, wavelength in air and distance of the plane [m].
     """
     x, y = positions(len(path), dx)
     # 1 inside, 0 outside; on the edge, about the covered fraction of a cell.
@@ -50,7 +51,7 @@ def angular_spectrum_psf(path: np.ndarray, dx: float, radius: float, wavelength:
     spectrum = np.fft.fft2(np.fft.ifftshift(field))  # plane waves of frequencies (fx, fy) [1/m] (§3.10.1)
     fx, fy = np.fft.fftfreq(len(path), dx)[None, :], np.fft.fftfreq(len(path), dx)[:, None]
     axial = np.sqrt(1 / wavelength**2 - fx**2 - fy**2 + 0j)  # cos θ / λ; imaginary for evanescent waves, which decay
-    spectrum = spectrum * np.exp(2j * np.pi * distance * axial)  # phase that each wave gains (eq. 3-74)
+    spectrum = spectrum * np.exp(2j * np.pi * distance * axial)  # phase shift of each plane wave (eq. 3-74)
     field = np.fft.fftshift(np.fft.ifft2(spectrum))  # sum of the waves in the plane behind
 
     return np.abs(field) ** 2 / (np.sum(inside) * dx**2)

@@ -35,7 +35,7 @@ DIGITS = 8.0  # choice: digits of the quadrature and of the sum
 class VectorSum:
     """Light that passes a pupil and arrives at samples around an image position c, window.centre.
 
-    aplanatic: whether the ray from ξ arrives at c with the sine ξ/z, and all rays arrive in phase.
+    aplanatic: True if the ray from ξ arrives at c with the sine ξ/z, and all rays arrive in phase.
     """
 
     beam: Beam

@@ -31,9 +31,10 @@ STEEP = 1e-2  # choice: a printed plan shows the error of scalar theory if it is
 
 
 class AccuracyError(ValueError):
-    """No method can meet the requested accuracy. The message states what is possible.
+    """No method can meet the requested accuracy. The message states which accuracy is possible.
 
-    what: description of the problem. remedy: settings that would work, given only if the caller alone can change them.
+    what: description of the problem.
+    remedy: settings that would work; omitted unless the caller can change them.
     """
 
     def __init__(self, what: str, remedy: str | None = None):
@@ -62,10 +63,9 @@ class Plan:
     samples: numbers of samples of the pupil (y, x), or numbers of nodes: (radial, angular), or (count, 1).
     padding: period of the pupil's transform divided by the number of its samples; 1 without a period.
     predicted_error: relative L2 error of the intensity over the window.
-    scalar_error: upper bound of the error of scalar theory, which depends on the steepest ray, for light of any
-        polarisation. It is an additional error that all methods share; only `optics.vector_focus` avoids it. The bound
-        is valid for windows that contain the brightest point of the light, but not for windows that are dark
-        everywhere.
+    scalar_error: upper bound on the error of scalar theory, for light of any polarisation. It depends on the steepest
+        ray and adds to `predicted_error`. All methods have it; only `optics.vector_focus` avoids it. The bound is valid
+        for windows that contain the brightest point of the light, but not for windows that are dark everywhere.
     seconds: predicted time of a call with compiled kernels on two cores; 0 without a prediction.
     options: all methods that were compared.
     derivative_error: upper bound of the relative L2 error of derivatives, for a random functional of the PSF. None: the

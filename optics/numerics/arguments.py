@@ -36,7 +36,7 @@ __all__ = [
 
 # Limits of positive numbers. Their squares, and ratios of the squares, stay within the range of double precision.
 SMALLEST, LARGEST = 1e-15, 1e15
-LONGEST_WAVE = 1.0  # larger values are probably wavelengths in nanometres
+LONGEST_WAVE = 1.0  # [m]; larger values are probably wavelengths in nanometres
 UNIT = " (550 nm is 550e-9)"
 LINE = 200  # most characters of a value in a message
 
@@ -79,7 +79,8 @@ def flag(name: str, value: Any) -> bool:
 def positive(name: str, value: float, unit: str = "m", *, infinite: bool = False, carried: bool = False) -> float:
     """Return `value` as a float; ValueError unless it is positive and its square is within double precision.
 
-    infinite: whether infinity is allowed. carried: see `without_derivative`.
+    infinite: True if infinity is allowed.
+    carried: see `without_derivative`.
     """
     number = _number(name, value, carried)
     if infinite and number == math.inf:

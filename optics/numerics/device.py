@@ -1,6 +1,7 @@
 """The device that Dr.Jit computes on: the processor, through LLVM, unless the environment selects a GPU.
 
-RHABDOM_DEVICE=cpu    the processor (default) RHABDOM_DEVICE=cuda   an NVIDIA GPU, for PSFs, eyes and rays
+RHABDOM_DEVICE=cpu    the processor (default)
+RHABDOM_DEVICE=cuda   an NVIDIA GPU, for PSFs, eyes and rays
 RHABDOM_DEVICE=auto   a GPU if Dr.Jit finds one, else the processor
 
 The physics of `sim` and the learner of `evolve` always run on the processor.

@@ -1,11 +1,11 @@
 """Fields that are even in x and y, stored on a quarter of the plane, and their Fourier sums.
 
-Of the factor exp(2πi jk/period), only the cosine contributes to a sum. A sum therefore takes a sixteenth of the
-products, and a phase factor takes a quarter of the sines.
+In sums over an even field, only the cosine of the factor exp(2πi jk/period) contributes. A sum therefore takes a
+sixteenth of the products, and a phase factor needs a quarter of the sines.
 
 Sample n//2 is the centre. If n is even, one side has one more sample than the other. The quarter extends from the
-centre to the last sample of the longer side. The last sample has no mirror image there, so it counts half on either
-side.
+centre to the last sample of the longer side. This sample has no mirror image on the shorter side, so its weight is
+halved.
 """
 
 from __future__ import annotations

@@ -38,7 +38,7 @@ __all__ = [
 ]
 
 LONGEST_FFT = 2**31
-SUM_ARRAYS = 4  # real arrays per array of a sum: real and imaginary part, each with one temporary array
+SUM_ARRAYS = 4  # number of real arrays that each complex array of a sum needs: two parts, each with a temporary array
 AT_A_TIME, FEWEST_LINES = 2**17, 16  # choice: samples transformed at once (a megabyte), and fewest lines
 
 
@@ -69,7 +69,7 @@ def dft2(
 
     The result is a Field on a grid of the given output pitch.
 
-    sign: sign of the exponent: -1 for the forward, +1 for the inverse transform. Neither is normalised.
+    sign: sign of the exponent: -1 for the forward, +1 for the inverse transform, both without normalisation.
     centre: (x, y) of the output's centre sample, in the unit of `pitch`.
     """
     grid = Grid(shape, pitch, centre)
@@ -210,7 +210,7 @@ def _fft(field: Field, period: int, shape: tuple[int, int], sign: int) -> tuple[
 def _fft_of_parts(
     parts: tuple[np.ndarray, np.ndarray], period: int, to: tuple[int, int], sign: int, types: Precision
 ) -> tuple[Array, Array]:
-    """Return the sum over both axes, in blocks of lines, because a whole padded plane exceeds the cache."""
+    """Return the sum over both axes, computed in blocks of lines because a padded plane exceeds the cache."""
     from scipy import fft
 
     turned, norm = (fft.fft, None) if sign < 0 else (fft.ifft, "forward")

@@ -76,7 +76,7 @@ def _matrix(types: Precision, n_out: int, n_in: int, period: Scalar, sign: int) 
 
 
 def by_halves(field: Field, period: Scalar, shape: Shape, sign: int) -> Parts:
-    """Return the same sum from u[j] + u[-j] and u[j] - u[-j], first along x and then along y."""
+    """Return the sum of `by_whole_matrices`, computed from u[j] ± u[-j], first along x and then along y."""
     types, (ny, nx), (my, mx) = field.types, field.grid.shape, shape
     cosine, sine = along_y = _quarter(types, mx, nx, period, sign)
     even, odd = _folded_columns(field)

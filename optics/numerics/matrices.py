@@ -21,7 +21,7 @@ def matmul(left: Array, right: Array, transposed: bool = False) -> Array:
 def complex_matmul(left: Parts, right: Parts, transposed: bool = False) -> Parts:
     """Return the product of two matrices, each a pair of real and imaginary part.
 
-    transposed: whether to transpose (not conjugate) `right`.
+    transposed: True to transpose (but not conjugate) `right`.
     """
     import drjit as dr
 

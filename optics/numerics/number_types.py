@@ -1,4 +1,5 @@
-"""Types of given arrays: half precision and masks are refused, and lazy operations of PyTorch are carried out."""
+"""Checks of arrays from the user. They refuse half precision and masked elements, and carry out lazy operations of
+PyTorch."""
 
 from __future__ import annotations
 

@@ -18,7 +18,7 @@ from optics.numerics.bessel import bessel_j
 
 __all__ = ["gauss_legendre", "gauss_legendre_count", "harmonics", "stepped_up"]
 
-NEWTON_STEPS = 10  # far more than convergence needs
+NEWTON_STEPS = 10  # iterations, far more than convergence needs
 STEPS = 16  # choice: values per octave in `stepped_up`; on average, cycles increase by half a step (2 %)
 
 

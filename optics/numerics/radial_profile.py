@@ -30,8 +30,8 @@ class RadialProfile:
     """A rotationally symmetric image up to the radius `rim` [m], as a function of the radius r. It is even in r.
 
     The image is computed at Chebyshev points on [0, radius], interpolated to a finer, evenly spaced table, and
-    interpolated from the table onto the grid. If the matrix between points and table would be too large, it is computed
-    at the positions of the table instead.
+    interpolated from the table onto the grid. If the matrix between points and table would be too large, the image is
+    computed at the positions of the table instead.
 
     An even function is approximated by a polynomial in r², so the Chebyshev points are radius · cos α with angles α in
     a quarter turn. `radius` exceeds the rim, because interpolation from the table reads points beyond the rim.
@@ -66,9 +66,9 @@ class RadialProfile:
         return self.points == self.table + TAPS - 1
 
     def pays(self, outputs: int) -> bool:
-        """Return whether the line has fewer points than the window has samples (`outputs`).
+        """Return whether computation along the radius needs fewer points than the window has samples (`outputs`).
 
-        This is not always the case: a window far off the axis needs only a short piece of a long line.
+        It may need more for a window far off the axis, which contains only a small part of the radii up to the rim.
         """
         return self.points < outputs
 
@@ -111,7 +111,9 @@ class RadialProfile:
 
 @dataclass(frozen=True)
 class DistinctRadii:
-    """The distinct radii of a window's samples. They are used if a window has few samples but covers many zones.
+    """The distinct radii of a window's samples, at which the image is computed without interpolation.
+
+    They are used if a window has few samples for the structure that it contains.
 
     The number of distinct radii of a square about the axis is less than an eighth of the number of its samples.
     """

@@ -1,6 +1,6 @@
-"""Read-only arrays. Results share the arrays that they store with later results, so these arrays must not change.
+"""Read-only arrays. Several results may share the same stored array, so it must not change.
 
-Arrays that a function computes and does not store belong to the caller, who may write into them.
+An array that a function computes and does not store belongs to the caller, who may write into it.
 """
 
 from __future__ import annotations

@@ -51,7 +51,7 @@ class ModesAtPupil:
     area: float
 
     def power(self, sine_x: np.ndarray, sine_y: np.ndarray) -> np.ndarray:
-        """Return the share of the light on the pupil that enters each mode, (mode, direction).
+        """Return the fraction of the light on the pupil that enters each mode, (mode, direction).
 
         sine_x, sine_y: sines of the light's directions, relative to the sines of the source's direction.
         """
@@ -65,10 +65,10 @@ class ModesAtPupil:
         return found
 
     def power_on(self, sines: Grid, taken: np.ndarray, digits: float = DIGITS) -> np.ndarray:
-        """Return the share of the light on the pupil that the modes accept, weighted and added up, (y, x).
+        """Return the fraction of the light on the pupil that the modes accept, weighted and added up, (y, x).
 
         sines: grid of sines of the light's directions.
-        taken: weight of each mode, for example the share of its light that is absorbed.
+        taken: weight of each mode, for example the fraction of its light that is absorbed.
         """
         per_sample = self.wavenumber / (2 * math.pi) * sines.dx
         sums = ScatteredSum(self.x * per_sample, self.y * per_sample, sines.shape, digits)

@@ -28,11 +28,11 @@ class FacetLens:
     thickness: thickness [m] of the lens on its axis.
     n, object_n, medium_n: refractive indices of the lens, of the medium in front of it, and of the cone behind it. Each
         is a number or a dispersion curve. With curves, the focus of an `Ommatidium` with this lens depends on the
-        wavelength. The lens' `pupil` has the same focus for all wavelengths.
+        wavelength, but `pupil` has the same focus for all wavelengths.
     shape: "hexagon", with corners along y, or "circle".
 
     Raises:
-        ValueError: names argument, value and valid range, or the lens does not focus.
+        ValueError: an argument is outside its valid range, which the message states, or the lens does not focus.
     """
 
     diameter: float

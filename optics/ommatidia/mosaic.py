@@ -16,7 +16,7 @@ from optics.ommatidia.ommatidium import Ommatidium
 __all__ = ["AppositionEye", "hexagonal_directions"]
 
 MOST_RINGS = 60
-PER_CYCLE = 4  # choice: directions per λ/D, the finest detail in the sensitivity of a facet
+PER_CYCLE = 4  # choice: number of directions per λ/D, the width of the finest detail in a facet's sensitivity
 WIDTHS = 3.0  # choice: half width of an ommatidium's field, in acceptance angles
 FINEST = 0.5  # sine of the widest direction
 
@@ -47,7 +47,7 @@ class AppositionEye:
     interommatidial_deg: Δφ between neighbours.
 
     Raises:
-        ValueError: names argument, value and valid range.
+        ValueError: an argument is outside its valid range, which the message states.
     """
 
     ommatidium: Ommatidium
@@ -97,7 +97,8 @@ class AppositionEye:
         """Return the contrast of a sine grating in an ommatidium's signal: the transform of the angular sensitivity.
 
         The contrast falls as the grating becomes finer. It is 0 beyond 2R n/λ cycles per radian, where n is the index
-        in front of the lens. (The array of ommatidia resolves gratings up to 1/(√3 Δφ).)
+        in front of the lens. The spacing of the ommatidia is a separate limit: their array resolves gratings up to
+        1/(√3 Δφ).
 
         Raises:
             ValueError: a negative frequency, or numbers that are not finite.

@@ -18,7 +18,7 @@ from optics.ommatidia.waveguide import Mode, Waveguide
 
 __all__ = ["Ommatidium", "snyder_acceptance"]
 
-STEEPEST = (0.03, 0.06, 0.12, 0.25, 0.5)  # sines of directions, in ascending order, for which modes are prepared
+STEEPEST = (0.03, 0.06, 0.12, 0.25, 0.5)  # ranges of directions (sines) for which modes are prepared
 ALONG = 121  # choice: directions in the search for an acceptance angle
 WIDE = 6.0  # choice: range of these directions, relative to the sum of λ/D and the angle of the rhabdom
 
@@ -34,7 +34,7 @@ class Ommatidium:
         all wavelengths, but a FacetLens with dispersion curves focuses each wavelength at its own distance.
 
     Raises:
-        ValueError: names argument, value and valid range.
+        ValueError: an argument is outside its valid range, which the message states.
     """
 
     lens: FacetLens | Pupil
@@ -70,7 +70,7 @@ class Ommatidium:
         return self.rhabdom.modes(wavelength)
 
     def mode_power(self, angle_x: np.ndarray, angle_y: np.ndarray, wavelength: float = 500e-9) -> np.ndarray:
-        """Return the share of the light on the facet that enters each mode, (mode, ...), from a distant point source.
+        """Return the fraction of a distant point source's light on the facet that enters each mode, (mode, ...).
 
         angle_x, angle_y: direction [rad] of the source, along x and y off the lens' axis. The light travels in the
             opposite direction, so the angles of its `PointSource` are the negative of these.
@@ -94,7 +94,7 @@ class Ommatidium:
         return found.reshape(len(found), *x.shape)
 
     def sensitivity(self, angle_x: np.ndarray, angle_y: np.ndarray, wavelength: float = 500e-9) -> np.ndarray:
-        """Return the share of the light on the facet that the rhabdom absorbs, from a distant point source.
+        """Return the fraction of a distant point source's light on the facet that the rhabdom absorbs.
 
         angle_x, angle_y: see `mode_power`; arrays of any shape. The result has the same shape.
 
@@ -107,8 +107,8 @@ class Ommatidium:
     def acceptance_angle(self, wavelength: float = 500e-9, azimuth_deg: float = 0.0) -> float:
         """Return the acceptance angle Δρ [rad]: the full width at half maximum of the sensitivity.
 
-        It is measured along a line through the axis at an azimuth from x. If there are several lobes, the outermost
-        angles at half maximum count.
+        It is measured along a line through the axis at an azimuth from x. If the sensitivity has several lobes, the
+        angle is that between the two outermost directions at half maximum.
 
         Raises:
             ValueError: see `mode_power`.

@@ -1,4 +1,4 @@
-"""Radiation of a waveguide's modes at a pupil's points.
+"""Field that the modes of a waveguide radiate to the points of a pupil.
 
 In coordinates around the waveguide's axis, the radiated field is cos lφ or sin lφ, times a function of the angle θ from
 this axis and of the distance D:
@@ -6,9 +6,9 @@ this axis and of the distance D:
     Ψ(ξ) = z e^{ikD} cos lφ G(sin θ, D),   G = ∫ ψ(x) (1/d - ik)/(2πd²) e^{ik(d - D)} dx,   d = |ξ - x|.
 
 z is the distance of the waveguide's end from the pupil's plane. The end of a waveguide off the pupil's axis is oblique
-to this plane. The error of Ψ is then up to 5e-3 of the largest value of Ψ. The integral G is computed at Chebyshev
-points in sin θ and 1/D, and interpolated between them by polynomials. For a waveguide on the pupil's axis, D is z/cos
-θ, so G depends on sin θ alone.
+to this plane. Ψ then has an error of up to 5e-3 of its largest value. The integral G is computed at Chebyshev points in
+sin θ and 1/D, and interpolated between them by polynomials. For a waveguide on the pupil's axis, D is z/cos θ, so G
+depends on sin θ alone.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from optics.ommatidia.waveguide import Mode
 __all__ = ["DIGITS", "radiated", "reach"]
 
 DIGITS = 6.0  # choice: digits of all sums
-FAR = 14.0  # choice: a mode's field is neglected where it has decayed by e^-14 from the core's edge
+FAR = 14.0  # choice: a mode's field is neglected after it has decayed by e^-14 from the core's edge
 # Choice: limit of the field in core radii, for modes near their cut-off. A limit of 100 radii would take up to seven
 # times as long and change the result by 2e-4.
 FARTHEST = 40.0
@@ -53,11 +53,11 @@ def radiated(
 ) -> np.ndarray:
     """Return Ψ of each mode at points of a pupil, (mode, point), up to a constant phase.
 
-    end: position (x, y, z) [m] of the waveguide's end, relative to the pupil's centre. The waveguide's axis passes
-        through both points.
+    end: position (x, y, z) [m] of the waveguide's end, relative to the pupil's centre. The waveguide's axis joins these
+        two points.
     k: wavenumber [1/m] behind the pupil.
     """
-    sine, phi, distance = _seen_from(x, y, end)
+    sine, phi, distance = _in_guide_frame(x, y, end)
     function = (_along_axis if end[:2] == (0.0, 0.0) else _aside)(modes, sine, distance, k)
     excess = (x * x + y * y - 2 * (x * end[0] + y * end[1])) / (distance + math.hypot(*end))
     sphere = end[2] / distance**2 * np.exp(1j * k * excess)
@@ -98,7 +98,7 @@ def _aside(modes: tuple[Mode, ...], sine: np.ndarray, distance: np.ndarray, k: f
     return lambda mode: np.asarray(((by_sine @ table[mode]) * by_nearness).sum(axis=1))
 
 
-def _seen_from(x: np.ndarray, y: np.ndarray, end: tuple[float, float, float]) -> tuple[np.ndarray, ...]:
+def _in_guide_frame(x: np.ndarray, y: np.ndarray, end: tuple[float, float, float]) -> tuple[np.ndarray, ...]:
     """Return sin θ, φ and D of points of a pupil, in the frame of the waveguide's end.
 
     This frame is the pupil's frame, rotated along the shortest arc from the pupil's axis to the waveguide's axis.
@@ -126,7 +126,7 @@ def _between(ends: Ends, radians: float, spare: int) -> np.ndarray:
 def _integrated(modes: tuple[Mode, ...], sine: np.ndarray, distance: np.ndarray, k: float) -> np.ndarray:
     """Return G D² at places (sin θ, D), (mode, place), by quadrature."""
     u, v, weight = _mode_nodes(modes, k * float(sine.max()))
-    # G of a mode with sin lφ equals that of its twin with cos lφ. Only the twin is nonzero at φ = 0, so it is used.
+    # G is the same for the modes with sin lφ and with cos lφ. Only the cosine is nonzero at φ = 0, so it is used.
     amplitude = np.stack([weight * replace(mode, sine=False).field(u, v) for mode in modes], axis=1)
     found = np.empty((len(sine), len(modes)), dtype=complex)
     step = max(1, PAIRS // u.size)

@@ -52,9 +52,9 @@ class Mode:
 
     @property
     def core_share(self) -> float:
-        """Share of the mode's light that travels within the core and can be absorbed.
+        """Fraction of the mode's light that travels within the core and can be absorbed.
 
-        The share is (W² + U²κ)/V² with κ = K_l²/(K_{l-1} K_{l+1}) (Gloge 1971, eq. 17).
+        The fraction is (W² + U²κ)/V² with κ = K_l²/(K_{l-1} K_{l+1}) (Gloge 1971, eq. 17).
         """
         square = self.u**2 + self.w**2
         return 1 - self.u**2 / square * (1 - self._kappa())
@@ -66,7 +66,7 @@ class Mode:
         return here * here / (below * above)
 
     def _square(self) -> float:
-        """Return the integral of the squared field, if the field is 1 at the core's edge, in closed form with κ."""
+        """Return the integral of the squared field, scaled to 1 at the core's edge, in closed form with κ."""
         azimuth = math.pi * (2 if self.l == 0 else 1)
         outside = self.radius**2 / 2 * (1 / self._kappa() - 1)
         return azimuth * outside / (1 - self.core_share)
@@ -80,11 +80,11 @@ class Waveguide:
     n_core, n_clad: refractive indices of core and surroundings, constant or dispersive. The index of the core should be
         only slightly larger, because modes are computed for weak guiding.
     length: length [m] over which light is absorbed (None: all guided light is absorbed).
-    absorption: absorption coefficient of the core [1/m] at the pigment's peak. A mode loses 1 - exp(-absorption · share
-        · length) of its light.
+    absorption: absorption coefficient of the core [1/m] at the pigment's peak. A mode loses the fraction 1 -
+        exp(-absorption · core_share · length) of its light.
 
     Raises:
-        ValueError: names argument, value and valid range.
+        ValueError: an argument is outside its valid range, which the message states.
     """
 
     diameter: float
@@ -130,7 +130,7 @@ class Waveguide:
         return tuple(sorted(found, key=lambda mode: mode.u))
 
     def absorbed(self, mode: Mode) -> float:
-        """Return the share of a mode's light that is absorbed along the whole length."""
+        """Return the fraction of a mode's light that is absorbed along the whole length."""
         return 1.0 if self.length is None else 1 - math.exp(-self.absorption * mode.core_share * self.length)
 
 
@@ -138,7 +138,7 @@ class Waveguide:
 def _roots(l: int, v: float) -> tuple[float, ...]:
     """Return U of all guided modes of azimuthal order l: the roots of U J_{l+1}(U)/J_l(U) = W K_{l+1}(W)/K_l(W).
 
-    Each mode, from its cut-off on, has one root between a zero of J_{l-1} and the next zero of J_l.
+    Each mode above its cut-off has one root, between a zero of J_{l-1} and the next zero of J_l.
     """
     from scipy.optimize import brentq
     from scipy.special import jn_zeros, jv, kve

@@ -20,8 +20,8 @@ __all__ = ["arriving_light"]
 # Choice: the light in the window may exceed the light that arrives by this amount, because sums have errors.
 HELD_TOO_MUCH = 1e-2
 DIGITS = 5.0  # choice: digits of the sum over the spectrum
-MOST_PAIRS = 1e7  # choice: most pairs of nodes and frequencies of this sum, about half a second
-SURE = 1e-4  # choice: uncertainty of the fraction below which the sum is not necessary; the sum is as accurate
+MOST_PAIRS = 1e7  # choice: largest number of pairs of nodes and frequencies in this sum; they take about half a second
+SURE = 1e-4  # choice: the sum, which has about this error, is computed only if the estimate is less certain
 
 
 def arriving_light(result: PSFResult, arriving: Any) -> tuple[Array, np.ndarray]:
@@ -47,10 +47,12 @@ def _not_evanescent(result: PSFResult) -> tuple[Array, np.ndarray]:
     """Return the fraction of light that is not evanescent, and its uncertainty.
 
     The squared spectrum of a straight edge, integrated over frequencies above f, is 1/(2π²f) per length of the edge.
-    For an aperture of perimeter P and area A, the fraction λP/(2π²A) is therefore evanescent. It is multiplied by the
-    mask's transmission along the edge, relative to that of the whole aperture. Light that the relief bends beyond
-    grazing is evanescent, too. Where this estimate is too uncertain, and the pupil is at most some wavelengths wide,
-    the spectrum of the light behind the pupil is summed. Derivatives are those of the estimate.
+    For an aperture of perimeter P and area A, the fraction λP/(2π²A) is therefore evanescent. This fraction is
+    multiplied by the mask's transmission along the edge, relative to that of the whole aperture. Light that the relief
+    bends beyond grazing is evanescent, too.
+
+    If this estimate is too uncertain, and the pupil is at most some wavelengths wide, the spectrum of the light behind
+    the pupil is summed instead. Derivatives are always those of the estimate.
     """
     import drjit as dr
 

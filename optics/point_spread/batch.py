@@ -120,7 +120,7 @@ def psf_batch(
     Pupils without a relief, or with a smooth relief of 4 x 4 points, can share one plan and one stack of matrix
     products. They may have Zernike wavefronts, masks, and different media in front and behind. The shared plan computes
     thousands of PSFs per second. It is used if the tolerance is 1e-3 or more and the plan is accurate enough. All other
-    PSFs are planned before the first of them is computed. Each of them is computed while the next one is prepared.
+    PSFs are planned first. Each of them is then computed while the next one is prepared.
 
     Raises:
         ValueError: an argument is invalid, or a sequence is empty.

@@ -1,4 +1,4 @@
-"""Sums over samples within circles about one centre. The circles share the work, however many there are.
+"""Sums over samples within circles about one centre, computed for all circles at once.
 
 Sums over samples are integrals if frequencies that alias onto those of the intensity are removed. The weight of a
 sample at the distance ρ from the centre of a circle of radius R is therefore the circle, convolved with a kernel whose
@@ -35,7 +35,8 @@ class SoftCircles:
 
     near: indices of the samples that contribute to any circle.
     samples: interpolation between these samples and evenly spaced distances (sample, distance), sparse.
-    to_spectrum: J₀ (distance, frequency). from_spectrum: J₁ with the weights of the quadrature (frequency, radius).
+    to_spectrum: J₀ (distance, frequency).
+    from_spectrum: J₁ with the weights of the quadrature (frequency, radius).
     radii: interpolation between evenly spaced and requested radii (requested, radius), sparse.
     size: number of all samples.
     """
@@ -106,8 +107,9 @@ def soft_sums(circles: SoftCircles, values: Array) -> Array:
 def sums_of_cells(values: Array, distance: np.ndarray, radii: np.ndarray, dx: float) -> Array:
     """Return sums of means over cells of side dx within circles, flat (row, radius), with derivatives.
 
-    A cell at the distance ρ counts with the share (R - ρ)/dx + 1/2, limited to [0, 1]. It is the difference between two
-    values of t ↦ Σ max(t - ρ, 0)/dx, which follows from the sums of v and vρ over the cells nearer than t.
+    A cell at the distance ρ has the weight (R - ρ)/dx + 1/2, limited to [0, 1]. The sum is the difference between two
+    values of the function t ↦ Σ v max(t - ρ, 0)/dx. This function follows from the sums of v and of vρ over all cells
+    nearer than t.
 
     values: flat Dr.Jit Float64 array (row, sample).
     """
@@ -131,9 +133,9 @@ def sums_of_cells(values: Array, distance: np.ndarray, radii: np.ndarray, dx: fl
 
 
 def _between(places: np.ndarray, step: float) -> tuple[Any, np.ndarray]:
-    """Return the matrix of interpolation to `places` >= 0 from multiples of `step`, and the multiples that it reads.
+    """Return the matrix that interpolates from multiples of `step` to `places` >= 0, and the multiples that it uses.
 
-    The functions are even, so that values at negative multiples are those at positive ones.
+    The functions are even, so values at positive multiples replace those at negative ones.
     """
     from scipy.sparse import csr_array
 

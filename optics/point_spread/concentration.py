@@ -1,4 +1,4 @@
-"""Concentration of the light: the peak of a PSF, and the power within a circle.
+"""Concentration of the light: the maximum of a PSF relative to a perfect lens, and the power within a circle.
 
 If the PSF carries derivatives, the results are Dr.Jit arrays that carry derivatives. Otherwise they are NumPy arrays.
 """
@@ -26,20 +26,20 @@ AT_A_PEAK = 1 / 32  # choice: pitch in units of 1/cutoff at which the fit of a p
 LOBES = 0.4  # choice: coarsest pitch in units of 1/cutoff at which samples miss no lobe
 BETWEEN = 1 / 16  # choice: pitch in units of 1/cutoff at which the spline is evaluated
 MOST_SPLINED = 20_000  # choice, limited by time: number of brightest samples around which the spline is evaluated
-NOT_YET = 0.9  # choice: factor on the lower bound of samples next to the peak, because the PSF has errors, too
-CLIMBS = 8  # choice: most windows, each moved to the brightest sample of the previous one
+NOT_YET = 0.9  # choice: factor on the lower bound for samples next to the maximum, since the PSF itself has errors
+CLIMBS = 8  # choice: largest number of windows in the search, each moved to the brightest sample of the previous one
 NEIGHBOURHOOD = 9  # choice: samples along a side of such a window
 PARABOLOID_ERROR = 3e-5
-OF_A_MASK = 1e-6  # choice: neglected level of a mask's spectrum for the peak without aberration
+OF_A_MASK = 1e-6  # choice: neglected level of a mask's spectrum, for the maximum without aberration
 RIPPLE = 1e-5  # choice: ripple of the circle's spectrum
 CELLS = 20.0  # choice: error of a circle's edge between cells, in units of the ripple
-SPREAD = 0.1  # choice: smallest share of the error of all light in the window that a circle may have
-DIGITS = 10.0  # choice: digits of the peak without aberration
+SPREAD = 0.1  # choice: lower limit of the error in a circle, as a fraction of the error in the whole window
+DIGITS = 10.0  # choice: digits of the maximum without aberration
 FINE = 1 / 3  # choice: coarsest pitch for circles in units of 1/cutoff; finer pitches need less area beyond a circle
 
 
 def strehl_ratio(result: PSFResult | Mixture, with_error: bool = False) -> Any:
-    """Return the peak of the PSF relative to the peak of the same aperture without aberration, (wavelength,).
+    """Return the maximum of the PSF relative to that of the same aperture without aberration, (wavelength,).
 
     The result for a `WhitePSF` is (type,). The wave without aberration is spherical and converges on the point where
     the axis hits the sensor. Its field at this point is, with L = √(z² + r²),
@@ -47,15 +47,15 @@ def strehl_ratio(result: PSFResult | Mixture, with_error: bool = False) -> Any:
         U = ∫ z/(2πL²) (1/L - ik) dξ
 
     the first Rayleigh-Sommerfeld integral of exp(-ikL(r)). Its modulus for a circle is |1 - z/L - ikz ln(L/z)|. The
-    peak of the PSF is the maximum near the brightest sample. If the samples are too coarse, finer samples are computed
-    there. The peak of a mean over wavelengths (`PSFResult.mean`) is divided by the mean of the peaks without
-    aberration.
+    maximum is searched near the brightest sample. If the samples are too coarse, finer samples are computed there. The
+    maximum of a mean over wavelengths (`PSFResult.mean`) is divided by the mean of the maxima without aberration.
 
-    with_error: whether to return (value, predicted error), each (wavelength,).
+    with_error: True to return (value, predicted error), each (wavelength,).
 
     Raises:
-        AccuracyError: the peak lies outside the window; the PSF is brighter at a point outside, at which rays land; or
-            the samples are too coarse and finer ones cannot be computed. The message states sufficient samples.
+        AccuracyError: the maximum lies outside the window; the PSF is brighter at a point outside, where rays land; or
+            the samples are too coarse and finer ones cannot be computed. The message states which samples are
+            sufficient.
     """
     import drjit as dr
 
@@ -77,7 +77,7 @@ def strehl_ratio(result: PSFResult | Mixture, with_error: bool = False) -> Any:
 
 
 def _unaberrated(result: PSFResult, wavelengths: np.ndarray) -> Array:
-    """Return the peak of the same aperture without aberration, (wavelength,), flat."""
+    """Return the maximum of the PSF of the same aperture without aberration, (wavelength,), flat."""
     import drjit as dr
 
     types = precision("float64")
@@ -122,9 +122,10 @@ def _peak(result: PSFResult, index: int) -> tuple[Array, float]:
 def _brightest(result: PSFResult, index: int) -> tuple[float, float]:
     """Return the point (x, y) at which the spline through the samples is brightest.
 
-    The brightest sample need not belong to the highest lobe. A non-negative function with a peak p and no frequency
-    beyond the cutoff f is at least p cos²(πfd) at a distance d < 1/(2f) from the peak (M. Riesz 1914). All samples with
-    at least this value, for the largest distance of a sample from the peak, are therefore searched.
+    The brightest sample need not belong to the highest lobe. A non-negative function with the maximum p and no
+    frequency beyond the cutoff f is at least p cos²(πfd) at a distance d < 1/(2f) from the maximum (M. Riesz 1914). The
+    sample nearest the maximum therefore has at least this value, with d the largest possible distance of that sample.
+    All samples above it are searched.
     """
     from scipy.ndimage import map_coordinates, spline_filter
 
@@ -218,10 +219,11 @@ def encircled_energy(
 
     The result for a `WhitePSF` is (type, radius). It is a weighted sum over samples. The weights are the circle,
     convolved with a kernel whose spectrum is 1 at all frequencies of the intensity and 0 at frequencies that alias onto
-    them. The sum therefore equals the integral over the sharp circle. It includes samples beyond the circle. They are
+    them. The sum therefore equals the integral over the sharp circle. It includes samples beyond the circle, which are
     computed if the window does not contain them.
 
-    centre: None for the middle of the PSF's window. with_error: whether to return (value, predicted error).
+    centre: None for the middle of the PSF's window.
+    with_error: True to return (value, predicted error).
 
     Raises:
         ValueError: a radius is negative or extends beyond the window.
@@ -252,7 +254,7 @@ def encircled_energy(
     total = to_user(types.Tensor(sums * seen.dx**2, (seen.tensor.shape[0], wanted.size)))
     if not with_error:
         return total
-    # The error of the PSF may be anywhere in the window, even if the circle is dark.
+    # The PSF's error may be concentrated in the circle, even if the circle is dark.
     share = np.maximum(plain(total), SPREAD * plain(seen.window_sums)[:, None]) / plain(seen.window_sums)[:, None]
     bright = np.pi * wanted**2 * seen.psf.max(axis=(1, 2))[:, None]
     return total, seen.sum_error[:, None] * share + RIPPLE * (CELLS if kernel is None else np.minimum(bright, 1.0))
@@ -261,11 +263,12 @@ def encircled_energy(
 def _around(
     result: PSFResult, middle: tuple[float, float], radius: float, edge: float
 ) -> tuple[PSFResult, SoftEdge | None]:
-    """Return a PSF whose samples suffice for sums within a circle, and the kernel; None for means over cells.
+    """Return a PSF whose samples suffice for sums within a circle, and the kernel (None for means over cells).
 
     Samples are fine enough, and they extend beyond the circle by the reach of the kernel.
 
-    radius: radius [m] of the circle. edge: distance [m] from its centre to the outermost samples.
+    radius: radius [m] of the circle.
+    edge: distance [m] from its centre to the outermost samples.
     """
     if result.holds_cells:
         return result, None

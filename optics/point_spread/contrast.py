@@ -24,7 +24,7 @@ from optics.point_spread.psf_result import PSFResult
 __all__ = ["combined_mtf", "image_quality", "mtf"]
 
 GROWTHS = 3  # choice: largest number of windows that are tried
-ROOM = 0.5  # choice: exponent of the factor √2 by which an enlarged window exceeds the necessary width
+ROOM = 0.5  # choice: an enlarged window exceeds the necessary width by √2 to this power
 
 
 def mtf(result: PSFResult | Mixture, arriving: Any = None, tolerance: float = 0.02) -> MTF:
@@ -33,8 +33,7 @@ def mtf(result: PSFResult | Mixture, arriving: Any = None, tolerance: float = 0.
     For a `WhitePSF` there is one MTF per receptor type.
 
     arriving: fraction of the pupil's power that arrives on the unbounded plane, a number or (wavelength,), in (0, 1].
-        None: all light except the evanescent part, which is due to the pupil's edge or to slopes of its relief that
-        bend light beyond grazing.
+        None: all light except the evanescent part, which the pupil's edge and steep slopes of its relief cause.
     tolerance: largest error of any contrast. Light outside the window causes errors at any frequency, and samples more
         than 1/(2 cutoff) apart alias frequencies. If necessary, the PSF is recomputed over a wider or finer window.
 
@@ -135,10 +134,11 @@ def image_quality(
     nyquist: Nyquist frequency of the retina, f_N = 1 / (2 receptor pitch) [1/m].
     throughput: T = a².
     noise_sigma: σ, in units of the signal.
-    tolerance: see `optics.mtf`. with_error: whether to return (value, predicted error), each (wavelength,).
+    tolerance: see `optics.mtf`.
+    with_error: True to return (value, predicted error), each (wavelength,).
 
     Raises:
-        ValueError: names argument, value and valid range.
+        ValueError: an argument is outside its valid range, which the message states.
         AccuracyError: see `optics.mtf`.
     """
     import drjit as dr
@@ -165,9 +165,9 @@ def image_quality(
 
 
 def _mean_over(values: Array, n: int, step: int) -> Array:
-    """Return the trapezoidal mean of every n values of a flat array.
+    """Return the trapezoidal mean of each group of n consecutive values of a flat array.
 
-    Only every `step`-th value is used.
+    Only every `step`-th value of a group is used.
     """
     import drjit as dr
 

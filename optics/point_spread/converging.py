@@ -30,7 +30,7 @@ __all__ = ["Converging", "VectorFocus"]
 PLANE_WAVES = "plane_waves"
 MOST_NODES = 400_000  # choice, limited by memory: number of plane waves in a sum; each is spread over 81 cells
 SUM_ERROR = 1e-8  # error of a sum of plane waves
-CHECK_SECONDS = 0.5  # choice: assumed time of a field [s], of which a check takes at most a third
+CHECK_SECONDS = 0.5  # choice: assumed time of a field [s]; a check may take a third of it
 MOST_SECONDS, FIELDS = 60.0, 7  # choice: time limit [s], and the number of fields that share it
 FIELD_ARRAYS = 4 * FIELDS  # arrays of real numbers: real and imaginary part of each field, and as many temporary arrays
 SINGLE = 1e-4  # choice: smallest tolerance for which float32 is sufficient
@@ -110,9 +110,9 @@ class Converging(ReadOnlyArrays):
     def _crossed(self, scalar: np.ndarray, window: Grid) -> float:
         """Return the error of field components to which both planes of polarisation contribute.
 
-        A check of a single plane of polarisation does not detect this error. It is due to the approximation that the
-        path has the same curvature for the whole pupil. Only the fraction s² of the fields interferes, because this is
-        the part that the rotation of rays moves to the other component.
+        A check of a single plane of polarisation does not detect this error. It results from the approximation that the
+        path has the same curvature for the whole pupil. Only a fraction of the fields interferes: the squared sine of
+        the steepest ray, which rotated rays contribute to the other component.
         """
         z, bright = number(self.beam.distance), np.abs(scalar) ** 2
         off = np.add.outer((window.y - self.image[1]) ** 2, (window.x - self.image[0]) ** 2)

@@ -19,7 +19,7 @@ __all__ = ["DiskSum"]
 
 RIPPLE = 1e-5  # choice: ripple of a disk's spectrum
 SUM_ERROR = 0.1  # choice: largest error of a sum in units of the ripple; see test_microvilli.py
-FINE = 1 / 3  # choice: coarsest pitch in units of 1/cutoff; a finer pitch needs fewer samples beyond a disk
+FINE = 1 / 3  # choice: coarsest pitch in units of 1/cutoff; with a finer pitch, sums need less area beyond a disk
 MOST_AGAIN = 1025  # choice: most samples along a side of a recomputed window
 
 
@@ -27,7 +27,7 @@ MOST_AGAIN = 1025  # choice: most samples along a side of a recomputed window
 class DiskSum:
     """A sum over a disk.
 
-    light: light on samples that are fine enough for sums.
+    light: the field on samples that are fine enough for sums.
     share: weight of each sample, (y, x).
     radius: radius [m] of the disk.
     """
@@ -79,7 +79,7 @@ class DiskSum:
 
     @property
     def light_error(self) -> float:
-        """Upper bound of the error of an integral over the disk that is due to the error of the light over its window.
+        """Upper bound on the error that the light's own error causes in an integral over the disk.
 
         The bound follows from the Cauchy-Schwarz inequality.
         """

@@ -17,14 +17,14 @@ __all__ = ["Microvilli"]
 
 @dataclass(frozen=True)
 class Microvilli:
-    """Parallel microvilli across the light's axis, as in a rhabdomere.
+    """Parallel microvilli, perpendicular to the light's axis, as in a rhabdomere.
 
     azimuth_deg: direction of the microvilli, from x towards y.
     dichroic_ratio: absorption of light polarised along the microvilli, divided by absorption of light polarised across
         them. It ranges from 1 (no preference) to infinity.
 
     Raises:
-        ValueError: names argument, value and valid range.
+        ValueError: an argument is outside its valid range, which the message states.
     """
 
     azimuth_deg: float = 0.0
@@ -60,8 +60,7 @@ class Microvilli:
 
         radius: radius [m] of the receptor.
         centre: centre (x, y) [m] of the receptor; None for the window's middle.
-        with_error: whether to return (value, predicted error). The error includes the errors of the sum and of
-            `vector_focus`.
+        with_error: True to return (value, predicted error). It includes the errors of the sum and of `vector_focus`.
 
         Raises:
             ValueError: the receptor extends beyond the window.
@@ -76,13 +75,13 @@ class Microvilli:
     def polarization_sensitivity(
         self, light: VectorFocus, radius: float, centre: tuple[float, float] | None = None
     ) -> float:
-        """Return the largest signal divided by the smallest over all planes of linear polarisation before the pupil.
+        """Return the polarisation sensitivity: the largest divided by the smallest signal of linearly polarised light.
 
-        If rays are nearly parallel to the axis, it equals the dichroic ratio. If rays are steep, it is smaller. For the
-        arguments, see `signal`.
+        All planes of polarisation in front of the pupil are considered. The result equals the dichroic ratio if rays
+        are nearly parallel to the axis, and is smaller if rays are steep. For the arguments, see `signal`.
 
         Raises:
-            ValueError: the light is polarised. Both planes of polarisation are known only for unpolarised light.
+            ValueError: `light` is polarised: only an unpolarised field contains both planes of polarisation.
         """
         of_kind("light", light, VectorFocus, "vector_focus(pupil)")
         if any(light.polarization[1:]):

@@ -13,7 +13,7 @@ __all__ = ["Mixture", "a_mixture", "flat", "mixed"]
 
 
 class Mixture(Protocol):
-    """Light of several wavelengths, such as a WhitePSF. For its methods, see the functions of the same names."""
+    """Interface of light of several wavelengths, such as a WhitePSF. See the functions with the methods' names."""
 
     def mtf(self, tolerance: float = 0.02) -> Any: ...
 
@@ -28,7 +28,7 @@ class Mixture(Protocol):
 
 
 def a_mixture(result: Any) -> Mixture:
-    """Return `result`; ValueError unless it is a Mixture. A batch and a plain array, for example, are not."""
+    """Return `result`; ValueError unless it is a Mixture. A batch or a plain array, for example, is refused."""
     if not hasattr(result, "strehl_ratio"):
         batch = ", as its `result(eye)` is" if hasattr(result, "result") else ""
         raise ValueError(f"result is a {type(result).__name__}: must be a PSFResult{batch}, or a WhitePSF")

@@ -30,7 +30,7 @@ ORIENTATIONS = 16
 MOST_ORIENTATIONS = 1024
 # Choice: fraction of the predicted error within which means over even and odd orientations must agree.
 PART = 0.1
-FINEST = 1e-5  # choice: the two means need not agree more closely than this
+FINEST = 1e-5  # choice: a smaller difference between the two means is always accepted
 DIGITS = 7.0  # choice: digits of sums over the PSF
 AT_A_TIME = 2**17  # choice: frequencies that are summed at once; with 64 cells each, they take some hundred megabytes
 
@@ -39,7 +39,8 @@ AT_A_TIME = 2**17  # choice: frequencies that are summed at once; with 64 cells 
 class MTF(ReadOnlyArrays):
     """Modulation transfer function on a square grid of spatial frequencies, zero frequency at n//2.
 
-    tensor: contrast as a Dr.Jit tensor (wavelength, fy, fx), which is 1 at zero frequency; mtf: the same in NumPy.
+    tensor: contrast as a Dr.Jit tensor (wavelength, fy, fx), which is 1 at zero frequency. `mtf` is the same as a NumPy
+        array.
     fx, fy: frequencies of the grid [cycles per metre on the sensor]. Their pitch is 1 / (longest side of the window).
     cutoff: highest frequency [1/m] that a pupil of this size transmits, 2 sin θ / λ, (wavelength,).
     predicted_error: predicted error of any contrast, at the grid's frequencies and between them, (wavelength,).

@@ -1,4 +1,5 @@
-"""Computation of requested PSFs: planning, evaluation, comparison with the direct sum, and repetition if necessary."""
+"""Computation of requested PSFs. Each PSF is planned, computed and compared with the direct sum; if it fails, it is
+repeated."""
 
 from __future__ import annotations
 
@@ -23,7 +24,7 @@ from optics.point_spread.window_cost import check_window
 __all__ = ["PSFPicture", "pictures"]
 
 TRIES = 3  # choice: number of attempts to meet a tolerance
-# Choice: if an error is f times too large, the next tolerance is f / 0.3 times smaller. One more attempt is then
+# Choice: if an error is f times too large, the next tolerance is f / 0.3 times smaller. The next attempt is then
 # usually sufficient.
 NEXT_TOLERANCE = 0.3
 LAST_TOLERANCE = 1e-2  # choice: additional factor on the tolerance of the last attempt
@@ -100,8 +101,8 @@ class _Attempt:
         If the method was an approximation, the next attempt uses an exact method. Otherwise it has a smaller tolerance,
         because a dark window needs more digits than a bright one. The result is None if the dtype cannot provide them.
 
-        last: whether this is the last attempt. Its tolerance is reduced further, because quadrature rules change in
-            steps, and a slightly smaller tolerance may give the same nodes.
+        last: True for the last attempt. Its tolerance is reduced further, because quadrature rules change in steps and
+            a slightly smaller tolerance may give the same nodes.
         """
         request, problem = self.request, self.request.problem
         if self.approximates:
@@ -111,8 +112,7 @@ class _Attempt:
             smaller = max(share * problem.tolerance * tolerance / error, 10 * FLOAT_NOISE[problem.dtype])
             if smaller >= problem.tolerance:
                 return None
-            # The problem is derived again, because it depends on the tolerance: finer detail of the relief then
-            # matters.
+            # The problem is derived again, because a smaller tolerance includes finer detail of the relief.
             problem = Problem.from_beam(request.beam, problem.window, smaller, problem.dtype)
             request = replace(request, problem=problem)
         return _Attempt.at(request, request.planned())
@@ -124,7 +124,7 @@ def pictures(requests: Sequence[Request], alike: bool = False) -> list[PSFPictur
     All PSFs are planned before the first is computed, so an impossible request raises its error at once. All
     computations are started before the first result is awaited.
 
-    alike: whether each request may reuse the method of the request before.
+    alike: True if each request may reuse the method of the preceding request.
 
     Raises:
         AccuracyError: no method meets a tolerance, or a window is so dark that rounding errors exceed it.
@@ -149,7 +149,7 @@ def pictures(requests: Sequence[Request], alike: bool = False) -> list[PSFPictur
 def _checked(attempt: _Attempt, asked: Request, tries: int) -> PSFPicture:
     """Return the PSF, or a more accurate one, and its plan with the error from the spot check.
 
-    asked: the user's request. If it names an approximation, this is used regardless of its error.
+    asked: the user's request. If it names an approximate method, the result is accepted regardless of its error.
     tries: number of remaining attempts, including this one.
 
     Raises:
@@ -179,16 +179,16 @@ def _checked(attempt: _Attempt, asked: Request, tries: int) -> PSFPicture:
 
 
 def _predicted_error(image: np.ndarray, sampling: Sampling, problem: Problem) -> float:
-    """Return the error that follows from the PSF itself. It is used without a spot check.
+    """Return the error that follows from the PSF itself, for a PSF without a spot check.
 
-    Sampling may use half the tolerance. Rounding adds an error δU to the field U, which is as large in a dark window as
-    in a bright one. If the transform spreads the error evenly over a plane of width W, the mean square of δU is ε²
-    times the mean intensity of the pupil's light on this plane, which is 1/W² in the units of a PSF. The error of the
-    intensity is then 2|U| |δU| + |δU|², so
+    Sampling causes an error of up to half the tolerance. Rounding adds an error δU to the field U, which is as large in
+    a dark window as in a bright one. If the transform spreads the error evenly over a plane of width W, the mean square
+    of δU is ε² times the mean intensity of the pupil's light on this plane, which is 1/W² in the units of a PSF. The
+    error of the intensity is then 2|U| |δU| + |δU|², so
 
         rounding = (2 ε √(mean PSF / W²) + ε² / W²) / √(mean PSF²).
 
-    If an approximation predicts a dark window, its error is total, because it misses all light there.
+    If an approximation predicts a dark window, its error counts as 1, because it misses all light there.
 
     Raises:
         AccuracyError: the window is so dark that rounding errors exceed the tolerance.

@@ -1,30 +1,30 @@
-"""The choice of method and samples: the fastest combination whose predicted error is within the tolerance.
+"""Choice of a PSF's method and samples: the fastest combination whose predicted error is within the tolerance.
 
-All exact methods evaluate the same integral: the angular spectrum of the field behind the thin element, which equals
-the first Rayleigh-Sommerfeld integral. They differ in their samples:
+All exact methods evaluate the first Rayleigh-Sommerfeld integral of the field behind the pupil, or its equivalent, the
+angular spectrum. They differ in where they place samples:
 
-- "hankel": two one-dimensional transforms, without a soft edge, for a rotationally symmetric pupil and light on its
-  axis.
-- "low_rank": one matrix product, whose matrix is the Fourier kernel times a slow factor of low rank. It is best near
-  the focus of lenses and for small pupils. The pupil needs samples only for the combined phase of lens and path, which
-  varies far less than either alone.
-- "far_field": one Fourier transform onto direction cosines for each of a few nodes of the window, with interpolation of
-  the kernel's slow factor between the nodes. It is best for small pupils and wide windows. It computes only the
-  intensity.
-- "angular_spectrum": two transforms, from the pupil to the spectrum and on to the sensor's plane. Both planes have the
-  same period. It is best at short distances.
-- "split_angular_spectrum": the same, but exp(ikz cos θ) is split into the paraxial part, whose Fourier transform is
-  known, and a remainder, whose Fourier transform is narrow. Period and number of samples then do not grow with the
-  distance.
-- "rayleigh_sommerfeld": the direct sum over nodes that are fitted to the edge. It needs no grid, and its time is
-  proportional to nodes x outputs. It is the reference.
+- "hankel": two one-dimensional transforms along the radius. It requires a rotationally symmetric pupil and light along
+    its axis.
+- "low_rank": one matrix product. The kernel is a Fourier kernel times a factor that varies slowly over the window and
+    therefore has a low rank. The method is best near the focus of lenses and for small pupils: samples must resolve
+    only the combined phase of lens and path, which varies far less than either alone.
+- "far_field": Fourier transforms onto direction cosines, one for each of a few nodes of the window. Between the nodes,
+    the kernel's slow factor is interpolated. The method is best for small pupils and wide windows. It computes the
+    intensity but not the complex field.
+- "angular_spectrum": two transforms, from the pupil to its spectrum and from there to the sensor's plane, on grids with
+    the same period. It is best at short distances.
+- "split_angular_spectrum": the same, but the transfer function exp(ikz cos θ) is split into the paraxial part, whose
+    Fourier transform is known, and a remainder, which moves light only a short way to the side. Period and number of
+    samples then do not grow with the distance.
+- "rayleigh_sommerfeld": the direct sum over quadrature nodes that are fitted to the pupil's edge. Its time is
+    proportional to the number of nodes times that of output samples. It is the reference for all other methods.
 
-Approximate methods are faster and predict their error. "auto" uses one of them only if its error is within the
+Approximate methods are faster, and their error is predicted. "auto" uses one of them only if its error is within the
 tolerance. If the user requests one by name, it runs regardless of its error, and the plan states the error:
 
 - "fresnel": the paraxial integral.
 - "fraunhofer": the paraxial far field.
-- "geometric": the density of rays, for shadows and coarse windows.
+- "geometric": the density of rays, without diffraction, for shadows and coarse windows.
 - "pinhole": all light in one cell.
 """
 
@@ -60,7 +60,7 @@ from optics.point_spread.window_cost import check_seconds, check_window, window_
 __all__ = ["APPROXIMATE", "EXACT", "FIELDS", "METHODS", "choose"]
 
 
-# Each function returns the samplings with which its method meets a problem's tolerance: none, one or several.
+# Each function returns the samplings with which its method meets a problem's tolerance. There may be none or several.
 EXACT: dict[str, Callable[[Problem], Sequence[Sampling]]] = {
     "hankel": hankel,
     "low_rank": low_rank,
@@ -94,7 +94,7 @@ FOR_PIXELS: dict[str, Callable[[Problem], Sequence[Sampling]]] = {
 
 @dataclass(frozen=True)
 class Weighing:
-    """Lower bound of a method's time, known before the method plans its samples.
+    """Lower bound on the time that a method takes. It is known before the method plans its samples.
 
     least: shortest possible time of a PSF [s].
     per_sample: time per sample of the window [s].
@@ -106,7 +106,7 @@ class Weighing:
     asking: float = 0.0
 
     def pays(self, best: float, outputs: int) -> bool:
-        """Return whether the method may save more time, relative to `best` [s], than planning its samples takes."""
+        """Return whether the method may be faster than `best` [s], including the time to plan its samples."""
         return self.least + outputs * self.per_sample + self.asking < best
 
 
@@ -133,8 +133,8 @@ def choose(problem: Problem, method: str = "auto", most_seconds: float = MOST_SE
     Planning takes as long as a small PSF, so plans are cached.
 
     method: "auto" compares all methods that may save time, "exact" only exact methods, and "field" only exact methods
-        with a complex field. A method's name selects this method. Its sampling must then meet the tolerance, but its
-        model error may exceed it.
+        with a complex field. A method's name selects that method. Its sampling must then meet the tolerance, but the
+        error of an approximation may exceed it.
 
     Raises:
         ValueError: unknown method.
@@ -156,7 +156,7 @@ def choose(problem: Problem, method: str = "auto", most_seconds: float = MOST_SE
         if best is not None and not WEIGHING[name].pays(best.seconds, outputs):
             continue
         if name == "fraunhofer" and "fresnel" in weighed and weighed["fresnel"].model_error > allowed:
-            continue  # Fraunhofer's integral neglects more than Fresnel's
+            continue  # Fraunhofer's integral is less accurate than Fresnel's
         samplings = known[name](problem)
         if not samplings:
             continue
@@ -178,7 +178,7 @@ def _check_dtype(problem: Problem) -> None:
 
 
 def _model_tolerance(problem: Problem) -> float:
-    """Return the part of the tolerance that is left for the model error, after sampling and rounding."""
+    """Return the part of the tolerance that sampling and rounding leave for the error of an approximation."""
     return problem.tolerance - _sampling_error(problem)
 
 
@@ -187,7 +187,7 @@ def _sampling_error(problem: Problem) -> float:
 
 
 def _seconds(option: Sampling, problem: Problem) -> float:
-    """Return the time of the whole PSF: that of the method, of the window, and of the check."""
+    """Return the time of the whole PSF: the sum for the method, the window and the spot check."""
     return option.seconds + window_seconds(problem) + check_seconds(problem, option)
 
 

@@ -1,12 +1,13 @@
 """PSFs of a whole population with one plan: pupils of different sizes and reliefs, as one stack of matrix products.
 
-Each PSF is computed like "low_rank" with rank 1. The Fourier kernel is multiplied by the slow factor at the centre,
+Each PSF is computed as by the method "low_rank" with rank 1: the Fourier kernel is multiplied by the slow factor at the
+window's centre,
 
     U(x) ≈ (z/ρ)² Σ_ξ P(ξ) z/(λD²) e^{ik(D - z)} Π (1 + 2ξx/z²) e^{-ik ξ·x/c},   D = √(ξ² + z²), ρ = √(x² + z²).
 
-Pupils are sampled in units of their radius, so all share the soft edge, the positions, B-splines and powers. The change
-of the slow factor's phase over the window is neglected. The resulting error is predicted for each PSF from its own
-light. If the error exceeds the tolerance, the PSF is computed in the ordinary way.
+Pupils are sampled in units of their radius, so all share the soft edge, the samples' positions, B-splines and powers.
+The slow factor's phase changes slightly over the window, which is neglected. The resulting error is predicted for each
+PSF from its own light. If it exceeds the tolerance, `optics.psf` computes the PSF.
 """
 
 from __future__ import annotations
@@ -36,8 +37,8 @@ FEW_WAVES = 3000.0  # choice: largest number of waves of a phase in float32
 FAR = 200.0  # choice: smallest kz for which the near-field term of the kernel is negligible
 RIPPLE = 0.3  # choice: ripple of the soft edge relative to the tolerance; see test_population.py
 SAMPLING = 0.2  # choice: error due to the soft edge, relative to the tolerance
-# Choice: smallest transmitted light, relative to a mask's brightest light next to the aperture, for which SAMPLING is
-# valid; see test_population_members.py. The error of the soft edge is relative to the light next to the aperture.
+# Choice: smallest transmitted light, relative to a mask's brightest light near the aperture's edge, for which SAMPLING
+# is valid; see test_population_members.py. The error of the soft edge is relative to the light near the edge.
 LEAST_LIGHT = 1e-2
 SPREAD = 1.1  # choice: error of the intensity divided by the spread of the phase; see test_population.py
 TURNS = 1.3  # choice: ratio of successive numbers of samples; similar pupils then share a plan
@@ -52,9 +53,9 @@ STEP = 1e-4  # choice [radii]: step of the differences that give a wavefront's s
 def population_pictures(
     members: Sequence[Member], window: Grid, tolerance: float
 ) -> Iterator[tuple[int, np.ndarray, Plan]]:
-    """Yield the PSFs for which the common plan is accurate enough: index of the member, PSF (y, x) [1/m²], plan.
+    """Yield index of the member, PSF (y, x) [1/m²] and plan, if the common plan is accurate enough for the member.
 
-    If the tolerance is below LOOSEST, there are none. window: a window about the axis.
+    Nothing is yielded for a tolerance below LOOSEST. window: a window about the axis.
     """
     groups: dict[tuple[Aperture, int], list[int]] = defaultdict(list)
     plain = [index for index, member in enumerate(members) if member.plain]
@@ -144,7 +145,7 @@ def _samples(aperture: Aperture, turns: float, ripple: float) -> _Samples:
 
 
 def _turns(stack: _Stack, window: Grid) -> tuple[np.ndarray, np.ndarray]:
-    """Return cycles per radius of the combined phase to any point of the window, and the largest sine of the light."""
+    """Return the cycles per radius of the combined phase of pupil and path, and the largest sine of the light."""
     slopes = SLOPES if stack.order < 2 else np.linspace(-1, 1, PER_ORDER * stack.order + 1) * (1 + EDGE_REACH)
     r = stack.radius * np.hypot(slopes[:, None], slopes[None, :]).astype(np.float32)
     outward = stack.before * r / np.hypot(r, stack.source) - np.sign(stack.focal) * r / np.hypot(r, stack.focal)
@@ -182,7 +183,8 @@ def _splines_and_slopes(t: np.ndarray) -> tuple[list[np.ndarray], list[np.ndarra
 
 
 def _sine(stack: _Stack, window: Grid, at: np.ndarray) -> np.ndarray:
-    """Return the sine ξ/c(ξ) along one axis. c² is z² + ξ², plus an average over the other axis and the window."""
+    """Return the sine ξ/c(ξ) along one axis. c² is z² + ξ² plus estimates of the mean squares of the other
+    coordinates."""
     elsewhere = np.square(stack.radius) / 4 + np.float32((0.4 * window.own_half_width) ** 2)
     found: np.ndarray = at / np.sqrt(np.square(stack.distance) + np.square(at) + elsewhere)
     return found
@@ -201,7 +203,7 @@ def _masks(stack: _Stack, samples: _Samples) -> np.ndarray:
 
 
 def _light(samples: _Samples, masks: np.ndarray) -> np.ndarray:
-    """Return the transmitted light, relative to the mask's brightest light next to the aperture, (member or 1,)."""
+    """Return the transmitted light, relative to the mask's brightest light near the aperture's edge, (member or 1,)."""
     power, soft = np.square(masks).reshape(len(masks), -1), samples.soft.ravel()
     passed, brightest = power @ np.square(soft) / np.square(soft).sum(), power[:, soft < 0.5].max(axis=1)
     return np.asarray(passed / np.maximum(brightest, 1e-30))
@@ -264,7 +266,7 @@ def _model_errors(stack: _Stack, images: np.ndarray, window: Grid) -> np.ndarray
     squares = np.stack([np.bincount(ring, np.square(image), RINGS) for image in flat.astype(np.float64)])
     means = np.stack([np.bincount(ring, image, RINGS) for image in flat.astype(np.float64)]) / count
     spread = _spread(stack, window)
-    # The spread of the phase causes an error of the amplitude. It is weighted with the light.
+    # The spread of the phase causes an error of the amplitude, which is weighted with the light.
     wrong = np.square(SPREAD * spread) * (squares + count * np.square(means))
     found: np.ndarray = np.sqrt(wrong.sum(axis=1) / squares.sum(axis=1))
     return found
@@ -286,7 +288,7 @@ def _spread(stack: _Stack, window: Grid) -> np.ndarray:
     out = np.arange(1, RINGS + 1) / RINGS * max(window.half_diagonal, window.dx)
     z = stack.distance.astype(np.float64)[:, 0, :, None]
     sines = _sine(stack, window, xi.real) + 1j * _sine(stack, window, xi.imag)
-    # Standard deviation of the phase relative to the window's centre: the larger one of axis and diagonal.
+    # Standard deviation of the phase relative to the window's centre: the larger of the values along axis and diagonal.
     worst = np.zeros((len(stack.radius), RINGS))
     for angle in (0.0, math.pi / 4):
         x = (out * np.exp(1j * angle))[None, :, None]

@@ -65,10 +65,10 @@ class Member:
 
     @property
     def numbers(self) -> tuple[float, ...]:
-        """Parameters as plain numbers.
+        """Parameters as plain numbers, in this order:
 
-        Radius, wavelength in the medium behind the pupil, distances of sensor and source, and focal length [m]. Index
-        in front of the pupil divided by the index behind it. Waist of a mask [m].
+        radius, wavelength in the medium behind the pupil, distances of sensor and source, and focal length [m]; index
+        in front of the pupil divided by the index behind it; waist of a mask [m].
         """
         pupil, vacuum = self.pupil, self.wavelength
         focal = math.inf if pupil.thin_lens_focal_length is None else pupil.thin_lens_focal_length
@@ -102,7 +102,7 @@ class Member:
                 continue
             for power, share in _radial(n, m):
                 found[known[power, m]] -= value * UM / self.wavelength * share * scale**power
-        found[known[0, 0]] = 0.0  # the constant term does not affect the light, as for a relief
+        found[known[0, 0]] = 0.0  # as for a relief, the constant term does not affect the light
         return found
 
     @property
@@ -112,7 +112,7 @@ class Member:
 
     @property
     def detail(self) -> float:
-        """Cycles per radius of a wavefront and a mask, in addition to the cycles that follow from slopes."""
+        """Cycles per radius that wavefront and mask add to those that follow from slopes."""
         pupil, found = self.pupil, 0.0
         if pupil.wavefront is not None:
             found = pupil.wavefront.bandwidth(0.0)

@@ -35,10 +35,10 @@ def psf(
     centre: tuple[float, float] = (0.0, 0.0),
     field: bool = False,
 ) -> PSFResult:
-    """Return the PSF |U|² / (pupil area) of a pupil. U is the field behind it if a wave of unit amplitude arrives.
+    """Return the PSF |U|² / (pupil area) of a pupil. U is the field on the sensor for incident light of amplitude 1.
 
-    wavelengths: one or several wavelengths [m] in vacuum. If there are eight or more, the plan of the first is used for
-        all, provided that it is accurate enough.
+    wavelengths: one or several wavelengths [m] in vacuum. With eight or more, the plan of the first is used for all,
+        provided that it is accurate enough.
     sensor_distance: distance [m] of the sensor behind the pupil. None: the distance at which the pupil's ideal lens
         images the source, or 240 µm without such a lens.
     source_distance, source_angle: distance [m] and direction (x, y) [rad] of the source, see PointSource.
@@ -47,8 +47,8 @@ def psf(
     method: "auto", "exact" (no approximations), or one of planner.METHODS. If an approximation is requested by name, it
         runs regardless of its error. The tolerance then applies only to its sampling, and the plan states the error.
     dtype: "float32" or "float64".
-    field: whether to return the complex amplitude as well, at no additional cost (`PSFResult.field`). Only methods that
-        compute it are then compared.
+    field: True to return the complex amplitude as well (`PSFResult.field`). Only methods that compute it are then
+        compared; it takes no additional time.
 
     Both distances and all parameters of the pupil may be Dr.Jit arrays that carry derivatives: see PSFResult.tensor.
 

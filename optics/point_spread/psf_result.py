@@ -31,7 +31,7 @@ from optics.point_spread.request import Request
 
 __all__ = ["PSFResult", "spread"]
 
-MOST_AGAIN = 2049  # choice: most samples along a side of a recomputed window
+MOST_AGAIN = 2049  # choice: largest number of samples along a side of a recomputed window
 MANY = 8  # choice: smallest number of wavelengths for which planning each separately would take longer than computing
 MOST_SECONDS = 20.0  # choice: time limit for a recomputed window [s]
 # Choice: relative error of sums over a PSF, of values at points or of means over cells, divided by that of the PSF. See
@@ -46,7 +46,7 @@ class PSFResult(ReadOnlyArrays, OnWindow):
 
     tensor: the PSF as a Dr.Jit tensor (wavelength, y, x) that carries the derivatives of the parameters.
     psf: the same as a NumPy array [1/m²]. Its integral over an unbounded plane is the fraction of the pupil's power
-        that arrives. Evanescent light, for example, does not arrive. The PSF is never renormalised.
+        that arrives there; evanescent light, for example, does not. The PSF is never renormalised.
     plans: one plan per wavelength; `plan` is the least accurate one.
     requests: one request per wavelength, from which measures recompute the PSF; empty if `psf` did not compute it.
     shares: weights of a mean over wavelengths, (request,), see `mean`. None: there is one PSF per request.

@@ -20,7 +20,7 @@ from optics.point_spread.window_cost import check_window, window_seconds
 __all__ = ["Request", "Setup", "sensor_place"]
 
 MOST_SECONDS_OF_JUMPS = 2.0  # choice: time limit for a height map with jumps [s]
-GROWN = 1.25  # choice: all methods are compared again if the time exceeds the previous wavelength's time by this factor
+GROWN = 1.25  # choice: factor in time, relative to the previous wavelength, above which methods are compared again
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,7 @@ class Request:
     problem: numbers that describe the light, the window and the tolerance.
     method: "auto", "exact" or a method's name.
     most_seconds: time limit of the PSF.
-    keeps_field: whether to return the complex amplitude as well.
+    keeps_field: True to return the complex amplitude as well.
     like: a plan whose method is tried before all methods are compared.
     """
 

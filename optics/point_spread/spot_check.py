@@ -27,7 +27,7 @@ CAUTION = 3.5
 # Choice: relative rounding error of a path, times 2π for the phase and 2 for the intensity, reduced by averaging over
 # the pupil. test_spot_check.py checks the value against sums in extended precision.
 WAVE_ROUNDING = 1.1e-16
-FINER_DETAIL = 1e-2  # choice: size of the detail that the check neglects, relative to that which the PSF neglects
+FINER_DETAIL = 1e-2  # choice: size of the detail that the check neglects, relative to the size that the PSF neglects
 DIGITS_STEP = 0.25  # choice: digits of a rule are rounded to multiples of this, so that cached rules are used
 
 
@@ -39,8 +39,9 @@ class Effort:
     points_along_radius: number of points of a rotationally symmetric PSF.
     fewest: number of points below which the estimate is useless.
     spare_digits: digits of the direct sum in addition to the requested accuracy. The first affordable value is used.
-    share: time of the check relative to the time of the PSF. share_of_few: the same for windows with fewer than
-        `fewest` samples. Without a check, the error of the only sample of a window may be as large as its bound.
+    share: time limit of the check, relative to the time of the PSF.
+    share_of_few: the same for windows with fewer than `fewest` samples, in which a single wrong sample makes the whole
+        result wrong.
     seconds: time [s] that every check may take.
     """
 
@@ -80,7 +81,7 @@ def spot_check(beam: Beam, problem: Problem, image: np.ndarray, seconds: float) 
     seconds: time of its computation.
     """
     if problem.reach is not None:
-        return None  # by design, such a PSF is not accurate everywhere
+        return None  # a PSF that may be wrong beyond `reach` cannot be checked
     if problem.knots is not None:  # the direct sum needs samples for the PSF only, and not for its derivatives
         problem = Problem.from_beam(beam, problem.window, problem.tolerance, problem.dtype, derivatives=False)
     total = float(np.sum(np.square(image, dtype=np.float64)))
@@ -93,13 +94,13 @@ def spot_check(beam: Beam, problem: Problem, image: np.ndarray, seconds: float) 
     drawn, chance = _drawn(problem, image, reference.points)
     exact = _exact(beam, problem, reference, drawn)
     squared = float(np.mean(np.square(image[drawn] - exact) / chance))
-    # Choice: above an error of a tenth, the PSF may be much brighter than the exact PSF, with which it is then
-    # compared.
+    # Choice: with an error above a tenth, the PSF may be much brighter than the exact PSF. Errors are then relative to
+    # the exact PSF.
     if squared > 0.01 * total:
         total = min(total, float(np.mean(np.square(exact) / chance)))
     rounding = max(FLOAT_NOISE["float64"], float(np.finfo(precision(problem.dtype).dtype).eps))
-    # The last two terms are errors that the direct sum shares with the PSF: 10^-digits of the amplitude of all light in
-    # phase, and twice that for the intensity; and the rounding of paths.
+    # The last two terms are errors of the direct sum itself: quadrature to `digits` digits, relative to the amplitude
+    # of all light in phase (twice that for the intensity), and the rounding of paths.
     shared = 2 * 10.0 ** (darkness - reference.digits) + path_rounding(problem, darkness)
     return CAUTION * math.sqrt(squared / total) + rounding + shared
 
@@ -107,8 +108,8 @@ def spot_check(beam: Beam, problem: Problem, image: np.ndarray, seconds: float) 
 def path_rounding(problem: Problem, darkness: float) -> float:
     """Return the relative error of the intensity that the rounding of paths in float64 causes.
 
-    An error of the phase changes the amplitude by the same fraction of the amplitude of all light in phase. A
-    comparison with the direct sum does not show this error, because the direct sum has similar paths.
+    A phase error of δ [rad] changes the amplitude by δ times the amplitude of all light in phase. A comparison with the
+    direct sum does not show this error, because the direct sum has similar paths.
     """
     return WAVE_ROUNDING * problem.waves * 10.0**darkness
 
@@ -116,8 +117,8 @@ def path_rounding(problem: Problem, darkness: float) -> float:
 def _darkness(beam: Beam, problem: Problem, mean: float) -> float:
     """Return the number of digits by which the amplitude in the window is below that of all light in phase.
 
-    The error of the direct sum is proportional to the amplitude that the light of the whole aperture, of area A, would
-    have in phase: U = A/(λz), with a PSF of U²/A = A/(λz)². The digits are halved, because amplitudes are square roots
+    If the light of the whole aperture (area A) arrived in phase, its amplitude would be U = A/(λz), and the PSF U²/A =
+    A/(λz)². The error of the direct sum is proportional to this U. The digits are those of the amplitude, half of those
     of the PSF.
 
     mean: root mean square of the PSF over the window.
@@ -127,7 +128,7 @@ def _darkness(beam: Beam, problem: Problem, mean: float) -> float:
 
 
 def _affordable(beam: Beam, problem: Problem, darkness: float, seconds: float) -> _DirectSum:
-    """Return the direct sum with as many points and digits as the time of the PSF allows."""
+    """Return the direct sum with the largest numbers of points and digits that the time of the PSF allows."""
     samples, fine = math.prod(problem.window.shape), _finer_detail(beam, problem)
     share = EFFORT.share if samples >= EFFORT.fewest else EFFORT.share_of_few
     pairs = max(share * seconds, EFFORT.seconds) * PAIRS_PER_SECOND["float32"]
@@ -145,10 +146,10 @@ def _affordable(beam: Beam, problem: Problem, darkness: float, seconds: float) -
 
 
 def _finer_detail(beam: Beam, problem: Problem) -> float:
-    """Return the additional cycles per radius of detail in reliefs, wavefronts and masks that the check resolves.
+    """Return the cycles per radius that the check needs in addition to those of the PSF.
 
-    A PSF neglects detail below a tenth of its tolerance. If the check neglected the same detail, it would not show the
-    resulting error.
+    A PSF neglects detail of reliefs, wavefronts and masks below a tenth of its tolerance. The check resolves finer
+    detail, because it would otherwise not show the resulting error.
     """
     fine = beam.pupil.bandwidth(beam.wavelength, FINER_DETAIL * problem.tolerance / 10)
     return problem.radius * max(fine - problem.detail, 0.0)
@@ -190,16 +191,16 @@ KINDS = 6  # kinds of points in `_chances`
 def _chances(bright: np.ndarray, window: Grid) -> np.ndarray:
     """Return the probability with which each point is drawn, flat.
 
-    It is the mean of six distributions. The first is uniform. The others are proportional to the intensity; to the
-    square of the intensity; to the nearness of a side; to the nearness of a corner; and to the product of intensity and
-    nearness.
+    It is the mean of six distributions. The first is uniform. The others are proportional to the following quantities:
 
-    The reasons are as follows. If the amplitude has the same error everywhere, the error of the intensity is
-    proportional to its square root. If there is a bright focus, only the second distribution detects such an error. The
-    errors of a focus of one sample lie next to it, so the square is spread over neighbouring samples. Phases change
-    fastest at sides and corners, so quadratures fail there first, and within a few samples. The light of a slit reaches
-    the sides only in few places, and errors are large where the light is bright; hence the product. In a window off the
-    axis, phases change fastest at the sides that are farthest from the axis.
+    - Intensity: if the amplitude has the same error everywhere, the error of the intensity is proportional to the
+        square root of the intensity. Beside a bright focus, only this distribution detects such an error.
+    - Squared intensity, spread over neighbouring samples: the errors of a focus of one sample lie next to it.
+    - Nearness of a side, and nearness of a corner: phases change fastest there, so quadratures fail there first, and
+        within a few samples. In a window off the axis, phases change fastest at the sides that are farthest from the
+        axis.
+    - Intensity times nearness: the light of a slit reaches the sides only in few places, and errors are largest in
+        bright places.
     """
     height, width = shape = window.shape
     squares = np.zeros((height + 2, width + 2))
@@ -225,7 +226,7 @@ def _in_order(window: Grid) -> np.ndarray:
 def _by_radius(window: Grid) -> np.ndarray:
     """Return flat indices in order of the distance from the axis.
 
-    If points are drawn at even steps from this order, no important ring is omitted.
+    Points at even steps in this order include every important ring.
     """
     radii = np.add.outer(np.square(window.y), np.square(window.x)).ravel()
     # Squared radii are rounded, so that rounding errors do not change the order of equal radii.
@@ -242,7 +243,8 @@ OUTWARDS = 2  # choice: exponent of the squared distance from the axis, for wind
 
 
 def _fixed_chances(shape: tuple[int, int], centre: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:
-    """Return the nearness of sides and corners, flat, and the sum of the three parts that do not depend on the PSF.
+    """Return the nearness of sides and corners, flat, and the sum of the three parts of the probabilities that do not
+    depend on the PSF.
 
     centre: position (x, y) of the window, in samples.
     """

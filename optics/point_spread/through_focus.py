@@ -52,7 +52,7 @@ class ThroughFocus(ReadOnlyArrays):
         It is the vertex of the parabola through the highest ratio and its neighbours.
 
         Raises:
-            ValueError: fewer than three distances, or the highest ratio is at the first or the last distance.
+            ValueError: there are fewer than three distances, or the highest ratio is at the first or the last one.
             AccuracyError: see `optics.strehl_ratio`.
         """
         if len(self.distances) < 3:

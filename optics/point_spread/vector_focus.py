@@ -1,4 +1,4 @@
-"""The focus according to Maxwell's equations: three components of the electric field."""
+"""The focus of polarised light: three components of the electric field, according to Maxwell's equations."""
 
 from __future__ import annotations
 
@@ -51,9 +51,9 @@ def vector_focus(
         S2, S3) with S1 = |Ex|² - |Ey|², S2 = 2 Re(Ex* Ey), S3 = 2 Im(Ex* Ey). None: unpolarised. For oblique light, the
         x and y of these definitions are rotated with the light's direction.
     source_angle: direction (x, y) [rad] of the light, as in `optics.psf`. The window lies around the image.
-    apodization: "flat": uniform light over a flat pupil. "aplanatic": light on the axis of a corrected objective. The
-        ray from ξ then arrives at the focus with the sine ξ/z, and the light is a sum of plane waves (Richards and Wolf
-        1959).
+    apodization: "flat" for uniform light over a flat pupil, or "aplanatic" for light along the axis of a corrected
+        objective. With the latter, the ray from ξ arrives at the focus with the sine ξ/z, and the light is a sum of
+        plane waves (Richards and Wolf 1959).
     dx, shape: pitch [m] and number of samples (y, x) of the window.
     tolerance: relative L2 error of the intensity over the window.
 

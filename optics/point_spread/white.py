@@ -29,8 +29,8 @@ from optics.spectra.spectrum import Spectrum, illuminant
 __all__ = ["WhitePSF", "white_psf"]
 
 FIRST, MOST_WAVES = 9, 513  # choice: initial and largest number of wavelengths
-# Choice: predicted error, relative to the change if only every second wavelength is used. In theory it is a fifteenth,
-# because splines converge with the fourth power of the step; see tests/optics/point_spread/test_white.py.
+# Choice: predicted error, relative to the difference from a sum over every second wavelength. In theory it is a
+# fifteenth, because splines converge with the fourth power of the step; see tests/optics/point_spread/test_white.py.
 LEFT = 0.25
 OF_PICTURES = 0.5  # choice: part of the tolerance that the PSFs may use; the rest is for the spectrum
 
@@ -42,7 +42,7 @@ class WhitePSF(ReadOnlyArrays, OnWindow):
     waves: the monochromatic PSFs (wavelength, y, x) of the sum.
     weights: w, (type, wavelength). Cubic splines interpolate PSFs between wavelengths, so a weight may be slightly
         negative.
-    coarse: weights of a sum over every second wavelength; the weights of all other wavelengths are 0.
+    coarse: the same for a sum over every second wavelength; the other weights are 0.
     spectral_error: predicted relative L2 error that is due to the number of wavelengths, (type,). It is a quarter of
         the difference from the result with every second wavelength. It falls with the fourth power of the number of
         wavelengths.
@@ -78,7 +78,7 @@ class WhitePSF(ReadOnlyArrays, OnWindow):
 
     @property
     def predicted_error(self) -> np.ndarray:
-        """Relative L2 error over the window that is due to the spectrum and to the PSFs, (type,)."""
+        """Relative L2 error over the window, due to the spectrum and to the PSFs, (type,)."""
         found: np.ndarray = self.spectral_error + self.waves.plan.predicted_error * np.abs(self.weights).sum(axis=1)
         return found
 
@@ -96,7 +96,7 @@ class WhitePSF(ReadOnlyArrays, OnWindow):
         return replace(found.first(count), predicted_error=error)
 
     def strehl_ratio(self, with_error: bool = False) -> np.ndarray | Array:
-        """Return the peak in white light, divided by the peak of the same light without aberration, (type,).
+        """Return the maximum of the white PSF, divided by the maximum in the same light without aberration, (type,).
 
         See `optics.strehl_ratio`.
 
@@ -158,7 +158,7 @@ def white_psf(
     waves: number of wavelengths over the receptors' range: an odd number, or "auto" for the fewest that meet the
         tolerance. Cubic splines interpolate PSFs between the wavelengths. The plan of the first wavelength is used for
         all, provided that it is accurate enough.
-    tolerance: relative L2 error over the window that is due to PSFs and spectrum together.
+    tolerance: relative L2 error over the window, for PSFs and spectrum together.
     asked: further arguments of `optics.psf`.
 
     Raises:

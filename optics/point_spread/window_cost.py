@@ -31,9 +31,10 @@ def window_seconds(problem: Problem) -> float:
 
 
 def check_seconds(problem: Problem, sampling: Sampling) -> float:
-    """Return the time of the direct sum of the spot check, if the PSF is a direct sum itself [s].
+    """Return the time [s] of the spot check of a PSF that is itself a direct sum; 0 for other PSFs.
 
-    Its nodes are about twice as many. For other methods, this time is a small part of that of the PSF.
+    The check has about twice as many nodes as the PSF. For other methods, the check's time is neglected, because it is
+    a small part of the PSF's time.
     """
     if problem.reach is not None or sampling.method != "rayleigh_sommerfeld":
         return 0.0
@@ -51,7 +52,7 @@ def window_bytes(problem: Problem) -> float:
 
 
 def check_window(window: Grid, dtype: str, count: int = 1, arrays: int = 1) -> None:
-    """Refuse a window that exceeds the limits even if its method needs neither time nor memory.
+    """Refuse a window whose arrays alone exceed the limits on memory and time, whatever the method.
 
     count: number of PSFs over the window that exist at the same time.
     arrays: number of arrays of real numbers that are stored for each PSF.

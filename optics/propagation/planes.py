@@ -1,8 +1,8 @@
 """A plane of a system, sampled for the light that it transmits.
 
-The aperture of a pupil is softened such that all frequencies that can reach the next plane are exact
-(optics.apertures.aperture). The samples of the pupil are so dense that no aliases fall onto these frequencies. Sums
-over samples then converge spectrally.
+The edge of a pupil's aperture is softened (optics.apertures.aperture), but all frequencies that can reach the next
+plane remain exact. The samples of the pupil are dense enough to keep aliases off these frequencies. Sums over samples
+then converge spectrally.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ REACH_MARGIN = 1.02  # choice: factor on the planes' half widths, because `propa
 
 @dataclass(frozen=True)
 class PlaneField:
-    """The field on the samples of a plane. band: highest frequency [1/m] of the field."""
+    """The field on the samples of a plane. band: highest frequency [1/m] in the field."""
 
     u: np.ndarray
     dx: float
@@ -60,7 +60,11 @@ class Stop:
 
 @dataclass(frozen=True)
 class StepSettings:
-    """Settings that are the same at every plane. tolerance: tolerance of each step; wavelength: in vacuum [m]."""
+    """Settings that are the same at every plane.
+
+    tolerance: tolerance of each step.
+    wavelength: wavelength in vacuum [m].
+    """
 
     wavelength: float
     medium_n: float
@@ -78,7 +82,7 @@ class StepSettings:
         return max(self.ripple, LEAST_RIPPLE)
 
     def reaching(self, half_widths: float, distance: float) -> float:
-        """Return the highest frequency [1/m] that `propagate` keeps between planes, including its fade.
+        """Return the highest frequency [1/m] that `propagate` does not remove between planes, including its fade.
 
         The result is infinite if both planes coincide. If they are close, it includes evanescent waves that have not
         yet decayed.
@@ -127,8 +131,8 @@ class PupilSampling:
     ) -> PupilSampling:
         """Return the sampling of the pupil at a stop.
 
-        The frequencies of the arriving light, of the pupil's phase and of the pupil's edge add up. Frequencies beyond
-        the band may be aliased, but not into the band.
+        The band is the sum of the frequencies of the arriving light, of the pupil's phase and of the pupil's edge.
+        Frequencies beyond the band may be aliased, but not into the band.
 
         arriving: highest frequency [1/m] of the arriving light.
 
@@ -145,7 +149,7 @@ class PupilSampling:
         turns = arriving + slope + pupil.bandwidth(settings.wavelength, settings.edge_ripple)
         band = settings.reaching(stop.half_width + following.half_width, following.distance)
         if math.isinf(band):
-            band = turns  # if the next plane is this plane, the edge is as soft as the finest detail of the light
+            band = turns  # coinciding planes: the edge is as soft as the finest detail
         soft = pupil.aperture.soften((turns + band) * pupil.radius, settings.edge_ripple, EDGE_REACH)
         pitch = 1 / (turns + band + soft.stopband / pupil.radius)
         across = 2 * math.ceil((1 + soft.reach) * pupil.radius / pitch) + 1
@@ -157,7 +161,7 @@ class PupilSampling:
         return cls(pupil, source, Grid.square(across, pitch), soft, band)
 
     def transmitted(self, u: np.ndarray | float, settings: StepSettings) -> PlaneField:
-        """Return the field u on the grid times the pupil's transmittance (its conjugate backwards)."""
+        """Return the field u on the grid times the pupil's transmittance; backwards, times its conjugate."""
         import drjit as dr
 
         beam = Beam(self.pupil, self.source, settings.wavelength, math.inf)

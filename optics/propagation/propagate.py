@@ -1,13 +1,13 @@
 """Propagation of a sampled field from one plane to another by its angular spectrum.
 
-The samples represent the band-limited function through them, which is zero outside. The spectrum is multiplied by the
+The samples define a band-limited function, which is zero outside the sampled area. Its spectrum is multiplied by the
 transfer function of free space and transformed onto the output samples:
 
     U(x, y; z) = F⁻¹{F{U₀} H}     (Goodman, §3.10.2; H in optics.propagation.transfer_function)
 
-A finite transform repeats the field every period. The period is so long that light that lands near the window does not
-wrap around. Light that lands farther away is faded out before it can wrap around. Both are impossible for light close
-to grazing incidence; the predicted error includes this light.
+A finite transform repeats the field periodically, so light that lands one period away would wrap around into the
+window. The period is long enough for light that lands near the window, and a smooth fade in the spectrum removes light
+that lands farther away. Neither is possible close to grazing incidence; the predicted error includes such light.
 """
 
 from __future__ import annotations
@@ -31,20 +31,19 @@ from optics.propagation.transform_sampling import TransformSampling, blur_left, 
 __all__ = ["PROPAGATION_METHODS", "WRAP_RIPPLE_PER_TOLERANCE", "PropagationResult", "propagate"]
 
 PROPAGATION_METHODS = ("angular_spectrum", "fresnel")
-# Choice: fraction of the faded light that may reach the window, relative to the tolerance. It is small, because the
-# window may contain far less light than is faded.
+# Choice: fraction of the removed light that may still reach the window, relative to the tolerance. It is small, because
+# the window may contain far less light than is removed.
 WRAP_RIPPLE_PER_TOLERANCE = 3e-3
-# Choice: initial padding, in units of √(λz), for the blur that truncation at the Nyquist frequency causes.
+# Choice: initial padding, in units of √(λz), for the blur due to truncation of the spectrum at the Nyquist frequency.
 SPARE = 1.0
-# Choice: a field is propagated again if the blur exceeds the allowed blur by this factor. The estimate of the blur is
-# accurate to a factor of two or three.
+# Choice: a field is propagated again if the blur, estimated to a factor of two or three, exceeds the limit this much.
 CLEARLY = 1.5
-# Choice: the evanescent part is subtracted from the missing light if the latter exceeds the arriving light by this
-# factor. Smaller amounts use almost nothing of the tolerance.
+# Choice: the evanescent part of the missing light is computed if the missing light exceeds the arriving light by this
+# factor. Smaller amounts hardly affect the predicted error.
 MUCH = 100.0
 
 HELD = (1e-20, 1e30)  # range of the power Σ|u|² for which float32 can represent the terms of the error estimate
-ONE = np.ones(1)  # weight of a sum without weights
+ONE = np.ones(1)  # stands for equal weights in a sum
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +52,7 @@ class PropagationResult(ReadOnlyArrays, OnWindow):
 
     u: complex field (…, y, x) at the pitch dx [m]. Sample n//2 is the centre.
     plan: method and predicted error.
-    window: positions of the samples, which `x` and `y` also contain [m].
+    window: grid of the samples [m].
     """
 
     u: np.ndarray
@@ -92,15 +91,15 @@ def propagate(
     method: str = "auto",
     dtype: str = "float32",
 ) -> PropagationResult:
-    """Return the field at a distance from the plane of u, including the carrier exp(ikz).
+    """Propagate the field u through free space and return it in a parallel plane, including the carrier exp(ikz).
 
     u: complex field (…, y, x) at the pitch dx [m]. Sample n//2 is the centre.
     wavelength: wavelength [m] in vacuum.
     distance: distance [m] behind the plane of u; negative for planes in front of it.
     out_dx, out_shape, out_centre: pitch [m], shape (y, x) and centre (x, y) [m] of the output. By default, pitch and
         shape equal those of u, and the centre is on the axis.
-    tolerance: relative L2 error of the intensity over the window, in addition to the error of the samples u. If light
-        at the Nyquist frequency of u causes a larger error, the plan states this error.
+    tolerance: relative L2 error of the intensity over the output, for exact samples u. If u contains light at its
+        Nyquist frequency, that is, if it is sampled too coarsely, the plan states the additional error.
     method: "auto" and "angular_spectrum" are exact. "fresnel" is the paraxial approximation.
 
     Raises:
@@ -127,7 +126,7 @@ def propagate(
         WRAP_RIPPLE_PER_TOLERANCE * tolerance,
         window.centre,
     )
-    how, planes = _with_room(sources, passage, (source, window), tolerance, precision(dtype))
+    how, planes = _with_padding(sources, passage, (source, window), tolerance, precision(dtype))
     out = np.stack([plane.u for plane in planes]).reshape(*given.shape[:-2], *window.shape)
     error = max(plane.error for plane in planes)
     if not error <= tolerance:
@@ -135,7 +134,7 @@ def propagate(
             f"tolerance = {tolerance:g}: the error reaches {error:.1g}, because too much of the light is near grazing "
             "incidence or too little of it hits the window; widen the tolerance or enlarge out_shape"
         )
-    plan = _plan(how, error, _untold(planes, tolerance), dtype)
+    plan = _plan(how, error, _sample_note(planes, tolerance), dtype)
     return PropagationResult(out, window.dx, plan, window, sources, how)
 
 
@@ -149,9 +148,9 @@ def _field(u: np.ndarray) -> np.ndarray:
 
 
 def _lit(field: np.ndarray) -> np.ndarray:
-    """Return the smallest part of a field, around the centre sample, that contains all light.
+    """Return the smallest part of a field around the centre sample that contains all light.
 
-    Dark samples around it would only increase the cost.
+    Dark samples outside it would only increase the cost.
     """
     for axis in (-2, -1):
         n = field.shape[axis]
@@ -176,13 +175,13 @@ class _Carried:
     blur: float
 
 
-def _with_room(
+def _with_padding(
     sources: np.ndarray, passage: Passage, grids: tuple[Grid, Grid], tolerance: float, types: Precision
 ) -> tuple[TransformSampling, list[_Carried]]:
-    """Return the planes, propagated with the padding that the light at the Nyquist frequency requires.
+    """Return the planes, propagated with enough padding for the blur due to light at the Nyquist frequency.
 
-    If even the largest useful padding is insufficient, no padding is added. The blur is then an error of the samples
-    themselves, which more padding would not reduce.
+    If even the largest useful padding is insufficient, none is added, because the samples themselves are then too
+    coarse.
     """
     most = most_spare(passage, grids[0])
     spare = min(SPARE * math.sqrt(passage.wavelength * abs(passage.z)), most)
@@ -202,7 +201,7 @@ def _one(plane: np.ndarray, how: TransformSampling, types: Precision) -> _Carrie
     with np.errstate(over="ignore"):
         plane = np.ascontiguousarray(given, dtype=types.complex_dtype)
         total = _power(plane)
-    # Then u is divided by the brightest sample, so that float32 can represent the powers.
+    # Divide u by its brightest sample, so that float32 can represent the powers.
     if not HELD[0] < total < HELD[1]:
         brightest = float(np.abs(given).max(initial=0.0))
         if brightest == 0:
@@ -217,8 +216,8 @@ def _one(plane: np.ndarray, how: TransformSampling, types: Precision) -> _Carrie
     grazing = _power(spectrum, space.grazing) / how.period**2
     blurred = blurred_back(spectrum, how)
     spectrum *= space.transfer
-    # By Parseval's theorem, power that is missing was faded out or is evanescent. If no power is missing, the
-    # difference in float32 is a rounding error, which is small compared with the remainder of the fade.
+    # By Parseval's theorem, missing power was either faded out or is evanescent. If no power is missing, the difference
+    # is a rounding error of float32, which is small compared with the remainder of the fade.
     faded = max(total - _power(spectrum) * how.period**2, 0.0) if how.passage.band.fade else 0.0
     if how.step:
         result = periodic_sum(spectrum, how.period, how.step, how.window.shape)
@@ -230,7 +229,8 @@ def _one(plane: np.ndarray, how: TransformSampling, types: Precision) -> _Carrie
     if faded > MUCH * arrived:
         faded = max(faded - total * _evanescent_share(plane, how), 0.0)
     rounding = FLOAT_NOISE[types.dtype] * (1 + math.sqrt(total / arrived))
-    # Light where a fade begins is hardly faded, but blurred. It is assumed to be as bright as the light that arrives.
+    # Light at the start of a fade is blurred but hardly weaker. It is assumed to be as bright as the light that
+    # arrives.
     blurred_by_fade = 2 * how.passage.ripple * (1 + math.sqrt(faded / arrived)) if how.passage.band.fade else 0.0
     error = 2 * math.sqrt(grazing / arrived) + rounding + blurred_by_fade
     result = result if brightest == 1 else result * result.dtype.type(brightest)
@@ -260,7 +260,7 @@ def _power(u: np.ndarray, weight: np.ndarray | None = ONE) -> float:
 
 @lru_cache(maxsize=4)
 def _free_space(how: TransformSampling, dtype: str) -> TransferFunction:
-    """Return the transfer function over the spectrum, including the scale of the sums.
+    """Return the transfer function over the spectrum, including the normalisation of the transforms.
 
     It is cached, because it takes more time than the transforms, and the same distance is often used again.
     """
@@ -275,10 +275,10 @@ def _free_space(how: TransformSampling, dtype: str) -> TransferFunction:
     return space
 
 
-def _untold(planes: list[_Carried], tolerance: float) -> str:
-    """Return a note on the error of the input samples if it exceeds the tolerance, else an empty string.
+def _sample_note(planes: list[_Carried], tolerance: float) -> str:
+    """Return a note on the error of coarse input samples if it exceeds the tolerance, else an empty string.
 
-    The predicted error does not include the error of the input samples.
+    The predicted error does not include this error.
     """
     blur = max(plane.blur for plane in planes)
     if blur <= tolerance:
@@ -288,11 +288,11 @@ def _untold(planes: list[_Carried], tolerance: float) -> str:
     )
 
 
-def _plan(how: TransformSampling, error: float, untold: str, dtype: str) -> Plan:
+def _plan(how: TransformSampling, error: float, note: str, dtype: str) -> Plan:
     band = how.passage.band
     kept = f"band {band.kept * how.passage.wavelength:.2g} n/λ" if band.fade else "the whole spectrum of u"
     period = how.period * how.source.dx
-    why = f"period {period:.3g} m, {kept}" + ("; paraxial, as requested" if how.passage.paraxial else "") + untold
+    why = f"period {period:.3g} m, {kept}" + ("; paraxial, as requested" if how.passage.paraxial else "") + note
     spectrum = how.across, how.across
     seconds = predicted_seconds(how.source.shape, how.period, spectrum)
     seconds += predicted_seconds(spectrum, period / how.window.dx, how.window.shape)

@@ -27,7 +27,7 @@ class FreeSpace:
     """Free space: a `distance` [m] in a medium with the refractive index medium_n.
 
     Raises:
-        ValueError: names argument, value and valid range.
+        ValueError: an argument is outside its valid range, which the message states.
     """
 
     distance: float
@@ -43,10 +43,10 @@ class SystemStep:
     """Power and accuracy of one step: the propagation to the next plane.
 
     distance: distance [m] of the step, negative for backward propagation.
-    plan: plan of the step. Its error is relative to the light within the next plane's window.
+    plan: plan of the step. Its predicted error is relative to the light within the next plane's window.
     power_in, power_out: power [intensity m²] at the start, and power that arrives within the window.
-    evanescent_power: fraction of power_in in waves that do not propagate (see PropagationResult). It includes only
-        waves that the samples represent, and samples need not represent waves that cannot reach the next plane.
+    evanescent_power: fraction of power_in in waves that do not propagate (see PropagationResult). It is a lower bound,
+        because the samples do not represent all waves that cannot reach the next plane.
     """
 
     distance: float
@@ -62,7 +62,7 @@ class StackResult(ReadOnlyArrays, OnWindow):
 
     u: complex field (y, x) at the pitch dx [m]. Sample n//2 is the centre.
     predicted_error: relative L2 error of the intensity.
-    window: positions of the samples, which `x` and `y` also contain [m].
+    window: grid of the samples [m]; `x` and `y` are the positions of its columns and rows.
     """
 
     u: np.ndarray
@@ -98,8 +98,9 @@ def propagate_through(
     wavelength: wavelength [m] in vacuum.
     out_dx, out_shape: pitch [m] and shape (y, x) of the output. By default, they equal those of u.
     tolerance: relative L2 error of the intensity over the window, in addition to the error of the samples u.
-    backward: whether u is the field behind the last element, to be propagated back to the plane in front of the first
-        element. Distances and phases are undone. Light that apertures blocked or that decayed is not restored.
+    backward: True if u is the field behind the last element, which is propagated back to the plane in front of the
+        first element. Propagation and phases are reversed. Light that apertures blocked or that decayed is not
+        restored.
 
     Raises:
         ValueError: an argument is invalid (named with its value and valid range), or a parameter carries derivatives.
@@ -144,10 +145,10 @@ def propagate_through(
 def _start(
     u: np.ndarray | None, dx: float | None, out_dx: float | None, out_shape: tuple[int, int] | None
 ) -> tuple[PlaneField | None, Grid, float]:
-    """Return the field in front of the first stop, the output window, and the modulus of the brightest sample.
+    """Return the field in front of the first stop, the output window, and the modulus of the field's brightest sample.
 
-    The field is None if a source illuminates the first pupil. Otherwise it is divided by its brightest sample, because
-    float32 cannot represent the power of every field.
+    The field is None if a source illuminates the first pupil. Otherwise it is divided by this modulus, because float32
+    cannot represent the power of every field.
     """
     if u is None:
         if out_dx is None or out_shape is None:
@@ -215,8 +216,8 @@ def _arriving(field: PlaneField | None, stop: Stop, settings: StepSettings) -> f
 def _error(steps: list[SystemStep], tolerance: float, settings: StepSettings) -> float:
     """Return the sum of the errors of the steps and of the soft edges between them.
 
-    Errors are relative. Light that is lost after a step increases its relative error, so each error is multiplied by
-    the loss of light after the step.
+    Errors are relative to the light at their step. If only part of this light arrives at the end, the relative error of
+    the result is larger, so each error is divided by that part.
 
     Raises:
         AccuracyError: the sum exceeds the tolerance.

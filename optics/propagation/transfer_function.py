@@ -1,15 +1,19 @@
-"""Free space between two planes as a filter: the frequencies that matter, and the transfer function for them.
+"""Free space between two planes as a filter: its transfer function, and the band of frequencies that can reach the
+window.
 
     H = exp(2πi z √((n/λ)² - fx² - fy²))     (Goodman, §3.10.2)
 
 With sin θ = λf/n, the exponent is ikz - ikz (1 - cos θ). The first part is the same for all frequencies, so its whole
-waves are subtracted exactly. Only the second part is rounded. It does not grow with the distance, because the samples
-resolve it.
+waves are subtracted exactly. Only the second part has a rounding error. This error does not grow with the distance,
+because the samples resolve the second part.
 
-Light whose angle to the axis is θ moves z tan θ to the side. Light that moves farther than from the far edge of one
-plane to the far edge of the other cannot reach the window. It is faded out before it can wrap around. A fade blurs the
-field. The width of the fade is a compromise: a narrow fade blurs over a large distance, so the unfaded band must
-include light that lands this far outside the window, and a wide fade includes light that moves far to the side.
+Light at an angle θ to the axis moves z tan θ to the side. If this exceeds the distance from the far edge of one plane
+to the far edge of the other, the light cannot reach the window. It is faded out, because it would otherwise wrap
+around.
+
+A fade of the spectrum blurs the field, and its width is a compromise. A narrow fade blurs over a large distance, so the
+unfaded band must include light that lands this far outside the window. A wide fade includes light that moves far to the
+side.
 """
 
 from __future__ import annotations
@@ -30,13 +34,13 @@ from optics.numerics.precision import Precision, opaque, padded_for_packets
 
 __all__ = ["PERIOD_MAX_SINE", "Band", "TransferFunction", "evanescent", "kept_band", "kept_square", "walk"]
 
-# Choice: sin θ of the steepest light for which the period is long enough. z tan θ has no bound at grazing incidence.
+# Choice: the period is long enough for light up to this sin θ. z tan θ has no bound at grazing incidence.
 PERIOD_MAX_SINE = 0.995
 # Choice: largest sine at which a fade along each axis may end. Towards grazing incidence, fades would become ever
 # narrower.
 STEEPEST_SQUARE = 0.8
-# Choice: blur beyond the displacement of the outermost light, relative to the blur of the whole fade. It is smaller,
-# because the outer end of a fade is dark.
+# Choice: blur of the outermost light, relative to the blur of the whole fade. It is smaller, because the outer end of a
+# fade is dark.
 OUTWARDS = 0.6
 # Choice: widths of the fade to try, in units of the sine.
 FADE_SINES = np.geomspace(0.003, 0.6, 33)
@@ -80,9 +84,9 @@ def walk(frequency: float, wavelength: float, z: float, paraxial: bool = False) 
 
 
 def kept_band(corner: float, wavelength: float, z: float, ripple: float, paraxial: bool = False) -> Band:
-    """Return the band for light that moves up to `corner` [m] to the side over the distance z.
+    """Return the band of the light whose sideways displacement over the distance z is at most `corner` [m].
 
-    It is the band with the shortest period, or `EVERYTHING` if no light may be faded.
+    It is chosen for the shortest period of the transform. The result is `EVERYTHING` if no light may be faded.
     """
     return _shortest(corner, wavelength, z, ripple, paraxial, square=False)
 
@@ -90,9 +94,9 @@ def kept_band(corner: float, wavelength: float, z: float, ripple: float, paraxia
 def kept_square(half: float, wavelength: float, z: float, ripple: float, paraxial: bool = False) -> Band:
     """Return the square band for light that moves up to `half` [m] along each axis over the distance z.
 
-    It can be smaller than the band of `kept_band`, because sides of a window are nearer than corners. The displacement
-    along x depends on fx / √(1 - λ²fy²), so the fade is a function of this expression. Because of the gradient of the
-    expression, the blur is larger than that of a fade in fx alone.
+    It can be smaller than the band of `kept_band`, because a window's sides are nearer than its corners. The
+    displacement along x depends on fx / √(1 - λ²fy²), so the fade is a function of this expression. The blur is
+    therefore larger than that of a fade in fx alone, by the gradient of the expression.
     """
     return _shortest(half, wavelength, z, ripple, paraxial, square=True)
 
@@ -128,10 +132,10 @@ def _gradient(sine: float) -> float:
 
 @lru_cache(maxsize=4)
 def evanescent(samples: int, dx: float, wavelength: float) -> np.ndarray:
-    """Return the fraction of the cell of each frequency, in a whole spectrum, that does not propagate.
+    """Return the evanescent fraction of each cell of a spectrum, (samples, samples) in FFT order.
 
-    The result is (samples, samples) in FFT order. The circle f = n/λ cuts some cells. The fraction of such a cell that
-    lies outside the circle is approximated by a straight edge. The error is of the order of the cell's width squared.
+    Waves outside the circle f = n/λ do not propagate. Within a cell, the circle is approximated by a straight edge. The
+    error is of the order of the cell's width squared.
     """
     f = np.fft.fftfreq(samples) * wavelength / dx
     share: np.ndarray = np.clip((np.hypot(f[None, :], f[:, None]) - 1) * samples * dx / wavelength + 0.5, 0, 1)
@@ -142,7 +146,7 @@ def evanescent(samples: int, dx: float, wavelength: float) -> np.ndarray:
 def _fade_table(ripple: float) -> Interpolant:
     """Return a fade from 1 at 0 to 0 at 1: the complement of the integral of a Kaiser window.
 
-    The fade blurs a field over the distance β/(π fade). Beyond this distance, a share `ripple` remains.
+    The fade blurs a field over the distance β/(π fade). Beyond this distance, a fraction `ripple` remains.
     """
     beta = kaiser_beta(ripple)
     nodes, weights = np.polynomial.legendre.leggauss(math.ceil(beta) + 24)
@@ -176,7 +180,7 @@ class Passage:
     """Parameters of a transfer function: the passage of light from one plane to another.
 
     centre: position (x, y) [m] of the window.
-    ripple: share of the light that remains beyond a fade.
+    ripple: fraction of the light that remains beyond a fade.
 
     Evanescent waves decay in forward propagation and are omitted in backward propagation (z < 0).
     """

@@ -1,8 +1,7 @@
-"""The period of a finite transform. It is so long that light does not wrap around into the window.
+"""The period of a finite transform, chosen long enough to keep light from wrapping around into the window.
 
-A finite transform repeats the field every period. Light that lands near the window must not wrap around, and light that
-lands farther away is faded out before it can wrap around. Light of frequency f moves z tan θ to the side, with sin θ =
-λ|f|.
+A finite transform repeats the field every period. Light of frequency f moves z tan θ to the side, with sin θ = λ|f|. If
+it lands near the window, the period must be long enough. Light that lands farther away is faded out instead.
 
 If no light can be faded, the spectrum is truncated at the Nyquist frequency f_N, which causes a blur. Along one axis,
 the field is ∫ S(f) e^{2πi (f x + z √(1/λ² - f²))} df up to f_N. The contribution of the integral's end is
@@ -10,10 +9,10 @@ the field is ∫ S(f) e^{2πi (f x + z √(1/λ² - f²))} df up to f_N. The con
     |b(x)| = |S(f_N)| / (2π d),   d = |x - walk(f_N)|,                                                             (1)
 
 where 2πd is the derivative of the phase. This is the first term of an integral's expansion about its end (Bleistein &
-Handelsman, Asymptotic Expansions of Integrals, §3.2). It decreases so slowly with d that the blur from the next period
+Handelsman, Asymptotic Expansions of Integrals, §3.2). It decreases slowly with d, so the blur of the next period
 reaches the window. Consider a source of width L that emits light of this frequency evenly and incoherently. Let g be
-the gap between the displaced light of the source in the next period and a window of width W. Divided by the power |S|²
-at the end of the spectrum, the power that comes back into the window is
+the gap between the displaced light of the source in the next period and a window of width W. The power that comes back
+into the window, divided by the power |S|² at the end of the spectrum, is
 
     ∫_0^L ds/L ∫_0^W dx / (2π (g + s + x))² = ln(1 + L W / (g (g + L + W))) / (4π² L).                             (2)
 """
@@ -73,8 +72,8 @@ def sampling(passage: Passage, source: Grid, window: Grid, spare: float) -> Tran
         AccuracyError: the period needs more samples than the limit.
     """
     wavelength, z, ripple, paraxial = passage.wavelength, abs(passage.z), passage.ripple, passage.paraxial
-    # Distance from the far edge of the source to the far edge of the window. The source is extended by one sample, for
-    # the band-limited function through the samples.
+    # Distance from the far edge of the source to the far edge of the window. The source is extended by one sample,
+    # because the band-limited function extends beyond the outermost samples.
     reach = max(
         (n // 2 + 1) * source.dx + (m // 2) * window.dx + abs(middle)
         for n, m, middle in zip(source.shape, window.shape, window.centre[::-1], strict=True)
@@ -86,7 +85,7 @@ def sampling(passage: Passage, source: Grid, window: Grid, spare: float) -> Tran
     )
     band = min(bands, key=lambda band: band.walk)
     far, nyquist = band.walk, 0.5 / source.dx
-    # If no light can be faded, all frequencies of the samples matter.
+    # If no light can be faded, all frequencies of the samples are included.
     if band.end >= (nyquist if band.square else math.sqrt(2) * nyquist):
         band, far = EVERYTHING, _farthest(nyquist, wavelength, z, paraxial) + spare
     # Light that moves `far` from the source's far edge must not wrap around to the window's edge, and the source must
@@ -110,8 +109,8 @@ def sampling(passage: Passage, source: Grid, window: Grid, spare: float) -> Tran
 def most_spare(passage: Passage, source: Grid) -> float:
     """Return the largest useful padding [m] for the blur of a truncated spectrum.
 
-    This is a bound, which assumes that the light with the largest displacement, from the spectrum's corner √2 f_N,
-    moves along an axis instead of the diagonal.
+    This is an upper bound. It assumes that the light with the largest displacement, at the spectrum's corner √2 f_N,
+    moves along an axis instead of along the diagonal.
     """
     nyquist, z, paraxial = 0.5 / source.dx, abs(passage.z), passage.paraxial
     end = math.sqrt(2) * nyquist
@@ -133,9 +132,9 @@ def _farthest(nyquist: float, wavelength: float, z: float, paraxial: bool) -> fl
 
 
 def blurred_back(spectrum: np.ndarray, how: TransformSampling) -> float:
-    """Return the power that comes back into the window due to truncation at the Nyquist frequency.
+    """Return the power [units of Σ|u|²] that comes back into the window due to truncation at the Nyquist frequency.
 
-    The power is in units of the samples u. It is assumed that the source emits light of this frequency evenly.
+    The source is assumed to emit light of this frequency evenly.
 
     spectrum: spectrum of the field at the source: (fx, fy) in FFT order if the window's pitch is a whole number of
         samples, else (fy, fx) centred.
@@ -147,7 +146,7 @@ def blurred_back(spectrum: np.ndarray, how: TransformSampling) -> float:
     lines = np.unique(np.linspace(-width, width, NYQUIST_LINES).round().astype(int))
     lines = (lines + (how.period // 2 if how.step else 0)) % how.period
     total = 0.0
-    for axis in (0, 1):  # axis along which the blur comes back: y, x
+    for axis in (0, 1):  # axis along which the blur returns (y, x)
         across = axis if how.step else 1 - axis  # axis of the spectrum for the frequency along the other axis
         u = np.take(spectrum, lines, axis=1 - across)
         power = u.real**2 + u.imag**2
@@ -156,7 +155,7 @@ def blurred_back(spectrum: np.ndarray, how: TransformSampling) -> float:
 
 
 def blur_left(how: TransformSampling, roomier: TransformSampling) -> float:
-    """Return the amplitude of the blur in a sampling with more padding, relative to that in `how`.
+    """Return the amplitude of the blur in the sampling `roomier`, which has more padding, relative to that in `how`.
 
     It is assumed that the power at the Nyquist frequency is the same for all frequencies along the other axis.
     """
@@ -168,23 +167,23 @@ def blur_left(how: TransformSampling, roomier: TransformSampling) -> float:
 def _blur_weights(how: TransformSampling, axis: int) -> np.ndarray:
     """Return the fraction of the power |U|² at the Nyquist frequency along one axis that comes back into the window.
 
-    There is one weight per frequency along the other axis. The weight is derived as follows. In terms of samples, U = Σ
-    u e^{-2πi...} equals S/dx. Therefore (2) times dx² |U|² is the power ∫|b|² dx. Divided by dx, it is the sum over
-    samples along the axis. The factor 1/period gives the sum along the other axis, by Parseval's theorem. A factor of 2
-    is due to the two ends ±f_N of the spectrum.
+    There is one weight per frequency along the other axis. It is derived as follows. In terms of samples, U = Σ u
+    e^{-2πi...} equals S/dx. Therefore (2) times dx² |U|² is the power ∫|b|² dx, and division by dx gives the sum over
+    samples along the axis. By Parseval's theorem, the factor 1/period gives the sum along the other axis. The two ends
+    ±f_N of the spectrum contribute a factor of 2.
     """
     source, window = how.source, how.window
     others = (np.arange(how.period) - how.period // 2) / (how.period * source.dx)
     far, aside = _walks(0.5 / source.dx, np.fft.ifftshift(others) if how.step else others, how)
     lit, seen = (grid.shape[axis] * grid.dx for grid in (source, window))
-    meets = _share_that_meets(aside, how, 1 - axis)
-    gap = np.maximum(how.period * source.dx - how.reach - np.where(meets > 0, far, 0), source.dx)
+    lands = _landing_fraction(aside, how, 1 - axis)
+    gap = np.maximum(how.period * source.dx - how.reach - np.where(lands > 0, far, 0), source.dx)
     comes_back = np.log1p(lit * seen / (gap * (gap + lit + seen))) / (4 * math.pi**2 * lit)  # (2)
-    weights: np.ndarray = 2 * comes_back * meets * source.dx / how.period
+    weights: np.ndarray = 2 * comes_back * lands * source.dx / how.period
     return weights
 
 
-def _share_that_meets(walks: np.ndarray, how: TransformSampling, axis: int) -> np.ndarray:
+def _landing_fraction(walks: np.ndarray, how: TransformSampling, axis: int) -> np.ndarray:
     """Return the fraction of a source's light that lands within the window's range along an axis (0 for y, 1 for x).
 
     The fraction is the overlap of two intervals of widths `lit` and `seen`, whose centres are `missed` apart.

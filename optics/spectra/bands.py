@@ -20,7 +20,7 @@ from optics.spectra.spectrum import Spectrum, cie_1931, daylight
 __all__ = ["SpectralBands", "cie_1931", "daylight", "pigment_absorptance"]
 
 FINEST = 64  # choice: largest number of bands
-CATCHES_FIRST = 1e4  # choice: weight of quantum catches relative to means in the least-squares fit
+CATCHES_FIRST = 1e4  # choice: weight of quantum catches relative to that of the bands' means in the least-squares fit
 
 
 @dataclass(frozen=True)
@@ -64,14 +64,14 @@ class SpectralBands(ReadOnlyArrays):
 
         The spectrum may have any shape, including the lines of a fluorescent lamp, which samples at the bands' centres
         could miss. The values are first computed as means over the bands, weighted by the receptors' sensitivity and
-        relative to daylight. Then they receive the smallest change with which Σ_b weights[c, b] radiance[b] is the
-        quantum catch of receptor type c (by quadrature to 1 nm). The catches are exact unless there are fewer bands
-        than types; then they are a least-squares solution. If a spectrum with lines is divided into few bands, a value
-        may be negative.
+        relative to daylight. They are then adjusted by the smallest change that makes Σ_b weights[c, b] radiance[b]
+        equal to the quantum catch of receptor type c (by quadrature to 1 nm). If there are fewer bands than types, this
+        is possible only in the least-squares sense. If a spectrum with lines is divided into few bands, a value may be
+        negative.
 
         radiance: a Spectrum, or a function of wavelengths [m]. For a surface, it is reflectance times illuminant.
         receptors: the receptors for which these bands were made.
-        nonnegative: whether values must be at least 0. Catches are then as close as possible to the exact ones.
+        nonnegative: True for values of at least 0. Catches are then as close to the exact ones as this permits.
         """
         if not isinstance(radiance, Spectrum) and not callable(radiance):
             raise ValueError(
@@ -85,7 +85,7 @@ class SpectralBands(ReadOnlyArrays):
         seen = catch.sum(axis=0)
         shares = linear_weights(nm, self.wavelengths * 1e9) * (
             seen + 1e-6 * seen.max()
-        )  # the mean of a band must be defined even if receptors do not absorb its light
+        )  # avoids 0/0 in a band whose light no receptor absorbs
         means = daylight(self.wavelengths) * (shares @ of_daylight) / shares.sum(axis=1)
         caught = catch @ of_daylight
         found: np.ndarray = means + np.linalg.pinv(self.weights) @ (caught - self.weights @ means)
@@ -97,7 +97,7 @@ class SpectralBands(ReadOnlyArrays):
 
 
 def _nonnegative(weights: np.ndarray, caught: np.ndarray, means: np.ndarray) -> np.ndarray:
-    """Return x >= 0 with weights @ x closest to the catches and, among these x, the one closest to the means."""
+    """Return x >= 0 with weights @ x closest to the catches. Among several such x, it is the closest to the means."""
     from scipy.optimize import lsq_linear
 
     equations = np.concatenate([weights * CATCHES_FIRST, np.eye(len(means))])
@@ -119,7 +119,7 @@ def _values(found: Any, shape: tuple[int, ...]) -> np.ndarray:
 
 
 def _catch(kinds: Receptors) -> tuple[np.ndarray, np.ndarray]:
-    """Return wavelengths [nm] over the receptors' range, and each type's catch of daylight with quadrature weights."""
+    """Return wavelengths [nm] over the receptors' range, and each type's catch of daylight times quadrature weights."""
     low, high = kinds.limits_nm
     nm = np.arange(low, high + 0.5)
     catch = kinds.catch(nm)

@@ -24,11 +24,11 @@ class PhotonBudget:
     illuminance: illuminance E_v [lx] of the scene by daylight (CIE D65): 1e5 in the sun, 1e4 under an overcast sky, 10
         at dusk.
     integration_time: integration time Δt [s] of a receptor. It is 10 to 50 ms in insects and vertebrates.
-    quantum_efficiency: η, the share of photons at the peak wavelength of its pigment that a receptor absorbs, reduced
-        by losses in front of the receptor.
+    quantum_efficiency: η, the fraction of photons at the peak wavelength of its pigment that a receptor absorbs. It
+        includes losses in front of the receptor.
 
     Raises:
-        ValueError: names argument, value and valid range.
+        ValueError: an argument is outside its valid range, which the message states.
     """
 
     illuminance: float = 1e4
@@ -57,7 +57,7 @@ class PhotonBudget:
             with the spectrum of daylight instead of one wavelength, for square receptors of side d.
 
         Raises:
-            ValueError: names argument, value and valid range.
+            ValueError: an argument is outside its valid range, which the message states.
         """
         of_kind("bands", bands, SpectralBands, "SpectralBands.uniform(4)")
         positive("etendue", etendue, "m² sr")

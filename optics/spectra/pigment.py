@@ -94,7 +94,7 @@ class Pigment:
     chromophore: "A1" (retinal) or "A2" (3,4-didehydroretinal, as in freshwater fish and amphibians).
 
     Raises:
-        ValueError: names argument, value and valid range.
+        ValueError: an argument is outside its valid range, which the message states.
     """
 
     lambda_max_nm: float

@@ -16,7 +16,8 @@ from optics.spectra.spectrum import LIMITS_NM, Spectrum, cone_fundamentals, dayl
 
 __all__ = ["RECEPTORS", "Receptors", "receptors_of"]
 
-# Neglected light beyond either end of the range of wavelengths, as a share of each type's catch from white in daylight.
+# Light neglected beyond either end of the range of wavelengths, as a fraction of each type's catch from a white surface
+# in daylight.
 NEGLIGIBLE = 1e-3
 STEP_NM = 10  # ends of the range are multiples of this step
 
@@ -32,10 +33,10 @@ class Receptors:
         type, as in a real retina, and signals are (1, h, w). The rows are repeated over the retina from its top left
         corner.
     range_nm: range of wavelengths (low, high) [nm] that is divided into bands: whole numbers within 300-780. None: a
-        range so wide that less than 1e-3 of any type's catch from white in daylight is omitted at either end.
+        range beyond whose ends each type has less than 1e-3 of its catch from a white surface in daylight.
 
     Raises:
-        ValueError: names argument, value and valid choices.
+        ValueError: an argument is invalid; the message states the valid choices.
     """
 
     types: tuple[Any, ...]
@@ -76,7 +77,7 @@ class Receptors:
         return tile[np.ix_(*(np.arange(n) % m for n, m in zip(resolution, tile.shape, strict=True)))]
 
     def catch(self, nm: np.ndarray) -> np.ndarray:
-        """Return each type's catch from unit daylight at wavelengths [nm], (type, wavelength), up to a common factor.
+        """Return each type's catch of daylight at wavelengths [nm], (type, wavelength), up to a common factor.
 
         The catch is daylight times λ times the quantal sensitivity, whose peak is 1. The factor λ is necessary because
         receptors count photons, while radiance is energy.
@@ -135,7 +136,7 @@ def _range(range_nm: Any) -> tuple[float, float]:
 
 
 def _range_of(receptors: Receptors) -> tuple[float, float]:
-    """Return the range of wavelengths outside which every type catches at most a share NEGLIGIBLE at either end."""
+    """Return the range of wavelengths beyond whose ends every type has at most the fraction NEGLIGIBLE of its catch."""
     nm = np.arange(LIMITS_NM[0], LIMITS_NM[1] + 1)
     so_far = np.cumsum(receptors.catch(nm), axis=1)
     so_far /= so_far[:, -1:]

@@ -29,7 +29,7 @@ __all__ = [
 ]
 
 LIMITS_NM = (300.0, 780.0)  # the table of CIE D65 starts at 300 nm; no receptors absorb beyond 780 nm
-SHORTEST_NM = 1.0  # shortest entry of a table; smaller numbers are probably metres
+SHORTEST_NM = 1.0  # [nm] shortest wavelength in a table; smaller numbers are probably in metres
 NORMAL_NM = 560.0  # wavelength at which illuminants are 1
 
 
@@ -45,7 +45,7 @@ class Spectrum:
     Two spectra are equal if their tables are equal.
 
     Raises:
-        ValueError: names argument, value and valid choices.
+        ValueError: an argument is invalid; the message states the valid choices.
     """
 
     wavelengths_nm: tuple[float, ...]
@@ -89,7 +89,7 @@ def _spectrum(nm: np.ndarray, values: np.ndarray) -> Spectrum:
 
 @lru_cache(maxsize=4)
 def _table(name: str) -> tuple[tuple[str, ...], np.ndarray]:
-    """Return names and values (column, wavelength) of a CSV file's columns. The first column is wavelengths [nm]."""
+    """Return names and values (column, wavelength) of the columns of a CSV file. The first is wavelengths [nm]."""
     with resources.files("optics.spectra").joinpath("data", name).open() as file:
         names = tuple(file.readline().strip().split(","))
         return names[1:], np.loadtxt(file, delimiter=",").T

@@ -50,7 +50,7 @@ class Animals:
                 _require_fit(other, senses)
 
     def seed(self, seed: int | tuple[int, ...]) -> None:
-        """Restart all random streams, from one seed or from a seed for each world."""
+        """Restart all random streams from one seed, or from one seed per world."""
         self.simulation.seed(seed)
         for senses in self.seeing:
             senses.restart()
@@ -77,10 +77,10 @@ class Animals:
         pending = self.launch() if simulation.task.renders_early else None
         step = simulation.judge(failed)
         pending = pending or self.launch()
-        if any(senses.tells for senses in self.seeing):
+        if any(senses.has_auxiliary for senses in self.seeing):
             poses = simulation.poses()
             for senses in self.seeing:
-                senses.tell(poses, NOWHERE)
+                senses.update_auxiliary(poses, NOWHERE)
         return Advanced(step, pending)
 
     def seen(self, advanced: Advanced) -> list[Arrays]:
@@ -101,7 +101,7 @@ class Animals:
             senses.action[worlds] = senses.agent.first_action
         poses = self.simulation.poses()
         for senses in self.seeing:
-            senses.tell(poses, worlds)
+            senses.update_auxiliary(poses, worlds)
         everyone = len(worlds) == self.simulation.n
         return [senses.launch(poses, None if everyone else worlds) for senses in self.seeing]
 

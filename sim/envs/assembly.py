@@ -17,7 +17,7 @@ from sim.envs.follow_camera import check_render_mode
 from sim.envs.prepared_task import PreparedTask
 from sim.envs.vec_env import EyesVecEnv
 from sim.eyes.eyes import Eyes
-from sim.render.fidelity import Fidelity, fidelity_asked
+from sim.render.fidelity import Fidelity, requested_fidelity
 from sim.tasks.batch_task import BatchTask
 from sim.tasks.encounter import Encounter
 from sim.tasks.eye_kinds import auxiliary_of
@@ -28,6 +28,8 @@ from sim.tasks.task import Task
 from sim.tasks.task_settings import TaskSettings
 from sim.tasks.user_tasks import batched
 from sim.worlds.course import Course
+from sim.worlds.layout import WALL_HEIGHT
+from sim.worlds.layout_family import LayoutSet
 from sim.worlds.world import build_world
 
 if TYPE_CHECKING:
@@ -35,10 +37,10 @@ if TYPE_CHECKING:
 
 AUTO = "auto"
 LAYOUT = "only built-in tasks have layouts; the world of a user task is its model"
-OF_TASKS = {  # arguments for built-in tasks only, each with the way in which a user task defines the same
+OF_TASKS = {  # arguments for built-in tasks only, with the place where a user task defines the same
     "eyes": "a user task defines its eyes by its settings eye and mounts",
     "rays_per_receptor": "a user task defines it by its setting fidelity",
-    **dict.fromkeys(("world_seed", "mazes", "course"), LAYOUT),
+    **dict.fromkeys(("world_seed", "mazes", "course", "layouts", "wall_height"), LAYOUT),
     **{name: f"a user task defines it by its setting {name}" for name in ("fidelity", "spectra", "vary", "auxiliary")},
 }
 IN_RESET = "pass it to reset(seed=...)"
@@ -58,6 +60,8 @@ def make_vec_env(
     world_seed: int = 0,
     mazes: int = 1,
     course: str | Course = "short",
+    layouts: LayoutSet | None = None,
+    wall_height: float = WALL_HEIGHT,
     least_return: float | None = None,
     episode_steps: int | None = None,
     spectra: Mapping[str, Spectrum | str] | None = None,
@@ -75,14 +79,15 @@ def make_vec_env(
     n_envs: number of worlds
     seed: seed of episodes and noise; None: a random seed
     memory: number of frames in an observation
-    mode: "training" or "evaluation". In evaluation, objects that the agent reached reappear elsewhere, and reward terms
-        have the weights of the fitness.
+    mode: "training", "evaluation" or "test". In evaluation, objects that the agent reached reappear elsewhere, and
+        reward terms have the weights of the fitness. "test" is an evaluation for final figures; it differs only if a
+        user task uses other worlds in it.
     rays_per_receptor: number of rays traced for each receptor, in direct light only. "auto": the cheapest fidelity
-        whose error the receptors' noise allows. It includes light that was reflected twice if this light changes
-        signals too much to be ignored. `sim.choose_fidelity(world, eyes, bands="own")` returns this fidelity.
+        whose error is small compared with the receptors' noise. It includes light that was reflected twice if this
+        light changes signals noticeably. `sim.choose_fidelity(world, eyes, bands="own")` returns the same fidelity.
     fidelity: a complete `sim.Fidelity` instead of rays_per_receptor, or "auto", which has the same meaning as
         rays_per_receptor="auto". A `sim.Fidelity` may also be passed as rays_per_receptor.
-    world_seed, mazes, course: the layout that all worlds share, see `sim.build_world`
+    world_seed, mazes, course, layouts, wall_height: the layout that all worlds share, see `sim.build_world`
     least_return: in training, an episode is truncated once its rewards sum to this value or less; None: never
     episode_steps: number of actions after which an episode is truncated; None: the task's default
     spectra: spectra of materials and lights by name, used instead of their colours: see `sim.build_world`
@@ -117,7 +122,8 @@ def make_vec_env(
     check_least_return(least_return, mode)
     if asked is not None:
         eyes = in_bands(eyes, asked.bands)
-    world = build_world(task, seed=world_seed, mazes=mazes, course=course, spectra=spectra)
+    where: dict[str, Any] = {"seed": world_seed, "mazes": mazes, "course": course}
+    world = build_world(task, **where, layouts=layouts, wall_height=wall_height, spectra=spectra)
     built_in = task_of(world, mode, eyes=eyes, fidelity=asked or AUTO)
     built_in.vary, built_in.auxiliary = vary or None, auxiliary_of(auxiliary, "auxiliary")
     return PreparedTask(built_in).vec_env(n_envs, seed, memory, **how)
@@ -185,14 +191,14 @@ def _refuse_for_tasks(given: Mapping[str, Any]) -> None:
 def _fidelity_of(
     rays_per_receptor: float | str | Fidelity, fidelity: Fidelity | str | None, eyes: Eyes | Mapping[str, Eyes]
 ) -> Fidelity | None:
-    """Return the fidelity that one of the two arguments requests; None if it is to be chosen automatically."""
+    """Return the fidelity that one of the two arguments specifies; None if it is to be chosen automatically."""
     chosen = isinstance(fidelity, str) and fidelity == AUTO
     if not (fidelity is None or chosen or isinstance(fidelity, Fidelity)):
         raise ValueError(f"fidelity = {shown(fidelity)}: must be a sim.Fidelity, {AUTO!r} or None")
     asked = (
         rays_per_receptor
         if isinstance(rays_per_receptor, Fidelity)
-        else fidelity_asked(rays_per_receptor, _first(eyes))
+        else requested_fidelity(rays_per_receptor, _first(eyes))
     )
     if fidelity is None:
         return asked

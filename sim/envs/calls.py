@@ -49,7 +49,7 @@ class CallOrder:
             raise RuntimeError(NOT_BEGUN)
 
     def start_reset(self) -> None:
-        """Note a reset that is not complete yet.
+        """Record that a reset has started.
 
         Raises:
             RuntimeError: the environment is closed, or an action is pending.
@@ -58,15 +58,15 @@ class CallOrder:
         self._begun = False
 
     def finish_reset(self) -> None:
-        """Note that all worlds have begun."""
+        """Record that the reset is complete, so that all worlds have begun."""
         self._begun = True
 
     def expect_wait(self) -> None:
-        """Note a pending action."""
+        """Record that an action is pending."""
         self._pending = True
 
     def take(self) -> None:
-        """Note that the pending action is being taken.
+        """Record that the pending action is being taken.
 
         Raises:
             RuntimeError: no action is pending, or the environment is closed.

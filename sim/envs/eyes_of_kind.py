@@ -57,7 +57,7 @@ class EyesOfKind:
         return {"remembered": self.memory.frames_held, "noise": self._normals.place}
 
     def set_state(self, remembered: np.ndarray, noise: np.ndarray) -> None:
-        """Restore what `get_state` returned."""
+        """Restore a state from `get_state`."""
         self.memory.restore(remembered)
         self._normals.go_on_from(noise)
 

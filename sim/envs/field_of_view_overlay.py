@@ -1,4 +1,4 @@
-"""Overlay that shows the eyes, their fields of view at eye height, and receptors' viewing directions in an image.
+"""Overlay for images: the eyes, their fields of view at eye height, and the viewing directions of receptors.
 
 The camera follows the agent, so the fields of view have a fixed position in the image. Only the parts that obstacles
 hide differ between images.
@@ -22,9 +22,9 @@ COLORS = np.array(
     [[0, 158, 115], [230, 159, 0], [86, 180, 233], [204, 121, 167], [240, 228, 66], [0, 114, 178], [213, 94, 0]]
 )
 FILL, RAY, RIM = 0.22, 0.55, 0.95  # opacities of a field's interior, of receptors' directions and of its edges
-FARTHEST = 30.0  # [m] length of a ray that hits nothing
+FARTHEST = 30.0  # [m] length of a ray that hits no surface
 MOST_RAYS = 15  # largest number of receptors' directions drawn for one eye, in addition to the edges of its field
-FAN = 64  # number of rays across a field that measure the distance to obstacles
+FAN = 64  # number of rays in the fan across a field
 LINE = 1.2  # [pixels] width of the lines
 IRIS, PUPIL = 0.07, 0.045  # [m] radii of the coloured disc and of the black disc in it
 
@@ -51,6 +51,8 @@ class _Level:
 @dataclass(frozen=True)
 class _Field:
     """Pixels that show one eye's field of view if nothing hides it.
+
+    A fan of rays across the field measures the distance to obstacles.
 
     pixels, depth: as in _Level, (n,)
     opacity: opacity of the overlay, (n,)

@@ -20,7 +20,7 @@ from sim.worlds.world import World
 # steep enough to look over a wall behind the agent.
 BEHIND, ABOVE, AHEAD = 4.0, 5.0, 3.0
 FOVY_DEG = 50.0
-WAVELENGTHS = np.linspace(430e-9, 660e-9, 8)  # [m] of slow images, which Mitsuba traces
+WAVELENGTHS = np.linspace(430e-9, 660e-9, 8)  # [m] wavelengths of slow images, which Mitsuba traces
 SIZE = (360, 480)  # pixels (height, width)
 
 
@@ -69,14 +69,14 @@ class FollowCamera:
             look = self._quick.render(self._data, view, width, height)
             picture, nearness = look.picture, look.inverse_distance
         else:
-            picture, nearness = self._slow_look(self._mirror, view, size)
+            picture, nearness = self._slow_image(self._mirror, view, size)
         if self.eyes is None:
             return picture
         if size not in self._fields:
             self._fields[size] = FieldsOfView(self.eyes, _behind(np.zeros(2), 0.0), size)
         return self._fields[size].draw(picture, nearness, self.world.model, self._data)
 
-    def _slow_look(self, scene: Mirror, view: Viewpoint, size: tuple[int, int]) -> tuple[np.ndarray, Nearness]:
+    def _slow_image(self, scene: Mirror, view: Viewpoint, size: tuple[int, int]) -> tuple[np.ndarray, Nearness]:
         scene.sync(self._data)
         height, width = size
         spp = self.samples or 1

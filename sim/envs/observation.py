@@ -7,7 +7,7 @@ import numpy as np
 # Margin between noiseless signals and the bounds of the observation space, in standard deviations of the noise. One in
 # 1e23 draws exceeds it.
 SIGMAS = 10.0
-ROUNDING = 1e-4  # error of float32, as a share of the brightest signal
+ROUNDING = 1e-4  # error of float32, relative to the brightest signal
 
 
 class Memory:
@@ -60,7 +60,7 @@ class Memory:
         return self._past[-1]
 
     def preview(self, frame: np.ndarray, worlds: np.ndarray) -> np.ndarray:
-        """Return the memory of these worlds as if a frame (len(worlds), ...) were added, without storing the frame."""
+        """Return the memory of these worlds after a frame (len(worlds), ...), without storing the frame."""
         if self.frames == 1:
             return frame[:, None]
         return np.stack([*(past[worlds] for past in self._past[1:]), frame], axis=1)

@@ -82,7 +82,7 @@ class PreparedTask:
         return found
 
     def elsewhere(self, task: BatchTask) -> PreparedTask:
-        """Return another task prepared with the same fidelities: `task`, with the same eyes in another layout."""
+        """Prepare `task`, which has the same eyes in another layout, with the same fidelities."""
         found = copy.copy(self)
         found.task = task
         found._scenes = None if self._scenes is None or not isinstance(task, AgentTask) else scenes_for(task)

@@ -15,6 +15,7 @@ from sim.envs.vector_env import EyesVectorEnv
 from sim.tasks.task import Task
 from sim.tasks.task_settings import MOST_STEPS
 from sim.worlds.course import Course
+from sim.worlds.layout_family import LayoutSet
 from sim.worlds.navigation import course_named
 
 ENDLESS = -1  # Gymnasium's value for episodes without truncation
@@ -49,7 +50,7 @@ def _begun(task: str | Task | type[Task]) -> str | Task:
 
 
 def _steps(asked: int, options: dict[str, Any]) -> int:
-    """Return the number of actions in an episode: the requested number, but at most that of the course."""
+    """Return the number of actions in an episode: the requested number, but at most that of the course or family."""
     if "episode_steps" in options:
         raise ValueError(
             f"episode_steps = {options['episode_steps']!r}: must be left out if Gymnasium makes the environment; "
@@ -57,5 +58,7 @@ def _steps(asked: int, options: dict[str, Any]) -> int:
         )
     course: str | Course | None = options.get("course")
     own = None if course is None else course_named(course).episode_steps
+    if isinstance(layouts := options.get("layouts"), LayoutSet):
+        own = layouts.family.episode_steps
     steps = MOST_STEPS if asked == ENDLESS else whole("max_episode_steps", asked, 1, MOST_STEPS)
     return min(steps, own or MOST_STEPS)

@@ -72,7 +72,7 @@ def _of_agent(
 
 
 def _scene_of_model(simulation: Simulation, kind: EyeKind, fidelity: Fidelity) -> PreparedScene:
-    """Return the simulation's model, prepared for one kind of eyes. If samples are rays, Mitsuba traces them."""
+    """Return the simulation's model as a scene for one kind of eyes. Mitsuba traces the samples if these are rays."""
     task, physics = simulation.task, simulation.physics
     return PreparedScene(
         physics.model,

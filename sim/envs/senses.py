@@ -1,4 +1,5 @@
-"""Observations of one agent in all worlds: noisy signals of its eyes, proprioception, its last action and others."""
+"""Observations of one agent in all worlds: noisy signals of its eyes, proprioception, its last action and other
+entries."""
 
 from __future__ import annotations
 
@@ -42,7 +43,7 @@ class Senses:
             Auxiliary(renderer, self.agent.auxiliary, prefix)
             for prefix, renderer in zip(prefixes, renderers.auxiliary, strict=False)
         ]
-        self._told: Arrays = {}
+        self._last_auxiliary: Arrays = {}
         self.action_space = spaces.Box(-1.0, 1.0, (self.agent.n_actions,), np.float32)
         self.observation_space = self._space()
         self.action = np.tile(self.agent.first_action, (simulation.n, 1))
@@ -61,20 +62,20 @@ class Senses:
         """Launch the rendering of these worlds (None: all) with all kinds of eyes."""
         return {name: sight.launch(poses, worlds) for name, sight in self.sights.items()}
 
-    def tell(self, poses: Poses, fresh: np.ndarray) -> None:
+    def update_auxiliary(self, poses: Poses, fresh: np.ndarray) -> None:
         """Update the auxiliary entries of the observation.
 
         fresh: indices of the worlds whose episode has just begun. If there are any, only their entries are updated.
         """
         for auxiliary in self._auxiliary:
             for name, array in auxiliary.render(poses, fresh).items():
-                if len(fresh) and name in self._told:
-                    self._told[name][fresh] = array[fresh]
+                if len(fresh) and name in self._last_auxiliary:
+                    self._last_auxiliary[name][fresh] = array[fresh]
                 else:
-                    self._told[name] = array
+                    self._last_auxiliary[name] = array
 
     @property
-    def tells(self) -> bool:
+    def has_auxiliary(self) -> bool:
         """True if observations contain auxiliary entries."""
         return bool(self._auxiliary)
 
@@ -87,7 +88,7 @@ class Senses:
         return {**remembered, **self.other_entries(slice(None))}
 
     def preview(self, seen: Arrays, worlds: np.ndarray) -> Arrays:
-        """Return the memory of these worlds as if the new frames were added, without storing them.
+        """Return the memory that these worlds would have after the new frames, which are not stored.
 
         seen: new frames of all worlds
         """
@@ -95,7 +96,7 @@ class Senses:
 
     def other_entries(self, worlds: Any) -> Arrays:
         """Return copies of all entries of these worlds' observations, except for the signals of eyes."""
-        known = {**self._told, "previous_action": self.action, **self._simulation.felt[self._number]}
+        known = {**self._last_auxiliary, "previous_action": self.action, **self._simulation.felt[self._number]}
         return {name: array[worlds].copy() for name, array in known.items()}
 
     @property
@@ -118,14 +119,18 @@ class Senses:
             for k, (name, sight) in enumerate(self.sights.items())
             for what, array in sight.get_state().items()
         }
-        return {**parts, **{name: array.copy() for name, array in self._told.items()}, "action": self.action.copy()}
+        return {
+            **parts,
+            **{name: array.copy() for name, array in self._last_auxiliary.items()},
+            "action": self.action.copy(),
+        }
 
     def set_state(self, state: Arrays) -> None:
-        """Restore what `get_state` returned."""
+        """Restore a state from `get_state`."""
         for k, (name, sight) in enumerate(self.sights.items()):
             sight.set_state(*(state[_part(k, name, what)] for what in ("remembered", "noise")))
         self.action = state["action"]
-        self._told = {name: state[name] for name in self._told}
+        self._last_auxiliary = {name: state[name] for name in self._last_auxiliary}
         for auxiliary in self._auxiliary:
             auxiliary.go_on_from(self._simulation.poses())
 

@@ -65,7 +65,7 @@ class EyesVecEnv(OneEnvironment):
 
     @property
     def state(self) -> Any:
-        """Current state of all worlds, in the type of their physics: `WorldState` for the built-in tasks.
+        """Current state of all worlds, as their physics represents it: `WorldState` for the built-in tasks.
 
         Raises:
             RuntimeError: before the first reset.

@@ -24,9 +24,9 @@ RIMS = 0.15  # length of the drawn edges of fields of view, in units of the mode
 
 
 class WorldPictures:
-    """Images of the type that `render_mode` selects.
+    """Images of worlds for human viewers, as `render_mode` selects.
 
-    "rgb_array": each world; "eyes": the signals of the learning agents' eyes; None: no images
+    "rgb_array": the model in each world; "eyes": the signals of the learning agents' eyes; None: no images
     """
 
     def __init__(self, animals: Animals, render_mode: str | None) -> None:

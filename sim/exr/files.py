@@ -39,7 +39,7 @@ from sim.exr.view import View
 LAYOUT_VERSION = "1.0"
 UNITS = "W.m^-2.sr^-1"
 SCALE = "relative: a white Lambertian facing unit daylight has radiance D65, 1 at 560 nm"
-# Default limit for the bytes of unpacked pixels in a file. Sixteen eyes of 128 x 128 receptors in 64 bands need a
+# Default limit on the unpacked size of a file's pixels [bytes]. Sixteen eyes of 128 x 128 receptors in 64 bands need a
 # fifteenth of it.
 MOST_BYTES = 2**30
 LARGEST_HEADER = 2**24  # bytes of a file other than pixels

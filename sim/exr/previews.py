@@ -19,7 +19,7 @@ def preview_of_spectra(radiance: np.ndarray | None, reflectance: np.ndarray | No
 
 
 def preview_of_receptors(receptors: np.ndarray, peaks_nm: Sequence[float] | np.ndarray | None) -> np.ndarray:
-    """Return an image (y, x, 3) that shows the receptors of the longest waves as red, the next as green, then blue.
+    """Return an image (y, x, 3) whose red, green and blue show channels in order of decreasing wavelength.
 
     A single channel is shown as grey.
     """

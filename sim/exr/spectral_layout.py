@@ -42,7 +42,7 @@ def channel(nm: float, quantity: str = RADIANCE) -> str:
 
 
 def require_nanometres(name: str, values: Any) -> np.ndarray:
-    """Return wavelengths [nm]; ValueError unless all of them are finite and plausible, which they are not in metres."""
+    """Return wavelengths [nm]; ValueError unless all are finite and plausible. Wavelengths in metres are refused."""
     nm = reals(name, values)
     if nm.ndim != 1 or not np.isfinite(nm).all() or (nm < SHORTEST_NM).any():
         raise ValueError(f"{name} = {shown(values)}: must be finite numbers in nanometres (550, not 550e-9), (band,)")

@@ -9,7 +9,8 @@ import optics
 # Independent errors add in quadrature. An error of half the noise increases the total to √(1 + 1/4) = 1.12 times the
 # noise.
 SHARE_OF_NOISE = 0.5
-# Chosen: lower limit of the allowed error, as a share of the signal of white. It applies if half of the noise is less.
+# Chosen: lower limit of the allowed error, relative to the signal of a white surface. It applies if half of the noise
+# is less.
 LEAST_TOLERANCE = 5e-3
 
 
@@ -17,7 +18,7 @@ def allowed_error(eye: optics.Eye, tolerance: float | None) -> float:
     """Return the allowed root mean square error of a signal.
 
     If the tolerance is None, the allowed error is half of the receptors' noise, but at least LEAST_TOLERANCE times the
-    signal of white behind the eye's pupil.
+    signal of a white surface behind the eye's pupil.
 
     Raises:
         ValueError: the tolerance is not positive and finite.

@@ -42,15 +42,15 @@ class DepthLayers:
         places = [i / (self.count - 1) for i in range(self.count)] if self.count > 1 else [0.5]
         return tuple(1 / v if (v := far + place * (near - far)) > 0 else math.inf for place in places)
 
-    def shares(self, vergence: Array) -> list[Array]:
-        """Return each layer's share of light, as Dr.Jit arrays that sum to 1.
+    def shares(self, inverse_distance: Array) -> list[Array]:
+        """Return the fraction of the light that each layer receives, as Dr.Jit arrays that sum to 1.
 
-        vergence: inverse distance 1/z from which the light comes [1/m]
+        inverse_distance: 1/z of the point from which the light comes [1/m]
         """
         if self.count == 1:
             return [1.0]
         far, near = 1 / self.farthest, 1 / self.nearest
-        place = dr.clip((vergence - far) * ((self.count - 1) / (near - far)), 0, self.count - 1)
+        place = dr.clip((inverse_distance - far) * ((self.count - 1) / (near - far)), 0, self.count - 1)
         return [dr.maximum(1 - dr.abs(place - float(layer)), 0) for layer in range(self.count)]
 
     def __str__(self) -> str:

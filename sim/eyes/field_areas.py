@@ -1,6 +1,6 @@
-"""Rectangles of the visual field of an eye behind a pupil, and the share of each receptive field in each rectangle.
+"""Rectangles of an eye's visual field, and the fraction of each receptive field in each rectangle.
 
-A receptor's signal is a sum over rectangles. Each term is the mean light in a rectangle times the share of the
+A receptor's signal is a sum over rectangles. Each term is the mean light in a rectangle times the fraction of the
 receptive field in that rectangle. The sum is exact if the light is constant within each rectangle. If receptive fields
 are hardly wider than receptors, as behind a lens in focus, one rectangle per receptor is enough, because each field
 then almost coincides with its rectangle.
@@ -15,10 +15,10 @@ import numpy as np
 
 from sim.eyes.receptive_fields import ReceptiveFields
 
-# Chosen: the largest share of all receptors' light that may come from beyond one side of the lattice. This light is
-# attributed to the rectangles inside the lattice. Behind a lens in focus that is a quarter as wide as the retina, the
-# share beyond a lattice without a rim is 0.012 for 1 x 4 receptors and 0.004 for 15 x 15. These lattices therefore have
-# no rim. A rim would change their errors by less than a tenth.
+# Chosen: the largest fraction of all receptors' light that may come from beyond one side of the lattice. This light is
+# attributed to the rectangles inside the lattice. Consider a lens in focus that is a quarter as wide as the retina.
+# Without a rim, the fraction is 0.012 for 1 x 4 receptors and 0.004 for 15 x 15, so their lattices have no rim. A rim
+# would change their errors by less than a tenth.
 BEYOND = 0.015
 
 
@@ -36,9 +36,8 @@ class FieldAreas:
     def from_fields(cls, fields: ReceptiveFields, parts: tuple[float, float], beyond: float = BEYOND) -> FieldAreas:
         """Divide each receptor's square into rows and columns, and add a rim of rectangles around the receptors.
 
-        The rim is so wide that at most the share `beyond` of the receptors' light comes from beyond the rim on each
-        side. If there is half a row per receptor, two receptors share a row. The outermost rows may then extend beyond
-        the outermost receptors.
+        At most the fraction `beyond` of the receptors' light comes from outside the rim on each side. With half a row
+        per receptor, each row covers two receptors, and the outermost rows may extend beyond the outermost receptors.
 
         parts: numbers of rows and of columns per receptor
         """
@@ -93,14 +92,14 @@ def _within(n: int, per_receptor: float) -> int:
 def _rim(profile: np.ndarray, line: tuple[int, float], cells: int, beyond: float) -> int:
     """Return the width of the rim before the first receptor of a line (a row or a column), as a number of rectangles.
 
-    It is the smallest number for which at most the share `beyond` of the light of the line's receptors comes from
+    It is the smallest number for which at most the fraction `beyond` of the light of the line's receptors comes from
     beyond the rim.
 
     profile: power of a receptor's field in each of its cells along the line
     line: number of receptors in the line, and rectangles per receptor
     """
     n, per_receptor = line
-    # before[k] is the share of a field's power in its first k cells.
+    # before[k] is the fraction of a field's power in its first k cells.
     before = np.concatenate([[0.0], np.cumsum(profile)])
     start = (len(profile) - cells) / 2
     overhang = (_within(n, per_receptor) / per_receptor - n) / 2
@@ -111,7 +110,7 @@ def _rim(profile: np.ndarray, line: tuple[int, float], cells: int, beyond: float
 
 
 def _shares(edges: np.ndarray, centre: float, size: int, cells: int) -> np.ndarray:
-    """Return the share of each cell of a field that lies between successive edges, (rectangle, cell).
+    """Return the fraction of each cell of a field that lies between successive edges, (rectangle, cell).
 
     centre: centre of the field, in the same coordinate as the edges
     """

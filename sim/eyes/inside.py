@@ -6,8 +6,8 @@ import mujoco
 import numpy as np
 
 _TYPES = mujoco.mjtGeom
-# Unit vectors in all directions. They are spaced by the golden angle, so that few of them hit edges of meshes. They
-# find an opening of a mesh if its angular diameter, as seen from the point, is at least 20 degrees.
+# Unit vectors in all directions, spaced by the golden angle so that few of them hit edges of meshes. At least one of
+# them passes through any opening in a mesh with an angular diameter of 20 degrees or more.
 _N_WAYS = 64
 _HEIGHTS, _AROUND = 1 - (2 * np.arange(_N_WAYS) + 1) / _N_WAYS, np.arange(_N_WAYS) * np.pi * (3 - np.sqrt(5))
 _WAYS = np.column_stack([np.sqrt(1 - _HEIGHTS**2) * f(_AROUND) for f in (np.cos, np.sin)] + [_HEIGHTS])

@@ -1,8 +1,8 @@
 """Weighted sums over samples for each receptor, as one matrix product per row of receptors.
 
-Rays are ordered by their height in the visual field, so each row of receptors uses a contiguous range of rays. The
-range becomes shorter as receptive fields become narrower. If light has few spectral components
-(`sim.tracing.closed_form_tracer`), the weights of the bands are multiplied into the receptors' weights in advance.
+Rays are ordered by their height in the visual field, so each row of receptors uses a contiguous range of rays. Narrow
+receptive fields have short ranges. If light has few spectral components (`sim.tracing.closed_form_tracer`), the weights
+of the bands are multiplied into the receptors' weights in advance.
 """
 
 from __future__ import annotations
@@ -148,8 +148,8 @@ def within_stretches(
 ) -> tuple[scipy.sparse.csr_array, ...]:
     """Return weights (receptor, ray) per band without the first and last rays of each row of receptors.
 
-    As many rays as possible are omitted, on the condition that each receptor's sum of weights decreases by at most the
-    share `share`. The remaining weights are then scaled so that this sum is unchanged.
+    The largest number of rays is omitted that reduces each receptor's sum of weights by at most the fraction `share`.
+    The remaining weights are then scaled so that this sum is unchanged.
     """
     height, width = resolution
     rows: list[list[scipy.sparse.csr_array]] = [[] for _ in weights]

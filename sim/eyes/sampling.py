@@ -28,8 +28,8 @@ from sim.eyes.receptor_sums import within_stretches
 from sim.eyes.sensor import BoxSensor, ReceptiveFieldSensor, Sensor
 from sim.eyes.tangent_plane import aspect_of, directions_of, extent_of, on_tangent_plane, parts_of
 
-# Chosen: small weights are omitted if this changes no signal by more than this share of the receptors' noise. The noise
-# and this error together are then at most √(1 + 0.1²) = 1.005 times the noise alone.
+# Chosen: small weights are omitted if this changes no signal by more than this fraction of the receptors' noise. The
+# noise and this error together are then at most √(1 + 0.1²) = 1.005 times the noise alone.
 NEGLIGIBLE = 0.1
 
 
@@ -137,8 +137,8 @@ class FieldSampling:
 
     If the requested number leaves a receptor without a ray, more rays are drawn until every receptor has one.
 
-    tolerance: allowed error of a signal, see `sim.eyes.allowed_error`. The lattice of areas is so wide that white
-        light from beyond it, on each side, contributes at most this amount to a signal.
+    tolerance: allowed error of a signal, see `sim.eyes.allowed_error`. White light from beyond each side of the lattice
+        of areas contributes at most this amount to a signal.
     """
 
     eye: optics.Eye
@@ -229,7 +229,7 @@ def _parts_or_share(per_receptor: float, in_rows: bool, aspect: float) -> tuple[
 
 
 def _unused(plane: np.ndarray) -> np.ndarray:
-    """Return placeholders for bounce samples. Areas do not use them: their reflected light is read from a table."""
+    """Return placeholders for bounce samples, which areas do not use: their reflected light comes from a table."""
     return np.zeros((len(plane), 2), np.float32)
 
 
@@ -266,8 +266,8 @@ def build_sensor(eye: optics.Eye, rays_per_receptor: float, depth: DepthLayers =
 
 
 def negligible_share(eye: optics.Eye) -> float:
-    """Return the share of a receptor's weights that can be omitted.
+    """Return the fraction of a receptor's weights that can be omitted.
 
-    Omitting a share s changes a signal by at most s times the throughput of the aperture.
+    Omitting a fraction s changes a signal by at most s times the throughput of the aperture.
     """
     return min(NEGLIGIBLE * eye.noise_sigma / eye.aperture_throughput, eye.tolerance)

@@ -67,14 +67,14 @@ class ReceptiveFieldSensor(ReadOnlyArrays):
 
     RF is the receptive field, which is the PSF, rotated by 180° and convolved with the receptor's square. q is the
     density of the directions, and power_b is the fraction of the pupil's power inside the kernel. With several depth
-    layers, each layer has its own W, which is applied to the layer's share of the light along a ray.
+    layers, each layer has its own W, which is applied to the fraction of a ray's light that the layer receives.
 
-    If the samples are areas of the visual field instead of rays, W_b[r, p] is the share of the receptive field in area
-    p.
+    If the samples are areas of the visual field instead of rays, W_b[r, p] is the fraction of the receptive field in
+    area p.
 
-    Small weights of rays far above and below a row of receptors are set to 0. Their share of each receptor's weights is
-    at most the tolerance of the PSF. In scenes that are nowhere brighter than white in full daylight, this changes no
-    signal by more than the share `sim.eyes.sampling.NEGLIGIBLE` of the receptors' noise.
+    Small weights of rays far above and below a row of receptors are set to 0. They are at most a fraction of each
+    receptor's weights, the tolerance of the PSF. In scenes that are nowhere brighter than white in full daylight, this
+    changes no signal by more than `sim.eyes.sampling.NEGLIGIBLE` times the receptors' noise.
 
     directions: unit vectors in the eye's frame, (ray, 3) float32
     bounce_samples: points in the unit square, one for each ray, that set the direction of reflected light, (ray, 2)
@@ -123,7 +123,7 @@ class ReceptiveFieldSensor(ReadOnlyArrays):
 
     @property
     def density(self) -> float:
-        """Share of the weights that are not zero."""
+        """Fraction of the weights that are not zero."""
         return float(np.mean([w.nnz / np.prod(w.shape) for w in self.weights]))
 
 

@@ -36,10 +36,10 @@ def tangent_size(eye: optics.Eye) -> tuple[float, float]:
 def parts_of(count: int, in_rows: bool, aspect: float = 1.0) -> tuple[int, int]:
     """Return the rows and columns of a receptor that is divided into this number of parts.
 
-    With `in_rows`, the shape of the parts is the nearest to a square. Of two equally good numbers of rows, the smaller
-    one is used.
+    With `in_rows`, the parts are as nearly square as possible. If two numbers of rows are equally good, the smaller one
+    is used.
 
-    aspect: height of a receptor / its width
+    aspect: height of a receptor divided by its width
     """
     if not in_rows:
         return 1, count
@@ -55,6 +55,6 @@ def aspect_of(eye: optics.Eye) -> float:
 
 
 def extent_of(eye: optics.Eye, size: tuple[float, float]) -> tuple[float, float]:
-    """Return a rectangle's width and height on the plane at distance 1; its size is in receptor widths and heights."""
+    """Return a rectangle's width and height on the plane at distance 1. size: in receptor widths and heights"""
     height, width = tangent_size(eye)
     return width * size[0], height * size[1]

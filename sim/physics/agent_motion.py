@@ -3,7 +3,7 @@
 The agent is a heavy body on two slide joints, which velocity actuators drive. Its heading is set directly, without
 simulation. Objects are mocap bodies that collide with nothing, so physics does not need their positions. Agents that
 cannot touch anything during the action move in closed form (`sim.physics.free_motion`). MuJoCo simulates all other
-agents, each among only the few geoms that it could touch (`sim.physics.local_contacts`).
+agents, each in a small model of the geoms that it could touch (`sim.physics.local_contacts`).
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from sim.worlds.world import MAX_SPEED, World
 
 SUBSTEPS = 10  # number of the model's timesteps per action, as in the published environments
 UNSTABLE_SPEED = 10 * MAX_SPEED  # [m/s], a speed that no actuator can cause
-FEW_GEOMS = 200  # largest number for which testing all geoms is faster than MuJoCo's tree of bounding volumes
+FEW_GEOMS = 200  # largest number of geoms for which a test of each is faster than MuJoCo's tree of bounding volumes
 
 
 @dataclass(frozen=True)
@@ -63,8 +63,8 @@ class AgentPhysics:
 
     threads: threads of MuJoCo's batched step, see `sim.physics.mujoco_batch`
     closed_form: if True, agents that cannot reach any obstacle move in closed form (`free_motion`), and agents near
-        obstacles are simulated among only these obstacles (`local_contacts`). Each of these two attributes is None if
-        the model does not allow its method. If False, MuJoCo simulates all agents in the whole world.
+        obstacles are simulated in models of these obstacles alone (`local_contacts`). Either attribute is None if the
+        model does not allow the method. If False, MuJoCo simulates all agents in the whole world.
 
     Raises:
         ValueError: the model lacks the agent's joints, actuators or touch sensor, or an object could collide.
@@ -102,10 +102,10 @@ class AgentPhysics:
         return motion
 
     def _near(self, agents: Agents | WorldState, velocity: np.ndarray, met: np.ndarray) -> Motion:
-        """Simulate agents that may touch something, each among only the geoms within its reach.
+        """Simulate agents that may touch something, each in a model of the geoms within its reach.
 
-        The motion is repeated in the whole world in three cases: too many geoms are within reach, a contact deflects
-        the agent towards further geoms, or the simulation breaks down.
+        An agent is simulated in the whole world instead if too many geoms are within reach, if a contact deflects it
+        towards other geoms, or if the simulation breaks down.
         """
         if self.local_contacts is None:
             return self._simulate(agents, velocity)
@@ -162,7 +162,7 @@ class AgentPhysics:
     def _motion(self, position: np.ndarray, states: np.ndarray, sensors: np.ndarray) -> Motion:
         path = states[:, :, self._columns.position] + self._columns.origin
         velocity = states[:, -1, self._columns.velocity].copy()
-        # Time after the action. MuJoCo resets a world that broke down, including its clock, which then differs from it.
+        # Time after the action. MuJoCo resets a world that broke down, so its clock shows another time.
         due = self._start[0] + self.seconds
         unstable = ~np.isfinite(states[:, -1]).all(axis=-1)  # an earlier state that is not finite resets the clock
         unstable |= np.abs(states[:, -1, 0] - due) > self._model.opt.timestep / 2

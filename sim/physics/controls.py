@@ -13,7 +13,7 @@ import numpy as np
 
 
 def actuator_names(model: mujoco.MjModel) -> list[str]:
-    """Names of all of a model's actuators, in its order; "" for actuators without a name."""
+    """Return the names of a model's actuators, in the model's order; "" for actuators without a name."""
     return [str(model.actuator(i).name) for i in range(model.nactuator)]
 
 

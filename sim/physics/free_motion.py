@@ -1,7 +1,7 @@
-"""Motion of agents that touch nothing, which is linear, with coefficients measured in MuJoCo.
+"""Motion of agents that touch nothing: a linear response, whose coefficients are measured in MuJoCo.
 
-Far from walls, an agent on slide joints with velocity servos responds linearly to its speed and to the command. Its
-motion during one action is then a weighted sum of both, with constant coefficients. The coefficients are measured in
+Far from walls, an agent on slide joints with velocity servos responds linearly to its initial speed and to the command.
+Its motion during one action is a weighted sum of the two, with constant coefficients. The coefficients are measured in
 the model with contacts disabled, so they include the effects of its integrator, damping and servos. A model that
 responds nonlinearly has no such coefficients.
 """
@@ -20,7 +20,7 @@ import numpy as np
 ROUNDING = 1e-11
 
 # Function that simulates runs with all contacts disabled. Arguments: initial speeds (run, 2) [m/s], commands (run, 2),
-# and displacements from the agent's position in the model (run, 2) [m]. Results: path relative to its beginning, (run,
+# and displacements from the agent's position in the model (run, 2) [m]. Results: path relative to its start, (run,
 # substep, 2) [m], and velocity after each substep.
 FreeSteps = Callable[[np.ndarray, np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
 
@@ -29,11 +29,12 @@ FreeSteps = Callable[[np.ndarray, np.ndarray, np.ndarray], tuple[np.ndarray, np.
 class FreeMotion:
     """Motion of an agent that touches nothing, during one action.
 
-    response: path [m] and velocity [m/s] after each substep, caused by an initial speed of 1 m/s without a command, and
-        by a command of 1 without an initial speed, for each axis: (path | velocity, substep, speed | command, 2)
+    response: path [m] and velocity [m/s] after each substep, for each axis: (path | velocity, substep, speed | command,
+        2). One response is to an initial speed of 1 m/s without a command, the other to a command of 1 without an
+        initial speed.
     obstacles: ids of the geoms that could be touched (n,)
     lower, upper: axis-aligned bounding boxes of the obstacles in the horizontal plane (n, 2) [m]
-    reach: smallest distance of the agent's centre from a box at which the agent cannot touch the obstacle [m]
+    reach: distance of the agent's centre from a box beyond which the agent cannot touch the obstacle [m]
     strongest: largest command that does not saturate the servo
     """
 

@@ -1,9 +1,9 @@
-"""Physics among the few geoms that an agent could touch during one action, instead of all geoms of a world.
+"""Physics in small models, with only the geoms that an agent could touch during one action.
 
 In every substep, MuJoCo updates the poses of all geoms of a model and tests each of them for contacts. The motion of an
-agent at a wall depends only on this wall. If all other geoms are omitted, every number that MuJoCo uses to compute the
-motion remains the same, and the results are bit-identical. The only exception is the order of several contacts in
-models that are large enough for MuJoCo to use a tree of bounding volumes.
+agent at a wall depends only on this wall, so all other geoms can be omitted. MuJoCo then computes the motion from the
+same numbers, and the results are bit-identical. The only exception is the order of several contacts in models that are
+large enough for MuJoCo to use a tree of bounding volumes.
 """
 
 from __future__ import annotations
@@ -47,16 +47,15 @@ class LocalContacts:
         self._step = BatchedStep(self._alone, threads)
 
     def few(self, met: np.ndarray) -> np.ndarray:
-        """Return the mask `met` of the obstacles within reach (n, obstacle) bool, limited to what small models can
-        contain.
+        """Return the obstacles of each agent's small model, (n, obstacle) bool.
 
-        It contains no obstacles for agents that have more obstacles within reach than a small model can contain.
+        They are the obstacles within reach, `met`. If these are too many for a small model, there are none.
         """
         few: np.ndarray = met & (met.sum(axis=1, keepdims=True) <= len(self._slots))
         return few
 
     def step(self, few: np.ndarray, initial: np.ndarray, control: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Step each agent among only the obstacles in `few`, (n, obstacle) bool; see `BatchedStep`."""
+        """Step each agent in the small model of the obstacles in `few`, (n, obstacle) bool; see `BatchedStep`."""
         if len(self._models) > MOST:
             self._models.clear()
         keys = [row.tobytes() for row in np.packbits(few, axis=1)]

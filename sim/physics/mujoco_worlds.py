@@ -89,7 +89,7 @@ class MujocoWorlds:
         return {world: words for world in moving if (words := _broken(self.datas[world])) is not None}
 
     def require_places(self, world: int) -> None:
-        """Reset a world if its poses are not finite, since an attempt to render it would stop all worlds."""
+        """Reset a world if its poses are not finite, because rendering would then fail for all worlds."""
         data = self.datas[world]
         if not _has_place(data):
             mujoco.mj_resetData(data.model, data)
@@ -129,7 +129,7 @@ class MujocoWorlds:
 
 
 def _broken(data: mujoco.MjData) -> str | None:
-    """Return the reason why a world's physics broke down; None if it did not.
+    """Return the reason why a world's physics broke down, or None.
 
     MuJoCo has already reset a world that broke down, unless the model disables automatic resets.
     """

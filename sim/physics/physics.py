@@ -69,7 +69,7 @@ class Physics(Protocol):
         """
 
     def set_state(self, state: Mapping[str, np.ndarray], worlds: np.ndarray) -> None:
-        """Restore what `get_state` returned, for these worlds."""
+        """Restore a state from `get_state` in these worlds."""
 
     def close(self) -> None:
         """Stop all threads."""

@@ -25,8 +25,8 @@ from sim.scene.lights import Emitter
 from sim.scene.variant import MitsubaObject, variant
 
 # Four wavelengths fill one mi.Spectrum. All sets on a grid of 5 nm with distances of at least 25 nm were compared.
-# Over colours and white in daylight, this set comes closest to `sim.scene.color.preview` at the eight wavelengths of
-# the slow image (`sim.envs.follow_camera`).
+# For colours and white in daylight, the results of this set are closest to those of `sim.scene.color.preview` at the
+# eight wavelengths of the slow image (`sim.envs.follow_camera`).
 WAVELENGTHS_NM = (450.0, 525.0, 590.0, 630.0)
 SRGB = np.array(  # linear sRGB per radiance at these wavelengths, (3, wavelength); fitted so that daylight is white
     [
@@ -36,12 +36,12 @@ SRGB = np.array(  # linear sRGB per radiance at these wavelengths, (3, wavelengt
     ]
 )
 
-# A pixel's samples, relative to its middle [pixels]. The middle comes first. If a pixel is divided into five rows and
-# five columns, no two samples share one.
+# A pixel's samples, relative to its middle [pixels], which is the first sample. If a pixel is divided into five rows
+# and five columns, no two samples are in the same row or column.
 SAMPLES = np.array([[0, 0], [0.2, 0.4], [0.4, -0.2], [-0.2, -0.4], [-0.4, 0.2]])
 CODES = 8  # codes per pixel
-NESTED = 64  # largest number of nested bodies that a camera may be inside of
-# Rays of a packet go through neighbouring pixels, and then towards one sun. Embree traverses its tree once for them.
+NESTED = 64  # largest number of nested bodies that may enclose a camera
+# Rays of a packet go through neighbouring pixels, and then towards one sun, so Embree traverses its tree once for all.
 COHERENT = True
 WANTED = int(mi.RayFlags.UV) | int(mi.RayFlags.ShadingFrame)  # properties of hits; textures need no derivatives
 _VIEW = 5  # rows of four floats of a view: position, columns of the rotation, (half, near, width, height)
@@ -64,9 +64,10 @@ class RayLight:
 class CameraInputs:
     """Inputs of kernels that are the same for every image of a mirror.
 
-    samples: positions within a pixel, in twos [pixels] · weights: irradiance from each directional light, in fours
-    closed: for each shape, whether a camera inside looks out of it
-    bsdfs: unused; BSDFs among the inputs make the recording collect their textures
+    samples: positions within a pixel, in twos [pixels]
+    weights: irradiance from each directional light, in fours
+    closed: for each shape, True if a camera inside it sees through it
+    bsdfs: not used by the kernel; a recording includes textures only if their BSDFs are among the inputs
     """
 
     samples: Array
@@ -126,7 +127,7 @@ class CameraRays:
         ray, axes = _ray(codes, pose, inputs.samples)
         si = scene.ray_intersect(ray, WANTED, COHERENT)
         if inside:
-            si = _looked_out_of(scene, si, ray, inputs.closed)
+            si = _through_inner_sides(scene, si, ray, inputs.closed)
         si.wavelengths = mi.Spectrum(*WAVELENGTHS_NM)
         light = self._direct_light(scene, si, codes, pose, inputs)
         rgb = [sum(float(w) * light[b] for b, w in enumerate(row)) for row in SRGB]
@@ -161,7 +162,7 @@ class CameraRays:
         return total
 
 
-def _looked_out_of(scene: MitsubaObject, si: Array, ray: Array, closed: Array) -> Array:
+def _through_inner_sides(scene: MitsubaObject, si: Array, ray: Array, closed: Array) -> Array:
     """Return the first hits of rays that pass through the inner sides of closed shapes."""
 
     def leaving(si: Array, ray: Array, turn: Array) -> Array:
@@ -180,7 +181,7 @@ def _looked_out_of(scene: MitsubaObject, si: Array, ray: Array, closed: Array) -
 
 @dataclass(frozen=True)
 class _Axes:
-    """Frame of a camera. position: its position · directions: unit vectors to the right, up and ahead."""
+    """Frame of a camera: its position, and unit vectors to the right, up and ahead."""
 
     position: Array
     directions: tuple[Array, Array, Array]
@@ -202,7 +203,7 @@ def _ray(codes: Array, pose: Array, samples: Array) -> tuple[Array, _Axes]:
 
 
 def plane_coordinates(fovy_deg: float, size: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
-    """Return the slopes of the rays through pixels' middles: to the right (x,) and up (y,) per unit of depth."""
+    """Return the slopes of the rays through the pixels' centres, per unit of depth: to the right (x,) and up (y,)."""
     height, width = size
     half = np.tan(np.radians(fovy_deg) / 2)
     across = (2 * (np.arange(width) + 0.5) - width) / height * half
@@ -212,7 +213,7 @@ def plane_coordinates(fovy_deg: float, size: tuple[int, int]) -> tuple[np.ndarra
 def _pose(
     view: Viewpoint, size: tuple[int, int], near: float, suns: Mapping[int, np.ndarray], n_lights: int
 ) -> np.ndarray:
-    """Return all numbers that change between frames, in fours."""
+    """Return all numbers that change between frames, in rows of four."""
     rows = aligned(4 * (_VIEW + n_lights), np.float32).reshape(-1, 4)
     rows[0, :3], rows[1:4, :3] = view.position, view.rotation.T
     rows[4] = np.tan(np.radians(view.fovy_deg) / 2), near, size[1], size[0]
@@ -222,7 +223,7 @@ def _pose(
 
 
 def _closed(mirror: MergedMirror) -> np.ndarray:
-    """Return by the shapes' ids whether a camera inside a shape looks out of it."""
+    """Return, in the order of the shapes' ids, whether a camera inside a shape sees through it."""
     names = mirror.shape_names
     return np.array([names.get(i, "") in mirror.closed for i in range(max(names) + 1)], np.uint32)
 
@@ -237,7 +238,7 @@ def _is_sun(lamp: Emitter) -> bool:
 
 
 def _is_textured_glow(light: MitsubaObject) -> bool:
-    """Return whether a light is a surface with a texture. (A sky's tables are exposed.)"""
+    """Return whether a light is a surface with a texture. (A sky is not: its tables are accessible.)"""
     kinds = int(mi.EmitterFlags.Surface) | int(mi.EmitterFlags.SpatiallyVarying)
     return int(light.flags()) & kinds == kinds
 

@@ -10,7 +10,7 @@ from sim.scene.cameras import Viewpoint
 COLORS = np.array(
     [[0, 158, 115], [230, 159, 0], [86, 180, 233], [204, 121, 167], [240, 228, 66], [0, 114, 178], [213, 94, 0]]
 )
-NEAREST = 1e-6  # share of `reach`: points closer to the camera's plane are not drawn
+NEAREST = 1e-6  # fraction of `reach`: points closer to the camera's plane are not drawn
 RIM, IRIS, PUPIL = 1.2, 3.5, 1.8  # width of borders and radii of dots [pixels of an image that is 360 pixels high]
 OPACITY = 0.8
 
@@ -21,7 +21,8 @@ def with_eyes(
     """Return an image (y, x, 3) uint8 of a model with marks of its eyes.
 
     eyes: pupils [m] (eye, 3) and frames (eye, 3, 3), columns (right, up, ahead)
-    fov_deg: horizontal field of view of the eyes · reach: length of the borders that are drawn [m]
+    fov_deg: horizontal field of view of the eyes
+    reach: length of the borders that are drawn [m]
     """
     shown, half = picture.astype(np.float64), np.radians(fov_deg) / 2
     scale = picture.shape[0] / 360
@@ -51,7 +52,7 @@ def _pixel(point: np.ndarray, view: Viewpoint, size: tuple[int, int], reach: flo
 
 
 def _off(start: np.ndarray, end: np.ndarray, size: tuple[int, int]) -> np.ndarray:
-    """Return the distance of pixels' middles from a line [pixels], (y, x)."""
+    """Return the distance of the pixels' centres from a line [pixels], (y, x)."""
     y, x = np.indices(size) + 0.5
     along = end - start
     length = float(along @ along)
@@ -61,6 +62,6 @@ def _off(start: np.ndarray, end: np.ndarray, size: tuple[int, int]) -> np.ndarra
 
 
 def _paint(shown: np.ndarray, off: np.ndarray, radius: float, color: np.ndarray) -> None:
-    """Paint a line or dot into an image in place, with smooth edges; off: distance of pixels' middles from it."""
+    """Paint a line or dot into an image, with smooth edges. off: distance of the pixels' centres from it [pixels]"""
     opacity = OPACITY * np.clip(radius + 0.5 - off, 0, 1)[..., None]
     shown += opacity * (color - shown)

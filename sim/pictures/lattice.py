@@ -1,7 +1,7 @@
-"""A lattice of every fifth pixel, a knight's move apart: each other pixel is adjacent to exactly one of them.
+"""A lattice of every fifth pixel, whose neighbours are a knight's move apart.
 
-Every horizontal, vertical or diagonal line of pixels contains every fifth of its pixels. No such line passes between
-pixels of the lattice.
+Every pixel outside the lattice is adjacent to exactly one lattice pixel. In every horizontal, vertical or diagonal line
+of pixels, each fifth pixel belongs to the lattice, so no such line can pass between lattice pixels.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ class Lattice:
     """The pixels of an image that are traced first.
 
     size: size of the image (height, width)
-    pixels: numbers of the lattice's pixels, row by row, and of pixels at the border that touch none of them, (n,)
+    pixels: numbers of the lattice's pixels, row by row, and of border pixels that are adjacent to none of them, (n,)
     nearest: for each pixel, the index in `pixels` of the nearest one, (height · width,)
     pairs: neighbours in the lattice, as indices in `pixels`, (2, m)
     """
@@ -40,7 +40,8 @@ class Lattice:
         alone = nearest < 0
         nearest[alone] = chosen.sum() + np.arange(alone.sum())
         pixels = np.concatenate([np.flatnonzero(chosen), np.flatnonzero(alone)])
-        # If the nearest lattice pixels of adjacent pixels differ, these are neighbours, also at the image's border.
+        # If two adjacent pixels have different nearest lattice pixels, these two are neighbours in the lattice, also at
+        # the border.
         beside = [(nearest[:, 1:], nearest[:, :-1]), (nearest[1:], nearest[:-1])]
         pairs = np.concatenate([np.stack([a.ravel(), b.ravel()]) for a, b in beside], axis=1)
         pairs = np.unique(np.sort(pairs[:, pairs[0] != pairs[1]], axis=0), axis=1)
@@ -50,7 +51,7 @@ class Lattice:
         """Return the numbers of pixels outside the lattice whose nearest lattice pixel differs from a neighbour in the
         lattice.
 
-        differ: true for pairs of neighbours that differ, (m,)
+        differ: True for pairs of neighbours that differ, (m,)
         """
         rough = np.zeros(len(self.pixels), bool)
         rough[self.pairs[:, differ]] = True

@@ -1,7 +1,7 @@
-"""A mirror of fewer shapes (`sim.mirror`): all static geoms of one material are one mesh.
+"""A mirror (`sim.mirror`) with fewer shapes: all static geoms of one material form one mesh.
 
-Every shape adds time to each launch of a kernel, and every geom to each `sync`. Static geoms cannot be identified in
-the image.
+Every shape makes each launch of a kernel slower, and every geom each `sync`. The price is that static geoms cannot be
+identified in the image.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ class MergedMirror(Mirror):
     """A Mitsuba scene that mirrors all of a model; moving shapes are "geom_<geom id>_<part>", others "still_<n>".
 
     model, spectra: see `sim.mirror`
-    closed: names of the shapes that are invisible from inside, so that a camera inside them looks out
+    closed: names of the shapes that are invisible to a camera inside them
     """
 
     def __init__(self, model: mujoco.MjModel, spectra: Mapping[str, Spectrum | str] | None = None) -> None:

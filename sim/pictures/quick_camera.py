@@ -24,10 +24,10 @@ from sim.scene.color import encode_srgb
 from sim.scene.mirror import MirrorWarning
 from sim.scene.rays import check_size
 
-# sRGB levels, of 255. Steps of up to EDGE between neighbours do not look jagged. Pixels that differ by up to SAME count
-# as equal.
+# sRGB levels from 0 to 255. Steps of up to EDGE between neighbours do not look jagged. Pixels that differ by up to SAME
+# count as equal.
 EDGE, SAME = 8, 1
-LEVELS = 1 << 14  # levels of linear light in the table of sRGB values: finer than 8 bits in dark colours
+LEVELS = 1 << 14  # number of levels of linear light in the table of sRGB values, enough for 8 bits in dark colours
 _DISPLAYED = np.rint(255 * encode_srgb(np.arange(LEVELS) / (LEVELS - 1))).astype(np.uint8)
 
 

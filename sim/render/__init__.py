@@ -3,7 +3,7 @@
 one_ray             see: one world, one ray for each receptor
 eye_renderer        EyeRenderer: all eyes of all worlds of any scene as one wavefront
 prepared_scene      PreparedScene: a model and its eyes, built once for choosing a fidelity and for rendering
-ray_kernel          kernel of rays: lanes, rays, light, depth layers, sums
+ray_kernel          kernel that traces rays: lanes, rays, light, depth layers, sums
 area_kernel         kernel of area sampling
 eye_rays            rays of upright eyes, and of eyes that may be anywhere
 edge_rays           adaptive edge sampling: many rays at edges, few in other places
@@ -16,12 +16,12 @@ model_renderer      ModelRenderer: eyes mounted on any MuJoCo model
 renderable          check of a fidelity against an eye
 reference_renderer  ReferenceRenderer: Mitsuba's integrators, slow
 fidelity            Fidelity: samples, bands, depth layers and light, and the reasons for them
-fidelity_choice     cheapest: the cheapest fidelity that receptor noise allows
+fidelity_choice     cheapest: the cheapest fidelity whose error is small compared with receptor noise
 world_fidelity      choose_fidelity: fidelity of a built-in world
 fidelity_stages     choice of bands, depth layers and light for a built-in world
 sample_choice       choice of rays or areas for a built-in world, and of their number
 fidelity_trials     trials that measure the errors of fidelities in a built-in world
-populations         views and receptors over which the errors of trials are taken
+populations         views and receptors for which the errors of trials are computed
 random_views        random views for the trials
 model_fidelity      choose_model_fidelity: fidelity of any other model, from trials at given poses
 memory_budget       check of the memory that rendering needs

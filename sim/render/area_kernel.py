@@ -1,5 +1,7 @@
-"""The kernel of area sampling. Results that are the same for several areas of a world or of a column are computed once,
-beforehand."""
+"""The kernel of area sampling.
+
+Results that are the same for several areas, of a world or of a column, are computed once, in advance.
+"""
 
 from __future__ import annotations
 
@@ -23,10 +25,12 @@ from sim.tracing.areas.patch import Area
 
 @dataclass(frozen=True)
 class BorderInputs:
-    """Level directions to the borders that areas share.
+    """Horizontal directions to the borders between columns of areas.
 
-    lanes: numbers of the borders of all eyes · sizes: number of borders of an eye, and number of eyes
-    along: directions to the borders · sides: numbers of each area's left and right border
+    lanes: numbers of the borders of all eyes
+    sizes: number of borders of an eye, and number of eyes
+    along: directions to the borders
+    sides: numbers of each area's left and right border
     """
 
     lanes: Array
@@ -39,8 +43,10 @@ class BorderInputs:
 class AreaInputs(KernelInputs):
     """Inputs of an area kernel that are the same in every call, in addition to `KernelInputs`.
 
-    extent: width and height of areas on the tangent plane · borders: None: areas share no borders
-    places: numbers of the places on the bodies of all worlds; None: light that bodies reflect is not followed
+    extent: width and height of areas on the tangent plane
+    borders: None: areas share no borders
+    places: numbers of the points on the bodies of all worlds at which illumination is computed; None: bodies reflect no
+        light onto other surfaces
     """
 
     extent: Array | None = None
@@ -51,7 +57,9 @@ class AreaInputs(KernelInputs):
 class AreaKernel(RayKernel):
     """A kernel that computes the light in areas.
 
-    areas: tracer · eyes: upright eyes · sensor: directions and extent of the areas
+    areas: tracer
+    eyes: upright eyes
+    sensor: directions and extent of the areas
     n_envs, n_eyes: numbers of worlds, and of eyes in each world
     """
 
@@ -71,11 +79,11 @@ class AreaKernel(RayKernel):
             self._areas.inputs,
             None,
             floats(np.array(self._extent)),
-            self._look_at_borders() if self._borders.shared else None,
+            self._border_inputs() if self._borders.shared else None,
             counted(self.n_envs * places) if places else None,
         )
 
-    def _look_at_borders(self) -> BorderInputs:
+    def _border_inputs(self) -> BorderInputs:
         n = len(self._borders.x)
         return BorderInputs(
             counted(self.n_envs * self.n_eyes * n),
@@ -92,12 +100,16 @@ class AreaKernel(RayKernel):
         width, height = (dr.gather(mi.Float, inputs.extent, i) for i in range(2))
         area = Area.from_extent(seen.ray, seen.axis.xy, (width, height))
         borders = inputs.borders
-        met = self._areas.met_by(area, inputs.tables) if borders is None else self._met_at(frame, inputs, borders, lane)
+        met = (
+            self._areas.border_faces(area, inputs.tables)
+            if borders is None
+            else self._shared_border_faces(frame, inputs, borders, lane)
+        )
         bodies = self._areas.bodies(frame.things, lane.world, seen.body)
         return self._areas.radiance(area, met, FrameState(bodies, inputs.tables, lane.world, lit), self.depth)
 
     def _lit(self, frame: Frame, inputs: AreaInputs) -> list[Array]:
-        """Return the share of each light that reaches each place of each world's bodies, flat (world, place)."""
+        """Return the fraction of each light that reaches each point of each world's bodies, flat (world, point)."""
         if inputs.places is None:
             return []
         world = inputs.places // self._areas.places
@@ -108,7 +120,9 @@ class AreaKernel(RayKernel):
         dr.eval(lit)
         return lit
 
-    def _met_at(self, frame: Frame, inputs: AreaInputs, borders: BorderInputs, lane: Lane) -> tuple[Array, Array]:
+    def _shared_border_faces(
+        self, frame: Frame, inputs: AreaInputs, borders: BorderInputs, lane: Lane
+    ) -> tuple[Array, Array]:
         """Return the faces at the left and right border of a lane's area."""
         faces = self._faces(frame, inputs, borders)
         n, eyes = (dr.gather(mi.UInt32, borders.sizes, i) for i in range(2))

@@ -24,8 +24,8 @@ class BatchedRenderer(EyeRenderer):
     eyes: the eyes of every agent
     n_envs: number of worlds in a state
     fidelity: number and kind of samples, bands, depth layers and light. `Fidelity(4, bands=4)` traces 4 rays for each
-        receptor in 4 bands. None: `choose_fidelity(world, eyes, bands="own")`, the cheapest fidelity that the
-        receptors' noise allows. The fidelity in use is in `.fidelity`
+        receptor in 4 bands. None: `choose_fidelity(world, eyes, bands="own")`, the cheapest fidelity whose error is
+        small compared with the receptors' noise. The fidelity in use is in `.fidelity`
     tracer: "closed_form" (worlds of upright walls, a floor and spheres), "mitsuba" (any shapes), or "auto": the closed
         form if the world has one. The tracer in use is in `.tracer.name`, and the reason for its choice in
         `.tracer.why`
@@ -68,7 +68,7 @@ class BatchedRenderer(EyeRenderer):
 def in_whole_rays(fidelity: Fidelity, eye: optics.Eye) -> Fidelity:
     """Return the fidelity with a whole number of samples per receptor, unless receptors share their samples.
 
-    Behind a pupil, receptors share rays, and areas if there are fewer areas than receptors.
+    Receptors behind a pupil share rays. They share areas only if there are fewer areas than receptors.
     """
     asked = fidelity.rays_per_receptor
     if eye.pupil is None or (fidelity.samples == AREAS and asked >= 1):

@@ -1,11 +1,11 @@
 """Adaptive edge sampling: many rays for receptors that see an edge, few for others.
 
-It requires a perfect lens, and is chosen automatically only for user models. Four rays through a receptor's square show
+It requires a perfect lens, and is chosen automatically only for user models. Four rays through a receptor's square test
 whether the square is uniform (Whitted 1980 compares a pixel's corners). If the four signals differ, all rays are
 traced. An edge may also pass between the four rays and cut off a corner, at most a quarter of the square. The surface
-beyond such an edge fills a neighbouring square. Receptors that differ strongly from a neighbour therefore get all rays,
-too. For this comparison, the first rays include squares beyond the rim of the field. An object is missed if it is
-smaller than the gaps between the four rays and fills no neighbouring square.
+beyond such an edge usually fills a neighbouring square. All rays are therefore also traced for receptors that differ
+strongly from a neighbour. For this comparison, the first rays include squares beyond the rim of the field. An object is
+missed if it is smaller than the gaps between the four rays and fills no neighbouring square.
 """
 
 from __future__ import annotations
@@ -24,17 +24,18 @@ from sim.render.ray_kernel import Frame, KernelInputs, RayKernel
 from sim.scene.device_arrays import as_whole_numbers
 from sim.scene.frozen_kernels import FrozenKernel
 
-Launch = Callable[[Any, KernelInputs], Callable[[], np.ndarray]]  # starts a frozen kernel; the result waits for it
-FIRST = 4  # first rays, through every receptor's square
+Launch = Callable[[Any, KernelInputs], Callable[[], np.ndarray]]  # the result waits for the kernel
+FIRST = 4  # number of first rays, which are traced through every receptor's square
 
 
 class EdgeRays:
     """The sums of `RayKernel.sums` over many rays per receptor, estimated from fewer rays.
 
     kernel: kernel that follows the rays
-    sampling: sampling of the receptors · rays: number of rays for a receptor at an edge
+    sampling: sampling of the receptors
+    rays: number of rays for a receptor at an edge
     signals: contribution of a component to the signal of each type of receptor, (channel, component)
-    noticed: largest difference between the signals of rays that count as equal
+    noticed: rays whose signals differ by at most this amount count as equal
     """
 
     def __init__(
@@ -44,7 +45,7 @@ class EdgeRays:
         self._kernel, self._rays, self._noticed = kernel, fine.rays_per_receptor, noticed
         self._beyond = beyond_rim_of(sampling.eye.resolution)
         self._signals = [[float(worth) for worth in channel] for channel in signals]
-        self._coarse, self._fine = FrozenKernel(self._look_once), FrozenKernel(self._look_again)
+        self._coarse, self._fine = FrozenKernel(self._render_all), FrozenKernel(self._render_edges)
         first = np.concatenate([sampling.sensor(FIRST).directions, sampling.beyond_rim(FIRST)])
         self._first, self._along = kernel.inputs(first), kernel.inputs(fine.directions)
 
@@ -75,7 +76,7 @@ class EdgeRays:
         return light.ravel()
 
     def _beside_edges(self, light: np.ndarray) -> np.ndarray:
-        """Return the receptors, flat, that differ strongly from a neighbour: an edge may run between their first rays.
+        """Return the receptors, flat, that differ strongly from a neighbour. An edge may pass between their first rays.
 
         light: (component, view, receptor or square beyond the rim)
         """
@@ -91,18 +92,18 @@ class EdgeRays:
             found[:, *other] |= apart
         return found[:, 1:-1, 1:-1].ravel()
 
-    def _look_once(self, scenes: Any, frame: Frame, inputs: KernelInputs) -> tuple[Array, ...]:
+    def _render_all(self, scenes: Any, frame: Frame, inputs: KernelInputs) -> tuple[Array, ...]:
         """Return the sums over each receptor's rays, per component, and the spread of the rays' signals."""
         components = self._kernel.layers(scenes, frame, inputs)
         signals = [sum(w * c for w, c in zip(worth, components, strict=True)) for worth in self._signals]
-        dr.eval(components, signals)  # otherwise the sums of each component would trace all rays again
+        dr.eval(components, signals)  # otherwise each component's sums would trace all rays again
         spread = mi.Float(0)
         for signal in signals:
             highest, lowest = (dr.block_reduce(op, signal, FIRST) for op in (dr.ReduceOp.Max, dr.ReduceOp.Min))
             spread = dr.maximum(spread, highest - lowest)
         return *_sums(components, FIRST), spread
 
-    def _look_again(self, scenes: Any, frame: Frame, inputs: KernelInputs) -> tuple[Array, ...]:
+    def _render_edges(self, scenes: Any, frame: Frame, inputs: KernelInputs) -> tuple[Array, ...]:
         """Return the sums over the rays of the receptors that are rendered again, per component."""
         components = self._kernel.layers(scenes, frame, inputs)
         dr.eval(components)
@@ -119,9 +120,9 @@ def _sums(components: list[Array], rays: int) -> tuple[Array, ...]:
 
 
 def edges_pay(resolution: tuple[int, int], rays: float) -> bool:
-    """Return whether the first rays, including rays beyond the rim, are at most half of the rays without adaptive
-    sampling.
+    """Return whether adaptive edge sampling is likely to save rays.
 
-    With more first rays, nothing is saved if a few receptors need all rays.
+    The first rays, including those beyond the rim, must be at most half of the rays without adaptive sampling. With
+    more first rays, nothing would be saved once a few receptors need all rays.
     """
     return 2 * FIRST * beyond_rim_of(resolution).size <= rays * resolution[0] * resolution[1]

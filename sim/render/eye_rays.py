@@ -25,7 +25,8 @@ EYE_ROWS = 4  # rows of four floats: the pupil, right, up and ahead
 class Lane:
     """One lane of a kernel: a sample of an eye in a world.
 
-    world, eye, sample: their numbers · row: number of the eye among all eyes of all worlds
+    world, eye, sample: their numbers
+    row: number of the eye among all eyes of all worlds
     """
 
     world: Array
@@ -61,7 +62,12 @@ class EyeRays(Protocol):
         """Return the directions of samples (ray, 3), given in an eye's frame."""
 
     def ray(self, rows: Array, along: Directions, lane: Lane, samples: Array) -> EyeRay:
-        """Return the ray of a lane, inside the kernel; rows: see `array` · samples: number of samples of an eye."""
+        """Return the ray of a lane, inside the kernel.
+
+        rows: see `array`
+        along: directions of the samples
+        samples: number of samples of an eye
+        """
 
 
 class UprightEyes:

@@ -43,14 +43,16 @@ MOST_ENVS = 2**31 - 1
 class EyeRenderer:
     """A renderer of `n_envs` worlds of one scene with the same eyes.
 
-    scene: the model and its eyes · n_envs: number of worlds
-    fidelity: samples, depth layers and light; its number of bands must be the scene's
+    scene: the model and its eyes
+    n_envs: number of worlds
+    fidelity: samples, depth layers and light; its number of bands must equal that of the scene
     eye, mounts, model: the scene's eye, mounts and model
-    sensor: the sampled directions · tracer: the method of tracing rays, with its name, why, light and basis
+    sensor: the sampled directions
+    tracer: the method of tracing rays, with its name, why, light and basis
     brightest: signal of a white surface that faces all directional lights at once
 
-    One warning (`sim.MirrorWarning`) lists features of the model that are not rendered. Others name lamps with spectral
-    lines for which the eye has too few bands.
+    One warning (`sim.MirrorWarning`) lists features of the model that are not rendered. Further warnings name lamps
+    with spectral lines for which the eye has too few bands.
 
     Raises:
         ValueError: n_envs below 1, more rays than fit into memory, or a fidelity that the scene does not support.
@@ -63,7 +65,7 @@ class EyeRenderer:
         self.tracer: Tracer | AreaTracer
         self.tracer = (scene.areas if fidelity.samples == AREAS else scene.tracers.tracer_for)(fidelity.light)
         self._check_memory(n_envs, fidelity.rays_per_receptor)
-        scene.tell(fidelity.light)
+        scene.warn_once(fidelity.light)
         asked = fidelity.rays_per_receptor
         self.sensor: Sensor
         if fidelity.samples == AREAS:
@@ -141,14 +143,14 @@ class EyeRenderer:
     begin, begin_some = renamed("launch"), renamed("launch_some")
 
     def launch(self, poses: Placed, light: np.ndarray | None = None) -> PendingFrame:
-        """Start rendering in the background, and return a frame; its `wait` returns the same as `signals`."""
+        """Start rendering in the background, and return a frame, whose `wait` returns the same signals as `signals`."""
         factors = None if light is None else LightFactors.from_light(light, (self.n_envs, self.eye.bands))
         return self._launched(poses).then(lambda found: self._signals(found, factors))
 
     def launch_some(self, poses: Placed, worlds: np.ndarray, light: np.ndarray | None = None) -> PendingFrame:
         """Start rendering only some of the worlds; the signals are (len(worlds), eye, channel, height, width).
 
-        At most FEW worlds have their own buffers, so that they can be rendered while a frame of all worlds is pending.
+        Up to FEW worlds are rendered in separate buffers, while a frame of all worlds may be pending.
         """
         if not len(worlds) <= FEW < self.n_envs:
             return self.launch(poses, light).then(lambda seen: seen[worlds])
@@ -212,7 +214,7 @@ class EyeRenderer:
 
     @property
     def only_directional(self) -> bool:
-        """True if all light is directional: no points or spots, whose light depends on distance, no sky, no glow."""
+        """True if all light comes from directional lamps: there are no points, spots, sky or glowing surfaces."""
         scene = self.scene.scene
         return all(light.kind == "directional" for light in scene.lights.found) and not (scene.has_sky or scene.glows)
 
@@ -223,8 +225,7 @@ class EyeRenderer:
 
     @property
     def recordings(self) -> int:
-        """Number of times that kernels were recorded: once per kernel in use, and up to three times per kernel if
-        meshes move."""
+        """Number of kernel recordings: one per kernel in use, or up to three per kernel if meshes move."""
         edges = 0 if self._edges is None else self._edges.recordings
         labels = vars(self).get("labels")
         recorded = self._rays.n_recordings + self._sums.n_recordings + edges

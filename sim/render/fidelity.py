@@ -1,6 +1,7 @@
 """The fidelity with which a world is rendered for given eyes, and the reasons for it.
 
-A fidelity is chosen in four stages: bands, depth layers, light and samples.
+A fidelity is chosen in four stages: bands, depth layers, light and samples. The choices available in one stage, ordered
+by cost, are its levels.
 """
 
 from __future__ import annotations
@@ -23,9 +24,10 @@ MOST_BANDS = 4096
 class Level:
     """The level that was chosen for one stage, and the reason.
 
-    stage, level: names of the stage and of the level · why: the reason
-    predicted_error: error of a signal (root mean square); None if unknown. For the eyes' own bands it is a bound: the
-        largest error over measured reflectances and types of receptors. This bound may exceed any tolerance
+    stage, level: names of the stage and of the level
+    why: the reason
+    predicted_error: error of a signal (root mean square); None if unknown. For the eyes' own bands it is an upper
+        bound: the largest error over measured reflectances and types of receptors. It may exceed the tolerance
     """
 
     stage: str
@@ -42,14 +44,13 @@ class Fidelity:
         receptors share rays and may share areas.
     bands: number of spectral bands, used instead of the eye's own
     depth: distances for which the eye has a PSF
-    light: "direct": light of lamps that is reflected once; "bounce": also light that is reflected twice; "all": light
-        that is reflected any number of times, with samples="areas" only
+    light: "direct": light of lamps after one reflection; "bounce": also after two reflections; "all": after any number
+        of reflections, with samples="areas" only
     samples: "rays", "areas" or "edges". With "areas", each receptor's square is divided into rays_per_receptor
         rectangles, and the mean light in each of them is computed in closed form. Behind a pupil, there are also
         rectangles around the receptors, and receptors share larger rectangles if rays_per_receptor is below 1. Areas
-        need an upright world. "edges" is adaptive edge sampling: four rays per receptor, and rays_per_receptor rays
-        where these differ. It needs a perfect lens and direct light. It is chosen automatically only for user models,
-        and used for built-in worlds only on request.
+        need an upright world. "edges" is adaptive edge sampling: four rays per receptor, and rays_per_receptor rays if
+        these differ. It needs a perfect lens and direct light, and is chosen automatically only for user models.
     tolerance: allowed error of a receptor's signal (root mean square); None if nothing was chosen. In adaptive edge
         sampling, rays whose signals differ by at most the tolerance count as equal.
     levels: chosen level of each stage, with its reason
@@ -82,7 +83,7 @@ class Fidelity:
 
     @property
     def predicted_error(self) -> float | None:
-        """Error of a receptor's signal by all stages together (root mean square); None if nothing was predicted."""
+        """Error of a receptor's signal due to all stages (root mean square); None if no stage predicts one."""
         known = [level.predicted_error for level in self.levels if level.predicted_error is not None]
         return math.hypot(*known) if known else None
 
@@ -106,7 +107,7 @@ class Fidelity:
         return "\n".join("  ".join([*(c.ljust(w) for c, w in zip(r, widths, strict=False)), r[3]]) for r in rows)
 
 
-def fidelity_asked(rays_per_receptor: float | str, eyes: Eyes) -> Fidelity | None:
+def requested_fidelity(rays_per_receptor: float | str, eyes: Eyes) -> Fidelity | None:
     """Return the fidelity with this number of rays in direct light, or None for "auto", which is chosen later.
 
     Raises:

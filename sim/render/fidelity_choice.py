@@ -1,8 +1,9 @@
-"""Choice of the cheapest fidelity that receptor noise allows, in four stages: bands, depth layers, light and samples.
+"""Choice of the cheapest fidelity, in four stages: bands, depth layers, light and samples.
 
-A brain cannot distinguish an error below half of the noise. Every stage has levels, ordered by cost. The cheapest level
-whose predicted error is allowed is taken, and stored with the reason. The available levels and their errors depend on
-the kind of scene (`world_fidelity`, `model_fidelity`). The rule by which a level is chosen does not.
+The allowed error is half of the receptors' noise, which a brain could not distinguish. Every stage has levels, ordered
+by cost. The cheapest level whose predicted error is allowed is chosen, and stored with the reason. The available levels
+and their errors depend on the kind of scene (`world_fidelity`, `model_fidelity`). The rule for choosing a level is the
+same for all scenes.
 """
 
 from __future__ import annotations
@@ -25,8 +26,10 @@ class FidelityWarning(UserWarning):
 class Samples:
     """The chosen samples: rays, areas or adaptive edge sampling.
 
-    kind: "rays", "areas" or "edges" · light, level: chosen levels of light and of samples
-    number: number of samples per receptor · enough: whether the error is at most the allowed one
+    kind: "rays", "areas" or "edges"
+    light, level: chosen levels of light and of samples
+    number: number of samples per receptor
+    enough: True if the error is at most the allowed one
     """
 
     kind: str
@@ -37,7 +40,7 @@ class Samples:
 
     @property
     def error(self) -> float:
-        """Error that is due to the samples and to the light that is left out."""
+        """Error due to the samples and to the omitted light."""
         return math.hypot(self.light.predicted_error or 0, self.level.predicted_error or 0)
 
 
@@ -45,7 +48,8 @@ class Samples:
 class Allowed:
     """Allowed error of the samples (root mean square).
 
-    error: if some light is left out, whose error is subtracted · without_light: if no light is left out
+    error: allowed error if some light is omitted, which also uses a part of the tolerance
+    without_light: allowed error if no light is omitted
     """
 
     error: float
@@ -54,8 +58,10 @@ class Allowed:
 
 @dataclass(frozen=True)
 class Shares:
-    """Shares of the tolerance that the stages before the samples may use. Squares of errors add up, and the samples may
-    use the rest."""
+    """Fractions of the tolerance that the stages before the samples may use.
+
+    Squares of errors add up. The samples may use the rest.
+    """
 
     bands: float
     depth: float
@@ -64,7 +70,8 @@ class Shares:
     def left(self, allowed: float, has_layers: bool, light: float) -> Allowed:
         """Return the rest of an allowed error, which the samples may use.
 
-        has_layers: whether the eye has depth layers · light: error by the light that is left out
+        has_layers: True if the eye has depth layers
+        light: error due to the omitted light
         """
         spent = self.bands**2 + (self.depth**2 if has_layers else 0)
         for_light = min(light / allowed, self.light) ** 2
@@ -75,8 +82,8 @@ class Stages(Protocol):
     """Levels of fidelity that a scene offers, and their errors.
 
     eye: its receptor noise determines the allowed error
-    allowed: allowed error of a signal by all stages together (root mean square)
-    shares: shares of the allowed error; None: each stage may use all of it
+    allowed: allowed error of a signal due to all stages (root mean square)
+    shares: fractions of the allowed error; None: each stage may use all of it
     """
 
     eye: optics.Eye
@@ -87,7 +94,7 @@ class Stages(Protocol):
         """Return the eye's own bands, and their error."""
 
     def depth(self, allowed: float) -> tuple[DepthLayers, Level | None]:
-        """Return the depth layers for which the eye has a PSF, and their level; None without a choice of layers."""
+        """Return the depth layers for which the eye has a PSF, and the chosen level; None if there was no choice."""
 
     def light(self, depth: DepthLayers, allowed: float) -> Level:
         """Return the level of light: which reflections are followed."""
@@ -111,7 +118,7 @@ def cheapest(stages: Stages) -> Fidelity:
     levels = [level for level in (stages.bands(), depth_level, samples.light, samples.level) if level is not None]
     bands = stages.eye.bands
     found = Fidelity(samples.number, bands, depth, allowed, tuple(levels), samples.light.level, samples.kind)
-    # The bands are left out: only a bound of their error is known, which may be far above the error.
+    # The bands are omitted: only an upper bound on their error is known, which may be much larger than the error.
     _warn_if_worse(levels[1:], allowed, together=shares is not None)
     return found
 

@@ -19,10 +19,10 @@ from sim.scene.band_error import band_error, measured
 from sim.tracing.lighting import BOUNCE, DIRECT
 from sim.worlds.world import World
 
-# Chosen: safety factor for errors that are measured in a few random views, because the error in agents' episodes
-# differs (tests/sim/render/test_fidelity.py compares the latter with the noise).
+# Chosen: safety factor for errors measured in a few random views, because the error in agents' episodes may be larger
+# (tests/sim/render/test_fidelity.py compares the error in episodes with the noise).
 CAUTION = 1.2
-LAYERS = (1, 3, 5, 9)  # numbers of layers that are tried; the layers of each number are also layers of the next
+LAYERS = (1, 3, 5, 9)  # numbers of layers to try; each set of layers is a subset of the next
 NEAREST = 0.005  # chosen: quantile of the visible distances that counts as the nearest distance
 
 
@@ -45,13 +45,12 @@ def own_bands(world: World, eye: optics.Eye) -> Level:
 
 
 def depth(trials: FidelityTrials, eye: optics.Eye, allowed: float) -> tuple[DepthLayers, Level]:
-    """Return one PSF for infinity if its error is certainly allowed, otherwise the fewest layers for random views of
-    the world.
+    """Return a single PSF for infinity if its error is certainly allowed, else the fewest layers for random views.
 
-    Light that comes from a point at the distance z and passes the pupil at p is shifted by f p/z, compared with light
-    from infinity. The means of |Δx| and |Δy| over a disk of radius R are both 4/(3π) f R/z. Divided by a receptor's
-    width and height, they sum to the share of the receptor's field that moves. This share bounds the error of any scene
-    up to white.
+    On the retina, light from a point at the distance z that passes the pupil at p is shifted by f p/z, compared with
+    light from infinity. The means of |Δx| and |Δy| over a disk of radius R are both 4/(3π) f R/z. Divided by a
+    receptor's width and height, respectively, they add up to the fraction of the receptor's field that moves. This
+    fraction bounds the error for any scene up to white.
     """
     if eye.pupil is None:
         return ONE_PSF, Level("depth", str(ONE_PSF), 0.0, "a perfect lens does not blur")
@@ -74,10 +73,10 @@ def depth(trials: FidelityTrials, eye: optics.Eye, allowed: float) -> tuple[Dept
 
 
 def light(trials: FidelityTrials, sampling: EyeSampling, allowed: float) -> Level:
-    """Return direct light if light that is reflected twice adds little, otherwise both.
+    """Return direct light if a second reflection adds little, otherwise light after one and two reflections.
 
-    In the second case, the error by light that is reflected more often is estimated. This light is assumed to have the
-    same ratio to light that is reflected twice as the latter has to direct light.
+    In the second case, the error due to further reflections is estimated from a geometric series: each further
+    reflection is assumed to have the same ratio to the one before as the second reflection has to direct light.
     """
     try:
         twice, direct = trials.reflected_twice(sampling)

@@ -1,8 +1,8 @@
 """Trials of sampling methods in views of a world, before any kernel is recorded.
 
-A trial renders some of an eye's receptors and compares their signals with signals from many more rays. Errors are taken
-over the populations in `sim.render.populations`. All draws have fixed seeds, so the same world and eyes give the same
-result.
+A trial renders some of an eye's receptors and compares their signals with signals from many more rays. Errors are
+computed for the populations in `sim.render.populations`. All draws have fixed seeds, so the same world and eyes give
+the same result.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ from sim.tracing.eye_ray import EyeRay
 # Chosen: the cost of a trial, and how much finer than the trial its reference ("truth") is.
 RAYS = 2**19  # largest number of rays in one trial, unless that leaves too few views
 TRUE_RAYS = 2**21  # largest number of rays in a reference for areas
-VIEWS = (12, 96)  # smallest and largest number of views in one trial
+VIEWS = (12, 96)  # smallest and largest number of views in a trial
 FINER = 8  # smallest ratio of the reference's rays to the trial's
 TRUE = 4096  # smallest number of rays of a reference behind a pupil
 TRUE_AREA = (1024, 8192)  # smallest and largest number of rays per receptor in a reference for areas
@@ -58,8 +58,9 @@ class FidelityTrials:
         return self._known[sampling.depth]
 
     def errors(self, sampling: EyeSampling, light: str = lighting.DIRECT) -> Callable[[float], float]:
-        """Return a function from rays per receptor to the signals' root mean square error, the larger of the two
-        populations'.
+        """Return a function that maps rays per receptor to the root mean square error of signals.
+
+        It is the larger of the two populations' errors.
 
         Raises:
             NoRaysError: raised by the returned function if a receptor has no rays.
@@ -99,8 +100,7 @@ class FidelityTrials:
         return True
 
     def area_errors(self, sampling: EyeSampling, light: str) -> Callable[[float], float]:
-        """Return a function from areas per receptor to the same error, which here includes the noise of the
-        reference."""
+        """Return the same function for areas per receptor. Its errors include the noise of the reference."""
         populations = self._populations(sampling)
         truths = [
             self._signals(self._truth(sampling, p.receptors), sampling.depth, light, p.views, TRUE_RAYS)
@@ -118,10 +118,10 @@ class FidelityTrials:
         return error
 
     def may_share(self, sampling: EyeSampling, per_receptor: float) -> bool:
-        """Return whether receptors may share areas, with this number per receptor, without having identical signals."""
+        """Return whether receptors that share areas, with this number per receptor, still have different signals."""
         return self._scene.may_share(sampling, per_receptor)
 
-    def areas_seen(self, sampling: EyeSampling, per_receptor: float) -> float:
+    def areas_of_field(self, sampling: EyeSampling, per_receptor: float) -> float:
         """Return the number of rendered areas per receptor. Behind a pupil, it includes areas around the receptors."""
         n = len(self._scene.area_trial(sampling, per_receptor, self._receptors[:1]).directions)
         return n / float(np.prod(self._eyes.resolution)) if self._eye.pupil else float(n)
@@ -137,18 +137,18 @@ class FidelityTrials:
         return own.trial(rays / np.prod(self._eyes.resolution), receptors)
 
     def reflected_more_often(self, sampling: EyeSampling) -> float:
-        """Return the root mean square of the signals by light that is reflected more than twice, with areas."""
+        """Return the root mean square of the signals due to more than two reflections, with areas."""
         trial = self._scene.area_trial(sampling, 1, self._receptors)
         twice, all_ = (self._signals(trial, sampling.depth, light) for light in lighting.LEVELS[1:])
         return _rms(all_ - twice)
 
     def reflected_twice(self, sampling: EyeSampling) -> tuple[float, float]:
-        """Return root mean squares of the signals by light that is reflected twice, and by direct light.
+        """Return root mean squares of the signals due to the second reflection and to direct light.
 
-        They are for the population in which the former is larger.
+        They are for the population in which the second reflection is larger.
 
         Raises:
-            ValueError: light that is reflected twice cannot be followed.
+            ValueError: light cannot be followed after the first reflection.
         """
         found = []
         for p in self._populations(sampling):
@@ -158,8 +158,9 @@ class FidelityTrials:
         return max(found)
 
     def errors_of_layers(self, finest: DepthLayers, counts: tuple[int, ...]) -> dict[int, float]:
-        """Return root mean square differences to the signals with the finest layers, with the same rays. The nodes of
-        each count must be among the nodes of the finest layers.
+        """Return root mean square differences to the signals with the finest layers, for the same rays.
+
+        The nodes of each count must be among the nodes of the finest layers.
 
         Raises:
             optics.AccuracyError: see `optics.Eye.kernel`.
@@ -185,7 +186,10 @@ class FidelityTrials:
     def _signals(
         self, trial: Trial, depth: DepthLayers, light: str, views: RandomViews | None = None, most: int = RAYS
     ) -> np.ndarray:
-        """Return signals (view, channel, receptor) in the first views; most: rays, which limit the number of views."""
+        """Return signals (view, channel, receptor) in the first views.
+
+        most: largest number of rays, which limits the number of views
+        """
         rays = len(trial.directions)
         views = (views or self._views).take(int(np.clip(most // rays, *VIEWS)))
         if trial.extent:
@@ -219,7 +223,7 @@ class FidelityTrials:
             area = Area.from_extent(ray, axis, (width, height))
             world, bodies = dr.arange(mi.UInt32, n * len(views)) // n, [*np.moveaxis(views.objects, 1, 0), views.agents]
             now = FrameState([_points(b, n) for b in bodies], tracer.inputs, world, self._lit(tracer, bodies))
-            components = tracer.radiance(area, tracer.met_by(area, tracer.inputs), now, depth)
+            components = tracer.radiance(area, tracer.border_faces(area, tracer.inputs), now, depth)
             dr.eval(components)
             return [np.array(c) for c in components]
 
@@ -238,7 +242,7 @@ class FidelityTrials:
         with variant(self._scene.variant):
             ray = mi.Ray3f(_points(origins, rays), mi.Vector3f([floats(d) for d in np.moveaxis(world, -1, 0)]))
             agent, cosine = _points(views.agents, rays), floats(np.tile(trial.directions[:, 2], len(views)))
-            seen = EyeRay(ray, mi.Vector3f(0), cosine, agent)  # no headlight shines along an axis here
+            seen = EyeRay(ray, mi.Vector3f(0), cosine, agent)  # built-in worlds have no headlight
             samples = mi.Vector4f(0)
             if light == lighting.BOUNCE:
                 samples = mi.Vector4f([floats(np.tile(column, len(views))) for column in _in_fours(trial).T])

@@ -52,17 +52,17 @@ class Labels:
 
         (env, eye, height, width) float32; infinite without a hit
         """
-        return self._seen(self._distances, self._scenes, poses)
+        return self._at_centres(self._distances, self._scenes, poses)
 
     def ids(self, poses: Placed) -> np.ndarray:
         """Return the geom that each receptor's centre sees, (env, eye, height, width) int32; -1 without a hit."""
         scene = self.scene.scene
-        apart, geoms = scene.told_apart
-        found = self._seen(self._hits, Scenes(apart, self._scenes.meshes), poses).astype(int)
+        apart, geoms = scene.one_shape_per_geom
+        found = self._at_centres(self._hits, Scenes(apart, self._scenes.meshes), poses).astype(int)
         return np.concatenate([scene.movers.geoms, geoms])[found].astype(np.int32)
 
     def flow(self, poses: Placed, later: Placed) -> np.ndarray:
-        """Return the optic flow from one moment to another, to the right and down [receptors].
+        """Return the optic flow between two moments, to the right and down [receptors].
 
         It is the motion on the retina of the point that each receptor's centre sees: (env, eye, 2, height, width)
         float32. It is NaN without a hit, or if the point is not in front of the eye at the later moment.
@@ -81,7 +81,7 @@ class Labels:
         """Number of times that the kernels were recorded."""
         return self._distances.n_recordings + self._hits.n_recordings
 
-    def _seen(self, kernel: Any, scenes: Scenes, poses: Placed) -> np.ndarray:
+    def _at_centres(self, kernel: Any, scenes: Scenes, poses: Placed) -> np.ndarray:
         placed = self.scene.placed(poses)
         self.scene.check_poses(placed, self.n_envs)
 

@@ -15,7 +15,7 @@ class LightFactors:
 
     @classmethod
     def from_light(cls, light: np.ndarray, shape: tuple[int, int]) -> LightFactors:
-        """Return a copy of these factors.
+        """Return a copy of the factors `light`.
 
         Raises:
             ValueError: another shape.
@@ -31,11 +31,11 @@ class LightFactors:
 
     @property
     def level(self) -> np.ndarray:
-        """Factors of signals (env, eye, channel, height, width)."""
+        """Factors for signals of the shape (env, eye, channel, height, width)."""
         return self.bands[:, :1, None, None, None]
 
     def on_bands(self, layers: np.ndarray, basis: np.ndarray | None, n_eyes: int) -> np.ndarray:
-        """Return light (layer, component, all rays of all views) times these factors, in bands instead of components.
+        """Return light (layer, component, all rays of all views) times these factors, converted to bands.
 
         basis: contribution of a component to each band, (component, band); None: components are bands
         """

@@ -10,8 +10,8 @@ import os
 from dataclasses import dataclass
 from pathlib import Path
 
-INDICES = 2**32  # elements of one Dr.Jit array
-RAY_BYTES = 64  # direction and origin of a ray, and the numbers from which they are computed
+INDICES = 2**32  # largest number of elements of one Dr.Jit array
+RAY_BYTES = 64  # bytes per ray: direction, origin, and the numbers from which they are computed
 GIB = 2**30
 CGROUPS = Path("/sys/fs/cgroup")
 # Files of control groups, version 2 and version 1: limit, usage and statistics. The last entry is the prefix of cached
@@ -26,7 +26,9 @@ _GROUPS = (
 class Demand:
     """The least memory that rendering needs.
 
-    rays_per_receptor · worlds: number of worlds · eyes: number of eyes of one agent
+    rays_per_receptor: number of rays per receptor
+    worlds: number of worlds
+    eyes: number of eyes of one agent
     resolution: receptors (height, width) of an eye
     planes: components of light times depth layers, along every ray
     weights: planes of weights behind a pupil (bands times depth layers); 0 without a pupil
@@ -75,8 +77,10 @@ def check_memory(demand: Demand) -> None:
 
 
 def available() -> float:
-    """Return the bytes available without swapping, in the machine and in the container that this runs in; infinite if
-    the system does not report them."""
+    """Return the bytes that are available without swapping, in the machine and in its container.
+
+    The result is infinite if the system does not report them.
+    """
     return min(_of_machine(), _of_container(CGROUPS))
 
 
@@ -95,7 +99,7 @@ def _of_machine() -> float:
 
 
 def _of_container(root: Path) -> float:
-    """Return the free bytes below control groups' limits; at least one, because a group may be above its limit."""
+    """Return the free bytes below the limits of control groups; at least 1, because a group may exceed its limit."""
     free = math.inf
     for limit, used, statistics, prefix in _GROUPS:
         try:

@@ -1,4 +1,4 @@
-"""Choice of the fewest rays that receptor noise allows on a user model, from trials at given moments.
+"""Choice of the fewest rays for eyes on a user model, from trials at given moments.
 
 A moment is a set of poses. Each moment is rendered with increasing numbers of rays, and with many rays as a reference.
 A receptor with a uniform field needs only one ray. If most receptors have a uniform field, they would hide the error of
@@ -32,12 +32,12 @@ from sim.scene.poses import Poses
 from sim.tracing import lighting
 from sim.tracing.model_tracer import ModelTracer
 
-# Rays per receptor that are tried, and rays per receptor of the reference, for perfect lenses and behind a pupil, where
-# all receptors share all rays.
+# Numbers of rays per receptor to try, and that of the reference: for perfect lenses, and behind a pupil, where all
+# receptors share all rays.
 PERFECT, PERFECT_TRUTH = (1, 2, 4, 8, 16, 32, 64, 128, 256), 1024
 SHARED, SHARED_TRUTH = (0.25, 0.5, 1, 2, 4, 8, 16), 64
 AUTO, FOLLOWED = "auto", (lighting.DIRECT, lighting.BOUNCE)
-# Share of the allowed error; a receptor whose error with the fewest rays is larger does not have a uniform field.
+# A receptor's field is uniform if the error with the fewest rays is at most this fraction of the allowed error.
 SPLIT = 0.1
 
 
@@ -45,7 +45,7 @@ SPLIT = 0.1
 class Trials:
     """Errors of signals over the receptors without a uniform field (root mean square), by rays per receptor.
 
-    share: share of all receptors that do not have a uniform field
+    share: fraction of all receptors that do not have a uniform field
     """
 
     errors: Mapping[float, float]
@@ -69,13 +69,13 @@ def choose_model_fidelity(
     If there is none, a FidelityWarning states by how much the tolerance is exceeded. Bands are the eye's own.
 
     model, eye, mounts: see `ModelRenderer`
-    poses: poses at moments that represent the later views
+    poses: poses that are typical of later use, one set per moment
     tolerance: allowed error of a signal (root mean square), over receptors without a uniform field; None: half of the
-        receptors' noise, but at least `sim.eyes.allowed_error.LEAST_TOLERANCE` of the signal of white behind the eye's
-        pupil
+        receptors' noise, but at least `sim.eyes.allowed_error.LEAST_TOLERANCE` times the signal of a white surface
+        behind the eye's pupil
     groups, spectra, varied: see `ModelRenderer`
-    light: light that is followed, "direct" or "bounce"; "auto": "bounce" if direct light alone has an error above the
-        tolerance at these moments, over receptors that bounced light reaches
+    light: "direct" or "bounce", see `Fidelity`; "auto": "bounce" if direct light alone has an error above the tolerance
+        at these moments, over receptors that bounced light reaches
 
     Raises:
         ValueError: a tolerance that is not positive, another light, or an argument that ModelRenderer refuses.
@@ -97,7 +97,7 @@ def choose_model_fidelity(
 
 
 class ModelStages:
-    """Levels that a model offers, tried at moments of its worlds; see `Stages`.
+    """Levels of fidelity for a model, tried at moments of its worlds; see `Stages`.
 
     light: see `choose_model_fidelity`
     """
@@ -107,13 +107,13 @@ class ModelStages:
     def __init__(self, scene: PreparedScene, moments: Poses, allowed: float, light: str) -> None:
         self.eye, self.allowed = scene.eye, allowed
         self._scene, self._moments, self._light = scene, moments, light
-        self._seen = cache(self._signals)
+        self._cached_signals = cache(self._signals)
 
     def _signals(self, rays: float, light: str) -> np.ndarray:
         """Return the signals at the moments, without noise."""
         fidelity = _with(rays, self.eye, self.allowed, light)
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", MirrorWarning)  # the final renderer warns
+            warnings.simplefilter("ignore", MirrorWarning)  # the final renderer repeats the warnings
             renderer = EyeRenderer(self._scene, self._moments.n, fidelity)
         return renderer.signals(self._moments)
 
@@ -127,12 +127,12 @@ class ModelStages:
 
     def light(self, depth: DepthLayers, allowed: float) -> Level:
         """See `Stages`."""
-        return _light(self._light, lambda light: self._seen(_truth(self.eye), light), allowed)
+        return _light(self._light, lambda light: self._cached_signals(_truth(self.eye), light), allowed)
 
     def samples(self, depth: DepthLayers, light: Level, allowed: Allowed) -> Samples:
         """See `Stages`."""
         ladder, most = PERFECT if self.eye.pupil is None else SHARED, allowed.error
-        trials = tried(lambda rays: self._seen(rays, light.level), ladder, _truth(self.eye), most)
+        trials = tried(lambda rays: self._cached_signals(rays, light.level), ladder, _truth(self.eye), most)
         rays = next((n for n, error in trials.errors.items() if error <= most), max(trials.errors))
         enough = trials.errors[rays] <= most
         why = (
@@ -145,7 +145,7 @@ class ModelStages:
 
 
 def _light(asked: str, truth: Callable[[str], np.ndarray], allowed: float) -> Level:
-    """Return the level of light; truth: function from the light that is followed to signals with many rays."""
+    """Return the level of light. truth: function that maps "direct" or "bounce" to signals with many rays"""
     if asked != AUTO:
         return Level("light", asked, None, "as requested")
     off = np.abs(truth(lighting.BOUNCE) - truth(lighting.DIRECT)).max(axis=2)
@@ -158,8 +158,11 @@ def _light(asked: str, truth: Callable[[str], np.ndarray], allowed: float) -> Le
 
 
 def _with(rays: float, eye: optics.Eye, allowed: float, light: str) -> Fidelity:
-    """Return the fidelity with this number of rays. In direct light through a perfect lens it uses adaptive edge
-    sampling if that saves work, except for the reference."""
+    """Return the fidelity with this number of rays.
+
+    In direct light through a perfect lens it uses adaptive edge sampling if that saves rays, except for the
+    reference.
+    """
     at_edges = light == lighting.DIRECT and eye.pupil is None and rays < PERFECT_TRUTH
     at_edges = at_edges and edges_pay(eye.resolution, rays)
     return Fidelity(rays, eye.bands, tolerance=allowed, light=light, samples=EDGES if at_edges else RAYS)
@@ -168,7 +171,8 @@ def _with(rays: float, eye: optics.Eye, allowed: float, light: str) -> Fidelity:
 def tried(seen: Callable[[float], np.ndarray], ladder: Sequence[float], truth: float, allowed: float) -> Trials:
     """Return the errors of increasing numbers of rays, compared with `truth` rays, up to the first allowed error.
 
-    seen: function from rays per receptor to signals (env, eye, channel, height, width) · ladder: numbers of rays to try
+    seen: function that maps rays per receptor to signals (env, eye, channel, height, width)
+    ladder: numbers of rays to try
     """
     right = seen(truth)
     errors: dict[float, float] = {}

@@ -30,13 +30,13 @@ class ModelRenderer(EyeRenderer):
     mounts: places of the eyes on the model
     n_envs: number of worlds
     fidelity: samples, bands and light. None: 16 rays per receptor, direct light of lamps, and the eye's own bands, 4 by
-        default. light="bounce" adds light that is reflected twice, and the light of the sky and of glowing geoms.
+        default. light="bounce" adds light after a second reflection, and the light of the sky and of glowing geoms.
         samples="edges" traces all rays only where the first four differ; it needs direct light. samples="areas" uses
         closed forms instead of rays, if the model has them
     groups, spectra: see `sim.mirror`
     varied: names of geoms whose size or colour may differ between worlds; poses contain the sizes and colours in the
-        worlds' mjModels. A mapping such as {"floor": ("sand", "grass")} also lists materials that a geom may have. The
-        colour of such a geom differs only with its material
+        worlds' mjModels. A mapping such as {"floor": ("sand", "grass")} also lists materials that a geom may have; the
+        colour of such a geom depends only on its material
     tracer: "mitsuba" (any shapes), "closed_form" (upright walls, a floor and spheres), or "auto": the closed form if
         the model has one. The tracer in use is in `.tracer.name`
     brightest: signal of a white surface that faces all directional lights at once
@@ -45,9 +45,9 @@ class ModelRenderer(EyeRenderer):
     lines for which the eye has too few bands.
 
     Raises:
-        ValueError: an invalid argument, a mount on a part that the model lacks, or an eye with an eccentricity. An eye
-            must not be inside a sphere, a capsule, another primitive or a closed mesh in the model's reference pose.
-            The model must support the fidelity, and the rays must fit into memory.
+        ValueError: an invalid argument; a mount on a part that the model lacks; an eye with an eccentricity, or inside
+            a primitive or a closed mesh in the model's reference pose; a fidelity that the model does not support; or
+            more rays than fit into memory.
         optics.AccuracyError: a pupil whose light spreads too far.
     """
 

@@ -36,7 +36,7 @@ def see(world: World, eyes: Eyes, state: WorldState, index: int = 0) -> np.ndarr
 
 
 def receptor_direction(eyes: Eyes, axis: np.ndarray, row: int, column: int) -> np.ndarray:
-    """Return the unit vector (3,) in which a receptor's centre looks; axis: of the eye, (3,); row 0 is on top."""
+    """Return the viewing direction of a receptor's centre, (3,). axis: axis of the eye, (3,). Row 0 is at the top."""
     height, width = eyes.resolution
     right, up = np.array([axis[1], -axis[0], 0]), np.array([0, 0, 1])
     across = np.tan(np.radians(eyes.fov_deg) / 2) * ((2 * column + 1) / width - 1)
@@ -46,7 +46,7 @@ def receptor_direction(eyes: Eyes, axis: np.ndarray, row: int, column: int) -> n
 
 
 def radiance(scene: MitsubaObject, ray: Array, wavelengths_nm: np.ndarray) -> np.ndarray:
-    """Return the radiance along a ray: ρ/π sum_l E_l cos θ_l over unobstructed lamps, (band,)."""
+    """Return the radiance along a ray, ρ/π sum_l E_l cos θ_l over all unobstructed lamps l, (band,)."""
     hit, total = scene.ray_intersect(ray), np.zeros(len(wavelengths_nm))
     for b, wavelength in enumerate(wavelengths_nm if hit.is_valid() else ()):
         hit.wavelengths = mi.Spectrum(float(wavelength))

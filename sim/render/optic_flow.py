@@ -1,7 +1,7 @@
 """Optic flow: the motion of visible points on the retina, from geometry alone.
 
 A point on a rigid body moves with the body, and an eye moves with its own body (Longuet-Higgins & Prazdny 1980). The
-flow from one moment to another is exact, whatever happens between them.
+flow between two moments is exact for any motion between them.
 """
 
 from __future__ import annotations
@@ -30,7 +30,8 @@ def flow_between(
     It is NaN without a hit, or if the point is not in front of the eye at the second moment.
 
     depth, ids: depth and geom that each receptor's centre sees at the first moment, (world, eye, height, width)
-    moments: poses at both moments · frames: eyes' frames at both moments
+    moments: poses at both moments
+    frames: eyes' frames at both moments
     """
     worlds, eyes = depth.shape[:2]
     geoms, far = ids.reshape(worlds, eyes, -1), depth.reshape(worlds, eyes, -1, 1)

@@ -1,8 +1,8 @@
 """Frames that are launched early and read late, so that other work runs in the meantime.
 
-A kernel reads its inputs from a buffer that the next launch overwrites. Each launcher has a FrameSlot, which reads the
-pending frame before the next one is launched. Each frame therefore keeps its own values, whatever the order in which
-frames are waited for.
+A kernel reads its inputs from a buffer that the next launch overwrites. Each launcher therefore has a FrameSlot, which
+reads the pending frame before the next one is launched. Frames then keep their own values, and may be waited for in any
+order.
 """
 
 from __future__ import annotations

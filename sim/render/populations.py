@@ -1,8 +1,8 @@
-"""Populations of views and receptors over which the errors of trials are taken.
+"""Populations of views and receptors for which the errors of trials are computed.
 
-There are two: any receptors in views from any place, and receptors that see an object in views with an object nearby.
-The second is separate because objects decide how an episode ends. Most receptors see floor and walls, and would hide
-errors at objects. All draws have fixed seeds, so the same world and eyes give the same populations.
+There are two: random receptors in views from random places, and receptors that see an object, in views with an object
+nearby. The second is separate because objects decide how an episode ends. Most receptors see floor and walls, and would
+hide errors at objects. All draws have fixed seeds, so the same world and eyes give the same populations.
 """
 
 from __future__ import annotations
@@ -16,15 +16,16 @@ from sim.render.random_views import RandomViews, near_views, on_objects, random_
 from sim.render.world_scene import WorldScene
 
 RECEPTORS = 24  # chosen: largest number of receptors of a population
-LEAST_WEIGHT = 1e-3  # weight of a receptor that sees an object in none of the views, compared with one of them
-ON_OBJECT = 0.02  # share of a receptor's field: a receptor sees an object that fills more than this share
+LEAST_WEIGHT = 1e-3  # weight of a receptor that sees an object in no view, relative to one that sees it in one
+ON_OBJECT = 0.02  # a receptor sees an object that fills more than this fraction of its field
 
 
 @dataclass(frozen=True)
 class Population:
-    """Views, and receptors that are tried in them.
+    """Views, and the receptors whose errors are computed in them.
 
-    receptors: their numbers, row by row · counted: whether each of them counts in each view, (view, receptor)
+    receptors: numbers of the receptors, row by row
+    counted: True if a receptor counts in a view, (view, receptor)
     """
 
     views: RandomViews
@@ -32,24 +33,25 @@ class Population:
     counted: np.ndarray
 
     def rms(self, error: np.ndarray) -> float:
-        """Return the root mean square of an error (view, channel, receptor) in the first views; 0 if none counts."""
+        """Return the root mean square of an error (view, channel, receptor) over receptors that count, else 0."""
         counted = np.broadcast_to(self.counted[: len(error), None], error.shape)
         return float(np.sqrt(np.mean(error[counted] ** 2))) if counted.any() else 0.0
 
 
 def everywhere(scene: WorldScene, views: int) -> Population:
-    """Return receptors drawn from all receptors, in this number of views from any place."""
+    """Return random receptors in this number of views from random places."""
     receptors = _drawn(np.ones(int(np.prod(scene.eyes.resolution))))
     counted = np.ones((views, len(receptors)), bool)
     return Population(random_views(scene.world, scene.eyes, views), receptors, counted)
 
 
 def near_objects(scene: WorldScene, sampling: EyeSampling, views: int, rays: int) -> Population:
-    """Return receptors that see an object in this number of views with an object nearby.
+    """Return views near objects, and random receptors, counted in those views in which they see an object.
 
-    In a wide eye, an object fills few receptors. Receptors that often see an object are therefore more likely drawn.
+    In a wide eye, an object fills few receptors. Receptors that often see an object are therefore drawn more often.
 
-    rays: number of rays through all receptors that decide which of them see an object
+    views: number of views
+    rays: number of rays, through all receptors together, that test which receptors see an object
     """
     near, n = near_views(scene.world, scene.eyes, views), int(np.prod(scene.eyes.resolution))
     middles = BoxSampling(scene.eye).trial(1, np.arange(n))
@@ -61,8 +63,10 @@ def near_objects(scene: WorldScene, sampling: EyeSampling, views: int, rays: int
 
 
 def _drawn(weights: np.ndarray) -> np.ndarray:
-    """Return up to RECEPTORS numbers of receptors, in increasing order, with probabilities proportional to their
-    weights."""
+    """Draw up to RECEPTORS receptors with probabilities proportional to their weights.
+
+    Return their numbers in increasing order.
+    """
     chance = weights / weights.sum()
     return np.sort(np.random.default_rng(0).choice(len(weights), min(RECEPTORS, len(weights)), replace=False, p=chance))
 

@@ -34,8 +34,11 @@ Placed: TypeAlias = Poses | Sequence[mujoco.MjData] | mujoco.MjData | Any  # pos
 class PreparedScene:
     """A model in the spectral bands of given eyes. Nothing in it depends on the fidelity, except for the bands.
 
-    model: the MuJoCo model · eye: optics and retina, with its own bands · mounts: places of the eyes on the model
-    spectra, groups: see `sim.mirror` · varied: see `sim.ModelRenderer`
+    model: the MuJoCo model
+    eye: optics and retina, with its own bands
+    mounts: places of the eyes on the model
+    spectra, groups: see `sim.mirror`
+    varied: see `sim.ModelRenderer`
     tracer: method of tracing rays, see `sim.BatchedRenderer`
     stand: the body that the eyes are fixed to, if they stand upright on one; None: derived from the mounts
 
@@ -62,7 +65,7 @@ class PreparedScene:
             self._refuse_eyes_inside()
         self.tracers = Tracers(self.scene, self.places, tracer, stand)
         self._samplings: dict[DepthLayers, EyeSampling] = {}
-        self._is_told = False
+        self._has_warned = False
 
     @property
     def mounts(self) -> tuple[Mount, ...]:
@@ -79,11 +82,11 @@ class PreparedScene:
         """Mitsuba's variant."""
         return self.scene.variant
 
-    def tell(self, light: str) -> None:
-        """Warn of features that are not rendered if this light is followed. Later calls do not warn again."""
-        if not self._is_told:
-            self._is_told = True
-            self.scene.tell_what_is_missing(light)
+    def warn_once(self, light: str) -> None:
+        """Warn once of features of the model that are not rendered with this kind of light."""
+        if not self._has_warned:
+            self._has_warned = True
+            self.scene.warn_of_missing(light)
 
     def eye_rays(self, tracer: Tracer | AreaTracer, n_envs: int) -> EyeRays:
         """Return the eyes in `n_envs` worlds, in the form for this tracer."""
@@ -124,8 +127,10 @@ class PreparedScene:
 
     @property
     def _in_rows(self) -> bool:
-        """True if areas are divided into rows, too. Walls and floor have closed forms along columns of any height, but
-        the outlines of spheres need rows."""
+        """True if areas are divided into rows as well as columns.
+
+        Walls and floor have closed forms along columns of any height, but the outlines of spheres need rows.
+        """
         upright = self.tracers.upright
         return isinstance(upright, UprightScene) and len(upright.spheres) > 0
 
@@ -155,7 +160,7 @@ class PreparedScene:
         """
         if poses.n != n_envs:
             raise ValueError(f"poses of {poses.n} worlds, this renderer was built for n_envs = {n_envs}")
-        if isinstance(poses, MovedBodies):  # everything else is as in the model
+        if isinstance(poses, MovedBodies):  # all other quantities are as in the model
             self._check_finite(poses.positions)
             if poses.reference.n_bodies != self.model.nbody:
                 raise ValueError("poses of another model")

@@ -11,10 +11,10 @@ from sim.eyes.eyes import EYE_HEIGHT, Eyes, eye_positions, eye_rotations
 from sim.worlds.layout import CLEARANCE
 from sim.worlds.world import World
 
-# Largest distance from a cell's centre along either axis [m]: less than half a cell minus the radius of the agent's
-# body, 1 - 0.2.
+# Largest distance from a cell's centre along either axis [m]. It is less than half a cell minus the radius of the
+# agent's body, 1 - 0.2.
 STRAY = 0.75
-NEAR = (0.8, 8.0)  # distance from an object's centre [m] at which its appearance decides the agents' actions
+NEAR = (0.8, 8.0)  # distances from an object's centre [m] at which its appearance decides the agents' actions
 TRIES = 100
 
 
@@ -22,7 +22,9 @@ TRIES = 100
 class RandomViews:
     """Views of single eyes; the first axis is the view.
 
-    position: position of the agent [m], (n, 2) · heading: [rad], (n,) · objects: centres [m], (n, k, 3)
+    position: position of the agent [m], (n, 2)
+    heading: [rad], (n,)
+    objects: centres [m], (n, k, 3)
     eye: index of the eye to which the view belongs, (n,)
     """
 
@@ -58,8 +60,10 @@ class RandomViews:
 
 
 def random_views(world: World, eyes: Eyes, n: int) -> RandomViews:
-    """Return views in any direction, of agents near cells in which agents or objects may start. Objects are on cells in
-    which objects may start."""
+    """Return views in random directions from places near the start cells of agents and objects.
+
+    Objects are on cells in which objects may start.
+    """
     rng = np.random.default_rng(0)
     cells, objects = _cells(world), _objects(world, n, rng)
     position = np.empty((n, 2))
@@ -120,7 +124,7 @@ def _stray(rng: np.random.Generator) -> np.ndarray:
 
 
 def _clear_of(objects: np.ndarray, draw: Callable[[], np.ndarray], clearance: float = CLEARANCE) -> np.ndarray:
-    """Return the first drawn place that is clear of objects, or the last of TRIES drawn places."""
+    """Return the first of TRIES random places that is clear of objects, or the last one if none is."""
     place = np.zeros(2)
     for _ in range(TRIES):
         place = draw()

@@ -1,4 +1,4 @@
-"""The kernel of `EyeRenderer`: from lanes to rays, from rays to light, and from light to sums per depth layer.
+"""The kernel of `EyeRenderer`: it generates a ray per lane, traces it, and sums its light per depth layer.
 
 Each lane is a sample of an eye in a world.
 """
@@ -31,9 +31,11 @@ SECOND = 3  # seed of the samples for a second reflection
 class KernelInputs:
     """Inputs of a kernel that are the same in every call.
 
-    lanes: numbers of the lanes · sizes: number of samples of an eye, number of eyes of a world, and number of lanes
-    along: directions of the samples · tables: the tracer's inputs
-    bounces: four numbers per sample, for the directions of bounced light; None: bounced light is not followed
+    lanes: numbers of the lanes
+    sizes: number of samples of an eye, number of eyes of a world, and number of lanes
+    along: directions of the samples
+    tables: the tracer's inputs
+    bounces: four numbers per sample, from which the directions of bounced light are computed; None: direct light only
     """
 
     lanes: Array
@@ -68,9 +70,11 @@ class Moving:
 
 
 class RayKernel:
-    """A kernel that follows rays. Its body is recorded once; only arrays that are passed to it may change.
+    """A kernel that traces rays. Its body is recorded once, so only arrays that are passed to it may change.
 
-    tracer: intersects rays · eyes: generate rays · n_envs, n_eyes: numbers of worlds, and of eyes in each world
+    tracer: intersects rays
+    eyes: generate rays
+    n_envs, n_eyes: numbers of worlds, and of eyes in each world
     depth: layers among which light is divided
     """
 
@@ -101,7 +105,7 @@ class RayKernel:
             each = dr.gather(mi.UInt32, inputs.sizes, 2)
             for k, value in enumerate(layers):
                 dr.scatter(out, value, inputs.lanes + k * each, mode=dr.ReduceMode.Permute)
-        # One reduction of one array, because a reduction per component would trace the rays once per component.
+        # A single reduction of one array: separate reductions would trace the rays once per component.
         return out if reduced == 1 else dr.block_reduce(dr.ReduceOp.Add, out, reduced)
 
     def layers(self, scenes: Any, frame: Frame, inputs: KernelInputs) -> list[Array]:

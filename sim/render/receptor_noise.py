@@ -3,8 +3,8 @@
 A counter-based generator (Salmon et al. 2011) needs only a key per world and the number of drawn frames as its state. A
 world's noise therefore depends on the world's own seed and history, and not on other worlds.
 
-Images of a single eye get their noise from `optics.eye.photoreceptor`, which draws numbers of photons. Both kinds of
-noise have the same mean, variance and third moment.
+The noise of `optics.Eye.see` is drawn as numbers of photons (`optics.eye.photoreceptor`). Both kinds of noise have the
+same mean, variance and third moment.
 """
 
 from __future__ import annotations
@@ -26,14 +26,15 @@ from sim.scene.device_arrays import SharedBuffer
 from sim.scene.frozen_kernels import garbage_kept
 from sim.scene.variant import variant
 
-PER_DRAW = 4  # normal numbers from one evaluation of Philox4x32
-FEW = 8  # width of a second kernel, for draws in at most this number of worlds
+PER_DRAW = 4  # number of normal numbers that one evaluation of Philox4x32 gives
+FEW = 8  # number of worlds of a second, narrower kernel
 
 
 class Normals:
     """Standard normal numbers, an array of shape `shape` per world and frame.
 
-    keys: one per world, (n,) uint64 · shape: shape of one world's receptors
+    keys: one per world, (n,) uint64
+    shape: shape of one world's receptors
     """
 
     def __init__(self, keys: np.ndarray, shape: tuple[int, ...]) -> None:
@@ -101,7 +102,7 @@ class _Kernel:
     def launch(
         self, keys: np.ndarray, frames: np.ndarray, frame_of: Callable[[list[Array]], np.ndarray]
     ) -> PendingFrame:
-        """Start drawing with these keys; frame_of: makes the frame's values from the device's arrays."""
+        """Start drawing with these keys. frame_of: function that converts the device's arrays to the frame's values"""
 
         def launch() -> Callable[[], np.ndarray]:
             self._keys.values[:], self._frames.values[:] = keys, frames

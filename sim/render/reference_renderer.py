@@ -90,8 +90,10 @@ class ReferenceRenderer:
         return np.array([[self._picture(view) for view in self._views(state, i)] for i in range(state.n)])
 
     def radiance(self, state: WorldState) -> np.ndarray:
-        """Return the spectral radiance in the batched renderer's shape, (env, eye, ray, band). Rays are an image's
-        cells, row by row."""
+        """Return the spectral radiance (env, eye, ray, band), as the batched renderer does.
+
+        Rays are the cells of an image, row by row.
+        """
         pictures = self.pictures(state)
         return np.moveaxis(pictures.reshape(*pictures.shape[:3], -1), 2, 3)
 

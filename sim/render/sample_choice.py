@@ -20,20 +20,19 @@ PUPIL_RAYS = (*(2.0**k * (1 + half / 2) for k in range(-4, 6) for half in (0, 1)
 FEW_RAYS = 1  # rays per receptor behind a pupil; if they are enough, areas are not tried
 NUMBERS_OF_AREAS = (1, 2, 4, 6, 9, 12, 16, 20, 25, 30)
 SHARED_AREAS = (4 / 9, 1 / 4, 1 / 9)  # areas per receptor if areas are shared: they are 1.5, 2 and 3 receptors wide
-# Cost of an area, in rays (docs/measurements/rendering.md). If fewer rays than this are enough, rays are taken. Behind
-# a pupil, the difference is smaller, because rays and areas have the same additional cost: their light is distributed
-# among receptors.
+# Cost of an area, in rays (docs/measurements/rendering.md). If fewer rays than this are enough, rays are chosen. Behind
+# a pupil, the ratio is smaller, because distributing light among receptors adds the same cost to a ray and to an area.
 PERFECT_LENS_AREA, PUPIL_AREA = 3, 1.6
-PUPIL_AREA_IN_ALL_LIGHT = 2  # cost of an area with all light, in rays with a bounce
-HARDLY_MORE = 1.1  # ratio to the smallest error: a smaller error is not worth several times the cost
+PUPIL_AREA_IN_ALL_LIGHT = 2  # cost of an area with light of any number of reflections, in rays with one bounce
+HARDLY_MORE = 1.1  # errors up to this multiple of the smallest error count as close to it
 
 
 def fewest_samples(trials: FidelityTrials, sampling: EyeSampling, light: Level, allowed: Allowed) -> Samples:
-    """Return the cheapest samples whose error is allowed, together with the error by light that they leave out.
+    """Return the cheapest samples whose error, including the error due to light that they omit, is allowed.
 
-    If there are none, they are the cheapest samples whose error is close to the smallest error.
+    If there are none, return the cheapest samples whose error is close to the smallest error.
 
-    light: the light that rays would follow
+    light: level of light for rays
     """
     errors = cache(trials.errors(sampling, light.level))
     perfect = isinstance(sampling, BoxSampling)
@@ -42,10 +41,10 @@ def fewest_samples(trials: FidelityTrials, sampling: EyeSampling, light: Level, 
     of_pupil = PUPIL_AREA_IN_ALL_LIGHT if light.level == BOUNCE else PUPIL_AREA
 
     def cost(areas: float) -> float:
-        return (PERFECT_LENS_AREA if perfect else of_pupil) * trials.areas_seen(sampling, areas)
+        return (PERFECT_LENS_AREA if perfect else of_pupil) * trials.areas_of_field(sampling, areas)
 
     left_out = light.predicted_error or 0
-    # What the light that is left out leaves of the allowed error. If it leaves nothing, no number of rays is enough.
+    # The part of the allowed error that the omitted light leaves. If nothing is left, no number of rays is enough.
     left = math.sqrt(max(allowed.without_light**2 - left_out**2, (1e-6 * allowed.without_light) ** 2))
 
     def rays(most: float = math.inf) -> Samples:
@@ -99,8 +98,8 @@ def _fewest(
 ) -> tuple[float, Level, bool]:
     """Return the lowest number of samples whose error is allowed, its level, and whether it is accurate enough.
 
-    If no error is allowed, it is the lowest number whose error is close to the smallest error. Errors are assumed to
-    fall at most like 1/n. Numbers that are too low by this rule are skipped.
+    If all errors are too large, return the lowest number whose error is close to the smallest one. Errors are assumed
+    to fall at most like 1/n, so numbers that are certainly too low are skipped.
     """
     at = 0
     tried: dict[float, float] = {}

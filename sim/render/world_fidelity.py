@@ -29,7 +29,7 @@ def choose_fidelity(
     world, eyes: the world, and the eyes of every agent in it
     tolerance: allowed error of a receptor's signal (root mean square), both over all receptors and over receptors that
         see a nearby object; None: half of the receptors' noise, but at least `sim.eyes.allowed_error.LEAST_TOLERANCE`
-        of the signal of white behind the eyes' pupil
+        times the signal of a white surface behind the eyes' pupil
     bands: "auto": the fewest that are accurate for scenes of any colours; "own": the eyes' own, as in environments
     tracer: tracer for the trials, see `sim.BatchedRenderer`
 
@@ -49,12 +49,12 @@ def choose_fidelity(
 
 
 def chosen_fidelity(scene: WorldScene, tolerance: float | None = None) -> Fidelity:
-    """Return the same as `choose_fidelity`, for a prepared scene with its own bands."""
+    """Return the result of `choose_fidelity` for a prepared scene with its own bands."""
     return cheapest(WorldStages(scene, tolerance))
 
 
 class WorldStages:
-    """Levels that a built-in world offers, tried in random views; see `Stages`."""
+    """Levels of fidelity for a built-in world, tried in random views; see `Stages`."""
 
     shares: Shares | None = SHARES
 

@@ -34,7 +34,7 @@ class WorldScene(PreparedScene):
         azimuths, body = eyes.azimuths(), int(world.model.body("agent").id)
         stand = LevelStand(body, EYE_HEIGHT, eye_positions(azimuths), eye_rotations(azimuths))
         super().__init__(world.model, eyes.eye(), mounts, spectra=world.spectra, tracer=tracer, stand=stand)
-        self.tell(lighting.DIRECT)
+        self.warn_once(lighting.DIRECT)
         bodies = [body, *(int(world.model.body(name).id) for name in world.objects)]
         self._reference = ReferencePose(world.model, bodies)
         self._turns = self._reference.poses.xmat[0, bodies]

@@ -1,8 +1,8 @@
 """Appearances of geoms: one for each geom, or one for each material that a world may draw for it.
 
 Every appearance is built as if the model had this material, including texture, mapping and glow. Each one is a separate
-mover, and a world shows one of a geom's appearances. Worlds that draw different materials therefore share one kernel,
-without extra cost for geoms with a single appearance.
+moving shape, of which a world shows only one per geom. Worlds with different materials therefore share one kernel, and
+geoms with a single appearance cost nothing extra.
 """
 
 from __future__ import annotations

@@ -19,8 +19,7 @@ LEAST_MISS = 1e-3  # relative to white in daylight: largest error of a quantum c
 
 
 def lights_in_bands(model: mujoco.MjModel, spectra: Spectra, eye: Eye) -> tuple[Spectra, list[str]]:
-    """Return measured spectra as sampled by this eye's bands, and messages about lights with inaccurate quantum
-    catches.
+    """Return measured spectra, with lights converted to this eye's bands, and messages about inaccurate lights.
 
     The values of lights at the bands' centres are chosen such that each receptor type has the correct quantum catch
     from white (`SpectralBands.band_values`). Sampling at the centres would include a spectral line only by chance.

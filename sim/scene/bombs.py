@@ -1,4 +1,4 @@
-"""Checks before a model is built: whether it would exhaust the memory, and whether all its values are finite.
+"""Checks before a model is built: it must fit into memory, and all its values must be finite.
 
 A few lines of MJCF can request a million copies. The elements of the text are counted before MuJoCo compiles it, and
 the elements of a compiled model before Mitsuba receives it. Included files count, too.
@@ -15,7 +15,7 @@ import numpy as np
 
 __all__ = ["require_finite", "require_modest", "require_modest_file"]
 
-MOST_COPIES = 20_000  # bodies, geoms and sites; the largest model mirrored so far has a few hundred
+MOST_COPIES = 20_000  # limit for the number of bodies, geoms and sites; typical models have at most a few hundred
 MOST_CELLS = 4096**2  # limit for the cells of a height field
 PLACES = (
     "geom_pos",
@@ -53,8 +53,9 @@ def require_modest(text: str, name: str) -> None:
 
 
 def require_modest_file(path: Path, name: str, seen: frozenset[Path] = frozenset()) -> None:
-    """Check a file, and all files that it includes, in the same way. Every file that it names must be a regular file if
-    it exists, since MuJoCo would wait for a pipe forever.
+    """Check a file, and all files that it includes, as `require_modest` does.
+
+    Every existing file that it names must be a regular file, since MuJoCo would wait for a pipe forever.
 
     Raises:
         ValueError: too many elements or cells, or a file that is not regular; one line names them.
@@ -100,7 +101,7 @@ def _copies(element: ElementTree.Element) -> float:
 
 
 def _count(text: str | None) -> float:
-    """Return the number in an attribute; 0 for anything else, which MuJoCo refuses."""
+    """Return the number in an attribute; 0 for any other text, which MuJoCo refuses."""
     try:
         number = float(text or 0)
     except ValueError:

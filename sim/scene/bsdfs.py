@@ -4,7 +4,7 @@
   1.5; Burley 2012). Its Beckmann roughness is √(2 / (n + 2)) for the exponent n = 128 · shininess (Walter et al.
   2007). If specular and shininess are both 0.5, MuJoCo's defaults for unset values, the surface is Lambertian.
 - metallic or roughness set: Burley's principled BSDF.
-- reflectance, on planes and on top of boxes as in MuJoCo: this share of the light is reflected as by a mirror.
+- reflectance, on planes and on top of boxes as in MuJoCo: this fraction of the light is reflected as by a mirror.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ def is_open(model: mujoco.MjModel, geom: int) -> bool:
 
 
 def mirror_share(model: mujoco.MjModel, geom: int) -> float:
-    """Return the share of the light that a plane or the top of a box reflects as a mirror."""
+    """Return the fraction of the light that a plane or the top of a box reflects as a mirror."""
     material = model.geom_matid[geom]
     flat = surfaces.geom_type(model, geom) in (_TYPES.mjGEOM_PLANE, _TYPES.mjGEOM_BOX)
     if material < 0 or not flat or surfaces.rgba(model, geom)[3] < _OPAQUE:
@@ -48,12 +48,12 @@ def bsdf(
     measured: Spectrum | None = None,
     mirrors: bool = True,
 ) -> MitsubaObject:
-    """Return a geom's BSDF (a Mitsuba object of the variant in force).
+    """Return a geom's BSDF (a Mitsuba object of the active variant).
 
     It is two-sided for planes and meshes, which may be open, and transparent according to the alpha of the geom's rgba.
 
     measured: a reflectance that replaces the geom's colour
-    mirrors: whether the mirror share of the material is included
+    mirrors: True if the material's mirror reflection is included
     """
     if measured is None:
         description = _matter(model, geom, surfaces.reflectance_texture(model, geom, to_uv))

@@ -68,7 +68,7 @@ def viewpoint(model: mujoco.MjModel, data: mujoco.MjData | PoseSnapshot, camera:
 
 
 def sensor(view: Viewpoint, width: int, height: int, near: float) -> MitsubaObject:
-    """Return a Mitsuba perspective sensor (of the variant in force) of width x height pixels."""
+    """Return a Mitsuba perspective sensor (of the active variant) of width x height pixels."""
     matrix = np.eye(4)
     matrix[:3, :3] = view.rotation @ np.diag([-1.0, 1.0, -1.0])
     matrix[:3, 3] = view.position

@@ -1,8 +1,8 @@
-"""Visible geoms in the same place. As in MuJoCo, the one that is defined last is visible there.
+"""Geoms whose surfaces coincide. As in MuJoCo, the geom that is defined last is visible.
 
-Rounding would decide which of two surfaces in the same place a ray hits. The surface of the later geom is therefore
-moved outwards by a few rounding steps of float32, everywhere where geoms are rendered. Coincidence is decided once, in
-the given pose. Planes are moved to their front, and seen from behind, the earlier of two planes is visible.
+If two surfaces are in the same place, rounding would decide which of them a ray hits. All renderers therefore move the
+surface of the later geom outwards by a few rounding steps of float32. Coincidence is decided once, in the given pose.
+Planes are moved to their front, so the earlier of two planes is visible from behind.
 """
 
 from __future__ import annotations
@@ -21,13 +21,15 @@ POINTS = 120  # points on each geom that are compared with other geoms
 # Surfaces that are closer than APART count as coincident, and LIFT separates them. Both are in units of `_scale`. At a
 # distance of 20 times the size of a geom, rounding errors are a tenth of LIFT, and a third for Mitsuba's cylinder.
 APART, LIFT = 5e-6, 5e-5
-MOST = 1e-3  # largest lift, as a share of the size of a geom
+MOST = 1e-3  # largest lift, relative to the size of a geom
 ALIGNED = 0.999  # smallest cosine between the normals of coincident surfaces
 
 
 @dataclass(frozen=True)
 class Coincidences:
-    """Geoms in the same place. pairs: ids, the geom that is defined later comes second
+    """Geoms whose surfaces coincide.
+
+    pairs: ids of two geoms; the geom that is defined later comes second
     lifts: distances by which surfaces are moved outwards [m], by geom; others are not moved
     """
 
@@ -39,7 +41,7 @@ class Coincidences:
         return self.lifts.get(geom, 0.0)
 
     def message(self, model: mujoco.MjModel) -> str | None:
-        """Return a warning if geoms of different groups coincide, such as collision and visual geoms; None if not."""
+        """Return a warning if geoms of different groups coincide, such as collision and visual geoms, else None."""
         found = [pair for pair in self.pairs if len(set(model.geom_group[list(pair)])) > 1]
         if not found:
             return None
@@ -123,30 +125,30 @@ def _touches(data: mujoco.MjData, points: np.ndarray, normals: np.ndarray, geom:
     above = 10 * apart
     for k in np.flatnonzero(near):
         found = np.zeros(3)
-        distance = _cast(data, geom, kind, points[k] + above * normals[k], -normals[k], found)
+        distance = _ray_distance(data, geom, kind, points[k] + above * normals[k], -normals[k], found)
         if abs(distance - above) <= apart and found @ normals[k] > ALIGNED:
             return True
     return False
 
 
-def _cast(
+def _ray_distance(
     data: mujoco.MjData, geom: int, kind: mujoco.mjtGeom, start: np.ndarray, direction: np.ndarray, normal: np.ndarray
 ) -> float:
-    """Return the distance of a geom along a ray, negative for a miss; writes the normal there to `normal`."""
+    """Return the distance of a geom along a ray, negative for a miss, and write the normal there to `normal`."""
     if kind == _TYPES.mjGEOM_MESH:
         return float(mujoco.mj_rayMesh(data.model, data, geom, start, direction, normal))
     if kind == _TYPES.mjGEOM_SDF:  # MuJoCo ends the process if it casts a ray at the mesh of a signed distance field
-        return _cast_at_triangles(data, geom, start, direction, normal)
+        return _ray_distance_to_triangles(data, geom, start, direction, normal)
     if kind == _TYPES.mjGEOM_HFIELD:
         return float(mujoco.mj_rayHfield(data.model, data, geom, start, direction, normal))
     place, turn, size = data.geom_xpos[geom], data.geom_xmat[geom], data.model.geom_size[geom]
     return float(mujoco.mju_rayGeom(place, turn, size, start, direction, kind, normal))
 
 
-def _cast_at_triangles(
+def _ray_distance_to_triangles(
     data: mujoco.MjData, geom: int, start: np.ndarray, direction: np.ndarray, normal: np.ndarray
 ) -> float:
-    """Return the same for the triangles of a geom (Möller and Trumbore 1997)."""
+    """Return the result of `_ray_distance` for the triangles of a geom (Möller and Trumbore 1997)."""
     triangles, turn = shapes.untextured(data.model, geom), data.geom_xmat[geom].reshape(3, 3)
     o, d = (start - data.geom_xpos[geom]) @ turn, direction @ turn
     corners = triangles.vertices[triangles.faces]

@@ -21,10 +21,10 @@ def decode_srgb(display: np.ndarray | float) -> np.ndarray:
 
 
 def preview(radiance: np.ndarray, wavelengths_nm: np.ndarray) -> np.ndarray:
-    """Linear sRGB (y, x, 3) of spectral radiance (band, y, x), by CIE 1931, scaled so that radiance D65 is white.
+    """Convert spectral radiance (band, y, x) to linear sRGB (y, x, 3) by CIE 1931, with white for radiance D65.
 
     Each band represents the wavelengths that are nearer to it than to other bands. With few bands the colours are
-    rough.
+    approximate.
     """
     from optics.spectra.bands import cie_1931, daylight
 

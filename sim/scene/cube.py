@@ -2,9 +2,9 @@
 
 MuJoCo looks up a cube texture by direction: a point's coordinates in the geom's frame, divided by its half sizes unless
 the texture is uniform. Mitsuba has no such texture. Triangles are therefore cut along the seams between faces of the
-cube. Their texture coordinates refer to one image that contains the six faces below each other, in MuJoCo's order R L U
-D F B: R/L = +x/-x, U/D = +y/-y, F/B = +z/-z. The directions of each face's own axes are OpenGL's (table 3.19 of its 2.1
-specification).
+cube. Their texture coordinates refer to one image in which the six faces are stacked vertically, in MuJoCo's order R L
+U D F B: R/L = +x/-x, U/D = +y/-y, F/B = +z/-z. The directions of each face's own axes are OpenGL's (table 3.19 of its
+2.1 specification).
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import numpy as np
 from sim.scene.tessellation import Triangles
 
 BORDER = 1  # texels around each face that repeat its edge, so that bilinear lookups do not bleed into its neighbours
-# For each face: the axis it faces and its sign, and the axes of the image's columns and rows with their signs.
+# For each face: its axis and sign, and the axes of the image's columns and rows with their signs.
 _MAJOR, _MAJOR_SIGN = np.array([0, 0, 1, 1, 2, 2]), np.array([1, -1, 1, -1, 1, -1])
 _COLUMN, _COLUMN_SIGN = np.array([2, 2, 0, 0, 0, 0]), np.array([-1, 1, 1, 1, 1, -1])
 _ROW, _ROW_SIGN = np.array([1, 1, 2, 2, 1, 1]), np.array([-1, -1, 1, -1, -1, -1])
@@ -28,7 +28,7 @@ _HALVINGS = 12
 
 
 def padded(pixels: np.ndarray) -> np.ndarray:
-    """Return faces below each other (n w, w, 3) with a border around each: (n (w + 2), w + 2, 3)."""
+    """Return faces, stacked vertically (n w, w, 3), with a border around each: (n (w + 2), w + 2, 3)."""
     width = pixels.shape[1]
     faces = pixels.reshape(-1, width, width, 3)
     margin = (BORDER, BORDER)
@@ -103,7 +103,8 @@ def _cut(pieces: np.ndarray, side: np.ndarray) -> np.ndarray:
     side = np.where(np.abs(side) < 1e-9 * np.abs(side).max(initial=0), 0, side)
     crossed = (side.max(axis=1) > 0) & (side.min(axis=1) < 0)
     whole, cut, side = pieces[~crossed], pieces[crossed], side[crossed]
-    # Rotate each triangle so that its first corner is alone on its side (a corner on the seam counts with the others).
+    # Rotate each triangle until only its first corner is on its side of the seam. Corners on the seam belong to the
+    # other side.
     positive = (side > 0).sum(axis=1)
     lone = np.where(positive == 1, np.argmax(side, axis=1), np.argmin(side, axis=1))
     turn = (lone[:, None] + np.arange(3)) % 3

@@ -15,7 +15,8 @@ import numpy as np
 from optics.numerics.autodiff import Array
 
 ALIGNMENT = 64  # [bytes]
-# [bytes] Largest read of a kernel. It may extend past an array's end (`optics.numerics.precision.padded_for_packets`).
+# [bytes] largest read of a kernel, which may extend past an array's end
+# (`optics.numerics.precision.padded_for_packets`).
 PACKET = 128
 
 
@@ -73,11 +74,10 @@ def as_whole_numbers(values: Any) -> np.ndarray:
 
 
 def counted(n: int) -> Array:
-    """Return 0 ... n - 1 in separate memory. A frozen kernel that reads this array lane by lane is replayed at this
-    width.
+    """Return 0 ... n - 1 in separate memory, which sets the width of a frozen kernel that reads it lane by lane.
 
-    If a kernel reads only tables, Dr.Jit 1.5 takes its width from one of them, depending on what else the process has
-    loaded. In one case it replayed 126 of 128 lanes, and left the last receptors dark without a message.
+    Dr.Jit 1.5 takes the width of a kernel that reads only tables from one of the tables, and which one depends on the
+    state of the process. In one case it replayed 126 of 128 lanes, and left the last receptors dark without a message.
     tests/test_parameters.py repeats each training run and detects this error.
     """
     found = dr.arange(mi.UInt32, n)

@@ -15,9 +15,9 @@ from optics.numerics.autodiff import Array
 
 
 class FrozenKernel:
-    """A kernel that is recorded once and replayed, whose inputs are dataclasses.
+    """A kernel that is recorded once and then replayed. Its inputs are dataclasses.
 
-    Dr.Jit receives only the arrays in them. Otherwise it would traverse every dataclass at every launch.
+    Dr.Jit receives only the arrays in them, because it would otherwise traverse every dataclass at every launch.
 
     body: function (scenes, moving, fixed) -> arrays, with Mitsuba scenes, inputs that change at every launch, and
         inputs that rarely change

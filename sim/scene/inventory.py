@@ -19,12 +19,14 @@ _UNMIRRORED_ROLES = {
     _ROLES.mjTEXROLE_EMISSIVE: "emissive",
     _ROLES.mjTEXROLE_ORM: "occlusion, roughness and metallic",
 }
-_NAMED = 4  # number of elements of one kind that are named; the rest are counted
+_NAMED = 4  # largest number of elements of one kind that a message names; it only counts the others
 
 
 def left_out(model: mujoco.MjModel, geoms: Sequence[int], groups: Sequence[int]) -> list[str]:
-    """Return messages about features without a counterpart: of the visible geoms, of their materials, and of other
-    elements that MuJoCo draws in these groups."""
+    """Return messages about features without a counterpart.
+
+    They may belong to the visible geoms, to their materials, or to other elements that MuJoCo draws in these groups.
+    """
     materials = sorted({int(model.geom_matid[g]) for g in geoms if model.geom_matid[g] >= 0})
     return [*_geoms(model, geoms), *_textures(model, materials), *_sky(model, geoms), *_others(model, groups)]
 
@@ -81,8 +83,7 @@ def _others(model: mujoco.MjModel, groups: Sequence[int]) -> list[str]:
 
 
 def _alpha(model: mujoco.MjModel, rgba: np.ndarray, material: np.ndarray) -> np.ndarray:
-    """Return alphas by MuJoCo's rule: the alpha of an element's own colour unless it is unset, otherwise of its
-    material's."""
+    """Return alphas by MuJoCo's rule: that of an element's own colour if it is set, else that of its material's."""
     unset = (rgba == np.array([0.5, 0.5, 0.5, 1.0], dtype=np.float32)).all(axis=1) & (material >= 0)
     return np.where(unset, model.mat_rgba[material, 3] if model.nmat else 1.0, rgba[:, 3])
 

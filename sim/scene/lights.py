@@ -29,7 +29,7 @@ from sim.scene.variant import Description, MitsubaObject
 
 WAVELENGTHS_NM = np.arange(300.0, 781.0, 5.0)
 _TYPES = mujoco.mjtLightType
-_PROFILE = 513  # samples across a spot's cone
+_PROFILE = 513  # pixels across the image of a spot's cone
 _WIDEST_DEG = 88.0  # widest cone over which an image can be projected
 # Fields that only MuJoCo's other renderer reads, with the values that mean unset.
 _UNMIRRORED = {"intensity": 0.0, "bulbradius": 0.02, "range": 10.0, "softness": 0.2}
@@ -37,10 +37,11 @@ _UNMIRRORED = {"intensity": 0.0, "bulbradius": 0.02, "range": 10.0, "softness": 
 
 @dataclass(frozen=True)
 class Emitter:
-    """A light. Its position and direction follow the data.
+    """A light, whose position and direction follow the data.
 
-    light: id in the model; -1: not one of its lights (the camera's headlight, the sky)
-    description: of the light for Mitsuba, with shadows · casts_shadow: False for the headlight, as in MuJoCo
+    light: id in the model; -1: not one of the model's lights (the camera's headlight, the sky)
+    description: Mitsuba's description of the light, with shadows
+    casts_shadow: False for the headlight, as in MuJoCo
     """
 
     name: str
@@ -50,7 +51,7 @@ class Emitter:
 
     @property
     def described(self) -> Description:
-        """Description for a scene of the variant in force; without shadows if the light casts none."""
+        """Description for a scene of the active variant; without shadows if the light casts none."""
         return self.description if self.casts_shadow else shadowless(self.description)
 
     @property
@@ -80,8 +81,10 @@ def emission(rgb: np.ndarray, scale: float, measured: Spectrum | None = None) ->
 
 
 def glow(model: mujoco.MjModel, geom: int, to_uv: np.ndarray | None, measured: Spectrum | None) -> Description | None:
-    """Return the radiance of a geom with an emissive material: its emission times the radiance that the geom would have
-    in full daylight. None if the geom does not glow."""
+    """Return the radiance of a geom with an emissive material; None if the geom does not glow.
+
+    It is the material's emission times the radiance that the geom would have in full daylight.
+    """
     material = model.geom_matid[geom]
     if material < 0 or model.mat_emission[material] <= 0:
         return None

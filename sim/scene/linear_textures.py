@@ -41,8 +41,10 @@ def compiled(spec: mujoco.MjSpec) -> mujoco.MjModel:
 
 
 def is_linear(model: mujoco.MjModel, texture: int) -> bool:
-    """Return whether a texture contains linear light: it is marked, or it is a 2-D texture that the model says to be
-    linear and that has no file, so that the compiler cannot have resolved "auto".
+    """Return whether a texture contains linear light.
+
+    It does if it is marked, or if it is a 2-D texture without a file that the model declares as linear. (The compiler
+    resolves "auto" to linear only for files.)
 
     Raises:
         ValueError: a mark lists an object that is not a texture.
@@ -54,7 +56,7 @@ def is_linear(model: mujoco.MjModel, texture: int) -> bool:
 
 
 def resolved(model: mujoco.MjModel) -> list[int]:
-    """Return the colour textures that the model says to be linear, although their values are display colours."""
+    """Return the colour textures that the model declares as linear, although their values are display colours."""
     sky = np.flatnonzero(model.tex_type == mujoco.mjtTexture.mjTEXTURE_SKYBOX)
     colors = {*sky.tolist(), *model.mat_texid[:, _ROLES].ravel().tolist()} - {-1}
     return [k for k in sorted(colors) if model.tex_colorspace[k] == _LINEAR and not is_linear(model, k)]

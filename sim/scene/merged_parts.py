@@ -1,5 +1,4 @@
-"""Shapes that share a material, merged into one, because every shape of a Mitsuba scene adds time to every kernel
-launch."""
+"""Merging of shapes that share a material. Every shape of a Mitsuba scene makes kernel launches slower."""
 
 from __future__ import annotations
 
@@ -17,7 +16,7 @@ PlacedPart = tuple[str, Part, np.ndarray, MitsubaObject]  # name, part, pose (4,
 
 
 def merged(parts: Iterable[PlacedPart], prefix: str) -> Description:
-    """Return Mitsuba shapes by name (of the variant in force).
+    """Return Mitsuba shapes (of the active variant) by name.
 
     Triangles of one material are merged into a shape with the name "<prefix>_<n>". Shapes that are not meshes keep
     their names.

@@ -1,8 +1,8 @@
 """`mirror(model)`: any MuJoCo model as a spectral Mitsuba scene that follows mjData.
 
 The scene contains all geoms with their materials and textures, lights, the skybox, and cameras. Faces are visible from
-the same side as in MuJoCo: a camera inside a body looks out of it. A single MirrorWarning names everything that cannot
-be mirrored.
+the same side as in MuJoCo, so a camera inside a body sees through its surface. One MirrorWarning names all features
+that cannot be mirrored.
 """
 
 from __future__ import annotations
@@ -66,7 +66,7 @@ def mirror(
 class Mirror:
     """A Mitsuba scene that mirrors a MuJoCo model.
 
-    model, variant: the arguments
+    model, variant: see `mirror`
     scene: mi.Scene; shape ids are "geom_<geom id>_<part>"
     geoms: ids of the geoms in the scene, (n,)
     spectra: spectra of materials and lights, by name
@@ -100,7 +100,7 @@ class Mirror:
             self.scene = self._build()
             self._params = mi.traverse(self.scene)
             self._names = rays.names_of(self.scene)
-        self._told_of_glass = False
+        self._has_warned_of_glass = False
         left_out = inventory.left_out(model, visible, groups) + left_out
         if left_out:
             warnings.warn(f"not mirrored: {'; '.join(left_out)}", MirrorWarning, stacklevel=3)
@@ -108,8 +108,9 @@ class Mirror:
             warnings.warn(message, MirrorWarning, stacklevel=3)
 
     def sync(self, data: mujoco.MjData) -> None:
-        """Move everything, including cameras, to the poses in `data` (after mj_forward or mj_step). A scene in which
-        nothing moved is not rebuilt.
+        """Move all shapes, lights and cameras to the poses in `data` (after mj_forward or mj_step).
+
+        A scene in which nothing moved is not rebuilt.
 
         Raises:
             ValueError: the data of another model, or positions that are not finite.
@@ -147,7 +148,8 @@ class Mirror:
 
         camera: name or id of a camera of the model, or a Viewpoint
         integrator: a Mitsuba integrator: "direct", "path", ..., or its description, {"type": "path", "max_depth": 3}
-        spp: samples per pixel · seed: seed of the samples
+        spp: samples per pixel
+        seed: seed of the samples
         sampler: "independent", or "multijitter", which has less noise in images
 
         Units: a white Lambertian surface that faces a light of diffuse 1 has radiance D65(λ), 1 at 560 nm.
@@ -162,21 +164,21 @@ class Mirror:
         rays.check_size(width, height, spp)
         asked = rays.checked_wavelengths(wavelengths)
         if rays.described(integrator)["type"] == "direct":
-            self._tell_of_glass()
+            self._warn_of_glass()
         with in_variant(self.variant):
             self._aim_headlight(view)
             taken = self._camera(view, width, height)
             return taken.radiance(integrator, spp, asked, seed, sampler)
 
-    def _tell_of_glass(self) -> None:
+    def _warn_of_glass(self) -> None:
         """Warn once about transparent geoms. Mitsuba's `direct` treats a mask's opacity as part of its colour, and
         shows only emitters behind it."""
         glass = [int(g) for g in self.geoms if surfaces.rgba(self.model, int(g))[3] < 1]
-        if glass and not self._told_of_glass:
+        if glass and not self._has_warned_of_glass:
             listed = inventory.listed_geoms(self.model, glass)
             words = f"'direct' does not show what is behind the transparent {listed}: integrator='path' does"
             warnings.warn(words, MirrorWarning, stacklevel=3)
-        self._told_of_glass = True
+        self._has_warned_of_glass = True
 
     def viewpoint(self, camera: str | int | Viewpoint) -> Viewpoint:
         """Return the viewpoint of a camera of the model at the last `sync`."""
@@ -201,8 +203,7 @@ class Mirror:
         return ids.reshape(height, width), depth.reshape(height, width)
 
     def _camera(self, view: Viewpoint, width: int, height: int) -> rays.Camera:
-        """Return the camera for a view. As in MuJoCo, planes are visible from both sides, and everything else only from
-        outside."""
+        """Return the camera for a view. As in MuJoCo, only planes are visible from both sides."""
         planes = {g for g in self._parts if surfaces.geom_type(self.model, g) == mujoco.mjtGeom.mjGEOM_PLANE}
         closed = {f"geom_{g}_{k}" for g, parts in self._parts.items() if g not in planes for k in range(len(parts))}
         sensor = cameras.sensor(view, width, height, self._near())

@@ -1,6 +1,7 @@
-"""Fields of a model that physics uses, as bytes, so that changes are detected at every step and can be undone.
+"""Fields of a model that physics uses, as bytes, to detect changes at every step and to undo them.
 
-Names and large fields (textures, meshes and heights) are omitted. Changes of these are neither detected nor undone.
+Names and large fields (textures, meshes and heights) are not included: changes of these are neither detected nor
+undone.
 """
 
 from __future__ import annotations

@@ -1,4 +1,5 @@
-"""A model at the time when its renderer was made. It refuses worlds with differences that the renderer cannot show."""
+"""Snapshot of a model when its renderer is built. It refuses worlds that differ in ways that the renderer cannot
+show."""
 
 from __future__ import annotations
 
@@ -10,7 +11,7 @@ import numpy as np
 from sim.scene import inventory, surfaces
 from sim.scene.poses import HEADLIGHT, OF_MODELS, OTHERS, Poses, of_model
 
-ROUNDING = 1e-6  # a few rounding steps of float32, for positions [m] (relative beyond 1 m) and entries of rotations
+ROUNDING = 1e-6  # a few steps of float32: tolerance for positions [m] (relative beyond 1 m) and rotations
 _MORE = {"size": ", and be a primitive without a texture", "material": ", with its materials"}
 # Elements other than geoms, by fields of `Poses`; the last entry is MuJoCo's name.
 _THINGS = (
@@ -23,7 +24,7 @@ _THINGS = (
 
 
 class ModelSnapshot:
-    """A model at the time when its renderer was made. Arrays are copies, since tasks change models.
+    """The state of a model when its renderer was built. Arrays are copies, since tasks may change the model later.
 
     geoms: visible geoms
     hidden: geoms that are invisible only because their alpha is 0
@@ -72,10 +73,10 @@ class ModelSnapshot:
         }
 
     def refuse_differences(self, poses: Poses) -> None:
-        """Refuse differences of worlds from the model that the renderer cannot show.
+        """Refuse worlds that differ from the model in a way that the renderer cannot show.
 
         Raises:
-            ValueError: there is a difference.
+            ValueError: there is such a difference.
         """
         self._refuse_other_materials(poses)
         for what, name in (("size", "geom_size"), ("colour", "geom_rgba"), ("material", "geom_matid")):

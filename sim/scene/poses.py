@@ -1,4 +1,4 @@
-"""Poses of everything in many worlds of one model, with sizes, colours and materials."""
+"""Poses of all elements in many worlds of one model, with sizes, colours and materials."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ class Poses:
     geom_rgba: (world, geom, 4)
     geom_matid: (world, geom)
     mat_rgba, mat_emission, light_diffuse, light_active: as in mjModel, for each world
-    heights: a checksum of each height field, (world, hfield), which stands for many heights
+    heights: a checksum of each height field's many heights, (world, hfield)
     others: a checksum of each field in OTHERS and in HEADLIGHT, (world, field)
     """
 
@@ -86,7 +86,7 @@ class Poses:
 
     @classmethod
     def from_data(cls, datas: Sequence[mujoco.MjData] | mujoco.MjData) -> Poses:
-        """Collect the poses of all worlds, one for each mjData; a single mjData is one world."""
+        """Collect the poses of all worlds. datas: one mjData per world, or a single mjData for one world"""
         datas = [datas] if isinstance(datas, mujoco.MjData) else datas
         names = [f.name for f in fields(cls) if f.name not in OF_MODELS]
         stacked = {name: np.stack([getattr(data, name) for data in datas]) for name in names}

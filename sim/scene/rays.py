@@ -1,7 +1,7 @@
 """Rays of a sensor through a scene, as in Mitsuba's film, but at given wavelengths and pixel centres.
 
-Faces that MuJoCo does not draw are skipped. The functions work on the types of the variant in force: whole wavefronts,
-or one ray at a time in a scalar variant.
+Faces that MuJoCo does not draw are skipped. The functions use the types of the active variant: whole wavefronts, or one
+ray at a time in a scalar variant.
 """
 
 from __future__ import annotations
@@ -108,7 +108,7 @@ class Camera:
             return [name for name, _ in hits], np.array([point for _, point in hits])
         ray, _ = self.sensor.sample_ray(0.0, 0.5, mi.Point2f(positions), mi.Point2f(0.5))
         ray.maxt = dr.inf  # no far limit
-        si = self._look(ray)
+        si = self._first_visible(ray)
         shape: Array = dr.reinterpret_array(mi.UInt32, si.shape)
         found = dr.select(si.is_valid(), shape, 0).numpy()
         # The distance of a hit is exact, but its point is inaccurate on shapes as large as a world.
@@ -117,13 +117,13 @@ class Camera:
     def _scalar_hit(self, position: np.ndarray) -> tuple[str, np.ndarray]:
         ray, _ = self.sensor.sample_ray(0.0, 0.5, [float(p) for p in position], [0.5, 0.5])
         ray.maxt = dr.inf
-        si = self._look(ray)
+        si = self._first_visible(ray)
         if not si.is_valid():
             return "", np.full(3, np.nan)
         return si.shape.id(), np.array(ray(si.t), dtype=float)
 
-    def _look(self, ray: Array) -> Array:
-        """Return the first visible intersection of the ray; moves the ray's origin past invisible inner faces."""
+    def _first_visible(self, ray: Array) -> Array:
+        """Return the first visible intersection of the ray, and move the ray's origin past invisible inner faces."""
         si = self.scene.ray_intersect(ray)
         for _ in range(NESTED):
             inner = self._is_inner(si, ray)
@@ -175,7 +175,7 @@ class Camera:
         ray.maxt = dr.inf
         # Wavelengths are opaque to the compiler, so that other wavelengths use the same kernel.
         ray.wavelengths = mi.Spectrum(*(x if _is_scalar() else dr.opaque(mi.Float, x) for x in spectrum))
-        self._look(ray)
+        self._first_visible(ray)
         value = method.sample(self.scene, sampler, ray)[0]
         return np.array(value) if _is_scalar() else np.array(value.numpy(), dtype=float)
 
@@ -199,7 +199,7 @@ def described(integrator: str | Mapping[str, Any]) -> Description:
 def _integrator(integrator: str | Mapping[str, Any]) -> MitsubaObject:
     description = described(integrator)
     if description["type"] == "direct" and {"emitter_samples", "shading_samples"} & description.keys():
-        # For point and directional lights, Mitsuba 3.9.1 adds these samples instead of averaging them.
+        # For point and directional lights, Mitsuba 3.9.1 adds several light samples instead of averaging them.
         raise ValueError('integrator "direct": its light samples cannot be set; take more spp')
     try:
         found = mi.load_dict(description)

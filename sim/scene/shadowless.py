@@ -1,7 +1,7 @@
 """Lights that cast no shadow, as emitters for all of Mitsuba's integrators.
 
-Mitsuba's integrators test the path from a surface to the point of an emitter that was sampled. Such a light places this
-point right above the surface, so that nothing can be in between.
+Mitsuba's integrators sample a point of an emitter, and test the path from the surface to this point. A light without
+shadows places the point right above the surface, so that nothing can be in between.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ def shadowless(light: Description) -> Description:
 
 @cache
 def _register(variant: str) -> None:
-    """Make the emitter known to the variant in force. Mitsuba's classes exist only after a variant is set."""
+    """Register the emitter with the active variant. Mitsuba's classes exist only after a variant is set."""
 
     class Shadowless(mi.Emitter):
         """An emitter that delegates to another one, and moves the sampled point."""

@@ -35,8 +35,8 @@ _ASSETS = (_TYPES.mjGEOM_MESH, _TYPES.mjGEOM_SDF, _TYPES.mjGEOM_HFIELD)
 # rad below the horizon, and float32 is accurate to 1e-3 of an extent for texture and shadows on it. (Hits on triangles
 # of this size would be wrong; see also LONG.)
 INFINITY = 1e4
-# Largest ratio of a plane's sides for which it is a single rectangle. Embree's hit points on a rectangle err by 1e-7
-# long² / short, which is 4 m for an infinite plane that is 2 m wide. Longer planes are strips of triangles.
+# Largest ratio of a plane's sides for which it is a single rectangle. Embree's hit points on a rectangle have an error
+# of 1e-7 long² / short, which is 4 m for an infinite plane that is 2 m wide. Longer planes are strips of triangles.
 LONG = 30
 
 
@@ -44,7 +44,7 @@ LONG = 30
 class Part:
     """One Mitsuba shape of a geom: a plugin with the pose `local` (4, 4) in the geom's frame, or triangles.
 
-    mirrors: whether the geom's mirror share, if it has one, applies to this part
+    mirrors: True if the geom's mirror reflection, if it has one, applies to this part
     """
 
     plugin: str = ""
@@ -80,7 +80,7 @@ def pose(data: mujoco.MjData, geom: int) -> np.ndarray:
 
 
 def has_shape(model: mujoco.MjModel, geom: int) -> bool:
-    """Return whether a geom's kind can be mirrored and its asset exists (a user-defined sdf has no mesh)."""
+    """Return whether a geom's kind can be mirrored and its asset exists. (A user-defined SDF has no mesh.)"""
     kind = surfaces.geom_type(model, geom)
     return kind in _PRIMITIVES or (kind in _ASSETS and model.geom_dataid[geom] >= 0)
 
@@ -105,7 +105,7 @@ def uv_transform(model: mujoco.MjModel, geom: int) -> np.ndarray | None:
     if kind not in (_TYPES.mjGEOM_SPHERE, _TYPES.mjGEOM_PLANE):
         return None
     if kind == _TYPES.mjGEOM_SPHERE:
-        # Both codes use u = azimuth / 2π, v = polar angle / π from +z.
+        # Both programs use u = azimuth / 2π, v = polar angle / π from +z.
         return np.diag([*surfaces.texture_repeat(model, geom, size[[0, 0]]), 1.0])
     # MuJoCo: u = (x/sx + 1)/2, v = 1 - (y/sy + 1)/2, and (x, -y) repeat/2 + 1/2 along an infinite axis. If one axis is
     # infinite, MuJoCo also adds 1/2 along the other. Mitsuba's v points upwards.
@@ -222,7 +222,7 @@ def _placed(sx: float, sy: float, sz: float, z: float = 0.0) -> np.ndarray:
 
 
 def build(part: Part, pose: np.ndarray, name: str, bsdf: MitsubaObject, radiance: Description | None) -> MitsubaObject:
-    """Return the Mitsuba shape (of the variant in force) of a part, as an emitter if `radiance` is not None."""
+    """Return the Mitsuba shape (of the active variant) of a part, as an emitter if `radiance` is not None."""
     if part.triangles is None:
         assert part.local is not None
         placed = mi.ScalarTransform4f((pose @ part.local).tolist())

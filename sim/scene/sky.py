@@ -1,8 +1,8 @@
 """MuJoCo's skybox as light from infinity.
 
-MuJoCo draws a skybox behind everything. Here it also illuminates the scene, as a sky does. Its white has the radiance
-of a white Lambertian surface that faces a light of diffuse 1, between 360 and 780 nm. MuJoCo looks up the direction (x,
-y, z) at (x, z, -y): faces R/L are visible towards +x/-x, U/D towards +z/-z, F/B towards -y/+y.
+MuJoCo draws a skybox behind everything. Here it also illuminates the scene, as a sky does. White in the skybox has the
+radiance of a white Lambertian surface that faces a light of diffuse 1, between 360 and 780 nm. MuJoCo looks up the
+direction (x, y, z) at (x, z, -y): faces R/L are visible towards +x/-x, U/D towards +z/-z, F/B towards -y/+y.
 """
 
 from __future__ import annotations

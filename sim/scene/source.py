@@ -47,8 +47,10 @@ def is_compiled(source: Source) -> bool:
 
 
 def with_compiled_color_spaces(source: Source) -> Source:
-    """Return a source of the same model, in which the colour textures that the compiler resolves to linear light
-    request it. A source without such textures is returned unchanged.
+    """Return a source of the same model in which linear light is requested explicitly.
+
+    The request is added to colour textures that the compiler resolves to linear light. A source without such textures
+    is returned unchanged.
 
     Raises:
         ValueError: the source has such textures but is a compiled model, or it does not give a model.
@@ -86,7 +88,7 @@ def _checked(compile_it: Callable[[], mujoco.MjModel], name: str) -> mujoco.MjMo
 
 
 def _reported(make: Callable[[], Made], name: str) -> Made:
-    """Return what `make` returns, and report MuJoCo's errors in one line."""
+    """Return the result of `make`, and report MuJoCo's errors in one line."""
     try:
         return make()
     except (ValueError, mujoco.FatalError) as error:

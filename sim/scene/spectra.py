@@ -1,8 +1,8 @@
 """Measured spectra that replace colours: reflectances of materials and emission of lights, by their names in the model.
 
 A material's spectrum replaces its rgba. A texture, which must be grey, still multiplies it. A light's spectrum replaces
-daylight and the light's colour. Its level is still the largest component of its diffuse colour. The glow of an emissive
-material has the spectrum that the material reflects in daylight.
+daylight and the light's colour. The strength of the light is still the largest component of its diffuse colour. The
+glow of an emissive material has the spectrum that the material reflects in daylight.
 """
 
 from __future__ import annotations
@@ -22,8 +22,9 @@ Spectra = Mapping[str, Spectrum]
 
 
 def resolve(model: mujoco.MjModel, spectra: Mapping[str, Spectrum | str] | None) -> Spectra:
-    """Return spectra by name, with the names of tabulated spectra (`optics.REFLECTANCES`, `optics.ILLUMINANTS`)
-    replaced by the spectra.
+    """Return spectra by name. Names of tabulated spectra are replaced by the spectra.
+
+    Tabulated spectra are those of `optics.REFLECTANCES` and `optics.ILLUMINANTS`.
 
     Raises:
         ValueError: a name that is neither a material nor a light of the model, or both; a value that is not a spectrum;
@@ -64,8 +65,10 @@ def in_daylight(reflectance: Spectrum) -> Spectrum:
 
 
 def described(spectrum: Spectrum, scale: float = 1.0) -> Description:
-    """Return Mitsuba's description of scale · spectrum on 300-780 nm. Mitsuba's `rgb` and `d65` are not used, because
-    they are dark in the ultraviolet."""
+    """Return Mitsuba's description of scale · spectrum on 300-780 nm.
+
+    Mitsuba's `rgb` and `d65` are not used, because they are dark in the ultraviolet.
+    """
     inside = [nm for nm in spectrum.wavelengths_nm if LIMITS_NM[0] < nm < LIMITS_NM[1]]
     nm = np.array([LIMITS_NM[0], *inside, LIMITS_NM[1]])
     return {

@@ -23,23 +23,29 @@ _ROLES = mujoco.mjtTextureRole
 
 
 def geom_type(model: mujoco.MjModel, geom: int) -> mujoco.mjtGeom:
-    """Return a geom's kind as an enum. Without the conversion, a comparison of NumPy's integer with the enum's members
-    would work in one direction only."""
+    """Return a geom's kind as an enum.
+
+    A comparison of NumPy's integer with the enum's members would work in one direction only.
+    """
     return mujoco.mjtGeom(int(model.geom_type[geom]))
 
 
 def set_rgba(color: Sequence[float]) -> np.ndarray:
-    """Return a colour (4,) for a geom. The grey UNSET_RGBA, which MuJoCo interprets as unset, is replaced by the
-    nearest grey."""
+    """Return a colour (4,) for a geom.
+
+    The grey UNSET_RGBA, which MuJoCo interprets as unset, is replaced by the nearest grey.
+    """
     found = np.array(color, np.float32)
     if np.array_equal(found, UNSET_RGBA):
-        found[:3] = np.nextafter(found[:3], np.float32(1))  # all three, so that a grey still reflects all bands alike
+        found[:3] = np.nextafter(found[:3], np.float32(1))  # all change alike, so that grey remains grey
     return found
 
 
 def rgba(model: mujoco.MjModel, geom: int) -> np.ndarray:
-    """Return the display-referred colour (4,) of a geom by MuJoCo's rule: the geom's own colour unless it is unset,
-    otherwise its material's colour."""
+    """Return the display-referred colour (4,) of a geom.
+
+    By MuJoCo's rule, it is the geom's own colour if set, else its material's colour.
+    """
     own = model.geom_rgba[geom]
     material = model.geom_matid[geom]
     if material >= 0 and np.array_equal(own, UNSET_RGBA):
@@ -99,7 +105,7 @@ def faces_of(model: mujoco.MjModel, texture: int) -> int:
 def image(model: mujoco.MjModel, texture: int) -> np.ndarray:
     """Return a texture's image (height, width, 3), as MuJoCo stores it, scaled to [0, 1], with row 0 at the top.
 
-    For a cube texture, the faces lie below each other, each with a border (`cube.padded`).
+    For a cube texture, the faces are stacked vertically, each with a border (`cube.padded`).
     """
     shape = model.tex_height[texture], model.tex_width[texture], model.tex_nchannel[texture]
     start = model.tex_adr[texture]
@@ -135,6 +141,8 @@ def bitmap(values: np.ndarray, to_uv: np.ndarray | None) -> Description:
 
 
 def is_mirrored(model: mujoco.MjModel, geom: int, texture: int) -> bool:
-    """Return whether a texture is visible on a geom. A cube texture on a plane is not, since its lookup along the plane
-    has no image."""
+    """Return whether a texture is visible on a geom.
+
+    A cube texture on a plane is not, since directions within the plane select no image.
+    """
     return not (faces_of(model, texture) and geom_type(model, geom) == mujoco.mjtGeom.mjGEOM_PLANE)

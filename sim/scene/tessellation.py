@@ -14,7 +14,8 @@ import numpy as np
 # Chord error of a tessellated unit circle: (π/SLICES)²/2 = 3e-4 of the radius, below the required 1e-3 of depths.
 SLICES = 128
 STACKS = 64
-# Largest number of moves of a point when faces are moved outwards, and the largest share that a face may lack.
+# Largest number of moves of a point when faces are moved outwards, and the largest fraction of the distance by which a
+# face may fall short.
 ROUNDS, ENOUGH = 100, 0.1
 
 
@@ -42,11 +43,11 @@ class Triangles:
         if distance == 0:
             return self
         _, place = np.unique(self.vertices, axis=0, return_inverse=True)
-        at = place.reshape(-1)[self.faces]  # (m, 3), numbers of distinct points
+        at = place.reshape(-1)[self.faces]  # indices of distinct points, (m, 3)
         corners = self.vertices[self.faces]
         normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
-        # Each point repeatedly moves along the normal of the face that lacks most (Motzkin and Schoenberg 1954).
+        # Each point repeatedly moves along the normal of the face that falls short most (Motzkin and Schoenberg 1954).
         moved = np.zeros((len(self.vertices), 3))
         for _ in range(ROUNDS):
             lacks = (normals**2).sum(axis=1)[:, None] - np.einsum("mki,mi->mk", moved[at], normals)
@@ -102,8 +103,10 @@ def box(half_size: np.ndarray) -> Triangles:
 
 
 def strip(half_sides: np.ndarray) -> Triangles:
-    """Return a level rectangle as pieces along its longer side, each about as long as its distance from the middle:
-    (u, v) = ((x/sx + 1)/2, (y/sy + 1)/2)."""
+    """Return a horizontal rectangle, divided into pieces along its longer side.
+
+    Each piece is about as long as its distance from the middle. (u, v) = ((x/sx + 1)/2, (y/sy + 1)/2).
+    """
     short, long = np.sort(half_sides)
     ahead = np.geomspace(short, long, int(np.ceil(np.log2(long / short))) + 1)
     along = np.repeat(np.concatenate([-ahead[::-1], ahead]), 2)
@@ -158,7 +161,8 @@ def mesh(model: mujoco.MjModel, mesh_id: int) -> Triangles:
     """Return a mesh asset with one vertex per corner of each face, since normals and texture coordinates have separate
     indices.
 
-    As in MuJoCo's renderer, a corner without texture whose normal deviates from that of its face is flat.
+    As in MuJoCo's renderer, a corner of a mesh without texture gets the normal of its face if its own normal deviates
+    from it.
     """
     faces = slice(model.mesh_faceadr[mesh_id], model.mesh_faceadr[mesh_id] + model.mesh_facenum[mesh_id])
     vertices = model.mesh_vert[model.mesh_face[faces].ravel() + model.mesh_vertadr[mesh_id]].astype(float)
@@ -215,8 +219,10 @@ def _arc(start: float, stop: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _revolved(radius: np.ndarray, height: np.ndarray, scale: np.ndarray, v: np.ndarray) -> Triangles:
-    """Return the surface of revolution of the profile (radius, height), from top to bottom, scaled afterwards. The
-    vertices of the seam are doubled, since u is 0 on one side of it and 1 on the other."""
+    """Return the surface of revolution of the profile (radius, height), from top to bottom, scaled afterwards.
+
+    The vertices of the seam are doubled, since u is 0 on one side of it and 1 on the other.
+    """
     azimuth = np.linspace(0, 2 * np.pi, SLICES + 1)
     circle = np.column_stack([np.cos(azimuth), np.sin(azimuth)])
     unit = np.concatenate(

@@ -12,8 +12,9 @@ import mitsuba as mi
 from optics.numerics import backend
 from optics.numerics.device import device
 
-# Mitsuba's types exist only after a variant is set, so type checkers cannot see them. These names describe each `Any`.
-# Mitsuba's objects made of arrays (rays, points, interactions) have the type `optics.numerics.autodiff.Array`.
+# Mitsuba's types exist only after a variant is set, so type checkers cannot see them. These aliases of `Any` document
+# the intended type. Mitsuba's objects made of arrays (rays, points, interactions) have the type
+# `optics.numerics.autodiff.Array`.
 MitsubaObject = Any  # a scene, shape, BSDF, sensor, sampler, integrator, texture or transform
 Description = dict[str, Any]  # description of one of them, for mi.load_dict
 
@@ -31,7 +32,7 @@ def default_variant() -> str:
 
 
 def on_gpu() -> bool:
-    """Return whether Mitsuba's variant in force computes on a GPU."""
+    """Return whether Mitsuba's active variant computes on a GPU."""
     return (mi.variant() or "").startswith("cuda")
 
 
@@ -47,8 +48,9 @@ def computed(*values: Any) -> None:
 
 @contextmanager
 def variant(name: str | None = None) -> Iterator[None]:
-    """Set Mitsuba's variant inside the block (None: that of the device), and restore the previous one afterwards, if
-    any.
+    """Set Mitsuba's variant inside the block, and restore the previous one, if any, afterwards.
+
+    name: the variant; None: that of the device
 
     (`mi.variant_context` fails if no variant was set before.)
 

@@ -1,8 +1,8 @@
 """Quantities that differ between the episodes of a task: light, and sizes, colours, materials and places of objects.
 
 All lights of a world, including the sky, are multiplied by one spectrum. Since light is additive, this multiplies the
-radiance in each band by exactly the same factor. Each world has its own sizes, colours, materials and places, see
-`sim.scene.world_models`. All worlds still share one kernel.
+radiance in each band by exactly the same factor. Each world may have its own sizes, colours, materials and places of
+objects (`sim.scene.world_models`), but all worlds share one kernel.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ DAYLIGHT = 6504.0  # [K] the correlated colour temperature of CIE D65
 LIGHT, TEMPERATURE = "light", "color_temperature"
 # Quantities of named objects: "ball.size".
 SIZE, COLOR, MATERIAL, START = OF_THINGS = ("size", "color", "material", "start")
-# Limits of the ranges: factors, kelvins, shares of red, green and blue, and lengths or angles.
+# Limits of the ranges: factors, kelvins, components of red, green and blue, and lengths or angles.
 LIMITS = {
     LIGHT: (1e-6, 1e6),
     TEMPERATURE: (1000.0, 40_000.0),
@@ -41,8 +41,8 @@ class Variation:
     """Ranges of the quantities that differ between episodes.
 
     ranges: (low, high) by name: "light", "color_temperature", and "NAME.size", "NAME.color" or "NAME.start" of objects.
-        Colours and points in space are three numbers each, with two opposite corners as (low, high). low = high is a
-        single value for all episodes. "NAME.material": names of materials; one is drawn.
+        For colours and points in space, low and high have three numbers each, and are opposite corners of a box. If low
+        = high, the value is the same in all episodes. "NAME.material": names of materials; one is drawn.
 
     Raises:
         ValueError: an unknown name, or an invalid range.
@@ -70,8 +70,9 @@ class Variation:
     def draw(self, random: np.random.Generator) -> dict[str, Drawn]:
         """Draw values for one episode.
 
-        Factors are uniform in their logarithm. Temperatures are uniform in their reciprocal, in which equal steps look
-        alike (mired). Colours and places are uniform between their corners. All materials have the same probability.
+        Factors are distributed uniformly in their logarithm. Temperatures are distributed uniformly in their reciprocal
+        (mired), in which equal steps look equally large. Colours and places are uniform between their corners. All
+        materials have the same probability.
         """
         found: dict[str, Drawn] = {}
         for name, given in self.ranges.items():
@@ -128,9 +129,11 @@ class Variation:
         return factors.astype(np.float32)
 
     def extremes(self, wavelengths: np.ndarray) -> np.ndarray:
-        """Return the factors of `light` at all combinations of the ends of its ranges, (case, band). The largest factor
-        of all bands is among them. A single band's factor may be larger in between, by a third for ranges from warm to
-        cold light."""
+        """Return the factors of `light` at all combinations of the ends of its ranges, (case, band).
+
+        The largest factor over all bands is among them. Within the ranges, the factor of a single band may be larger,
+        by a third for ranges from warm to cold light.
+        """
         names = self.of_light
         ends = [self.ranges[name] for name in names]
         corners = np.stack(np.meshgrid(*ends, indexing="ij"), axis=-1).reshape(-1, len(names)) if names else None
@@ -174,11 +177,10 @@ def _check_names(name: str, given: Any) -> None:
 
 
 def filter_to(kelvins: float, wavelengths: np.ndarray) -> np.ndarray:
-    """Return the transmission (band,) of a filter that changes daylight to light of this colour temperature and the
-    same illuminance.
+    """Return the transmission (band,) of a filter that changes the colour temperature of daylight to `kelvins`.
 
-    It is the ratio of black bodies of this temperature and of DAYLIGHT (Planck's law), scaled to preserve the
-    illuminance.
+    It is the ratio of the spectra of black bodies of this temperature and of DAYLIGHT (Planck's law), scaled to
+    preserve the illuminance.
     """
     seen = daylight(_VISIBLE) * cie_1931(_VISIBLE)[:, 1]
     scale = seen.sum() / (seen * _ratio(kelvins, _VISIBLE)).sum()
@@ -194,7 +196,7 @@ def _ratio(kelvins: float, wavelengths: np.ndarray) -> np.ndarray:
 
 
 def _corners(name: str, given: Any) -> np.ndarray | None:
-    """Return (low, high) as an array (2,) or (2, 3); None if it is not such a pair of finite numbers."""
+    """Return (low, high) as an array (2,) or (2, 3); None unless `given` is such a pair of finite numbers."""
     given = full_precision(name, given)
     try:
         corners = np.asarray(given, float)

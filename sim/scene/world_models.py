@@ -1,8 +1,8 @@
-"""A model for each world, if sizes, colours or materials differ or a task changes them, and starting places of objects.
+"""A model for each world, if quantities of objects differ between worlds or a task changes the model.
 
-MuJoCo's compiler applies sizes, so that mass, inertia and all derived quantities are its own: an object with a density
-scales its mass with its volume, and an object with a given mass keeps it. A world's model and data remain the same
-objects.
+MuJoCo's compiler applies sizes and computes mass, inertia and all derived quantities. The mass of an object with a
+density therefore scales with its volume, and an object with a given mass keeps this mass. A world's MjModel and MjData
+remain the same Python objects.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from sim.scene.primitive_geoms import is_resizable
 from sim.scene.variation import COLOR, MATERIAL, OF_THINGS, SIZE, START, Variation
 
 Drawn = Mapping[str, of_worlds.Drawn]
-# Fields that do not depend on sizes; copying the large ones would be wasteful.
+# Fields that do not depend on sizes. They are not copied, because some are large.
 _FIXED = ("tex", "mesh", "hfield", "skin", "mat_", "name", "text", "numeric", "tuple", "key", "path")
 _JOINTS = (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE)
 
@@ -34,8 +34,8 @@ class WorldModels:
     given: source of the model
     model: the compiled model; worlds have copies of it
     models: models of the worlds; a single one for all, unless `own` is True
-    own: True if each world has its own model, because some quantity differs or a task changes it (`separate`). Each
-        episode then starts with the model as it was compiled.
+    own: True if each world has its own model, because a quantity differs between worlds or a task changes the model
+        (`separate`). Each episode then starts from the compiled model.
     varied: names of the geoms whose size, colour or material differs, with the materials that may be drawn
 
     Raises:
@@ -103,7 +103,7 @@ class WorldModels:
             )
 
     def start_episode(self, world: int, drawn: Drawn) -> None:
-        """Set a world's sizes, colours and materials, and reset everything else in its own model to the compiled state.
+        """Set a world's sizes, colours and materials, and reset all other fields of its model to the compiled values.
 
         Raises:
             ValueError: a material that is not one of the geom's.
@@ -152,7 +152,7 @@ class WorldModels:
         for geom, mjs in self._geoms.items():
             factor, (size, ends) = float(drawn[self._sizes[geom]]), self._natural[geom]
             middle = np.tile((ends[:3] + ends[3:]) / 2, 2)
-            # A capsule defined by its ends keeps its centre, and its half length is unused.
+            # A capsule that is defined by its ends keeps its centre. Its half length is not used.
             mjs.size, mjs.fromto = factor * size, middle + factor * (ends - middle)
         compiled = self._spec.compile()
         for name in self._fields:
@@ -174,7 +174,7 @@ def _geom(model: mujoco.MjModel, thing: str, name: str) -> int:
 
 
 def _place(model: mujoco.MjModel, thing: str, name: str, variation: Variation | None) -> tuple[str, Any]:
-    """Return the field of mjData, and the entries in it, that contain an object's place."""
+    """Return the field of mjData that contains an object's place, and the indices in this field."""
     assert variation is not None
     spatial = np.ndim(variation.ranges[name][0]) == 1
     joint = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, thing)

@@ -12,7 +12,7 @@ find_goal       detection, foraging and tracking
 find_way        navigation and maze
 simulation      Simulation: worlds of a task, without rendering
 command         Command: the meaning of a number in an action
-outcome         Outcome: a task's verdict on one action; Step: one action of all worlds
+outcome         Outcome: result of one action, which a task returns; Step: one action of all worlds
 batch_arrays    checks of arrays that tasks return
 reward          the built-in reward's named terms and their weights
 placement       random starting positions of agents and objects

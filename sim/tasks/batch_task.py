@@ -55,16 +55,16 @@ class BatchTask(TaskSettings):
     default physics is `sim.ArrayWorlds`, which stacks MuJoCo's arrays (`worlds.qpos`, `worlds.xpos` ...) over worlds.
     The built-in tasks use `sim.SlidingAgents`. `sim.check_batch_task` tests whether a task follows this description.
 
-    renders_early: if True, rendering may begin before an action is judged, which is faster. In this case,
-        `rewards`, `terminated`, `succeeded` and `proprioception` must not move anything, unless `judge` lists the
-        worlds in which bodies moved in `Outcome.changed`.
+    renders_early: if True, rendering may begin before an action is judged, which is faster. In this case, `rewards`,
+        `terminated`, `succeeded` and `proprioception` must not move bodies, unless `judge` returns the worlds in which
+        they do as `Outcome.changed`.
     proprioception_ranges: (lowest, highest) value of each entry of `proprioception`, by name; an entry that is
         not listed has no limits
-    ramped: terms of the reward whose weight may be reduced at the beginning of training; `evolve` does so if the
-        setting `learning.contact_ramp` is above 0
-    counted: row titles of tables, by reward term; such a row shows the number of actions in which the term is not 0
-    compared_light: setting of the light with which `evolve` compares eyes, for example "direct"; None: the setting in
-        `fidelity`
+    ramped: terms of the reward whose weight `evolve` reduces at the beginning of training if the setting
+        `learning.contact_ramp` is above 0
+    counted: titles of table rows, by reward term. A row shows the number of actions in which the term is not 0
+    compared_light: level of light (see `Fidelity`) with which `evolve` compares eyes, for example "direct"; None: the
+        level in `fidelity`
     """
 
     renders_early: bool = True
@@ -86,7 +86,7 @@ class BatchTask(TaskSettings):
 
         The default maps each value to the full range of one control of the actuators.
 
-        Return the reasons, by world, for which worlds cannot continue, or None.
+        Return the reasons why worlds cannot continue, by world, or None if all can.
         """
         mine = controls_of(worlds.model, self.actuators)
         limited = worlds.model.actuator_ctrllimited[mine].astype(bool)
@@ -109,7 +109,7 @@ class BatchTask(TaskSettings):
     def proprioception(self, worlds: Any) -> np.ndarray | Mapping[str, np.ndarray]:
         """Return the part of the observation that does not come from eyes, (n, k), or several such arrays by name.
 
-        The default is no such part.
+        By default, there is no such part.
         """
         return {}
 
@@ -144,21 +144,21 @@ class BatchTask(TaskSettings):
         return Outcome(RewardTerms(list(terms), stacked), terminated, success, failure)
 
     def first_info(self, worlds: Any, chosen: np.ndarray) -> Sequence[Mapping[str, Any]] | None:
-        """Return additional entries of `info` at the beginning of an episode, for each chosen world; None if there are
-        none."""
+        """Return additional entries of `info` at the start of an episode, for each chosen world, or None."""
         return None
 
     def commands(self) -> tuple[Command, ...]:
-        """Return the meaning of each number in the first agent's action; by default, a running number as the name."""
+        """Return the meaning of each number in the first agent's action. By default, names are consecutive numbers."""
         return tuple(Command(str(number)) for number in range(self.agents()[0].n_actions))
 
     def solved(self, before: bool | None, info: Mapping[str, Any]) -> bool | None:
-        """Return whether an episode counts as solved, given the `info` of one more action; None: still undecided.
+        """Return whether an episode counts as solved after one more action; None while this is undecided.
 
         This method is called after every action. By default, an episode is solved if `succeeded` is true after its
         last action.
 
         before: return value of this method after the previous action
+        info: `info` of the last action
         """
         return bool(info["is_success"])
 
@@ -170,8 +170,10 @@ class BatchTask(TaskSettings):
         return np.radians([mount.azimuth_deg for mount in self.agents()[0].kinds[0].mounts])
 
     def ground_plan(self, place: np.ndarray) -> GroundPlan | None:
-        """Return a plan of the surroundings of this place (2,) [m], seen from above; None if the task has no plan, in
-        which case images of its camera are shown instead."""
+        """Return a plan of the surroundings of this place (2,) [m], seen from above; None if the task has no plan.
+
+        Without a plan, reports show images of the task's camera instead.
+        """
         return None
 
     # Only tasks with their own physics, agents or random streams override the following methods.
@@ -196,7 +198,7 @@ class BatchTask(TaskSettings):
         return StreamsByWorld(seed, n, [len(agent.kinds) for agent in self.agents()])
 
     def in_mode(self, mode: str) -> Self:
-        """Return this task in the given mode, "training" or "evaluation"."""
+        """Return this task in the given mode, "training", "evaluation" or "test"."""
         if self.mode == mode:
             return self
         found = copy.copy(self)

@@ -29,7 +29,7 @@ from sim.worlds.world import MAX_SPEED, World
 
 __all__ = ["STANDING", "AgentEvents", "AgentTask", "mounts_of_agent"]
 
-# Height of a pupil above the agent's skin, as a fraction of the agent's radius. Rounding errors therefore cannot put
+# Height of a pupil above the agent's skin, as a fraction of the agent's radius. It keeps rounding errors from putting
 # the pupil below the skin.
 OUTSIDE = 1e-6
 STANDING = (-1.0, 0.0)  # "previous action" at the start of an episode: no speed and no turn
@@ -40,11 +40,11 @@ class AgentEvents:
     """Events during one action, per world.
 
     progress: progress as the task defines it [m], (n,)
-    goal: whether a goal was reached, (n,) bool
-    adversary: whether an adversary was reached, (n,) bool
-    adversary_first: whether an adversary was reached before any goal, (n,) bool
-    reached: whether each object was reached, (n, k) bool
-    terminated: whether the task ends the episode, (n,) bool
+    goal: True if a goal was reached, (n,) bool
+    adversary: True if an adversary was reached, (n,) bool
+    adversary_first: True if an adversary was reached before any goal, (n,) bool
+    reached: True for objects that were reached, (n, k) bool
+    terminated: True if the task ends the episode, (n,) bool
     """
 
     progress: np.ndarray
@@ -56,7 +56,7 @@ class AgentEvents:
 
     @property
     def any(self) -> np.ndarray:
-        """Array (n,) bool: whether a goal or an adversary was reached in each world."""
+        """True for worlds in which a goal or an adversary was reached, (n,) bool."""
         return self.goal | self.adversary
 
     def within(self, worlds: np.ndarray) -> AgentEvents:
@@ -75,7 +75,7 @@ class AgentTask(BatchTask):
     """A task in one of the built-in worlds, in which an agent slides over the floor between walls.
 
     world: the compiled world
-    mode: "training" or "evaluation", which selects the weights of the reward
+    mode: "training", "evaluation" or "test", which selects the weights of the reward
     eyes: eyes on the agent's equator, or a dictionary of several kinds of eyes by name; None: no eyes
     fidelity: fidelity of the eyes, or "auto"
     """
@@ -118,7 +118,7 @@ class AgentTask(BatchTask):
         return (Command("speed", "m/s", MAX_SPEED / 2, 1.0), Command("turn", "°", np.degrees(MAX_TURN)))
 
     def solved(self, before: bool | None, info: Mapping[str, Any]) -> bool | None:
-        """Return True if the first object that the agent reached was a goal, False if it was an adversary."""
+        """Return whether the first object that the agent reached was a goal; None before it reaches any."""
         if before is not None:
             return before
         if info.get("adversary_first"):

@@ -21,8 +21,8 @@ def wander(state: WorldState, chance: MotionNoise, bounds: np.ndarray, seconds: 
     """Return the positions (n, k, 3) [m] and headings (n, k) [rad] of the objects one action later.
 
     Every object moves at SPEED, and its heading drifts randomly. A step must not lead out of `bounds` (x_min, y_min,
-    x_max, y_max), nor to a point closer than SEPARATION to the present or next position of another object. An object
-    whose step would violate this stays at its position and turns to a random heading.
+    x_max, y_max), nor to a point closer than SEPARATION to the present or next position of another object. If a step
+    would break these rules, the object stays at its position and turns to a random heading.
     """
     drift, turn = chance.next(state.objects.shape[1])
     heading = wrap_angle(state.object_heading + TURN * drift)
@@ -52,6 +52,6 @@ def _nearest(to_x: np.ndarray, to_y: np.ndarray, x: np.ndarray, y: np.ndarray) -
 def _but_itself(k: int) -> np.ndarray:
     """Return an array (k, 2k, 1) that is added to squared distances from k objects to 2k positions.
 
-    It is infinite for the two positions of the object itself, and 0 elsewhere.
+    It is infinite for the two positions of the object itself, and 0 for all others.
     """
     return np.tile(np.diag(np.full(k, np.inf)), 2)[..., None]

@@ -64,11 +64,11 @@ class Outcome:
     """The outcome of one action in all worlds, which a task returns.
 
     terms: terms of the reward
-    terminated: whether the task ends the episode, (row,) bool
-    success: whether the task is accomplished, (row,) bool
+    terminated: True if the task ends the episode, (row,) bool
+    success: True if the task is accomplished, (row,) bool
     failure: the worlds that could not continue, each with the reason; their episodes end
-    over: whether a world's episode ends for another reason than a row that is terminated, such as an animal that does
-        not learn, (world,) bool; None: False in all worlds
+    over: True if a world's episode ends although no row is terminated, for example because of an animal that does not
+        learn, (world,) bool; None: False in all worlds
     changed: worlds in which the task moved bodies after the action
     info: additional entries of each row's `info`; None: no additions
     proprioception: part of the observation that does not come from eyes, for each agent and by name, (world, number);
@@ -93,11 +93,11 @@ class Step:
     state: state of the physics after the action
     terms: terms of the reward
     reward: sum of the terms (row,)
-    terminated: whether the task ended the episode, (row,) bool
-    truncated: whether the episode ended for another reason, such as its number of actions, (row,) bool
-    success: whether the task is accomplished, (row,) bool
+    terminated: True if the task ended the episode, (row,) bool
+    truncated: True if the episode ended for another reason, such as its number of actions, (row,) bool
+    success: True if the task is accomplished, (row,) bool
     changed: worlds that must be rendered again
-    given_up: whether the episode was truncated because the sum of its rewards is too low, (row,) bool
+    given_up: True if the episode was truncated because the sum of its rewards is too low, (row,) bool
     failure: the worlds that could not continue, each with the reason
     info: additional entries of each row's `info`, or None
     """
@@ -120,5 +120,5 @@ class Step:
 
     @property
     def done(self) -> np.ndarray:
-        """Array (row,) bool: whether the episode of each row has ended."""
+        """True for rows whose episode has ended, (row,) bool."""
         return self.terminated | self.truncated

@@ -41,7 +41,7 @@ class _OfWorld:
 
 
 class PerWorld(BatchTask):
-    """Batch task of a `sim.Task` and its `others`, or of a `sim.Encounter`, whose animals all learn.
+    """Batch task for one animal of a `sim.Task` and its `others`, or for all animals of a `sim.Encounter`.
 
     learners: tasks of the learning animals
     frozen: animals that do not learn
@@ -96,7 +96,7 @@ class PerWorld(BatchTask):
                 for animal in self.animals:
                     animal.reset(worlds.datas[world], rng)
             except BaseException as error:
-                raise RuntimeError(_told(error)) from error
+                raise RuntimeError(_message(error)) from error
 
     def take(self, worlds: MujocoWorlds, actions: np.ndarray, failed: Mapping[int, str]) -> Mapping[int, str]:
         found, first = dict[int, str](), 0
@@ -108,7 +108,7 @@ class PerWorld(BatchTask):
                     try:
                         animal.act(data, own[world])
                     except BaseException as error:
-                        found[world] = _told(error)
+                        found[world] = _message(error)
         return found
 
     def judge(self, worlds: MujocoWorlds, failed: Mapping[int, str]) -> Outcome:
@@ -125,7 +125,7 @@ class PerWorld(BatchTask):
                     judged.append(outcomes)
                     continue
                 except BaseException as error:
-                    failure[world] = _told(error)
+                    failure[world] = _message(error)
             worlds.require_places(world)
             # Terminated, not truncated: learners must not bootstrap from the state after a failure.
             worth = [{"failure": animal.failure_reward} if animal.failure_reward else {} for animal in self.learners]
@@ -145,7 +145,7 @@ class PerWorld(BatchTask):
             of_worlds = [self._felt(worlds.datas[world]) for world in chosen]
             return [_stacked(list(own)) for own in zip(*of_worlds, strict=True)]
         except BaseException as error:
-            raise RuntimeError(_told(error)) from error
+            raise RuntimeError(_message(error)) from error
 
     def _judged(self, data: mujoco.MjData) -> tuple[list[_OfWorld], bool]:
         """Return the outcome for every learner, and whether any animal ends the episode."""
@@ -180,7 +180,7 @@ class PerWorld(BatchTask):
 
 
 def _row(where: str, returned: object) -> np.ndarray:
-    """Return what a method returned as a float32 array; ValueError unless it consists of real numbers."""
+    """Convert the return value of a method to a float32 array; ValueError unless it consists of real numbers."""
     given = number_types.real_array(where, returned)
     if given is None:
         raise ValueError(f"{where} returned {shown(returned)}: must be finite numbers, (k,)")
@@ -201,8 +201,8 @@ def _stacked(felt: Sequence[np.ndarray | None]) -> dict[str, np.ndarray]:
     return {"feels": np.array([np.full(size, np.nan, np.float32) if row is None else row for row in felt])}
 
 
-def _told(error: BaseException) -> str:
-    """Return the message of an error; if it was raised in the user's file, with the function and line.
+def _message(error: BaseException) -> str:
+    """Return the message of an error, with function and line if it was raised in the user's file.
 
     The error may be a SystemExit or another exception that would end the program. Only Ctrl-C is raised again.
     """

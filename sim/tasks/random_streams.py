@@ -22,7 +22,7 @@ AHEAD = 64
 class RandomStreams(Protocol):
     """Protocol of the random number generators of all worlds.
 
-    entropy: seed of all generators; using it as the seed again repeats every episode
+    entropy: seed of all generators; a simulation with this seed repeats every episode
     noise_keys: keys of the receptor noise for `sim.render.receptor_noise`, for each agent (kind of eyes, world) uint64
     """
 
@@ -92,8 +92,8 @@ class StreamsByWorld:
         children = [np.random.SeedSequence(entropy, spawn_key=(i,)) for entropy, i in roots]
         self.episodes = self.variation = [np.random.default_rng(child) for child in children]
         drawn = np.array([child.generate_state(sum(kinds), np.uint64) for child in children]).T
-        # The first keys go to the first kind of eyes of every agent. If an agent gets a second kind of eyes, the noise
-        # in the first kind of the other agents therefore stays the same.
+        # The first keys go to the first kind of eyes of every agent. A second kind of eyes of one agent therefore does
+        # not change the noise in the first kind of the other agents.
         more, self.noise_keys = len(kinds), []
         for number, count in enumerate(kinds):
             self.noise_keys.append(np.concatenate([drawn[number : number + 1], drawn[more : more + count - 1]]))
@@ -157,8 +157,8 @@ class MotionNoise:
 def _roots(seed: Any, n: int) -> tuple[Any, list[tuple[Any, int]]]:
     """Return the entropy of all streams, and for each world the entropy and the index from which its streams derive.
 
-    seed: one seed, which the worlds share with different indices; or a tuple with a seed for each world, whose streams
-        are those of the first world of a batch with this seed
+    seed: one seed, from which the worlds derive different streams by their indices; or a tuple with a seed for each
+        world. With the latter, a world has the streams of the first world of a batch with this seed
     """
     if isinstance(seed, tuple):
         return seed, [(own, 0) for own in seed]

@@ -13,6 +13,7 @@
                 λ      w_g    w_a    w_c
     training    0.25   1      -1     -1     reaching a goal or an adversary ends the episode
     evaluation  1.5    10     -10    -2     objects respawn and the episode continues; only a goal region ends it
+    test        1.5    10     -10    -2     the same, for final figures
 
 Terms and weights follow the text of Tiwary, Young et al. (2025), "What if Eye...? Computationally Recreating Vision
 Evolution". The fitness is the sum of an evaluation episode's rewards, averaged over these episodes. In training, the
@@ -55,14 +56,14 @@ class RewardWeights:
 
 TRAINING = RewardWeights(progress=0.25, goal=1.0, adversary=-1.0, contact=-1.0)
 EVALUATION = RewardWeights(progress=1.5, goal=10.0, adversary=-10.0, contact=-2.0)
-MODES = {"training": TRAINING, "evaluation": EVALUATION}
+MODES = {"training": TRAINING, "evaluation": EVALUATION, "test": EVALUATION}
 
 
 def check_mode(mode: str) -> None:
     """Check that a mode is one of MODES.
 
     Raises:
-        ValueError: it is not.
+        ValueError: the mode is unknown.
     """
     one_of("mode", mode, MODES)
 

@@ -71,7 +71,7 @@ class Simulation:
         self._rehearse()
 
     def _rehearse(self) -> None:
-        """Start an episode in one world, to record the proprioception and whether the task changes the model."""
+        """Start an episode in one world, which shows the proprioception and whether the task changes the model."""
         first = np.zeros(1, int)
         self._start(first)
         while self.physics.adopt_changed_model():
@@ -129,7 +129,7 @@ class Simulation:
         return self.judge(self.move(actions))
 
     def move(self, actions: np.ndarray) -> dict[int, str]:
-        """Compute the first half of a step: the motion of everything.
+        """Compute the first half of a step: the motion of all bodies.
 
         Return the worlds that could not continue, each with the reason.
 

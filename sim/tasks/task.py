@@ -25,13 +25,14 @@ class Task(TaskSettings):
 
     others: animals in the same world that do not learn, see `sim.Frozen`. Each has its own body, actuators and eyes in
         the same model. At the start of an episode, `reset` of every animal is called in turn. As soon as `terminated`
-        of one animal returns True, the episode ends for all animals. It counts as truncated for the other animals.
+        of one animal returns True, the episode ends for all animals; for the other animals it counts as truncated.
 
     If eyes evolve for this task (`evolve run FILE.py:CLASS`), every candidate has its own eyes, at the mounts that
     `place` returns. The class must then have no required arguments.
 
-    If a method raises an exception, the episode of its world ends. If `reset` raises one, or `proprioception` during a
-    reset, a RuntimeError ends the simulation of all worlds, because no episode can start.
+    If a method raises an exception, the episode of its world ends. There is one exception to this rule: an error in
+    `reset`, or in `proprioception` during a reset, ends the simulation of all worlds by a RuntimeError, because no
+    episode can start.
 
     Methods are called for one world at a time, with its mjData after mj_forward. One task object is used for
     all worlds. Variables of an episode must therefore be stored in mjData (for example in `userdata`), not in the task.
@@ -91,7 +92,7 @@ def named_terms(task: Task, data: mujoco.MjData, whose: str = "") -> dict[str, f
 
 
 def condition(where: str, returned: Any) -> bool:
-    """Return what a method returned as a truth value; None counts as False.
+    """Convert the return value of a method to a truth value; None counts as False.
 
     where: the method, for the error message
 

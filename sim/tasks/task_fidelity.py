@@ -1,4 +1,5 @@
-"""Rendering fidelity of the eyes in a task: set by the task, or chosen automatically from a few of its scenes."""
+"""Rendering fidelity of the eyes in a task: set by the task, or chosen automatically from a few moments of its
+episodes."""
 
 from __future__ import annotations
 

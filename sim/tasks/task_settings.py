@@ -40,14 +40,14 @@ class TaskSettings:
         "color_temperature": colour temperature of white [K], with a uniformly distributed reciprocal.
         "GEOM.size": factor of a geom's size, with a uniformly distributed logarithm. MuJoCo's compiler recomputes mass
         and inertia.
-        "GEOM.color": colour of a geom. Red, green and blue are drawn independently between those of two colours. The
+        "GEOM.color": colour of a geom. Red, green and blue are each drawn between their values in two colours. The
         colour multiplies a texture.
         "GEOM.material": one of two or more materials of the model, given by their names, with its texture, colour and
         emission. The geom must not have an rgba of its own.
         "JOINT.start": initial position of a hinge [rad] or a slide [m].
         "BODY.start": initial position between two points (x, y, z) [m], of a mocap body or a body with a free joint.
-        Except for "light" and "color_temperature", values are set in `data.model`, of which each world then has a copy,
-        or in the world's data. Each world also has a copy of the model if the first `reset` changes `data.model`.
+        Except for "light" and "color_temperature", values are set in the world's data or in `data.model`, of which each
+        world then has a copy. Each world also has a copy of the model if the first `reset` changes `data.model`.
         Otherwise all worlds share one model.
     auxiliary: any of "depth", "ids" and "flow", which an observation then contains for each receptor in addition to its
         signal. They describe the surface seen at the centre of the receptor: its distance, its geom, and its motion
@@ -57,8 +57,8 @@ class TaskSettings:
     name: name of the animal, if there are several; None: the name of the class
     failure_reward: reward of a step in which the world fails, as the term "failure". If rewards are negative costs, the
         default of 0 is better than any normal episode. In this case, set a value below the return of an episode.
-    mode: "training" or "evaluation", which is set when the environment is made; methods may use it, a class must not
-        define it
+    mode: "training", "evaluation" or "test" (an evaluation for final figures). The environment sets it, and methods may
+        read it; a class must not define it
     """
 
     model: mujoco.MjModel | mujoco.MjSpec | str | Path

@@ -38,7 +38,7 @@ def require_rewards(task: Task | BatchTask) -> None:
     """Check that the task of a learner defines rewards.
 
     Raises:
-        ValueError: it does not.
+        ValueError: the task defines no rewards.
     """
     judges = isinstance(task, BatchTask) and type(task).judge is not BatchTask.judge
     if getattr(task.rewards, "__func__", None) in (Task.rewards, BatchTask.rewards) and not judges:

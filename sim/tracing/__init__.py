@@ -10,7 +10,7 @@ walls                upright walls and the floor of a model
 wall_intersection    intersections of rays with upright walls
 reflectance_atlas    reflectances of all materials in one table
 areas                means over rectangles of the visual field, without rays
-lighting             directional light, direct and reflected once more
+lighting             directional light, after one or two reflections
 model_tracer         ModelTracer: rays through models with any shapes
 model_scene          static and moving geoms of any model
 model_lights         lights of any model

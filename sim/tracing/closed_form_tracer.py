@@ -1,10 +1,10 @@
 """A ray tracer in closed form for worlds of upright walls, a floor and spheres.
 
 A few walls are intersected one by one. If there are more, a ray walks through a grid in which each wall fills whole
-cells (Amanatides and Woo 1987). Reflectances are Mitsuba's (`sim.tracing.reflectance_atlas`). Components of light are
-usually bands. If all lights share one spectrum, and few spectra span the materials' spectra, there is one component per
-spanning spectrum. The spectrum of light that is reflected twice is a product of two materials' spectra. If it is
-followed, all bands are traced, unless all materials are grey.
+cells (Amanatides and Woo 1987). Reflectances are Mitsuba's (`sim.tracing.reflectance_atlas`). Light is traced in
+components, which are usually the bands. There are fewer components if all lights share one spectrum, and the materials'
+spectra are combinations of a few spectra: each of these is a component. After two reflections, the spectrum of light is
+a product of two materials' spectra, so all bands are traced, unless all materials are grey.
 """
 
 from __future__ import annotations
@@ -26,12 +26,11 @@ from sim.tracing.upright_scene import UprightScene
 from sim.tracing.wall_intersection import CellTables, Footprints, footprints_of
 from sim.tracing.walls import ALIGNED, NoClosedForm
 
-# Singular values below this share of the largest are rounding errors. It is eight times float32's 1.2e-7.
-RANK_TOLERANCE = 1e-6
+RANK_TOLERANCE = 1e-6  # smaller singular values, relative to the largest, are rounding errors of float32 (1.2e-7)
 # Chosen: largest deviation of a grey reflectance from its mean over the bands. Mitsuba's greys are not quite flat.
 GREY = 1e-4
-# Distance at which shadow rays and bounce rays start, compared with Mitsuba's. The latter, 3 mm in a maze, would shift
-# the shadow of a body next to a wall by as much. Closed forms have smaller rounding errors than meshes.
+# Distance at which shadow rays and bounce rays start, relative to Mitsuba's. Mitsuba's distance, 3 mm in a maze, would
+# shift the shadow of a body next to a wall by this amount. Closed forms have smaller rounding errors than meshes.
 CLEARANCE = 1 / 16
 Irradiance = Callable[[Array, Array], list[Array]]  # function (point, normal) of a surface: irradiance per component
 ROW = 12  # floats per face: affine functions of (x, y, z) for the texel's column and row, then the texture's place
@@ -41,7 +40,8 @@ ROW = 12  # floats per face: affine functions of (x, y, z) for the texel's colum
 class Components:
     """Factors of radiance_b = sum_k basis[k, b] reflectance_k sum_l levels[l, k] cos θ_l.
 
-    reflectance: (texel, component) · levels: of the lights (light, component) · basis: (component, band)"""
+    reflectance: (texel, component) · levels: of the lights (light, component) · basis: (component, band)
+    """
 
     reflectance: np.ndarray
     levels: np.ndarray
@@ -62,7 +62,7 @@ def components_of(texels: np.ndarray, irradiance: np.ndarray) -> Components:
 
 
 def reflected_components_of(texels: np.ndarray, irradiance: np.ndarray) -> Components:
-    """Return components in which reflection multiplies each component of light by the same component of the texel."""
+    """Return components in which reflection multiplies light by a texel, component by component."""
     grey = texels.mean(axis=1, keepdims=True)
     if np.abs(texels - grey).max() <= GREY:
         few = components_of(np.tile(grey, texels.shape[1]), irradiance)
@@ -74,7 +74,7 @@ def reflected_components_of(texels: np.ndarray, irradiance: np.ndarray) -> Compo
 
 @dataclass(frozen=True)
 class _Hit:
-    """First hits of rays. is_lit: whether the front of a surface is hit · reflectance: one array per component."""
+    """First hits of rays. is_lit: True if a ray hits the front of a surface. reflectance: one array per component"""
 
     t: Array
     point: Array
@@ -85,7 +85,9 @@ class _Hit:
 
 @dataclass(frozen=True)
 class ClosedFormTables:
-    """Arrays that are the same in all worlds. texels: reflectance, one array per component · faces: see `face_rows`
+    """Arrays that are the same in all worlds.
+
+    texels: reflectance, one array per component · faces: see `face_rows`
     cells: grid in which the walls stand; None: walls are intersected one by one
     """
 
@@ -96,7 +98,7 @@ class ClosedFormTables:
 
 @dataclass(frozen=True)
 class ClosedFormSurroundings:
-    """Spheres and tables for one lane. centres: of the visible spheres in its world (Point3f) · tables: see above."""
+    """Spheres and tables for one lane. centres: centres of the visible spheres in the lane's world (Point3f)"""
 
     centres: list[Array]
     tables: ClosedFormTables
@@ -106,14 +108,14 @@ class ClosedForm:
     """A tracer of rays through one scene of upright walls, a floor and spheres.
 
     name, why: name of the tracer, and the reason for its choice, for reports
-    light: one of `lighting.LEVELS`: which reflections are followed
+    light: level of light, one of `lighting.LEVELS`
     basis: (component, band): contribution of each component to each band
     world, walls, footprints, lights, components: the parts of the scene
     faces: textures of walls and floor, see `face_rows` · sphere_textures: maps to the texels, and the texels' places
 
     Raises:
-        NoClosedForm: walls that lie on no grid. For light that is reflected twice also: walls of several heights, walls
-            lower than a body, bodies that may change their height, and a texture on the body that carries the eyes.
+        NoClosedForm: walls that lie on no grid. With more than direct light also: walls of several heights, walls lower
+            than a body, bodies that may change their height, and a texture on the body that carries the eyes.
     """
 
     name = "closed_form"
@@ -160,8 +162,7 @@ class ClosedForm:
         return [*centres, mi.Point3f(stand.x, stand.y, float(self.world.heights[-1]))]
 
     def radiance(self, seen: EyeRay, there: ClosedFormSurroundings, samples: Array) -> tuple[list[Array], Array]:
-        """Return the light along each ray, one array per component, and the distance to the visible surface [m]. The
-        first two samples of a ray, on the unit square, determine its bounce ray (`lighting.spawn_bounce_ray`)."""
+        """Return the light along each ray, one array per component, and the distance to the visible surface [m]."""
         centres, tables = there.centres, there.tables
         bodies = self.all_bodies(centres, seen.body)
         hit = self._hit(seen.ray, centres, tables)
@@ -175,7 +176,7 @@ class ClosedForm:
 
     def returned(self, ray: Array, shade: Array, radius: float, more: Irradiance | None = None) -> list[Array]:
         """Return the light that walls and floor reflect towards the origin of each ray, per component. They receive
-        direct light, which the sphere at `shade` may block, and `more` irradiance, if given."""
+        direct light, which the sphere at `shade` may block, and the additional irradiance `more`, if given."""
         hit = self._hit(ray, [], self.inputs)
         light = self._irradiance(hit, [shade], self.inputs, [radius])
         if more:
@@ -183,7 +184,7 @@ class ClosedForm:
         return [dr.select(hit.is_lit, r * e, 0) for r, e in zip(hit.reflectance, light, strict=True)]
 
     def _hit(self, ray: Array, centres: list[Array], tables: ClosedFormTables) -> _Hit:
-        """Return the first hits of rays with walls, floor or bodies; bodies without a centre are left out."""
+        """Return the first hits of rays with walls, floor or bodies. Bodies without a centre are ignored."""
         t, face, normal = self.footprints.hit(ray, tables.cells)
         on_floor, t_floor = self._floor_hit(ray)
         floor_first = on_floor & (t_floor < t)
@@ -216,8 +217,7 @@ class ClosedForm:
     def _irradiance(
         self, hit: _Hit, bodies: list[Array], tables: ClosedFormTables, radii: list[float] | None = None
     ) -> list[Array]:
-        """Return the irradiance per component: the sum of level · cos θ over unobstructed lights; radii: of the
-        bodies."""
+        """Return the irradiance per component: the sum of level · cos θ over unobstructed lights."""
         levels = self.components.levels
         start = lighting.clear_of(hit.point, hit.normal, CLEARANCE)
         radii = list(map(float, self._bodies.radii)) if radii is None else radii
@@ -280,7 +280,7 @@ def _check_tops(scene: UprightScene) -> None:
 
 
 def face_rows(uv: np.ndarray, atlas: Atlas, place: np.ndarray) -> np.ndarray:
-    """Return rows (face, ROW): the texel's column and row as affine functions of the point, the texture's place, 0."""
+    """Return rows (face, ROW): column and row of the texel as affine functions of the point, the texture's place, 0."""
     rows = np.zeros((len(uv), ROW))
     for i, (affine, texture) in enumerate(zip(uv, place, strict=True)):
         to_texel = atlas.to_texels[texture] @ np.vstack([affine, [0, 0, 0, 1]])

@@ -1,4 +1,4 @@
-"""Positions of a model's eyes: as frames in the world, or fixed to one body that stays level."""
+"""Positions of a model's eyes: as frames in the world, or relative to one body that stays upright."""
 
 from __future__ import annotations
 
@@ -17,13 +17,14 @@ _SLIDE, _HINGE = int(mujoco.mjtJoint.mjJNT_SLIDE), int(mujoco.mjtJoint.mjJNT_HIN
 
 
 class NotLevelError(ValueError):
-    """The reason why eyes are not fixed to one body that stays level."""
+    """The eyes are not fixed to one body that stays upright. The message states the reason."""
 
 
 class EyeFrames(NamedTuple):
     """Positions and orientations of all eyes in all worlds.
 
-    origins: pupils [m], (world, eye, 3) · rotations: columns (right, up, ahead), (world, eye, 3, 3)
+    origins: pupils [m], (world, eye, 3)
+    rotations: columns (right, up, ahead), (world, eye, 3, 3)
     """
 
     origins: np.ndarray
@@ -32,10 +33,12 @@ class EyeFrames(NamedTuple):
 
 @dataclass(frozen=True)
 class LevelStand:
-    """Eyes that are fixed to one body, which only moves and turns on a level plane.
+    """Eyes that are fixed to one body, which moves and turns only in a horizontal plane.
 
-    body: id of the body · height: height of the body's origin [m]
-    origins: pupils in the body's frame [m], (eye, 3) · rotations: eyes' frames in the body's frame, (eye, 3, 3)
+    body: id of the body
+    height: height of the body's origin [m]
+    origins: pupils in the body's frame [m], (eye, 3)
+    rotations: eyes' frames in the body's frame, (eye, 3, 3)
     """
 
     body: int
@@ -52,8 +55,8 @@ class LevelStand:
     def radius(self) -> float | None:
         """Common distance of all pupils from the body's vertical axis [m].
 
-        None if the distance differs between eyes, or if an eye is not upright or does not look straight away from the
-        axis.
+        It is None if the distance differs between eyes, if an eye is not upright, or if it does not look straight away
+        from the axis.
         """
         level, axes = self.origins[:, :2], self.rotations[:, :, 2]
         radii = np.linalg.norm(level, axis=1)
@@ -131,8 +134,10 @@ class EyePlaces:
         return origin + rotation @ offset, rotation @ turn
 
     def _require_level(self, body: int, data: mujoco.MjData) -> None:
-        """Refuse a body that may tilt or change its height. All joints between the world and the body must move it in a
-        level plane or turn it about z."""
+        """Refuse a body that may tilt or change its height.
+
+        All joints between the world and the body must move it in a horizontal plane or turn it about z.
+        """
         model, name = self._model, self._model.body(body).name
         if abs(data.xmat[body].reshape(3, 3)[2, 2] - 1) > ROUNDING:
             raise NotLevelError(f"the eyes are on body {name!r}, which is tilted")

@@ -11,7 +11,9 @@ from optics.numerics.autodiff import Array
 class EyeRay:
     """A ray, with the axis and the body of its eye.
 
-    ray: from the pupil into the scene (Ray3f) · axis: of the eye (Vector3f) · cosine: of the angle between the two
+    ray: ray from the pupil into the scene (Ray3f)
+    axis: axis of the eye (Vector3f)
+    cosine: cosine of the angle between the two
     body: position of the body that carries the eyes (Point3f), if they stand upright on one; otherwise the pupil
     """
 

@@ -1,10 +1,11 @@
-"""Light from the scene's directional emitters: direct, and reflected once more.
+"""Light from the scene's directional emitters, after one or two reflections.
 
-Direct light is computed exactly, because each emitter has exactly one direction. Mitsuba's `direct` integrator
-estimates the same value with noise. Light that another surface reflects to the visible surface is sampled by one bounce
-ray per camera ray. The bounce ray leaves the visible surface in a direction that is drawn from Lambert's cosine. A
-camera ray's bounce sample, a fixed point on the unit square (`sim.eyes.sensor`), determines this direction. The bounce
-rays of all camera rays of a receptor together sample the hemisphere.
+Direct light is light after one reflection, at the visible surface. It is computed exactly, because each emitter has
+exactly one direction. Mitsuba's `direct` integrator estimates the same value with noise. Light that another surface
+reflects to the visible surface is sampled by one bounce ray per camera ray. The bounce ray leaves the visible surface
+in a direction that is distributed as Lambert's cosine. The camera ray's bounce sample, a fixed point on the unit square
+(`sim.eyes.sensor`), determines this direction. Together, the bounce rays of all camera rays of a receptor sample the
+hemisphere.
 """
 
 from __future__ import annotations
@@ -19,21 +20,27 @@ from optics.numerics.autodiff import Array
 from sim.scene.variant import MitsubaObject
 
 LANES = 4  # wavelengths in one mi.Spectrum
-# Light that is followed: "bounce" adds light that is reflected twice, "all" also light that is reflected more often.
+# Levels of light: "direct" includes one reflection, "bounce" up to two, "all" any number.
 DIRECT, BOUNCE, ALL = LEVELS = ("direct", "bounce", "all")
 
 
 @dataclass(frozen=True)
 class DirectionalLight:
-    """A light at infinity. direction: unit vector (3,) towards it · irradiance: on a surface that faces it, (band,)."""
+    """A light at infinity.
+
+    direction: unit vector towards the light, (3,)
+    irradiance: irradiance on a surface that faces the light, (band,)
+    """
 
     direction: np.ndarray
     irradiance: np.ndarray
 
 
 def spectra(wavelengths: np.ndarray) -> list[Array]:
-    """Return the bands' wavelengths [m] as a list of Mitsuba spectra [nm], each with LANES wavelengths. Copies of the
-    last wavelength fill up the last spectrum."""
+    """Return the bands' wavelengths [m] as a list of Mitsuba spectra [nm], each with LANES wavelengths.
+
+    Copies of the last wavelength fill the rest of the last spectrum.
+    """
     padded = np.pad(wavelengths * 1e9, (0, -len(wavelengths) % LANES), mode="edge")
     return [mi.Spectrum(*map(float, chunk)) for chunk in padded.reshape(-1, LANES)]
 
@@ -47,9 +54,9 @@ def spawn_bounce_ray(point: Array, normal: Array, bounce_sample: Array, clearanc
     clearance: see `clear_of`
     """
     local = mi.warp.square_to_cosine_hemisphere(bounce_sample)
-    # mi.Frame3f(normal) is not used: the normals of walls are level up to rounding errors, which would decide the
-    # directions of the frame's axes. Instead, the axes are computed from a vector that is not close to the normal: x
-    # for normals up to 26° from upright (cosine 0.9), otherwise z.
+    # mi.Frame3f(normal) is not used: the normals of walls are horizontal up to rounding errors, and these errors would
+    # decide the directions of the frame's axes. Instead, the axes are computed from a vector that is not close to the
+    # normal: x for normals up to 26° from upright (cosine 0.9), otherwise z.
     beside = dr.select(dr.abs(normal.z) < 0.9, mi.Vector3f(0, 0, 1), mi.Vector3f(1, 0, 0))
     s = dr.normalize(dr.cross(beside, mi.Vector3f(normal)))
     direction = mi.Frame3f(s, dr.cross(mi.Vector3f(normal), s), normal).to_world(local)

@@ -1,8 +1,8 @@
 """All moving meshes in one Mitsuba scene, in which a kernel intersects each of them separately.
 
-Every mesh is scaled to a ball of radius 1 in a cell of its own. A ray that is followed only inside this ball cannot hit
+Every mesh is scaled to a ball of radius 1 in a separate cell. A ray that is traced only inside this ball cannot hit
 another mesh. A kernel therefore needs one scene and one loop for any number of meshes, and moving a mesh does not
-change the scene. With one scene per mesh, kernels of 128 meshes take minutes to compile.
+change the scene. With one scene per mesh, kernels for 128 meshes would take minutes to compile.
 """
 
 from __future__ import annotations
@@ -19,14 +19,14 @@ from sim.scene.merged_parts import PlacedPart, merged
 from sim.scene.shapes import Part
 from sim.scene.variant import MitsubaObject
 
-# Distance between centres of cells, and radius of the ball in which a ray is followed. Its surface lies between a mesh
-# and its neighbours, so that rounding moves no mesh out of its ball.
+# Distance between centres of cells, and radius of the ball in which a ray is traced. The ball is larger than a mesh, so
+# that rounding moves no mesh out of its ball, and smaller than the distance to other meshes.
 PITCH, BALL = 2.5, 1.1
 
 
 @dataclass(frozen=True)
 class MeshAtlas:
-    """Moving meshes in one scene. cells: centre of each mesh's cell, (mesh, 3) · scene: None without meshes."""
+    """Moving meshes in one scene (None without meshes). cells: centre of each mesh's cell, (mesh, 3)"""
 
     cells: np.ndarray
     scene: MitsubaObject | None
@@ -36,7 +36,7 @@ class MeshAtlas:
         """Return the atlas of meshes with these parts.
 
         reach: largest distance of each mesh's surface from its origin [m], (mesh,)
-        bsdf: any BSDF; light on movers is computed with their own
+        bsdf: BSDF of the shapes in the atlas. It has no effect, because light is computed with the movers' own BSDFs
         """
         if not len(parts):
             return MeshAtlas(np.zeros((0, 3)), None)
@@ -58,7 +58,7 @@ class MeshAtlas:
         return dr.select(found.is_valid(), (start + found.t) * reach, dr.inf)
 
     def surface(self, o: Array, d: Array, cell: Array, reach: Array, active: Array) -> tuple[Array, Array]:
-        """Return the normal in the mesh's frame, and the texture coordinates, at the same hits."""
+        """Return the normal in the mesh's frame, and the texture coordinates, at the hits of `hit`."""
         ray, _ = _within(o, d, cell, reach)
         assert self.scene is not None
         si = self.scene.ray_intersect(ray, mi.RayFlags.All, True, active)

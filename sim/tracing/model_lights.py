@@ -30,11 +30,12 @@ _DIRECTIONAL, _POINT, _SPOT = "directional", "point", "spot"
 class ModelLight:
     """One light of a model.
 
-    light: id in the model; -1: the headlight of the observing eye · kind: "directional", "point" or "spot"
-    level: irradiance per band (band,) on a surface that faces the light; for points and spots, at a distance of 1 m
+    light: id in the model; -1: the headlight of the observing eye
+    kind: "directional", "point" or "spot"
+    level: irradiance per band (band,) on a surface that faces the light, at a distance of 1 m from points and spots
     cutoff, exponent: for a spot, the cosine of its half angle, and the exponent of its falloff to the side
     direction: unit vector (3,) towards a directional light in the model's reference pose; None for other lights
-    casts_shadow: whether obstacles block it
+    casts_shadow: True if obstacles block the light
     """
 
     light: int
@@ -49,10 +50,9 @@ class ModelLight:
 def model_lights(
     model: mujoco.MjModel, spectra: Spectra, wavelengths: np.ndarray
 ) -> tuple[list[ModelLight], list[str]]:
-    """Return a model's lights, except for the sky, at wavelengths [m], and messages about properties of lights that
-    cannot be mirrored.
+    """Return a model's lights, except for the sky, at wavelengths [m], and messages about properties without a mirror.
 
-    The scene's Mitsuba variant must be in force.
+    The scene's Mitsuba variant must be active.
     """
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
@@ -96,8 +96,7 @@ class Lights:
         return len(self.found)
 
     def rows(self, poses: Poses) -> np.ndarray:
-        """Return positions and directions of lights, (world, light, 4 ROWS) float32; a headlight's rows are not
-        used."""
+        """Return positions and directions of lights, (world, light, 4 ROWS) float32; unused for headlights."""
         rows = np.zeros((poses.n, len(self), ROWS, 4), np.float32)
         for k, light in enumerate(self.found):
             if light.light >= 0:
@@ -107,8 +106,12 @@ class Lights:
         return rows.reshape(poses.n, len(self), -1)
 
     def towards(self, k: int, point: Array, axis: Array, there: WorldRows) -> tuple[Array, Array, Array]:
-        """Return the unit vector from a point to a light, the distance [m], and the share of the light's level that
-        arrives on a surface that faces the light; axis: axis of the observing eye."""
+        """Return the unit vector from a point to a light, the distance [m], and a factor of the light's level.
+
+        The factor is the fraction of the level that arrives on a surface that faces the light.
+
+        axis: axis of the observing eye
+        """
         light = self.found[k]
         if light.light < 0:
             return -axis, mi.Float(FAR), mi.Float(1)

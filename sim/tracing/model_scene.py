@@ -1,6 +1,6 @@
 """A model in two parts: static geoms form one Mitsuba scene, and moving geoms are intersected separately.
 
-All surfaces are matt and opaque here. Gloss, mirrors and glass are left out, and a warning lists them.
+All surfaces are treated as matt and opaque. A warning lists gloss, mirrors and glass, which are not rendered.
 """
 
 from __future__ import annotations
@@ -40,12 +40,16 @@ _HERE = Path(__file__).parents[1]
 class ModelScene:
     """The parts of a model that tracers need. Mitsuba's scenes are built on first use.
 
-    model: the MuJoCo model · eye: determines the spectral bands · variant: Mitsuba's variant
-    geoms: ids of all visible geoms · looks: appearances of all these geoms
+    model: the MuJoCo model
+    eye: determines the spectral bands
+    variant: Mitsuba's variant
+    geoms: ids of all visible geoms
+    looks: appearances of these geoms
     moving: appearances that may change their place, size or colour
     bsdfs: one for every appearance; stored here, because a BSDFPtr does not keep its objects alive
-    lights: all lights · spectra: measured spectra of materials and lights, by name
-    has_sky: whether rays without a hit reach a sky
+    lights: all lights
+    spectra: measured spectra of materials and lights, by name
+    has_sky: True if rays without a hit reach a sky
     glows: BSDFs whose reflectance is the radiance of a glowing geom, by appearance; such geoms count as movers
     varied: geoms whose size or colour differs between worlds, with the ids of the materials that each may have; they
         count as movers, although they may be static
@@ -67,8 +71,8 @@ class ModelScene:
         self.model, self.eye, self.variant, self._groups = model, eye, default_variant(), groups
         self.spectra = resolve(model, spectra)
         in_bands, self._off = lights_in_bands(model, self.spectra, eye)
-        self._seen = surfaces.visible(model, groups)
-        self.geoms = [g for g in self._seen if shapes.has_shape(model, g)]
+        self._visible = surfaces.visible(model, groups)
+        self.geoms = [g for g in self._visible if shapes.has_shape(model, g)]
         surfaces.require_geoms(model, self.geoms)
         data = mujoco.MjData(model)
         mujoco.mj_forward(model, data)
@@ -95,12 +99,14 @@ class ModelScene:
     def _may_change(self, look: Appearance) -> bool:
         return _moves(self.model, look.geom) or look.geom in self.varied or look in self.glows
 
-    def tell_what_is_missing(self, light: str = DIRECT) -> None:
-        """Warn (`sim.MirrorWarning`) of features that are not rendered if this part of the light is followed, and of
-        measured lights for which the eye has too few bands."""
+    def warn_of_missing(self, light: str = DIRECT) -> None:
+        """Warn (`sim.MirrorWarning`) of features that are not rendered with this level of light.
+
+        Also warn of measured lights for which the eye has too few bands.
+        """
         model = self.model
         of_sky = ["light of the sky on surfaces"] if light == DIRECT and self.has_sky else []
-        missing = [*self._unlit, *of_sky, *inventory.left_out(model, self._seen, self._groups)]
+        missing = [*self._unlit, *of_sky, *inventory.left_out(model, self._visible, self._groups)]
         missing += _not_matt(model, self.looks, light)
         told = [f"eyes do not see: {'; '.join(missing)}"] if missing else []
         for words in (*told, *filter(None, [self.coincidences.message(model)]), *self._off):
@@ -111,7 +117,7 @@ class ModelScene:
         """Snapshot of the model, with which worlds are compared."""
         model, groups = self.model, self._groups
         reachable = [g for g in range(model.ngeom) if model.geom_group[g] in groups and shapes.has_shape(model, g)]
-        hidden = [g for g in reachable if g not in self._seen]
+        hidden = [g for g in reachable if g not in self._visible]
         moving = np.array([look.geom for look in self.moving], int)
         fixed = [look.geom for look in self.moving if not is_resizable(look.model, look.geom)]
         return ModelSnapshot(model, self.geoms, hidden, moving, np.setdiff1d(moving, fixed), self.varied)
@@ -145,8 +151,11 @@ class ModelScene:
         return bsdfs.matt(look.model, look.geom, to_uv, of_geom(look.model, look.geom, self.spectra))
 
     def _glow(self, look: Appearance, white: bool) -> MitsubaObject | None:
-        """Return a BSDF whose reflectance is the radiance of a glowing geom; None if the geom does not glow. The kernel
-        evaluates it like other BSDFs. If it is white, the kernel multiplies it by its world's colour."""
+        """Return a BSDF whose reflectance is the radiance of a glowing geom; None if the geom does not glow.
+
+        The kernel evaluates it like other BSDFs. If it is white, the kernel multiplies it by the colour in the lane's
+        world.
+        """
         to_uv, geom = shapes.uv_transform(look.model, look.geom), look.geom
         model = in_white(look.model, geom) if white else look.model
         radiance = lights.glow(model, geom, to_uv, of_geom(model, geom, self.spectra))
@@ -155,9 +164,12 @@ class ModelScene:
         return mi.load_dict({"type": "twosided", "inside": {"type": "diffuse", "reflectance": radiance}})
 
     @cached_property
-    def told_apart(self) -> tuple[MitsubaObject, np.ndarray]:
-        """Mitsuba scene in which every static geom has its own shapes, and a table from the shapes' ids in Mitsuba to
-        geoms (-1 for unused ids). On a GPU, a ray reports only the id of the shape that it hits."""
+    def one_shape_per_geom(self) -> tuple[MitsubaObject, np.ndarray]:
+        """Mitsuba scene in which every static geom has its own shapes, and a table from shapes' ids to geoms.
+
+        The table contains -1 for unused ids. It is necessary because a ray on a GPU reports only the id of the shape
+        that it hits.
+        """
         with in_variant(self.variant):
             built = {name: shapes.build(part, pose, name, bsdf, None) for name, part, pose, bsdf in self._still_parts()}
             scene = mi.load_dict({"type": "scene", **built}, optimize=False)
@@ -191,7 +203,7 @@ def _outside() -> int:
 
 
 def _not_matt(model: mujoco.MjModel, looks: Sequence[Appearance], light: str) -> list[str]:
-    """Return descriptions of surface properties that are left out."""
+    """Return descriptions of surface properties that are not rendered."""
     materials = sorted({look.material for look in looks if look.material >= 0})
     glossy = [m for m in materials if bsdfs.has_gloss(model, m)]
     glowing = [m for m in materials if model.mat_emission[m] > 0 and light == DIRECT]

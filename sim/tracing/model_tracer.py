@@ -1,9 +1,9 @@
 """A tracer of rays through any model: Mitsuba intersects static geoms, `sim.tracing.movers` the moving ones.
 
-Direct light comes from lamps only. For light that bounces (`sim.tracing.lighting`), a bounce ray leaves every visible
-surface. It collects light that the second surface reflects or emits, or light of the sky. If there is a sky or a
-glowing geom, another ray leaves the second surface and collects only their light. All light that is reflected at most
-twice is included.
+Direct light comes from lamps only. With bounced light (`sim.tracing.lighting`), a bounce ray leaves every visible
+surface. It collects light that a second surface reflects or emits, or light of the sky. If there is a sky or a glowing
+geom, another ray leaves the second surface and collects the light of sky and glowing geoms. This includes all light
+after at most two reflections.
 """
 
 from __future__ import annotations
@@ -38,9 +38,10 @@ class Scenes:
 
 @dataclass(frozen=True)
 class Tables:
-    """Arrays that are the same in all worlds. bsdfs: of all movers · ends, painted: see `Movers` and `Paint`
+    """Arrays that are the same in all worlds.
 
-    sky: an emitter, or None · glowing: for each mover, its index in `glows` · glows: BSDFs of glowing geoms, or None
+    bsdfs: BSDFs of all movers · ends: see `Movers` · painted: see `Paint`
+    sky: an emitter, or None · glows: BSDFs of glowing geoms, or None · glowing: for each mover, its index in `glows`
     """
 
     bsdfs: Array
@@ -100,8 +101,8 @@ class _SurfaceHit:
     """First hits of rays.
 
     si: interaction for the BSDF · colors, glow: factors of its reflectance and of its emission, per chunk of bands
-    which: number of the mover, or the number of movers for none · seen: whether anything is hit · active: traced rays
-    point, normal: in the world, the normal towards the ray's origin · t: distance [m] · direction: of the ray
+    which: number of the mover, or the number of movers for none · seen: True for a hit · active: traced rays
+    point, normal: in the world; the normal points to the ray's origin · t: distance [m] · direction: of the ray
     """
 
     si: Array
@@ -121,7 +122,7 @@ class ModelTracer:
     """A tracer of rays through any model. Surfaces are Lambertian; lamps are sampled once per ray and reflection.
 
     name, why: name of the tracer, and the reason for its choice, for reports
-    light: the part of the light that is followed, "direct" or "bounce"
+    light: level of light, "direct" or "bounce"
     basis: (component, band): contribution of each component to each band; each component is one band
     """
 
@@ -136,7 +137,7 @@ class ModelTracer:
         self.scene = Scenes(scene.still, scene.movers.atlas.scene)
         shapes = scene.still.shapes()
         self._any_still = len(shapes) > 0
-        # Never empty: the recording collects the BSDFs' textures only if a BSDF is among the inputs.
+        # Never empty: a recording includes the BSDFs' textures only if a BSDF is among the inputs.
         known = [*(scene.bsdfs[look] for look in scene.movers.looks), *(shape.bsdf() for shape in shapes[:1])]
         sky = mi.EmitterPtr([scene.still.environment()]) if scene.has_sky else None
         self.inputs = Tables(mi.BSDFPtr(known), scene.movers.ends, scene.paint.painted, sky, *self._of_glows())
@@ -170,7 +171,7 @@ class ModelTracer:
     def radiance(self, seen: EyeRay, there: Surroundings, samples: Array) -> tuple[list[Array], Array]:
         """Return the light along each ray, per band, and the distance to the visible surface [m]. The samples of a ray,
         two points on the unit square, determine its bounce rays (`lighting.spawn_bounce_ray`)."""
-        met = self._met(seen.ray, there)
+        met = self._first_hits(seen.ray, there)
         arrives = self._irradiance(met, seen.axis, there)
         if self.light == lighting.BOUNCE:
             reflected = self._returned(met, seen.axis, there, samples)
@@ -179,27 +180,27 @@ class ModelTracer:
         return [spectra[b // lighting.LANES][b % lighting.LANES] for b in range(len(self.basis))], met.t
 
     def _returned(self, met: _SurfaceHit, axis: Array, there: Surroundings, samples: Array) -> list[Array]:
-        """Return the light that reaches each visible surface from one direction, drawn from Lambert's cosine: light of
-        the sky or of a glowing geom, and light of lamps, sky and glowing geoms that a second surface reflects."""
+        """Return the light that reaches each visible surface from a random direction (Lambert's cosine). It comes from
+        the sky, from a glowing geom, or from a second surface that reflects light of lamps, sky and glowing geoms."""
         bounce_ray = lighting.spawn_bounce_ray(met.point, met.normal, mi.Point2f(samples.x, samples.y))
-        second = self._met(bounce_ray, there, met.seen)
+        second = self._first_hits(bounce_ray, there, met.seen)
         arrives = self._irradiance(second, axis, there)
         if self._scene.has_sky or self._glows:
             further = lighting.spawn_bounce_ray(second.point, second.normal, mi.Point2f(samples.z, samples.w))
-            last = self._met(further, there, second.seen)
+            last = self._first_hits(further, there, second.seen)
             emitted = self._emitted(last, there)
             arrives = [e + dr.pi * more for e, more in zip(arrives, emitted, strict=True)]
         found = self._sent(second, arrives, there)
         return [dr.select(met.seen, spectrum, 0) for spectrum in found]
 
-    def _met(self, ray: Array, there: Surroundings, active: Array | None = None) -> _SurfaceHit:
+    def _first_hits(self, ray: Array, there: Surroundings, active: Array | None = None) -> _SurfaceHit:
         """Return the first hits of rays."""
         movers = self._scene.movers
         active = mi.Bool(True) if active is None else active
         ray.wavelengths = self._bands[0]
         si = there.still.ray_intersect(ray, active) if self._any_still else _nothing()
         if movers.apart:
-            computed(si)  # evaluated here: otherwise every kernel that reads `si` would trace the rays again
+            computed(si)  # evaluated here, because otherwise every kernel that reads `si` would trace the rays again
         far = dr.select(active, si.t, 0)
         hit = movers.nearest(ray, far, there.movers)
         on_mover = active & (hit.which < len(movers))
@@ -229,8 +230,9 @@ class ModelTracer:
         return self._scene.movers.nearest(ray, far, there.movers).t
 
     def which(self, ray: Array, there: Surroundings) -> Array:
-        """Return the first hit of each ray: a mover's number, or the number of movers plus the Mitsuba id of a static
-        shape, 0 for none. Every static geom has its own shapes, see `ModelScene.told_apart`."""
+        """Return the number of the surface that each ray hits first. It is a mover's number, or the number of movers
+        plus the Mitsuba id of a static shape (0 for none). Every static geom has its own shapes, see
+        `ModelScene.one_shape_per_geom`."""
         movers, any_still = len(self._scene.movers), len(there.still.shapes()) > 0
         si = there.still.ray_intersect_preliminary(ray) if any_still else _nothing()
         far = dr.select(si.is_valid(), si.t, dr.inf)
@@ -239,7 +241,7 @@ class ModelTracer:
         return dr.select(hit.which < movers, hit.which, movers + dr.select(si.is_valid(), shape, 0))
 
     def _irradiance(self, met: _SurfaceHit, axis: Array, there: Surroundings) -> list[Array]:
-        """Return the irradiance of surfaces by lamps, as spectra of LANES bands each."""
+        """Return the irradiance of surfaces due to lamps, as spectra of LANES bands each."""
         start = lighting.clear_of(met.point, met.normal)
         total = [mi.Spectrum(0) for _ in self._bands]
         for k, light in enumerate(self._scene.lights.found):

@@ -27,16 +27,18 @@ from sim.tracing.primitives import PRIMITIVES, Primitive
 from sim.tracing.world_rows import WorldRows
 
 _TYPES = mujoco.mjtGeom
-# Rows of four floats for each mover: a sphere around its origin; then, three times, an axis of its frame in the world
-# and one of its sizes. The sizes of a mesh are the centre of its cell in the atlas.
+# Rows of four floats for each mover: a sphere around its origin, then three times an axis of its frame in the world,
+# followed by one of its sizes. The sizes of a mesh are the centre of its cell in the atlas.
 ROWS = 4
 MESH = "mesh"
 
 
 @dataclass(frozen=True)
 class Hit:
-    """First hit of a ray. t: distance [m], infinite without a hit · which: number of the mover · normal: unit vector in
-    the world · uv: texture coordinates of meshes and planes."""
+    """First hit of a ray. t: distance [m], infinite without a hit · which: number of the mover
+
+    normal: unit vector in the world · uv: texture coordinates of meshes and planes
+    """
 
     t: Array
     which: Array
@@ -46,9 +48,9 @@ class Hit:
 
 @dataclass(frozen=True)
 class _Frame:
-    """A mover's frame. axes: its axes in the world (3 Vector3f) · origin: its origin in the world (Vector3f)
+    """A mover's frame. axes, origin: axes (3 Vector3f) and origin (Vector3f) of the frame in the world
 
-    size: its half sizes · reach: largest distance of its surface from its origin
+    size: half sizes of the mover · reach: largest distance of its surface from the origin
     """
 
     axes: tuple[Array, Array, Array]
@@ -57,11 +59,11 @@ class _Frame:
     reach: Array
 
     def taken(self, v: Array) -> Array:
-        """Return a direction of the world in the mover's frame."""
+        """Convert a direction from the world's frame to the mover's frame."""
         return mi.Vector3f(*(dr.dot(axis, v) for axis in self.axes))
 
     def given(self, v: Array) -> Array:
-        """Return a direction of the mover's frame in the world."""
+        """Convert a direction from the mover's frame to the world's frame."""
         return self.axes[0] * v.x + self.axes[1] * v.y + self.axes[2] * v.z
 
 
@@ -73,10 +75,10 @@ class MoverRows(WorldRows):
 
 
 class Movers:
-    """The moving geoms of a model, primitives first, by kind. A geom with drawn materials has a mover per appearance.
+    """The moving geoms ("movers") of a model: primitives by kind, then meshes. Each appearance of a geom is a mover.
 
     looks: appearance of each mover · geoms: geom id of each mover, (mover,)
-    atlas: all other movers · lifts: distances by which surfaces are moved outwards [m], by geom
+    atlas: the movers that are meshes · lifts: distances by which surfaces are moved outwards [m], by geom
     ends: number of the first mover of each kind, for the kernel
     """
 
@@ -115,7 +117,7 @@ class Movers:
 
     @property
     def apart(self) -> bool:
-        """True if movers are intersected in their own kernel, which no branch can contain: see `computed`."""
+        """True if movers are intersected in a separate kernel, which cannot be inside a branch (see `computed`)."""
         return self.atlas.scene is not None and on_gpu()
 
     @property
@@ -144,8 +146,7 @@ class Movers:
         return rows.reshape(poses.n, -1)
 
     def _absent(self, poses: Poses) -> np.ndarray | None:
-        """Return a mask of the appearances that a world does not show, (world or 1, mover); None if all worlds show
-        all."""
+        """Return a mask of the appearances that a world does not show, (world or 1, mover); None if there are none."""
         if not self._drawn.any():
             return None
         here = self._as_built if poses.geom_matid is None else poses.geom_matid
@@ -153,8 +154,8 @@ class Movers:
         return absent
 
     def _extents(self, poses: Poses) -> tuple[np.ndarray, np.ndarray]:
-        """Return the movers' half sizes (world or 1, mover, 3), a sphere's radius three times, and the largest distance
-        of each mover's surface from its origin [m], (world or 1, mover)."""
+        """Return the movers' half sizes (world or 1, mover, 3), three radii for a sphere, and the largest distance of
+        each surface from its origin [m], (world or 1, mover)."""
         if poses.geom_size is None:
             sizes = self._sizes[None].copy()
         else:
@@ -188,7 +189,7 @@ class Movers:
             found = self._nearest(ray, farthest, there)
             computed(found)
             return Hit(*found)
-        near = _may_meet(ray, there, 0)
+        near = _may_hit(ray, there, 0)
         found = dr.if_stmt((), near, lambda: self._nearest(ray, farthest, there), lambda: none)
         return Hit(*found)
 
@@ -199,7 +200,7 @@ class Movers:
             blocked = self._block(ray, farthest, there)
             computed(blocked)
             return blocked
-        near = _may_meet(ray, there, 0) & (farthest > 0)
+        near = _may_hit(ray, there, 0) & (farthest > 0)
         return dr.if_stmt((), near, lambda: self._block(ray, farthest, there), lambda: mi.Bool(False))
 
     def _nearest(self, ray: Array, farthest: Array, there: MoverRows) -> tuple[Array, ...]:
@@ -207,7 +208,7 @@ class Movers:
         for i, hit in self._kinds():
 
             def step(k: Array, t: Array, which: Array, hit: Callable[..., Array] = hit) -> tuple[Array, ...]:
-                found = _met(hit, ray, there, k)
+                found = _distance_to(hit, ray, there, k)
                 nearer = found < t
                 return k + 1, dr.select(nearer, found, t), dr.select(nearer, k, which)
 
@@ -220,7 +221,7 @@ class Movers:
         for i, hit in self._kinds():
 
             def step(k: Array, blocked: Array, hit: Callable[..., Array] = hit) -> tuple[Array, ...]:
-                return k + 1, blocked | (_met(hit, ray, there, k) < farthest)
+                return k + 1, blocked | (_distance_to(hit, ray, there, k) < farthest)
 
             _, blocked = _loop(i, there, step, blocked)
         return blocked
@@ -262,7 +263,7 @@ def _of_primitive(primitive: Primitive) -> Callable[..., Array]:
     return lambda o, d, frame: primitive.hit(o, d, frame.size)
 
 
-def _met(hit: Callable[..., Array], ray: Array, there: MoverRows, k: Array) -> Array:
+def _distance_to(hit: Callable[..., Array], ray: Array, there: MoverRows, k: Array) -> Array:
     """Return the distance to mover k along a ray [m]. A branch skips the intersection if a ray misses the sphere around
     the mover, as most rays and their neighbours do. The origin of an absent mover is NaN, so all rays miss it."""
 
@@ -270,7 +271,7 @@ def _met(hit: Callable[..., Array], ray: Array, there: MoverRows, k: Array) -> A
         frame = _frame(there, k)
         return hit(frame.taken(ray.o - frame.origin), frame.taken(ray.d), frame)
 
-    found: Array = dr.if_stmt((), _may_meet(ray, there, 1 + k * ROWS), within, lambda: mi.Float(dr.inf))
+    found: Array = dr.if_stmt((), _may_hit(ray, there, 1 + k * ROWS), within, lambda: mi.Float(dr.inf))
     return found
 
 
@@ -282,7 +283,7 @@ def _frame(there: MoverRows, k: Array) -> _Frame:
     return _Frame((a, b, c), mi.Vector3f(x, y, z), mi.Vector3f(*(four[3] for four in fours)), reach)
 
 
-def _may_meet(ray: Array, there: MoverRows, row: Array | int) -> Array:
+def _may_hit(ray: Array, there: MoverRows, row: Array | int) -> Array:
     """Return whether a ray hits the sphere of this row."""
     x, y, z, radius = there.four(row)
     way, square = mi.Vector3f(x, y, z) - ray.o, radius * radius

@@ -1,8 +1,9 @@
-"""Colours that differ between worlds, as reflectances in the eye's bands, for the kernel.
+"""Colours of geoms that differ between worlds ("paint"), as reflectances in the eye's bands.
 
-Painted geoms are built in white, multiplied by their texture if they have one. The kernel multiplies them by their
-world's colour, as MuJoCo multiplies a texture by a colour. Spectra of colours are Mitsuba's (Jakob and Hanika 2019), as
-in all scenes. Glowing geoms glow in their world's colour, with the spectrum of `sim.scene.lights.emission`.
+The BSDF of a painted geom is white, times its texture if it has one. The kernel multiplies its reflectance by the
+colour in the lane's world, as MuJoCo multiplies a texture by a colour. As in all scenes, Mitsuba converts colours to
+spectra (Jakob and Hanika 2019). A glowing geom emits light of this colour, with the spectrum of
+`sim.scene.lights.emission`.
 """
 
 from __future__ import annotations
@@ -25,15 +26,17 @@ from sim.tracing.world_rows import WorldRows
 
 @dataclass(frozen=True)
 class PaintRows(WorldRows):
-    """Rows of one world. painted: see `Paint`"""
+    """Rows of one world: reflectances of the painted geoms. painted: see `Paint`"""
 
     painted: Array
 
 
 class Paint:
-    """Colours of some geoms, in the order of `geoms`. The scene's Mitsuba variant must be in force.
+    """Colours of the painted geoms. The scene's Mitsuba variant must be active.
 
-    geoms: ids of the geoms · movers: geom id of each mover · glow: whether any of the geoms glows
+    geoms: ids of the painted geoms
+    movers: geom id of each mover
+    glow: True if any of the painted geoms glows
     painted: index in `geoms` of each mover's geom, or len(geoms) for geoms without paint, for the kernel
     """
 
@@ -58,8 +61,7 @@ class Paint:
         return max(len(self) * len(self._spectra) * (1 + self.glow), 1)
 
     def rows(self, poses: Poses) -> np.ndarray:
-        """Return reflectances, (world, 4 n_rows) float32. If any geom glows, the factors of the glow follow in each
-        world."""
+        """Return reflectances, (world, 4 n_rows) float32, in each world followed by emissions if any geom glows."""
         rows = np.zeros((poses.n, self.n_rows * lighting.LANES), np.float32)
         if not len(self):
             return rows
@@ -71,8 +73,10 @@ class Paint:
         return rows
 
     def _colors(self, poses: Poses) -> np.ndarray:
-        """Return sRGB colours, (world or 1, geom, 3). As in MuJoCo, a geom whose own colour is unset has its
-        material's."""
+        """Return sRGB colours, (world or 1, geom, 3).
+
+        As in MuJoCo, a geom without a colour has the colour of its material.
+        """
         if poses.geom_rgba is None:
             return self._own[None]
         here = poses.geom_rgba[:, self.geoms]
@@ -80,7 +84,7 @@ class Paint:
         return np.where(unset, self._own, here[..., :3])
 
     def factors(self, which: Array, there: PaintRows, seen: Array, *, glow: bool = False) -> list[Array]:
-        """Return the factors of a mover's reflectances, or of its glow, as spectra."""
+        """Return the factors of a mover's reflectance, or of its emission, as spectra."""
         k = dr.gather(mi.UInt32, there.painted, which, seen)
         painted = seen & (k < len(self))
         start = len(self) * len(self._spectra) if glow else 0
@@ -91,8 +95,11 @@ class Paint:
         return found
 
     def _spectrum(self, rgb: tuple[float, ...], emitted: bool) -> np.ndarray:
-        """Return the reflectance (band,) of a display-referred colour. emitted: as for emitters, the reflectance of the
-        colour's hue times the colour's largest component."""
+        """Return the reflectance (band,) of a display-referred colour.
+
+        emitted: True to return the factor of an emission instead: the reflectance of the colour's hue, times the
+            colour's largest component
+        """
         if (rgb, emitted) not in self._known:
             if len(self._known) > 10_000:
                 self._known.clear()

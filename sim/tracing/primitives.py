@@ -1,9 +1,9 @@
 """Intersections of rays with MuJoCo's primitives, in the geom's own frame, from outside.
 
-Only the outer sides of faces are visible, except for planes. As in MuJoCo's rendering, an eye inside a body looks out
-of it. Distances are multiples of the direction's length, and infinite for a miss. Roots are computed relative to the
-point at which the ray is nearest to the geom's centre or axis, so that hits of small or distant geoms are accurate in
-float32.
+Only the outer sides of faces are visible, except for planes. As in MuJoCo's rendering, an eye inside a body therefore
+sees through its surface. Distances are multiples of the direction's length, and infinite for a miss. Roots are computed
+relative to the point at which the ray is nearest to the geom's centre or axis, so that hits of small or distant geoms
+are accurate in float32.
 """
 
 from __future__ import annotations
@@ -18,15 +18,17 @@ from optics.numerics.autodiff import Array
 from sim.scene.primitive_geoms import PLANE
 
 TINY = 1e-20
-# If the component of a unit direction across a surface is smaller, the ray counts as parallel to it and misses it.
+# A ray counts as parallel to a surface, and misses it, if its unit direction has a smaller component across the
+# surface.
 PARALLEL = 1e-9
 
 
 @dataclass(frozen=True)
 class Primitive:
-    """Functions for one kind of primitive; size: MuJoCo's sizes.
+    """Functions for one kind of primitive. size: MuJoCo's sizes
 
-    hit: (origin, direction, size) -> distance · normal: (point, size) -> outward normal, not normalised
+    hit: (origin, direction, size) -> distance
+    normal: (point, size) -> outward normal, not normalised
     """
 
     hit: Callable[[Array, Array, Array], Array]

@@ -40,8 +40,10 @@ class Atlas:
 
 
 def bake(model: mujoco.MjModel, geoms: Sequence[int], bsdfs: Sequence[MitsubaObject], wavelengths: np.ndarray) -> Atlas:
-    """Return the atlas of these geoms' BSDFs at wavelengths [m], with one texture per geom. Geoms with the same BSDF
-    share texels."""
+    """Return the atlas of these geoms' BSDFs at wavelengths [m], with one texture per geom.
+
+    Geoms with the same BSDF share texels.
+    """
     texels: list[np.ndarray] = []
     places: dict[int, tuple[tuple[int, int, int], np.ndarray]] = {}
     for geom, bsdf in zip(geoms, bsdfs, strict=True):

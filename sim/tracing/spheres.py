@@ -26,9 +26,9 @@ TURNED = 1e-6  # smallest change of a rotation that is not a rounding error
 class Spheres:
     """The moving spheres of a scene; only their positions differ between worlds.
 
-    radii: [m], (k,)
+    radii: radii [m], (k,)
     frames: rotation from each sphere's frame to the world's, (k, 3, 3)
-    textured: whether each sphere has a texture, (k,)
+    textured: True for spheres with a texture, (k,)
     names: names of the geoms
     bsdfs: one Mitsuba BSDF per sphere; stored here, because a BSDFPtr does not keep its objects alive
     geoms: ids of the geoms, (k,)
@@ -86,14 +86,14 @@ def nearest(spheres: Spheres, centres: list[Array], ray: Array, t: Array) -> tup
     """Return the distance [m] to the first sphere that a ray hits closer than `t`, and the number of this sphere.
 
     Without such a hit, they are `t` and len(spheres). If there are fewer centres than spheres, the last spheres are
-    left out.
+    ignored.
     """
     which = mi.UInt32(len(spheres))
     for k, centre in enumerate(centres):
         b, c = _quadratic(ray, centre, float(spheres.radii[k]))
         discriminant = b * b - c
         root = dr.sqrt(dr.maximum(discriminant, 0))
-        # From inside (c < 0), the far side is visible.
+        # If the ray starts inside (c < 0), the far side is visible.
         t_k = dr.select(c < 0, root - b, -b - root)
         hit = (discriminant > 0) & (t_k > 0) & (t_k < t)
         t = dr.select(hit, t_k, t)
@@ -125,8 +125,10 @@ def normal_and_uv(spheres: Spheres, centres: list[Array], which: Array, point: A
 
 
 def surface_point(spheres: Spheres, centres: list[Array], which: Array, normal: Array) -> Array:
-    """Return the point of sphere `which` at which the surface has this normal. (Rounding may place the hit point of a
-    distant sphere inside it, where the sphere would shade itself.)"""
+    """Return the point of sphere `which` at which the surface has this normal.
+
+    It replaces the hit point, which rounding may place inside a distant sphere, where the sphere would shade itself.
+    """
     point = mi.Point3f(0)
     for k, centre in enumerate(centres):
         point = dr.select(which == k, centre + normal * float(spheres.radii[k]), point)

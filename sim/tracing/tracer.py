@@ -24,7 +24,7 @@ TRACERS = ("auto", ClosedForm.name, ModelTracer.name)
 
 
 class Buffers(Protocol):
-    """Buffers of everything that differs between worlds, which kernels read."""
+    """Buffers that kernels read, for all values that differ between worlds."""
 
     def fill(self, poses: Poses) -> None:
         """Write the rows of these worlds."""
@@ -36,8 +36,9 @@ class Buffers(Protocol):
 class Tracer(Protocol):
     """A method of tracing rays.
 
-    name: one of TRACERS · why: reason for its choice
-    light: one of `lighting.LEVELS`: which reflections are followed
+    name: one of TRACERS
+    why: reason for its choice
+    light: level of light, one of `lighting.LEVELS`
     basis: (component, band): radiance_b = sum_k basis[k, b] component_k
     """
 
@@ -103,10 +104,10 @@ class Tracers:
         return self.tracer_for(lighting.DIRECT).name == ClosedForm.name
 
     def tracer_for(self, light: str) -> Tracer:
-        """Return the tracer that follows this light, one of `lighting.LEVELS`.
+        """Return the tracer for this level of light, one of `lighting.LEVELS`.
 
         Raises:
-            ValueError: no tracer follows this light.
+            ValueError: no tracer supports this level.
         """
         if light not in self._known:
             with variant(self._scene.variant):

@@ -1,6 +1,7 @@
-"""A model as upright walls, a floor and moving spheres, seen by eyes that stay level.
+"""A model as upright walls, a floor and moving spheres, for eyes that stay upright.
 
-For models of another form, `NoClosedForm` states the reason in one line, with the name of the geom, light or body.
+If a model cannot be represented in this form, `NoClosedForm` states the reason in one line, with the name of the geom,
+light or body.
 """
 
 from __future__ import annotations
@@ -28,15 +29,18 @@ _KEEP_THEIR_WAY = (int(mujoco.mjtCamLight.mjCAMLIGHT_FIXED), int(mujoco.mjtCamLi
 
 @dataclass(frozen=True)
 class UprightScene:
-    """A model in closed form.
+    """A model as walls, a floor and spheres, whose intersections with a ray have a closed form.
 
-    stand: the body that the eyes are fixed to · walls: all walls and the floor · lights: all lights
-    spheres: all visible spheres · bodies: these spheres, followed by the eyes' own body if it is a sphere, which the
-        eyes do not see
+    stand: the body that the eyes are fixed to
+    walls: all walls and the floor
+    lights: all lights
+    spheres: all visible spheres
+    bodies: these spheres, followed by the eyes' own body if it is a sphere, which the eyes do not see
     heights: heights of all bodies' centres in the reference pose [m], (body,)
-    settled: whether each body keeps this height, (body,)
-    model: the MuJoCo model · variant: Mitsuba's variant
-    bsdfs: BSDF of each geom, by id; geoms that look alike share one object
+    settled: True for bodies that keep this height, (body,)
+    model: the MuJoCo model
+    variant: Mitsuba's variant
+    bsdfs: BSDF of each geom, by id; geoms of equal appearance share one object
     """
 
     model: mujoco.MjModel
@@ -132,8 +136,10 @@ def _checked(model: mujoco.MjModel, light: ModelLight) -> DirectionalLight:
 def _refuse_what_eyes_would_see(
     model: mujoco.MjModel, data: mujoco.MjData, stand: LevelStand, own: Sequence[int]
 ) -> None:
-    """Refuse eyes that would see their own body. The body must be a sphere, with eyes on its surface that look straight
-    away from its centre."""
+    """Refuse eyes that would see their own body.
+
+    The body must be a sphere, and its eyes must lie on its surface and look straight away from its centre.
+    """
     if not own:
         return
     name = model.body(stand.body).name
@@ -151,7 +157,7 @@ def _refuse_what_eyes_would_see(
 
 
 def _alike(scene: ModelScene) -> dict[int, MitsubaObject]:
-    """Return BSDFs by geom; geoms that look alike share one object."""
+    """Return BSDFs by geom. Geoms of equal appearance share one object."""
     first: dict[tuple[object, ...], Appearance] = {}
     found = {}
     for look in scene.looks:

@@ -14,18 +14,19 @@ from optics.numerics.autodiff import Array
 from sim.scene.device_arrays import floats
 from sim.tracing.walls import ALIGNED, SIDES, NoClosedForm, Walls
 
-# Largest number of walls that are tested one by one; for this number, a walk through a grid costs about the same.
+# Largest number of walls that are tested one by one. For this number, a walk through a grid takes about the same time.
 FEW = 8
 CELLS = 1_000_000  # largest number of cells in a grid
-NEVER_ZERO = 1e-9  # replaces smaller components of directions, which shifts no hit past the end of a wall
+NEVER_ZERO = 1e-9  # replaces smaller components of directions; this shifts no hit past the end of a wall
 
 
 @dataclass(frozen=True)
 class CellTables:
     """Tables of a grid's cells, row by row.
 
-    wall: number of the wall that fills the cell · top: height of this wall's top [m]
-    stop: height [m] below which a ray ends in the cell
+    wall: number of the wall that fills the cell
+    top: height of this wall's top [m]
+    stop: height [m] below which a ray stops in the cell
     """
 
     wall: Array
@@ -36,7 +37,8 @@ class CellTables:
 class Footprints(Protocol):
     """A method of intersecting rays with walls.
 
-    how: description for reports · tables: the grid's cells, for the kernel; None: walls are tested one by one
+    how: description for reports
+    tables: the grid's cells, for the kernel; None: walls are tested one by one
     """
 
     how: str
@@ -108,8 +110,10 @@ class EachWall:
 
 
 class Cells:
-    """A walk through a grid of cells that are empty or filled by one wall. Rays that leave the grid end in a ring of
-    cells around it."""
+    """A walk through a grid of cells that are empty or filled by one wall.
+
+    Rays that leave the grid stop in a ring of cells around it.
+    """
 
     def __init__(self, walls: Walls) -> None:
         self._side, origin, cells = cells_of(walls)
@@ -195,8 +199,10 @@ class Cells:
 
 
 def cells_of(walls: Walls) -> tuple[float, np.ndarray, np.ndarray]:
-    """Return the coarsest grid in which each wall fills whole cells: the side of a cell [m], the grid's lower corner
-    (2,), and the number of the wall that fills each cell (row, column), -1 for none.
+    """Return the coarsest grid in which each wall fills whole cells.
+
+    The result is the side of a cell [m], the grid's lower corner (2,), and the number of the wall that fills each cell
+    (row, column), -1 for none.
 
     Raises:
         NoClosedForm: walls that lie on no grid, or overlap.
@@ -212,8 +218,10 @@ def cells_of(walls: Walls) -> tuple[float, np.ndarray, np.ndarray]:
 
 
 def _finished(t: Array, face: Array, through_x: Array, dx: Array, dy: Array) -> tuple[Array, Array, Array]:
-    """Return the distance, the number of the hit face, and its normal; face: number of the wall's first face. Faces are
-    ordered -x, +x, -y, +y."""
+    """Return the distance, the number of the hit face, and its normal.
+
+    face: number of the wall's first face. The faces of a wall are in the order -x, +x, -y, +y.
+    """
     x, y = dr.select(dx > 0, -1.0, 1.0), dr.select(dy > 0, -1.0, 1.0)
     side = dr.select(
         through_x, dr.select(dx > 0, mi.UInt32(0), mi.UInt32(1)), dr.select(dy > 0, mi.UInt32(2), mi.UInt32(3))
@@ -227,8 +235,10 @@ def _never_zero(d: Array) -> Array:
 
 
 def _grid(walls: Walls) -> tuple[float, np.ndarray, tuple[int, int]]:
-    """Return the side of a cell [m], the lower corner (2,), and the numbers of rows and columns of the coarsest square
-    grid whose lines contain all faces of the walls."""
+    """Return the coarsest square grid whose lines contain all faces of the walls.
+
+    The result is the side of a cell [m], the lower corner (2,), and the numbers of rows and columns.
+    """
     faces = [np.unique(np.round(np.concatenate([walls.lower[:, a], walls.upper[:, a]]), 6)) for a in range(2)]
     origin = np.array([f[0] for f in faces])
     side = 0.0

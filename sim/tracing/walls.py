@@ -1,8 +1,8 @@
-"""A static world in closed form: upright walls on a floor, if the model consists of these.
+"""The static part of a world in closed form: upright walls on a floor.
 
 Walls are axis-aligned boxes that reach from the floor to above the eyes. Their tops and bottoms are not visible from
-the eyes. A ray therefore hits a wall when it enters the wall's footprint, if it is below the wall's top there. Texture
-coordinates are affine on every face; they are taken from the mirror's own triangles.
+the eyes. A ray therefore hits a wall where it enters the wall's footprint, if it is below the wall's top there. Texture
+coordinates are affine on every face, and follow from the mirror's triangles.
 """
 
 from __future__ import annotations
@@ -22,15 +22,17 @@ ALIGNED = 1e-6
 
 
 class NoClosedForm(ValueError):
-    """The reason why a world has no closed form."""
+    """A world has no closed form. The message states the reason."""
 
 
 @dataclass(frozen=True)
 class Walls:
     """Walls and floor of a world.
 
-    lower, upper: corners of the walls' footprints [m], (n, 2) · top: height of each wall's top [m], (n,)
-    floor: height of the floor [m] · floor_lower, floor_upper: corners of the floor [m], (2,)
+    lower, upper: corners of the walls' footprints [m], (n, 2)
+    top: height of each wall's top [m], (n,)
+    floor: height of the floor [m]
+    floor_lower, floor_upper: corners of the floor [m], (2,)
     uv: texture coordinates of faces, (SIDES n + 1, 2, 4): (u, v) = uv @ (x, y, z, 1); the floor comes last
     geoms: geom id of each face, (SIDES n + 1,)
     """

@@ -1,4 +1,4 @@
-"""Rows of four floats for everything that differs between worlds, which kernels read."""
+"""Rows of four floats that kernels read, for all values that differ between worlds."""
 
 from __future__ import annotations
 
@@ -13,7 +13,11 @@ from sim.scene.device_arrays import three
 
 @dataclass(frozen=True)
 class WorldRows:
-    """Rows of one lane's world. fours: rows of all worlds, flat · first: number of the first row of this world."""
+    """Rows of one lane's world.
+
+    fours: rows of all worlds, flat
+    first: number of the first row of this world
+    """
 
     fours: Array
     first: Array

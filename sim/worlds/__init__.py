@@ -7,6 +7,8 @@ foraging     the field of detection, with objects that differ in ultraviolet ref
 navigation   the built-in courses between walls
 course       Course: a course on which the distance from the start need not decrease
 maze         random mazes
+random_course  random courses
+layout_family  LayoutFamily: random mazes or courses in disjoint sets for training, selection and test
 striped_walls  walls of cells as boxes with stripes
 layout       grid cells, walls and the floor
 materials    reflectances, stripes, daylight

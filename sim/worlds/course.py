@@ -8,7 +8,6 @@ decrease by more than MOST_FALL.
 from __future__ import annotations
 
 import heapq
-from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -20,7 +19,7 @@ from sim.worlds.layout import CELL, cell_centers
 
 Cell = tuple[int, int]  # row, column
 
-# [m] largest allowed decrease of the distance from the start on the way from any reachable position to the goal.
+# [m] largest allowed decrease of the distance from the start, on the way from any reachable position to the goal
 MOST_FALL = 1.5
 GOAL_COLUMNS = 3  # the goal consists of the free cells in the last columns before the outer wall
 LOOK_AHEAD = 3  # number of cells of the shortest path from which its direction is computed
@@ -136,27 +135,32 @@ class Course:
         ease = self._ease(start)
         return max((_apart(start, cell) - float(ease[cell]), cell) for cell in self._ahead(start))
 
+    def _apart_from(self, start: Cell) -> np.ndarray:
+        """Return the distance of every cell from a start [m], (row, column)."""
+        rows, columns = np.indices(self.walls.shape)
+        return np.asarray(CELL * np.hypot(rows - start[0], columns - start[1]))
+
     def _ease(self, start: Cell) -> np.ndarray:
         """Return the smallest distance from the start on the best path from each cell to the goal [m], (row, column).
 
         The best path is the one on which this smallest distance is largest.
         """
-        ease = np.full(self.walls.shape, -1.0)
-        queue = [(-_apart(start, cell), cell) for cell in _cells(self.goal)]
+        ease, apart = np.full(self.walls.shape, -1.0), self._apart_from(start)
+        queue = [(-float(apart[cell]), cell) for cell in _cells(self.goal)]
         for negative, cell in queue:
             ease[cell] = -negative
         heapq.heapify(queue)
         while queue:
             negative, cell = heapq.heappop(queue)
             for other in self._next_to(cell):
-                least = min(-negative, _apart(start, other))
+                least = min(-negative, float(apart[other]))
                 if least > ease[other]:
                     ease[other] = least
                     heapq.heappush(queue, (-least, other))
         return ease
 
     def _ahead(self, start: Cell) -> set[Cell]:
-        """Return the cells on all paths from the start on which every step shortens the remaining path to the goal."""
+        """Return the cells of all paths on which every step from the start shortens the remaining path to the goal."""
         seen, waiting = {start}, [start]
         while waiting:
             cell = waiting.pop()
@@ -166,13 +170,22 @@ class Course:
                     waiting.append(other)
         return seen
 
-    def _next_to(self, cell: Cell) -> Iterator[Cell]:
-        """Yield the free cells that an agent can enter next. A diagonal step must not cut the corner of a wall."""
-        row, column = cell
-        for r in (row - 1, row, row + 1):
-            for c in (column - 1, column, column + 1):
-                if (r, c) != cell and not (self.walls[r, c] or self.walls[row, c] or self.walls[r, column]):
-                    yield r, c
+    def _next_to(self, cell: Cell) -> tuple[Cell, ...]:
+        """Return the free cells that an agent can enter next. A diagonal step must not cut the corner of a wall."""
+        if cell not in self._neighbors:
+            row, column = cell
+            self._neighbors[cell] = tuple(
+                (r, c)
+                for r in (row - 1, row, row + 1)
+                for c in (column - 1, column, column + 1)
+                if (r, c) != cell and not (self.walls[r, c] or self.walls[row, c] or self.walls[r, column])
+            )
+        return self._neighbors[cell]
+
+    @cached_property
+    def _neighbors(self) -> dict[Cell, tuple[Cell, ...]]:
+        """Results of `_next_to` that have been computed."""
+        return {}
 
     def places(self, cells: list[Cell]) -> np.ndarray:
         """Return the centres of cells [m], (n, 2)."""

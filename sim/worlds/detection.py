@@ -12,7 +12,7 @@ FIELD = (9, 11)  # free cells (rows, columns), as published
 OBJECT_RADIUS = 0.5  # [m], as published
 OBJECTS = ("goal", "adversary_0", "adversary_1")
 STRIPES = 6  # number of stripes on the visible half of an object
-# Edges between an adversary's bands [deg from the top]. Seen by an agent, they are about as far apart as the edges
+# Edges between an adversary's stripes [deg from the top]. As seen by an agent, they are about as far apart as the edges
 # between a goal's stripes. In light from above, both kinds of objects have the same mean brightness, as computed by
 # validation/sim/equal_brightness.py.
 BAND_EDGES_DEG = (23.2, 47.8, 77.1, 107.0, 138.0, 170.0)

@@ -36,12 +36,13 @@ class GroundPlan:
 
     @classmethod
     def from_world(cls, world: World, place: np.ndarray) -> GroundPlan:
-        """Return the plan of a world; if the world has several mazes, only of the one around `place` (2,) [m]."""
+        """Return the plan of a world; if the world has several layouts, only of the one around `place` (2,) [m]."""
         model = world.model
         walls = np.array([_footprint(model, i) for i in range(model.ngeom) if model.geom(i).name.startswith("wall")])
         region = world.goal_region
         if world.mazes > 1:
-            walls, region = _maze_around(walls, region, world.mazes, float(place[1]))
+            north = float(model.geom("floor").size[1])
+            walls, region = _layout_around(walls, region, (-north, north), world.mazes, float(place[1]))
         low, high = walls[:, :2] - walls[:, 2:], walls[:, :2] + walls[:, 2:]
         return cls(
             walls=walls,
@@ -54,14 +55,16 @@ class GroundPlan:
         )
 
 
-def _maze_around(
-    walls: np.ndarray, region: np.ndarray | None, mazes: int, y: float
+def _layout_around(
+    walls: np.ndarray, region: np.ndarray | None, extent: tuple[float, float], mazes: int, y: float
 ) -> tuple[np.ndarray, np.ndarray | None]:
-    """Return the walls and the goal region of the maze that contains the coordinate y [m].
+    """Return the walls and the goal region of the maze or course that contains the coordinate y [m].
 
-    The mazes are arranged from south to north and have the same extent along y.
+    The layouts are arranged from south to north and have the same extent along y.
+
+    extent: south and north end of the floor [m]
     """
-    south, north = (walls[:, 1] - walls[:, 3]).min(), (walls[:, 1] + walls[:, 3]).max()
+    south, north = extent
     height = (north - south) / mazes
     low = south + height * int(np.clip((y - south) // height, 0, mazes - 1))
     own = walls[(walls[:, 1] > low) & (walls[:, 1] < low + height)]

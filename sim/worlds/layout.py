@@ -94,6 +94,13 @@ def add_wall(spec: mujoco.MjSpec, name: str, center: np.ndarray, size: tuple[flo
     )
 
 
+def set_wall_height(spec: mujoco.MjSpec, height: float) -> None:
+    """Change the height of all walls [m]. They go on standing on the floor."""
+    for geom in spec.worldbody.geoms:
+        if geom.name.startswith("wall"):
+            geom.pos[2] = geom.size[2] = height / 2
+
+
 def add_floor(spec: mujoco.MjSpec, size: tuple[float, float]) -> None:
     """Add the floor, of this size along x and y [m]. It is visible but does not collide with anything."""
     spec.worldbody.add_geom(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import mujoco
 import numpy as np
 
@@ -17,15 +19,18 @@ GOAL_COLUMNS = 3  # the goal consists of the free cells in the last columns befo
 _NEIGHBORS = ((0, 2), (0, -2), (2, 0), (-2, 0))
 
 
-def add_layout(spec: mujoco.MjSpec, rng: np.random.Generator, mazes: int = 1) -> Layout:
-    """Add random mazes drawn by `rng`, which lie next to each other from south to north and are not connected.
+def add_layout(spec: mujoco.MjSpec, mazes: Sequence[np.ndarray], rngs: Sequence[np.random.Generator]) -> Layout:
+    """Add mazes of equal size, which lie next to each other from south to north and are not connected.
 
     An episode starts in any of the mazes, so that an agent learns a behaviour that works in all of them.
+
+    mazes: walls of each maze, boolean (row, column)
+    rngs: generators of the stripes: one for all mazes, or one for each
     """
-    walls = np.concatenate([draw_maze(MAZE, rng) for _ in range(mazes)])
+    walls = np.concatenate(mazes)
     shape = walls.shape
     add_floor(spec, (shape[1] * CELL, shape[0] * CELL))
-    add_striped_walls(spec, walls, rng)
+    add_striped_walls(spec, walls, rngs)
     rows, columns = np.nonzero(~walls)
     start = columns < START_COLUMNS
     right = shape[1] * CELL / 2 - CELL

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 
 import mujoco
@@ -72,25 +72,36 @@ def course_named(course: str | Course) -> Course:
     return DRAWN[course]
 
 
-def add_layout(spec: mujoco.MjSpec, rng: np.random.Generator, course: Course) -> Layout:
-    """Add the walls of a course, with stripes drawn by `rng`."""
-    rows, columns = course.walls.shape
+def add_layout(spec: mujoco.MjSpec, courses: Sequence[Course], rngs: Sequence[np.random.Generator]) -> Layout:
+    """Add courses of equal size, which lie next to each other from south to north and are not connected.
+
+    An episode starts on any of the courses.
+
+    rngs: generators of the stripes: one for all courses, or one for each
+    """
+    walls = np.concatenate([course.walls for course in courses])
+    rows, columns = walls.shape
     add_floor(spec, (columns * CELL, rows * CELL))
-    # Wall cells without an adjacent free cell are never visible, so they are left out.
-    near = scipy.ndimage.binary_dilation(~course.walls, np.ones((3, 3)))
-    add_striped_walls(spec, course.walls & near, rng)
+    # Wall cells without an adjacent free cell are never visible, so they are omitted.
+    near = scipy.ndimage.binary_dilation(~walls, np.ones((3, 3)))
+    add_striped_walls(spec, walls & near, rngs)
     right, top = columns * CELL / 2 - CELL, rows * CELL / 2 - CELL
     return Layout(
         objects=(),
-        starts=_starts(course, training=False),
-        training_starts=_starts(course, training=True),
+        starts=_starts(courses, training=False),
+        training_starts=_starts(courses, training=True),
         object_spawn=np.empty((0, 2)),
         goal_region=np.array([right - GOAL_COLUMNS * CELL, -top, right, top]),
-        episode_steps=course.episode_steps,
+        episode_steps=courses[0].episode_steps,
     )
 
 
-def _starts(course: Course, training: bool) -> Starts:
-    """Return starting positions with headings along the course."""
-    cells = course.training_starts if training else course.starts
-    return Starts(course.places(cells), np.array([course.heading(cell) for cell in cells]))
+def _starts(courses: Sequence[Course], training: bool) -> Starts:
+    """Return starting positions with headings along the courses."""
+    positions, headings = list[np.ndarray](), list[float]()
+    for number, course in enumerate(courses):
+        cells = course.training_starts if training else course.starts
+        north = (number - (len(courses) - 1) / 2) * len(course.walls) * CELL
+        positions.append(course.places(cells) + np.array([0, north]))
+        headings += [course.heading(cell) for cell in cells]
+    return Starts(np.concatenate(positions), np.array(headings))

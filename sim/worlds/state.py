@@ -54,7 +54,7 @@ class WorldState(ReadOnlyArrays):
 
     @property
     def finite(self) -> np.ndarray:
-        """Array (n,) bool: whether all numbers of each world are finite."""
+        """True for worlds in which all numbers are finite, (n,) bool."""
         total = self.heading + self.position.sum(axis=1) + self.velocity.sum(axis=1)
         total += self.objects.sum(axis=(1, 2)) + self.object_heading.sum(axis=1)
         finite: np.ndarray = np.isfinite(total)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import mujoco
 import numpy as np
 
@@ -16,18 +18,24 @@ LONGEST_WALL = 4
 STRIPE_PERIODS = (4.0, 2.0, 1.0, 2 / 3)
 
 
-def add_striped_walls(spec: mujoco.MjSpec, walls: np.ndarray, rng: np.random.Generator) -> None:
-    """Add the walls of a grid as boxes, each with a stripe frequency drawn by `rng`.
+def add_striped_walls(spec: mujoco.MjSpec, walls: np.ndarray, rngs: Sequence[np.random.Generator]) -> None:
+    """Add the walls of a grid as boxes, each with a random stripe frequency.
 
     walls: cells that are walls, boolean (row, column)
+    rngs: the rows are divided into as many equal parts; each generator draws the stripes of one part
     """
     materials.add_texture(spec, "stripes", materials.stripes((8, 256), 2, axis=1))
     for i, period in enumerate(STRIPE_PERIODS):
         materials.add_textured(spec, f"stripes_{i}", "stripes", repeat=(2 / period, 1), uniform=True)
-    for i, (row, column, n_rows, n_columns) in enumerate(merge_walls(walls, LONGEST_WALL)):
-        center = cell_centers(np.array(column + (n_columns - 1) / 2), np.array(row + (n_rows - 1) / 2), walls.shape)
-        frequency = rng.integers(len(STRIPE_PERIODS))
-        add_wall(spec, f"wall_{i}", center, (n_columns * CELL, n_rows * CELL), f"stripes_{frequency}")
+    rows, number = len(walls) // len(rngs), 0
+    for part, rng in enumerate(rngs):
+        south = part * rows
+        for row, column, n_rows, n_columns in merge_walls(walls[south : south + rows], LONGEST_WALL):
+            at = np.array(column + (n_columns - 1) / 2), np.array(south + row + (n_rows - 1) / 2)
+            frequency = rng.integers(len(STRIPE_PERIODS))
+            size = n_columns * CELL, n_rows * CELL
+            add_wall(spec, f"wall_{number}", cell_centers(*at, walls.shape), size, f"stripes_{frequency}")
+            number += 1
 
 
 def merge_walls(walls: np.ndarray, longest: int) -> list[tuple[int, int, int, int]]:

@@ -7,12 +7,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 import mujoco
 import numpy as np
 
-from optics.numerics.arguments import did_you_mean, of_kind, shown, whole
+from optics.numerics.arguments import did_you_mean, in_range, of_kind, shown, whole
 from optics.numerics.read_only import ReadOnlyArrays
 from optics.spectra.spectrum import Spectrum
 from sim.eyes.eyes import BODY_RADIUS, EYE_HEIGHT, Eyes, camera_rotations, eye_positions
@@ -21,10 +22,14 @@ from sim.worlds import detection, foraging, materials, maze, navigation
 from sim.worlds.agent_model import AgentModel
 from sim.worlds.catalog import TASKS
 from sim.worlds.course import Course
-from sim.worlds.layout import WALL_CONAFFINITY, Layout, Starts
+from sim.worlds.layout import WALL_CONAFFINITY, WALL_HEIGHT, Layout, Starts, set_wall_height
+from sim.worlds.layout_family import TASKS_WITH_LAYOUTS, LayoutSet
 
 MOST_SEED = 2**128  # largest allowed seed; the seeds that NumPy draws have 128 bits
 MOST_MAZES = 100_000  # largest allowed number of mazes; fewer already exhaust the memory
+# [m] smallest and largest allowed height of walls. Lower walls would end below the top of the agent, and higher ones
+# are no different for its eyes.
+WALL_HEIGHTS = (2 * BODY_RADIUS, 100.0)
 _FIELDS = {"detection": detection.add_layout, "foraging": foraging.add_layout, "tracking": detection.add_layout}
 
 TIMESTEP = 0.02  # [s], as published
@@ -55,7 +60,7 @@ class World(ReadOnlyArrays):
         simulated in the whole model
     training_starts: starting positions of the agent in training; None: `starts`
     episode_steps: number of actions after which an episode is truncated; None: the task's default
-    mazes: number of mazes, which are arranged from south to north; 1 in other tasks
+    mazes: number of mazes, or of courses, which are arranged from south to north; 1 in other tasks
     """
 
     task: str
@@ -84,6 +89,8 @@ def build_world(
     seed: int = 0,
     mazes: int = 1,
     course: str | Course = "short",
+    layouts: LayoutSet | None = None,
+    wall_height: float = WALL_HEIGHT,
     eyes: Eyes | None = None,
     spectra: Mapping[str, Spectrum | str] | None = None,
 ) -> World:
@@ -94,14 +101,18 @@ def build_world(
         depend on it
     mazes: number of different mazes in the task "maze"; an episode starts in any of them
     course: course of navigation: "short", "long" (twice as long, with half as many actions) or a `sim.Course`
+    layouts: one set of a `sim.LayoutFamily` for navigation or mazes, instead of `seed`, `mazes` and `course`; an
+        episode starts in any of its layouts
+    wall_height: height of all walls [m], in [0.4, 100]; 0.5 in the published code
     eyes: eyes for which the agent gets cameras eye_0 ..., from left to right; None: no cameras
     spectra: spectra of materials and lights, by name ("wall", "floor", "light_0" ...). They add to the spectra that the
         task defines, or replace them. Each is an `optics.Spectrum`, or a name that `optics.reflectance` or
         `optics.illuminant` accepts.
 
     Raises:
-        ValueError: the task or the course is unknown, the seed is negative, `mazes` or `course` is given for another
-            task, or `spectra` contains a name that does not exist.
+        ValueError: the task or the course is unknown, the seed is negative, `mazes`, `course` or `layouts` is given for
+            another task, `layouts` is given together with `seed`, `mazes` or `course`, the height is out of range, or
+            `spectra` contains a name that does not exist.
     """
     if not isinstance(task, str) or task not in TASKS:
         raise ValueError(f"unknown task {shown(task)}: must be one of {', '.join(TASKS)}{did_you_mean(task, TASKS)}")
@@ -113,10 +124,18 @@ def build_world(
         of_kind("build_world: eyes", eyes, Eyes, "sim.Eyes(n_eyes=2)")
     if spectra is not None:
         of_kind("build_world: spectra", spectra, Mapping, "{'wall': 'foliage'}")
-    if task != "navigation" and not (isinstance(course, str) and course == "short"):
+    short = isinstance(course, str) and course == "short"
+    if task != "navigation" and not short:
         raise ValueError(f"build_world: course: must be left out for {shown(task)}, only 'navigation' has one")
+    wall_height = in_range("build_world: wall_height", wall_height, *WALL_HEIGHTS)
     spec = _empty_world()
-    layout = _layout(spec, task, np.random.default_rng(seed), mazes, course)
+    if layouts is None:
+        layout = _layout(spec, task, np.random.default_rng(seed), mazes, course)
+    else:
+        _check_layouts(task, layouts, alone=seed == 0 and mazes == 1 and short)
+        layout, mazes = _family_layout(spec, task, layouts), len(layouts)
+    if wall_height != WALL_HEIGHT:
+        set_wall_height(spec, wall_height)
     _add_agent(spec, layout.starts.position[0], eyes)
     model = spec.compile()
     return World(
@@ -136,8 +155,28 @@ def build_world(
 
 def _layout(spec: mujoco.MjSpec, task: str, rng: np.random.Generator, mazes: int, course: str | Course) -> Layout:
     if task == "navigation":
-        return navigation.add_layout(spec, rng, navigation.course_named(course))
-    return maze.add_layout(spec, rng, mazes) if task == "maze" else _FIELDS[task](spec, rng)
+        return navigation.add_layout(spec, [navigation.course_named(course)], [rng])
+    if task == "maze":
+        return maze.add_layout(spec, [maze.draw_maze(maze.MAZE, rng) for _ in range(mazes)], [rng])
+    return _FIELDS[task](spec, rng)
+
+
+def _check_layouts(task: str, layouts: Any, alone: bool) -> None:
+    """Check that these are layouts, for a task that has some, and that they are given alone."""
+    of_kind("build_world: layouts", layouts, LayoutSet, "sim.LayoutFamily(seed=0).training")
+    if task not in TASKS_WITH_LAYOUTS:
+        tasks = " and ".join(map(repr, TASKS_WITH_LAYOUTS))
+        raise ValueError(f"build_world: layouts: must be left out for {shown(task)}, only {tasks} have layouts")
+    if not alone:
+        raise ValueError("build_world: layouts: seed, mazes and course must be left out, a family replaces them")
+
+
+def _family_layout(spec: mujoco.MjSpec, task: str, layouts: LayoutSet) -> Layout:
+    if task == "navigation":
+        layout = navigation.add_layout(spec, layouts.courses, layouts.stripes())
+    else:
+        layout = maze.add_layout(spec, layouts.mazes, layouts.stripes())
+    return replace(layout, episode_steps=layouts.family.episode_steps)
 
 
 def _empty_world() -> mujoco.MjSpec:

@@ -1,5 +1,6 @@
 """Runs become rows; rows become means with intervals, power laws and pages."""
 
+import json
 import math
 from dataclasses import replace
 
@@ -16,6 +17,7 @@ from evolve.report.eye_figures import relief_heights
 from evolve.store.candidate import Candidate
 from evolve.store.directory import Run
 from evolve.store.evaluation import Evaluation
+from evolve.store.versions import machine
 from experiments import bending_light, brains_and_acuity, goals_shape_eyes, learning_through_holes
 from experiments.candidates import Row, full_return, parameters, rows_of
 from experiments.evolved import RunMetadata, Store, main
@@ -163,10 +165,13 @@ def test_unfinished_generations_do_not_count(tmp_path):
 def test_runs_of_one_group_differ_in_their_seeds_alone(tmp_path, capsys):
     for name, settings in (("a", ()), ("b", ("seed=1", "workers=2")), ("c", ("eye.noise_sigma=0.02",))):
         run_of(tmp_path / name, "bifurcation-detection", (*SMALL, *settings), (1.0, 2.0))
+    started = tmp_path / "b" / "versions.json"
+    started.write_text(started.read_text().replace(json.dumps(machine()), '"another machine"'))
     collect = ["--docs", str(tmp_path / "docs"), "--runs", f"detection={tmp_path / 'a'}"]
     assert goals_shape_eyes.main([*collect, f"detection={tmp_path / 'b'}"]) == 0
     text = (tmp_path / "docs/goals_shape_eyes.md").read_text()
     assert "| detection, seed 1 | 2 | 1 of 2 | 0.0 |" in text
+    assert f"worker seconds on {machine()}; another machine; rhabdom at" in text
     assert goals_shape_eyes.main([*collect, f"detection={tmp_path / 'c'}"]) == 2
     assert "has other settings than the last run of group 'detection'" in capsys.readouterr().err
 

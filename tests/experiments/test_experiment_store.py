@@ -1,5 +1,6 @@
 """The store of experiments: written rows read back, together with their origin."""
 
+import json
 from dataclasses import dataclass
 
 import pytest
@@ -39,6 +40,30 @@ def test_origin_reads_back_and_names_what_counts(tmp_path):
     assert Origin.read(tmp_path / "origin.json") == origin
     assert origin.sentence().startswith("2.5 core hours on ")
     assert f"numpy {origin.versions['numpy']}" in origin.sentence()
+
+
+def test_records_name_the_machines_that_made_them(tmp_path):
+    """Records may be collected on another machine, whose name must not appear."""
+    made = {"first": ["Old Processor, 4 cores", "New Processor, 8 cores"], "second": ["New Processor, 8 cores"]}
+    for name, processors in made.items():
+        versions = {"commit": "a" * 40, "python": "3.9", "machine": "abc"}
+        starts = [{"processor": each, "versions": versions} for each in processors]
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "versions.json").write_text(json.dumps(starts))
+    origin = Origin.from_runs([tmp_path / name for name in made], 30.0)
+    assert origin.sentence() == (
+        f"30 worker hours on Old Processor, 4 cores; New Processor, 8 cores; rhabdom at {'a' * 10}, Python 3.9."
+    )
+    assert origin.machine != Origin.here(1.0).machine
+
+
+def test_records_of_former_versions_name_no_processor(tmp_path):
+    (tmp_path / "versions.json").write_text('[{"versions": {"commit": "", "python": "3.9", "machine": "riscv64"}}]')
+    assert Origin.from_runs([tmp_path], 1.0).machine == "riscv64, processor not recorded"
+    (tmp_path / "versions.json").unlink()
+    assert Origin.from_runs([tmp_path], 1.0).sentence() == (
+        "1 worker hours on an unknown machine; rhabdom at unknown, Python unknown."
+    )
 
 
 @pytest.mark.parametrize(("hours", "shown"), [(10.0, "10 core hours"), (0.5, "30 core m"), (0.005, "18 core seconds")])

@@ -5,6 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from evolve.learning.final_figures import final_episodes
+from evolve.learning.fitness import evaluate
+from evolve.learning.policy import load_policy
 from experiments import crossing as crossing_module
 from experiments.crossing import _interaction, crossing
 from experiments.designed import Design, Trained, crossed, train_all
@@ -139,6 +142,22 @@ def test_what_has_been_trained_is_not_trained_again(tmp_path, capsys):
     assert both[0] == first[0]
     assert capsys.readouterr().out.count("of 2") == 1, "only the second design is trained"
     assert Origin.read(path.with_suffix(".json")).whose == "worker"
+
+
+@pytest.mark.slow
+def test_trained_animals_are_tested_in_layouts_that_no_selection_has_used(tmp_path):
+    """The row repeats what the test set gives when the same policy is trained here, in this process."""
+    family = ("world.layouts=family", *(f"world.{name}_layouts=2" for name in ("training", "selection", "test")))
+    given = (*TINY, *family, "world.layout_rows=9", "world.layout_columns=17")
+    design = replace(ANIMAL, task="maze")
+    (row,) = train_all([design], given, tmp_path / "lives.csv", workers=1, tested=True)
+    assert read_rows(Trained, tmp_path / "lives.csv") == [row]
+    config, path = design.config(given), tmp_path / "0.safetensors"
+    outcome = evaluate(design.animal, config, design.seed, path)
+    final = final_episodes(design.animal, config, load_policy(path), design.seed)
+    assert row.fitness == pytest.approx(outcome.fitness, rel=1e-5)
+    assert (row.held_out, row.held_out_episodes) == (pytest.approx(final.returns.mean(), rel=1e-5), 2)
+    assert row.held_out != row.fitness
 
 
 @pytest.mark.slow

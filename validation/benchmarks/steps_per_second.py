@@ -1,24 +1,25 @@
 """Steps per second of worlds and models, and the share of rendering
 
-How many steps per second do worlds and models reach, and what share of a step is rendering? With 64 worlds, detection
-reaches 11701 steps per CPU second and the humanoid 1107. Rendering takes 49 % to 71 % of the time of physics and
-rendering together.
+How many steps per second do worlds and models reach, and what fraction of a step is rendering? With 64 worlds,
+detection reaches 11701 steps per CPU second and the humanoid 1107. Rendering takes 49 % to 71 % of the time of physics
+and rendering together.
 
 **Method.** The benchmark uses two built-in tasks and two of Gymnasium's models (ant, humanoid; MIT). Each agent has two
 eyes of 15 x 15 receptors and 60°, with 4 rays per receptor in direct light, 4 bands, and noise. Actions are random, and
-episodes restart when they end. Rates are steps per CPU second of one thread, the median of a few rounds in one process.
-Each round measures physics and rules alone, rendering alone, and whole steps, in turns. Other work on the machine
-therefore hardly changes the comparison.
+episodes restart when they end. Rates are steps per CPU second of one thread, as the median of a few rounds in one
+process. Each round measures physics and rules alone, rendering alone, and whole steps, one after the other. Other work
+on the machine therefore affects all three in the same way, and hardly changes their ratios.
 
-**Table.** "render" is the rate of rendering alone and "step" is the rate of whole steps. "share" is the share of
-rendering in the time of physics and rendering. "step/sum" is the time of a whole step relative to the sum of both.
+**Table.** "render" is the rate of rendering alone and "step" is the rate of whole steps. "share" is the fraction of the
+time of physics and rendering that is spent on rendering. "step/sum" is the time of a whole step relative to the sum of
+the times for physics and for rendering.
 
 **Bounds.** The bounds apply to every model with 64 worlds or more.
 
 - Rendering per world is at least twice as fast as with a single world. Measured ratios are 2.7 to 3.7, because the
   worlds of a batch share one kernel launch.
-- A whole step takes at most 1.25 times as long as physics and rendering alone. Measured ratios are at most 1.17. They
-  exceed 1 because physics and rendering displace each other's data from the caches.
+- A whole step takes at most 1.25 times as long as physics and rendering alone. Measured ratios are at most 1.17. The
+  ratio exceeds 1 because physics and rendering displace each other's data from the processor's caches.
 
 **Limits.** Absolute rates depend on the machine and on the code.
 

@@ -1,29 +1,31 @@
 """Early ranking: does fitness after little training predict final fitness?
 
 Does the order of animals after part of a training run predict their order after all of it? After half of the training,
-the rank correlation with the final order is 0.86. Less training predicts little: the correlation is 0.64 after an
-eighth of the training and -0.33 after a quarter.
+the rank correlation with the final order is 0.86. The order after less training is a poor predictor: the correlation is
+0.64 after an eighth of the training and -0.33 after a quarter.
 
 **Method.** Successive halving (`search.rungs`, `evolve.search.successive_halving`) trains the whole generation for a
-short time and continues only with the better part. The parts of such a training run are called rungs. Successive
+short time and continues only with the better animals. The parts of such a training run are called rungs. Successive
 halving saves time only if the early order resembles the final order. For this test, animals with one to four eyes of 1
 x 1 to 15 x 15 receptors behind a perfect lens are drawn from the genome. They learn detection over four rungs, as in an
 evolutionary run, but no animal is stopped at a rung.
 
-**First table.** It compares the order of the animals on each rung with their order on the last rung. Cells state
-Spearman's rank correlation, and its 90 % confidence interval from a bootstrap over animals. "32 episodes" is the
-fitness that a run uses, from the evaluation episodes of each rung. "128 episodes" is the fitness of the same policies
-in more episodes, in other worlds. The last line compares the two measures of fitness on the last rung.
+**First table.** The table compares the order of the animals on each rung with their order on the last rung, by the same
+number of episodes. Cells state Spearman's rank correlation, and its 90 % confidence interval from a bootstrap over
+animals. In the column "32 episodes", animals are ordered by the fitness that a run uses, from the evaluation episodes
+of each rung. In the column "128 episodes", they are ordered by the fitness of the same policies in more episodes, in
+other worlds. The last line compares the two measures of fitness on the last rung.
 
-**Second table.** The table lists schedules of successive halving that train these animals as one generation. "CPU time"
-is relative to training all animals to the end. The last two columns state the final rank of the animal that the
-schedule selects as the best. The final rank is that of the last rung, by 128 episodes. The two columns differ in the
-fitness that decides which animals continue: from 32 or from 128 episodes.
+**Second table.** The table lists possible schedules of successive halving, applied to these animals as one generation.
+"CPU time" is relative to training all animals to the end. The last two columns state the final rank of the animal that
+the schedule selects as the best. The final rank is the rank on the last rung, by 128 episodes. The two columns differ
+in the number of episodes, 32 or 128, from which the schedule decides which animals continue.
 
-**Result.** Two rungs save a fifth of the time if half of the animals continue to the second rung. Lower rungs save more
-time but may lose the best animal. Successive halving is off by default. Thirty-two episodes measure fitness well
-enough: their correlation with 128 episodes is 0.99. Six episodes were not enough with an earlier learner, which had not
-learnt the task by the end of training: fitness from six episodes did not predict fitness from 48 (correlation 0.02).
+**Result.** Two rungs save a fifth of the time if half of the animals continue to the second rung. Schedules that select
+animals earlier save more time but may lose the best animal. Successive halving is off by default. Thirty-two episodes
+measure fitness well enough: their correlation with 128 episodes is 0.99. With an earlier learner, fitness from six
+episodes did not predict fitness from 48 (correlation 0.02). That learner had not learnt the task by the end of
+training.
 
 **Limits.** 16 animals are too few for further conclusions. An eighth of the training predicted the final order better
 (0.64) than a quarter (-0.33), and both confidence intervals are wide.

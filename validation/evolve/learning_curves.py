@@ -2,27 +2,28 @@
 
 How many steps does it take to learn the tasks? Animals with two eyes of 15 x 15 receptors solve detection after 86,016
 and 143,360 steps (23 and 40 CPU seconds, two seeds) and tracking after 159,744. An animal with a single receptor stays
-at chance. In the maze, no animal reaches the goal within these budgets.
+at chance. In the maze, no animal reaches the goal by the end of its training run.
 
-**Method.** Each row is a training run with `evolve.learning.ppo` in sim's worlds. Every 50,000 steps the policy is
+**Method.** Each row is a training run with `evolve.learning.ppo` in a built-in world. Every 50,000 steps the policy is
 evaluated without exploration, in 100 episodes in worlds that were not used for training. Detection counts as solved if
 the agent reaches the goal first in 80 % of the episodes. An agent that reaches objects without distinguishing them
 finds the goal first in a third of the episodes. Eyes with many receptors use one ray per receptor (four in mazes), and
 the single receptor uses 96 rays.
 
-**First table.** "CPU s" is CPU time of one thread, for rollouts and updates without the evaluations. "update" is the
-share of the updates in this time. Brackets contain the 95 % confidence interval of the last evaluation (Wilson).
-"return" is the undiscounted return per training episode. The single receptor is at chance: if the agent reaches an
-object at all, this object is the goal in one of three cases.
+**First table.** "CPU s" is the CPU time of one thread, for rollouts and updates but without the evaluations. "update"
+is the fraction of this time that the updates take. Brackets contain the 95 % confidence interval of the last evaluation
+(Wilson). "return" is the undiscounted return per training episode. The animal with a single receptor stays at chance:
+if it reaches an object at all, this object is the goal in one of three cases.
 
-**Second table.** In the maze, the table states the distance from the start at which an episode ends, and its return.
-The return is 0.25 per metre, minus 1 for every action in contact with a wall. The fitness is 1.5 per metre, minus 2 for
-every such action. Means have 95 % confidence intervals. The interval of the fitness is an upper bound.
+**Second table.** For the maze, the table states the distance from the start at which an episode ends, and the return of
+the episode. The return is 0.25 per metre, minus 1 for every action in contact with a wall. The fitness is 1.5 per
+metre, minus 2 for every such action. Means have 95 % confidence intervals. The stated width of the interval of the
+fitness is an upper bound, so the actual interval may be narrower.
 
-An animal that stands still earns 0, and an animal with one eye learns little more than that. Animals with ten eyes
-travel. They travel farther than a hand-written controller that receives the true distances of the walls in eleven
-directions and steers towards the largest free space. At 1.5 m/s, that controller reaches 21.8 m with 2.6 actions in
-contact and a return of 2.8 ± 0.9. At 5 m/s it reaches 25.6 m and a return of -14. The return of the animals with ten
+An animal that stands still earns 0, and an animal with one eye learns little more than to stand still. Animals with ten
+eyes travel. They travel farther than a hand-written controller that receives the true distances of the walls in eleven
+directions and steers towards the largest free space. At 1.5 m/s, that controller travels 21.8 m, with 2.6 actions in
+contact and a return of 2.8 ± 0.9. At 5 m/s it travels 25.6 m, with a return of -14. The return of the animals with ten
 eyes is about 0, because every action in contact costs as much as four metres earn. Their fitness, which selection uses,
 is above 0.
 
@@ -32,16 +33,17 @@ is above 0.
   and mini-batches made of segments of 32 consecutive steps. The detection runs are from the last commit with these
   defaults.
 - The other rows use 128 worlds x 32 steps, 10 epochs, leaky rectifiers, and segments of 8 steps. Their learning rate is
-  3e-3 and falls as one over the number of steps after 75,000 steps (in mazes after 200,000). In these runs the number
-  of epochs is constant. The present learner reduces the number of epochs before the learning rate (`fewer_epochs`).
+  3e-3. After 75,000 steps (in mazes after 200,000), it falls in inverse proportion to the number of steps. In these
+  runs the number of epochs is constant. In the present learner, the learning rate first falls to half, and then the
+  number of epochs falls instead (`fewer_epochs`).
 
 **Bounds.** Two eyes of 15 x 15 receptors solve detection and tracking. A single receptor is not better than chance. In
 the maze, animals with ten eyes have a higher fitness and travel farther than animals with one eye.
 
-**Limits.** If a row states few steps, the training run was stopped there; it did not finish learning sooner. In the
-rows "with tanh" except detection, the learner had no bounds on the means of actions. In the maze row "with tanh",
-contact had its full price only after 500,000 steps. `docs/measurements/learning.md` lists other settings that were
-tried.
+**Limits.** If a row states few steps, the training run was stopped at this point. It does not mean that learning was
+finished. In the rows "with tanh" for tracking and the maze, the learner did not limit the means of actions. In the maze
+row "with tanh", contact had its full cost only after 500,000 steps. `docs/measurements/learning.md` lists other
+settings that were tried.
 
 Training runs take minutes each, so their results are stored (`docs/validation/data/learning_curves.csv`). The page is
 written from the stored results.
@@ -220,7 +222,7 @@ def draw(rows: Sequence[Row], path: Path) -> None:
     for level, label in ((SOLVED, "solved"), (CHANCE, "chance")):
         axes.axhline(level, color=MUTED, lw=0.6, ls=":")
         axes.annotate(label, (0, level), fontsize=7, va="bottom")
-    axes.set(xlabel="steps [1000]", ylabel="goal first, share of episodes", ylim=(0, 1), xlim=(0, None))
+    axes.set(xlabel="steps [1000]", ylabel="fraction of episodes with the goal first", ylim=(0, 1), xlim=(0, None))
     axes.spines[["top", "right"]].set_visible(False)
     figure.savefig(path, dpi=150)
     pyplot.close(figure)

@@ -1,6 +1,7 @@
 """Safety of run directories: runs from strangers and killed runs
 
-Are a stranger's run and a killed run safe to open? Yes: 2,605 random trials of 13 promises had 0 failures.
+Is it safe to open a run from a stranger, or a run that was killed? Yes: the 13 promises in the table were tested in
+2,605 random trials, with 0 failures.
 
 **Method.** Most trials damage a fresh copy of a small run (or a policy, an image, a model, a page) and pass it to a
 command (`validation/evolve/hostile.py`). Such a trial fails in any of these cases:
@@ -10,11 +11,11 @@ command (`validation/evolve/hostile.py`). Such a trial fails in any of these cas
 - where sizes are checked, the command takes more than a second;
 - the command touches a file outside the run.
 
-The other trials kill a run with SIGKILL at a random moment and resume it. They fail if the record or a policy differs
-by a bit from that of the same run without kills. `tests/evolve/search/kills.py` uses candidates whose fitness has a
+The other trials kill a run with SIGKILL at a random moment and resume it. They fail if the record or a policy is not
+bit-identical to that of the same run without kills. `tests/evolve/search/kills.py` uses candidates whose fitness has a
 closed form, and `tests/evolve/search/training_kills.py` uses real training runs.
 
-**Table.** It counts trials and failures of each promise.
+**Table.** The table counts the trials and the failures of each promise.
 
 **Limits.** The trials cover the listed promises only. Short versions of the trials are part of the tests.
 `tests/validation/evolve/test_hostile.py` also breaks each promise on purpose, and checks that the trial notices.

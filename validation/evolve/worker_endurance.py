@@ -1,19 +1,21 @@
 """Worker endurance: memory and open files over many candidates
 
-Do the memory and the open files of a worker stay constant over many candidates? Yes: over 300 candidates, the ratio of
-the last quarter to the second quarter is 1.00 for memory and 1.00 for open files.
+Do the memory and the open files of a worker stay constant over many candidates? Yes: over 300 candidates, memory in the
+last quarter is 1.00 times the memory in the second quarter, and the ratio of open files is 1.00.
 
 **Method.** One worker evaluates many real candidates one after another, as in a run of a week. The candidates are drawn
 from the whole genome, so that eyes, kernels and brains differ between them. Each candidate is trained for a few steps
 and evaluated. After each candidate, the worker's resident memory and its open files are read from the system.
 
-**Table.** Candidates differ in size, so the trend counts: the median of the last quarter of the candidates relative to
-that of the second quarter. (During the first quarter, libraries are still being loaded and kernels compiled.)
+**Table.** Candidates differ in size, so only the trend matters. It is measured by the median over the last quarter of
+the candidates, relative to the median over the second quarter. (During the first quarter, libraries are still being
+loaded and kernels compiled.)
 
 **Bounds.** Memory in the last quarter is at most 1.25 times that in the second, and the number of open files does not
 grow.
 
-**Limits.** Any growth comes from the kernels that Dr.Jit keeps: one for each shape of eye that has not occurred before.
+**Limits.** Memory may grow slightly because Dr.Jit caches compiled kernels: one for each shape of eye that has not
+occurred before.
 
 Measurements are stored (`docs/validation/data/worker_endurance.csv`). The page is written from the stored measurements.
 

@@ -1,24 +1,26 @@
 """Mutation testing: do the tests notice deliberate mistakes?
 
-Which share of deliberate mistakes do the tests notice? They kill 185 of 193 mutants, which is 96 %. Six further mutants
+Which fraction of deliberate mistakes do the tests notice? A copy of the code with one such mistake is called a mutant,
+and the tests kill a mutant if they notice the mistake. They kill 185 of 193 mutants, which is 96 %. Six further mutants
 change nothing that a user could see and do not count.
 
-**Method.** A mutant is a copy of the source tree with one deliberate mistake. Examples are a changed sign or
-comparison, a bound that is off by one, an omitted check or call, swapped axes or arguments, or a maximum instead of a
-minimum. For each mutant the nearest tests are run. The `__init__.py` of each test folder names these tests for each
-module (for example `tests/optics/methods/__init__.py`). In each test file the quickest tests run first, for about
-twenty seconds. A mutant is killed if one of these tests fails, hangs or crashes.
+**Method.** Examples of mistakes are a changed sign or comparison, a bound that is off by one, an omitted check or call,
+swapped axes or arguments, or a maximum instead of a minimum. For each mutant the nearest tests are run. The
+`__init__.py` of each test folder names these tests for each module (for example `tests/optics/methods/__init__.py`). In
+each test file the quickest tests run first, for about twenty seconds. A mutant is killed if one of these tests fails,
+hangs or crashes.
 
-The first mutants are those in `validation/mutants/named_mutants.py`: mistakes that no test had noticed. The others are
-drawn evenly from all places in the three packages where such a mistake can be made. Some mutants change nothing that a
-user could see, because they give the same results slightly sooner or later. They are not mistakes. The table lists them
-as "alike", with the reason, and does not count them.
+The first mutants are those in `validation/mutants/named_mutants.py`, which contain mistakes that no test had noticed at
+first. The others are drawn evenly from all places in the three packages where such a mistake can be made. Some mutants
+change nothing that a user could see, because they give the same results slightly sooner or later. The table lists them
+as "alike", with the reason, and does not count them as mistakes.
 
 **Bounds.** At least 90 % of the mutants that are mistakes are killed. Every mutant that survived or is alike has a
 stated reason.
 
-**Limits.** Eight mutants were tried by hand, with tests that this procedure omits or that were written for them. They
-are stored with the rest. The reasons for mutants that survived or are alike come from reading the code.
+**Limits.** Eight mutants were tried by hand, with tests that this procedure would not have run, or that were written
+for these mutants. Their results are stored with the others. The reasons for mutants that survived or are alike come
+from reading the code.
 
 A trial takes a minute, so results are stored (`docs/validation/data/mutation_testing.csv`). The page is written from
 the stored results. `--trials` continues after the last stored mutant. `--again` tries the survivors once more, for

@@ -1,29 +1,30 @@
 """Aliasing and wrap-around: where the plain angular spectrum stops converging
 
 At which distance does the textbook's angular spectrum stop converging with the number of samples N? Its error falls
-with N only while the distance is below the critical distance z = N dx²/λ. On a grid of fixed width, the critical
-distance becomes shorter as N grows. At Fresnel number 0.1, far beyond the critical distance, the error is 1.1e+00 both
-with N = 256 and with N = 1024. `optics.propagate` has errors of 2.2e-03 and 2.6e-04 with the same samples.
+with N only while the distance is below the critical distance z = N dx²/λ. On a grid of fixed width, more samples have a
+smaller pitch dx, so the critical distance becomes shorter as N grows. At Fresnel number 0.1, far beyond the critical
+distance, the error is 1.1e+00 both with N = 256 and with N = 1024. `optics.propagate` has errors of 2.2e-03 and 2.6e-04
+with the same samples.
 
 **Method.** A circular aperture of R = 50 µm at 550 nm is sampled on N x N points over a period of 4R. The intensity
 within |x|, |y| <= R is compared with the direct Rayleigh-Sommerfeld sum. The textbook's angular spectrum
 (`validation/optics/textbook_propagation.py`) multiplies the spectrum of the samples by the transfer function. Its
 period is that of the samples. Beyond the critical distance, the steepest light that the samples represent leaves the
 period at one edge and re-enters at the other. More samples then do not help, and at larger distances the error reaches
-100 %. Equivalently, the phase of the transfer function changes by more than half a wave between neighbouring frequency
+100 %. In terms of frequencies, the phase of the transfer function changes by more than half a wave between neighbouring
 samples.
 
 `optics.propagate` receives the same hard-edged samples. It chooses its own period, and fades out light that would land
 far outside the window. Its error falls with N at any distance. The remaining error comes from the pixelated edge of the
-aperture. `optics.psf` takes no N from the user: it low-pass filters the edge and plans its own sampling.
+aperture. In `optics.psf` the user does not choose N: the function low-pass filters the edge and plans its own sampling.
 
 **First table.** Each row is one Fresnel number R²/λz. N* is the number of samples for which this distance is the
 critical one. The last columns show the error of `optics.psf`, its predicted error and the method that it chose.
 
 **Second table.** A Gaussian beam spreads to the radius w (1/e² of intensity) and is propagated with shorter and shorter
-periods P. In the textbook's method the beam overlaps its own repetition. Its amplitude at the edge of the period is
-about exp(-(P/2w)²). The errors of `optics.propagate` with the same samples do not depend on P: they come only from
-rounding and from the tolerance.
+periods P. In the textbook's method the beam overlaps its own repetition. The amplitude of the beam at the edge of the
+period is about exp(-(P/2w)²). The errors of `optics.propagate` with the same samples do not depend on P: they come only
+from rounding and from the tolerance.
 
 **Limits.** The first table covers one aperture at one wavelength, at Fresnel numbers from 0.1 to 100.
 

@@ -9,16 +9,17 @@ a half wavelengths and float64 after two. `optics.propagate` recovers a Gaussian
 with them the rounding errors of the samples. A wave of f = 2.8/λ grows by 7 decades per wavelength of distance. Samples
 with a pitch of λ/4 represent such a wave along their diagonal. At larger distances the numbers overflow.
 
-With a negative distance, `optics.propagate` only reverses phases. It drops waves beyond f = 1/λ, and
-`result.evanescent_power` reports their share of the input's power. Waves that have decayed cannot be recovered. The
-recovered field therefore lacks the evanescent part of the original, and its error equals √(evanescent share). The share
-that forward propagation reports thus predicts the error of the recovered field.
+With a negative distance, `optics.propagate` only reverses phases. It drops waves beyond f = 1/λ (evanescent waves), and
+`result.evanescent_power` reports their fraction of the input's power. Waves that have decayed cannot be recovered. The
+recovered field therefore lacks the evanescent part of the original, and its error equals the square root of the
+evanescent fraction. Forward propagation reports this fraction, so the error of the recovered field is known in advance.
 
-**Tables.** Both use Gaussian spots exp(-r²/w²), whose exact field at z is summed from their closed-form spectrum. In
-the first table w is 2 λ. This spot has almost no evanescent part, so the table shows only the error of the method. In
-the second table z is λ/2 and w falls from 1 λ to 0.2 λ. The spot of w = 0.2 λ is 45 % evanescent.
+**Tables.** Both tables use Gaussian spots exp(-r²/w²). The exact field of such a spot at the distance z is summed from
+its closed-form spectrum. In the first table w is 2 λ. This spot has almost no evanescent part, so the table shows only
+the error of the method. In the second table z is λ/2 and w falls from 1 λ to 0.2 λ. The spot of w = 0.2 λ is 45 %
+evanescent.
 
-**Limits.** Two more kinds of light cannot be recovered: light that leaves the window, and light that is too close to
+**Limits.** Two more kinds of light cannot be recovered: light that leaves the window, and light at angles too close to
 grazing for the window. `propagate` includes light near grazing in its predicted error, and raises an `AccuracyError` if
 that error exceeds the tolerance.
 

@@ -1,14 +1,15 @@
 """Limiting cases: a known value or an error of one line
 
-Does every input at the edge of the domain give the right value or a clear error? Yes: all 12 inputs with a known value
-reach it within their tolerance, and all 26 invalid inputs are refused in one line.
+Does every input at the edge of the domain give the right value or a clear error? Yes: all 12 inputs with a known result
+give this result within their tolerance, and all 26 invalid inputs are refused in one line.
 
-**Method.** Each row of the table passes an input at the edge of the domain to `optics`, and has an expected outcome. An
-accepted input has a value that is known, mostly in closed form, and the result must agree with it within a bound that
-the script sets for this row. A refused input must raise an error that names the problem, in most cases as argument,
-value and valid range. No other outcome is allowed: no NaN, no mere warning, and no image of noise.
+**Method.** Each row of the table passes an input at the edge of the domain to `optics`, and has an expected outcome.
+For an accepted input, the correct result is known, mostly in closed form. The computed result must agree with it within
+a bound that the script sets for this row. A refused input must raise an error that names the problem, in most cases as
+argument, value and valid range. No other outcome is allowed: no NaN, no mere warning, and no image of noise.
 
-**Accepted inputs.** The table states the relative error of the result, or for darkness the brightest sample:
+**Accepted inputs.** The table states the relative error of the result. For a dark field, it states the brightest sample
+instead. The inputs are:
 
 - pupils far below the wavelength, compared with the cos²θ lobe of Rayleigh-Sommerfeld's integral;
 - a relief with the refractive index of the medium, and a DOE of one pixel (a plate), compared with the bare pupil;
@@ -22,14 +23,15 @@ value and valid range. No other outcome is allowed: no NaN, no mere warning, and
 
 - lengths of 0, NaN, below 1e-15 m or above 1e15 m, and a relief higher than 100 radii;
 - arrays that are empty, not finite, or of the wrong shape;
-- refractive indices below 1, also if a dispersion curve falls below 1 at some wavelength;
+- refractive indices below 1, including dispersion curves that fall below 1 at some wavelength;
 - wavelengths outside the colour tables (300 to 780 nm), and pigments outside their range of peaks;
 - a source behind the pupil;
 - a tolerance of 0, or below what the dtype allows;
 - windows so close that light reaches them only at grazing angles;
 - cases that need more than 4 GB of memory, or more than 60 s.
 
-The last three kinds, except a tolerance of 0, raise an `AccuracyError`, which is a `ValueError`.
+The last three kinds of input raise an `AccuracyError`, which is a `ValueError`. A tolerance of 0 raises a plain
+`ValueError`.
 
     python -m validation.optics.limiting_cases [--out DIR] [--docs DIR]
 """

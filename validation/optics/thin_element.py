@@ -1,25 +1,25 @@
 """Thin element: effects that a phase mask omits from a real relief
 
 Which effects of a real relief does a phase mask omit, and when do they matter? `optics` models every relief as a phase
-mask. The mask is accurate for slopes below 10° and for lenses below NA = 1.16 (λ/f)^¼. That NA is 0.25 for f = 240 µm.
+mask. The mask is accurate for slopes below 10°, and for lenses below NA = 1.16 (λ/f)^¼, which is 0.25 for f = 240 µm.
 
-**Method.** A relief of height h is modelled as the phase k(n - 1)h in one plane. This is a choice of model, so no
-predicted error covers it: `predicted_error` is the error of propagating the mask. Rays through the real surface show
-the effects that the mask omits. They follow Snell's law and come from inside the glass of n = 1.5
-(`validation/optics/refraction.py`):
+**Method.** A relief of height h is modelled as the phase k(n - 1)h in one plane. The `predicted_error` of a PSF covers
+the propagation behind the mask, but not this choice of model. Rays through the real surface show the effects that the
+mask omits. The rays follow Snell's law and come from inside the glass of n = 1.5 (`validation/optics/refraction.py`):
 
 - **Refraction at a slope.** A prism of angle α deviates light by arcsin(n sin α) - α, the mask by arcsin((n - 1) tan
-  α). The deviation of the mask is the same for light from either side. The mask's deviation is 1 % too small at α = 11°
-  and 10 % too small at 30°.
-- **Total reflection.** Beyond a slope of 41.8° no light leaves the glass, but the mask transmits light up to 63°. A
-  lens made of one relief cannot exceed this slope, which limits it to NA = 0.45. The mask has no such limit.
-- **Fresnel reflection.** The reflected share is 4 % at normal incidence, 10 % at 36° and 25 % at 40°. No PSF here
-  includes it.
-- **Thickness.** Rays bend at the surface and not in the plane. A relief whose mask is an ideal lens is therefore not an
-  ideal lens itself. Its Strehl ratio falls below 0.8 at NA = 1.16 (λ/f)^¼. Its focus spreads along the axis by several
-  depths of field at this NA, and by more at a higher NA.
+  α). The deviation by the mask is 1 % too small at α = 11° and 10 % too small at 30°. It does not depend on the side
+  from which the light comes.
+- **Total reflection.** Beyond a slope of 41.8° no light leaves the glass, but the mask transmits light up to 63°. The
+  slope of a lens that consists of one relief therefore cannot exceed 41.8°, so its NA is at most 0.45. The mask has no
+  such limit.
+- **Fresnel reflection.** A surface reflects 4 % of the light at normal incidence, 10 % at 36° and 25 % at 40°. PSFs of
+  `optics` do not include this loss.
+- **Thickness.** Real rays bend at the surface of the glass and not in the plane of the mask. A relief whose mask is an
+  ideal lens is therefore not an ideal lens itself. Its Strehl ratio falls below 0.8 at NA = 1.16 (λ/f)^¼. Its focus
+  spreads along the axis by several depths of field at this NA, and by more at a higher NA.
 - **Neighbouring ridges.** A sinusoidal corrugation starts to reflect totally if its depth is 0.28 of its period. From
-  0.30 on, some rays that have left the surface hit the next ridge.
+  0.30 of the period on, some rays that have left the surface hit the next ridge.
 
 The command computes the table:
 

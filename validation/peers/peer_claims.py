@@ -1,15 +1,16 @@
 """Claims of other codes' tests and of textbooks
 
-Do the claims of other codes' tests and of textbooks hold here? All 89 claims hold.
+Do the claims of other codes' tests and of textbooks also hold for the results of `optics`? All 89 claims hold.
 
-**Method.** The test suites of prysm, poppy and hcipy assert closed forms, and textbooks contain tables. Each of these
-claims is computed with the functions of `optics`.
+**Method.** The test suites of prysm, poppy and hcipy compare results with closed forms, and textbooks contain tables of
+values. Each of these values is computed with the functions of `optics`.
 
-**Table.** Each row shows the value of the source, our value, and the largest difference allowed between them. If a test
-suite states a bound, the same bound is used. Where the exact integral differs from a paraxial claim, the bound is
-wider. Most claims are paraxial, so most systems are slow (f/100). Lengths are in units of λf/D.
+**Table.** Each row shows the value from the source ("theirs"), our value, and the largest difference that is allowed
+between them. If a test suite states a bound, the same bound is used. The bound is wider where the claim is paraxial and
+the exact integral differs from it. Because most claims are paraxial, most systems have a large F-number (f/100).
+Lengths are in units of λf/D.
 
-**Limits.** The claims listed below the table have no counterpart here. Each one is followed by the reason.
+**Limits.** The claims listed below the table cannot be tested with `optics`. Each one is followed by the reason.
 
     python -m validation.peers.peer_claims [--out DIR] [--docs DIR]
 """

@@ -5,19 +5,19 @@ computes 7178 PSFs per CPU second with a median error of 1.5e-03, and `psf` comp
 The fastest peer, prysm with 32 samples, computes 2871 with a median error of 6.9e-03.
 
 **Method.** The eyes resemble the eyes in an evolutionary search: pupil radii of 15 to 40 µm, a relief of 4 x 4 control
-points close to a lens, a retina at a distance of 240 µm, and green light. A PSF has 65 x 65 samples with a pitch of
-0.25 µm. Each code computes PSFs on one thread. `psf_batch` is timed on the whole population, and the other codes are
-timed on 24 new eyes. The time includes the heights of the relief and all matrices that an eye needs. The error is the
-relative L2 distance from our direct sum over nodes, which is accurate to 1e-5. The table states its median and its
-largest value over every fifth eye.
+points that is close to that of a lens, a retina at a distance of 240 µm, and green light. A PSF has 65 x 65 samples
+with a pitch of 0.25 µm. Each code computes PSFs on one thread. `psf_batch` is timed on the whole population, and the
+other codes are timed on 24 new eyes. The time includes the computation of the relief's heights and of all matrices that
+an eye needs. The error of a PSF is its relative L2 distance from our direct sum over nodes, which is accurate to 1e-5.
+The table states the median and the largest error over every fifth eye.
 
 **Table.** `psf_batch` runs with five tolerances and `psf` with three. The peers run with 32 to 256 samples across the
 pupil.
 
-**Limits.** The other codes have no plan for a population. They also have no exact propagator whose output grid is as
-free as that of `optics.psf`. They have a matrix Fourier transform from the pupil to the focal plane. This transform
-equals Fresnel's integral if the phase kr²/2z is added to the field in the pupil. Their errors therefore come from the
-paraxial model, and from a hard or a grey edge of the pupil.
+**Limits.** The other codes cannot share a plan between the eyes of a population. They also have no exact propagator
+with a freely chosen output grid, as `optics.psf` has. Instead, their matrix Fourier transform from the pupil to the
+focal plane is used. It equals Fresnel's integral if the phase kr²/2z is added to the field in the pupil. The errors of
+these codes therefore come from the paraxial model, and from the hard or grey edge of the sampled pupil.
 
     python -m validation.peers.population_speed [--eyes N] [--without-peers] [--out DIR] [--docs DIR]
 """

@@ -117,10 +117,11 @@ def draw(ours: Sequence[Point], peers: Sequence[Point], path: Path, caption: str
 
 
 LEGEND = (
-    "thick lines: the method that the planner chooses; dots: each exact method selected by name; "
-    "grey: the best of each peer's methods\n"
-    f"goal 1: {_power(ACCURATE)} at least {FASTER:g}x faster than the first peer to reach its own best; "
-    f"goal 2: {_power(SINGLE)} in float32 before any peer has {_power(CONVERGED_PEER)}"
+    "thick lines: methods that the planner chooses; dots: all exact methods, selected by name; "
+    "grey: the best methods of each other code\n"
+    f"goal 1: an error of {_power(ACCURATE)}, at least {FASTER:g} times as fast as the first other code to reach its "
+    f"own smallest error\n"
+    f"goal 2: an error of {_power(SINGLE)} in float32, before any other code reaches {_power(CONVERGED_PEER)}"
 )
 TITLES = {
     case.name: f"ideal lens {case.name}, window ±10 λ f/#" if case.has_lens else "circular aperture, near field"

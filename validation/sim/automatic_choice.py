@@ -1,22 +1,22 @@
 """Cost of the automatic choice of samples over resolution, field of view and number of eyes
 
 Does the automatic choice ("auto") have a cliff, where a slightly different eye takes many more samples? It does not. In
-every setting it chooses areas, each of which averages the light over a part of a receptor. It needs one to six of them
-per receptor, and the predicted error is within the tolerance.
+every setting it chooses area sampling, in which each sample averages the light over a receptor or a part of it (an
+area). One to six areas per receptor are enough for a predicted error within the tolerance.
 
 **Method.** `sim.choose_fidelity` chooses samples for eyes with perfect lenses in detection, a maze and navigation. One
 property changes at a time: the number of receptors across, the field of view, or the number of eyes. Detection has
 square eyes. Mazes and navigation have eyes of a single row, as in the evolved animals. Then 64 worlds are rendered with
 the chosen samples.
 
-**Table.** The column *error* states the predicted error divided by the tolerance. It leaves out the bound that is due
-to the eyes' spectral bands. Times are the median CPU time per frame and receptor, relative to the smallest value of the
-same task. They are longer where eyes have few receptors, because work that is done once per world or per eye is then
-shared by few receptors.
+**Table.** The column *error* states the predicted error divided by the tolerance. This error does not include the error
+that the eyes' spectral bands cause. Times are the median CPU time per frame and receptor, relative to the smallest
+value of the same task. The time per receptor is longer if eyes have few receptors, because the work that is done once
+per world or per eye is then divided by fewer receptors.
 
-**Bounds.** No error is above 1, and in no setting are single rays chosen instead of areas. In the sweep over
-resolutions, the number of samples changes by at most a factor of three between neighbouring settings that differ by at
-most three receptors.
+**Bounds.** No error is above 1, and in no setting are single rays chosen instead of areas. If two neighbouring settings
+of the sweep over resolutions differ by at most three receptors, their numbers of samples differ by at most a factor of
+three.
 
     python -m validation.sim.automatic_choice [--out DIR] [--docs DIR]
 """

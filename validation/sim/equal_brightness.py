@@ -1,29 +1,30 @@
 """Equal brightness of goal and adversary to a single receptor
 
 Can a single photoreceptor distinguish goal from adversary by brightness? At distances of 2 m or more it cannot: the
-mean difference over directions is at most 0.04 of the receptor noise.
+signals from goal and adversary differ by at most 0.04 of the receptor noise, in the mean over directions.
 
 **Method.** In detection and tracking, objects are spheres with black and white stripes. A goal has vertical sectors of
 30°, and an adversary has horizontal bands. Light comes from above. If all bands had the same width, adversaries would
-therefore be brighter or darker than goals, and one photoreceptor could distinguish them. The edges of the bands are
-fitted by least squares so that an adversary is as bright as grey. The fit covers 24 directions, and distances at which
-an eye of 45° sees (nearly) all of an object. It starts from edges that are 30° apart, and penalises deviations from
-them. The two lowest edges can hardly be seen and are not fitted.
+therefore be brighter or darker than goals, and one photoreceptor could distinguish them. To prevent this, the edges of
+the bands are fitted by least squares, so that an adversary is as bright as a uniformly grey sphere. The fit covers 24
+directions, and distances at which an eye of 45° sees (nearly) all of an object. It starts from edges that are 30°
+apart, and penalises deviations from them. The two lowest edges can hardly be seen and are not fitted.
 
 The light of one illuminated sphere is computed by tracing rays, without the renderer.
 `tests/sim/worlds/test_balance.py` computes the same difference from rendered signals.
 
-**Table.** It states the signal of an adversary minus that of a goal, in units of the receptor noise (a standard
+**Table.** The table states the signal of an adversary minus that of a goal, in units of the receptor noise (a standard
 deviation of 0.01), for one receptor that looks straight at the object. Each cell is a mean or a root mean square over
-24 directions. The first pair of columns uses the shipped edges of the built-in adversaries, which have seven bands. The
-second pair uses six bands of 30°.
+24 directions. The first pair of columns is for the built-in adversaries, which have seven bands with the shipped edges.
+The second pair is for six bands of 30°.
 
-**Bounds.** At distances of 2 m or more, the mean difference is below a fifth of the noise. It also exceeds the mean
-difference with the fitted edges by at most a tenth of the noise. (The shipped edges differ from the fitted ones by up
-to 3.0°.)
+**Bounds.** At distances of 2 m or more, the mean difference is below a fifth of the noise. With the shipped edges, the
+mean difference is at most a tenth of the noise larger than with the fitted edges. (The shipped edges differ from the
+fitted ones by up to 3.0°.)
 
 **Limits.** At distances below 2 m, an eye does not see the top of an object, and the difference grows to several times
-the noise. There, objects of one kind also differ more in brightness between their lit and their shaded side.
+the noise. At such short distances, the brightness of an object also depends more on whether the eye sees its lit or its
+shaded side.
 
     python -m validation.sim.equal_brightness [--out DIR] [--docs DIR]
 """

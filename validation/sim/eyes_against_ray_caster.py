@@ -3,20 +3,21 @@
 Do eyes on any MuJoCo model see the surfaces that MuJoCo's ray caster hits? In each of 53 third-party models, the two
 agree for at least 99.997 % of the receptors: both find the same depth to 1e-3, or both see nothing.
 
-**Method.** The models are all models of `scene_against_mujoco` with moving parts. Each model gets one eye on an added
-camera that looks at it from a random side, and one eye on each of up to three of its own cameras. Five worlds at once
-have random poses. For the centre of every receptor, the depth from `sim.ModelRenderer` is compared with the depth from
-MuJoCo's ray caster.
+**Method.** The models are all models of `scene_against_mujoco` with moving parts. One eye is mounted on an added camera
+that looks at the model from a random side. Up to three more eyes are mounted on cameras of the model itself. Five
+worlds with random poses are rendered at once. For the centre of every receptor, the depth from `sim.ModelRenderer` is
+compared with the depth from MuJoCo's ray caster.
 
-**Table.** The columns state the number of moving geoms, the share of receptors with the same depth, and this share for
-the worst eye of any world. The last column states steps per CPU second. It was measured with 64 worlds of two eyes of
-15 x 15 receptors and 4 rays per receptor, without physics.
+**Table.** The columns state the number of moving geoms, the fraction of receptors with the same depth, and this
+fraction for the worst eye of any world. The last column states steps per CPU second. It was measured with 64 worlds of
+two eyes of 15 x 15 receptors and 4 rays per receptor, without physics.
 
 **Bounds.** In every model, at least 99.5 % of the receptors have the same depth to 1e-3, or both see nothing.
 
-**Limits.** The other receptors look at the limb of a tessellated surface or at the inside of a surface. MuJoCo's rays
-hit the inside of a surface, but eyes look through it. Planes are the opposite case: eyes see their backs, and MuJoCo's
-rays do not hit them. Only eyes in front of every plane are therefore counted.
+**Limits.** The receptors that differ look at the edge of a curved surface that is approximated by triangles, or at the
+inside of a surface. MuJoCo's rays hit the inside of a surface, but eyes look through it. With planes it is the other
+way round: eyes see the back of a plane, and MuJoCo's rays do not hit it. Only eyes in front of every plane are
+therefore counted.
 
     PYTHONPATH=DIR python -m validation.sim.eyes_against_ray_caster [--only suite] [--out DIR] [--docs DIR]
 """

@@ -1,18 +1,19 @@
 """Receptive fields sampled by rays, compared with convolution of a padded image
 
-Do rays sample receptive fields without bias? With the number n of rays per receptor, errors fall at least like n^-0.51
-wherever a slope can be fitted. The automatic choice has an error of at most 0.165 of the receptor noise σ.
+Do rays sample receptive fields without bias? Yes: errors fall with the number n of rays per receptor, at least like
+n^-0.51 wherever a slope can be fitted. The automatic choice has an error of at most 0.165 of the receptor noise σ.
 
 **Method.** Behind a pupil, all receptors of an eye share one set of rays, drawn from the mixture of their receptive
 fields. The signal of a receptor is a weighted sum over these rays. The reference is the published method: an image of
 the tangent plane is convolved with the PSF (`Eye.see`). On every side this image is wider than the retina by the reach
-of the kernel. The cells of the image form a different grid from the one on which the receptive fields of the rays are
-tabulated. Each cell is rendered with many rays of its own, or with many areas if all light is followed. Rays and
-reference use the same light, so they differ only in sampling.
+of the kernel. The grid of this image differs from the grid on which the receptive fields of the rays are tabulated.
+Each cell is rendered with many rays of its own or, if light may be reflected any number of times, with many areas
+([area sampling](../concepts/rendering.md#area-sampling)). Rays and reference use the same light, so they differ only in
+sampling.
 
 Errors are root mean squares over receptors, channels and states of an agent that acts at random in the detection world.
-They are in units of the receptor noise: σ is 0.01 of the signal of white behind a pupil as wide as the retina (a = 1).
-The five kinds of pupil are:
+They are in units of the receptor noise σ = 0.01, where white gives a signal of 1 behind a pupil as wide as the retina
+(a = 1). The five kinds of pupil are:
 
 - perfect: no pupil (the perfect lens);
 - pinhole: a = 0.04;
@@ -26,7 +27,7 @@ The perfect lens uses 24 states, because its errors differ much between views. T
 is a number of rays or of areas, and its error. No slope is given if fewer than three errors are above 0.01 σ.
 
 **Bounds.** The error of the automatic choice is at most half of the noise. Errors fall at least like n^-0.5, as with
-independent rays, down to 0.01 σ. Differences of this size can come from the two grids on which one PSF is tabulated.
+independent rays, down to 0.01 σ. Smaller differences can come from the two different grids.
 
     python -m validation.sim.receptive_field_sampling [--out DIR] [--docs DIR]
 """

@@ -10,17 +10,17 @@ of every pixel is compared with MuJoCo's segmentation renderer. Where the geoms 
 MuJoCo's ray caster. (The segmentation renderer draws round shapes as polygons, here of 96 slices. The ray caster uses
 exact shapes.)
 
-**Table.** The columns state the number of geoms, the share of pixels that show the same geom, this share in the worst
-image, and the share of these pixels that have the same depth. The last column lists the features of the model that the
-mirror lacks, as reported by the mirror.
+**Table.** The columns state the number of geoms, the fraction of pixels that show the same geom, this fraction in the
+worst image, and the fraction of these pixels that have the same depth. The last column lists the features of the model
+that the mirror lacks, as reported by the mirror.
 
 **Bounds.** In every model, at least 99.5 % of the pixels show the same geom, and at least 99.9 % of those have the same
 depth to 1e-3.
 
-**Limits.** The remaining pixels are at the limb of surfaces that the mirror tessellates. The models are those in
-dm_control (suite, locomotion, third-party robots), gymnasium-robotics and gymnasium that compile on their own. They are
-not part of rhabdom. Install them with `pip install 'rhabdom[validation]'`. If pinned versions conflict, use
-`pip install --no-deps --target DIR dm_control gymnasium-robotics` and add DIR to PYTHONPATH.
+**Limits.** The pixels that differ are at the edges of curved surfaces, which the mirror approximates by triangles. The
+models are those in dm_control (suite, locomotion, third-party robots), gymnasium-robotics and gymnasium that compile on
+their own. They are not part of rhabdom. Install them with `pip install 'rhabdom[validation]'`. If pinned versions
+conflict, use `pip install --no-deps --target DIR dm_control gymnasium-robotics` and add DIR to PYTHONPATH.
 
     python -m validation.sim.scene_against_mujoco [--only WORD] [--out DIR] [--docs DIR]
 """

@@ -1,13 +1,13 @@
 """Speed against accuracy of rendering for agents' eyes
 
-How much accuracy does each rendering speed allow, and does the automatic choice keep its promise of an error below σ/2?
-The automatic choice keeps the promise in all six scenes: its largest error is 0.399 σ. Its speed is 0.95 to 1.00 of
-that of the fastest setting that is at least as accurate.
+How much accuracy does each rendering speed allow? The automatic choice of settings promises an error below σ/2, where σ
+is the receptor noise. Does it keep this promise? It does in all six scenes: its largest error is 0.399 σ. Its speed is
+0.95 to 1.00 of that of the fastest setting that is at least as accurate.
 
 **Errors.** The error of a setting is the root mean square difference from a reference, over channels, eyes, states and
 receptors. Errors are in units of the receptor noise, σ = 0.01. Errors below σ/2 are small compared with the noise of
-one receptor. (An agent could still learn to use an error that many receptors share.) Errors are computed over two
-populations of receptors:
+one receptor. (If many receptors have the same error, an agent could still learn to use it.) Errors are computed over
+two populations of receptors:
 
 - all receptors, in 4 states that agents reached;
 - the receptors that see an object, in 24 views with an object 0.8 to 4 m ahead. With a perfect lens there are 8 views,
@@ -17,10 +17,11 @@ The reference is Mitsuba's path tracer in 8 bands. Behind a lens, its image is c
 (`Eye.see`).
 
 **Speed.** The speed is the number of agent-steps per second of one core's CPU time, without physics. In an agent-step,
-all eyes of one agent are rendered once. The best of several interleaved rounds counts.
+all eyes of one agent are rendered once. All settings are measured in turns over several rounds, and the best round of
+each setting counts.
 
 **Settings.** The eyes are those of the published experiments. Each is rendered with a perfect lens, and behind a lens
-in focus whose pupil has a radius of a times half the retina's width. The following settings vary:
+in focus with a stated relative aperture a (pupil diameter / retina width). The following settings vary:
 
 - samples: rays traced in closed form, rays traced by Mitsuba, areas, or the reference renderer with few samples;
 - the number of samples per receptor;
@@ -32,13 +33,14 @@ in focus whose pupil has a radius of a times half the retina's width. The follow
 All settings use float32, because Mitsuba's spectral variants are built for float32 only.
 
 **Table.** "auto" is the choice of `choose_fidelity`, bands included. "front" marks settings on the Pareto front of
-speed against error, where the error is the greater of the two populations' errors. "vs same light" is the error over
-all receptors relative to very many rays in the same light, so it contains only the effects of samples and bands.
+speed against error: no other setting is both faster and more accurate. For this comparison, the error of a setting is
+the greater of the two populations' errors. "vs same light" is the error over all receptors relative to very many rays
+in the same light, so it contains only the effects of samples and bands.
 
 **Bounds.** Compared with path-traced light, the error of "auto" must not exceed the promised σ/2 (plus the noise of the
-reference) in either population, unless a `FidelityWarning` was raised. If the promise is broken, the table states the
-error. "auto" must also be on the Pareto front, or at most 20 % slower than the front at the same error. "auto" was not
-tuned on any of these views.
+reference) in either population, unless a `FidelityWarning` was raised. If the promise is broken, the table states by
+how much. "auto" must also be on the Pareto front, or at most 20 % slower than settings of the front with the same
+error. "auto" was not tuned on any of these views.
 
     python -m validation.sim.speed_accuracy [--out DIR] [--docs DIR] [--scenes N]
 """

@@ -50,8 +50,8 @@ def finished_products(run: Run, shown: bool, replay: bool = False) -> Products:
 
     The report is written last, so its existence shows that all files are complete.
 
-    shown: whether to show a progress bar
-    replay: whether to also write a page that plays the episode
+    shown: True to show a progress bar
+    replay: True to also write a page that plays the episode
     """
     with Waiting(3 + replay, shown) as wait:
         wait.step("the best agent plays an episode")
@@ -67,7 +67,7 @@ def finished_products(run: Run, shown: bool, replay: bool = False) -> Products:
             wait.step("writing the replay")
             played = write_page(run, best)
         wait.step("writing EXR files")
-        frames = exr_export.export_episode(best, run.path / EXR, wait.within)
+        frames = exr_export.export_episode(run, best, run.path / EXR, wait.within)
         wait.step("writing the report")
         return Products(write(run, best, doing=wait.within), frames, played)
 
@@ -79,7 +79,9 @@ def replay(arguments: Namespace) -> int:
         from evolve.report.replay import BESIDE, episode_facts, episode_table, write_replay
 
         also = [form for form in BESIDE if getattr(arguments, form)]
-        episode, paths = write_replay(run, arguments.candidate, arguments.seed, also, arguments.out)
+        mode = "test" if arguments.test else "evaluation"
+        asked = (arguments.candidate, arguments.seed, arguments.every)
+        episode, paths = write_replay(run, *asked, also, arguments.out, mode)
     if arguments.json:
         say(json.dumps({**episode_facts(episode), "files": [str(path) for path in paths]}, indent=1))
     else:
@@ -107,7 +109,8 @@ def export(arguments: Namespace) -> int:
     with _waiting(arguments, "EXR files are written") as wait:
         from evolve.report.exr_export import export_run
 
-        files = export_run(run, arguments.candidate, arguments.seed, arguments.out, wait.within)
+        asked = (arguments.candidate, arguments.seed, arguments.every, arguments.out)
+        files = export_run(run, *asked, wait.within)
     if arguments.json:
         say(json.dumps({"exr": [str(file) for file in files]}, indent=1))
     else:

@@ -10,6 +10,7 @@ from contextlib import AbstractContextManager, contextmanager, nullcontext
 from typing import Any
 
 from evolve.analysis.episode_failures import episode_failure_lines, episode_failures_of
+from evolve.analysis.fitness_parts import fitness_text
 from evolve.cli.commands import INTERRUPTED
 from evolve.cli.commands.products import REPORT, Products, finished_products, open_page
 from evolve.cli.run_plan import RunPlan, steps_each
@@ -43,7 +44,7 @@ def start(arguments: Namespace) -> int:
         return _show(RunPlan.from_config(prepared.config, prepared.directory(arguments.out)), arguments.json)
     notes = (
         [] if arguments.json or arguments.quiet else lint(prepared.config)
-    )  # may build the task's world, which takes time, so this is done before the run directory exists
+    )  # this may build the task's world, which takes time, so it precedes the run directory
     with prepared.create(Run, arguments.out) as run:
         if not arguments.json:
             for note in notes:
@@ -123,7 +124,7 @@ class _Shown:
 def _carry_on(run: Run, arguments: Namespace, scheduler: Scheduler | None) -> int:
     """Continue a locked run to its end.
 
-    After Ctrl-C, print how to continue. The files need no further writing, because the record is always complete.
+    After Ctrl-C, print how to continue. No file needs to be written then, because the record is always complete.
     """
     shown = _Shown(arguments)
     try:
@@ -201,12 +202,14 @@ def _finish(run: Run, arguments: Namespace) -> int:
 
 
 def _finished_event(run: Run, best: Candidate, made: Products) -> dict[str, Any]:
-    return {"event": "finished", "best": best.id, "fitness": best.fitness, **made.record(run)}
+    parts = {"fitness": best.fitness, "task_fitness": best.task_fitness, "costs": best.costs}
+    return {"event": "finished", "best": best.id, **parts, **made.record(run)}
 
 
 def _outcome(run: Run, best: Candidate, failures: list[Candidate]) -> list[str]:
     """Return lines about the best candidate, failed candidates, failed episodes and repaired genomes."""
-    lines = [f"best: candidate {best.id}, fitness {best.fitness:.4g}, success rate {best.success_rate:.0%}"]
+    fitness = fitness_text(best.fitness, best.costs)
+    lines = [f"best: candidate {best.id}, fitness {fitness}, success rate {best.success_rate:.0%}"]
     if failures:
         lines.append(
             f"failed: {len(failures)} of {len(run.candidates)} candidates; the last one: {failures[-1].failure}"

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from evolve.analysis.episode_failures import episode_failure_lines, episode_failures_of
+from evolve.analysis.fitness_parts import fitness_text
 from evolve.config.task_code import names_code
 from evolve.runs.output import as_it_is, results, say
 from evolve.search.successive_halving import finished
@@ -27,7 +28,7 @@ from evolve.store.lock import holder
 __all__ = ["listing", "standing", "standing_lines", "status"]
 
 WATCH_S = 2.0  # [s] interval between two readings
-SHOWN = 12  # number of generations shown, the latest ones
+SHOWN = 12  # number of the latest generations that are shown
 
 
 def status(arguments: Namespace) -> int:
@@ -52,7 +53,7 @@ def _read(arguments: Namespace) -> dict[str, Any]:
 
 
 def listing(arguments: Namespace) -> int:
-    """Print one line for each run in a directory, the latest last. For an unreadable run, print the reason."""
+    """Print one line for each run in a directory, the latest last. For an unreadable run, it states the reason."""
     # os.path.exists returns False for an unreadable folder, which cannot be a run of this user. pathlib would raise.
     folders = [path for path in arguments.directory.iterdir() if os.path.exists(path / "config.toml")]
     found = [_standing_or_reason(path) for path in sorted(folders, key=lambda path: path.stat().st_mtime)]
@@ -70,7 +71,7 @@ def listing(arguments: Namespace) -> int:
 def _standing_or_reason(path: Path) -> dict[str, Any]:
     try:
         return {name: value for name, value in standing(Run.open(path)).items() if name != "generations"}
-    except Exception as error:  # one directory, whatever it contains, must not hide the others
+    except Exception as error:  # an error in one directory must not hide the others
         reason = str(error) or type(error).__name__
         return {"directory": str(path), "state": "unreadable", "reason": shortened(" ".join(reason.split()))}
 
@@ -78,7 +79,8 @@ def _standing_or_reason(path: Path) -> dict[str, Any]:
 def _in_one_line(one: dict[str, Any]) -> str:
     if one["state"] == "unreadable":
         return f"unreadable: {one['reason']}"
-    best = "" if one["best"] is None else f", best fitness {one['best']['fitness']:.4g}"
+    found = one["best"]
+    best = "" if found is None else f", best fitness {fitness_text(found['fitness'], found['costs'])}"
     count = one["candidates"]
     return f"{one['task']:<11} {one['state']:<11} {count['evaluated']} of {count['planned']} candidates{best}"
 
@@ -118,11 +120,13 @@ def standing(run: Run) -> dict[str, Any]:
         "last_failure": next((c.failure for c in reversed(run.in_order_of_finish) if c.failure), None),
         "mishaps": episode_failures_of(run.candidates),
         "steps": sum(candidate.steps for candidate in run.candidates),
-        "best": None
-        if best is None
-        else {"id": best.id, "fitness": best.fitness, "phenotype": best.phenotype.to_json()},
+        "best": None if best is None else {"id": best.id, **_parts(best), "phenotype": best.phenotype.to_json()},
         "generations": _generations(run),
     }
+
+
+def _parts(candidate: Candidate) -> dict[str, float]:
+    return {"fitness": candidate.fitness, "task_fitness": candidate.task_fitness, "costs": candidate.costs}
 
 
 def _generations(run: Run) -> list[dict[str, Any]]:
@@ -133,11 +137,15 @@ def _generations(run: Run) -> list[dict[str, Any]]:
 
 
 def _generation(members: Sequence[Candidate]) -> dict[str, Any]:
-    fitness = [candidate.fitness for candidate in members if candidate.failure is None]
+    """Return the state of a generation as JSON values; the task fitness and the costs are those of its best member."""
+    done = [candidate for candidate in members if candidate.failure is None]
+    best = max(done, key=lambda candidate: (candidate.fitness, -candidate.id), default=None)
     return {
         "evaluated": len(members),
-        "best": max(fitness, default=None),
-        "median": statistics.median(fitness) if fitness else None,
+        "best": None if best is None else best.fitness,
+        "task_fitness": None if best is None else best.task_fitness,
+        "costs": None if best is None else best.costs,
+        "median": statistics.median(candidate.fitness for candidate in done) if done else None,
     }
 
 
@@ -156,12 +164,13 @@ def standing_lines(now: dict[str, Any]) -> list[str]:
         lines.append(f"last failure: {now['last_failure']}")
     lines += episode_failure_lines(now["mishaps"])
     if best is not None:
-        lines.append(f"best: candidate {best['id']}, fitness {best['fitness']:.4g}")
+        lines.append(f"best: candidate {best['id']}, fitness {fitness_text(best['fitness'], best['costs'])}")
     told = [(number, g) for number, g in enumerate(now["generations"]) if g["best"] is not None]
     if len(told) > SHOWN:
         lines.append(f"generations 0 to {told[-SHOWN][0] - 1}: best {max(g['best'] for _, g in told[:-SHOWN]):.4g}")
     for number, generation in told[-SHOWN:]:
-        lines.append(f"generation {number}: best {generation['best']:.4g}, median {generation['median']:.4g}")
+        shown = fitness_text(generation["best"], generation["costs"])
+        lines.append(f"generation {number}: best {shown}, median {generation['median']:.4g}")
     if now["state"] == "interrupted":
         task = f" --task {now['task']}" if names_code(now["task"]) else ""
         lines.append(f"continue: evolve resume {now['directory']}{task}")

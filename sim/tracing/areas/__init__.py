@@ -1,12 +1,12 @@
 """Area sampling: means over rectangles of the visual field in closed form, which would otherwise need many rays.
 
 area_tracer         AreaTracer: the light in an area
-branches            branches of the kernel for work that few areas need
+branches            branches of the kernel, for computations that few areas need
 illumination        light that falls on a patch
 patch               Area, and the Patch of a surface that is visible in an area
 illuminated_bodies  table of the light on moving bodies
 body_light          light on the visible part of a body
-half_planes         shares of an area that straight lines cut off
+half_planes         fractions of an area that straight lines cut off
 borders             borders between columns of areas
 columns             walls, floor and sky behind an area
 sphere_areas        spheres in an area
@@ -16,5 +16,5 @@ light_baking        computation of the light tables
 light_store         cache of light tables on disk
 cell_grid           grid of the free cells of a world
 stripes             averages of textures
-shadows             share of a patch that each light reaches
+shadows             fraction of a patch that each light reaches
 """

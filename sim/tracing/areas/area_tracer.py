@@ -1,8 +1,8 @@
 """A renderer by area sampling for worlds of upright walls, a floor and spheres: in closed form, without noise.
 
 Each area is divided among floor, walls, sky and spheres. The part of a surface that is visible in an area is a patch.
-The surface's texture is averaged over the patch, and each light is reduced by the share of the patch that lies in its
-shadow. Colours and components are the same as in `sim.tracing.closed_form_tracer`, which follows rays through the same
+The surface's texture is averaged over the patch, and each light is multiplied by the fraction of the patch that it
+reaches. Colours and components are the same as in `sim.tracing.closed_form_tracer`, which traces rays through the same
 worlds.
 """
 
@@ -34,8 +34,8 @@ from sim.tracing.walls import ALIGNED, NoClosedForm
 
 LEAST_DIP = 1e-4  # smallest downward slope of directions that hit the floor
 BANDS = 2  # horizontal bands into which the floor in an area is divided
-# Number of equally wide parts of an area in which a wall's texture is averaged separately: the near part of a wall
-# fills more of the area than a distant part of the same length.
+# Number of equally wide parts of an area in which a wall's texture is averaged separately. It is more than 1, because
+# the near part of a wall fills more of the area than a distant part of the same length.
 STRETCHES = 2
 
 
@@ -43,7 +43,8 @@ STRETCHES = 2
 class _LitSphere:
     """A sphere in an area.
 
-    number: its number among the bodies · view: its visible part · light: light on it · now: inputs of the current frame
+    number: number of the sphere among the bodies · view: visible part of the sphere · light: light on the sphere
+    now: inputs of the current frame
     depth: layers among which its light is divided
     """
 
@@ -60,7 +61,7 @@ class AreaTracer:
     rays: tracer of rays through the same world, for the same light
 
     name, why: name of the tracer, and the reason for its choice, for reports
-    light: one of `lighting.LEVELS`: which reflections are followed
+    light: level of light, one of `lighting.LEVELS`
     basis: (component, band): contribution of each component to each band
 
     Raises:
@@ -113,7 +114,7 @@ class AreaTracer:
     ) -> list[Array]:
         """Return the mean radiance in each area, one array per component, for each depth layer.
 
-        met: faces at the area's left and right border, see `first_faces` and `met_by`
+        met: faces at the area's left and right border, see `first_faces` and `border_faces`
         """
         nothing = [0.0] * (depth.count * len(self.basis))
         pieces = self._columns.pieces(area, met, now.inputs.face_ends)
@@ -123,7 +124,7 @@ class AreaTracer:
         floor = partial(self._floor, area, pieces, now, depth)
         seen.append(only_where(pieces[0].floor_share + pieces[1].floor_share > 0, floor, nothing))
         spheres = []
-        for k, centre in enumerate(self._seen_bodies(now)):
+        for k, centre in enumerate(self._visible_bodies(now)):
             in_view = sphere_areas.may_see(area, centre, self._radii[k])
             sphere = partial(self._sphere, area, k, pieces, now, depth)
             spheres.append(only_where(in_view, sphere, [0.0] * 3 + nothing))
@@ -135,10 +136,10 @@ class AreaTracer:
         return [sum(own, rest) for rest, *own in zip(total, *(sphere[3:] for sphere in spheres), strict=True)]
 
     def first_faces(self, origin: Array, level: Array, inputs: AreaTables) -> Array:
-        """Return the number of the wall's face that is hit in a level direction (Vector2f)."""
+        """Return the number of the wall's face that a ray in a horizontal direction (Vector2f) hits."""
         return self._columns.first_faces(origin, level, inputs.cells)
 
-    def met_by(self, area: Area, inputs: AreaTables) -> tuple[Array, Array]:
+    def border_faces(self, area: Area, inputs: AreaTables) -> tuple[Array, Array]:
         """Return the numbers of the faces at an area's left and right border."""
         left, right = (self.first_faces(area.origin, area.level(mi.Float(a)), inputs) for a in (-0.5, 0.5))
         return left, right
@@ -153,12 +154,12 @@ class AreaTracer:
 
     @property
     def places(self) -> int:
-        """Number of rows of a world's table of illuminated bodies; 0 if the light that they reflect is not followed."""
+        """Number of rows of a world's table of illuminated bodies; 0 if light that bodies reflect is neglected."""
         return self._illumination.bodies.nodes_per_body_set if self._reflected else 0
 
     def body_light(self, place: Array, bodies: list[Array], inputs: AreaTables) -> list[Array]:
         """Return rows of the table of illuminated bodies. place: row within a world's table · bodies: centres of the
-        bodies in this world."""
+        bodies in this world"""
         assert self._reflected
         assert inputs.reflected
         reflected = partial(self._reflected.on_body, tables=inputs.reflected)
@@ -183,8 +184,8 @@ class AreaTracer:
         return _in_layers(depth, piece.inverse_distance_at(piece.middle), sent_on)
 
     def _floor(self, area: Area, pieces: tuple[Piece, Piece], now: FrameState, depth: DepthLayers) -> list[Array]:
-        """Return the floor's light, computed in bands that have equal heights in the area. On the floor, bands near the
-        horizon are longer."""
+        """Return the floor's light, computed in bands of equal height in the area. On the floor, bands near the horizon
+        are longer."""
         share = pieces[0].floor_share + pieces[1].floor_share
         a = sum(piece.middle * piece.floor_share for piece in pieces) / dr.maximum(share, LEAST_DIP)
 
@@ -206,7 +207,7 @@ class AreaTracer:
         return [sum_ * share / BANDS for sum_ in total]
 
     def _floor_patch(self, area: Area, a: Array, dip: Array, height: Array) -> Patch:
-        """Return the floor's patch in a band of the visual field, from the band's height and middle (column a, dip)."""
+        """Return the floor's patch in a band of the visual field. a, dip: middle of the band"""
         t = (area.origin.z - self._walls.floor) / dip
         level, across = area.level(a), area.level(a) * (t / dip * height)
         point = area.origin + mi.Vector3f(level.x, level.y, -dip) * t
@@ -222,9 +223,9 @@ class AreaTracer:
     def _sphere(
         self, area: Area, k: int, pieces: tuple[Piece, Piece], now: FrameState, depth: DepthLayers
     ) -> list[Array]:
-        """Return the shares of the area in which a sphere hides the left wall, the right wall and the floor. The
-        sphere's light times its own share follows, per component. Parts of the sphere that nearer spheres hide are left
-        out."""
+        """Return the fractions of the area in which a sphere hides the left wall, the right wall and the floor. They
+        are followed by the sphere's light times the fraction of the area that it fills, per component. Parts of the
+        sphere that nearer spheres hide are omitted."""
         view = SphereView(area, now.bodies[k], self._radii[k])
         light = BodyLight.on_patch(self._illumination, k, view.whole().patch, now)
         sphere = _LitSphere(k, view, light, now, depth)
@@ -242,8 +243,8 @@ class AreaTracer:
         return [*hidden, *total]
 
     def _strip(self, area: Area, sphere: _LitSphere, strip: Strip) -> list[Array]:
-        """Return the share of a strip that no other sphere hides, followed by the strip's light times its share of the
-        area, per component."""
+        """Return the fraction of a strip that no other sphere hides. It is followed by the strip's light times the
+        fraction of the area that it fills, per component."""
         k, view, now, depth = sphere.number, sphere.view, sphere.now, sphere.depth
         texture = self._sphere_textures[k]
 
@@ -262,31 +263,32 @@ class AreaTracer:
         return total
 
     def _not_hidden(self, area: Area, k: int, slice_: Slice, now: FrameState) -> Array:
-        """Return the share of a slice that no other sphere hides. The parts that several spheres hide are assumed to
+        """Return the fraction of a slice that no other sphere hides. The parts that several spheres hide are assumed to
         overlap at random."""
         way = now.bodies[k] - area.origin
         bare = mi.Float(1)
-        for j, other in enumerate(self._seen_bodies(now)):
+        for j, other in enumerate(self._visible_bodies(now)):
             if j != k:
                 towards = other - area.origin
                 nearer = dr.squared_norm(towards) < dr.squared_norm(way)
                 bare *= 1 - dr.select(nearer, sphere_areas.hidden_by(towards, self._radii[j], slice_), 0)
         return bare
 
-    def _seen_bodies(self, now: FrameState) -> list[Array]:
+    def _visible_bodies(self, now: FrameState) -> list[Array]:
         return now.bodies[: len(self._sphere_textures)]
 
 
-def _in_layers(depth: DepthLayers, vergence: Array, light: list[Array]) -> list[Array]:
-    """Divide light from the distance 1 / vergence along the eye's axis among depth layers."""
+def _in_layers(depth: DepthLayers, inverse_distance: Array, light: list[Array]) -> list[Array]:
+    """Divide light from the distance 1 / inverse_distance along the eye's axis among depth layers."""
     if depth.count == 1:
         return light
-    return [share * component for share in depth.shares(vergence) for component in light]
+    return [share * component for share in depth.shares(inverse_distance) for component in light]
 
 
 def _in_eights(rows: np.ndarray) -> np.ndarray:
-    """Return eight numbers per face: the texel's column as an affine function of (x, y, z), the texture's first texel
-    and its number of columns. The floor's rim has an arbitrary texture, because it is invisible."""
+    """Return eight numbers per face, from which its texture is looked up. They are the texel's column as an affine
+    function of (x, y, z), the texture's first texel and its number of columns. The floor's rim is invisible and has an
+    arbitrary texture."""
     found = np.zeros((len(rows) + RIM, 8))
     found[: len(rows), :6] = rows
     found[len(rows) :, 5] = 1

@@ -1,6 +1,7 @@
 """Light on the visible part of a body.
 
-Shadows and the effect of other bodies are computed once for the whole part. The rest depends on the surface's normal.
+Shadows and the effect of other bodies are computed once for the whole part. All other factors depend on the surface's
+normal.
 """
 
 from __future__ import annotations
@@ -19,10 +20,11 @@ from sim.tracing.areas.patch import Patch
 class BodyLight:
     """Light on the visible part of one body.
 
-    illumination: direct light · visibility: share of each light that reaches the visible part
-    around: harmonics of the reflected light around the body, in fours, per component; empty if reflected light is not
-        followed
-    change: change of the reflected light by other bodies, per component
+    illumination: direct light
+    visibility: fraction of each light that reaches the visible part
+    around: spherical harmonics of the reflected light around the body, in groups of four, per component; empty if
+        reflected light is neglected
+    change: change of the reflected light due to other bodies, per component
     """
 
     illumination: Illumination
@@ -32,7 +34,7 @@ class BodyLight:
 
     @classmethod
     def on_patch(cls, illumination: Illumination, body: int, patch: Patch, now: FrameState) -> BodyLight:
-        """Return the light on a patch that stands for the visible part of a body; body: its number."""
+        """Return the light on the visible part of a body, which `patch` represents. body: number of the body"""
         lit = illumination.visibility(patch, now, body)
         if not now.body_light:
             return cls(illumination, lit, [], [])

@@ -22,7 +22,7 @@ class Borders:
 
     @classmethod
     def from_middles(cls, middles: np.ndarray, width: float) -> Borders:
-        """Return the borders of areas of one width around these x."""
+        """Return the borders of areas of equal width around the positions `middles`."""
         edges = np.stack([middles - width / 2, middles + width / 2], axis=-1)
         _, first, sides = np.unique(np.rint(edges * (PARTS / width)), return_index=True, return_inverse=True)
         return cls(edges.ravel()[first], sides.reshape(edges.shape))
@@ -34,5 +34,5 @@ class Borders:
 
     @property
     def directions(self) -> np.ndarray:
-        """Level directions to the borders in the eye's frame, (border, 3)."""
+        """Horizontal directions to the borders in the eye's frame, (border, 3)."""
         return np.stack([self.x, np.zeros_like(self.x), np.ones_like(self.x)], axis=-1)

@@ -1,4 +1,4 @@
-"""Branches for work that few areas need, skipped by packets of the wavefront in which no area needs it."""
+"""Branches of the kernel for computations that few areas need."""
 
 from __future__ import annotations
 
@@ -11,7 +11,9 @@ from optics.numerics.autodiff import Array
 
 
 def only_where(needed: Array, values: Callable[[], list[Array]], otherwise: list[float]) -> list[Array]:
-    """Return the values where they are needed, and the alternatives otherwise. This is a branch of the kernel: packets
-    of lanes skip it if none of their lanes needs the values."""
+    """Return the values in lanes that need them, and the alternatives in all others.
+
+    Packets of lanes skip the computation if none of their lanes needs the values.
+    """
     found: list[Array] = dr.if_stmt((), needed, values, lambda: [mi.Float(value) for value in otherwise])
     return found

@@ -17,8 +17,9 @@ from sim.tracing.walls import Walls
 class CellGrid:
     """Cells of the grid in which the walls of a world stand. The grid ends at the outermost faces of the walls.
 
-    side: side of a cell [m] · corner: lower corner of the grid [m], (2,)
-    free: true for cells without a wall, (row, column)
+    side: side of a cell [m]
+    corner: lower corner of the grid [m], (2,)
+    free: True for cells without a wall, (row, column)
     """
 
     side: float
@@ -48,10 +49,11 @@ class CellGrid:
         return found
 
     def locate(self, point: Array, table: Array) -> tuple[Array, Array, Array]:
-        """Return the table's entry for the cell that contains a point, and the position of the point in this cell, x
-        and y in [0, 1].
+        """Return the table's entry for the cell that contains a point, and the point's x and y in this cell, in [0, 1].
 
-        Points outside the grid are moved to its border. table: one number per cell, row by row
+        Points outside the grid are moved to its border.
+
+        table: one number per cell, row by row
         """
         rows, columns = self.free.shape
         x, y = ((point[i] - float(self.corner[i])) * (1 / self.side) for i in range(2))

@@ -1,10 +1,10 @@
 """The walls behind an area: the faces at its left and right borders, and the edge between them.
 
-Columns are numbered by a (`sim.tracing.areas.patch.Area`). A level eye at height z sees a wall in column a at the
-distance t, in lengths of the direction's level part. The foot of the wall is visible at the slope (floor - z)/t, and
-its top at (top - z)/t. The inverse distance 1/t is linear in a, so the shares of floor, wall and sky have closed forms.
-If different walls are hit at the two borders of the area, a corner or an edge lies between them. It is computed from
-the ends of the walls.
+The coordinate a runs across an area (`sim.tracing.areas.patch.Area`). An upright eye at the height z sees a wall in
+column a at the distance t, in units of the horizontal part of the direction. The foot of the wall is visible at the
+slope (floor - z)/t, and its top at (top - z)/t. The inverse distance 1/t is linear in a, so the fractions of the area
+that floor, wall and sky fill have closed forms. If rays at the two borders of the area hit different walls, a corner or
+an edge lies between them. It is computed from the ends of the walls.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ from sim.tracing.walls import SIDES, Walls
 
 LEAST_NEARNESS = 1e-6  # smallest inverse distance [1/m], which also prevents divisions by 0
 NOTHING = 1e-12  # smallest height of a part of an area, which prevents divisions by 0
-RIM = 4  # number of sides of the floor, whose rim is hit in directions without a wall
+RIM = 4  # number of sides of the floor; its rim counts as a wall in directions without one
 
 
 @dataclass(frozen=True)
 class Face:
-    """A face of a wall. index: its number · left, right: its ends, seen from the front (Point2f)."""
+    """A face of a wall. index: number of the face. left, right: ends of the face, as seen from the front (Point2f)"""
 
     index: Array
     left: Array
@@ -40,8 +40,8 @@ class Face:
 class Piece:
     """A wall's face in columns start <= a <= end of an area.
 
-    inverse_distance: 1/t at a = 0, and its slope along a [1/m]
-    floor_share, wall_share, sky_share: shares of the area that floor, wall and sky fill in these columns
+    inverse_distance: inverse of the face's distance at a = 0, and its slope along a [1/m]
+    floor_share, wall_share, sky_share: fractions of the area that floor, wall and sky fill in these columns
     """
 
     face: Face
@@ -88,7 +88,8 @@ class Piece:
 class Columns:
     """Pieces of walls behind areas, in a world of walls of one height.
 
-    top: height of the walls' tops [m] · face_ends: ends of all faces, for the kernel
+    top: height of the walls' tops [m]
+    face_ends: ends of all faces, for the kernel
     """
 
     def __init__(self, walls: Walls, footprints: Footprints) -> None:
@@ -99,7 +100,7 @@ class Columns:
         self.face_ends = floats(_face_ends(walls))
 
     def pieces(self, area: Area, met: tuple[Array, Array], face_ends: Array) -> tuple[Piece, Piece]:
-        """Return the left and the right piece; if one wall fills all columns, the right piece is empty.
+        """Return the left and the right piece. If one wall fills all columns, the right piece is empty.
 
         met: faces at the area's left and right border, see `first_faces`
         """
@@ -109,7 +110,7 @@ class Columns:
         return self._piece(area, left, -half, edge), self._piece(area, right, edge, half)
 
     def first_faces(self, origin: Array, level: Array, cells: CellTables | None) -> Array:
-        """Return the number of the face that is hit in a level direction (Vector2f)."""
+        """Return the number of the face that a ray in a horizontal direction (Vector2f) hits."""
         ray = mi.Ray3f(origin, mi.Vector3f(level.x, level.y, 0))
         t, face, _ = self._footprints.hit(ray, cells)
         return dr.select(dr.isfinite(t), face, self._rim + self._side_of_floor(ray))
@@ -129,8 +130,11 @@ class Columns:
         return dr.select(t[0] < t[1], x, y + 2)
 
     def _edge(self, area: Area, left: Face, right: Face) -> Array:
-        """Return the column of the edge between two walls: an end of the nearer wall, or their common corner. If both
-        walls end, the surface between them is unknown, and the edge is put in the middle of the gap."""
+        """Return the column of the edge between two walls: an end of the nearer wall, or their common corner.
+
+        If both walls end in the area, the surface between them is unknown, and the edge is put in the middle of the
+        gap.
+        """
         ends = dr.minimum(_column_of(area, left.right, 1.0), 0.5)
         begins = dr.maximum(_column_of(area, right.left, -1.0), -0.5)
         (l0, l1), (r0, r1) = _inverse_distance(area, left), _inverse_distance(area, right)
@@ -161,7 +165,7 @@ class Columns:
 
 
 def _inverse_distance(area: Area, face: Face) -> tuple[Array, Array]:
-    """Return the inverse distance at a = 0, and its slope, of the line on which a face stands."""
+    """Return the inverse distance of a face's line at a = 0, and its slope along a."""
     side = face.right - face.left
     scale = dr.rcp(_cross(face.left - area.origin.xy, side))
     return _cross(area.ahead, side) * scale, _cross(area.right, side) * scale
@@ -179,8 +183,11 @@ def _cross(a: Array, b: Array) -> Array:
 
 
 def _face_ends(walls: Walls) -> np.ndarray:
-    """Return the left and right end of each face, seen from the front, (face, 4): the walls' faces, followed by the
-    sides of the floor's rim, which are seen from inside."""
+    """Return the left and right end of each face, (face, 4).
+
+    The faces of the walls, as seen from the front, are followed by the sides of the floor's rim, as seen from
+    inside.
+    """
     found = []
     for (x0, y0), (x1, y1) in zip(walls.lower, walls.upper, strict=True):
         # Faces in the order -x, +x, -y, +y.

@@ -1,4 +1,4 @@
-"""The two integrals from which all shares of an area are computed: shares that straight lines cut off."""
+"""The two integrals from which fractions of an area are computed. Straight lines bound the parts."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import drjit as dr
 
 from optics.numerics.autodiff import Array
 
-# Smallest ratio of a line's slopes along the two sides. Smaller ratios are below float32's precision of 1.2e-7.
+# Smallest ratio of a line's slopes along the two sides. Smaller ratios are within float32's rounding error of 1.2e-7.
 PARALLEL = 1e-9
 # If the two values differ by less than this, their clamped mean replaces the mean of the clamped line. The error is at
 # most an eighth of the difference.
@@ -14,11 +14,11 @@ LEVEL = 1e-2
 
 
 def share_above(s: Array, p: Array, q: Array) -> Array:
-    """Return the share of the unit square, |a| and |b| up to 1/2, in which s + p a + q b > 0."""
+    """Return the fraction of the unit square, |a| and |b| up to 1/2, in which s + p a + q b > 0."""
     p, q = dr.abs(p), dr.abs(q)
     longer = dr.maximum(dr.maximum(p, q), PARALLEL)
     shorter = dr.maximum(dr.minimum(p, q), PARALLEL * longer)
-    below = dr.abs(s)  # the smaller share is a trapezium or, if the line cuts a corner off, a triangle
+    below = dr.abs(s)  # the smaller part is a trapezium or, if the line cuts off a corner, a triangle
     reach = dr.maximum((longer + shorter) / 2 - below, 0)
     triangle = dr.minimum(reach * reach / (2 * longer * shorter), 0.5)
     trapezium = 0.5 - below / longer
@@ -27,7 +27,7 @@ def share_above(s: Array, p: Array, q: Array) -> Array:
 
 
 def mean_clamped(first: Array, last: Array) -> Array:
-    """Return the mean of max(0, min(x, 1)) for x uniformly between first and last."""
+    """Return the mean of max(0, min(x, 1)) for x that is uniform between `first` and `last`."""
     gap = last - first
     flat = (dr.abs(gap) < LEVEL) | (dr.minimum(first, last) >= 1) | (dr.maximum(first, last) <= 0)
     mean = (_antiderivative(last) - _antiderivative(first)) / dr.select(flat, 1, gap)

@@ -1,6 +1,6 @@
-"""The light on the moving bodies: the share of each light that reaches them, and the reflected light around them.
+"""Light on the moving bodies: the fraction of each light that reaches them, and the reflected light around them.
 
-It does not depend on the eye. It is computed once per world, in a table that all areas of the world read.
+It does not depend on the eye, so it is computed once per world, in a table that all areas of the world read.
 """
 
 from __future__ import annotations
@@ -18,10 +18,10 @@ from sim.tracing.areas.patch import Patch
 from sim.tracing.areas.shadows import WallShadows, lit_past_sphere
 
 MIDDLE = 2 / 3  # distance from a body's centre to the middle of its visible side, weighted by projected area [radii]
-# Number of places along x and along y, of which the outer ones are at the middles of the body's sides. Interpolation
+# Number of places on a body along x and along y. The outer ones are at the middles of the body's sides. Interpolation
 # between places has an error of 0.05.
 SIDES = 3
-WHOLE = SIDES * SIDES  # number of the place that stands for the whole body
+WHOLE = SIDES * SIDES  # number of the place that represents the whole body
 PLACES = WHOLE + 1
 
 Reflected = Callable[[Array, Array, Array], list[Array]]
@@ -30,15 +30,17 @@ Reflected = Callable[[Array, Array, Array], list[Array]]
 class IlluminatedBodies:
     """Computation and lookup of the light on the moving bodies of all worlds.
 
-    A row of the table contains the shares of the lights at a place, in fours. The first rows of each body also contain
-    the harmonics of the reflected light around it, one four per component.
+    A row of the table contains the fractions of the lights at a place, in groups of four ("fours"). The first rows of
+    each body also contain the spherical harmonics of the reflected light around it, one group of four per component.
 
-    shadows: shadows of walls · directions: directions towards the lights · radii: radii of the bodies [m]
+    shadows: shadows of walls
+    directions: directions towards the lights
+    radii: radii of the bodies [m]
     """
 
     def __init__(self, shadows: WallShadows, directions: list[list[float]], radii: list[float]) -> None:
         self._shadows, self._directions, self._radii = shadows, directions, radii
-        self._fours = -(-len(directions) // 4)  # of shares in a row
+        self._fours = -(-len(directions) // 4)  # groups of four fractions in a row
 
     @property
     def nodes_per_body_set(self) -> int:
@@ -46,13 +48,16 @@ class IlluminatedBodies:
         return PLACES * len(self._radii)
 
     def table(self, place: Array, bodies: list[Array], walls_around: Array | None, reflected: Reflected) -> list[Array]:
-        """Return the share of each light that reaches a place on a body of a world, in fours, and then the harmonics.
+        """Return the fraction of each light that reaches a place on a body, in fours, followed by the harmonics.
 
-        Walls block the light at all places. Other bodies block it only at places on a side, not at the place of the
-        whole body.
+        Walls block the light at all places. Other bodies block it only at places on a side, not at the place that
+        represents the whole body.
 
-        place: row of a world's table · bodies: centres of the world's bodies · walls_around: see `WallShadows`
-        reflected: function from a body's number, the number of a four, and the body's centre to harmonics
+        place: row of a world's table
+        bodies: centres of the world's bodies
+        walls_around: see `WallShadows`
+        reflected: function that returns harmonics for a body's number, the number of a group of four, and the body's
+            centre
         """
         k, side = place // PLACES, place % PLACES
         radius, whole = select(k, self._radii), side == WHOLE
@@ -77,11 +82,11 @@ class IlluminatedBodies:
         return [[dr.gather(mi.Vector4f, rows, first + i) for i in range(FOURS)] for rows in table[self._fours :]]
 
     def on_whole(self, k: Array, world: Array, table: list[Array]) -> list[Array]:
-        """Return the share of each light that reaches the k-th body of a world."""
+        """Return the fraction of each light that reaches the k-th body of a world."""
         return self._row((world * len(self._radii) + k) * PLACES + WHOLE, table)
 
     def on_side(self, k: Array, towards: Array, world: Array, table: list[Array]) -> list[Array]:
-        """Return the share of each light that reaches the k-th body on its side in a direction (unit vector)."""
+        """Return the fraction of each light that reaches the k-th body on its side in a direction (unit vector)."""
         # In whole numbers, because with many worlds, float32 is not accurate enough.
         first = (world * len(self._radii) + k) * PLACES
         found = [mi.Float(0) for _ in self._directions]
@@ -104,6 +109,6 @@ def select(k: Array, values: list[Array] | list[float]) -> Array:
 
 
 def _disk(centre: Array, radius: Array) -> Patch:
-    """Return a level square with the area of a disk."""
+    """Return a horizontal square with the area of a disk."""
     side = math.sqrt(math.pi) * radius
     return Patch(centre, mi.Normal3f(0, 0, 1), mi.Vector3f(side, 0, 0), mi.Vector3f(0, side, 0))

@@ -1,4 +1,5 @@
-"""The light that reaches a patch. Walls and bodies block parts of it, and reflect light towards the patch."""
+"""The light that reaches a patch of a surface. Walls and bodies block parts of it, and reflect light towards the
+patch."""
 
 from __future__ import annotations
 
@@ -22,16 +23,19 @@ from sim.tracing.closed_form_tracer import ClosedForm
 from sim.tracing.wall_intersection import CellTables
 
 REACH = 8  # [radii] more distant bodies are ignored, because they fill less than 1/64 of the view from a patch
-ITSELF_NONE = 2**16  # number that no body has, for a patch that does not lie on a body
+ITSELF_NONE = 2**16  # number for a patch that does not lie on a body
 
 
 @dataclass(frozen=True)
 class AreaTables:
     """Arrays of area sampling that are the same in all worlds.
 
-    faces: walls' faces, in eights, see `area_tracer` · face_ends: see `Columns` · cells: see `Footprints`
-    around: see `WallShadows` · stripes: textures
-    reflected: light that walls and floor reflect to each other; None: reflected light is not followed
+    faces: walls' faces, eight numbers each, see `area_tracer`
+    face_ends: see `Columns`
+    cells: see `Footprints`
+    around: see `WallShadows`
+    stripes: textures
+    reflected: light that walls and floor reflect to each other; None: reflected light is neglected
     """
 
     faces: Array
@@ -46,8 +50,10 @@ class AreaTables:
 class FrameState:
     """Inputs that change between calls.
 
-    bodies: centres of the moving spheres, the agent's last · inputs: tables · world: number of the world of each area
-    body_light: tables of `IlluminatedBodies`, world by world; empty if light that bodies reflect is not followed
+    bodies: centres of the moving spheres; the agent is the last one
+    inputs: tables
+    world: number of the world of each area
+    body_light: tables of `IlluminatedBodies`, world by world; empty if light that bodies reflect is neglected
     """
 
     bodies: list[Array]
@@ -57,12 +63,13 @@ class FrameState:
 
 
 class Illumination:
-    """The light that reaches patches, directly or reflected, past walls and bodies.
+    """Direct and reflected light on patches, without the light that walls and bodies block.
 
-    around: for each cell, which cells around it are walls, for the kernel · bodies: the light on bodies
+    around: for each cell, which cells around it are walls, for the kernel
+    bodies: the light on bodies
 
     Raises:
-        NoClosedForm: shadows for which WallShadows has no closed form.
+        NoClosedForm: WallShadows has no closed form for the shadows.
     """
 
     def __init__(self, rays: ClosedForm, radii: np.ndarray) -> None:
@@ -79,7 +86,7 @@ class Illumination:
         return self.arriving(patch.normal, self.visibility(patch, now))
 
     def visibility(self, patch: Patch, now: FrameState, itself: int = ITSELF_NONE) -> list[Array]:
-        """Return the share of a patch that each light reaches; itself: number of the body that the patch is part of."""
+        """Return the fraction of a patch that each light reaches. itself: number of the body that has the patch"""
 
         def past(k: Array, lit: list[Array]) -> list[Array]:
             left = lit_past_sphere(patch, self._directions, select(k, now.bodies), select(k, self._radii))
@@ -88,7 +95,7 @@ class Illumination:
         return self._for_bodies(past, self._shadows.visibility(patch, self._directions, now.inputs.around))
 
     def arriving(self, normal: Array, lit: list[Array]) -> list[Array]:
-        """Return the irradiance per component: the sum over the lights of level · cos θ · these shares."""
+        """Return the irradiance per component: the sum over the lights of level · cos θ · fraction that arrives."""
         total = [mi.Float(0) for _ in range(self._levels.shape[1])]
         for direction, level, share in zip(self._directions, self._levels, lit, strict=True):
             arrives = share * dr.maximum(dr.dot(normal, mi.Vector3f(*direction)), 0)
@@ -98,8 +105,10 @@ class Illumination:
     def past_bodies(
         self, patch: Patch, arriving: list[Array], now: FrameState, itself: int = ITSELF_NONE
     ) -> list[Array]:
-        """Return the reflected light on a patch, per component, after correction for bodies: light that they hide is
-        subtracted, and light that they reflect is added."""
+        """Return the reflected light on a patch, per component, corrected for bodies.
+
+        Light that bodies hide is subtracted, and light that they reflect is added.
+        """
 
         def past(k: Array, arriving: list[Array]) -> list[Array]:
             radius = select(k, self._radii)
@@ -111,7 +120,7 @@ class Illumination:
         return self._for_bodies(past, arriving)
 
     def _for_bodies(self, step: Callable[[Array, list[Array]], list[Array]], start: list[Array]) -> list[Array]:
-        """Run a step for each body. This is a loop in the kernel, which would be very long otherwise."""
+        """Run a step for each body, as a loop in the kernel, because unrolled code would be very long."""
         if len(self._radii) == 1:
             return step(mi.UInt32(0), start)
         _, found = dr.while_loop(
@@ -123,11 +132,11 @@ class Illumination:
         return found
 
     def _exchanged(self, patch: Patch, arriving: list[Array], k: Array, now: FrameState) -> list[Array]:
-        """Return the light from a body minus the light that it hides, both by the form factor of a sphere. If the
-        patch's horizon crosses the sphere, Snyder's (1996) form factor applies.
+        """Return the light from a body minus the light that it hides, both by the form factor of a sphere.
 
-        The body hides light that would arrive on its far side, as seen from the patch. This light is as bright as the
-        irradiance of that side, but no more of it is hidden than arrives at the patch.
+        If the patch's horizon crosses the sphere, Snyder's (1996) form factor applies. The hidden light is the light
+        that arrives on the body's far side, as seen from the patch. Its radiance follows from the irradiance of that
+        side, but at most the light that arrives at the patch is subtracted.
         """
         way, radius = select(k, now.bodies) - patch.point, select(k, self._radii)
         distance = dr.maximum(dr.norm(way), radius)
@@ -143,8 +152,10 @@ class Illumination:
         return [factor * mine - dr.clip(dark, 0, all_) - shadow for mine, dark, all_, shadow in exchanged]
 
     def _shadow(self, k: Array, patch: Patch, now: FrameState) -> list[Array]:
-        """Return the light, per component, that a patch does not receive because of the shadows of a body on the floor.
-        The shadows have the form factors of disks."""
+        """Return the light, per component, that a patch lacks because of the shadows of a body on the floor.
+
+        The shadows have the form factors of disks.
+        """
         centre, disk = select(k, now.bodies), math.pi * dr.square(select(k, self._radii))
         total = [mi.Float(0) for _ in range(self._levels.shape[1])]
         lit = self.bodies.on_whole(k, now.world, now.body_light)
@@ -158,15 +169,15 @@ class Illumination:
         return total
 
     def _sent(self, k: Array, towards: Array, nearness: Array, now: FrameState) -> list[Array]:
-        """Return the radiosity of a body as seen from a patch, per component: its mean reflectance times the light on
-        the middle of its visible side.
+        """Return the radiosity of a body as seen from a patch, per component.
 
-        The light is a weighted mean of two limits. From far away, the whole visible side counts, and the light follows
-        Lambert's phase function. From close by, only the body's nearest point counts, and the light is the irradiance
-        there.
+        It is the body's mean reflectance times the light on its visible side. The light is a weighted mean of two
+        limits. From far away, the patch sees the whole side, whose light follows Lambert's phase function. From close
+        by, it sees only the body's nearest point, with the irradiance there.
 
         towards: unit vector from the body to the patch
-        nearness: radius / distance. The weight as a function of it is fitted (residual at most 0.05 of the light).
+        nearness: radius divided by distance. The weight is a fitted function of it (residual at most 0.05 of the
+            light).
         """
         near = nearness * (1.4 - 0.4 * nearness)
         lit = self.bodies.on_side(k, towards, now.world, now.body_light)

@@ -17,14 +17,15 @@ from sim.tracing import lighting
 from sim.tracing.areas.light_nodes import BODY_SPACING, MARGIN, SIDES, SPACING, LightNodes, NodeLight, NodeTables
 from sim.tracing.closed_form_tracer import ClosedForm, Irradiance
 
-# Chosen. In navigation, half the density of nodes doubles the error. Four times the rays change it by a fiftieth.
+# Chosen. In navigation, four times the number of rays change the error by a fiftieth.
 RAYS = 256  # rays from a node
-BODY_RAYS = 128  # rays from each place on a body's surface; all of them together determine its harmonics
+BODY_RAYS = 128  # rays from each point of a body's surface; the rays of all points determine the harmonics
 NORMALS = 96  # normals of a body's surface, to which sixteen harmonics are fitted
 FOURS = 4  # groups of four floats: sixteen harmonics
-# Largest number of reflections; each further one adds at most the previous light times the surfaces' reflectance.
+# Largest number of reflections. Each further one adds at most the light of the previous one times the surfaces'
+# reflectance.
 ORDERS = 16
-CHANGE = 1e-3  # the iteration ends if all changes are at most this share of the largest irradiance
+CHANGE = 1e-3  # the iteration ends if all changes are at most this fraction of the largest irradiance
 LANES = 2**21  # rays traced at once
 
 
@@ -37,7 +38,7 @@ class Baking:
     def __init__(self, tracer: ClosedForm, nodes: LightNodes, kinds: list[tuple[float, float]]) -> None:
         self._tracer, self._nodes, self._kinds = tracer, nodes, kinds
         self._orders = ORDERS if tracer.light == lighting.ALL else 1
-        self._arriving: Irradiance | None = None  # irradiance by light of fewer reflections; None: not added
+        self._arriving: Irradiance | None = None  # irradiance after fewer reflections; None: not added
 
     @property
     def ingredients(self) -> list[np.ndarray]:
@@ -59,8 +60,10 @@ class Baking:
         return {f"bounced_{name}_{k}": size for name, size in (sizes | bodies).items() for k in count}
 
     def tables(self) -> dict[str, np.ndarray]:
-        """Return all tables by name, one for each component, float32, flat. Each iteration adds one reflection, until
-        the tables stop changing."""
+        """Return all tables by name, one for each component, float32, flat.
+
+        Each iteration adds one reflection, until the tables stop changing.
+        """
         found = self._surfaces()
         for _ in range(self._orders - 1):
             self._arriving = self._between(found)
@@ -96,8 +99,10 @@ class Baking:
         return self._gathered(points, np.tile([0.0, 0, 1], (len(points), 1)), RAYS)
 
     def _on_walls(self) -> np.ndarray:
-        """Return the light on walls, (node, component), in order of cell, side, z and place along the wall; 0 without a
-        wall."""
+        """Return the light on walls, (node, component), in the order of cell, side, z and place along the wall.
+
+        It is 0 if a side has no wall.
+        """
         n, grid = self._nodes.across * self._nodes.up, self._nodes.grid
         light = np.zeros((len(grid.corners), len(SIDES), n, len(self._tracer.basis)))
         free = np.pad(grid.free, 1, constant_values=True)
@@ -138,7 +143,7 @@ class Baking:
     def _gathered(
         self, points: np.ndarray, normals: np.ndarray, rays: int, shade: tuple[float, np.ndarray] | None = None
     ) -> np.ndarray:
-        """Return the irradiance of points (n, 3) by light that walls and floor reflect, (n, component).
+        """Return the irradiance at points (n, 3) due to light from walls and floor, (n, component).
 
         rays: number of rays from each point
         shade: radius of a body that casts a shadow, and its centre for each point

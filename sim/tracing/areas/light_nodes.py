@@ -1,6 +1,6 @@
 """Nodes at which the light that walls and floor reflect to each other is computed, and interpolation between them.
 
-Every free cell of the grid has its own nodes on its floor and on each of the walls around it, and places at which the
+Every free cell of the grid has nodes on its floor and on each of the walls around it. It also has places at which the
 light on bodies is computed.
 """
 
@@ -24,7 +24,7 @@ from sim.tracing.walls import NoClosedForm, Walls
 SPACING = 0.25  # largest spacing of nodes on floor and walls [m]
 BODY_SPACING = 0.5  # largest spacing of bodies' places [m]
 MARGIN = 0.02  # smallest distance from a cell's borders [m], so that nodes lie on one side of each edge
-MOST_MARGIN = 1 / 4  # largest distance of bodies' places from a cell's borders, as a share of the cell's side
+MOST_MARGIN = 1 / 4  # largest distance of bodies' places from a cell's borders, as a fraction of the cell's side
 MOST_NODES = 2**22
 SIDES = np.array([[-1, 0], [1, 0], [0, -1], [0, 1]])  # sides of a cell, on which walls may stand
 
@@ -33,8 +33,10 @@ SIDES = np.array([[-1, 0], [1, 0], [0, -1], [0, 1]])  # sides of a cell, on whic
 class LightNodes:
     """Nodes of a world.
 
-    grid: free cells · floor, top: heights of the floor and of the walls' tops [m]
-    across, up: numbers of nodes along a cell and up a wall · places: number of bodies' places along a cell
+    grid: free cells
+    floor, top: heights of the floor and of the walls' tops [m]
+    across, up: numbers of nodes along a cell and up a wall
+    places: number of bodies' places along a cell
     """
 
     grid: CellGrid
@@ -61,8 +63,10 @@ class LightNodes:
         return cls(grid, floor, top, across, up, _count(grid.side, BODY_SPACING))
 
     def body_margin(self, radius: float) -> float:
-        """Return the distance of the places of a body of this radius from a cell's borders [m]. Walls may stand at the
-        borders, and the centre of a body is at least its radius away from them."""
+        """Return the distance of a body's places from a cell's borders [m]. radius: radius of the body
+
+        Walls may stand at the borders, and the centre of a body is at least its radius away from them.
+        """
         return min(radius, MOST_MARGIN * self.grid.side)
 
     @property
@@ -75,7 +79,8 @@ class LightNodes:
 class NodeTables:
     """Reflected light at the nodes.
 
-    cells: numbers of the free cells · floor, walls: light at their nodes, one array per component
+    cells: numbers of the free cells
+    floor, walls: light at their nodes, one array per component
     """
 
     cells: Array
@@ -86,20 +91,21 @@ class NodeTables:
 class NodeLight:
     """Light interpolated between nodes, from tables that are passed to each call.
 
-    nodes: nodes at which the light is known · components: number of components of light
+    nodes: nodes at which the light is known
+    components: number of components of light
     """
 
     def __init__(self, nodes: LightNodes, components: int) -> None:
         self._nodes, self._components = nodes, components
 
     def on_floor(self, patch: Patch, tables: NodeTables) -> list[Array]:
-        """Return the irradiance of a patch of the floor by reflected light, per component."""
+        """Return the irradiance of a patch of the floor due to reflected light, per component."""
         cell, x, y = self._nodes.grid.locate(patch.point, tables.cells)
         n = self._nodes.across
         return self._interpolate(tables.floor, cell * (n * n), (x, n), (y, n))
 
     def on_wall(self, patch: Patch, tables: NodeTables) -> list[Array]:
-        """Return the irradiance of a patch of a wall by reflected light, per component."""
+        """Return the irradiance of a patch of a wall due to reflected light, per component."""
         normal = patch.normal
         cell, x, y = self._nodes.grid.locate(patch.point + normal * MARGIN, tables.cells)
         along_y = dr.abs(normal.x) > 0.5
@@ -110,7 +116,7 @@ class NodeLight:
         return self._interpolate(tables.walls, first, (across, self._nodes.across), (z, self._nodes.up))
 
     def on_surface(self, point: Array, normal: Array, tables: NodeTables) -> list[Array]:
-        """Return the irradiance at a point of the floor or of a wall by reflected light, per component."""
+        """Return the irradiance at a point of the floor or of a wall due to reflected light, per component."""
         nothing = mi.Vector3f(0)
         patch = Patch(point, normal, nothing, nothing)
         either = zip(self.on_floor(patch, tables), self.on_wall(patch, tables), strict=True)
@@ -123,8 +129,11 @@ class NodeLight:
 
 
 def corners(first: Array, *axes: tuple[Array, int]) -> Iterator[tuple[Array, Array]]:
-    """Yield index and weight of the four nodes around a position. first: index of the grid's first node · axes: x and y
-    in [0, 1], each with its number of nodes."""
+    """Yield index and weight of the four nodes around a position.
+
+    first: index of the grid's first node
+    axes: x and y in [0, 1], each with its number of nodes
+    """
     (x, nx), (y, ny) = axes
     x, y = dr.clip(x, 0, 1) * (nx - 1), dr.clip(y, 0, 1) * (ny - 1)
     i, j = dr.minimum(dr.floor(x), nx - 2), dr.minimum(dr.floor(y), ny - 2)

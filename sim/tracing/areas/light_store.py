@@ -1,7 +1,7 @@
 """A cache on disk of tables of reflected light, which take seconds to bake and are the same for the same world.
 
-A file is used only if it is exactly the archive that would be written for this world: the expected names, shapes and
-number types, finite numbers, and a checksum that includes the world. Otherwise the tables are baked again.
+A file is used only if it has the expected names, shapes and number types, finite numbers, and a checksum that includes
+the world. Otherwise the tables are baked again.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ import numpy as np
 
 from sim.tracing.areas.light_baking import Baking
 
-VERSION = 3  # version of the tables, to be increased when the same ingredients give other tables or other files
+VERSION = 3  # version of the tables; to be increased with every change of the method or of the file format
 KEPT = 200  # largest number of files; the oldest are deleted first
 CHECKSUM = "sha256"  # name of the table that contains the checksum
 ENTRY = 1024  # largest number of bytes that an archive adds to each table
@@ -30,7 +30,7 @@ def cache_folder() -> Path:
 
 
 def stored(baking: Baking) -> dict[str, np.ndarray]:
-    """Return the tables, from disk if they are stored there. Without a writable disk, they are baked every time."""
+    """Return the tables, from the cache if possible. Without a writable disk, they are baked in every process."""
     world = _digest(baking.ingredients)
     path = cache_folder() / f"{world}.npz"
     found = _read(path, baking.layout, world)

@@ -1,6 +1,6 @@
-"""Light that the walls and the floor of a world reflect to each other, looked up in tables that are baked beforehand.
+"""Light that the walls and the floor of a world reflect to each other, looked up in precomputed tables.
 
-Every free cell of the grid has its own table for its floor and for each of the walls around it. Another table contains
+Every free cell of the grid has a table for its floor, and one for each of the walls around it. Another table contains
 the light that arrives from all sides on the surface of bodies in the cell (`sim.tracing.areas.light_baking`).
 """
 
@@ -24,8 +24,10 @@ from sim.tracing.closed_form_tracer import ClosedForm
 
 @dataclass(frozen=True)
 class LightTables(NodeTables):
-    """Reflected light at the nodes and on bodies. bodies: harmonics of the light on all kinds of bodies, one array per
-    component."""
+    """Reflected light at the nodes and on bodies.
+
+    bodies: spherical harmonics of the light on all kinds of bodies, one array per component
+    """
 
     bodies: list[Array]
 
@@ -33,7 +35,7 @@ class LightTables(NodeTables):
 class LightTable(NodeLight):
     """Lookup of reflected light on floor, walls and bodies of one world.
 
-    tracer: tracer of rays through the same world, whose components of light the tables have
+    tracer: tracer of rays through the same world; the tables have its components of light
     radii, heights: radii of the bodies, and heights of their centres [m]
 
     tables: for the kernel
@@ -53,10 +55,13 @@ class LightTable(NodeLight):
         self._body_nodes = int(nodes.grid.free.sum()) * nodes.places**2
 
     def on_body(self, body: Array, four: Array, centre: Array, tables: LightTables) -> list[Array]:
-        """Return four harmonics of the light that arrives on a body, per component (Vector4f). All FOURS of them
-        together are the coefficients for `sum_of`.
+        """Return four harmonics of the light that arrives on a body, per component (Vector4f).
 
-        body, four: number of the body, and of the four · centre: of the body
+        All FOURS groups together are the coefficients for `sum_of`.
+
+        body: number of the body
+        four: number of the group of four harmonics
+        centre: centre of the body
         """
         cell, x, y = self._nodes.grid.locate(centre, tables.cells)
         n, margin = self._nodes.places, mi.Float(select(body, self._margins) / self._nodes.grid.side)
@@ -81,8 +86,7 @@ def _tables(baked: dict[str, np.ndarray], nodes: LightNodes, kinds: int) -> Ligh
 
 
 def sum_of(fours: list[Array], normal: Array) -> Array:
-    """Return the value of a sum of spherical harmonics, whose coefficients are given in fours, in the direction
-    `normal`."""
+    """Return the sum of spherical harmonics in the direction `normal`. fours: coefficients, in groups of four"""
     values = spherical_harmonics(normal.x, normal.y, normal.z)
     return sum((four[i] * v for four, i, v in _spread(fours, values)), mi.Float(0))
 

@@ -1,5 +1,4 @@
-"""The regions that are averaged: an area of the visual field, and the patch of a surface that is visible in the
-area."""
+"""Regions over which light is averaged: an area of the visual field, and the patch of a surface that it shows."""
 
 from __future__ import annotations
 
@@ -12,10 +11,12 @@ from optics.numerics.autodiff import Array
 
 @dataclass(frozen=True)
 class Area:
-    """A rectangle on the tangent plane of a level eye: directions (ahead + a right, up + b height), |a| and |b| up to
-    1/2.
+    """A rectangle on the tangent plane of an upright eye.
 
-    origin: the pupil (Point3f) · ahead, up: level part (Vector2f) and z of the direction to the rectangle's middle
+    It contains the directions (ahead + a right, up + b height) for |a| and |b| up to 1/2.
+
+    origin: the pupil (Point3f)
+    ahead, up: horizontal part (Vector2f) and z of the direction to the rectangle's middle
     right, height: whole width (Vector2f), and whole height
     """
 
@@ -27,9 +28,10 @@ class Area:
 
     @classmethod
     def from_extent(cls, middle: Array, axis: Array, extent: tuple[Array, Array]) -> Area:
-        """Return the area around a ray of a level eye, whose x is level and whose y is vertical.
+        """Return the area around a ray of an upright eye. Its x is horizontal, and its y is vertical.
 
-        middle: the ray, whose component along the eye's axis is 1 · axis: of the eye (Vector2f)
+        middle: the ray, whose component along the eye's axis is 1
+        axis: of the eye (Vector2f)
         extent: width and height on the tangent plane
         """
         width, height = extent
@@ -37,7 +39,7 @@ class Area:
         return cls(middle.o, middle.d.xy, right, middle.d.z, mi.Float(height))
 
     def level(self, a: Array) -> Array:
-        """Return the level part of the direction at a."""
+        """Return the horizontal part of the direction at a."""
         return self.ahead + self.right * a
 
     def direction(self, a: Array, b: Array) -> Array:
@@ -48,7 +50,7 @@ class Area:
 
 @dataclass(frozen=True)
 class Rectangle:
-    """A part of an area, in units of the area's sides. a, b: its middle · width, height"""
+    """A part of an area, in units of the area's sides. a, b: middle of the part"""
 
     a: Array
     b: Array
@@ -58,7 +60,7 @@ class Rectangle:
 
 @dataclass(frozen=True)
 class Patch:
-    """A parallelogram of a surface: point + a along + b across, |a| and |b| up to 1/2; normal: towards the eye."""
+    """A parallelogram of a surface: point + a along + b across, |a| and |b| up to 1/2. The normal points to the eye."""
 
     point: Array
     normal: Array

@@ -1,4 +1,4 @@
-"""The share of a patch that a light reaches. Edges of shadows are treated as straight lines across the patch."""
+"""The fraction of a patch that a light reaches. Edges of shadows are treated as straight lines across the patch."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from sim.tracing.areas.patch import Patch
 from sim.tracing.wall_intersection import NEVER_ZERO, cells_of
 from sim.tracing.walls import NoClosedForm, Walls
 
-# [m] distance from a patch to a point in front of it, which lies in the cell from which the patch is visible.
+# [m] distance of a point in front of a patch; the point identifies the cell from which the patch is visible
 BESIDE = 1e-3
 NEIGHBOURS = tuple((row, column) for row in (-1, 0, 1) for column in (-1, 0, 1))
 
 
 def lit_past_sphere(patch: Patch, directions: list[list[float]], centre: Array, radius: Array) -> list[Array]:
-    """Return the share of a patch on which a sphere casts no shadow, for each light."""
+    """Return the fraction of a patch on which a sphere casts no shadow, for each light."""
     way = centre - patch.point
     slope = max(math.hypot(*d[:2]) / d[2] for d in directions)
     patch_reach = (dr.norm(patch.along) + dr.norm(patch.across)) / 2
@@ -36,8 +36,11 @@ def lit_past_sphere(patch: Patch, directions: list[list[float]], centre: Array, 
 
 
 def _lit_past_sphere(patch: Patch, direction: list[float], way: Array, radius: Array) -> Array:
-    """Return the share of a patch that one light reaches past a sphere. On small patches, the rim of the shadow is one
-    straight line or two. On large patches, the shadow is a disk that lies within the patch."""
+    """Return the fraction of a patch that one light reaches past a sphere.
+
+    On small patches, the rim of the shadow is treated as one straight line, or as two. On large patches, the shadow is
+    treated as a disk within the patch.
+    """
     towards = mi.Vector3f(*direction)
     ahead = dr.dot(way, towards)
     beside = way - ahead * towards
@@ -55,7 +58,7 @@ class WallShadows:
 
     A ray from a point in a free cell to a light crosses the next cell along x, the next cell along y, or the cell
     across the corner. A table states for each cell which of these neighbours are walls. Three straight lines across the
-    patch decide which neighbour the ray enters first, and whether the ray is above its top there.
+    patch decide which neighbour the ray enters first, and whether the ray passes over its wall.
 
     around: for each cell, which cells around it are walls, for the kernel; None without walls
 
@@ -82,7 +85,7 @@ class WallShadows:
         self.around = floats(around)
 
     def visibility(self, patch: Patch, directions: list[list[float]], table: Array | None) -> list[Array]:
-        """Return the share of the patch that each light reaches."""
+        """Return the fraction of the patch that each light reaches."""
         if table is None:
             return [mi.Float(1) for _ in directions]
         clear = patch.point + patch.normal * BESIDE
@@ -101,8 +104,10 @@ class WallShadows:
         return only_where(concerns, lit, [1.0] * len(directions))
 
     def _lit_from(self, patch: Patch, direction: list[float], row: Array, column: Array, around: Array) -> Array:
-        """Return the share of a patch that is not in the shadow of the cells that the ray enters along x, along y, or
-        through the corner."""
+        """Return the fraction of a patch that no neighbouring wall shades.
+
+        The neighbours are the cells that a ray to the light enters along x, along y, or through the corner.
+        """
         dx, dy = (math.copysign(max(abs(d), NEVER_ZERO), d) for d in direction[:2])
         dz = direction[2]
         crosses_x, crosses_y = (

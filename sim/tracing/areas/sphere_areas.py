@@ -1,7 +1,7 @@
-"""The share of an area that a sphere fills, and the patch of the sphere that is visible there.
+"""The fraction of an area that a sphere fills, and the patch of the sphere that is visible there.
 
-A sphere's outline on the tangent plane is a conic. A few lines across the area are intersected with it exactly. Between
-these lines, the outline is approximated by straight lines.
+A sphere's outline on the tangent plane is a conic. Its intersections with a few lines across the area are exact.
+Between these lines, the outline is approximated by straight lines.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from sim.tracing.areas.stripes import Texture
 # Chosen: number of strips across the visible part of a sphere, and of slices in each strip. Wide areas have more,
 # because otherwise they would have to be divided into smaller areas (docs/measurements/rendering.md#area-sampling).
 SIDES, SIDES_OF_WIDE = 3, 4
-WIDE = 0.0555  # width on the plane at distance 1: 3.2 degrees
+WIDE = 0.0555  # width of a wide area on the plane at distance 1: 3.2 degrees
 # Smallest cosine between a surface's normal and the direction to the eye. Smaller ones would make its patch longer than
 # the sphere.
 GRAZING = 0.15
@@ -32,7 +32,8 @@ NEARLY_OPEN = 1e-4  # chosen: outlines that are more than about 100 times as lon
 class SphereTexture:
     """A texture that changes along one axis.
 
-    texture: its place in the tables · to_column: map column = to_column @ (u, v, 1)
+    texture: its place in the tables
+    to_column: map column = to_column @ (u, v, 1)
     frame: rotation from the sphere's axes to the world's, (3, 3)
     """
 
@@ -45,8 +46,10 @@ class SphereTexture:
 class Slice:
     """A slice of a sphere's visible part in an area.
 
-    share: share of the area that the slice fills · seen: direction of its middle
-    along, across: its sides on the area's plane · patch: its part of the sphere's surface
+    share: fraction of the area that the slice fills
+    seen: direction of its middle
+    along, across: sides of the slice on the area's plane
+    patch: part of the sphere's surface in the slice
     """
 
     share: Array
@@ -63,8 +66,10 @@ class Slice:
 
 @dataclass(frozen=True)
 class Strip(Slice):
-    """A strip of a sphere's visible part: a row of slices, treated as one slice. part: the part of the area that it
-    fills, approximately."""
+    """A strip of a sphere's visible part: a row of slices, treated as one slice.
+
+    part: part of the area that the strip fills, approximately
+    """
 
     part: Rectangle
 
@@ -102,7 +107,7 @@ class SphereView:
         return self._between(mi.Float(number) * per, (mi.Float(number) + 1) * per)
 
     def _between(self, low: Array, high: Array) -> Strip:
-        """Return the strip between two cumulative shares of the visible part, from 0 to 1."""
+        """Return the strip between two cumulative fractions of the visible part, from 0 to 1."""
         outline = self._outline
         one, other = outline.edge(low), outline.edge(high)
         place, width = (one.place + other.place) / 2, other.place - one.place
@@ -142,7 +147,8 @@ class _Edge:
 class _Outline:
     """A sphere's outline on an area's tangent plane, in units of the area's sides.
 
-    closed: whether it is an ellipse, which the other fields describe · middle: its middle, across and along the area
+    closed: True if the outline is an ellipse, which the other fields describe
+    middle: middle of the ellipse, across and along the area
     half: half of the ellipse's width across the area, and half of the chord through its middle along the area
     slant: shift of chords along the area per unit of position across it
     low, high: angles at which the area cuts the ellipse off
@@ -156,15 +162,17 @@ class _Outline:
     high: Array
 
     def edge(self, share: Array) -> _Edge:
-        """Return the edge of a strip that has this share of the visible part before it."""
+        """Return the edge of a strip before which this fraction of the visible part lies."""
         angle = dr.fma(self.high - self.low, share, self.low)
         sine = dr.sin(angle)
         place = dr.select(self.closed, dr.fma(self.half[0], sine, self.middle[0]), share - 0.5)
         return _Edge(dr.clip(place, -0.5, 0.5), angle, sine)
 
     def mean_chord(self, one: _Edge, other: _Edge) -> tuple[Array, Array]:
-        """Return length and middle of the average chord between two edges, clipped to the area. With this length, areas
-        of ellipses are exact."""
+        """Return length and middle of the average chord between two edges, clipped to the area.
+
+        With this length, the areas of ellipses are exact.
+        """
         double = other.sine * dr.cos(other.angle) - one.sine * dr.cos(one.angle)
         mean = (other.angle - one.angle + double) / (2 * dr.maximum(other.sine - one.sine, TINY))
         middle = self.middle[1] + self.slant * ((one.place + other.place) / 2 - self.middle[0])
@@ -173,7 +181,7 @@ class _Outline:
 
 
 def _outline(way: Array, radius: float, ahead: Array, along: Array, across: Array) -> _Outline:
-    """Return the outline: v = ahead + x across + y along hits the sphere if |way × v|² < radius² |v|²."""
+    """Return the outline. A direction v = ahead + x across + y along hits the sphere if |way × v|² < radius² |v|²."""
     x, y, z = (dr.cross(way, v) for v in (across, along, ahead))
     square = radius * radius
 
@@ -195,12 +203,12 @@ def _outline(way: Array, radius: float, ahead: Array, along: Array, across: Arra
 
 
 def may_see(area: Area, centre: Array, radius: float) -> Array:
-    """Return whether a sphere may be visible in an area; false only if it certainly is not."""
+    """Return whether a sphere may be visible in an area; False only if it certainly is not."""
     way = centre - area.origin
     ahead = area.direction(0, 0)
     beside = dr.cross(way, ahead)
     along = dr.dot(way, ahead)
-    # Tangent of the sphere's angular radius around the area's middle, plus half of the area's diagonal, on its plane.
+    # Tangent of the sphere's angular radius, plus half of the area's diagonal on the tangent plane.
     half = dr.sqrt(dr.squared_norm(area.right) + dr.square(area.height)) / 2
     reach = radius * dr.norm(ahead) + half * dr.norm(way)
     return (dr.squared_norm(beside) < dr.square(reach)) & (along > -radius * dr.norm(ahead))
@@ -226,8 +234,12 @@ def columns_of(texture: SphereTexture, patch: Patch, radius: float) -> tuple[Arr
 
 
 def hidden_by(way: Array, radius: Array, slice_: Slice) -> Array:
-    """Return the share of a slice that another sphere hides, whose outline is approximated by a straight line there;
-    way: vector to the sphere's centre."""
+    """Return the fraction of a slice that another sphere hides.
+
+    The sphere's outline is approximated by a straight line in the slice.
+
+    way: vector to the sphere's centre
+    """
     seen, sides = slice_.seen, (slice_.along, slice_.across)
     length, moment = dr.norm(seen), dr.cross(way, seen)
     beside = dr.maximum(dr.norm(moment), TINY)
@@ -238,7 +250,8 @@ def hidden_by(way: Array, radius: Array, slice_: Slice) -> Array:
 def _chord(way: Array, tangent: Array, start: Array, side: Array) -> tuple[Array, Array]:
     """Return length and middle, in units of `side`, of the chord on which start + x side hits the sphere.
 
-    Its points satisfy q2 x² + 2 q1 x + q0 > 0, have |x| up to 1/2 and lie ahead of the eye."""
+    On the chord, q2 x² + 2 q1 x + q0 > 0, |x| is at most 1/2, and points lie ahead of the eye.
+    """
     a, b = dr.dot(way, start), dr.dot(way, side)
     q2 = b * b - dr.squared_norm(side) * tangent
     q1 = a * b - dr.dot(start, side) * tangent

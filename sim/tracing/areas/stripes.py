@@ -1,8 +1,9 @@
-"""Averages of textures along one axis, over stretches and parallelograms, from differences of precomputed integrals.
+"""Averages of textures that vary along one axis, from differences of precomputed integrals.
 
-A stretch takes two lookups of the first integral, as with prefix sums. A parallelogram takes four lookups of the second
-integral. Textures are linear between texels, so their integrals are parabolas and cubics. Only the deviation of a
-texture from its mean is integrated. Such integrals repeat with the texture and stay small, which suits float32.
+An average over a stretch of the axis takes two lookups of the first integral, as with prefix sums. An average over a
+parallelogram takes four lookups of the second integral. Textures are linear between texels, so their integrals are
+parabolas and cubics. Only the deviation of a texture from its mean is integrated. Such integrals repeat with the
+texture and stay small, which suits float32.
 """
 
 from __future__ import annotations
@@ -18,9 +19,10 @@ import numpy as np
 from optics.numerics.autodiff import Array
 from sim.scene.device_arrays import floats
 
-# Smallest length of a stretch [texels]. An integral of 100 texels is accurate to 4e-6, a mean over this length to 1e-4.
+# Smallest length of a stretch [texels]. An integral over 100 texels is accurate to 4e-6, and a mean over this smallest
+# length to 1e-4.
 LEAST = 0.1
-# Chosen: largest error of a mean over a parallelogram that rounding may cause. It limits how short the sides may be.
+# Chosen: largest rounding error of a mean over a parallelogram. It determines the shortest side.
 ROUNDING = 1e-3
 HALF_ULP = 2.0**-24  # largest relative error of a number that is rounded to float32
 
@@ -29,7 +31,8 @@ HALF_ULP = 2.0**-24  # largest relative error of a number that is rounded to flo
 class Texture:
     """The place of a texture in the kernel's tables.
 
-    first: its first texel · columns: number of its columns
+    first: number of the first texel
+    columns: number of columns
     least_side: shorter sides of parallelograms are treated as this long [texels], see `Stripes.texture`
     """
 
@@ -54,7 +57,8 @@ class StripeTables:
 class Stripes:
     """Averages of textures along one axis.
 
-    reflectance: (texel, component) · places: first texel and number of columns of each texture, (texture, 2)
+    reflectance: (texel, component)
+    places: first texel and number of columns of each texture, (texture, 2)
 
     tables: for the kernel
     """
@@ -69,9 +73,9 @@ class Stripes:
             here = own - own.mean(axis=0)
             beyond = np.roll(here, -1, axis=0)
             once = _integral_up_to((here + beyond) / 2)
-            once -= (once + (2 * here + beyond) / 6).mean(axis=0)  # so that the second integral repeats, too
+            once -= (once + (2 * here + beyond) / 6).mean(axis=0)  # makes the second integral periodic, too
             twice = _integral_up_to(once + (2 * here + beyond) / 6)
-            twice -= (twice.max(axis=0) + twice.min(axis=0)) / 2  # a constant cancels, but smaller values round less
+            twice -= (twice.max(axis=0) + twice.min(axis=0)) / 2  # smaller values have smaller errors
             self._least_sides[first] = _least_side(float(np.abs(twice).max()))
             rows[first : first + columns] = np.stack([twice, once, here, beyond], axis=-1)
         count = range(self.components)
@@ -84,8 +88,8 @@ class Stripes:
     def mean(self, texture: Texture, ends: list[Array], spread: Array | float, tables: StripeTables) -> list[Array]:
         """Return the mean reflectance, per component, over consecutive stretches of equal weight.
 
-        ends: ends of the stretches, texel centres at whole numbers · spread: additional width, half of it on either
-            side
+        ends: ends of the stretches, in columns; texel centres are at whole numbers
+        spread: additional width of each stretch, half of it on either side
         """
         found = self._mean(texture, tables)
         for one, other in pairwise(ends):
@@ -101,7 +105,8 @@ class Stripes:
     ) -> list[Array]:
         """Return the mean reflectance, per component, over a parallelogram.
 
-        middle: column of its middle · sides: number of columns that each side spans, of any sign
+        middle: column of the parallelogram's middle
+        sides: number of columns that each side spans, with either sign
         """
         one: Array = dr.maximum(dr.abs(sides[0]), texture.least_side)
         other: Array = dr.maximum(dr.abs(sides[1]), texture.least_side)
@@ -116,20 +121,20 @@ class Stripes:
         return [dr.gather(mi.Float, tables.means[k], mi.UInt32(texture.first)) for k in range(self.components)]
 
     def _once(self, texture: Texture, middle: Array, beyond: Array, tables: StripeTables) -> list[Array]:
-        """Return the integral of the deviation from the mean, up to middle + beyond."""
+        """Return the integral of the texture minus its mean, up to middle + beyond."""
         rows, past = self._rows(texture, middle, beyond, tables)
         return [dr.fma(dr.fma((row.w - row.z) / 2, past, row.z), past, row.y) for row in rows]
 
     def _twice(self, texture: Texture, middle: Array, beyond: Array, tables: StripeTables) -> list[Array]:
-        """Return the second integral of the deviation from the mean, up to middle + beyond."""
+        """Return the second integral of the texture minus its mean, up to middle + beyond."""
         rows, past = self._rows(texture, middle, beyond, tables)
         return [dr.fma(dr.fma(dr.fma((row.w - row.z) / 6, past, row.z / 2), past, row.y), past, row.x) for row in rows]
 
     def _rows(self, texture: Texture, middle: Array, beyond: Array, tables: StripeTables) -> tuple[list[Array], Array]:
         """Return the rows of the texel below middle + beyond, per component, and the distance from its centre.
 
-        The whole texels of the middle are split off first. The sum with a short distance is then not rounded to the
-        precision of a large column number, whose errors would not cancel in differences.
+        Whole texels are separated from `middle` before `beyond` is added. A sum with a large column number would be
+        rounded, and such errors would not cancel in differences.
         """
         whole = dr.floor(middle)
         past = (middle - whole) + beyond
@@ -141,11 +146,13 @@ class Stripes:
 
 
 def _least_side(largest: float) -> float:
-    """Return the shortest side of parallelograms [texels] at which rounding of the second integral, whose largest value
-    is given, causes an error of at most ROUNDING. Textures are linear between texels, so one texel is short enough.
+    """Return the shortest side of parallelograms [texels] for which rounding causes an error of at most ROUNDING.
 
-    A mean is a sum of four values, divided by the product of the sides. Each value is rounded twice: in the table, and
-    after the polynomial within a texel is added.
+    It is at most one texel, because textures are linear between texels. A mean is a sum of four values of the second
+    integral, divided by the product of the sides. Each value is rounded twice: in the table, and after the polynomial
+    within a texel is added.
+
+    largest: largest value of the second integral
     """
     return max(1.0, math.sqrt(8 * HALF_ULP * largest / ROUNDING))
 

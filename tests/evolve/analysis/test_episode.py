@@ -188,8 +188,8 @@ def test_perfect_eyes_are_shown_the_same_light():
     assert seen == pytest.approx(exact.mean(), rel=0.04)
 
 
-def test_exr_files_hold_what_the_eyes_saw(episode, tmp_path):
-    files = exr_export.export_episode(episode, tmp_path / "exr")
+def test_exr_files_hold_what_the_eyes_saw(run, episode, tmp_path):
+    files = exr_export.export_episode(run, episode, tmp_path / "exr")
     assert [path.name for path in files] == [f"candidate000000_seed3_t{t:04}.exr" for t in (0, 64, 128, 192)]
     left, right = sim.read_exr(files[1])
     assert (left.name, right.name) == ("left", "right")

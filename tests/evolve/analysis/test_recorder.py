@@ -14,10 +14,13 @@ from evolve.analysis.episode_file import load_episode, save_episode
 from evolve.analysis.recorder import Recorder, record
 from evolve.analysis.vision import SCENES, seen_and_perfect, vision
 from evolve.cli.main import main
+from evolve.config.assemble import to_toml
 from evolve.learning.fitness import evaluate
 from evolve.learning.policy import load_policy
+from evolve.report.exr_export import export_episode
 from evolve.report.picture_sheet import film_of_pictures
 from evolve.store.directory import Run
+from evolve.store.versions import fingerprint, run_id
 from sim.scene.variation import DAYLIGHT, filter_to
 from tests.evolve.analysis.compared import assert_same
 from tests.evolve.learning.test_task_module import small, written
@@ -120,6 +123,28 @@ def test_replay_report_and_exr_show_it(path, call, tmp_path):
     assert call("export", path, "--task", NAMED, "--out", tmp_path / "exr")[0] == 0
     views = sim.read_exr(sorted((tmp_path / "exr").glob("*.exr"))[0])
     assert views[0].attributes["eye_elevation_deg"] == pytest.approx(Run.open(path).best.phenotype.elevation_deg)
+
+
+@pytest.mark.slow
+def test_exr_files_of_a_user_task_have_run_and_poses(path, episode, tmp_path):
+    """The eyes are on an arc at the front of the cart, which moves along y, and are tilted by the evolved elevation."""
+    run = Run.open(path)
+    file = export_episode(run, episode, tmp_path / "exr")[1]
+    views = sim.read_exr(file)
+    t, elevation = int(episode.radiance_frames[1]), np.radians(run.best.phenotype.elevation_deg)
+    assert t == 8
+    assert len(views) == run.best.phenotype.n_eyes
+    for view, azimuth in zip(views, episode.azimuths, strict=True):
+        known = view.attributes
+        assert (known["run_id"], known["settings"]) == (run_id(path), fingerprint(to_toml(run.config)))
+        x, y, z = known["eye_position_m"]
+        assert (x, z) == pytest.approx((0.26 * np.cos(azimuth), 0.32))
+        cart = episode.scene.positions[t, episode.scene.bodies.index("cart"), 1]
+        assert y - cart == pytest.approx(0.26 * np.sin(azimuth))
+        level = np.cos(elevation)
+        ahead = [level * np.cos(azimuth), level * np.sin(azimuth), np.sin(elevation)]
+        np.testing.assert_allclose(known["eye_ahead"], ahead, atol=1e-9)
+        assert known["eye_up"][2] == pytest.approx(level)
 
 
 def test_replay_records_it_for_rerun(path, call, tmp_path):

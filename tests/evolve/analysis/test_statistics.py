@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 import optics
+from evolve.analysis.acuity import acuity_cpd
 from evolve.analysis.statistics import (
-    acuity_cpd,
     bootstrap_interval,
     by_generation,
     eye_image_quality,

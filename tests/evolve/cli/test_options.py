@@ -95,10 +95,11 @@ TABLE = {
         **DAMAGE,
         **OF_ONE,
         **OPEN,
-        **{name: ([f"--{name}"], CHANGES) for name in ("rrd", "gif", "mp4")},
+        **{name: ([f"--{name}"], CHANGES) for name in ("test", "rrd", "gif", "mp4")},
+        "every": (["--every", "4"], CHANGES),  # test_run_products: refused without --rrd
     },
     "report": {**OF_PRODUCTS, **DAMAGE, **OPEN},
-    "export": {**OF_PRODUCTS, **DAMAGE, **OF_ONE},
+    "export": {**OF_PRODUCTS, **DAMAGE, **OF_ONE, "every": (["--every", "4"], CHANGES)},
     "demo": {"out": (["--out", "there"], CHANGES), **OPEN, **JSON, "quiet": (["--quiet"], CHANGES)},
     "validate": {"proofs": (["aliasing"], CHANGES), "list": (["--list"], CHANGES)},
     "doctor": JSON,

@@ -2,6 +2,7 @@
 
 run_config: test_run_config.py
 settings: test_assemble.py, test_run_config.py, test_parameters.py
+costs: test_costs.py
 assemble: test_assemble.py, test_presets.py
 sources: test_sources.py, test_assemble.py
 provenance: test_provenance.py

@@ -41,8 +41,10 @@ def test_contradictions_are_refused():
 def test_only_the_maze_has_mazes_and_only_navigation_a_course():
     assert assemble("maze", assignments=["world.mazes=4", "world.unseen=true"]).world.evaluation == {
         "mazes": 4,
-        "world_seed": 1,
+        "seed": 1,
         "course": "short",
+        "layouts": None,
+        "wall_height": 1.0,
     }
     for change in ("world.mazes=2", "world.unseen=true"):
         with pytest.raises(ConfigError, match="is for the task maze, not for navigation"):

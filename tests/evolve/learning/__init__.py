@@ -8,7 +8,8 @@ ppo: test_ppo.py, test_learning.py, search/test_successive_halving.py
 policy: test_policy.py
 observed: test_policy.py, test_task_module.py
 eye_features: test_eye_features.py, test_policy.py, test_learning.py
-per_eye_layers: test_eye_features.py, test_policy.py
+per_eye_layers: test_eye_features.py, test_policy.py, test_regridding.py
+regridding: test_regridding.py
 schedule: test_schedule.py, test_ppo.py
 training_rewards: test_ppo.py
 rollout_buffer: test_rollout_buffer.py

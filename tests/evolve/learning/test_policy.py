@@ -18,7 +18,7 @@ from evolve.genome.phenotype import develop
 from evolve.learning import policy as policy_module
 from evolve.learning.eye_features import UNITS
 from evolve.learning.per_eye_layers import CONTRAST
-from evolve.learning.policy import EyePolicy, PolicyConfig, build_policy, learnt, load_policy, save_policy
+from evolve.learning.policy import Brain, EyePolicy, PolicyConfig, build_policy, learnt, load_policy, save_policy
 from evolve.store.regular_files import StrangeFileError
 
 CONFIG = PolicyConfig(eyes=(3, 2, 3, 2, 4), neurons=8)
@@ -242,7 +242,7 @@ def test_first_actions_are_as_fast_as_asked():
     torch.manual_seed(0)
     space = CONFIG.observation_space()
     slow = EyePolicy(
-        space, spaces.Box(-1.0, 1.0, (2,)), lambda _: 1e-3, neurons=8, first_actions=[(-0.5, 0.25), (0.0, 0.5)]
+        space, spaces.Box(-1.0, 1.0, (2,)), lambda _: 1e-3, brain=Brain(8), first_actions=[(-0.5, 0.25), (0.0, 0.5)]
     )
     n = 4000
     blank = {name: torch.zeros(n, *box.shape) for name, box in space.spaces.items()}

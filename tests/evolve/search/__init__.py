@@ -1,10 +1,10 @@
 """Tests of evolve/search: which test covers which module.
 
 ask_tell: test_ask_tell.py
-loop: test_loop.py, test_ask_tell.py, test_kill.py
+loop: test_loop.py, test_ask_tell.py, test_kill.py, test_priced_search.py
 search: test_search.py
 optimizers: test_search.py, test_ask_tell.py
-null_model: test_null_model.py
+null_model: test_null_model.py, test_priced_search.py
 same_search: test_same_search.py
 successive_halving: test_successive_halving.py
 job: test_local_executor.py, test_dask_executor.py

@@ -4,12 +4,12 @@ directory: test_directory.py
 record: test_record.py, test_chain.py, test_sizes.py
 chain: test_chain.py
 checksums: test_checksums.py, test_policies.py
-candidate: test_record.py, test_reads_back_equal.py
+candidate: test_record.py, test_reads_back_equal.py, test_priced_record.py
 evaluation: test_record.py
 shipped_run: cli/test_demo.py
 policies: test_policies.py
 lock: test_lock.py, test_regular_files.py
 regular_files: test_regular_files.py
 atomic_files: test_atomic_files.py
-versions: test_versions.py
+versions: test_versions.py, interactive/test_run_products.py
 """

@@ -1,8 +1,9 @@
 """The versions behind a run are recorded, and settings that change later are detected."""
 
 import json
+import os
 
-from evolve.store.versions import config_change, present, record_start, recorded
+from evolve.store.versions import config_change, machine, machines, present, record_start, recorded
 
 
 def test_versions_are_recorded_at_each_start(run):
@@ -11,6 +12,14 @@ def test_versions_are_recorded_at_each_start(run):
     record_start(run.path, 7)
     starts = json.loads((run.path / "versions.json").read_text())
     assert [start["candidates"] for start in starts] == [0, 7]
+
+
+def test_machines_are_recorded_at_each_start(run):
+    assert machine().endswith(f", {os.cpu_count()} cores")
+    assert machines(run.path) == [machine()]
+    starts = json.loads((run.path / "versions.json").read_text())
+    (run.path / "versions.json").write_text(json.dumps([{**starts[0], "processor": "another"}, *starts]))
+    assert machines(run.path) == ["another", machine()]
 
 
 def test_settings_that_change_meanwhile_are_noticed(run):

@@ -24,7 +24,7 @@ receptor_noise: test_receptor_noise.py
 pending_frame: test_pending_frame.py, envs/test_eyes_of_kind.py
 model_renderer: test_model_renderer.py, test_pupil_axes.py
 renderable: test_model_renderer.py, test_edge_rays.py
-model_fidelity: test_model_fidelity.py, test_model_light.py
+model_fidelity: test_model_fidelity.py, test_needed_light.py, test_model_light.py
 edge_rays: test_edge_rays.py
 optic_flow: test_labels.py
 """

@@ -7,7 +7,8 @@ import pytest
 
 import optics
 import sim
-from sim.render import memory_budget
+from sim.eyes.depth_layers import DepthLayers
+from sim.render import eye_renderer, memory_budget
 from sim.render.memory_budget import Demand, check_memory
 
 EYES = sim.Eyes(n_eyes=2, resolution=(3, 4))
@@ -36,6 +37,22 @@ def test_what_it_recommends_fits(monkeypatch):
 
 def test_weights_behind_a_pupil_count():
     assert dataclasses.replace(SOME, weights=24).bytes - SOME.bytes == 8 * 225 * 24 * 15 * 16
+
+
+@pytest.mark.parametrize(("pupil", "per_layer"), [(None, 0), (optics.Pupil(30e-6), 3)])
+def test_each_depth_layer_has_planes_and_behind_a_pupil_weights(monkeypatch, pupil, per_layer):
+    """The demand of a renderer: a plane per layer and component of light, and weights per layer and band."""
+    asked = []
+    monkeypatch.setattr(eye_renderer, "check_memory", asked.append)
+    eyes = dataclasses.replace(EYES, optics=pupil, bands=3)
+    layers = DepthLayers(nearest=0.5, count=2) if pupil else DepthLayers()
+    renderer = sim.BatchedRenderer(sim.build_world("detection"), eyes, 2, sim.Fidelity(2, 3, depth=layers))
+    demand = asked[-1]
+    count = renderer.fidelity.depth.count
+    assert (demand.worlds, demand.eyes, demand.resolution) == (2, 2, (3, 4))
+    assert demand.planes == count * len(renderer.tracer.basis)
+    assert demand.weights == count * per_layer
+    assert demand.rays_per_receptor == len(renderer.sensor.directions) / 12
 
 
 def test_more_than_an_array_can_number_is_refused_whatever_the_memory(monkeypatch):

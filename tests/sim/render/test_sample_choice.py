@@ -167,7 +167,7 @@ class FormulaTrials:
     def may_share(self, sampling, number):
         return False
 
-    def areas_seen(self, sampling, number):
+    def areas_of_field(self, sampling, number):
         return number
 
     def have_areas(self, *lights):

@@ -28,5 +28,5 @@ def test_terms_add_up_to_the_formula(mode):
 
 
 def test_an_unknown_mode_is_named():
-    with pytest.raises(ValueError, match="mode = 'test': must be one of 'training', 'evaluation'"):
-        check_mode("test")
+    with pytest.raises(ValueError, match="mode = 'exam': must be one of 'training', 'evaluation', 'test'"):
+        check_mode("exam")

@@ -89,7 +89,9 @@ def test_all_kinds_together():
 
 
 def kernels_of(look, datas):
-    """Return the number of kernels in the first call, and its result."""
+    """Return the number of kernels in the first call, and its result. Work left by earlier code is finished before."""
+    dr.eval()
+    dr.sync_thread()
     with dr.scoped_set_flag(dr.JitFlag.KernelHistory):
         dr.kernel_history_clear()
         found = look(datas)

@@ -1,0 +1,33 @@
+"""Acuity of an animal: the finest gratings that the spacing of its eyes and receptors resolves."""
+
+from __future__ import annotations
+
+from evolve.genome.phenotype import Phenotype
+
+__all__ = ["acuity_cpd", "acuity_vertical_cpd"]
+
+
+def acuity_cpd(phenotype: Phenotype) -> float:
+    """Return the horizontal acuity: the frequency of the finest vertical grating that is resolved [cycles/degree].
+
+    It is 1 / (2 min(range/(n_eyes - 1), fov/width)), after Tiwary, Young et al. (2025). The first term is the angle
+    between neighbouring eyes, the second the angle between neighbouring receptors. With a single eye, or if all eyes
+    look in the same direction, only the second term counts, because no angle separates the eyes.
+    """
+    between_receptors = phenotype.fov_deg / phenotype.resolution[1]
+    if phenotype.n_eyes == 1 or phenotype.placement_range_deg == 0:
+        return 1 / (2 * between_receptors)
+    between_eyes = phenotype.placement_range_deg / (phenotype.n_eyes - 1)
+    return 1 / (2 * min(between_eyes, between_receptors))
+
+
+def acuity_vertical_cpd(phenotype: Phenotype) -> float:
+    """Return the vertical acuity: the frequency of the finest horizontal grating that is resolved [cycles/degree].
+
+    It is 1 / (2 vertical fov/height). Square receptors have the same spacing as along the width, fov/width. Eyes are
+    placed side by side, so their number has no effect.
+    """
+    rows, columns = phenotype.resolution
+    if phenotype.vertical_fov_deg is None:
+        return columns / (2 * phenotype.fov_deg)
+    return rows / (2 * phenotype.vertical_fov_deg)

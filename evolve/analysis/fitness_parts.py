@@ -1,0 +1,38 @@
+"""Parts of fitness: task fitness, which is the mean return of the evaluation episodes, minus costs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+
+from evolve.analysis.statistics import bootstrap_interval
+from evolve.store.candidate import Candidate
+
+__all__ = ["any_costs", "fitness_interval", "fitness_label", "fitness_text"]
+
+
+def any_costs(candidates: Iterable[Candidate]) -> bool:
+    """Return whether a candidate has costs."""
+    return any(candidate.costs for candidate in candidates)
+
+
+def fitness_label(costs: bool) -> str:
+    """Return the label of an axis that shows fitness, with or without costs."""
+    return "fitness (mean return − costs)" if costs else "fitness (mean return)"
+
+
+def fitness_text(fitness: float, costs: float, shown: Callable[[float], str] = "{:.4g}".format) -> str:
+    """Return a fitness as text, followed by its parts if there are costs.
+
+    shown: function that returns a number as text
+    """
+    parts = f" (task fitness {shown(fitness + costs)}, costs {shown(costs)})" if costs else ""
+    return f"{shown(fitness)}{parts}"
+
+
+def fitness_interval(candidate: Candidate) -> tuple[float, float]:
+    """Return the 95 % bootstrap interval of a candidate's fitness, from the returns of its evaluation episodes.
+
+    Costs are exact, so they only shift the interval. It is (NaN, NaN) for a single episode.
+    """
+    low, high = bootstrap_interval(candidate.returns)
+    return low - candidate.costs, high - candidate.costs

@@ -1,0 +1,30 @@
+"""Episodes of a run's candidate in the test set of layouts, which neither training nor selection has used."""
+
+from __future__ import annotations
+
+from evolve.analysis.recorder import damage_named, trained_policy
+from evolve.learning.final_figures import final_episodes, require_test_set
+from evolve.learning.ppo import Episodes
+from evolve.store.directory import Run
+
+__all__ = ["held_out_episodes"]
+
+
+def held_out_episodes(
+    run: Run, candidate_id: int | None = None, seed: int = 0, episodes: int | None = None
+) -> Episodes:
+    """Play evaluation episodes in the test set of a run. The same arguments give the same episodes.
+
+    candidate_id: id of the candidate; None: the best candidate
+    seed: seed of the episodes
+    episodes: number of episodes; None: `evaluation.episodes`
+
+    Raises:
+        RunError: the candidate does not exist, or its policy is missing or damaged.
+        ConfigError: the run has no test set, or the user has not named the code of its task.
+    """
+    require_test_set(run.config)
+    candidate = run.candidate(candidate_id)
+    policy = trained_policy(run, candidate)
+    with damage_named(run.policy_path(candidate.id)):
+        return final_episodes(candidate.phenotype, run.config, policy, seed, episodes)

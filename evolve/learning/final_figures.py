@@ -1,0 +1,73 @@
+"""Final figures: the returns of a trained policy in layouts that neither its training nor its selection has used."""
+
+from __future__ import annotations
+
+from contextlib import closing
+
+from evolve.config.checks import ConfigError
+from evolve.config.run_config import RunConfig
+from evolve.config.settings import FAMILY
+from evolve.config.task_card import LAYOUTS, tasks_with
+from evolve.genome.phenotype import Phenotype
+from evolve.learning.animal_task import animal_task
+from evolve.learning.policy import EyePolicy
+from evolve.learning.ppo import Episodes, play
+from sim.envs.prepared_task import PreparedTask
+from sim.envs.vec_env import EyesVecEnv
+
+__all__ = ["UnfitPolicy", "final_episodes", "require_fit", "require_test_set"]
+
+
+class UnfitPolicy(ValueError):
+    """The policy belongs to an animal with different eyes."""
+
+
+def final_episodes(
+    phenotype: Phenotype, config: RunConfig, policy: EyePolicy, seed: int = 0, episodes: int | None = None
+) -> Episodes:
+    """Play evaluation episodes in the mode "test". The same arguments give the same episodes.
+
+    A run with `world.layouts = "family"` has a set of layouts for this mode. In other runs, the episodes take place in
+    the worlds of the evaluation, with other starts.
+
+    seed: seed of the episodes
+    episodes: number of episodes; None: `evaluation.episodes`
+
+    Raises:
+        ConfigError: the user task was not named when the run was opened, or its start fails.
+        TrainingDiverged: the policy's actions are not finite.
+        UnfitPolicy: the policy was trained with different eyes.
+    """
+    count = config.evaluation.episodes if episodes is None else episodes
+    prepared = PreparedTask(animal_task(phenotype, config, "test"))
+    with closing(prepared.vec_env(count, seed, phenotype.memory_frames)) as worlds:
+        require_fit(policy, worlds)
+        return play(policy, worlds, seed)
+
+
+def require_fit(policy: EyePolicy, worlds: EyesVecEnv) -> None:
+    """Check that a policy was trained with the eyes of these worlds.
+
+    Raises:
+        UnfitPolicy: it was not.
+    """
+    own, here = (space["eyes"].shape for space in (policy.observation_space, worlds.observation_space))
+    if own != here:
+        raise UnfitPolicy(f"its eyes have the shape {own}, those of this animal {here} (memory, eye, channel, y, x)")
+
+
+def require_test_set(config: RunConfig) -> None:
+    """Check that the mode "test" differs from the evaluation. User tasks may do so by themselves.
+
+    Raises:
+        ConfigError: the task has no layouts, or the run has fixed ones.
+    """
+    if config.card.has_file or config.world.layouts == FAMILY:
+        return
+    if LAYOUTS not in config.card.settings:
+        raise ConfigError(f"task = {config.task}: has no test set: must be {' or '.join(tasks_with(LAYOUTS))}", "task")
+    raise ConfigError(
+        f"{LAYOUTS} = {config.world.layouts}: has no test set, its evaluation may use the layouts of training: must be "
+        f"{FAMILY}",
+        LAYOUTS,
+    )

@@ -1,0 +1,66 @@
+"""Averaging of an eye's signals to a coarser grid, and repetition on a finer one, before they reach the encoder.
+
+Both are controls in experiments on resolution. An eye of 15 x 15 receptors whose signals are averaged to 4 x 4 and
+repeated on 15 x 15 has the acuity of 4 x 4 receptors, but as many inputs as before.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from evolve.config.settings import WiringConfig
+
+__all__ = ["Regridding"]
+
+
+class Regridding:
+    """Linear map from the signals of a retina to the inputs of an encoder, the same for all eyes and channels.
+
+    shape: rows and columns of the inputs
+
+    It is not a PyTorch module, because it has no parameters and no state.
+    """
+
+    def __init__(self, retina: tuple[int, int], wiring: WiringConfig) -> None:
+        maps = [_axis(n, wiring.pool_side, wiring.repeat_side) for n in retina]
+        self.shape = (len(maps[0]), len(maps[1]))
+        self._rows, self._columns = (torch.tensor(one, device="cpu") for one in maps)
+        self._is_identity = all(np.array_equal(one, np.eye(n)) for one, n in zip(maps, retina, strict=True))
+
+    def __call__(self, signals: Tensor) -> Tensor:
+        """Return inputs (..., rows, columns) from signals (..., height, width)."""
+        if self._is_identity:
+            return signals
+        rows, columns = self._rows.to(signals), self._columns.to(signals)
+        return rows @ signals @ columns.T
+
+
+def _axis(n: int, pool_side: int, repeat_side: int) -> np.ndarray:
+    """Return the matrix (input, n) that maps the signals of `n` receptors along an axis to the inputs along this
+    axis."""
+    pooled = _averages(n, min(pool_side or n, n))
+    return _repeats(len(pooled), max(repeat_side, len(pooled))) @ pooled
+
+
+def _averages(n: int, side: int) -> np.ndarray:
+    """Return the matrix (side, n) that averages `n` receptors over `side` equal intervals of their axis.
+
+    The weight of a receptor is the fraction of the interval that it covers.
+    """
+    receptor, interval = (
+        side * np.arange(n),
+        n * np.arange(side)[:, None],
+    )  # where they begin; the axis is n * side long
+    overlap = np.minimum(receptor + side, interval + n) - np.maximum(receptor, interval)
+    return np.clip(overlap, 0, None) / n
+
+
+def _repeats(n: int, side: int) -> np.ndarray:
+    """Return the matrix that repeats `n` values on a grid of `side` cells, (side, n).
+
+    Each cell takes the value of the interval that contains its centre.
+    """
+    taken = (np.arange(side) + 0.5) * n // side
+    return np.eye(n)[taken.astype(int)]

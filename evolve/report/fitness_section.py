@@ -1,0 +1,62 @@
+"""Section of the report with fitness, its parts and success over the generations, learning curves, and descent."""
+
+from __future__ import annotations
+
+from evolve.analysis.fitness_parts import any_costs
+from evolve.analysis.genealogy import descent
+from evolve.analysis.statistics import generation_statistics
+from evolve.report.figures import costs_figure, fitness_figure, genealogy_figure, learning_figure, success_figure
+from evolve.report.hints import hint
+from evolve.report.markup import Html, figure, html, key, section
+from evolve.store.directory import Run
+
+__all__ = ["POPULATION", "fitness_section"]
+
+POPULATION = html("{} 10–90 % of the population, {} its median", key("muted band"), key("muted"))
+
+
+def fitness_section(run: Run) -> Html:
+    """Return the section with fitness and success over the generations, and the learning curves."""
+    if not run.candidates:
+        return section("fitness", "Fitness", html("<p>No candidate has been evaluated yet.</p>\n"))
+    rows, best = generation_statistics(run.candidates), run.best
+    minus = ", minus costs" if any_costs(run.candidates) else ""
+    caption = html(
+        "<b>{} over generations.</b> {} best so far and, pale, its 95 % bootstrap interval; "
+        '{}; a dot per candidate, <span class="vermillion">×</span> failed. Fitness is the mean return of {} '
+        "evaluation episodes after training{}. The best of many candidates is partly best by chance (selection bias); "
+        "the interval does not include that.",
+        *(hint("fitness", "Fitness"), key("accent"), POPULATION, run.config.evaluation.episodes, minus),
+    )
+    figures = figure(fitness_figure(rows, run.candidates), caption)
+    if minus and best is not None:
+        figures += figure(costs_figure(run.candidates), _costs_caption(run))
+    caption = html(
+        "<b>Episodes solved.</b> Fraction of a candidate's evaluation episodes in which the task was solved (dots), "
+        "{} mean of the generation.",
+        key("muted"),
+    )
+    figures += figure(success_figure(run.candidates), caption)
+    if best is not None:
+        caption = html(
+            "<b>Learning.</b> Mean evaluation return while a candidate trains: {} the best (no. {}), {} the others.",
+            *(key("accent"), best.id, key("muted")),
+        )
+        figures += figure(learning_figure(run.candidates, best), caption)
+        caption = html(
+            "<b>Genealogy.</b> Each candidate and the nearest of its parents (click one for its row in the table); "
+            "{} the line of candidate {}: {}.",
+            *(key("accent"), best.id, ", ".join(str(c.id) for c in descent(best, run.candidates))),
+        )
+        figures += figure(genealogy_figure(run.candidates, best), caption)
+    return section("fitness", "Fitness", html('<div class="figures">{}</div>\n', figures))
+
+
+def _costs_caption(run: Run) -> Html:
+    costs = run.config.costs
+    prices = f"{costs.per_receptor:g} per receptor, {costs.per_eye:g} per eye, {costs.per_neuron:g} per neuron"
+    return html(
+        "<b>Parts of fitness.</b> Task fitness is the mean return, and costs are {}: a dot per candidate, {} the best "
+        "so far. Fitness is their difference.",
+        *(prices, key("accent")),
+    )

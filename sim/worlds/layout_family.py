@@ -1,0 +1,165 @@
+"""Families of random layouts for the tasks navigation and maze, in three sets that have no layout in common.
+
+An animal that is trained and judged in the same layouts may memorise them. A family therefore has a set for training, a
+set for the selection of animals and policies, and a set for final figures ("test"). A layout depends only on the
+family's seed and size, the name of its set and its index in the set. A larger set thus begins with the layouts of a
+smaller one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+
+from optics.numerics.arguments import whole
+from optics.numerics.read_only import read_only
+from sim.worlds.course import MOST_STEPS, Course
+from sim.worlds.maze import draw_maze
+from sim.worlds.random_course import draw_course
+
+__all__ = ["MOST_LAYOUTS", "SETS", "TASKS_WITH_LAYOUTS", "LayoutFamily", "LayoutSet"]
+
+SETS = ("training", "selection", "test")
+MOST_LAYOUTS = 100  # largest allowed number of layouts in a set
+ROWS, COLUMNS = (7, 31), (15, 99)  # smallest and largest allowed number of cells
+PATH_WIDTHS = (1, 3)
+_MOST_SEED = 2**128
+_WALLS, _STRIPES = 0, 1  # purposes of a layout's random numbers
+
+
+@dataclass(frozen=True)
+class LayoutFamily:
+    """Random courses or mazes in three disjoint sets, for `sim.build_world` and `sim.make_vec_env`.
+
+    Courses fulfil the conditions of `sim.Course`: the distance from the start never has to fall by more than 1.5 m.
+
+    seed: seed of all layouts and of the stripes on their walls
+    n_training, n_selection, n_test: number of layouts in each set
+    rows, columns: number of cells of a layout along y and x, including the outer wall; odd, because mazes have rooms in
+        every second row and column
+    path_width: width of the paths of courses [cells], 1 or 3; corridors of mazes are always one cell wide
+    episode_steps: number of actions after which an episode is truncated; None: the task's default
+
+    Raises:
+        ValueError: a number is out of range, or the size or the width is even.
+    """
+
+    seed: int = 0
+    n_training: int = 8
+    n_selection: int = 8
+    n_test: int = 8
+    rows: int = 13
+    columns: int = 39
+    path_width: int = 3
+    episode_steps: int | None = None
+
+    def __post_init__(self) -> None:
+        limits = {"seed": (0, _MOST_SEED), "rows": ROWS, "columns": COLUMNS, "path_width": PATH_WIDTHS}
+        limits |= {f"n_{name}": (1, MOST_LAYOUTS) for name in SETS}
+        if self.episode_steps is not None:
+            limits["episode_steps"] = (1, MOST_STEPS)
+        for name, (low, high) in limits.items():
+            number = whole(f"LayoutFamily: {name}", getattr(self, name), low, high)
+            object.__setattr__(self, name, number)
+            if name in ("rows", "columns", "path_width") and number % 2 == 0:
+                raise ValueError(f"LayoutFamily: {name} = {number}: must be odd, such as {number - 1}")
+
+    @property
+    def training(self) -> LayoutSet:
+        """Layouts for training."""
+        return LayoutSet(self, "training")
+
+    @property
+    def selection(self) -> LayoutSet:
+        """Layouts in which policies and animals are compared and selected."""
+        return LayoutSet(self, "selection")
+
+    @property
+    def test(self) -> LayoutSet:
+        """Layouts for final figures, in which nothing is selected."""
+        return LayoutSet(self, "test")
+
+    def number(self, name: str) -> int:
+        """Return the number of layouts in the set of this name."""
+        return int(getattr(self, f"n_{name}"))
+
+    def random(self, name: str, index: int, purpose: int) -> np.random.Generator:
+        """Return the random number generator of one layout, for its walls or for its stripes."""
+        return np.random.default_rng(
+            np.random.SeedSequence(self.seed, spawn_key=(SETS.index(name), index, purpose)),
+        )
+
+
+@dataclass(frozen=True)
+class LayoutSet:
+    """One set of a family: an argument of `sim.build_world` and `sim.make_vec_env`.
+
+    family: the family
+    name: "training", "selection" or "test"
+    """
+
+    family: LayoutFamily
+    name: str
+
+    def __len__(self) -> int:
+        """Return the number of layouts."""
+        return self.family.number(self.name)
+
+    @property
+    def mazes(self) -> tuple[np.ndarray, ...]:
+        """Walls of the mazes, boolean (row, column) each.
+
+        Raises:
+            ValueError: two mazes of the family are equal.
+        """
+        return _drawn(self.family, "maze")[self.name]
+
+    @property
+    def courses(self) -> tuple[Course, ...]:
+        """The courses.
+
+        Raises:
+            ValueError: two courses of the family are equal, or courses of this size could not be drawn.
+        """
+        return _drawn(self.family, "navigation")[self.name]
+
+    def stripes(self) -> list[np.random.Generator]:
+        """Return a new random number generator for the stripes of each layout."""
+        return [self.family.random(self.name, index, _STRIPES) for index in range(len(self))]
+
+
+def _course(family: LayoutFamily, rng: np.random.Generator) -> Course:
+    return draw_course((family.rows, family.columns), rng, family.path_width)
+
+
+def _maze(family: LayoutFamily, rng: np.random.Generator) -> np.ndarray:
+    return read_only(draw_maze((family.rows, family.columns), rng))
+
+
+_DRAW: Mapping[str, Callable[..., Any]] = MappingProxyType({"navigation": _course, "maze": _maze})
+TASKS_WITH_LAYOUTS = tuple(_DRAW)
+
+
+@lru_cache(maxsize=8)
+def _drawn(family: LayoutFamily, task: str) -> Mapping[str, tuple[Any, ...]]:
+    """Return the layouts of all sets by name, after checking that their walls differ."""
+    draw = _DRAW[task]
+    found: dict[str, tuple[Any, ...]] = {}
+    known: dict[bytes, str] = {}
+    for name in SETS:
+        layouts = tuple(draw(family, family.random(name, i, _WALLS)) for i in range(family.number(name)))
+        for index, layout in enumerate(layouts):
+            walls = layout.walls if isinstance(layout, Course) else layout
+            first, here = known.setdefault(walls.tobytes(), f"{name} {index}"), f"{name} {index}"
+            if first != here:
+                raise ValueError(
+                    f"LayoutFamily: layouts {first} and {here} have the same walls: must differ; use another seed, "
+                    "larger layouts or fewer of them"
+                )
+        found[name] = layouts
+    return MappingProxyType(found)
