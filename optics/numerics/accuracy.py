@@ -12,6 +12,7 @@ __all__ = [
     "AccuracyError",
     "Option",
     "Plan",
+    "above",
     "size_of",
 ]
 
@@ -104,6 +105,12 @@ class Plan:
             for option in self.options
         ]
         return "\n".join([*head, "compared", *others])
+
+
+def above(error: float, tolerance: float) -> str:
+    """Return an error that exceeds a tolerance, with as many digits as show this: "0.002", but "0.0011" above 0.001."""
+    shown = (f"{error:.{digits}g}" for digits in range(1, 17))
+    return next((text for text in shown if float(text) > tolerance), f"{error!r}")
 
 
 def size_of(count: float) -> str:
