@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from optics.apertures.circular import Circle
+from optics.methods.problem import Problem
 from optics.numerics.arguments import reals, shown
 from optics.numerics.autodiff import Array, number, plain
 from optics.numerics.precision import opaque, padded_for_packets, precision
@@ -133,7 +134,8 @@ def _summed(request: Request, unsure: float = 1.0) -> float | None:
     It is ∫ |F(u)|² df / A over |f| < 1/λ, with the field u behind the pupil and the area A of its aperture. Lengths are
     in units of the radius. |F(u)|² has no structure finer than one cycle per diameter.
     """
-    beam, problem = request.beam, request.problem
+    beam, asked = request.beam, request.problem
+    problem = Problem.from_beam(beam, asked.window, asked.tolerance, asked.dtype, derivatives=False)
     highest = problem.radius / problem.wavelength
     phase = highest + problem.radius * problem.phase_band
     if problem.pixelated is not None or max(phase, highest) > 100:
