@@ -10,6 +10,10 @@ import pytest
 # OpenImageIO starts a process of its own.
 sys.modules["OpenImageIO"] = None  # type: ignore[assignment]
 
+# Idle threads of OpenBLAS and OpenMP spin. With a worker on every core, that took up to half of the CPU time of tests
+# with large matrices. Nothing has imported NumPy or torch yet, and child processes inherit the variables.
+os.environ.update(dict.fromkeys(("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1"))
+
 pytest_plugins = ["pytester", "tests.cpu_times", "tests.sharing", "tests.slow_part"]
 
 

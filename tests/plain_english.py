@@ -15,6 +15,7 @@ import re
 import tokenize
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -71,7 +72,7 @@ class Text:
         """Number of words."""
         return len(self.text.split())
 
-    @property
+    @cached_property
     def markers(self) -> list[tuple[str, str]]:
         """Name of each marker, and the words that it matches."""
         return [(name, match[0]) for name, marker in MARKERS.items() for match in marker.finditer(self.text)]

@@ -1,7 +1,7 @@
-"""A pytest plugin: with `-n auto`, tests that share expensive fixtures run on one worker, and others on any.
+"""A pytest plugin: with `-n auto`, the tests of a file run on one worker, so that fixtures and caches are built once.
 
-This is the behaviour of pytest-xdist's option `--dist loadgroup` and its mark `xdist_group`, which have no effect with
-pytest 9.2. Any other value of `--dist` works as usual.
+Groups of files that share expensive fixtures also run on one worker. Long files whose tests share nothing are divided
+among all workers. Any other value of `--dist` than the default works as usual.
 """
 
 from __future__ import annotations
@@ -12,29 +12,27 @@ import pytest
 
 # Names of groups, and the common start of their tests' names.
 SHARING = {
-    "contrasts of the standard observer": ("tests/optics/elements/test_human_eye.py::test_standard_observer",),
     "a run, an episode and its page": ("tests/evolve/report/",),
     "a run and an episode": ("tests/evolve/analysis/test_episode.py", "tests/evolve/cli/test_products.py"),
-    "a run in a user task": ("tests/evolve/analysis/test_recorder.py",),
-    "five stages of an eye": ("tests/experiments/test_five_eyes.py",),
-    "lives behind lenses": ("tests/experiments/test_sharp_lenses.py",),
-    "a wheel": ("tests/rhabdom/test_wheel.py",),
-    "a Dask cluster": ("tests/evolve/search/test_dask_executor.py",),
-    "a silent Dask cluster": ("tests/evolve/search/test_silent_cluster.py",),
-    "animals that evolve in turn": ("tests/evolve/learning/test_animals_in_turn.py",),
-    "tables and figures of a run": ("tests/evolve/interactive/test_opened_run.py",),
-    "outputs before a change": ("tests/test_parameters.py",),
     "the sources, parsed": (
         *("tests/test_architecture.py", "tests/test_conventions.py", "tests/rhabdom/test_dependencies.py"),
         *("tests/test_docs.py::test_paths", "tests/test_docs.py::test_names"),
     ),
     "the built site": tuple(f"tests/test_docs.py::test_{name}" for name in ("site", "menus", "reference")),
 }
+# Files of which any worker may run any test.
+DIVIDED = (
+    "tests/experiments/test_records.py",
+    "tests/sim/render/test_sample_choice.py",
+    "tests/sim/render/test_vertical_field.py",
+    "tests/test_docs.py",
+)
 
 
 def group(test: str) -> str:
     """Name of the group of a test; tests of one group run on one worker."""
-    return next((name for name, starts in SHARING.items() if test.startswith(starts)), test)
+    alone = test if test.startswith(DIVIDED) else test.split("::")[0]
+    return next((name for name, starts in SHARING.items() if test.startswith(starts)), alone)
 
 
 @pytest.hookimpl(optionalhook=True)

@@ -5,7 +5,7 @@ from collections import defaultdict
 
 import pytest
 
-from tests.plain_english import FOLDERS, ROOT, Text, document, rate, texts, texts_in
+from tests.plain_english import ROOT, Text, document, rate, texts, texts_in
 
 MOST, MOST_PER_PAGE = 2.0, 4.0  # markers per 1,000 words; comparison pages of other projects have 0.1 to 0.7
 SHORT = 60  # words: one marker in a shorter page says nothing
@@ -45,13 +45,11 @@ def test_no_page_is_in_dialect(found):
     assert {page.path.name: rate([page]) for page in pages if rate([page]) > MOST_PER_PAGE} == {}
 
 
-def test_docstrings_begin_with_a_subject_or_an_imperative():
+def test_docstrings_begin_with_a_subject_or_an_imperative(found):
     wrong = defaultdict(list)
-    for name in FOLDERS:
-        for path in sorted((ROOT / name).rglob("*.py")):
-            for text in texts_in(path):
-                if text.kind == "docstring" and text.text.split()[0].strip(",.:") in FRAGMENTS:
-                    wrong[path.relative_to(ROOT).as_posix()].append(text.text.split("\n")[0])
+    for text in found:
+        if text.kind == "docstring" and text.text.split()[0].strip(",.:") in FRAGMENTS:
+            wrong[text.path.relative_to(ROOT).as_posix()].append(text.text.split("\n")[0])
     assert wrong == {}
 
 

@@ -224,11 +224,13 @@ GENES: Mapping[str, Gene] = gene_table()
 ALL_GENES: Mapping[str, Gene] = _all_genes(int(RELIEF_POINTS.high))  # genes of all kinds of eyes together
 
 
+@lru_cache(maxsize=1024)
 def group_members(name: str) -> tuple[str, ...]:
     """Return the names of the genes in a cluster or family, or the gene of this name; () for an unknown name."""
     return tuple(gene for gene in ALL_GENES if name in (gene, *groups_of(gene)))
 
 
+@lru_cache(maxsize=1024)
 def groups_of(name: str) -> tuple[str, ...]:
     """Return the family and the cluster of a gene, the smaller group first; () for an unknown name."""
     if name not in ALL_GENES:

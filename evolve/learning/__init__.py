@@ -8,6 +8,7 @@ task_module       execution of the code of a user task
 task_trial        short trial of a user task before a run
 ppo               PPO training, which stops early if returns no longer improve
 policy            policy of an animal (actor and critic), and its storage in files
+distribution      normal distribution of a policy's actions
 observed          entries of an observation other than the eyes' signals
 eye_features      encoder of each eye
 per_eye_layers    linear layers for each eye, with its own or with shared weights

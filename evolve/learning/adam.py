@@ -26,14 +26,15 @@ class Adam:
     def __init__(self, parameters: Iterable[nn.Parameter], lr: float) -> None:
         self.parameters = list(parameters)
         self.param_groups: list[dict[str, Any]] = [{"lr": lr, "params": self.parameters}]
-        with torch.no_grad():
-            self.values = torch.cat([p.detach().reshape(-1) for p in self.parameters])
+        # Not torch.cat, which imports torch's compiler on the "meta" device of `load_policy`.
+        self.values = self.parameters[0].new_empty(sum(p.numel() for p in self.parameters), requires_grad=False)
         self.gradient = torch.zeros_like(self.values)
         self.mean, self.square = torch.zeros_like(self.values), torch.zeros_like(self.values)
         self.steps = 0
         first = 0
         for parameter in self.parameters:
             piece = slice(first, first + parameter.numel())
+            self.values[piece].copy_(parameter.detach().reshape(-1))
             parameter.data = self.values[piece].view_as(parameter)
             parameter.grad = self.gradient[piece].view_as(parameter)
             first = piece.stop

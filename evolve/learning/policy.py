@@ -26,6 +26,7 @@ from evolve.config.checks import check_values
 from evolve.config.settings import DIRECT, WiringConfig
 from evolve.genome.phenotype import FORMER_ENCODER
 from evolve.learning.adam import Adam
+from evolve.learning.distribution import Gaussian, Within
 from evolve.learning.eye_features import UNITS, EyeFeatures
 from evolve.learning.observed import CONTACT, Entry, entries_of, known_beside_eyes
 from evolve.learning.tensor_file import read_tensors
@@ -101,9 +102,8 @@ class PolicyConfig:
         by all versions. Former versions had neither a list of other entries nor a choice of wiring, so their form is
         used for shapes that they could describe.
         """
-        values = {name: value for name, value in asdict(self).items() if name != "beside"}
-        if self.wiring == DIRECT:
-            del values["wiring"]
+        left_out = ("beside", "wiring") if self.wiring == DIRECT else ("beside",)
+        values = {name: value for name, value in asdict(self).items() if name not in left_out}
         if self.beside == (CONTACT,) and self.actions == 2:
             del values["actions"]
             return values
@@ -147,26 +147,6 @@ def _entries(stored: Mapping[str, Any]) -> tuple[Entry, ...]:
     return (CONTACT,)
 
 
-class _Within(torch.autograd.Function):
-    """Means of actions whose gradients never move them beyond the bounds -1 and 1.
-
-    Actions beyond the bounds are clipped. If the mean is far outside, all actions are clipped to the same value.
-    Exploration then has no effect, and no gradient would move the mean back (Hausknecht and Stone 2016, section 5.2,
-    "zeroing gradients").
-    """
-
-    @staticmethod
-    def forward(ctx: Any, mean: Tensor) -> Tensor:
-        ctx.save_for_backward(mean)
-        return mean.clone()
-
-    @staticmethod
-    def backward(ctx: Any, gradient: Tensor) -> Tensor:
-        (mean,) = ctx.saved_tensors
-        # Gradient descent increases the mean if the gradient is negative.
-        return gradient * torch.where(gradient < 0, mean < 1, mean > -1)
-
-
 class EyePolicy(MultiInputActorCriticPolicy):
     """Actor and critic of stable-baselines3 (SB3), whose inputs are EyeFeatures.
 
@@ -197,7 +177,11 @@ class EyePolicy(MultiInputActorCriticPolicy):
         with torch.no_grad():
             means, spreads = zip(*(first_actions or [(0.0, FIRST_SPREAD)] * self.config.actions), strict=True)
             self.action_net.bias.copy_(torch.tensor(means))
-            self.log_std.copy_(torch.tensor(spreads).log())
+            self.log_std.copy_(torch.tensor(spreads, device="cpu").log())
+
+    def _build(self, lr_schedule: Any) -> None:
+        self.action_dist = Gaussian(self.action_space.shape[0])
+        super()._build(lr_schedule)
 
     def extract_features(
         self, obs: dict[str, Tensor], features_extractor: BaseFeaturesExtractor | None = None
@@ -208,7 +192,7 @@ class EyePolicy(MultiInputActorCriticPolicy):
     def _get_action_dist_from_latent(self, latent_pi: Tensor) -> Distribution:
         if not torch.isfinite(latent_pi).all():
             raise TrainingDiverged("policy's actions not finite")
-        mean = _Within.apply(self.action_net(latent_pi))
+        mean = Within.apply(self.action_net(latent_pi))
         return self.action_dist.proba_distribution(mean, self.log_std)
 
 

@@ -22,7 +22,7 @@ from optics.apertures.soft_edge import SoftEdge
 from optics.apertures.soft_polygon import TINY, radial_table, sides_share
 from optics.numerics.autodiff import Array
 from optics.numerics.cost import SOFT_SIDE_SAMPLE
-from optics.numerics.precision import Precision, opaque
+from optics.numerics.precision import Precision, opaque, padded_for_packets
 from optics.numerics.quadrature import gauss_legendre, gauss_legendre_count
 
 __all__ = ["SoftOutline"]
@@ -72,7 +72,7 @@ def _short(arcs: np.ndarray) -> np.ndarray:
 def _arcs_share(edge: SoftEdge, arcs: np.ndarray, x: Array, y: Array, types: Precision) -> Array:
     import drjit as dr
 
-    columns = [types.Float64(np.ascontiguousarray(column)) for column in arcs.T]
+    columns = [types.Float64(padded_for_packets(column)) for column in arcs.T]
     count = dr.opaque(types.Index, len(arcs))
     arc = _Arc(edge, types)
 
@@ -99,7 +99,7 @@ class _Arc:
         self.radial = radial_table(edge)
         # Within the reach, a quarter of a turn is at most π/2 times as long as its chord.
         nodes, weights = gauss_legendre(gauss_legendre_count(pi * edge.cycles, 1 - log10(edge.ripple)) + 4)
-        self.nodes, self.weights = types.Float64(nodes), types.Float64(weights)
+        self.nodes, self.weights = (types.Float64(padded_for_packets(each)) for each in (nodes, weights))
         self.count = dr.opaque(types.Index, len(nodes))
 
     def share(self, x: Array, y: Array, radius: Array, begin: Array, end: Array) -> Array:

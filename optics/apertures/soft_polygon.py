@@ -26,7 +26,7 @@ from optics.apertures.soft_edge import SoftEdge
 from optics.numerics.autodiff import Array
 from optics.numerics.cost import SOFT_SIDE_SAMPLE
 from optics.numerics.interpolation import Interpolant
-from optics.numerics.precision import Precision, opaque
+from optics.numerics.precision import Precision, opaque, padded_for_packets
 from optics.numerics.quadrature import gauss_legendre, gauss_legendre_count
 
 __all__ = ["TINY", "SoftPolygon", "radial_table", "sides_share"]
@@ -60,7 +60,7 @@ def sides_share(edge: SoftEdge, starts: np.ndarray, ends: np.ndarray, x: Array, 
     along = ends - starts
     length = np.hypot(*along.T)
     columns = (*starts.T, *(along / length[:, None]).T, length)
-    sides = [types.Float64(np.ascontiguousarray(column)) for column in columns]
+    sides = [types.Float64(padded_for_packets(column)) for column in columns]
     count = dr.opaque(types.Index, len(length))
     line = _Line(edge, types)
 
@@ -94,7 +94,9 @@ class _Line:
         # H is even in t, so half the nodes of an even rule from -s to s are enough.
         nodes, weights = gauss_legendre(2 * ceil(gauss_legendre_count(2 * edge.cycles, -log10(edge.ripple)) / 2))
         half = len(nodes) // 2
-        self.nodes, self.weights = types.Float64(2 * nodes[half:] - 1), types.Float64(2 * weights[half:])
+        self.nodes, self.weights = (
+            types.Float64(padded_for_packets(each)) for each in (2 * nodes[half:] - 1, 2 * weights[half:])
+        )
         self.count = dr.opaque(types.Index, half)
 
     def between(self, d: Array, start: Array, end: Array) -> Array:

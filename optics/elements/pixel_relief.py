@@ -11,7 +11,7 @@ from optics.apertures.aperture import Aperture
 from optics.elements.relief import Relief
 from optics.elements.square_samples import square_samples
 from optics.numerics.autodiff import Array, is_differentiable
-from optics.numerics.precision import Precision
+from optics.numerics.precision import Precision, padded_for_packets
 
 __all__ = ["PixelRelief"]
 
@@ -44,7 +44,7 @@ class PixelRelief(Relief):
         import drjit as dr
 
         n = len(self._heights)
-        known = dr.ravel(self.samples) if is_differentiable(self.samples) else self._heights.ravel()
+        known = dr.ravel(self.samples) if is_differentiable(self.samples) else padded_for_packets(self._heights)
         column, row = (dr.clip(dr.floor((place + 1) * (n / 2)), 0, n - 1) for place in (x, y))
         return dr.gather(types.Float64, types.Float64(known), types.Index(row * n + column))
 

@@ -19,7 +19,7 @@ from optics.numerics.arguments import finite, plain_reals, positive
 from optics.numerics.autodiff import Array, is_differentiable, plain
 from optics.numerics.interpolation import cubic_bsplines
 from optics.numerics.matrices import matmul
-from optics.numerics.precision import Precision
+from optics.numerics.precision import Precision, padded_for_packets
 
 __all__ = ["BSplineRelief", "HeightMap", "Relief"]
 
@@ -210,7 +210,7 @@ class HeightMap(Relief):
         import drjit as dr
 
         if not is_differentiable(self.samples):
-            return types.Float64(self._coefficients.ravel())
+            return types.Float64(padded_for_packets(self._coefficients))
         n = len(self._heights)
         tensor: Array = types.Tensor64(types.Float64(dr.ravel(self.samples)), (n, n))
         matrix = types.Tensor64(np.ascontiguousarray(_spline_coefficients(np.eye(n), self._margin)))

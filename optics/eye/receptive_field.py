@@ -132,8 +132,9 @@ def visual_kernel(
         # Samples and cells both run backwards. A symmetric pupil thus has the same sums, in the same order, as a turned
         # one, whose samples run forwards.
         down, across = (
-            types.Tensor(cell_integrals(samples, window.dx, tiles)[::-1].copy())
+            types.Tensor(padded_for_packets(sums), sums.shape)
             for samples, tiles in zip(window.shape, (rows, columns), strict=True)
+            for sums in [cell_integrals(samples, window.dx, tiles)[::-1]]
         )
         image = types.Tensor(picture.image if retina.pupil_turned else dr.reverse(picture.image), window.shape)
         kernels.append(matmul(down, matmul(image, across, transposed=True)).array)

@@ -6,7 +6,7 @@ from optics.elements.beam import Beam
 from optics.methods.problem import Problem
 from optics.numerics.autodiff import Array
 from optics.numerics.field import Field
-from optics.numerics.precision import opaque, precision
+from optics.numerics.precision import opaque, padded_for_packets, precision
 from optics.numerics.radial_profile import DistinctRadii, RadialProfile
 
 __all__ = ["on_line", "on_window", "with_sphere"]
@@ -37,7 +37,7 @@ def on_line(profile: Field, line: RadialProfile | DistinctRadii, beam: Beam, pro
     Without its spherical phase the field is as smooth as the intensity.
     """
     types, window = precision(problem.dtype), problem.window
-    r = types.Float64(line.positions)
+    r = types.Float64(padded_for_packets(line.positions))
     slow = with_sphere(profile, r, 0 * r, beam, problem, -1)
     re, im = (line.onto(part, window, types, signed=True) for part in (slow.re, slow.im))
     return on_window(Field(re, im, window, types), beam, problem)

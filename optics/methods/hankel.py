@@ -31,7 +31,7 @@ from optics.numerics.cost import (
 )
 from optics.numerics.field import Field
 from optics.numerics.grid import Grid
-from optics.numerics.precision import Precision, opaque, precision
+from optics.numerics.precision import Precision, opaque, padded_for_packets, precision
 from optics.numerics.quadrature import gauss_legendre, gauss_legendre_count
 from optics.numerics.radial_profile import DistinctRadii, RadialProfile
 
@@ -115,25 +115,28 @@ def _hankel(beam: Beam, problem: Problem, how: HankelSampling, types: Precision)
     import drjit as dr
 
     nodes, weights = _on_rings(problem.aperture.rings, how.radii)
-    r = types.Float64(nodes) * opaque(types, beam.radius)
+    r = types.Float64(padded_for_packets(nodes)) * opaque(types, beam.radius)
     zero = dr.zeros(types.Float64, len(nodes))
-    area = types.Float64(2 * np.pi * weights * nodes) * dr.square(opaque(types, beam.radius))
+    area = types.Float64(padded_for_packets(2 * np.pi * weights * nodes)) * dr.square(opaque(types, beam.radius))
     if beam.pupil.mask is not None:
-        area *= beam.pupil.amplitude(types.Float64(nodes), zero, types)
+        area *= beam.pupil.amplitude(types.Float64(padded_for_packets(nodes)), zero, types)
     pupil = Field.from_waves(area, beam.waves(r, zero, types), Grid((1, len(nodes)), 1.0), types)
     edge = math.asin(how.taper.end * problem.wavelength)
     nodes, weights = gauss_legendre(how.angles)
-    theta = types.Float64(nodes * edge)
-    sine, cosine = types.Float64(np.sin(nodes * edge)), types.Float64(np.cos(nodes * edge))
+    theta, sine, cosine = (
+        types.Float64(padded_for_packets(each)) for each in (nodes * edge, np.sin(nodes * edge), np.cos(nodes * edge))
+    )
     f = sine / opaque(types, problem.wavelength)
     exactly = problem.tolerance < LOOSE
     spectrum = _transform(pupil, r, f, types, exactly)
     fade = how.taper.fade(f * f, types)
-    ring = types.Float64(2 * np.pi * edge * weights) * f * cosine / opaque(types, problem.wavelength)
+    ring = (
+        types.Float64(padded_for_packets(2 * np.pi * edge * weights)) * f * cosine / opaque(types, problem.wavelength)
+    )
     waves = -opaque(types, beam.distance) / opaque(types, problem.wavelength) * 2 * dr.square(dr.sin(theta / 2))
     grid = Grid((1, how.angles), 1.0)
     spectrum = spectrum * Field.from_waves(ring * types.Float64(fade), waves, grid, types)
-    return _transform(spectrum, f, types.Float64(how.line.positions), types, exactly)
+    return _transform(spectrum, f, types.Float64(padded_for_packets(how.line.positions)), types, exactly)
 
 
 def _on_rings(rings: tuple[tuple[float, float], ...], counts: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray]:

@@ -253,7 +253,7 @@ def _entries(u: Field, at: tuple[Array, Array], beam: Beam, problem: Problem, ho
     size = n * how.rank
     grid = Grid((size, size - size // 2), 1.0)
     (a, i), (b, j) = (_split(index, n, types) for index in at)
-    points = types.Float64(how.half_width * chebyshev_points(how.rank))
+    points = types.Float64(padded_for_packets(how.half_width * chebyshev_points(how.rank)))
     from_centre = [dr.gather(types.Float64, points, types.Index(index)) for index in (a, b)]
     x, y = (u + opaque(types, middle) for u, middle in zip(from_centre, problem.window.centre, strict=True))
     xi, eta = how.pupil.places(i, j, beam, types)

@@ -96,7 +96,7 @@ class Problem:
 
     @cached_property
     def turning_inside(self) -> float:
-        """Highest frequency [1/m] of this combined phase over the disk without its soft edge."""
+        """The same as `turning`, over the disk without its soft edge."""
         return self._turning[1]
 
     @cached_property

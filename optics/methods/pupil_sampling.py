@@ -115,9 +115,8 @@ class PixelSamples:
         """Return the positions of samples along one axis."""
         import drjit as dr
 
-        return dr.gather(types.Float64, types.Float64(self.aperture.rows(self.across)), types.Index(index)) * opaque(
-            types, beam.radius
-        )
+        rows = types.Float64(padded_for_packets(self.aperture.rows(self.across)))
+        return dr.gather(types.Float64, rows, types.Index(index)) * opaque(types, beam.radius)
 
     def field(self, beam: Beam, types: Precision) -> Field:
         radius, at = opaque(types, beam.radius), self.aperture.rows(self.across)

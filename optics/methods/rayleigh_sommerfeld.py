@@ -16,7 +16,7 @@ from optics.numerics.autodiff import Array
 from optics.numerics.cost import CALL, ITEM_BYTES, NODE, NODE_BYTES, PAIRS_PER_SECOND
 from optics.numerics.field import Field
 from optics.numerics.grid import Grid
-from optics.numerics.precision import Precision, opaque, precision
+from optics.numerics.precision import Precision, opaque, padded_for_packets, precision
 from optics.numerics.quadrature import stepped_up
 from optics.numerics.radial_profile import RadialProfile
 
@@ -70,7 +70,7 @@ class NodeSampling:
         if self.line is None:
             x, y = problem.window.coordinates(types)
             return direct_sum(beam, self.rule, x, y, types).intensity
-        r = types.Float64(self.line.positions)
+        r = types.Float64(padded_for_packets(self.line.positions))
         return self.line.onto(direct_sum(beam, self.rule, r, 0 * r, types).intensity, problem.window, types)
 
     def field(self, beam: Beam, problem: Problem) -> Field:
@@ -80,7 +80,7 @@ class NodeSampling:
             x, y = problem.window.coordinates(types)
             found = direct_sum(beam, self.rule, x, y, types)
             return Field(found.re, found.im, problem.window, types)
-        r = types.Float64(self.line.positions)
+        r = types.Float64(padded_for_packets(self.line.positions))
         return on_line(direct_sum(beam, self.rule, r, 0 * r, types), self.line, beam, problem)
 
     def plane(self, problem: Problem) -> float:
@@ -212,7 +212,7 @@ def _added(
     import drjit as dr
 
     x, y = at
-    found_x, found_y, found_weight = (types.Float64(column) for column in rule)
+    found_x, found_y, found_weight = (types.Float64(padded_for_packets(column)) for column in rule)
     radius = opaque(types, beam.radius)
     nodes_x, nodes_y = found_x * radius, found_y * radius
     z, wavelength = opaque(types, beam.distance), opaque(types, beam.wavelength / beam.index)

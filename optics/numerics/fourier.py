@@ -24,7 +24,7 @@ from optics.numerics.cost import DFT_CALL, FFT_COPY, FFT_FLOPS, FFT_LINE_SAMPLE
 from optics.numerics.field import Field
 from optics.numerics.fourier_matrices import matrix_seconds, matrix_sum
 from optics.numerics.grid import Grid
-from optics.numerics.precision import ROOM, Precision, opaque
+from optics.numerics.precision import Precision, aligned, opaque
 
 __all__ = [
     "dft2",
@@ -216,7 +216,7 @@ def _fft_of_parts(
     turned, norm = (fft.fft, None) if sign < 0 else (fft.ifft, "forward")
     (ny, nx), (my, mx) = parts[0].shape, to
     rows = np.empty((ny, mx), types.complex_dtype)
-    found = [np.empty(my * mx + ROOM, types.dtype)[: my * mx] for _ in parts]
+    found = [aligned(my * mx, types.dtype) for _ in parts]
     re, im = (part.reshape(to) for part in found)
     for some in _lines(ny, period):
         lines = np.zeros((rows[some].shape[0], period), types.complex_dtype)

@@ -14,7 +14,7 @@ from math import pi
 import numpy as np
 
 from optics.numerics.autodiff import Array
-from optics.numerics.precision import Precision, opaque
+from optics.numerics.precision import Precision, opaque, padded_for_packets
 
 __all__ = [
     "LAGRANGE_8",
@@ -77,7 +77,7 @@ class Interpolant:
         last = opaque(types, len(self.samples) - 2 * MARGIN - 1)
         t = dr.clip((place - opaque(types, self.first)) * opaque(types, 1 / self.step), 0, last)
         cell = dr.minimum(dr.floor(t), last - 1)
-        samples, first = types.Float64(self.samples), types.Index(cell)
+        samples, first = types.Float64(padded_for_packets(self.samples)), types.Index(cell)
         values = [dr.gather(types.Float64, samples, first + i) for i in range(TABLE_TAPS)]
         return sum(
             (w * v for w, v in zip(lagrange_weights(t - cell, TABLE_TAPS), values, strict=True)), types.Float64(0)

@@ -13,9 +13,9 @@ from optics.numerics.arguments import shown
 from optics.numerics.autodiff import Array, Scalar, is_differentiable
 from optics.numerics.device import Device, make_ready
 
-__all__ = ["ROOM", "Precision", "opaque", "padded_for_packets", "precision"]
+__all__ = ["PACKET", "Precision", "aligned", "opaque", "padded_for_packets", "precision"]
 
-ROOM = 64  # choice: number of padding elements, more than any processor reads at once
+PACKET = 128  # [bytes] what a processor reads at once at most: sixteen float64 (AVX-512)
 
 
 @dataclass(frozen=True)
@@ -58,15 +58,26 @@ def _precision(dtype: str, place: Device) -> Precision:
     )
 
 
+def aligned(count: int, dtype: Any) -> np.ndarray:
+    """Return a flat array of zeros that starts at a multiple of PACKET bytes and can be read beyond its end.
+
+    Dr.Jit compiles a kernel again if an input is aligned differently, which for NumPy's own memory is a matter of
+    chance.
+    """
+    size = count * np.dtype(dtype).itemsize
+    room = np.zeros(size + 2 * PACKET, np.uint8)
+    first = -room.ctypes.data % PACKET
+    return room[first : first + size].view(dtype)
+
+
 def padded_for_packets(values: np.ndarray) -> np.ndarray:
-    """Return the same numbers as a flat array, in memory that can be read beyond the end of the array.
+    """Return the same numbers as a flat array, in aligned memory that can be read beyond the end of the array.
 
     Dr.Jit uses NumPy's memory without a copy. Its kernels read whole packets of numbers, sixteen with AVX-512, and
     ignore the numbers beyond the end. If the next memory page is not mapped, reading it crashes the process. This can
     happen with arrays of some megabytes (observed with Dr.Jit 1.5 and 2087 x 2087 numbers).
     """
-    room = np.empty(values.size + ROOM, values.dtype)
-    flat = room[: values.size]
+    flat = aligned(values.size, values.dtype)
     flat.reshape(values.shape)[...] = values
     return flat
 

@@ -10,7 +10,7 @@ below the requested error.
 from __future__ import annotations
 
 from functools import lru_cache
-from math import ceil, log2, pi
+from math import ceil, log, log2, pi
 
 import numpy as np
 
@@ -19,19 +19,42 @@ from optics.numerics.bessel import bessel_j
 __all__ = ["gauss_legendre", "gauss_legendre_count", "harmonics", "stepped_up"]
 
 NEWTON_STEPS = 10  # iterations, far more than convergence needs
+DEBYE_STEPS = 3  # choice: iterations; one more rarely changes the rounded order
 STEPS = 16  # choice: values per octave in `stepped_up`; on average, cycles increase by half a step (2 %)
 
 
 def harmonics(z: np.ndarray, digits: float) -> np.ndarray:
-    """Return the smallest m from which on 2 |J_m| <= 10^-digits for all arguments up to z, by bisection."""
+    """Return the smallest m from which on 2 |J_m| <= 10^-digits for all arguments up to z.
+
+    The search starts at Debye's estimate, which is usually the result, so that two Bessel functions are enough.
+    """
     z = np.asarray(z, dtype=np.float64)
     # Beyond m = z, |J_m(z)| falls steadily with m and is below (ez/2m)^m. This bounds the search, since e/2 is 1.36.
     low, high = np.floor(z), np.ceil(1.36 * z + 3 * digits + 4)
+    order, step = np.clip(np.ceil(_debye_order(z, digits)), low + 1, high - 1), 1
     while np.any(high - low > 1):
-        middle = np.ceil((low + high) / 2)
-        small = 2 * np.abs(bessel_j(middle, z)) <= 10.0**-digits
-        low, high = np.where(small, low, middle), np.where(small, middle, high)
+        small = 2 * np.abs(bessel_j(order, z)) <= 10.0**-digits
+        low, high = np.where(small, low, order), np.where(small, order, high)
+        order, step = np.where(small, order - step, order + step), 2 * step
+        order = np.where((order > low) & (order < high), order, np.ceil((low + high) / 2))
     return np.asarray(high, dtype=np.int64)
+
+
+def _debye_order(z: np.ndarray, digits: float) -> np.ndarray:
+    """Return the order m, not rounded, at which Debye's expansion of 2 J_m(z) is 10^-digits.
+
+    J_m(m / cosh a) is about e^(m (tanh a - a)) / √(2π m tanh a) (Watson, §8.4). Newton's method solves for m. Near
+    m = z, the expansion is wrong, and so is the estimate.
+    """
+    z = np.maximum(z, 1e-9)
+    least = z + 0.3 * np.cbrt(z)
+    order = z + np.cbrt(z) * (2.44 * (digits + 0.3)) ** (2 / 3) + digits
+    for _ in range(DEBYE_STEPS):
+        root = np.sqrt((order - z) * (order + z))
+        a = np.log((order + root) / z)
+        excess = root - order * a - 0.5 * np.log(2 * pi * root) + log(2) + digits * log(10)
+        order = np.maximum(order + excess / a, least)
+    return np.asarray(order)
 
 
 def gauss_legendre_count(cycles: float, digits: float, degree: int = 0) -> int:

@@ -105,7 +105,7 @@ class RadialProfile:
 
     def _refined(self, values: Array, types: Precision) -> Array:
         """Return the values of the table, given values at Chebyshev points."""
-        matrix = types.Tensor(_refinement(self.points, self.table, self.rim / self.radius, types.dtype))
+        matrix = types.Tensor(*_refinement(self.points, self.table, self.rim / self.radius, types.dtype))
         return matmul(matrix, types.Tensor(values, (self.points, 1))).array
 
 
@@ -168,8 +168,8 @@ def _places(table: int) -> np.ndarray:
 
 
 @lru_cache(maxsize=32)
-def _refinement(points: int, table: int, rim: float, dtype: str) -> np.ndarray:
-    """Return the matrix (table + 7, points) of even Chebyshev interpolation to the positions -3 ... table + 3.
+def _refinement(points: int, table: int, rim: float, dtype: str) -> tuple[np.ndarray, tuple[int, ...]]:
+    """Return the flat matrix (table + 7, points) of even Chebyshev interpolation to -3 ... table + 3, and its shape.
 
     The positions are evenly spaced. The axis is position 0, and the rim, in units of the line's radius, is position
     table - 1.
@@ -180,5 +180,4 @@ def _refinement(points: int, table: int, rim: float, dtype: str) -> np.ndarray:
     transform = np.cos(np.arccos(nodes)[None, :] * degrees[:, None]) * (2 / points)
     transform[0] /= 2
     matrix = np.cos(np.arccos(np.minimum(np.abs(radius), 1))[:, None] * degrees[None, :]) @ transform
-    matrix.setflags(write=False)
-    return np.ascontiguousarray(matrix, dtype=dtype)
+    return padded_for_packets(matrix.astype(dtype)), matrix.shape

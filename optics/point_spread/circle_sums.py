@@ -120,7 +120,7 @@ def sums_of_cells(values: Array, distance: np.ndarray, radii: np.ndarray, dx: fl
     ends = np.concatenate([radii + dx / 2, radii - dx / 2])
     count = np.searchsorted(sorted_, ends)
     last, within = types.Index(np.maximum(count - 1, 0).astype(np.uint32)), types.Float((count > 0) / dx)
-    index, far = types.Index(order.astype(np.uint32)), types.Float(sorted_)
+    index, far = types.Index(padded_for_packets(order.astype(np.uint32))), types.Float(padded_for_packets(sorted_))
     outer = dr.arange(types.Index, radii.size)
     parts = []
     for row in range(len(values) // distance.size):

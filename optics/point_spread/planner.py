@@ -234,6 +234,15 @@ def _verdict(option: Sampling, best: Sampling, problem: Problem, most_seconds: f
     return f"{_seconds(option, problem) / _seconds(best, problem):.1f} times as slow"
 
 
+def _count(sampling: Sampling) -> str:
+    """Return the number of samples in words. The two numbers of a Hankel transform are not sides of a grid."""
+    if sampling.method == "hankel":
+        return f"integrals over {sampling.samples[0]:.2g} radii and {sampling.samples[1]:.2g} angles"
+    if sampling.samples[1] == 1:
+        return f"{sampling.samples[0]} nodes"
+    return f"{max(sampling.samples)} samples across"
+
+
 def _refusal(problem: Problem, found: list[Sampling], most_seconds: float, method: str) -> str:
     width = 2 * problem.window.half_width
     if not found and problem.pixelated is not None:
@@ -250,9 +259,8 @@ def _refusal(problem: Problem, found: list[Sampling], most_seconds: float, metho
             "use method='rayleigh_sommerfeld'"
         )
     least = min(found, key=lambda option: option.seconds)
-    across = f"{least.samples[0]} nodes" if least.samples[1] == 1 else f"{max(least.samples)} samples across"
     return (
-        f"tolerance = {problem.tolerance:g} needs {across}, {size_of(_bytes(least, problem))} and about "
+        f"tolerance = {problem.tolerance:g} needs {_count(least)}, {size_of(_bytes(least, problem))} and about "
         f"{_seconds(least, problem):.2g} s by {least.method}; the limits are {size_of(MOST_BYTES)} and "
         f"{most_seconds:g} s: widen the tolerance, shrink the window ({width:.3g} m) or the pupil (radius "
         f"{problem.radius:.3g} m, Fresnel number {problem.fresnel_number:.3g})"

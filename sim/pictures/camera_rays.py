@@ -17,9 +17,10 @@ import mitsuba as mi
 import numpy as np
 
 from optics.numerics.autodiff import Array
+from optics.numerics.precision import aligned
 from sim.pictures.merged_mirror import MergedMirror
 from sim.scene.cameras import Viewpoint
-from sim.scene.device_arrays import aligned, floats, whole_numbers
+from sim.scene.device_arrays import floats, whole_numbers
 from sim.scene.frozen_kernels import garbage_kept
 from sim.scene.lights import Emitter
 from sim.scene.variant import MitsubaObject, variant

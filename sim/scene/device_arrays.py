@@ -13,19 +13,7 @@ import mitsuba as mi
 import numpy as np
 
 from optics.numerics.autodiff import Array
-
-ALIGNMENT = 64  # [bytes]
-# [bytes] largest read of a kernel, which may extend past an array's end
-# (`optics.numerics.precision.padded_for_packets`).
-PACKET = 128
-
-
-def aligned(n: int, dtype: type) -> np.ndarray:
-    """Return n zeros that start at a multiple of 64 bytes."""
-    size = np.dtype(dtype).itemsize
-    raw = np.zeros(n * size + ALIGNMENT + PACKET, np.uint8)
-    first = -raw.ctypes.data % ALIGNMENT
-    return raw[first : first + n * size].view(dtype)
+from optics.numerics.precision import aligned
 
 
 class SharedBuffer:

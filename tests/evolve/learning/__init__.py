@@ -1,10 +1,12 @@
 """Tests of evolve/learning: which test covers which module.
 
 fitness: test_fitness.py
+final_figures: test_final_figures.py
 training_envs: test_fitness.py, test_task_module.py, test_animals_in_turn.py
 task_module: test_task_module.py, test_textures_of_runs.py, test_animals_in_turn.py
 task_trial: test_task_module.py, test_task_settings.py
 ppo: test_ppo.py, test_learning.py, search/test_successive_halving.py
+distribution: test_policy.py, test_adam.py
 policy: test_policy.py
 observed: test_policy.py, test_task_module.py
 eye_features: test_eye_features.py, test_policy.py, test_learning.py

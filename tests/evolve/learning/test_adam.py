@@ -33,12 +33,14 @@ def test_steps_are_those_of_torchs_adam():
 
 
 @pytest.mark.slow
-def test_a_policy_is_built_without_torchs_compiler():
-    """torch._dynamo takes seconds to import in every worker process."""
+def test_a_policy_is_built_and_read_without_torchs_compiler(tmp_path):
+    """torch._dynamo takes seconds to import in every process."""
+    file = tmp_path / "policy.safetensors"
     code = (
-        "import sys; from evolve.learning.policy import PolicyConfig, build_policy\n"
+        "import sys; from evolve.learning.policy import PolicyConfig, build_policy, load_policy, save_policy\n"
         "policy = build_policy(PolicyConfig((1, 1, 1, 1, 1), 4)); policy.optimizer.zero_grad()\n"
         "sum(p.sum() for p in policy.parameters()).backward(); policy.optimizer.step()\n"
+        f"save_policy(policy, {str(file)!r}); load_policy({str(file)!r})\n"
         "sys.exit('torch._dynamo' in sys.modules)"
     )
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

@@ -34,7 +34,7 @@ def traced(side, lead, light=lambda x, y: 1.0, direction=(0.0, 0.0), step=1e-8):
     light(x, y): transmitted intensity.
     direction: angles (right, up) [degrees] at which the owner sees the point.
     """
-    at = (np.arange(1500) + 0.5) / 1500 * 2 * RADIUS - RADIUS
+    at = (np.arange(500) + 0.5) / 500 * 2 * RADIUS - RADIUS
     right, up = (axis.ravel() for axis in np.meshgrid(at, at))
     right, up = (axis[np.hypot(right, up) < RADIUS] for axis in (right, up))
 

@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 from scipy.special import jv, roots_legendre
 
+from optics.numerics import quadrature
+from optics.numerics.bessel import bessel_j
 from optics.numerics.quadrature import gauss_legendre, gauss_legendre_count, harmonics, stepped_up
 
 
@@ -15,6 +17,17 @@ def test_harmonics_are_the_fewest(digits):
     below = m > np.floor(z) + 1  # the search starts at z
     assert below.sum() > 40
     assert (2 * np.abs(jv(m - 1, z)) > 10.0**-digits)[below].all()
+
+
+@pytest.mark.parametrize("digits", [3, 8, 12])
+def test_two_bessel_functions_find_most_harmonics(digits, monkeypatch):
+    """The planner asks for thousands of numbers. Bisection needs six to eleven Bessel functions for each."""
+    calls = []
+    monkeypatch.setattr(quadrature, "bessel_j", lambda m, z: calls.append(m) or bessel_j(m, z))
+    arguments = np.geomspace(10, 3000, 40)
+    for z in arguments:
+        harmonics(z, digits)
+    assert len(calls) < 2.5 * len(arguments)
 
 
 @pytest.mark.parametrize("digits", [3, 6, 9, 12])

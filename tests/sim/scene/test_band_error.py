@@ -12,6 +12,7 @@ from sim.tasks.registry import task_of
 from sim.tasks.simulation import Simulation
 from sim.worlds.foraging import ULTRAVIOLET, petal
 
+NOISY = 0.1  # standard deviation of the noise, so large that few rays suffice
 PETALS = [petal(share) for share in ULTRAVIOLET.values()]
 NM = np.arange(300.0, 781.0)
 GREY = optics.Spectrum((300.0, 780.0), (0.4, 0.4))
@@ -59,16 +60,16 @@ def test_a_renderer_says_what_its_bands_are_worth():
     grey = sim.build_world("detection")
     assert measured(grey.model, grey.spectra) == []
     few, many = (
-        sim.BatchedRenderer(world, sim.Eyes(1, (2, 2), receptors="honeybee", bands=bands), 1).fidelity.levels[0]
+        sim.BatchedRenderer(world, sim.Eyes(1, (2, 2), receptors="honeybee", bands=bands, noise_sigma=NOISY), 1).fidelity.levels[0]
         for bands in (4, 16)
     )
     assert few.predicted_error == pytest.approx(band_error(PETALS, "honeybee", 4))
     assert many.predicted_error < few.predicted_error / 5
     half = optics.Pupil(50e-6, thin_lens_focal_length=241e-6)
-    dim = sim.Eyes(1, (2, 2), receptors="honeybee", optics=half)
+    dim = sim.Eyes(1, (2, 2), receptors="honeybee", optics=half, noise_sigma=NOISY)
     behind = sim.BatchedRenderer(world, dim, 1).fidelity.levels[0].predicted_error
     assert behind == pytest.approx(few.predicted_error / 4), "the pupil transmits a quarter of the light"
-    grey = sim.BatchedRenderer(sim.build_world("detection"), sim.Eyes(1, (2, 2)), 1).fidelity.levels[0]
+    grey = sim.BatchedRenderer(sim.build_world("detection"), sim.Eyes(1, (2, 2), noise_sigma=NOISY), 1).fidelity.levels[0]
     assert grey.predicted_error is None
 
 

@@ -10,7 +10,8 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from sim.scene.device_arrays import ALIGNMENT, PACKET, SharedBuffer, aligned, floats
+from optics.numerics.precision import PACKET, aligned
+from sim.scene.device_arrays import SharedBuffer, floats
 from sim.scene.frozen_kernels import FrozenKernel
 from sim.scene.variant import variant
 
@@ -58,7 +59,7 @@ def test_aligned_arrays_are_whole_and_a_packet_may_be_read_beyond_their_end():
         while whole.base is not None:
             whole = whole.base
         assert array.shape == (n,)
-        assert array.ctypes.data % ALIGNMENT == 0
+        assert array.ctypes.data % PACKET == 0
         assert whole.ctypes.data + whole.nbytes >= array.ctypes.data + array.nbytes + PACKET
 
 

@@ -1,0 +1,39 @@
+"""Distribution of a policy's actions: normal, with means whose gradients stay within the bounds."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import torch
+from stable_baselines3.common.distributions import DiagGaussianDistribution
+from torch import Tensor, nn
+
+
+class Within(torch.autograd.Function):
+    """Means of actions whose gradients never move them beyond the bounds -1 and 1.
+
+    Actions beyond the bounds are clipped. If the mean is far outside, all actions are clipped to the same value.
+    Exploration then has no effect, and no gradient would move the mean back (Hausknecht and Stone 2016, section 5.2,
+    "zeroing gradients").
+    """
+
+    @staticmethod
+    def forward(ctx: Any, mean: Tensor) -> Tensor:
+        ctx.save_for_backward(mean)
+        return mean.clone()
+
+    @staticmethod
+    def backward(ctx: Any, gradient: Tensor) -> Tensor:
+        (mean,) = ctx.saved_tensors
+        # Gradient descent increases the mean if the gradient is negative.
+        return gradient * torch.where(gradient < 0, mean < 1, mean > -1)
+
+
+class Gaussian(DiagGaussianDistribution):
+    """SB3's distribution of actions, whose initial spread is not computed.
+
+    Arithmetic on the "meta" device of `load_policy` would import torch's compiler, which takes a second.
+    """
+
+    def proba_distribution_net(self, latent_dim: int, log_std_init: float = 0.0) -> tuple[nn.Module, nn.Parameter]:
+        return nn.Linear(latent_dim, self.action_dim), nn.Parameter(torch.full((self.action_dim,), log_std_init))
