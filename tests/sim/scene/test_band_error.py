@@ -60,7 +60,9 @@ def test_a_renderer_says_what_its_bands_are_worth():
     grey = sim.build_world("detection")
     assert measured(grey.model, grey.spectra) == []
     few, many = (
-        sim.BatchedRenderer(world, sim.Eyes(1, (2, 2), receptors="honeybee", bands=bands, noise_sigma=NOISY), 1).fidelity.levels[0]
+        sim.BatchedRenderer(
+            world, sim.Eyes(1, (2, 2), receptors="honeybee", bands=bands, noise_sigma=NOISY), 1
+        ).fidelity.levels[0]
         for bands in (4, 16)
     )
     assert few.predicted_error == pytest.approx(band_error(PETALS, "honeybee", 4))
@@ -69,7 +71,8 @@ def test_a_renderer_says_what_its_bands_are_worth():
     dim = sim.Eyes(1, (2, 2), receptors="honeybee", optics=half, noise_sigma=NOISY)
     behind = sim.BatchedRenderer(world, dim, 1).fidelity.levels[0].predicted_error
     assert behind == pytest.approx(few.predicted_error / 4), "the pupil transmits a quarter of the light"
-    grey = sim.BatchedRenderer(sim.build_world("detection"), sim.Eyes(1, (2, 2), noise_sigma=NOISY), 1).fidelity.levels[0]
+    plain = sim.Eyes(1, (2, 2), noise_sigma=NOISY)
+    grey = sim.BatchedRenderer(sim.build_world("detection"), plain, 1).fidelity.levels[0]
     assert grey.predicted_error is None
 
 
