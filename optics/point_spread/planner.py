@@ -287,8 +287,8 @@ def _refusal(problem: Problem, found: list[Sampling], most_seconds: float, metho
     least = min(found, key=lambda option: option.seconds)
     purpose = "" if problem.knots is None else f" for derivatives by the samples of maps ({problem.knots.maps})"
     return (
-        f"tolerance = {problem.tolerance:g}{purpose} needs {_count(least)}, {size_of(_bytes(least, problem))} and about "
-        f"{_seconds(least, problem):.2g} s by {least.method}; the limits are {size_of(MOST_BYTES)} and "
+        f"tolerance = {problem.tolerance:g}{purpose} needs {_count(least)}, {size_of(_bytes(least, problem))} and "
+        f"about {_seconds(least, problem):.2g} s by {least.method}; the limits are {size_of(MOST_BYTES)} and "
         f"{most_seconds:g} s: widen the tolerance, shrink the window ({width:.3g} m) or the pupil (radius "
         f"{problem.radius:.3g} m, Fresnel number {problem.fresnel_number:.3g})"
     )
