@@ -22,7 +22,7 @@ __all__ = [
     "runs_of",
 ]
 
-TASKS = ("maze", "navigation", "detection")
+TASKS = ("maze", "detection")
 SIGMA = 0.01  # standard deviation of a receptor's noise
 FOV_DEG = 45.0
 # Settings of the learner, the same in all tasks. The cost of contact rises and the learning rate falls within the

@@ -15,7 +15,7 @@ from experiments.page import new_figure, save
 
 __all__ = ["COLORS", "draw"]
 
-COLORS = {"maze": "#D55E00", "navigation": "#E69F00", "detection": "#0072B2"}
+COLORS = {"maze": "#D55E00", "detection": "#0072B2"}
 APART = 0.22  # distance between the tasks' marks, in rows
 
 

@@ -90,7 +90,7 @@ _CONTENTS = {
     "reflectance": "spectra.spectrum",
     "require": "numerics.backend",
     "snyder_acceptance": "ommatidia.ommatidium",
-    "strehl_ratio": "point_spread.concentration",
+    "strehl_ratio": "point_spread.strehl",
     "through_focus": "point_spread.through_focus",
     "union": "apertures.combined",
     "vector_focus": "point_spread.vector_focus",

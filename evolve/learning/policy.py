@@ -102,9 +102,8 @@ class PolicyConfig:
         by all versions. Former versions had neither a list of other entries nor a choice of wiring, so their form is
         used for shapes that they could describe.
         """
-        values = {name: value for name, value in asdict(self).items() if name != "beside"}
-        if self.wiring == DIRECT:
-            del values["wiring"]
+        left_out = ("beside", "wiring") if self.wiring == DIRECT else ("beside",)
+        values = {name: value for name, value in asdict(self).items() if name not in left_out}
         if self.beside == (CONTACT,) and self.actions == 2:
             del values["actions"]
             return values

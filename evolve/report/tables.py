@@ -77,7 +77,7 @@ def _best_spread(best: Candidate) -> str:
     spread = _spread(best.returns, best.costs)
     if not best.costs:
         return spread
-    return f"task fitness {rounded(best.task_fitness, 4)} − costs {rounded(best.costs, 4)}; {spread}"
+    return f"task fitness {rounded(best.task_fitness, 4)}, costs {rounded(best.costs, 4)}; {spread}"
 
 
 def _spread(returns: Sequence[float], costs: float = 0.0) -> str:

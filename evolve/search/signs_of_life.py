@@ -64,7 +64,7 @@ class SignsOfLife:
 
     @property
     def silence_s(self) -> float:
-        """Time since the last sign of life of the scheduler, or of any worker if the scheduler answers [s]."""
+        """Time [s] since the last sign of life of the scheduler, or of any worker, whichever is longer ago."""
         return max(self._scheduler_s, self._workers_s)
 
     @property

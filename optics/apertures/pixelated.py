@@ -1,4 +1,7 @@
-"""Quadrature over an opening that is tiled by square pixels, for integrands that jump between pixels.
+"""Quadrature over an opening that is tiled by pixels, for integrands that jump or bend at the borders between pixels.
+
+The phase of a relief of pixels jumps at their borders. The derivative of a spline by one of its samples bends at the
+knots: it is a different polynomial in every cell between knots, and these cells are then the pixels.
 
 Pixels that lie wholly inside have Gauss-Legendre nodes. Pixels that the opening's edge cuts can be treated in two ways.
 `PixelatedAperture.nodes` divides them into panels at the points where the edge enters and leaves them (see `strips`).
@@ -32,10 +35,22 @@ MOST_NODES = 32
 
 @dataclass(frozen=True)
 class PixelatedAperture(Aperture):
-    """An opening tiled by count x count square pixels that fill [-1, 1]². The integrand may jump at their borders."""
+    """An opening tiled by count x count pixels that fill [-1, 1]². The integrand may jump or bend at their borders.
+
+    borders: ascending borders between pixels, from -1 to 1, the same along x and along y. None: all pixels are squares
+        of the same size.
+    fixed: number of nodes along a pixel. None: the number depends on the requested cycles and digits.
+    """
 
     opening: Aperture
     count: int
+    borders: tuple[float, ...] | None = None
+    fixed: int | None = None
+
+    @classmethod
+    def between(cls, opening: Aperture, borders: tuple[float, ...], fixed: int | None = None) -> PixelatedAperture:
+        """Return the opening with pixels between these borders."""
+        return cls(opening, len(borders) - 1, borders, fixed)
 
     @property
     def area(self) -> float:
@@ -58,37 +73,50 @@ class PixelatedAperture(Aperture):
 
     def nodes_across(self, cycles: float, digits: float) -> int | None:
         """Nodes along a pixel that make rows and columns as accurate as `nodes`; None if there would be too many."""
-        # Upper bound on the fraction of the area that lies in cut pixels.
-        share = min(1.0, len(self._cut) * self._pitch**2 / self.area)
-        turns = np.array(pi * cycles * self._pitch)
+        if self.fixed is not None:
+            return self.fixed
+        turns = np.array(pi * cycles * self.widest)
         across = max(
-            gauss_legendre_count(cycles * self._pitch, digits + 0.3),
-            int(harmonics(turns, max(digits + 0.3 + log10(share), 0.3))) if share else 1,
+            gauss_legendre_count(cycles * self.widest, digits + 0.3),
+            int(harmonics(turns, max(digits + 0.3 + log10(self.cut_share), 0.3))) if self.cut_share else 1,
         )
         return across if across <= MOST_NODES else None
+
+    @cached_property
+    def cut_share(self) -> float:
+        """Upper bound of the share of the area that lies in pixels that the edge cuts."""
+        return min(1.0, float(np.prod(self._widths[self._cut], axis=1).sum()) / self.area)
+
+    @property
+    def widest(self) -> float:
+        """Largest width of a pixel."""
+        return float(self._widths.max())
 
     def rows(self, across: int) -> np.ndarray:
         """Positions of the rows (and of the columns) of nodes in units of R, in ascending order, (count x across,)."""
         u, _ = gauss_legendre(across)
-        return (self._centres[:, None] + (u - 0.5) * self._pitch).ravel()
+        return (self._centres[:, None] + (u - 0.5) * self._widths[:, None]).ravel()
 
     def weights(self, across: int) -> np.ndarray:
         """Weights of the nodes [R²], (row, column)."""
         return _weights(self, across)
 
     @cached_property
-    def _pitch(self) -> float:
-        return 2 / self.count
+    def _widths(self) -> np.ndarray:
+        return np.full(self.count, 2 / self.count) if self.borders is None else np.diff(self.borders)
 
     @cached_property
     def _centres(self) -> np.ndarray:
-        centres: np.ndarray = (np.arange(self.count) + 0.5) * self._pitch - 1
+        if self.borders is not None:
+            return np.asarray(self.borders[:-1]) + self._widths / 2
+        centres: np.ndarray = (np.arange(self.count) + 0.5) * (2 / self.count) - 1
         return centres
 
     @cached_property
     def _near(self) -> np.ndarray:
         """Mask of the pixels that the edge may cut, (row, column)."""
-        return self.outline.near(self._centres[None, :], self._centres[:, None], self._pitch / 2)
+        half = np.maximum.outer(self._widths, self._widths) / 2
+        return self.outline.near(self._centres[None, :], self._centres[:, None], half)
 
     @cached_property
     def _whole(self) -> np.ndarray:
@@ -100,48 +128,61 @@ class PixelatedAperture(Aperture):
         """Index (row, column) of each pixel that may be cut."""
         return np.argwhere(self._near)
 
+    def node_count(self, cycles: float, digits: float) -> int | None:
+        return None if self.fixed is None else int(np.count_nonzero(self._whole | self._near)) * self.fixed**2
+
     def _nodes(self, cycles: float, digits: float) -> Nodes:
-        u, weight = gauss_legendre(gauss_legendre_count(cycles * self._pitch, digits + 0.3))
+        if self.fixed is not None:
+            return self._matrix_nodes(self.fixed)
+        u, weight = gauss_legendre(gauss_legendre_count(cycles * self.widest, digits + 0.3))
         row, column = np.nonzero(self._whole)
-        along, across = (self._centres[place][:, None, None] for place in (row, column))
-        offset = (u - 0.5) * self._pitch
+        (along, height), (across, width) = (
+            (self._centres[place][:, None, None], self._widths[place][:, None, None]) for place in (row, column)
+        )
         shape = len(row), len(u), len(u)
         parts = [
             (
-                np.broadcast_to(across + offset, shape).ravel(),
-                np.broadcast_to(along + offset[:, None], shape).ravel(),
-                np.broadcast_to(np.outer(weight, weight) * self._pitch**2, shape).ravel(),
+                np.broadcast_to(across + (u - 0.5) * width, shape).ravel(),
+                np.broadcast_to(along + (u - 0.5)[:, None] * height, shape).ravel(),
+                (np.outer(weight, weight) * (height * width)).ravel(),
             ),
             *(piece for at in self._cut for piece in self._pieces(at, cycles, digits)),
         ]
         x, y, size = (np.concatenate(column) for column in zip(*parts, strict=True))
         return Nodes(x, y, size)
 
+    def _matrix_nodes(self, across: int) -> Nodes:
+        """Return the rows and columns of nodes as single nodes, without the nodes of closed pixels."""
+        used = np.kron(self._whole | self._near, np.ones((across, across), dtype=bool))
+        x, y = np.meshgrid(at := self.rows(across), at)
+        return Nodes(x[used], y[used], self.weights(across)[used])
+
     def _pieces(
         self, at: np.ndarray, cycles: float, digits: float, degree: int = 0
     ) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
         """Yield x, y and weights of the nodes in each panel of a cut pixel's open part: see `strips`."""
-        bottom, left = self._centres[at] - self._pitch / 2
-        box = float(left), float(left + self._pitch), float(bottom), float(bottom + self._pitch)
+        bottom, left = self._centres[at] - self._widths[at] / 2
+        height, width = self._widths[at]
+        box = float(left), float(left + width), float(bottom), float(bottom + height)
         return strips(self.outline, box, cycles, digits, degree)
 
     def _softened(self, edge: SoftEdge) -> SoftAperture:
         raise TypeError("jumps between pixels have no band limit: a soft edge does not make a grid accurate")
 
 
-@lru_cache(maxsize=4)
+@lru_cache(maxsize=8)
 def _weights(aperture: PixelatedAperture, across: int) -> np.ndarray:
     u, weight = gauss_legendre(across)
-    pitch, count = aperture._pitch, aperture.count
+    widths, count = aperture._widths, aperture.count
     weights = np.zeros((count, across, count, across))
     rows, columns = np.nonzero(aperture._whole)
-    weights[rows, :, columns, :] = np.outer(weight, weight) * pitch**2
+    weights[rows, :, columns, :] = np.outer(weight, weight) * (widths[rows] * widths[columns])[:, None, None]
     for row, column in aperture._cut:
         # The integrals are exact for the Lagrange polynomials of the nodes, which have degree across - 1 in x and in y.
         total = np.zeros((across, across))
         for x, y, size in aperture._pieces(np.array([row, column]), 0.0, MOMENT_DIGITS, across - 1):
             in_x, in_y = (
-                lagrange_basis((at - aperture._centres[k]) / pitch + 0.5, u) for at, k in ((x, column), (y, row))
+                lagrange_basis((at - aperture._centres[k]) / widths[k] + 0.5, u) for at, k in ((x, column), (y, row))
             )
             total += in_y * size @ in_x.T
         weights[row, :, column, :] = total

@@ -15,5 +15,6 @@ exit_pupil        read_exit_pupil: lenses from other programs
 refractive_index  RefractiveIndex, Sellmeier, Cornu; media of eyes
 wavefront_slopes  directions of a wavefront's rays
 beam              light of one wavelength between source and sensor plane
+derivative_knots  cells in which derivatives by the samples of maps are polynomials
 ray_field         polarised light along rays
 """

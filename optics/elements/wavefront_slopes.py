@@ -18,6 +18,7 @@ from optics.numerics.read_only import ReadOnlyArrays, read_only
 __all__ = ["Slopes"]
 
 
+GROUPS = 400  # choice: number of groups of slopes in `spread`
 AROUND = 16  # choice: number of points around the window to which paths are evaluated
 # Differences of fourth order at the first two points of a row (Fornberg, Mathematics of Computation 51 (1988) 699,
 # table 3).
@@ -76,6 +77,28 @@ class Slopes(ReadOnlyArrays):
     def steepest_inside(self) -> float:
         """Largest slope over the disk."""
         return math.sqrt(self._squared[self.distance_from_axis <= self.radius].max())
+
+    def spread(self, margin: float, towards: tuple[Grid, float, float] | None = None) -> np.ndarray:
+        """Return slopes at points that are evenly spread over the disk.
+
+        The points extend beyond the rim by a margin [radii], but not beyond the square around the disk. Their slopes
+        are sorted into groups of equal size, each of which is represented by its largest slope.
+
+        towards: window, its distance [m] and the refractive index. The slopes are then upper bounds of those of the
+            paths to any point of the window, see `turning`. None: slopes of the wavefront alone.
+        """
+        within = np.abs(self.grid.x) <= self.radius
+        inside = (self.distance_from_axis <= (1 + margin) * self.radius) & within[:, None] & within
+        along_x, along_y, more = self.along_x[inside], self.along_y[inside], 0.0
+        if towards is not None:
+            window, distance, medium_n = towards
+            (cx, cy), reach = window.centre, window.own_half_diagonal
+            x, y = (part[inside] - c for part, c in zip(np.meshgrid(self.grid.x, self.grid.y), (cx, cy), strict=True))
+            scale = medium_n / np.sqrt(x * x + y * y + distance * distance)
+            along_x, along_y, more = along_x + x * scale, along_y + y * scale, medium_n * reach / distance
+        ordered = np.sort(np.hypot(along_x, along_y))[::-1]
+        found: np.ndarray = ordered[:: max(1, len(ordered) // GROUPS)] + more
+        return found
 
     def turning(self, distance: float, window: Grid, medium_n: float) -> tuple[float, float]:
         """Return the largest slope |∇L + n (ξ - x) / D| of paths through points ξ of the pupil to points x of a window.

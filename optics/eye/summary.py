@@ -11,9 +11,9 @@ import numpy as np
 from optics.eye.eye_spec import EyeSpec
 from optics.numerics.accuracy import AccuracyError, Plan
 from optics.numerics.autodiff import Array, Scalar, number, plain
-from optics.point_spread.concentration import strehl_ratio
 from optics.point_spread.contrast import image_quality, mtf
 from optics.point_spread.psf_result import PSFResult
+from optics.point_spread.strehl import strehl_ratio
 from optics.spectra.spectrum import daylight
 
 __all__ = ["Description", "describe", "noise_of"]

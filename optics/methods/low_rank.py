@@ -84,7 +84,7 @@ def low_rank(problem: Problem) -> list[LowRankSampling]:
     if problem.radius > STEEPEST * problem.distance:
         return []
     half = max(problem.window.own_half_width, problem.window.dx)
-    if problem.pixelated is None:
+    if not problem.divided:
         sines = sine_samples(problem)
         found = None if sines is None else _sampling(problem, sines, half, 1.0)
         if found is not None:

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from optics.elements.beam import Beam
 from optics.methods.angular_spectrum import arrived, split_period, whole_period
 from optics.methods.problem import Problem
-from optics.methods.pupil_sampling import PixelSamples, pixel_samples
+from optics.methods.pupil_sampling import PixelSamples, cell_samples, pixel_samples
 from optics.methods.rayleigh_sommerfeld import node_rule
 from optics.methods.spectral_taper import Taper, tapers
 from optics.methods.spectrum_sampling import SpectrumSampling
@@ -89,6 +89,8 @@ def _samplings(problem: Problem, method: str) -> list[PixelSpectrum]:
 
 def _nodes(problem: Problem, taper: Taper) -> PixelSamples | None:
     """Return nodes within pixels that resolve the phase and every frequency below the end of the taper."""
+    if problem.knots is not None:
+        return cell_samples(problem, taper.end)
     assert problem.pixelated is not None
     cycles = problem.radius * (problem.phase_band_inside + taper.end)
     return pixel_samples(problem.pixelated, cycles, node_rule(problem)[1], problem.radius)

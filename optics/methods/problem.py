@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
+from itertools import pairwise
+
+import numpy as np
 
 from optics.apertures.aperture import EDGE_REACH, Aperture, SoftAperture
 from optics.apertures.pixelated import PixelatedAperture
 from optics.elements.beam import Beam
+from optics.elements.derivative_knots import DerivativeKnots, carries_derivatives, derivative_knots
 from optics.elements.source import PointSource
 from optics.elements.wavefront_slopes import Slopes
+from optics.methods.derivative_cells import derivative_cells
 from optics.methods.rays import Rays
 from optics.methods.scalar_theory import ROUND, light_spread, scalar_theory_error, steepest_sine
 from optics.numerics.arguments import in_range, positive
@@ -27,6 +32,10 @@ SLOPE_MARGIN = 1.02
 # relative error of the amplitude of edge-diffracted light is several ripples, and the relative error of its intensity
 # is twice as large: half the tolerance in a window that contains no other light.
 EDGE_RIPPLE_PER_TOLERANCE = 0.1
+DETAIL_PART = 0.1  # choice: phase [rad] of neglected detail, relative to the tolerance
+# Choice: factor by which detail is finer if derivatives by single numbers are requested. Such a derivative can be a
+# small difference, as that by the focal length of a lens in focus, to which the detail contributes most.
+FINER_DETAIL = 10.0
 BRIGHT_EDGE_RIPPLE_PER_TOLERANCE = 0.3
 
 
@@ -52,6 +61,9 @@ class Problem:
     masked: True if a mask scatters light to places that rays do not predict, so that approximations cannot predict
         their error.
     spread: spread of the light over the pupil, see `light_spread`.
+    differentiated: whether the PSF carries derivatives.
+    knots: cells that derivatives by the samples of maps require; None if no such derivatives are requested.
+    other_detail: `detail` without that of these maps.
     """
 
     aperture: Aperture
@@ -72,10 +84,17 @@ class Problem:
     medium_n: float = 1.0
     spread: float = ROUND
     even: bool = False
+    differentiated: bool = False
+    knots: DerivativeKnots | None = None
+    other_detail: float = 0.0
 
     @classmethod
-    def from_beam(cls, beam: Beam, window: Grid, tolerance: float, dtype: str = "float32") -> Problem:
+    def from_beam(
+        cls, beam: Beam, window: Grid, tolerance: float, dtype: str = "float32", derivatives: bool = True
+    ) -> Problem:
         """Return the problem for a beam that passes a pupil and arrives at a window.
+
+        derivatives: whether the samples must also be suitable for the derivatives that the beam carries.
 
         Raises:
             ValueError: the distance is not positive, the tolerance is not in [1e-12, 0.5], or the dtype is invalid.
@@ -84,7 +103,10 @@ class Problem:
         tolerance = in_range("tolerance", tolerance, 1e-12, 0.5)
         precision(dtype)
         source = PointSource(number(beam.source.distance), beam.source.angle)
-        return _problem(Beam(beam.pupil, source, beam.wavelength, distance), window, tolerance, dtype)
+        plain = Beam(beam.pupil, source, beam.wavelength, distance)
+        if not (derivatives and carries_derivatives(beam)):
+            return _problem(plain, window, tolerance, dtype)
+        return _differentiated(plain, window, tolerance, dtype, derivative_knots(beam.pupil, beam.wavelength))
 
     @cached_property
     def turning(self) -> float:
@@ -96,7 +118,7 @@ class Problem:
 
     @cached_property
     def turning_inside(self) -> float:
-        """Highest frequency [1/m] of this combined phase over the disk without its soft edge."""
+        """The same as `turning`, over the disk without its soft edge."""
         return self._turning[1]
 
     @cached_property
@@ -111,6 +133,41 @@ class Problem:
         if self.pixelated is not None:
             return None
         return Rays.from_slopes(self.slopes, self.aperture, self.distance, self.medium_n)
+
+    def cells(self, band: float | None = None) -> PixelatedAperture | None:
+        """Return the aperture with nodes in the cells between knots that are suitable for derivatives.
+
+        The result is None if there would be too many cells.
+
+        band: highest frequency [1/m] in the pupil's plane of the light that must be resolved. None: the light that
+            arrives at any point of the window, as in `turning`.
+        """
+        assert self.knots is not None
+        slopes = self._turning_slopes if band is None else self._slopes
+        cycles = self.radius * (slopes / (self.wavelength * self.medium_n) + self.other_detail + (band or 0.0))
+        opening = self.aperture.opening if isinstance(self.aperture, PixelatedAperture) else self.aperture
+        return derivative_cells(opening, self.knots, cycles, self.tolerance)
+
+    @cached_property
+    def _slopes(self) -> np.ndarray:
+        """Slopes of the wavefront at the nodes of cells, see `Slopes.spread`."""
+        return self.slopes.spread(self._beyond_rim)
+
+    @cached_property
+    def _turning_slopes(self) -> np.ndarray:
+        """The same for the combined phase of pupil and path."""
+        return self.slopes.spread(self._beyond_rim, (self.window, self.distance, self.medium_n))
+
+    @property
+    def _beyond_rim(self) -> float:
+        """Distance [R] beyond the rim up to which nodes lie: the diagonal of the largest cell that the rim cuts."""
+        assert self.knots is not None
+        return math.sqrt(2) * max(after - before for before, after in pairwise(self.knots.borders))
+
+    @property
+    def divided(self) -> bool:
+        """True if the aperture must be divided, into the pixels of a relief or into the cells between knots."""
+        return self.pixelated is not None or self.knots is not None
 
     @property
     def pixelated(self) -> PixelatedAperture | None:
@@ -189,13 +246,22 @@ class PupilEdge:
 
 
 @lru_cache(maxsize=256)
-def _problem(beam: Beam, window: Grid, tolerance: float, dtype: str) -> Problem:
+def _differentiated(beam: Beam, window: Grid, tolerance: float, dtype: str, knots: DerivativeKnots | None) -> Problem:
+    part = DETAIL_PART / (1 if knots else FINER_DETAIL)
+    found = replace(_problem(beam, window, tolerance, dtype, part), differentiated=True, knots=knots)
+    if knots is None:
+        return found
+    others = knots.without_maps(beam.pupil)
+    return replace(found, other_detail=others.bandwidth(beam.wavelength, DETAIL_PART * tolerance))
+
+
+@lru_cache(maxsize=256)
+def _problem(beam: Beam, window: Grid, tolerance: float, dtype: str, part: float = DETAIL_PART) -> Problem:
     pupil, wavelength, distance = beam.pupil, beam.wavelength, beam.distance
     slopes = pupil.slopes(wavelength, beam.source)
     pixels = pupil.pixels if pupil.bends(wavelength) else 0
     on_axis = beam.source.angle == (0.0, 0.0)
-    # Choice: a tenth of the tolerance, as an error of the phase [rad].
-    detail = pupil.bandwidth(wavelength, tolerance / 10)
+    detail = pupil.bandwidth(wavelength, part * tolerance)
     return Problem(
         aperture=PixelatedAperture(pupil.aperture, pixels) if pixels else pupil.aperture,
         radius=pupil.radius,

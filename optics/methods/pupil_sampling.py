@@ -21,7 +21,7 @@ from optics.numerics.field import Field
 from optics.numerics.grid import Grid
 from optics.numerics.precision import Precision, opaque, padded_for_packets
 
-__all__ = ["GridSamples", "PixelSamples", "PupilSamples", "pixel_samples", "samples_of"]
+__all__ = ["GridSamples", "PixelSamples", "PupilSamples", "cell_samples", "pixel_samples", "samples_of"]
 
 MOST_ACROSS = 1e6  # choice, limited by memory: largest number of samples across the pupil
 
@@ -102,7 +102,7 @@ class PixelSamples:
         Pixels that the edge cuts also have nodes outside the aperture, but the weights integrate over the open part
         alone. The edge itself lies within the radius.
         """
-        return self.radius * (1 + math.sqrt(2) * 2 / self.aperture.count)
+        return self.radius * (1 + math.sqrt(2) * self.aperture.widest)
 
     @property
     def seconds(self) -> float:
@@ -137,11 +137,22 @@ def pixel_samples(aperture: PixelatedAperture, cycles: float, digits: float, rad
     return None if across is None else PixelSamples(aperture, across, radius)
 
 
+def cell_samples(problem: Problem, band: float | None = None) -> PixelSamples | None:
+    """Return the nodes that derivatives by the samples of maps require; None if there would be too many cells.
+
+    band: see `Problem.cells`.
+    """
+    cells = problem.cells(band)
+    return None if cells is None or cells.fixed is None else PixelSamples(cells, cells.fixed, problem.radius)
+
+
 def samples_of(problem: Problem) -> PupilSamples | None:
     """Return the fewest samples that resolve the combined phase of pupil and path.
 
     The result is None if pixels are too coarse for this phase, or if a grid would be too large.
     """
+    if problem.knots is not None:
+        return cell_samples(problem)
     if problem.pixelated is not None:
         return pixel_samples(problem.pixelated, *node_rule(problem), problem.radius)
     edge = problem.soft_edge(problem.turning)

@@ -102,8 +102,13 @@ class NodeSampling:
 
 def nodes(problem: Problem) -> list[NodeSampling]:
     """Return a sampling whose nodes resolve the combined phase of pupil and path."""
-    cycles, digits = node_rule(problem)
-    count = node_count(problem.aperture, cycles, digits)
+    (cycles, digits), aperture = node_rule(problem), problem.aperture
+    if problem.knots is not None:
+        cells = problem.cells()
+        if cells is None:
+            return []
+        aperture, cycles = cells, 0.0  # the cells have a fixed number of nodes
+    count = node_count(aperture, cycles, digits)
     line, outputs = None, math.prod(problem.window.shape)
     if problem.symmetric:
         outermost = max(min(problem.window.half_diagonal, problem.outermost), problem.window.dx)
@@ -114,7 +119,7 @@ def nodes(problem: Problem) -> list[NodeSampling]:
     pairs = count * max(outputs, LANES)
     seconds = CALL["rayleigh_sommerfeld"] + pairs / PAIRS_PER_SECOND[problem.dtype] + count * NODE
     needed = count * NODE_BYTES + (line.entries * ITEM_BYTES[problem.dtype] if line else 0.0)
-    return [NodeSampling(problem.aperture, cycles, digits, count, line, seconds, needed)]
+    return [NodeSampling(aperture, cycles, digits, count, line, seconds, needed)]
 
 
 def node_rule(problem: Problem) -> tuple[float, float]:

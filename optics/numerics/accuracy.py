@@ -12,6 +12,7 @@ __all__ = [
     "AccuracyError",
     "Option",
     "Plan",
+    "above",
     "size_of",
 ]
 
@@ -68,6 +69,8 @@ class Plan:
         for windows that contain the brightest point of the light, but not for windows that are dark everywhere.
     seconds: predicted time of a call with compiled kernels on two cores; 0 without a prediction.
     options: all methods that were compared.
+    derivative_error: upper bound of the relative L2 error of derivatives, for a random functional of the PSF. None: the
+        PSF carries no derivatives, or an approximation predicts no error of them.
     """
 
     method: str
@@ -79,6 +82,7 @@ class Plan:
     options: tuple[Option, ...] = ()
     padding: float = 1.0
     scalar_error: float = 0.0
+    derivative_error: float | None = None
 
     def __str__(self) -> str:
         rows = {
@@ -87,6 +91,7 @@ class Plan:
             "padding": f"{self.padding:.2f}",
             "dtype": self.dtype,
             "predicted error": f"{self.predicted_error:.1e}",
+            **({} if self.derivative_error is None else {"derivatives": f"error up to {self.derivative_error:.1e}"}),
             **({"scalar theory": f"error up to {self.scalar_error:.2g}"} if self.scalar_error >= STEEP else {}),
             **({"predicted time": f"{self.seconds:.2g} s"} if self.seconds else {}),
             "why": self.why,
@@ -100,6 +105,12 @@ class Plan:
             for option in self.options
         ]
         return "\n".join([*head, "compared", *others])
+
+
+def above(error: float, tolerance: float) -> str:
+    """Return an error that exceeds a tolerance, with as many digits as show this: "0.002", but "0.0011" above 0.001."""
+    shown = (f"{error:.{digits}g}" for digits in range(1, 17))
+    return next((text for text in shown if float(text) > tolerance), f"{error!r}")
 
 
 def size_of(count: float) -> str:

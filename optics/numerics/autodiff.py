@@ -9,7 +9,16 @@ import numpy as np
 from optics.numerics.backend import BackendError
 from optics.numerics.device import VARIABLE, device
 
-__all__ = ["Array", "Scalar", "grad_enabled", "is_differentiable", "number", "plain", "to_user"]
+__all__ = [
+    "Array",
+    "Scalar",
+    "carries_derivative",
+    "grad_enabled",
+    "is_differentiable",
+    "number",
+    "plain",
+    "to_user",
+]
 
 # Dr.Jit creates its types when a backend is first loaded, so type checkers cannot see them. These names are aliases of
 # `Any` that document the intended type.
@@ -27,6 +36,11 @@ def grad_enabled(value: Array) -> bool:
     import drjit as dr
 
     return bool(dr.grad_enabled(value))
+
+
+def carries_derivative(value: Any) -> bool:
+    """Return whether `value` is a Dr.Jit array or tensor whose gradient is enabled; numbers are not."""
+    return is_differentiable(value) and grad_enabled(value)
 
 
 def number(value: Any) -> float:

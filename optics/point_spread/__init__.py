@@ -21,5 +21,7 @@ mixture        sums over wavelengths
 white          white_psf: light of a lamp, weighted by receptors
 through_focus  through_focus: PSFs at several distances of the sensor
 circle_sums    sums over samples within circles, for any number of radii
-concentration  strehl_ratio, encircled_energy
+concentration  encircled_energy
+strehl         strehl_ratio
+window_loss    errors of contrasts at each frequency, due to light outside the window
 """

@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 
 from optics.apertures.circular import Circle
+from optics.methods.problem import Problem
 from optics.numerics.arguments import reals, shown
 from optics.numerics.autodiff import Array, number, plain
-from optics.numerics.precision import opaque, precision
+from optics.numerics.precision import opaque, padded_for_packets, precision
 from optics.point_spread.psf_result import PSFResult
 from optics.point_spread.request import Request
 
@@ -19,7 +20,9 @@ __all__ = ["arriving_light"]
 # Choice: the light in the window may exceed the light that arrives by this amount, because sums have errors.
 HELD_TOO_MUCH = 1e-2
 DIGITS = 5.0  # choice: digits of the sum over the spectrum
-MOST_PAIRS = 1e7  # choice: largest number of pairs of nodes and frequencies in this sum; they take about half a second
+MOST_PAIRS = 2e8  # choice: largest number of pairs of nodes and frequencies in this sum; they take about a second
+WORTH_MOST = 1e-3  # choice: uncertainty of the fraction from which the sum may have MOST_PAIRS
+STEEPEST = 0.96  # choice: squared sine at which the evanescent light of an edge is limited to that of this sine
 SURE = 1e-4  # choice: the sum, which has about this error, is computed only if the estimate is less certain
 
 
@@ -46,9 +49,9 @@ def _not_evanescent(result: PSFResult) -> tuple[Array, np.ndarray]:
     """Return the fraction of light that is not evanescent, and its uncertainty.
 
     The squared spectrum of a straight edge, integrated over frequencies above f, is 1/(2π²f) per length of the edge.
-    For an aperture of perimeter P and area A, the fraction λP/(2π²A) is therefore evanescent. This fraction is
-    multiplied by the mask's transmission along the edge, relative to that of the whole aperture. Light that the relief
-    bends beyond grazing is evanescent, too.
+    For an aperture of perimeter P and area A, the fraction λP/(2π²A) is therefore evanescent, see `_at_edge`. This
+    fraction is multiplied by the mask's transmission along the edge, relative to that of the whole aperture. Light that
+    the relief bends beyond grazing is evanescent, too.
 
     If this estimate is too uncertain, and the pupil is at most some wavelengths wide, the spectrum of the light behind
     the pupil is summed instead. Derivatives are always those of the estimate.
@@ -62,14 +65,18 @@ def _not_evanescent(result: PSFResult) -> tuple[Array, np.ndarray]:
     if pupil.mask is not None:
         x, y = (types.Float64(np.ascontiguousarray(at)) for at in outline.points().T)
         rim = dr.mean(dr.square(pupil.amplitude(x, y, types))) / light
-    edge = dr.minimum(wavelength * ratio / opaque(types, pupil.aperture_radius) * rim, 0.5)
-    bent = np.zeros(len(result.wavelengths))
+    edge = wavelength * ratio / opaque(types, pupil.aperture_radius) * rim
+    tilted, bent = np.ones(len(result.wavelengths)), np.zeros((2, len(result.wavelengths)))
     if result.can_recompute:
-        bent = _mean(result, [_bent_beyond_grazing(request) for request in result.requests])
-    found, unsure = (1 - edge) * types.Float(1 - bent) * light, number(light) * (np.square(edge.numpy()) + bent)
+        tilted = _mean(result, [_at_edge(request) for request in result.requests])
+        bent = _mean(result, [_bent_beyond_grazing(request) for request in result.requests]).T
+    doubt = np.minimum(edge.numpy() * (tilted - 1), 0.5)
+    edge = dr.minimum(edge * types.Float(tilted), 0.5)
+    found = (1 - edge) * types.Float(1 - bent[0]) * light
+    unsure = number(light) * (np.square(edge.numpy()) + doubt + bent[1])
     if not result.can_recompute or float(unsure.max()) <= SURE:
         return found, unsure
-    sums = [_summed(request) for request in result.requests]
+    sums = [_summed(request, float(unsure.max())) for request in result.requests]
     if any(one is None for one in sums):
         return found, unsure
     exact = _mean(result, sums)
@@ -82,20 +89,53 @@ def _mean(result: PSFResult, values: list[Any]) -> np.ndarray:
     return found if result.shares is None else np.atleast_1d(result.shares @ found)
 
 
-def _bent_beyond_grazing(request: Request) -> float:
-    """Return the fraction of the pupil's light that the relief bends beyond grazing."""
-    pupil = request.beam.pupil
-    x, _ = pupil.slopes(request.beam.wavelength, request.beam.source).rays(1.0, request.beam.index)
-    return float(np.mean(~np.isfinite(x)))
+def _at_edge(request: Request) -> float:
+    """Return the factor on the evanescent light of an edge that is due to the directions of rays at the edge.
+
+    In units of 1/λ, the light at a point of the edge is spread along the line s + t n, where s is the frequency of the
+    ray, and n the normal of the edge. Its power is proportional to 1/t². The line leaves the unit circle at t = -s·n ±
+    √((s·n)² + 1 - s²), beyond which lies √((s·n)² + 1 - s²) / (1 - s²) times the power for s = 0.
+    """
+    beam, outline = request.beam, request.problem.aperture.outline
+    places, types = outline.points(), precision("float64")
+    step, radius = 1e-4, request.problem.radius
+
+    def waves(dx: float, dy: float) -> np.ndarray:
+        x, y = (types.Float64(padded_for_packets(at * radius)) for at in (places + np.array([dx, dy])).T)
+        return plain(beam.waves(x, y, types))
+
+    per_wave = request.problem.wavelength / (2 * step * radius)
+    sx, sy = ((waves(dx, dy) - waves(-dx, -dy)) * per_wave for dx, dy in ((step, 0.0), (0.0, step)))
+    along = np.roll(places, -1, axis=0) - np.roll(places, 1, axis=0)
+    length = np.maximum(np.hypot(*along.T), 1e-300)
+    square = np.minimum(sx * sx + sy * sy, STEEPEST)
+    normal = np.minimum(np.square((sx * along[:, 1] - sy * along[:, 0]) / length), square)
+    return float(np.mean(np.sqrt(normal + 1 - square) / (1 - square)))
 
 
-def _summed(request: Request) -> float | None:
+def _bent_beyond_grazing(request: Request) -> tuple[float, float]:
+    """Return the fraction of the pupil's light that the relief bends beyond grazing, and its uncertainty.
+
+    Diffraction spreads the light of a ray over sines of about √(λ/R).
+    """
+    pupil, problem = request.beam.pupil, request.problem
+    slopes = pupil.slopes(request.beam.wavelength, request.beam.source)
+    inside = slopes.distance_from_axis <= slopes.radius
+    sine = np.hypot(slopes.along_x, slopes.along_y)[inside] / request.beam.index
+    steep = sine > 1 - math.sqrt(problem.wavelength / problem.radius)
+    return float(np.mean(sine >= 1)), float(np.mean(steep))
+
+
+def _summed(request: Request, unsure: float = 1.0) -> float | None:
     """Return the fraction of the pupil's light at frequencies below 1/λ; None if the sum is too long.
+
+    unsure: uncertainty of the estimate. The sum may take longer if it is large.
 
     It is ∫ |F(u)|² df / A over |f| < 1/λ, with the field u behind the pupil and the area A of its aperture. Lengths are
     in units of the radius. |F(u)|² has no structure finer than one cycle per diameter.
     """
-    beam, problem = request.beam, request.problem
+    beam, asked = request.beam, request.problem
+    problem = Problem.from_beam(beam, asked.window, asked.tolerance, asked.dtype, derivatives=False)
     highest = problem.radius / problem.wavelength
     phase = highest + problem.radius * problem.phase_band
     if problem.pixelated is not None or max(phase, highest) > 100:
@@ -103,17 +143,40 @@ def _summed(request: Request) -> float | None:
     aperture = problem.aperture
     counted = aperture.node_count(phase, DIGITS)
     seen = Circle().nodes(2 * highest, DIGITS)
-    if (counted or 0) * len(seen.weight) > MOST_PAIRS:
+    most = MOST_PAIRS * min(1.0, unsure / WORTH_MOST)
+    if (counted or 0) * len(seen.weight) > most:
         return None
     nodes = aperture.nodes(phase, DIGITS)
-    if len(nodes.weight) * len(seen.weight) > MOST_PAIRS:
+    if len(nodes.weight) * len(seen.weight) > most:
         return None
     types = precision("float64")
-    x, y = (types.Float64(np.ascontiguousarray(at)) for at in (nodes.x, nodes.y))
-    waves = beam.waves(x * problem.radius, y * problem.radius, types)
-    u = nodes.weight * np.exp(2j * np.pi * plain(waves))
+    x, y = (types.Float64(padded_for_packets(at)) for at in (nodes.x, nodes.y))
+    waves, u = (
+        beam.waves(x * problem.radius, y * problem.radius, types),
+        types.Float64(padded_for_packets(nodes.weight)),
+    )
     if beam.pupil.mask is not None:
-        u = u * plain(beam.pupil.amplitude(x, y, types))
-    turns = highest * (np.multiply.outer(seen.x, nodes.x) + np.multiply.outer(seen.y, nodes.y))
-    spectrum = np.square(np.abs(np.exp(-2j * np.pi * turns) @ u))
+        u = u * beam.pupil.amplitude(x, y, types)
+    spectrum = _spectrum(x, y, waves, u, *(highest * at for at in (seen.x, seen.y)))
     return float((spectrum @ seen.weight) * highest**2 / aperture.area)
+
+
+def _spectrum(x: Array, y: Array, waves: Array, u: Array, fx: np.ndarray, fy: np.ndarray) -> np.ndarray:
+    """Return |Σ u exp(2πi (waves - fx x - fy y))|² at every frequency (fx, fy)."""
+    import drjit as dr
+
+    types, count = precision("float64"), dr.width(u)
+    to_x, to_y = (types.Float64(padded_for_packets(at)) for at in (fx, fy))
+    with dr.suspend_grad():
+        dr.eval(x, y, waves, u, to_x, to_y)
+
+        def add(j: Array, re: Array, im: Array) -> tuple[Array, Array, Array]:
+            at_x, at_y, along, size = (dr.gather(types.Float64, part, j) for part in (x, y, waves, u))
+            turns = along - at_x * to_x - at_y * to_y
+            sin, cos = dr.sincos(types.Float64(2 * math.pi) * (turns - dr.round(turns)))
+            return j + 1, re + size * cos, im + size * sin
+
+        start, zero = dr.zeros(types.Index, len(fx)), dr.zeros(types.Float64, len(fx))
+        last = dr.opaque(types.Index, count)
+        _, re, im = dr.while_loop((start, zero, zero), lambda j, re, im: j < last, add, max_iterations=-1)
+        return np.asarray((re * re + im * im).numpy())

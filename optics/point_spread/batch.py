@@ -22,7 +22,7 @@ from optics.numerics.arguments import (
     whole,
     without_derivative,
 )
-from optics.numerics.autodiff import Array, Scalar, number
+from optics.numerics.autodiff import Array, Scalar
 from optics.numerics.grid import Grid, OnWindow
 from optics.numerics.precision import Precision, padded_for_packets, precision
 from optics.numerics.read_only import read_only
@@ -30,7 +30,7 @@ from optics.point_spread.pictures import pictures
 from optics.point_spread.population import population_pictures
 from optics.point_spread.population_members import Member
 from optics.point_spread.psf_result import PSFResult
-from optics.point_spread.request import Request, Setup
+from optics.point_spread.request import Request, Setup, sensor_place
 from optics.point_spread.window_cost import check_window
 
 __all__ = ["PSFBatch", "psf_batch"]
@@ -163,12 +163,12 @@ def _members(
     if sensor_distance is not None:
         positive("sensor_distance", sensor_distance, carried=True)
     lambdas = [vacuum_wavelength(wavelength) for wavelength in wavelengths]
-    first = number(PointSource(next(iter(source_distances))).distance)
+    first = PointSource(next(iter(source_distances))).distance
     for depth in source_distances:
         positive("source_distance", depth, infinite=True, carried=True)
     for pupil in pupils:
         of_kind("pupil", pupil, Pupil, "Pupil(25e-6)")
-        at = pupil.image_distance(first) if sensor_distance is None else sensor_distance
+        at = sensor_place(pupil, sensor_distance, first)
         yield from (Member(pupil, wavelength, at, depth) for depth in source_distances for wavelength in lambdas)
 
 

@@ -20,6 +20,7 @@ from optics.point_spread.arriving import arriving_light
 from optics.point_spread.mixture import Mixture, a_mixture, flat, mixed
 from optics.point_spread.modulation_transfer import MTF
 from optics.point_spread.psf_result import PSFResult
+from optics.point_spread.window_loss import ErrorCauses
 
 __all__ = ["combined_mtf", "image_quality", "mtf"]
 
@@ -52,7 +53,8 @@ def mtf(result: PSFResult | Mixture, arriving: Any = None, tolerance: float = 0.
     known = light.numpy()
     seen = _wide(result.with_pitch(0.5 / result.highest_cutoff, "the MTF"), known, tolerance)
     lost = np.maximum(known - plain(seen.window_sums), 0)
-    error = (lost + unsure + seen.sum_error) / known
+    causes = ErrorCauses((lost + unsure) / known, unsure / known, seen.sum_error / known)
+    error = causes.total
     if float(error.max()) > tolerance and tolerance < 1:
         raise AccuracyError(
             f"tolerance = {tolerance:g}: contrasts have errors of up to {float(error.max()):.2g} (PSF "
@@ -60,7 +62,7 @@ def mtf(result: PSFResult | Mixture, arriving: Any = None, tolerance: float = 0.
             f"arrive {float(unsure.max()):.2g}): set arriving= if it is known, widen the tolerance, or compute a more "
             "accurate PSF"
         )
-    return _transformed(seen, light, error)
+    return _transformed(seen, light, causes)
 
 
 def combined_mtf(result: PSFResult, weights: np.ndarray, tolerance: float) -> MTF:
@@ -72,14 +74,15 @@ def combined_mtf(result: PSFResult, weights: np.ndarray, tolerance: float) -> MT
     light, unsure = arriving_light(result, None)
     known = light.numpy()
     seen = _wide(result.with_pitch(0.5 / float(result.cutoff.max()), "the MTF"), known, tolerance)
-    missing = np.maximum(known - plain(seen.window_sums), 0) + unsure + seen.sum_error
-    error = np.abs(weights) @ missing / (weights @ known)
+    lost, size = np.maximum(known - plain(seen.window_sums), 0) + unsure, np.abs(weights)
+    causes = ErrorCauses(*(size @ part / (weights @ known) for part in (lost, unsure, seen.sum_error)))
+    error = causes.total
     if float(error.max()) > tolerance and tolerance < 1:
         raise AccuracyError(f"tolerance = {tolerance:g}: contrasts have errors of up to {float(error.max()):.2g}")
     shortest = np.array([result.wavelengths[row != 0].min() for row in weights])
     sums = replace(seen, tensor=mixed(seen.tensor, weights), wavelengths=shortest, requests=())
     arriving = mixed(precision("float64").Tensor(light, (len(known), 1)), weights)
-    return _transformed(sums, flat(arriving), error)
+    return _transformed(sums, flat(arriving), causes)
 
 
 def _wide(result: PSFResult, known: np.ndarray, tolerance: float) -> PSFResult:
@@ -101,7 +104,7 @@ def _wide(result: PSFResult, known: np.ndarray, tolerance: float) -> PSFResult:
     return seen
 
 
-def _transformed(seen: PSFResult, light: Array, error: np.ndarray) -> MTF:
+def _transformed(seen: PSFResult, light: Array, causes: ErrorCauses) -> MTF:
     """Return the MTF of a PSF that already has a sufficient window.
 
     light: all light that arrives, (wavelength,), with derivatives.
@@ -114,7 +117,7 @@ def _transformed(seen: PSFResult, light: Array, error: np.ndarray) -> MTF:
     held = dr.block_reduce(dr.ReduceOp.Add, values, height * width) * seen.dx**2
     whole = dr.repeat(dr.maximum(arrives, held), height * width)
     shares = types.Tensor(values * seen.dx**2 / whole, (waves, height, width))
-    return MTF.from_shares(shares, seen.window, seen.cutoff, error)
+    return MTF.from_shares(shares, seen.window, seen.cutoff, causes)
 
 
 def image_quality(
@@ -154,14 +157,15 @@ def image_quality(
     types = precision("float64")
     f = np.linspace(0, nyquist, 257)
     light = opaque(types, throughput)
-    contrast = types.Float(flat(transfer.profile(f)))
+    profile, errors = transfer.profile(f, with_error=True) if with_error else (transfer.profile(f), None)
+    contrast = types.Float(flat(profile))
     above = light * dr.maximum(contrast - noise_sigma / light, 0)
     value = to_user(types.Tensor(_mean_over(above, f.size, 1), (waves,)))
-    if not with_error:
+    if errors is None:
         return value
     # The error of a sum with twice the step would be four times as large, or twice as large at a corner of the MTF.
     unsure = np.abs(plain(value) - plain(_mean_over(above, f.size, 2)))
-    return value, number(throughput) * transfer.predicted_error + unsure
+    return value, number(throughput) * errors.mean(axis=1) + unsure
 
 
 def _mean_over(values: Array, n: int, step: int) -> Array:

@@ -15,7 +15,7 @@ from optics.methods.method_sampling import WithField
 from optics.methods.problem import Problem
 from optics.methods.smythe import ALONG_X, smythe
 from optics.methods.vector_sum import VectorSum
-from optics.numerics.accuracy import AccuracyError, Plan
+from optics.numerics.accuracy import AccuracyError, Plan, above
 from optics.numerics.autodiff import number
 from optics.numerics.field import Field
 from optics.numerics.grid import Grid
@@ -134,7 +134,9 @@ class Converging(ReadOnlyArrays):
         checked = self._errors(made.problem, {ALONG_X: found[0]})
         error = max(made.plan.predicted_error, checked or 0.0)
         if error > self.tolerance:
-            raise AccuracyError(f"tolerance = {self.tolerance:g}: a check finds an error of {error:.1g} in Ex")
+            raise AccuracyError(
+                f"tolerance = {self.tolerance:g}: a check finds an error of {above(error, self.tolerance)} in Ex"
+            )
         why, seconds = f"Smythe's integral; {made.plan.why}", FIELDS * made.plan.seconds
         return found, replace(made.plan, predicted_error=error, why=why, seconds=seconds, scalar_error=0.0)
 

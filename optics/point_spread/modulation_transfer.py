@@ -8,11 +8,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
 from optics.numerics.accuracy import AccuracyError
-from optics.numerics.arguments import reals, shown, whole
+from optics.numerics.arguments import flag, reals, shown, whole
 from optics.numerics.autodiff import Array, plain, to_user
 from optics.numerics.field import Field
 from optics.numerics.fourier import dft2
@@ -21,6 +22,7 @@ from optics.numerics.precision import precision
 from optics.numerics.read_only import ReadOnlyArrays, read_only
 from optics.numerics.scattered_sum import ScatteredSum, sums_at
 from optics.point_spread.mixture import flat
+from optics.point_spread.window_loss import ErrorCauses, spectrum_of_loss
 
 __all__ = ["MTF"]
 
@@ -43,9 +45,11 @@ class MTF(ReadOnlyArrays):
         array.
     fx, fy: frequencies of the grid [cycles per metre on the sensor]. Their pitch is 1 / (longest side of the window).
     cutoff: highest frequency [1/m] that a pupil of this size transmits, 2 sin θ / λ, (wavelength,).
-    predicted_error: predicted error of any contrast, at the grid's frequencies and between them, (wavelength,).
+    predicted_error: predicted error of any contrast, at the grid's frequencies and between them, (wavelength,). Only
+        frequencies near 0 have errors of this size, see `errors`.
     shares: fraction of all arriving light in each sample of the PSF, as a Dr.Jit tensor (wavelength, y, x).
     centre: position (x, y) [m] of sample n//2 of the PSF.
+    causes: parts of the predicted error; None if they are unknown.
     """
 
     tensor: Array
@@ -55,9 +59,10 @@ class MTF(ReadOnlyArrays):
     predicted_error: np.ndarray
     shares: Array
     centre: tuple[float, float] = (0.0, 0.0)
+    causes: ErrorCauses | None = None
 
     @classmethod
-    def from_shares(cls, shares: Array, window: Grid, cutoff: np.ndarray, error: np.ndarray) -> MTF:
+    def from_shares(cls, shares: Array, window: Grid, cutoff: np.ndarray, causes: ErrorCauses) -> MTF:
         """Return the MTF of samples on a window of the sensor."""
         import drjit as dr
 
@@ -68,7 +73,7 @@ class MTF(ReadOnlyArrays):
         ]
         tensor = types.Tensor(planes[0] if len(planes) == 1 else dr.concat(planes), (len(planes), side, side))
         f = Grid.square(side, 1 / (side * window.dx)).x
-        return cls(tensor, f, f, cutoff, error, shares, window.centre)
+        return cls(tensor, f, f, cutoff, causes.total, shares, window.centre, causes)
 
     def __repr__(self) -> str:
         planes = f"{self.tensor.shape[0]} wavelengths or types, to {self.fx[-1]:.3g} cycles per metre"
@@ -91,6 +96,35 @@ class MTF(ReadOnlyArrays):
         planes = [otf.numpy() * there for otf in _transforms(self.shares, self._dx)]
         return read_only(np.angle(np.stack(planes)))
 
+    @cached_property
+    def errors(self) -> np.ndarray:
+        """Predicted error of each contrast, in the shape of `mtf`. Most are far smaller than `predicted_error`.
+
+        Light outside the window changes contrasts at frequencies near 0 by its whole share, and other contrasts much
+        less, see `optics.point_spread.window_loss`. An uncertainty of all light that arrives changes contrasts in
+        proportion.
+        """
+        if self.causes is None:
+            return read_only(np.broadcast_to(self.predicted_error[:, None, None], self.mtf.shape).copy())
+        light, rest = (part[:, None, None] for part in (self.causes.light, self.causes.rest))
+        images = np.asarray(self.shares.numpy())
+        missing = np.stack([spectrum_of_loss(*each) for each in zip(images, self.causes.lost, strict=True)])
+        found = missing + light * self.mtf + rest + self._at_nyquist[:, None, None]
+        middle = self.fx.size // 2
+        found[:, middle, middle] = 0
+        return read_only(found)
+
+    @property
+    def _at_nyquist(self) -> np.ndarray:
+        """Root mean square of the contrasts at the highest frequencies along each axis, (wavelength,).
+
+        Contrasts beyond these frequencies are of this size, and are aliased. Behind pupils about a wavelength wide,
+        contrasts do not end sharply at the cutoff.
+        """
+        rim = np.concatenate([self.mtf[:, 0], self.mtf[:, :, 0]], axis=1)
+        found: np.ndarray = np.sqrt(np.mean(np.square(rim), axis=1))
+        return found
+
     @property
     def _dx(self) -> float:
         """Pitch of the PSF's samples [m]; 1 for a single sample, whose only frequency is 0."""
@@ -104,37 +138,62 @@ class MTF(ReadOnlyArrays):
         """
         count = whole("count", count, 1, self.tensor.shape[0])
         tensor, shares = (_first(part, count) for part in (self.tensor, self.shares))
-        return MTF(tensor, self.fx, self.fy, self.cutoff[:count], self.predicted_error[:count], shares, self.centre)
+        causes = None if self.causes is None else self.causes.first(count)
+        errors = self.predicted_error[:count]
+        return MTF(tensor, self.fx, self.fy, self.cutoff[:count], errors, shares, self.centre, causes)
 
-    def profile(self, frequencies: np.ndarray) -> np.ndarray | Array:
+    def profile(self, frequencies: np.ndarray, with_error: bool = False) -> Any:
         """Return the mean over all orientations at radial `frequencies` [1/m], (wavelength, frequency).
 
         The frequencies need not lie on the grid. Beyond the Nyquist frequency of the PSF's samples (half a cycle per
         sample), contrasts are 0.
+
+        with_error: whether to return (value, predicted error), each (wavelength, frequency).
 
         Raises:
             ValueError: the PSF has a single sample, or the frequencies are invalid.
             AccuracyError: contrasts change so fast with orientation that the error of a mean over 1024 orientations may
                 exceed the predicted error.
         """
+        flag("with_error", with_error)
         if self.fx.size < 2:
             raise ValueError("the PSF has one sample and therefore only the frequency 0: must be at least 2 x 2")
         f = np.atleast_1d(reals("frequencies", frequencies)).ravel()
         if f.size == 0 or not np.isfinite(f).all():
             raise ValueError(f"frequencies = {shown(frequencies)}: must be finite, and at least one")
+        found, unsure = self._over_orientations(f)
+        return (to_user(found), self._radial_errors(f) + unsure) if with_error else to_user(found)
+
+    def _over_orientations(self, f: np.ndarray) -> tuple[Array, np.ndarray]:
+        """Return the mean over all orientations, and its error due to their number, (wavelength, frequency)."""
         found, n = self._mean(f, ORIENTATIONS, 0.0), ORIENTATIONS
         allowed = np.maximum(self.predicted_error, FINEST)[:, None]
         while n < MOST_ORIENTATIONS:
             between = self._mean(f, n, 0.5)
-            unsure = float((np.abs(plain(found) - plain(between)) / 2 / allowed).max(initial=0))
+            apart = np.abs(plain(found) - plain(between)) / 2
+            unsure = float((apart / allowed).max(initial=0))
             found, n = (found + between) / 2, 2 * n
             if unsure <= PART:
-                return to_user(found)
+                return found, apart
         if unsure > 1:
             raise AccuracyError(
                 f"frequencies: a mean over {n} orientations has {unsure:.2g} times the predicted error", "see `mtf`"
             )
-        return to_user(found)
+        return found, apart
+
+    def _radial_errors(self, f: np.ndarray) -> np.ndarray:
+        """Return the mean of `errors` over the orientations at radial frequencies f, (wavelength, frequency).
+
+        It is interpolated between rings one step of the grid wide. Below one step, errors are as large as they can be.
+        """
+        step, side = float(self.fx[1] - self.fx[0]), self.fx.size
+        ring = np.rint(np.hypot.outer(self.fy, self.fx) / step).astype(np.intp).ravel()
+        count = np.bincount(ring)
+        means = np.stack([np.bincount(ring, one.ravel()) for one in self.errors]) / np.maximum(count, 1)
+        means[:, :2] = np.maximum(means[:, :2], self.predicted_error[:, None])
+        at = np.minimum(np.abs(f) / step, side // 2)
+        found = np.stack([np.interp(at, np.arange(count.size), row) for row in means])
+        return np.where(f == 0, 0.0, found)
 
     def _mean(self, f: np.ndarray, n: int, shift: float) -> Array:
         """Return the mean over n orientations within half a turn, (wavelength, frequency).

@@ -13,7 +13,7 @@ import numpy as np
 from optics.methods.geometric import NoDerivativesError
 from optics.methods.method_sampling import Sampling, WithField
 from optics.methods.problem import Problem
-from optics.numerics.accuracy import FLOAT_NOISE, AccuracyError, Plan
+from optics.numerics.accuracy import FLOAT_NOISE, AccuracyError, Plan, above
 from optics.numerics.autodiff import Array
 from optics.numerics.field import Field
 from optics.numerics.precision import opaque, precision
@@ -164,7 +164,7 @@ def _checked(attempt: _Attempt, asked: Request, tries: int) -> PSFPicture:
     if error <= tolerance or named:
         return attempt.stated(error)
     found = (
-        f"tolerance = {tolerance:g}: a check against the direct sum finds an error of {error:.1g} by "
+        f"tolerance = {tolerance:g}: a check against the direct sum finds an error of {above(error, tolerance)} by "
         f"{attempt.plan.method} in {problem.dtype}"
     )
     try:
@@ -203,6 +203,7 @@ def _predicted_error(image: np.ndarray, sampling: Sampling, problem: Problem) ->
     if error > problem.tolerance:
         raise AccuracyError(
             f"tolerance = {problem.tolerance:g}: the window is so dark that {problem.dtype} rounding reaches "
-            f"{error:.1g}" + ("; dtype='float64' has a 1e6 times lower floor" if problem.dtype == "float32" else "")
+            f"{above(error, problem.tolerance)}"
+            + ("; dtype='float64' has a 1e6 times lower floor" if problem.dtype == "float32" else "")
         )
     return error + sampling.model_error

@@ -140,14 +140,16 @@ def choose(problem: Problem, method: str = "auto", most_seconds: float = MOST_SE
         ValueError: unknown method.
         AccuracyError: no sampling within the limits on memory and time meets the tolerance.
     """
-    asked = {"auto": tuple(METHODS), "exact": tuple(EXACT), "field": FIELDS}.get(method, (method,))
+    # Approximations predict the error of the intensity, and not that of its derivatives.
+    everything = tuple(EXACT if problem.differentiated else METHODS)
+    asked = {"auto": everything, "exact": tuple(EXACT), "field": FIELDS}.get(method, (method,))
     if asked[0] not in METHODS:
         raise ValueError(f"method = {method!r}: must be 'auto', 'exact' or one of {', '.join(METHODS)}")
     _check_dtype(problem)
     check_window(problem.window, problem.dtype)
     allowed = _model_tolerance(problem) if method == "auto" else math.inf
     outputs = math.prod(problem.window.shape)
-    known = METHODS if problem.pixelated is None else FOR_PIXELS
+    known = FOR_PIXELS if problem.divided else METHODS
     weighed: dict[str, Sampling] = {}
     best: Sampling | None = None
     for name in sorted(set(asked) & set(known), key=list(WEIGHING).index):
@@ -216,10 +218,23 @@ def _plan(problem: Problem, best: Sampling, weighed: dict[str, Sampling], most_s
         f"Fresnel number {problem.fresnel_number:.3g}, sine of the steepest ray kept "
         f"{problem.band() * problem.wavelength:.2g}; "
         + ("cheapest method that meets the tolerance" if len(weighed) > 1 else "requested")
+        + _why_for_derivatives(problem, best)
     )
     error = _sampling_error(problem) + best.model_error
     sampled = best.method, best.samples, problem.dtype, error, why, _seconds(best, problem)
-    return Plan(*sampled, tuple(options), best.padding, problem.scalar_error)
+    derivatives = problem.tolerance if problem.differentiated and not best.model_error else None
+    return Plan(*sampled, tuple(options), best.padding, problem.scalar_error, derivatives)
+
+
+def _why_for_derivatives(problem: Problem, best: Sampling) -> str:
+    """Return the part of a plan's reason that concerns derivatives; empty if none are requested."""
+    if not problem.differentiated:
+        return ""
+    if best.model_error:
+        return "; an approximation predicts no error of derivatives"
+    if problem.knots is None:
+        return "; derivatives exclude approximations"
+    return f"; derivatives by the samples of maps need nodes in each cell between knots ({problem.knots.maps})"
 
 
 def _verdict(option: Sampling, best: Sampling, problem: Problem, most_seconds: float) -> str:
@@ -234,8 +249,28 @@ def _verdict(option: Sampling, best: Sampling, problem: Problem, most_seconds: f
     return f"{_seconds(option, problem) / _seconds(best, problem):.1f} times as slow"
 
 
+def _count(sampling: Sampling) -> str:
+    """Return the number of samples in words. The two numbers of a Hankel transform are not sides of a grid."""
+    if sampling.method == "hankel":
+        return f"integrals over {sampling.samples[0]:.2g} radii and {sampling.samples[1]:.2g} angles"
+    if sampling.samples[1] == 1:
+        return f"{sampling.samples[0]} nodes"
+    return f"{max(sampling.samples)} samples across"
+
+
 def _refusal(problem: Problem, found: list[Sampling], most_seconds: float, method: str) -> str:
     width = 2 * problem.window.half_width
+    if not found and problem.knots is not None and method in {*METHODS} - {*FOR_PIXELS}:
+        return (
+            f"method = {method!r}: cannot compute derivatives by the samples of maps ({problem.knots.maps}); use "
+            f"method='auto' or one of {', '.join(FOR_PIXELS)}"
+        )
+    if not found and problem.knots is not None:
+        return (
+            f"tolerance = {problem.tolerance:g}: derivatives by the samples of maps ({problem.knots.maps}) need too "
+            f"many nodes: widen the tolerance, or shrink the window ({width:.3g} m) or the pupil (radius "
+            f"{problem.radius:.3g} m)"
+        )
     if not found and problem.pixelated is not None:
         return (
             "this method cannot sample a pixelated relief within its limits; use method='auto' or one of "
@@ -250,10 +285,10 @@ def _refusal(problem: Problem, found: list[Sampling], most_seconds: float, metho
             "use method='rayleigh_sommerfeld'"
         )
     least = min(found, key=lambda option: option.seconds)
-    across = f"{least.samples[0]} nodes" if least.samples[1] == 1 else f"{max(least.samples)} samples across"
+    purpose = "" if problem.knots is None else f" for derivatives by the samples of maps ({problem.knots.maps})"
     return (
-        f"tolerance = {problem.tolerance:g} needs {across}, {size_of(_bytes(least, problem))} and about "
-        f"{_seconds(least, problem):.2g} s by {least.method}; the limits are {size_of(MOST_BYTES)} and "
+        f"tolerance = {problem.tolerance:g}{purpose} needs {_count(least)}, {size_of(_bytes(least, problem))} and "
+        f"about {_seconds(least, problem):.2g} s by {least.method}; the limits are {size_of(MOST_BYTES)} and "
         f"{most_seconds:g} s: widen the tolerance, shrink the window ({width:.3g} m) or the pupil (radius "
         f"{problem.radius:.3g} m, Fresnel number {problem.fresnel_number:.3g})"
     )

@@ -29,6 +29,7 @@ from optics.numerics.grid import Grid
 from optics.numerics.interpolation import cubic_bsplines
 from optics.numerics.precision import precision
 from optics.point_spread.population_members import Member, powers
+from optics.point_spread.window_cost import population_seconds
 
 __all__ = ["population_pictures"]
 
@@ -43,11 +44,10 @@ LEAST_LIGHT = 1e-2
 SPREAD = 1.1  # choice: error of the intensity divided by the spread of the phase; see test_population.py
 TURNS = 1.3  # choice: ratio of successive numbers of samples; similar pupils then share a plan
 STACK = 2_000_000  # choice, limited by memory: samples of pupils in a stack
-SECONDS = 3e-4  # approximate time per PSF
 RINGS = 12  # choice: number of rings of the window for which the error is predicted
 SLOPES = np.linspace(-1, 1, 9) * (1 + EDGE_REACH)  # positions where the slope of a relief is evaluated
-PER_ORDER = 4  # choice: positions per order at which the slope of a wavefront is evaluated
-STEP = 1e-4  # choice [radii]: step of the differences that give a wavefront's slope
+# Choices for the slope of a wavefront: positions per order at which it is evaluated, and step of differences [radii].
+PER_ORDER, STEP = 4, 1e-4
 
 
 def population_pictures(
@@ -83,15 +83,15 @@ def population_pictures(
             errors = np.where(_light(samples, masks) < LEAST_LIGHT, math.inf, errors)
             for index, image, error in zip(part, images, errors, strict=True):
                 if error <= tolerance:
-                    yield index, image, _plan(members[index], samples, float(error), leaving[index])
+                    yield index, image, _plan(members[index], samples, window, float(error), leaving[index])
 
 
-def _plan(member: Member, samples: _Samples, error: float, leaving: float) -> Plan:
-    shape, radius = (samples.at.size, samples.at.size), member.pupil.radius
-    sine = steepest_sine(radius, number(member.distance), leaving)
+def _plan(member: Member, samples: _Samples, window: Grid, error: float, leaving: float) -> Plan:
+    shape = samples.at.size, samples.at.size
+    sine = steepest_sine(member.pupil.radius, number(member.distance), leaving)
     scalar = scalar_theory_error(sine, light_spread(member.pupil))
     why = "one of a population: rank 1, not spot-checked"
-    return Plan("low_rank", shape, "float32", error, why, SECONDS, scalar_error=scalar)
+    return Plan("low_rank", shape, "float32", error, why, population_seconds(shape[0], window), scalar_error=scalar)
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,11 +12,11 @@ from optics.elements.pupil import Pupil
 from optics.elements.source import PointSource
 from optics.numerics.accuracy import Plan
 from optics.numerics.arguments import flag, of_kind, vacuum_wavelength, vacuum_wavelengths
-from optics.numerics.autodiff import Scalar, number
+from optics.numerics.autodiff import Scalar
 from optics.numerics.grid import Grid
 from optics.point_spread.planner import FIELDS
 from optics.point_spread.psf_result import PSFResult, spread
-from optics.point_spread.request import Setup
+from optics.point_spread.request import Setup, sensor_place
 
 __all__ = ["plan", "psf"]
 
@@ -57,7 +57,7 @@ def psf(
         AccuracyError: no method meets the tolerance within the limits on memory and time.
     """
     source = PointSource(source_distance, source_angle)
-    at = _placed(pupil, sensor_distance, source)
+    at = sensor_place(of_kind("pupil", pupil, Pupil, "Pupil(25e-6)"), sensor_distance, source.distance)
     setup = Setup(at, source, Grid(shape, dx, centre), tolerance, method, dtype)
     lambdas = np.atleast_1d(vacuum_wavelengths(wavelengths))
     if lambdas.size == 0:
@@ -87,11 +87,6 @@ def plan(
 ) -> Plan:
     """Return the plan of `psf` at one wavelength without computing the PSF. Arguments and errors: see `psf`."""
     source = PointSource(source_distance, source_angle)
-    at = _placed(pupil, sensor_distance, source)
+    at = sensor_place(of_kind("pupil", pupil, Pupil, "Pupil(25e-6)"), sensor_distance, source.distance)
     setup = Setup(at, source, Grid(shape, dx, centre), tolerance, method, dtype)
     return setup.request(pupil, vacuum_wavelength(wavelength)).planned()[0]
-
-
-def _placed(pupil: Pupil, sensor_distance: Scalar | None, source: PointSource) -> Scalar:
-    of_kind("pupil", pupil, Pupil, "Pupil(25e-6)")
-    return pupil.image_distance(number(source.distance)) if sensor_distance is None else sensor_distance

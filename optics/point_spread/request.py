@@ -11,13 +11,13 @@ from optics.methods.method_sampling import Sampling
 from optics.methods.problem import Problem
 from optics.numerics.accuracy import MOST_SECONDS, AccuracyError, Plan
 from optics.numerics.arguments import one_of
-from optics.numerics.autodiff import Scalar
+from optics.numerics.autodiff import Scalar, carries_derivative, number
 from optics.numerics.grid import Grid
 from optics.numerics.precision import precision
 from optics.point_spread.planner import EXACT, METHODS, choose
 from optics.point_spread.window_cost import check_window, window_seconds
 
-__all__ = ["Request", "Setup"]
+__all__ = ["Request", "Setup", "sensor_place"]
 
 MOST_SECONDS_OF_JUMPS = 2.0  # choice: time limit for a height map with jumps [s]
 GROWN = 1.25  # choice: factor in time, relative to the previous wavelength, above which methods are compared again
@@ -66,6 +66,7 @@ class Request:
         except AccuracyError as error:
             bent = " and ".join(name for name in ("height", "wavefront") if getattr(pupil, name) is not None)
             advice = _wrapped(jump) if jump else f"a flatter {bent} needs less" if bent else ""
+            advice = "" if "use method=" in str(error) else advice  # another method helps, and not another relief
             raise AccuracyError(f"{error}; {advice}" if advice else str(error)) from None
         if jump and plan.seconds > MOST_SECONDS_OF_JUMPS:
             raise AccuracyError(f"about {plan.seconds:.2g} s by {plan.method}: {_wrapped(jump)}")
@@ -93,6 +94,25 @@ def _wrapped(jump: float) -> str:
         f"height jumps by {jump:.3g} m from sample to sample, as in a wrapped lens, and HeightMap connects them by "
         "steep slopes: optics.PixelRelief(height) represents the steps"
     )
+
+
+def sensor_place(pupil: Pupil, sensor_distance: Scalar | None, source_distance: Scalar) -> Scalar:
+    """Return the distance [m] of the sensor. None: the distance at which the pupil's ideal lens images the source.
+
+    Raises:
+        ValueError: the distance is missing although it would depend on a number that carries a derivative, or the lens
+            forms no real image.
+    """
+    if sensor_distance is not None:
+        return sensor_distance
+    focal = pupil.thin_lens_focal_length
+    for name, value in (("thin_lens_focal_length", focal), ("source_distance", source_distance)):
+        if focal is not None and carries_derivative(value):
+            raise ValueError(
+                f"sensor_distance is missing: {name} carries a derivative, but the default distance of the sensor, "
+                "which depends on it, carries none; specify the distance [m], which may be a Dr.Jit number"
+            )
+    return pupil.image_distance(number(source_distance))
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ from optics.numerics.grid import Grid
 from optics.numerics.precision import padded_for_packets, precision
 from optics.numerics.quadrature import stepped_up
 
-__all__ = ["CAUTION", "EFFORT", "path_rounding", "spot_check"]
+__all__ = ["CAUTION", "EFFORT", "exact_psf", "path_rounding", "spot_check"]
 
 # Choice: safety factor on the estimate. From 40 points, the root mean square of the error is known only to within a
 # factor of about two. tests/optics/point_spread/test_robustness.py checks that the stated error bounds the true error.
@@ -40,14 +40,15 @@ class Effort:
     fewest: number of points below which the estimate is useless.
     spare_digits: digits of the direct sum in addition to the requested accuracy. The first affordable value is used.
     share: time limit of the check, relative to the time of the PSF.
-    share_of_few: the same for windows with fewer than `fewest` samples, in which a single wrong sample makes the whole
-        result wrong.
+    share_of_few: the same for windows with fewer than `few` samples. Of a direct sum over so few samples, `share`
+        affords fewer than `fewest` points. Without a check, the error may be as large as its bound.
     seconds: time [s] that every check may take.
     """
 
     points: int = 40
     points_along_radius: int = 20
     fewest: int = 8
+    few: int = 54
     spare_digits: tuple[float, ...] = (7.0, 4.0)
     share: float = 0.3
     share_of_few: float = 1.0
@@ -82,6 +83,8 @@ def spot_check(beam: Beam, problem: Problem, image: np.ndarray, seconds: float) 
     """
     if problem.reach is not None:
         return None  # a PSF that may be wrong beyond `reach` cannot be checked
+    if problem.knots is not None:  # the direct sum needs samples for the PSF only, and not for its derivatives
+        problem = Problem.from_beam(beam, problem.window, problem.tolerance, problem.dtype, derivatives=False)
     total = float(np.sum(np.square(image, dtype=np.float64)))
     if total == 0:
         return None
@@ -128,7 +131,7 @@ def _darkness(beam: Beam, problem: Problem, mean: float) -> float:
 def _affordable(beam: Beam, problem: Problem, darkness: float, seconds: float) -> _DirectSum:
     """Return the direct sum with the largest numbers of points and digits that the time of the PSF allows."""
     samples, fine = math.prod(problem.window.shape), _finer_detail(beam, problem)
-    share = EFFORT.share if samples >= EFFORT.fewest else EFFORT.share_of_few
+    share = EFFORT.share if samples >= EFFORT.few else EFFORT.share_of_few
     pairs = max(share * seconds, EFFORT.seconds) * PAIRS_PER_SECOND["float32"]
     along_radius = problem.symmetric and problem.window.centre == (0.0, 0.0)
     wanted = min(EFFORT.points_along_radius if along_radius else EFFORT.points, samples)
@@ -167,13 +170,31 @@ def _drawn(problem: Problem, image: np.ndarray, points: int) -> tuple[np.ndarray
     return drawn, chance[drawn]
 
 
+def exact_psf(
+    beam: Beam, problem: Problem, x: np.ndarray, y: np.ndarray, bright: float, seconds: float
+) -> tuple[np.ndarray, float] | None:
+    """Return the PSF at points (x, y) [m] by the direct sum, and its relative error where it is `bright` [1/m²].
+
+    The result is None if the sum would take longer than a check of a PSF that takes `seconds`.
+    """
+    darkness = _darkness(beam, problem, bright)
+    reference = _affordable(beam, problem, darkness, seconds)
+    if problem.reach is not None or reference.points < min(x.size, math.prod(problem.window.shape)):
+        return None
+    error = 2 * 10.0 ** (darkness - reference.digits) + path_rounding(problem, darkness)
+    return _at_points(beam, problem, reference, x, y), error
+
+
 def _exact(beam: Beam, problem: Problem, reference: _DirectSum, drawn: np.ndarray) -> np.ndarray:
     """Return the exact PSF at the drawn points, by the direct sum in float64."""
+    row, column = np.divmod(drawn, problem.window.shape[1])
+    return _at_points(beam, problem, reference, problem.window.x[column], problem.window.y[row])
+
+
+def _at_points(beam: Beam, problem: Problem, reference: _DirectSum, x: np.ndarray, y: np.ndarray) -> np.ndarray:
     import drjit as dr
 
-    row, column = np.divmod(drawn, problem.window.shape[1])
     types = precision("float64")
-    x, y = problem.window.x[column], problem.window.y[row]
     if problem.symmetric:
         x, y = np.hypot(x, y), np.zeros_like(y)
     rule = problem.aperture, reference.cycles, reference.digits, problem.symmetric

@@ -13,9 +13,9 @@ from optics.elements.pupil import Pupil
 from optics.numerics.arguments import positive, reals, shown
 from optics.numerics.autodiff import plain
 from optics.numerics.read_only import ReadOnlyArrays, read_only
-from optics.point_spread.concentration import strehl_ratio
 from optics.point_spread.psf import psf
 from optics.point_spread.psf_result import PSFResult
+from optics.point_spread.strehl import strehl_ratio
 
 __all__ = ["ThroughFocus", "through_focus"]
 

@@ -17,12 +17,13 @@ from optics.numerics.autodiff import Array, plain, to_user
 from optics.numerics.grid import Grid, OnWindow
 from optics.numerics.precision import padded_for_packets, precision
 from optics.numerics.read_only import ReadOnlyArrays, read_only
-from optics.point_spread.concentration import encircled_energy, strehl_ratio
+from optics.point_spread.concentration import encircled_energy
 from optics.point_spread.contrast import combined_mtf
 from optics.point_spread.mixture import mixed
 from optics.point_spread.modulation_transfer import MTF
 from optics.point_spread.psf import psf
 from optics.point_spread.psf_result import PSFResult
+from optics.point_spread.strehl import strehl_ratio
 from optics.spectra.receptors import receptors_of
 from optics.spectra.spectrum import Spectrum, illuminant
 
@@ -92,8 +93,10 @@ class WhitePSF(ReadOnlyArrays, OnWindow):
         """
         found, count = combined_mtf(self.waves, np.vstack([self.weights, self.coarse]), tolerance), len(self.weights)
         fine, rough = found.mtf[:count], found.mtf[count:]
-        error = found.predicted_error[:count] + LEFT * np.abs(fine - rough).max(axis=(1, 2))
-        return replace(found.first(count), predicted_error=error)
+        spectral = LEFT * np.abs(fine - rough).max(axis=(1, 2))
+        kept = found.first(count)
+        causes = kept.causes and replace(kept.causes, rest=kept.causes.rest + spectral)
+        return replace(kept, predicted_error=kept.predicted_error + spectral, causes=causes)
 
     def strehl_ratio(self, with_error: bool = False) -> np.ndarray | Array:
         """Return the maximum of the white PSF, divided by the maximum in the same light without aberration, (type,).

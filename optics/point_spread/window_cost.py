@@ -20,7 +20,10 @@ from optics.numerics.cost import (
 from optics.numerics.grid import Grid
 from optics.point_spread.spot_check import EFFORT
 
-__all__ = ["check_seconds", "check_window", "window_bytes", "window_seconds"]
+__all__ = ["check_seconds", "check_window", "population_seconds", "window_bytes", "window_seconds"]
+
+# Time [s] of a PSF by a common plan: per PSF, per entry of pupil and Fourier kernels, and per sample of the window.
+PER_PSF, PER_ENTRY, PER_SAMPLE = 5e-5, 2e-8, 1.7e-7
 
 
 def window_seconds(problem: Problem) -> float:
@@ -42,7 +45,13 @@ def check_seconds(problem: Problem, sampling: Sampling) -> float:
     points = max(min(EFFORT.points, samples), LANES)
     needed = 2 * sampling.samples[0] * points / PAIRS_PER_SECOND["float64"]
     slower = PAIRS_PER_SECOND["float32"] / PAIRS_PER_SECOND["float64"]
-    return needed if samples < EFFORT.fewest else min(needed, EFFORT.share * sampling.seconds * slower)
+    share = EFFORT.share if samples >= EFFORT.few else EFFORT.share_of_few
+    return needed if samples < EFFORT.fewest else min(needed, share * sampling.seconds * slower)
+
+
+def population_seconds(across: int, window: Grid) -> float:
+    """Return the approximate time per PSF by the common plan of a population, for `across` samples of the pupil [s]."""
+    return PER_PSF + across * (across + sum(window.shape)) * PER_ENTRY + math.prod(window.shape) * PER_SAMPLE
 
 
 def window_bytes(problem: Problem) -> float:

@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from optics.numerics.accuracy import FLOAT_NOISE, AccuracyError, Plan
+from optics.numerics.accuracy import FLOAT_NOISE, AccuracyError, Plan, above
 from optics.numerics.arguments import complexes, finite, in_range, shown, vacuum_wavelength, without_derivative
 from optics.numerics.fourier import fourier_sum, kept_indices, periodic_spectrum, periodic_sum, predicted_seconds
 from optics.numerics.grid import Grid, OnWindow
@@ -131,8 +131,8 @@ def propagate(
     error = max(plane.error for plane in planes)
     if not error <= tolerance:
         raise AccuracyError(
-            f"tolerance = {tolerance:g}: the error reaches {error:.1g}, because too much of the light is near grazing "
-            "incidence or too little of it hits the window; widen the tolerance or enlarge out_shape"
+            f"tolerance = {tolerance:g}: the error reaches {above(error, tolerance)}, because too much of the light is "
+            "near grazing incidence or too little of it hits the window; widen the tolerance or enlarge out_shape"
         )
     plan = _plan(how, error, _sample_note(planes, tolerance), dtype)
     return PropagationResult(out, window.dx, plan, window, sources, how)

@@ -12,7 +12,7 @@ from optics.apertures.aperture import EDGE_REACH
 from optics.elements.pupil import Pupil
 from optics.elements.refractive_index import Dispersion
 from optics.elements.source import PointSource
-from optics.numerics.accuracy import FLOAT_NOISE, AccuracyError, Plan
+from optics.numerics.accuracy import FLOAT_NOISE, AccuracyError, Plan, above
 from optics.numerics.arguments import complexes, in_range, of_kind, positive, shape_2d, shown, vacuum_wavelength
 from optics.numerics.grid import Grid, OnWindow
 from optics.numerics.precision import precision
@@ -230,7 +230,7 @@ def _error(steps: list[SystemStep], tolerance: float, settings: StepSettings) ->
     error += sum(edges * math.sqrt(max(step.power_in / last, 1)) for step in steps)
     if not error <= tolerance:
         raise AccuracyError(
-            f"tolerance = {tolerance:g}: the error reaches {error:.1g}, because too little of the light hits the last "
-            "window; widen the tolerance or enlarge out_shape"
+            f"tolerance = {tolerance:g}: the error reaches {above(error, tolerance)}, because too little of the light "
+            "hits the last window; widen the tolerance or enlarge out_shape"
         )
     return error

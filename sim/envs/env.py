@@ -45,7 +45,7 @@ class EyesEnv(gymnasium.Env[dict[str, np.ndarray], np.ndarray]):
 
     @property
     def state(self) -> Any:
-        """Current state of the world, as a batch of one, in the type of its physics: `WorldState` for the built-in
+        """Current state of the world as a batch of one, as its physics represents it: `WorldState` for the built-in
         tasks."""
         return self._batch.state
 

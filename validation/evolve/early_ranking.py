@@ -23,9 +23,7 @@ in the number of episodes, 32 or 128, from which the schedule decides which anim
 
 **Result.** Two rungs save a fifth of the time if half of the animals continue to the second rung. Schedules that select
 animals earlier save more time but may lose the best animal. Successive halving is off by default. Thirty-two episodes
-measure fitness well enough: their correlation with 128 episodes is 0.99. With an earlier learner, fitness from six
-episodes did not predict fitness from 48 (correlation 0.02). That learner had not learnt the task by the end of
-training.
+measure fitness well enough: their correlation with 128 episodes is 0.99.
 
 **Limits.** 16 animals are too few for further conclusions. An eighth of the training predicted the final order better
 (0.64) than a quarter (-0.33), and both confidence intervals are wide.

@@ -179,7 +179,11 @@ REFUSALS: tuple[tuple[str, Callable[[], Any], str], ...] = (
     ),
     ("relief of 1 m", lambda: Pupil(RADIUS, ROUGH * 1e5), "height spans .* must be in metres, at most 100 radii"),
     ("relief of 0.9 mm", lambda: psf(Pupil(RADIUS, ROUGH * 90)), "needs .* samples across, .*the limits are 4 GB"),
-    ("X-rays (1 pm)", lambda: psf(BARE, wavelength=1e-12), "needs .* samples across, .*the limits are 4 GB"),
+    (
+        "X-rays (1 pm)",
+        lambda: psf(BARE, wavelength=1e-12),
+        "needs integrals over .* radii and .* angles, .*the limits are 4 GB",
+    ),
     ("grazing: ±16 µm wide at 10 nm", lambda: psf(BARE, 1e-8, method="angular_spectrum"), "too close to grazing"),
     ("propagate over 1e6 m", lambda: propagated(np.ones((5, 5)), distance=1e6), "needs .* samples across"),
     ("propagate NaN", lambda: propagated(np.full((5, 5), math.nan)), "u: must be finite everywhere"),

@@ -1,6 +1,7 @@
 """Tests of evolve/learning: which test covers which module.
 
 fitness: test_fitness.py
+final_figures: test_final_figures.py
 training_envs: test_fitness.py, test_task_module.py, test_animals_in_turn.py
 task_module: test_task_module.py, test_textures_of_runs.py, test_animals_in_turn.py
 task_trial: test_task_module.py, test_task_settings.py
@@ -20,4 +21,5 @@ checkpoint: test_checkpoint.py, search/test_successive_halving.py
 checkpoint_file: test_checkpoint.py, search/test_successive_halving.py
 training_rung: search/test_successive_halving.py
 animal_task: test_task_module.py, test_fitness.py, test_textures_of_runs.py
+final_figures: test_final_figures.py, experiments/test_eyes_for_tasks.py
 """

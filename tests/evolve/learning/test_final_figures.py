@@ -20,6 +20,8 @@ from evolve.learning.final_figures import final_episodes, require_test_set
 from evolve.learning.fitness import evaluate
 from evolve.learning.policy import load_policy
 from evolve.learning.task_trial import check_layouts
+from evolve.report.markup import rounded
+from evolve.report.page import numbers_section
 from evolve.store.candidate import Candidate
 from evolve.store.directory import Run
 from sim.worlds import layout_family
@@ -105,6 +107,13 @@ def _boxes_of_episode(episode):
     assert episode.mode in ("test", "evaluation")
     assert episode.plan.bounds[3] - episode.plan.bounds[1] == pytest.approx(9 * CELL)
     return {tuple(np.round(wall[:2], 6)) for wall in episode.plan.walls}
+
+
+def test_the_report_states_the_return_in_the_test_set(played, run):
+    shown = numbers_section(played).markup
+    assert "Its return in the test layouts" in shown
+    assert f"<dd>{rounded(held_out_episodes(played).returns.mean(), 4)}<small>mean of 6 episodes" in shown
+    assert "test layouts" not in numbers_section(run).markup
 
 
 def test_fixed_layouts_and_tasks_without_layouts_have_no_test_set(run, call):

@@ -102,7 +102,7 @@ def test_intervals_are_those_of_returns_minus_costs(priced):
     low, high = bootstrap_interval(priced.best.returns)
     assert fitness_interval(priced.best) == (low - 7.75, high - 7.75)
     assert "95 % interval 18.2 to 22.2" in headline(priced).markup
-    assert "task fitness 28.00 − costs 7.750; " in headline(priced).markup
+    assert "task fitness 28.00, costs 7.750; " in headline(priced).markup
 
 
 def test_the_table_has_both_parts(priced, free):

@@ -54,6 +54,28 @@ def test_rows_and_columns_of_nodes_are_as_good(opening, exact, count, digits):
     assert abs(np.sum(pixels.weights(across) * wave(at[None, :], at[:, None])) - exact) < 10**-digits * opening.area
 
 
+@pytest.mark.parametrize("fixed", [4, 7])
+def test_cells_of_different_widths_integrate_polynomials_exactly(opening, fixed):
+    """A different cubic in every cell, as of a spline with uneven knots, times another one: degree 3 in x and in y."""
+    borders = (-1.0, -0.7, -0.65, -0.1, 0.2, 0.5, 0.95, 1.0)
+    cells = PixelatedAperture.between(opening, borders, fixed)
+    slopes = np.random.default_rng(0).standard_normal((2, 7, 4))
+
+    def pieces(x, y):
+        parts = []
+        for at, slope in zip((x, y), slopes, strict=True):
+            cell = np.searchsorted(borders, at).clip(1, 7) - 1
+            parts.append(sum(slope[cell, k] * (at - np.asarray(borders)[cell]) ** k for k in range(4)))
+        return parts[0] * parts[1]
+
+    at, nodes = cells.rows(fixed), cells.nodes(0.0, 3.0)
+    strips = PixelatedAperture.between(opening, borders).nodes(1.0, 12.0)
+    exact = np.sum(strips.weight * pieces(strips.x, strips.y))
+    assert abs(np.sum(cells.weights(fixed) * pieces(at[None, :], at[:, None])) - exact) < 1e-7
+    assert abs(np.sum(nodes.weight * pieces(nodes.x, nodes.y)) - exact) < 1e-7
+    assert len(nodes) == cells.node_count(0.0, 3.0) < (7 * fixed) ** 2
+
+
 def test_pixels_cannot_be_left_out_or_taken_whole():
     """The usual way takes a pixel as open if its centre is: the staircase edge has an error of 3e-3 with 33 pixels, a
     thousand times the tolerance above."""

@@ -1,6 +1,7 @@
 """Tests that fail when a module of optics/elements is broken.
 
 beam: methods/test_textbook.py
+derivative_knots: point_spread/test_gradients.py
 exit_pupil: test_exit_pupil.py
 fine_detail: test_fine_detail.py, eye/test_scattered_light.py
 human_eye: test_human_eye.py

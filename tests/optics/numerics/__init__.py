@@ -1,6 +1,6 @@
 """Tests that fail when a module of optics/numerics is broken.
 
-accuracy: point_spread/test_psf.py
+accuracy: point_spread/test_psf.py, test_accuracy.py
 arguments: test_arguments.py, test_any_input.py
 autodiff: point_spread/test_derivatives.py
 backend: test_backend.py

@@ -4,6 +4,8 @@ arriving: test_measure_bounds.py
 batch: test_batch.py
 circle_sums: test_circle_sums.py
 concentration: test_measures.py, test_measure_errors.py, test_measure_bounds.py
+strehl: test_measures.py, test_measure_errors.py, test_measure_bounds.py
+window_loss: test_measure_bounds.py
 microvilli: test_microvilli.py
 converging: test_vector_focus.py, test_microvilli.py
 disk_sum: test_microvilli.py

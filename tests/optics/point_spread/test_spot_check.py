@@ -178,3 +178,16 @@ def test_the_far_corner_of_a_window_off_the_axis_is_checked(seed):
         window = Grid((n, n), 2 * half / n, tuple(rng.uniform(0.5, 1, 2) * half * rng.choice([-1, 1], 2)))
         stated, actual = stated_and_actual(pupil, distance, window, 10 ** rng.uniform(-3, -1.7))
         assert actual < 0.8 * stated
+
+
+@pytest.mark.parametrize("shape", [(3, 3), (4, 5), (5, 5), (2, 6)])
+def test_direct_sums_of_few_samples_are_checked(shape):
+    """A check of eight points was too long for them, so that their plans stated half the tolerance."""
+    rng = np.random.default_rng(sum(shape))
+    distance = 1.5e-3
+    pupil = optics.Pupil(0.35e-3, optics.BSplineRelief(rng.random((4, 4)) * 2e-6))
+    asked = {"sensor_distance": distance, "dx": 1e-6, "shape": shape, "method": "rayleigh_sommerfeld"}
+    found = optics.psf(pupil, **asked)
+    exact = optics.psf(pupil, **asked, tolerance=1e-8, dtype="float64")
+    off = np.linalg.norm(found.psf - exact.psf) / np.linalg.norm(exact.psf)
+    assert off < found.plan.predicted_error < 0.1 * 1e-3

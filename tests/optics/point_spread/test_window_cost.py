@@ -80,3 +80,9 @@ def test_refusals_name_the_memory():
     with pytest.raises(AccuracyError, match=r"needs \d+ samples across, \d+ GB and .*; the limits are 4 GB and 60 s"):
         choose(problem)
     assert MOST_BYTES == 4e9
+
+
+def test_refusals_of_hankel_transforms_count_radii_and_angles():
+    """The numbers of nodes of two integrals are no samples across a grid."""
+    with pytest.raises(AccuracyError, match=r"needs integrals over \S+ radii and \S+ angles, .* by hankel"):
+        optics.psf(Pupil(30e-6), [1e-12])

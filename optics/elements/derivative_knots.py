@@ -1,0 +1,125 @@
+"""Inputs of a PSF that carry derivatives, and the cells in which these derivatives are polynomials.
+
+A small change of one sample of a map multiplies the light behind the pupil by a cardinal spline. This spline is a
+different cubic polynomial in every cell between two knots, whatever the values of the map are: the derivative by the
+samples of a flat map has the same detail as that of a rough map. Samples of the pupil that resolve only the light
+therefore give wrong derivatives, and quadrature nodes are placed in each cell instead.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from optics.elements.beam import Beam
+from optics.elements.pupil import Pupil
+from optics.elements.refractive_index import RefractiveIndex
+from optics.elements.relief import BSplineRelief, HeightMap, Relief
+from optics.elements.transmittance import GaussianMask, MaskMap
+from optics.elements.wavefront import WavefrontMap, Zernike
+from optics.numerics.autodiff import carries_derivative
+from optics.numerics.precision import precision
+
+__all__ = ["DerivativeKnots", "carries_derivatives", "derivative_knots"]
+
+APART = 1e-9  # rounding: borders that are closer, in pupil radii, are the same
+
+
+@dataclass(frozen=True)
+class DerivativeKnots:
+    """Cells between the knots of all maps that carry derivatives.
+
+    borders: ascending borders of the cells along x and along y, in units of the pupil's radius, from -1 to 1. They
+        include the borders of a relief of pixels.
+    splines: number of cubic splines by which the derivatives multiply the light in each cell.
+    maps: names and samples along a side of the maps, such as "height: 32 x 32".
+    names: names of these maps, as arguments of `Pupil`.
+    """
+
+    borders: tuple[float, ...]
+    splines: int
+    maps: str
+    names: tuple[str, ...]
+
+    def without_maps(self, pupil: Pupil) -> Pupil:
+        """Return the pupil without the maps. The cells resolve them, so that their bandwidth does not matter."""
+        without: dict[str, Any] = dict.fromkeys(self.names)
+        return replace(pupil, **without)
+
+
+def derivative_knots(pupil: Pupil, wavelength: float) -> DerivativeKnots | None:
+    """Return the cells that derivatives by the samples of maps require; None if no map is concerned.
+
+    A derivative by the refractive index is proportional to the height, so it requires the cells of the relief, too.
+    """
+    maps = dict(_maps(pupil, wavelength))
+    if not maps:
+        return None
+    inner = np.concatenate([*maps.values(), _borders_of_pixels(pupil)])
+    inner = np.unique(inner[np.abs(inner) < 1 - APART])
+    kept = inner[np.diff(inner, prepend=-1.0) > APART]
+    paths = len(maps.keys() - {"mask"})
+    # A derivative by a sample of the relief or wavefront is a spline, times the mask, which may be a spline as well.
+    splines = 2 if paths and "mask" in maps else 1
+    sizes = ", ".join(f"{name}: {len(knots)} x {len(knots)}" for name, knots in maps.items())
+    return DerivativeKnots((-1.0, *kept.tolist(), 1.0), splines, sizes, tuple(maps))
+
+
+def carries_derivatives(beam: Beam) -> bool:
+    """Return whether any number of the light carries a derivative."""
+    pupil = beam.pupil
+    numbers: list[Any] = [pupil.aperture_radius, pupil.thin_lens_focal_length, beam.distance, beam.source.distance]
+    numbers += [pupil.mask.waist] if isinstance(pupil.mask, GaussianMask) else []
+    numbers += [pupil.mask.samples] if isinstance(pupil.mask, MaskMap) else []
+    numbers += [pupil.wavefront.samples] if isinstance(pupil.wavefront, WavefrontMap) else []
+    if isinstance(pupil.wavefront, Zernike):
+        given = pupil.wavefront.coefficients_um
+        numbers += list(given.values()) if isinstance(given, dict) else [given]
+    return any(map(carries_derivative, numbers)) or _index_carries(pupil) or _relief_carries(pupil.height)
+
+
+def _maps(pupil: Pupil, wavelength: float) -> Iterator[tuple[str, np.ndarray]]:
+    """Yield the names and knots, in units of the pupil's radius, of the maps whose derivatives are requested."""
+    relief, wavefront, mask = pupil.height, pupil.wavefront, pupil.mask
+    bent = isinstance(relief, HeightMap) and pupil.bends(wavelength)
+    if bent and (carries_derivative(relief.samples) or _index_carries(pupil)):
+        yield "height", _knots(relief.samples)
+    if isinstance(wavefront, WavefrontMap) and carries_derivative(wavefront.samples):
+        yield "wavefront", _knots(wavefront.samples) * _ratio(wavefront.radius, pupil)
+    if isinstance(mask, MaskMap) and carries_derivative(mask.samples):
+        yield "mask", _knots(mask.samples) * _ratio(mask.reach, pupil)
+
+
+def _knots(samples: Any) -> np.ndarray:
+    """Return the positions of the samples, which are the knots of the spline, in units of half the side of the map."""
+    count = samples.shape[0]
+    return (np.arange(count) + 0.5) * 2 / count - 1
+
+
+def _ratio(half_side: float | None, pupil: Pupil) -> float:
+    return 1.0 if half_side is None else half_side / pupil.radius
+
+
+def _borders_of_pixels(pupil: Pupil) -> np.ndarray:
+    return np.arange(1, pupil.pixels) * 2 / max(pupil.pixels, 1) - 1
+
+
+def _index_carries(pupil: Pupil) -> bool:
+    curve = pupil.n
+    if isinstance(curve, RefractiveIndex):
+        return carries_derivative(curve.a) or carries_derivative(curve.b)
+    return curve.is_differentiable
+
+
+def _relief_carries(relief: Relief | None) -> bool:
+    if relief is None:
+        return False
+    if isinstance(relief, BSplineRelief):
+        return carries_derivative(relief.control_points)
+    if hasattr(relief, "samples"):
+        return carries_derivative(relief.samples)
+    types = precision("float64")
+    return carries_derivative(relief.height(types.Float64(0), types.Float64(0), types))

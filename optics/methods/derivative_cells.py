@@ -1,0 +1,95 @@
+"""Quadrature nodes in the cells between the knots of maps, for derivatives by the samples of the maps.
+
+In a cell, the integrand of a derivative is a cubic polynomial times a wave, the light behind the pupil. With t in
+[-1, 1] across the cell, the wave is e^{izt} or slower, with the Chebyshev coefficients 2 J_k(z). n Gauss-Legendre nodes
+are exact up to degree 2n - 1. Cells that the edge of the aperture cuts have the same nodes, with weights that are exact
+up to degree n - 1 over the open part.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from functools import lru_cache
+from itertools import count
+
+import numpy as np
+
+from optics.apertures.aperture import Aperture
+from optics.apertures.pixelated import PixelatedAperture
+from optics.elements.derivative_knots import DerivativeKnots
+
+__all__ = ["NODES_PART", "derivative_cells"]
+
+NODES_PART = 0.7  # choice: part of the tolerance that the nodes in the cells may use
+MOST_NODES = 12  # choice: largest number of nodes along a cell; wider cells are divided
+MOST_CELLS = 4096  # choice, limited by memory: largest number of cells along a side
+# Chebyshev coefficients of a cubic spline through a single sample: root mean square over the cells between its knots,
+# relative to the constant coefficient. test_derivative_cells.py computes them.
+SPLINE = (1.0, 0.970, 0.150, 0.076)
+# Choice: the error of cut cells is T^CUT_POWER, where T is the sum of the coefficients from degree n on. The power lies
+# between 1, for weights that are exact up to degree n - 1, and 2, for cells of which hardly anything is cut off. Both
+# errors are upper bounds, of which about a tenth is reached. test_gradients.py compares with exact derivatives.
+CUT_POWER, REACHED = 1.8, 0.1
+WAVES = np.concatenate([[0.0], np.geomspace(0.01, 40.0, 120)])  # values of z in the table of errors
+DEGREES = 96  # number of degrees in this table, above which all coefficients are negligible
+
+
+def derivative_cells(
+    opening: Aperture, knots: DerivativeKnots, cycles: np.ndarray, tolerance: float
+) -> PixelatedAperture | None:
+    """Return the opening with the fewest nodes that keep the error of derivatives below a part of the tolerance.
+
+    The error is the relative L2 error of the derivatives by all samples, for a random functional of the PSF. Cells are
+    divided if they would need many nodes. The result is None if there would be too many cells.
+
+    cycles: local frequencies [cycles per R] of the integrand at points that are evenly spread over the opening.
+    """
+    for halvings in count():
+        cells = _divided(opening, knots.borders, halvings)
+        if cells.count > MOST_CELLS:
+            return None
+        errors = _errors(math.pi * cells.widest * cycles, knots.splines, cells.cut_share)
+        enough = np.flatnonzero(errors <= NODES_PART * tolerance)
+        if enough.size:
+            return replace(cells, fixed=int(enough[0]) + 1)
+    return None
+
+
+@lru_cache(maxsize=64)
+def _divided(opening: Aperture, borders: tuple[float, ...], halvings: int) -> PixelatedAperture:
+    """Return the cells between these borders, after each has been halved a number of times."""
+    parts = 2**halvings
+    places = np.interp(np.arange((len(borders) - 1) * parts + 1) / parts, np.arange(len(borders)), borders)
+    return PixelatedAperture.between(opening, tuple(places.tolist()))
+
+
+def _errors(z: np.ndarray, splines: int, cut_share: float) -> np.ndarray:
+    """Return the error for 1 to MOST_NODES nodes along a cell.
+
+    z: half the phase [rad] that the wave gains across the cell, at points that are evenly spread.
+    cut_share: share of the area that lies in cut cells.
+    """
+    place = np.searchsorted(WAVES, z)
+    if place.max() >= len(WAVES):
+        return np.full(MOST_NODES, np.inf)
+    share = np.bincount(place, minlength=len(WAVES)) / len(z)
+    squared = share @ np.square(_tails(splines))
+    n = np.arange(1, MOST_NODES + 1)
+    whole, cut = np.sqrt(squared[2 * n]), np.sqrt(cut_share * squared[n])
+    found: np.ndarray = REACHED * (whole + cut**CUT_POWER)
+    return found
+
+
+@lru_cache(maxsize=2)
+def _tails(splines: int) -> np.ndarray:
+    """Return sums of the Chebyshev coefficients of the integrand from each degree on, (z, degree)."""
+    from scipy.special import jv
+
+    wave = 2 * np.abs(jv(np.arange(DEGREES), WAVES[:, None]))
+    # Below the order z, the coefficients oscillate. Their envelope falls with the degree.
+    found = np.minimum(np.maximum.accumulate(wave[:, ::-1], axis=1)[:, ::-1], 1.0)
+    for _ in range(splines):
+        found = np.stack([np.convolve(row, SPLINE) for row in found])
+    tails: np.ndarray = np.cumsum(found[:, ::-1], axis=1)[:, ::-1]
+    return tails

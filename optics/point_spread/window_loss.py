@@ -1,0 +1,93 @@
+"""Errors of contrasts at each spatial frequency.
+
+Light outside the window is missing in the sum ∫ PSF(x) exp(-2πi f·x) dx. Near f = 0, its whole share is missing. At
+other frequencies, contributions of different places cancel, and most of the error results from the sharp end of the
+samples at the sides of the window. If the samples fade towards the sides instead, this error disappears. The difference
+between the spectra of sharp and fading samples therefore estimates it. At some frequencies, such as those of the rings
+around the focus of an annulus, the lost light itself has contrast. It is estimated from the outer parts of the window.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+__all__ = ["ErrorCauses", "spectrum_of_loss"]
+
+# Choices, see test_measure_bounds.py: positions where samples begin to fade, and sizes of inner windows, in half widths
+# of the window; factor on the estimate; number of steps between frequencies below which all lost light may matter.
+FADES = (0.5, 0.7)
+INNER = (0.5, 0.7, 0.9)
+CAUTION = 1.0
+NEAR_ZERO = 2.0
+
+
+@dataclass(frozen=True, eq=False)
+class ErrorCauses:
+    """Parts of the error of contrasts, relative to all light that arrives, (wavelength,).
+
+    lost: light outside the window, at most.
+    light: uncertainty of the light that arrives.
+    rest: error of the PSF inside the window.
+    """
+
+    lost: np.ndarray
+    light: np.ndarray
+    rest: np.ndarray
+
+    @property
+    def total(self) -> np.ndarray:
+        """Return the largest error of any contrast."""
+        found: np.ndarray = self.lost + self.rest
+        return found
+
+    def first(self, count: int) -> ErrorCauses:
+        """Return the parts of the first `count` wavelengths."""
+        return ErrorCauses(self.lost[:count], self.light[:count], self.rest[:count])
+
+
+def spectrum_of_loss(image: np.ndarray, lost: float) -> np.ndarray:
+    """Return the error of each contrast due to light outside the window, (fy, fx), at the frequencies of `MTF.fx`.
+
+    The largest error of nine neighbouring frequencies is used, because spectra have zeros.
+
+    image: samples (y, x) of the PSF, as fractions of all light that arrives.
+    lost: fraction of this light outside the window.
+    """
+    from scipy.ndimage import maximum_filter
+
+    image, side = image.astype(np.float64), max(image.shape)
+    early, late = (_spectrum(image * (1 - np.outer(*(_fade(n, start) for n in image.shape)))) for start in FADES)
+    found = maximum_filter(np.abs(early) + np.abs(early - late) + _like_the_rest(image, lost), 3, mode="wrap")
+    steps = np.arange(side) - side // 2
+    near_zero = np.exp(-np.square(np.hypot.outer(steps, steps) / NEAR_ZERO))
+    return np.minimum(CAUTION * found + lost * near_zero, lost)
+
+
+def _like_the_rest(image: np.ndarray, lost: float) -> np.ndarray:
+    """Return the spectrum of the lost light if it is spread like the light in the outer parts of the window."""
+    squares, parts = np.zeros((max(image.shape),) * 2), 0
+    for share in INNER:
+        inner = tuple(slice(n // 2 - round(share * n / 2), n // 2 + round(share * n / 2) + 1) for n in image.shape)
+        outer = image.copy()
+        outer[inner] = 0
+        light = float(outer.sum())
+        if light > 0:
+            squares += np.square(np.abs(_spectrum(outer)) / light)
+            parts += 1
+    return lost * np.sqrt(squares / max(parts, 1))
+
+
+def _spectrum(image: np.ndarray) -> np.ndarray:
+    """Return the spectrum on a square grid, zero frequency at n//2."""
+    from scipy import fft
+
+    side = max(image.shape)
+    return np.asarray(fft.fftshift(fft.fft2(image, (side, side))))
+
+
+def _fade(n: int, start: float) -> np.ndarray:
+    """Return a fade from 1 to 0 between the position `start` and the ends of a row of samples."""
+    away = np.abs(np.arange(n) - n // 2) / max(n / 2, 1.0)
+    return np.asarray(np.square(np.cos(np.pi / 2 * np.clip((away - start) / (1 - start), 0, 1))))

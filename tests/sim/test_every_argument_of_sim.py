@@ -1,0 +1,271 @@
+"""Every optional argument of the public functions and classes of `sim` changes a result, or names the test that shows
+its effect."""
+
+import os
+from contextlib import closing
+
+import mujoco
+import numpy as np
+import pytest
+
+import optics
+import sim
+from sim import Eyes, Fidelity, Mount
+from tests.sim.envs.hunt import hunt
+from tests.walked_arguments import NoEffect, Walk, With, missing
+
+XML = """<mujoco><worldbody>
+  <light name="lamp" pos="0 0 3" dir="0 0 -1" diffuse="0.8 0.8 0.8"/>
+  <geom name="floor" type="plane" size="3 3 .1" rgba=".5 .6 .7 1"/>
+  <geom name="hidden" type="box" size=".2 .2 .2" pos="1.5 .4 .3" rgba="1 0 0 1" group="3"/>
+  <body name="ball" pos="1 0 .3"><freejoint/><geom type="sphere" size=".2" rgba=".9 .2 .1 1"/>
+    <site name="ball" pos="0 0 .5"/></body>
+  <body name="head" pos="0 0 .3"><joint type="hinge" axis="0 0 1"/><geom type="sphere" size=".05" mass="1"/>
+    <site name="eye" pos=".1 0 0"/></body>
+</worldbody></mujoco>"""
+MODEL = mujoco.MjModel.from_xml_string(XML)
+DATA = mujoco.MjData(MODEL)
+mujoco.mj_forward(MODEL, DATA)
+MOVED = mujoco.MjData(MODEL)
+MOVED.qpos[0] += 0.2
+mujoco.mj_forward(MODEL, MOVED)
+PERFECT = {"resolution": (4, 4), "n_eyes": 1, "bands": 3, "fov_deg": 70.0}
+RAYS = Fidelity(2, bands=3)
+PUPIL = optics.Pupil(10e-6, thin_lens_focal_length=240e-6)
+EYE = optics.Eye(None, (4, 4), 70.0, bands=3)
+
+
+def rendered(mount=Mount("eye"), **given):  # noqa: B008 (a frozen value)
+    """Return the signals of an eye on the model."""
+    renderer = sim.ModelRenderer(MODEL, EYE, [mount], **{"fidelity": RAYS, **given})
+    return np.asarray(renderer.signals([DATA] * renderer.n_envs))
+
+
+def looked(**given):
+    """Return observations of an agent with these eyes."""
+    return played(eyes=Eyes(**{**PERFECT, **given}), rays_per_receptor=2)
+
+
+def played(task="detection", steps=2, **given):
+    """Return the first observations, images and rewards of an environment."""
+    asked = {"eyes": Eyes(**PERFECT), "n_envs": 2, "fidelity": RAYS, **given}
+    if "rays_per_receptor" in given:
+        del asked["fidelity"]
+    with closing(sim.make_vec_env(task, **asked)) as env:
+        found = [env.reset(), env.get_images() if env.render_mode else None]
+        for _ in range(steps):
+            found.append(env.step(np.full((env.num_envs, 2), 0.7, np.float32))[:3])
+        return found
+
+
+def world(**given):
+    found = sim.build_world(given.pop("task", "maze"), **given)
+    return (
+        found.model.geom_pos,
+        found.model.geom_rgba,
+        found.model.ncam,
+        sorted(found.spectra),
+        found.mazes,
+        found.episode_steps,
+    )
+
+
+def met(**given):
+    with closing(sim.make_parallel_env(hunt(), **given)) as env:
+        observations, _ = env.reset()
+        return observations, None if env.render_mode is None else env.render()
+
+
+def written(tmp="view.exr", **given):
+    aspect = given.pop("pixel_aspect", None)
+    view = sim.View("left", **{"wavelengths_nm": np.array([500.0]), "radiance": np.full((1, 2, 2), 0.5), **given})
+    sim.write_exr(tmp, [view], **({} if aspect is None else {"pixel_aspect": aspect}))
+    with open(tmp, "rb") as file:
+        return file.read().hex()
+
+
+IN_WORLDS = {
+    "make_vec_env": Walk(
+        played,
+        {
+            "eyes": Eyes(**{**PERFECT, "fov_deg": 90.0}),
+            "n_envs": 3,
+            "seed": 5,
+            "memory": 2,
+            "mode": With("evaluation", {"steps": 40}),
+            "rays_per_receptor": With(3, {"rays_per_receptor": 1}),
+            "fidelity": Fidelity(3, bands=3),
+            "world_seed": With(2, {"task": "maze"}),
+            "mazes": With(3, {"task": "maze", "n_envs": 6}),
+            "course": With("long", {"task": "navigation"}),
+            "least_return": With(-0.01, {"steps": 30}),
+            "episode_steps": With(2, {"steps": 4}),
+            "spectra": {"light_0": "A"},
+            "vary": {"light": (0.1, 0.5)},
+            "auxiliary": ("depth",),
+            "render_mode": "eyes",
+        },
+    ),
+    "Eyes": Walk(
+        looked,
+        {
+            "n_eyes": 2,
+            "resolution": (3, 4),
+            "fov_deg": 90.0,
+            "placement_range_deg": With(90.0, {"n_eyes": 2}),
+            "optics": PUPIL,
+            "sensor_width": With(3e-4, {"optics": PUPIL}),
+            "noise_sigma": 0.2,
+            "bands": 4,
+            "receptors": "honeybee",
+            "photon_budget": optics.PhotonBudget(100.0),
+            "waveguide": With(optics.Waveguide(2e-6), {"optics": PUPIL, "resolution": (2, 2)}),
+            "pupil_turned": With(
+                True,
+                {"optics": optics.Pupil(20e-6, wavefront=optics.Zernike({(1, 1): 4.0}), thin_lens_focal_length=240e-6)},
+            ),
+            "vertical_fov_deg": 30.0,
+        },
+    ),
+    "build_world": Walk(
+        world,
+        {
+            "seed": 3,
+            "mazes": 2,
+            "course": With("long", {"task": "navigation"}),
+            "eyes": Eyes(),
+            "spectra": {"wall": "foliage"},
+        },
+    ),
+    "make_env": Walk(
+        lambda **given: sim.make_env("detection", rays_per_receptor=1, **given).observation_space.spaces.__repr__(),
+        {"eyes": Eyes(resolution=(3, 3))},
+    ),
+    "make_parallel_env": Walk(met, {"seed": 3, "memory": 2, "render_mode": "eyes"}),
+    "Course": Walk(
+        lambda **given: sim.build_world("navigation", course=sim.Course(DRAWING, **given)).episode_steps,
+        {"episode_steps": 7},
+    ),
+}
+DRAWING = "\n".join(["#" * 9, "#.......#", "#.S.....#", "#.......#", "#" * 9])
+ON_MODELS = {
+    "Mount": Walk(
+        lambda **given: rendered(Mount(given.pop("on", "eye"), **given)),
+        {
+            "azimuth_deg": 10.0,
+            "elevation_deg": 10.0,
+            "roll_deg": 30.0,
+            "offset": (0.0, 0.0, 0.2),
+            "kind": With("body", {"on": "ball", "elevation_deg": -30.0, "offset": (0.3, 0.0, 0.0)}),
+        },
+    ),
+    "fan": Walk(
+        lambda **given: [str(mount) for mount in sim.fan(Mount("eye"), 2, 60.0, **given)], {"elevation_deg": 9.0}
+    ),
+    "ModelRenderer": Walk(
+        rendered,
+        {
+            "n_envs": 2,
+            "fidelity": Fidelity(3, bands=3),
+            "groups": (0, 1, 2, 3),
+            "spectra": {"lamp": "A"},
+            "varied": NoEffect("it allows `Poses` with varied values: tests/sim/scene change them"),
+            "tracer": NoEffect("all tracers give the same signals: tests/sim/tracing compare them"),
+        },
+    ),
+    "ModelRenderer.signals": Walk(
+        lambda **given: sim.ModelRenderer(MODEL, EYE, [Mount("eye")], fidelity=RAYS).signals([DATA], **given),
+        {"light": np.full((1, 3), 0.5)},
+    ),
+    "choose_model_fidelity": Walk(
+        lambda **given: sim.choose_model_fidelity(
+            *(MODEL, EYE, [Mount("eye")], [DATA, MOVED]), **{"tolerance": 0.05, **given}
+        ),
+        {
+            "tolerance": 0.3,
+            "groups": NoEffect("as in ModelRenderer"),
+            "spectra": NoEffect("as in ModelRenderer"),
+            "varied": NoEffect("as in ModelRenderer"),
+            "light": "bounce",
+        },
+    ),
+    "View": Walk(
+        written,
+        {
+            "wavelengths_nm": np.array([600.0]),
+            "radiance": np.zeros((1, 2, 2)),
+            "receptors": With(np.ones((2, 2, 2)), {"peaks_nm": None}),
+            "rgb": np.ones((2, 2, 3)),
+            "attributes": {"seed": 3},
+            "peaks_nm": With(
+                (500.0, 400.0), {"radiance": None, "wavelengths_nm": np.empty(0), "receptors": np.ones((2, 2, 2))}
+            ),
+            "reflectance": np.full((1, 2, 2), 0.2),
+        },
+    ),
+    "write_exr": Walk(written, {"pixel_aspect": 2.0}),
+    "read_exr": Walk(lambda **given: outcome(lambda: sim.read_exr("view.exr", **given)), {"most_bytes": 10}, {}),
+}
+# Other tests change each of these arguments, because a call takes seconds or is a part of a larger one.
+ELSEWHERE = {
+    name: Walk(dict, dict.fromkeys(names, NoEffect(where)))
+    for name, names, where in (
+        ("BatchedRenderer", ("fidelity", "tracer"), "tests/sim/render"),
+        ("BatchedRenderer.launch", ("light",), "as ModelRenderer.signals"),
+        ("BatchedRenderer.launch_some", ("light",), "as ModelRenderer.signals"),
+        ("BatchedRenderer.signals", ("light",), "as ModelRenderer.signals"),
+        ("ModelRenderer.launch", ("light",), "as ModelRenderer.signals"),
+        ("ModelRenderer.launch_some", ("light",), "as ModelRenderer.signals"),
+        ("Fidelity", ("depth", "levels", "light", "samples", "tolerance"), "tests/sim/render: they describe a choice"),
+        ("Frozen", ("policy",), "tests/sim/envs"),
+        ("Mirror.render", ("integrator", "sampler", "seed", "spp", "wavelengths"), "tests/sim/scene"),
+        ("mirror", ("bodies", "data", "groups", "spectra", "variant"), "tests/sim/scene"),
+        ("Outcome", ("changed", "failure", "info", "over", "proprioception"), "tests/sim/tasks"),
+        (
+            "Poses",
+            ("geom_matid", "geom_rgba", "geom_size", "heights", "light_active", "light_diffuse", "mat_emission"),
+            "tests/sim/scene",
+        ),
+        (
+            "ReferenceRenderer",
+            ("depth_layers", "depths", "integrator", "sampler", "samples_per_receptor", "seed", "spp", "variant"),
+            "tests/sim/render: it is the reference of other renderers",
+        ),
+        ("SlidingAgents", ("threads", "variation"), "tests/sim/physics; threads changes only the speed"),
+        ("World", ("alone", "episode_steps", "mazes", "spectra", "training_starts"), "build_world sets them"),
+        ("check_batch_task", ("n_envs", "steps"), "tests/sim/envs: it returns nothing"),
+        ("choose_fidelity", ("bands", "tolerance", "tracer"), "tests/sim/render"),
+    )
+}
+ELSEWHERE["Poses"].changes.update(dict.fromkeys(("mat_rgba", "others"), NoEffect("tests/sim/scene")))
+TABLE = {**IN_WORLDS, **ON_MODELS, **ELSEWHERE}
+
+
+def outcome(call):
+    """Return the result of a call in words, or its error."""
+    try:
+        return str(type(call()))
+    except ValueError as error:
+        return str(error)
+
+
+@pytest.fixture(autouse=True)
+def _in_a_new_folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    written()
+    assert os.path.exists("view.exr")
+
+
+def test_the_table_names_every_optional_argument():
+    assert missing(sim, TABLE) == []
+
+
+QUICK = ("View", "write_exr", "read_exr", "fan", "Course", "build_world")
+
+
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(name, marks=[] if name in QUICK else [pytest.mark.slow]) for name in {**IN_WORLDS, **ON_MODELS}],
+)
+def test_every_argument_changes_a_result(name):
+    assert TABLE[name].unchanged() == []
