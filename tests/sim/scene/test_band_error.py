@@ -1,6 +1,7 @@
 """The error of measured colours in a few bands is predicted before rendering."""
 
 import warnings
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -59,21 +60,15 @@ def test_a_renderer_says_what_its_bands_are_worth():
     assert len(measured(world.model, world.spectra)) == 2
     grey = sim.build_world("detection")
     assert measured(grey.model, grey.spectra) == []
-    few, many = (
-        sim.BatchedRenderer(
-            world, sim.Eyes(1, (2, 2), receptors="honeybee", bands=bands, noise_sigma=NOISY), 1
-        ).fidelity.levels[0]
-        for bands in (4, 16)
-    )
+    bees = sim.Eyes(1, (2, 2), receptors="honeybee", noise_sigma=NOISY)
+    few, many = (sim.BatchedRenderer(world, replace(bees, bands=n), 1).fidelity.levels[0] for n in (4, 16))
     assert few.predicted_error == pytest.approx(band_error(PETALS, "honeybee", 4))
     assert many.predicted_error < few.predicted_error / 5
     half = optics.Pupil(50e-6, thin_lens_focal_length=241e-6)
-    dim = sim.Eyes(1, (2, 2), receptors="honeybee", optics=half, noise_sigma=NOISY)
-    behind = sim.BatchedRenderer(world, dim, 1).fidelity.levels[0].predicted_error
+    behind = sim.BatchedRenderer(world, replace(bees, optics=half), 1).fidelity.levels[0].predicted_error
     assert behind == pytest.approx(few.predicted_error / 4), "the pupil transmits a quarter of the light"
-    plain = sim.Eyes(1, (2, 2), noise_sigma=NOISY)
-    grey = sim.BatchedRenderer(sim.build_world("detection"), plain, 1).fidelity.levels[0]
-    assert grey.predicted_error is None
+    eyes = sim.Eyes(1, (2, 2), noise_sigma=NOISY)
+    assert sim.BatchedRenderer(grey, eyes, 1).fidelity.levels[0].predicted_error is None
 
 
 class TestLampsWithLines:
