@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from optics.apertures.aperture import Nodes
 from optics.apertures.circular import Circle
+from optics.elements.beam import Beam
 from optics.methods.problem import Problem
 from optics.numerics.arguments import reals, shown
 from optics.numerics.autodiff import Array, number, plain
@@ -54,7 +58,7 @@ def _not_evanescent(result: PSFResult) -> tuple[Array, np.ndarray]:
     the relief bends beyond grazing is evanescent, too.
 
     If this estimate is too uncertain, and the pupil is at most some wavelengths wide, the spectrum of the light behind
-    the pupil is summed instead. Derivatives are always those of the estimate.
+    the pupil is summed instead.
     """
     import drjit as dr
 
@@ -66,12 +70,12 @@ def _not_evanescent(result: PSFResult) -> tuple[Array, np.ndarray]:
         x, y = (types.Float64(np.ascontiguousarray(at)) for at in outline.points().T)
         rim = dr.mean(dr.square(pupil.amplitude(x, y, types))) / light
     edge = wavelength * ratio / opaque(types, pupil.aperture_radius) * rim
-    tilted, bent = np.ones(len(result.wavelengths)), np.zeros((2, len(result.wavelengths)))
+    tilted, bent = types.Float(1.0), np.zeros((2, len(result.wavelengths)))
     if result.can_recompute:
         tilted = _mean(result, [_at_edge(request) for request in result.requests])
-        bent = _mean(result, [_bent_beyond_grazing(request) for request in result.requests]).T
-    doubt = np.minimum(edge.numpy() * (tilted - 1), 0.5)
-    edge = dr.minimum(edge * types.Float(tilted), 0.5)
+        bent = _mean_number(result, [_bent_beyond_grazing(request) for request in result.requests]).T
+    doubt = np.minimum(edge.numpy() * (tilted.numpy() - 1), 0.5)
+    edge = dr.minimum(edge * tilted, 0.5)
     found = (1 - edge) * types.Float(1 - bent[0]) * light
     unsure = number(light) * (np.square(edge.numpy()) + doubt + bent[1])
     if not result.can_recompute or float(unsure.max()) <= SURE:
@@ -79,38 +83,49 @@ def _not_evanescent(result: PSFResult) -> tuple[Array, np.ndarray]:
     sums = [_summed(request, float(unsure.max())) for request in result.requests]
     if any(one is None for one in sums):
         return found, unsure
-    exact = _mean(result, sums)
-    return found * types.Float(exact / found.numpy()), np.minimum(unsure, SURE)
+    return _mean(result, [one for one in sums if one is not None]), np.minimum(unsure, SURE)
 
 
-def _mean(result: PSFResult, values: list[Any]) -> np.ndarray:
+def _mean(result: PSFResult, values: Sequence[Array]) -> Array:
     """Return one value per wavelength, from one value per request."""
+    import drjit as dr
+
+    types = precision("float64")
+    found = types.Float(values[0]) if len(values) == 1 else dr.concat([types.Float(one) for one in values])
+    return found if result.shares is None else dr.sum(found * types.Float(np.asarray(result.shares)))
+
+
+def _mean_number(result: PSFResult, values: Sequence[Any]) -> np.ndarray:
+    """Return the same as `_mean`, of numbers or of tuples of numbers."""
     found = np.array(values)
     return found if result.shares is None else np.atleast_1d(result.shares @ found)
 
 
-def _at_edge(request: Request) -> float:
+def _at_edge(request: Request) -> Array:
     """Return the factor on the evanescent light of an edge that is due to the directions of rays at the edge.
 
     In units of 1/λ, the light at a point of the edge is spread along the line s + t n, where s is the frequency of the
     ray, and n the normal of the edge. Its power is proportional to 1/t². The line leaves the unit circle at t = -s·n ±
     √((s·n)² + 1 - s²), beyond which lies √((s·n)² + 1 - s²) / (1 - s²) times the power for s = 0.
     """
-    beam, outline = request.beam, request.problem.aperture.outline
-    places, types = outline.points(), precision("float64")
-    step, radius = 1e-4, request.problem.radius
+    import drjit as dr
 
-    def waves(dx: float, dy: float) -> np.ndarray:
-        x, y = (types.Float64(padded_for_packets(at * radius)) for at in (places + np.array([dx, dy])).T)
-        return plain(beam.waves(x, y, types))
+    beam, types = request.beam, precision("float64")
+    places = request.problem.aperture.outline.points()
+    step, radius = 1e-4, opaque(types, beam.pupil.aperture_radius)
+
+    def waves(dx: float, dy: float) -> Array:
+        x, y = (types.Float64(padded_for_packets(at)) for at in (places + np.array([dx, dy])).T)
+        return beam.waves(x * radius, y * radius, types)
 
     per_wave = request.problem.wavelength / (2 * step * radius)
     sx, sy = ((waves(dx, dy) - waves(-dx, -dy)) * per_wave for dx, dy in ((step, 0.0), (0.0, step)))
     along = np.roll(places, -1, axis=0) - np.roll(places, 1, axis=0)
-    length = np.maximum(np.hypot(*along.T), 1e-300)
-    square = np.minimum(sx * sx + sy * sy, STEEPEST)
-    normal = np.minimum(np.square((sx * along[:, 1] - sy * along[:, 0]) / length), square)
-    return float(np.mean(np.sqrt(normal + 1 - square) / (1 - square)))
+    unit = along / np.maximum(np.hypot(*along.T), 1e-300)[:, None]
+    along_x, along_y = (types.Float64(padded_for_packets(at)) for at in unit.T)
+    square = dr.minimum(sx * sx + sy * sy, STEEPEST)
+    normal = dr.minimum(dr.square(sx * along_y - sy * along_x), square)
+    return dr.mean(dr.sqrt(normal + 1 - square) / (1 - square))
 
 
 def _bent_beyond_grazing(request: Request) -> tuple[float, float]:
@@ -126,7 +141,7 @@ def _bent_beyond_grazing(request: Request) -> tuple[float, float]:
     return float(np.mean(sine >= 1)), float(np.mean(steep))
 
 
-def _summed(request: Request, unsure: float = 1.0) -> float | None:
+def _summed(request: Request, unsure: float = 1.0) -> Array | None:
     """Return the fraction of the pupil's light at frequencies below 1/λ; None if the sum is too long.
 
     unsure: uncertainty of the estimate. The sum may take longer if it is large.
@@ -149,34 +164,92 @@ def _summed(request: Request, unsure: float = 1.0) -> float | None:
     nodes = aperture.nodes(phase, DIGITS)
     if len(nodes.weight) * len(seen.weight) > most:
         return None
-    types = precision("float64")
-    x, y = (types.Float64(padded_for_packets(at)) for at in (nodes.x, nodes.y))
-    waves, u = (
-        beam.waves(x * problem.radius, y * problem.radius, types),
-        types.Float64(padded_for_packets(nodes.weight)),
-    )
-    if beam.pupil.mask is not None:
-        u = u * beam.pupil.amplitude(x, y, types)
-    spectrum = _spectrum(x, y, waves, u, *(highest * at for at in (seen.x, seen.y)))
-    return float((spectrum @ seen.weight) * highest**2 / aperture.area)
+    return _Sum(nodes.x, nodes.y, nodes.weight, seen).fraction(beam, problem.wavelength) / aperture.area
 
 
-def _spectrum(x: Array, y: Array, waves: Array, u: Array, fx: np.ndarray, fy: np.ndarray) -> np.ndarray:
-    """Return |Σ u exp(2πi (waves - fx x - fy y))|² at every frequency (fx, fy)."""
+@dataclass(frozen=True)
+class _Sum:
+    """Sum of the power spectrum behind a pupil over frequencies inside a circle.
+
+    x, y, weight: nodes of the pupil, in units of its radius R
+    seen: nodes of the unit circle of frequencies, in units of 1/λ
+    """
+
+    x: np.ndarray
+    y: np.ndarray
+    weight: np.ndarray
+    seen: Nodes
+
+    def fraction(self, beam: Beam, wavelength: float) -> Array:
+        """Return h² Σ w |Σ u exp(2πi (W - h (sx x + sy y)))|², with h = R/λ and the waves W of the beam.
+
+        Derivatives come from the adjoint of the sum, which has as many terms as the sum itself.
+        """
+        import drjit as dr
+
+        types = precision("float64")
+        x, y, u = (types.Float64(padded_for_packets(at)) for at in (self.x, self.y, self.weight))
+        sx, sy, w = (types.Float64(padded_for_packets(at)) for at in (self.seen.x, self.seen.y, self.seen.weight))
+        radius = opaque(types, beam.pupil.aperture_radius)
+        h, waves = radius / wavelength, beam.waves(x * radius, y * radius, types)
+        if beam.pupil.mask is not None:
+            u = u * beam.pupil.amplitude(x, y, types)
+        at, steady = (h, waves, u), [dr.detach(one) for one in (h, waves, u)]
+        with dr.suspend_grad():
+            turns, size = steady[0], steady[2]
+            re, im = _sums((turns * sx, turns * sy, 1.0), (x, y, steady[1], size, 0 * size))
+            total = dr.sum(w * (re * re + im * im)) * turns * turns
+        if not any(map(dr.grad_enabled, at)):
+            return total
+        with dr.suspend_grad():
+            slopes = self._slopes(steady, (x, y, sx, sy), (w * re, -w * im), total)
+        return total + sum((dr.sum(slope * (a - b)) for slope, a, b in zip(slopes, at, steady, strict=True)), 0.0)
+
+    @staticmethod
+    def _slopes(at: Sequence[Array], places: Sequence[Array], back: Sequence[Array], total: Array) -> tuple[Array, ...]:
+        """Return the derivatives of the sum by h, by the waves and by the amplitudes of the nodes.
+
+        at: h, waves and amplitudes · places: x, y of the nodes, sx, sy of the frequencies
+        back: w times the conjugate of the spectrum at each frequency, real and imaginary part
+        """
+        import drjit as dr
+
+        (h, waves, u), (x, y, sx, sy) = at, places
+        # The sum over frequencies has the opposite roles of nodes and frequencies, and the sign of the phase is kept.
+        re, im = _sums((h * x, h * y, 0.0), (sx, sy, 0 * sx, *back))
+        re, im = _turned(re, im, waves)
+        along_x = _turned(*_sums((h * x, h * y, 0.0), (sx, sy, 0 * sx, sx * back[0], sx * back[1])), waves)
+        along_y = _turned(*_sums((h * x, h * y, 0.0), (sx, sy, 0 * sx, sy * back[0], sy * back[1])), waves)
+        factor = 4 * math.pi * h * h * u
+        by_h = dr.sum(factor * (x * along_x[1] + y * along_y[1])) + 2 * total / h
+        return by_h, -factor * im, 2 * h * h * re
+
+
+def _turned(re: Array, im: Array, turns: Array) -> tuple[Array, Array]:
+    """Return (re + i im) exp(2πi turns)."""
     import drjit as dr
 
-    types, count = precision("float64"), dr.width(u)
-    to_x, to_y = (types.Float64(padded_for_packets(at)) for at in (fx, fy))
-    with dr.suspend_grad():
-        dr.eval(x, y, waves, u, to_x, to_y)
+    sin, cos = dr.sincos(2 * math.pi * (turns - dr.round(turns)))
+    return re * cos - im * sin, re * sin + im * cos
 
-        def add(j: Array, re: Array, im: Array) -> tuple[Array, Array, Array]:
-            at_x, at_y, along, size = (dr.gather(types.Float64, part, j) for part in (x, y, waves, u))
-            turns = along - at_x * to_x - at_y * to_y
-            sin, cos = dr.sincos(types.Float64(2 * math.pi) * (turns - dr.round(turns)))
-            return j + 1, re + size * cos, im + size * sin
 
-        start, zero = dr.zeros(types.Index, len(fx)), dr.zeros(types.Float64, len(fx))
-        last = dr.opaque(types.Index, count)
-        _, re, im = dr.while_loop((start, zero, zero), lambda j, re, im: j < last, add, max_iterations=-1)
-        return np.asarray((re * re + im * im).numpy())
+def _sums(to: tuple[Array, Array, float], of: Sequence[Array]) -> tuple[Array, Array]:
+    """Return the real and imaginary part of Σ (a + ib) exp(2πi (c W - fx x - fy y)) at every (fx, fy).
+
+    to: fx, fy (point,), and the factor c · of: x, y, W, a, b (term,)
+    """
+    import drjit as dr
+
+    types, count = precision("float64"), dr.width(of[3])
+    dr.eval(*to, *of)
+
+    def add(j: Array, re: Array, im: Array) -> tuple[Array, Array, Array]:
+        x, y, along, a, b = (dr.gather(types.Float64, part, j) for part in of)
+        turns = to[2] * along - x * to[0] - y * to[1]
+        sin, cos = dr.sincos(types.Float64(2 * math.pi) * (turns - dr.round(turns)))
+        return j + 1, re + a * cos - b * sin, im + a * sin + b * cos
+
+    start, zero = dr.zeros(types.Index, dr.width(to[0])), dr.zeros(types.Float64, dr.width(to[0]))
+    last = dr.opaque(types.Index, count)
+    _, re, im = dr.while_loop((start, zero, zero), lambda j, re, im: j < last, add, max_iterations=-1)
+    return re, im

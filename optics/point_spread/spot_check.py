@@ -100,10 +100,16 @@ def spot_check(beam: Beam, problem: Problem, image: np.ndarray, seconds: float) 
     if squared > 0.01 * total:
         total = min(total, float(np.mean(np.square(exact) / chance)))
     rounding = max(FLOAT_NOISE["float64"], float(np.finfo(precision(problem.dtype).dtype).eps))
-    # The last two terms are errors of the direct sum itself: quadrature to `digits` digits, relative to the amplitude
-    # of all light in phase (twice that for the intensity), and the rounding of paths.
-    shared = 2 * 10.0 ** (darkness - reference.digits) + path_rounding(problem, darkness)
-    return CAUTION * math.sqrt(squared / total) + rounding + shared
+    return CAUTION * math.sqrt(squared / total) + rounding + _own_error(problem, reference, darkness)
+
+
+def _own_error(problem: Problem, reference: _DirectSum, darkness: float) -> float:
+    """Return the relative error of the intensity that the direct sum itself has.
+
+    It has two causes: quadrature to `digits` digits, relative to the amplitude of all light in phase (twice that for
+    the intensity), and the rounding of paths.
+    """
+    return 2 * 10.0 ** (darkness - reference.digits) + path_rounding(problem, darkness)
 
 
 def path_rounding(problem: Problem, darkness: float) -> float:
@@ -181,8 +187,7 @@ def exact_psf(
     reference = _affordable(beam, problem, darkness, seconds)
     if problem.reach is not None or reference.points < min(x.size, math.prod(problem.window.shape)):
         return None
-    error = 2 * 10.0 ** (darkness - reference.digits) + path_rounding(problem, darkness)
-    return _at_points(beam, problem, reference, x, y), error
+    return _at_points(beam, problem, reference, x, y), _own_error(problem, reference, darkness)
 
 
 def _exact(beam: Beam, problem: Problem, reference: _DirectSum, drawn: np.ndarray) -> np.ndarray:

@@ -281,6 +281,6 @@ OF_PARTS = {
     "PSFResult.recompute_on": Walk(bright, {"waves": INTERNAL}),
     "PSFResult": Walk(bright, dict.fromkeys(("centre", "requests", "shares", "field_parts"), SAME)),
     "MTF": Walk(bright, dict.fromkeys(("centre", "causes"), SAME)),
-    "Plan": Walk(bright, dict.fromkeys(("seconds", "options", "padding", "scalar_error"), SAME)),
+    "Plan": Walk(bright, dict.fromkeys(("seconds", "options", "padding", "scalar_error", "derivative_error"), SAME)),
     "VectorFocus": Walk(bright, {"towards": SAME}),
 }

@@ -47,7 +47,11 @@ NAMED = (
             "2 * 10.0 ** (darkness - reference.digits)",
             "2 * 10.0 ** (-reference.digits)",
         ),
-        ("the direct sum's own error is included", "shared = 2 * 10.0 ** (darkness - reference.digits)", "shared = 0"),
+        (
+            "the direct sum's own error is included",
+            "+ rounding + _own_error(problem, reference, darkness)",
+            "+ rounding",
+        ),
     ),
     *_mutants("optics/eye/kernel_interpolation.py", ("negative differences count", "in (1, -1)))", "in (1, 1)))")),
     *_mutants(

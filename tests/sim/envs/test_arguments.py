@@ -38,6 +38,8 @@ ARGUMENTS = {
     "world_seed": (1, CHANGES, LAYOUT),
     "mazes": (2, CHANGES, LAYOUT),
     "course": ("long", CHANGES, LAYOUT),
+    "layouts": (sim.LayoutFamily(seed=1, n_training=1, n_selection=1, n_test=1).training, CHANGES, LAYOUT),
+    "wall_height": (0.5, CHANGES, LAYOUT),
     "least_return": (-1e-3, CHANGES, CHANGES),
     "episode_steps": (1, CHANGES, CHANGES),
     "spectra": ({"wall": "foliage"}, CHANGES, f"{SET} spectra"),
@@ -47,7 +49,7 @@ ARGUMENTS = {
 }
 GIVEN = {"n_envs": 1, "seed": 0}
 # Tasks in which an argument has an effect. Detection has one layout, and only navigation has courses.
-TASKS = {"world_seed": "maze", "mazes": "maze", "course": "navigation"}
+TASKS = {"world_seed": "maze", "mazes": "maze", "course": "navigation", "layouts": "maze", "wall_height": "maze"}
 OF_ONE_WORLD = {
     "n_envs": "this is one world: make_vec_env has several",
     "seed": r"pass it to reset\(seed=...\)",
