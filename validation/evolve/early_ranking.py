@@ -10,11 +10,11 @@ halving saves time only if the early order resembles the final order. For this t
 x 1 to 15 x 15 receptors behind a perfect lens are drawn from the genome. They learn detection over four rungs, as in an
 evolutionary run, but no animal is stopped at a rung.
 
-**First table.** The table compares the order of the animals on each rung with their order on the last rung, by the same
-number of episodes. Cells state Spearman's rank correlation, and its 90 % confidence interval from a bootstrap over
-animals. In the column "32 episodes", animals are ordered by the fitness that a run uses, from the evaluation episodes
-of each rung. In the column "128 episodes", they are ordered by the fitness of the same policies in more episodes, in
-other worlds. The last line compares the two measures of fitness on the last rung.
+**First table.** The table compares the order of the animals on each rung with their order on the last rung, with
+fitness from the same number of episodes on both. Cells state Spearman's rank correlation, and its 90 % confidence
+interval from a bootstrap over animals. In the column "32 episodes", animals are ordered by the fitness that a run uses,
+from the evaluation episodes of each rung. In the column "128 episodes", they are ordered by the fitness of the same
+policies in more episodes, in other worlds. The last line compares the two measures of fitness on the last rung.
 
 **Second table.** The table lists possible schedules of successive halving, applied to these animals as one generation.
 "CPU time" is relative to training all animals to the end. The last two columns state the final rank of the animal that

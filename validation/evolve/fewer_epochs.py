@@ -16,10 +16,11 @@ detection and tracking the animals have two eyes of 8 x 8 receptors, in navigati
 on the same machine, which did other work as well.
 
 **Table.** "runs" is the number of training runs of each kind. "return" is the mean over all evaluations (96 episodes
-every 50,000 steps), which measures the area under the learning curve. Arrows lead from a constant to a falling number
-of epochs. Differences have standard errors over the training runs. "CPU s" is the CPU time of a whole training run,
-evaluations included. The figure shows CPU time within a training run, computed from the two totals and the number of
-epochs.
+every 50,000 steps), which measures the area under the learning curve. "goal first" is the fraction of the final
+evaluation's episodes in which the goal is reached, and reached before any adversary. Arrows lead from a constant to a
+falling number of epochs. Differences have standard errors over the training runs. "CPU s" is the CPU time of a whole
+training run, evaluations included. The figure shows CPU time within a training run, computed from the two totals and
+the number of epochs.
 
 **Bounds.** No task's mean return falls by more than two standard errors, and CPU time falls by at least a twentieth.
 

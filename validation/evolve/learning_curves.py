@@ -16,9 +16,9 @@ is the fraction of this time that the updates take. Brackets contain the 95 % co
 if it reaches an object at all, this object is the goal in one of three cases.
 
 **Second table.** For the maze, the table states the distance from the start at which an episode ends, and the return of
-the episode. The return is 0.25 per metre, minus 1 for every action in contact with a wall. The fitness is 1.5 per
-metre, minus 2 for every such action. Means have 95 % confidence intervals. The stated width of the interval of the
-fitness is an upper bound, so the actual interval may be narrower.
+the episode. The return is 0.25 per metre of this distance, minus 1 for every action in contact with a wall. The fitness
+is 1.5 per metre, minus 2 for every such action. Means have 95 % confidence intervals. The stated width of the interval
+of the fitness is an upper bound, so the actual interval may be narrower.
 
 An animal that stands still earns 0, and an animal with one eye learns little more than to stand still. Animals with ten
 eyes travel. They travel farther than a hand-written controller that receives the true distances of the walls in eleven

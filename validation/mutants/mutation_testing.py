@@ -6,9 +6,9 @@ change nothing that a user could see and do not count.
 
 **Method.** Examples of mistakes are a changed sign or comparison, a bound that is off by one, an omitted check or call,
 swapped axes or arguments, or a maximum instead of a minimum. For each mutant the nearest tests are run. The
-`__init__.py` of each test folder names these tests for each module (for example `tests/optics/methods/__init__.py`). In
-each test file the quickest tests run first, for about twenty seconds. A mutant is killed if one of these tests fails,
-hangs or crashes.
+`__init__.py` of each test folder names these tests for each module (for example `tests/optics/methods/__init__.py`).
+From each test file, only the quickest tests are run, up to a total of about twenty seconds. A mutant is killed if one
+of these tests fails, hangs or crashes.
 
 The first mutants are those in `validation/mutants/named_mutants.py`, which contain mistakes that no test had noticed at
 first. The others are drawn evenly from all places in the three packages where such a mistake can be made. Some mutants

@@ -16,9 +16,9 @@ below one wave, is converted to float32. Long distances alone therefore do not r
 **Second table.** In `optics`, the limit of float32 is a dark window. The rounding error is a fixed fraction of the
 pupil's light, and a window far from the focus receives so little of that light that the error matters. Here the source
 of an ideal lens (R = 50 µm, f = 0.5 mm) moves off the axis while the window stays on it. Every PSF is compared with the
-direct sum at a few of its points. If the error at these points exceeds the tolerance, the PSF is computed again with
-more digits. If that does not help, an `AccuracyError` is raised that names the dtype ("refused" in the table). With
-float64, the tolerance is still reached in these windows.
+direct sum at a few of its points. If the error at these points exceeds the tolerance, the PSF is computed again with a
+smaller tolerance or by an exact method. If that does not help, an `AccuracyError` is raised that names the dtype
+("refused" in the table). With float64, the tolerance is still reached in these windows.
 
     python -m validation.optics.float32_precision [--out DIR] [--docs DIR]
 """

@@ -30,8 +30,8 @@ instead. The inputs are:
 - windows so close that light reaches them only at grazing angles;
 - cases that need more than 4 GB of memory, or more than 60 s.
 
-The last three kinds of input raise an `AccuracyError`, which is a `ValueError`. A tolerance of 0 raises a plain
-`ValueError`.
+The last two kinds of input, and a tolerance below what the dtype allows, raise an `AccuracyError`, which is a
+`ValueError`. A tolerance of 0 raises a plain `ValueError`.
 
     python -m validation.optics.limiting_cases [--out DIR] [--docs DIR]
 """

@@ -7,9 +7,10 @@ mask. The mask is accurate for slopes below 10°, and for lenses below NA = 1.16
 the propagation behind the mask, but not this choice of model. Rays through the real surface show the effects that the
 mask omits. The rays follow Snell's law and come from inside the glass of n = 1.5 (`validation/optics/refraction.py`):
 
-- **Refraction at a slope.** A prism of angle α deviates light by arcsin(n sin α) - α, the mask by arcsin((n - 1) tan
-  α). The deviation by the mask is 1 % too small at α = 11° and 10 % too small at 30°. It does not depend on the side
-  from which the light comes.
+- **Refraction at a slope.** A prism of angle α deviates light that leaves through its slope ("glass first" in the
+  table) by arcsin(n sin α) - α, the mask by arcsin((n - 1) tan α). The deviation by the mask is 1 % too small at α =
+  11° and 10 % too small at 30°. It does not depend on the side from which the light comes, unlike that of the prism
+  ("relief first": light enters through the slope).
 - **Total reflection.** Beyond a slope of 41.8° no light leaves the glass, but the mask transmits light up to 63°. The
   slope of a lens that consists of one relief therefore cannot exceed 41.8°, so its NA is at most 0.45. The mask has no
   such limit.
