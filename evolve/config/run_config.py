@@ -68,7 +68,8 @@ class RunConfig:
     """All settings that determine the outcome of a run, and the number of its processes.
 
     task: one of TASKS, or FILE.py:CLASS of a user task
-    code: code of the user task, if the user has named it; code that the user has not named is never executed
+    code: code of the user task, if the user has named the task in the command or call; code that only a file names is
+        never executed
 
     Raises:
         ConfigError: settings contradict each other.

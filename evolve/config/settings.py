@@ -86,14 +86,14 @@ class WorldConfig:
 
     @property
     def test(self) -> dict[str, Any]:
-        """Arguments of `sim.build_world` that define the worlds of final figures.
+        """Arguments of `sim.build_world` that define the worlds of final results ("test").
 
-        Without a family, they are those in which fitness is evaluated.
+        Without a family of layouts, these are the worlds in which fitness is evaluated.
         """
         return {**self.evaluation, **self._walls("test")}
 
     def _walls(self, name: str) -> dict[str, Any]:
-        """Return the height of the walls, and the set of this name if there is a family."""
+        """Return the height of the walls, and the family's set of layouts of this name (None without a family)."""
         layouts = None
         if self.layouts == FAMILY:
             from sim.worlds.layout_family import LayoutFamily  # loads MuJoCo, which `evolve list` does not need

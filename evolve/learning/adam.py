@@ -1,4 +1,4 @@
-"""Adam on a single vector of all weights, so that a step needs a few operations in total instead of for each tensor.
+"""Adam on a single vector of all weights. A step therefore needs only a few operations, not a few for each tensor.
 
 torch.optim would need ten times as many calls. Its first use also imports torch's compiler, which takes seconds in
 every worker process.

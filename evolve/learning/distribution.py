@@ -1,4 +1,4 @@
-"""Distribution of a policy's actions: normal, with means whose gradients stay within the bounds."""
+"""Distribution of a policy's actions: normal, with means that no gradient moves further beyond the bounds."""
 
 from __future__ import annotations
 

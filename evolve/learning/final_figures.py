@@ -1,4 +1,4 @@
-"""Final figures: the returns of a trained policy in layouts that neither its training nor its selection has used."""
+"""Final results: the returns of a trained policy in layouts that neither its training nor its selection has used."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Connection to a Dask scheduler. No call waits for longer than the patience without a sign of life."""
+"""Connection to a Dask scheduler. No call waits longer than `patience_s` for a sign of life."""
 
 from __future__ import annotations
 

@@ -84,7 +84,7 @@ class Run:
         """Open a run directory.
 
         task: "FILE.py:CLASS", if the run has a user task. The code of a user task is executed only if the task is named
-            here. It is needed to continue the run and to let its animals play.
+            here. The code is needed to continue the run and to let its animals play.
         before_damage: True to use only the lines of the record before the first damaged line, if there is one
 
         Raises:

@@ -1,4 +1,4 @@
-"""Versions of the software, the machine and fingerprints of the settings, recorded at each start of a run."""
+"""Record of each start of a run: software versions, the machine, and fingerprints of the settings."""
 
 from __future__ import annotations
 

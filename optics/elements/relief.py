@@ -191,7 +191,7 @@ class HeightMap(Relief):
 
     @property
     def jump(self) -> float:
-        """Largest step [m] between neighbours; 0 if it is at most half the span, unlike that of a wrapped lens."""
+        """Largest step [m] between neighbours if it exceeds half the span, as in a wrapped lens; else 0."""
         many = len(self._heights) >= FEWEST_FOR_JUMPS
         steepest = max(np.abs(np.diff(self._heights, axis=axis)).max() for axis in (0, 1)) if many else 0.0
         return float(steepest) if steepest > self.span / 2 else 0.0

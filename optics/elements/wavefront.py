@@ -85,7 +85,8 @@ class Zernike(Aberration):
     Webb, J. Refract. Surg. 18, S652, 2002.
 
     coefficients_um: {(n, m): [µm]}, or a vector [µm] by the index j = (n(n + 2) + m)/2, piston first.
-    radius: radius [m] of the circle to which the coefficients refer, at least the pupil's radius. None: this radius.
+    radius: radius [m] of the circle to which the coefficients refer, at least the pupil's radius. None: the pupil's
+        radius.
 
     A Dr.Jit vector, or Dr.Jit numbers in a dictionary, carry derivatives.
 
@@ -160,7 +161,7 @@ class Zernike(Aberration):
         return max(1.0, self.order / 2) if self.span > level or self.asks else 0.0
 
     def detail(self, level: float, part: float = 1.0) -> float:
-        """Return 0: a mode has only n/2 cycles, and its slopes require higher frequencies, in proportion to n²."""
+        """Return 0, because a mode has only n/2 cycles. Its slopes cause higher frequencies, in proportion to n²."""
         return 0.0
 
     @property

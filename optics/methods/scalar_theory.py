@@ -2,7 +2,7 @@
 
 Let the unit vectors of two rays differ by Δs. The contrast of their interference is the product e·e' of their fields'
 directions. To second order in Δs it is 1 - Δs²/4 in unpolarised light, 1 - (Δs·p)²/2 in light polarised along p, and 1
-in scalar theory. The error of scalar theory is therefore proportional to the square of the steepest sine. It also
+in scalar theory. The error of scalar theory is therefore proportional to the square of the steepest ray's sine. It also
 depends on the mean square distance between the points of the pupil from which the light comes. For a round pupil in
 focus, the integrals of Richards and Wolf give the error to all orders.
 """

@@ -14,7 +14,7 @@ fourier_matrices  Fourier sums as products of matrices
 grid            sample positions
 interpolation   linear, Lagrange, B-splines; tabulated functions
 matrices        matrix products of Dr.Jit tensors
-number_types    refusal of half precision and masks, and tensors that PyTorch conjugates or negates later
+number_types    checks of users' arrays: half precision, masked elements, PyTorch's lazy conjugation and negation
 precision       float32 and float64 in Dr.Jit
 quadrature      Gauss-Legendre nodes, and the number of nodes that a wave needs
 radial_profile  rotationally symmetric images, computed along one radius

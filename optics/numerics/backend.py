@@ -51,7 +51,7 @@ LIBRARY_PATTERNS = (
 
 
 class BackendError(RuntimeError):
-    """Dr.Jit cannot compute: it finds no usable LLVM library, no GPU, or an array on a device that is not selected.
+    """Dr.Jit cannot compute: no usable LLVM library, no GPU, or an array on a device that is not selected.
 
     The message is one line with the remedy.
     """

@@ -101,8 +101,8 @@ class MTF(ReadOnlyArrays):
         """Predicted error of each contrast, in the shape of `mtf`. Most are far smaller than `predicted_error`.
 
         Light outside the window changes contrasts at frequencies near 0 by its whole share, and other contrasts much
-        less, see `optics.point_spread.window_loss`. An uncertainty of all light that arrives changes contrasts in
-        proportion.
+        less, see `optics.point_spread.window_loss`. An uncertainty of the total light that arrives changes each
+        contrast in proportion to that contrast.
         """
         if self.causes is None:
             return read_only(np.broadcast_to(self.predicted_error[:, None, None], self.mtf.shape).copy())

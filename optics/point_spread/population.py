@@ -5,9 +5,9 @@ window's centre,
 
     U(x) ≈ (z/ρ)² Σ_ξ P(ξ) z/(λD²) e^{ik(D - z)} Π (1 + 2ξx/z²) e^{-ik ξ·x/c},   D = √(ξ² + z²), ρ = √(x² + z²).
 
-Pupils are sampled in units of their radius, so all share the soft edge, the samples' positions, B-splines and powers.
-The slow factor's phase changes slightly over the window, which is neglected. The resulting error is predicted for each
-PSF from its own light. If it exceeds the tolerance, `optics.psf` computes the PSF.
+Pupils are sampled in units of their radius, so all share the soft edge, the samples' positions, and B-splines (reliefs)
+and powers (Zernike polynomials) at these positions. Slight changes of the slow factor's phase over the window are
+neglected. The error is predicted for each PSF from its own light. Above the tolerance, `optics.psf` computes the PSF.
 """
 
 from __future__ import annotations

@@ -43,7 +43,7 @@ class WhitePSF(ReadOnlyArrays, OnWindow):
     waves: the monochromatic PSFs (wavelength, y, x) of the sum.
     weights: w, (type, wavelength). Cubic splines interpolate PSFs between wavelengths, so a weight may be slightly
         negative.
-    coarse: the same for a sum over every second wavelength; the other weights are 0.
+    coarse: weights, (type, wavelength), of a sum over every second wavelength; the weights of the others are 0.
     spectral_error: predicted relative L2 error that is due to the number of wavelengths, (type,). It is a quarter of
         the difference from the result with every second wavelength. It falls with the fourth power of the number of
         wavelengths.

@@ -3,9 +3,9 @@ window.
 
     H = exp(2πi z √((n/λ)² - fx² - fy²))     (Goodman, §3.10.2)
 
-With sin θ = λf/n, the exponent is ikz - ikz (1 - cos θ). The first part is the same for all frequencies, so its whole
-waves are subtracted exactly. Only the second part has a rounding error. This error does not grow with the distance,
-because the samples resolve the second part.
+With sin θ = λf/n, the exponent is ikz - ikz (1 - cos θ). The first part is the same for all frequencies, so whole waves
+can be subtracted from it exactly. Only the second part has a rounding error. This error does not grow with the
+distance, because the samples resolve the second part.
 
 Light at an angle θ to the axis moves z tan θ to the side. If this exceeds the distance from the far edge of one plane
 to the far edge of the other, the light cannot reach the window. It is faded out, because it would otherwise wrap

@@ -8,11 +8,12 @@ the field is ∫ S(f) e^{2πi (f x + z √(1/λ² - f²))} df up to f_N. The con
 
     |b(x)| = |S(f_N)| / (2π d),   d = |x - walk(f_N)|,                                                             (1)
 
-where 2πd is the derivative of the phase. This is the first term of an integral's expansion about its end (Bleistein &
-Handelsman, Asymptotic Expansions of Integrals, §3.2). It decreases slowly with d, so the blur of the next period
-reaches the window. Consider a source of width L that emits light of this frequency evenly and incoherently. Let g be
-the gap between the displaced light of the source in the next period and a window of width W. The power that comes back
-into the window, divided by the power |S|² at the end of the spectrum, is
+where walk(f) = z tan θ is the sideways displacement of light of frequency f, and 2πd is the derivative of the phase.
+This is the first term of an integral's expansion about its end (Bleistein & Handelsman, Asymptotic Expansions of
+Integrals, §3.2). It decreases slowly with d, so the blur of the next period reaches the window. Consider a source of
+width L that emits light of this frequency evenly and incoherently. Let g be the gap between the displaced light of the
+source in the next period and a window of width W. The power that comes back into the window, divided by the power |S|²
+at the end of the spectrum, is
 
     ∫_0^L ds/L ∫_0^W dx / (2π (g + s + x))² = ln(1 + L W / (g (g + L + W))) / (4π² L).                             (2)
 """

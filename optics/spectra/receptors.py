@@ -33,7 +33,8 @@ class Receptors:
         type, as in a real retina, and signals are (1, h, w). The rows are repeated over the retina from its top left
         corner.
     range_nm: range of wavelengths (low, high) [nm] that is divided into bands: whole numbers within 300-780. None: a
-        range beyond whose ends each type has less than 1e-3 of its catch from a white surface in daylight.
+        range chosen by the catch from a white surface in daylight. Each type has at most 1e-3 of its catch below the
+        range, and at most 1e-3 above it.
 
     Raises:
         ValueError: an argument is invalid; the message states the valid choices.

@@ -80,8 +80,8 @@ def make_vec_env(
     seed: seed of episodes and noise; None: a random seed
     memory: number of frames in an observation
     mode: "training", "evaluation" or "test". In evaluation, objects that the agent reached reappear elsewhere, and
-        reward terms have the weights of the fitness. "test" is an evaluation for final figures; it differs only if a
-        user task uses other worlds in it.
+        reward terms have the weights of the fitness. "test" is an evaluation for final results; it differs from
+        "evaluation" only if a user task uses other worlds in this mode.
     rays_per_receptor: number of rays traced for each receptor, in direct light only. "auto": the cheapest fidelity
         whose error is small compared with the receptors' noise. It includes light that was reflected twice if this
         light changes signals noticeably. `sim.choose_fidelity(world, eyes, bands="own")` returns the same fidelity.

@@ -1,6 +1,7 @@
 """The kernel of area sampling.
 
-Results that are the same for several areas, of a world or of a column, are computed once, in advance.
+Results that several areas share are computed once, in advance: the light on the bodies of a world, and the walls at
+the borders of columns.
 """
 
 from __future__ import annotations

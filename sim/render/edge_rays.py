@@ -4,8 +4,8 @@ It requires a perfect lens, and is chosen automatically only for user models. Fo
 whether the square is uniform (Whitted 1980 compares a pixel's corners). If the four signals differ, all rays are
 traced. An edge may also pass between the four rays and cut off a corner, at most a quarter of the square. The surface
 beyond such an edge usually fills a neighbouring square. All rays are therefore also traced for receptors that differ
-strongly from a neighbour. For this comparison, the first rays include squares beyond the rim of the field. An object is
-missed if it is smaller than the gaps between the four rays and fills no neighbouring square.
+strongly from a neighbour. For this comparison, four rays are also traced through each square just beyond the rim of the
+field. An object is missed if it is smaller than the gaps between the four rays and fills no neighbouring square.
 """
 
 from __future__ import annotations

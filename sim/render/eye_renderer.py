@@ -275,5 +275,5 @@ class EyeRenderer:
         return self.sensor.receptor_sums(self._mixing, np.eye(self.eye.bands))
 
     def _components(self, found: np.ndarray) -> np.ndarray:
-        """Return a kernel's output as (layer, component, all rays of all views, or their sums)."""
+        """Return a kernel's output as (layer, component, n). n counts the rays of all views, or their sums."""
         return found.reshape(self.sensor.depth.count, len(self.tracer.basis), -1)

@@ -1,9 +1,9 @@
 """Choice of the cheapest fidelity, in four stages: bands, depth layers, light and samples.
 
-The allowed error is half of the receptors' noise, which a brain could not distinguish. Every stage has levels, ordered
-by cost. The cheapest level whose predicted error is allowed is chosen, and stored with the reason. The available levels
-and their errors depend on the kind of scene (`world_fidelity`, `model_fidelity`). The rule for choosing a level is the
-same for all scenes.
+The allowed error is half of the receptors' noise. A brain could not distinguish such an error from the noise. Every
+stage has levels, ordered by cost. The cheapest level whose predicted error is allowed is chosen, and stored with the
+reason. The available levels and their errors depend on the kind of scene (`world_fidelity`, `model_fidelity`). The rule
+for choosing a level is the same for all scenes.
 """
 
 from __future__ import annotations

@@ -2,7 +2,8 @@
 
 A moment is a set of poses. Each moment is rendered with increasing numbers of rays, and with many rays as a reference.
 A receptor with a uniform field needs only one ray. If most receptors have a uniform field, they would hide the error of
-the others. The error is therefore computed only over receptors for which the fewest rays are not enough.
+the others. The error is therefore computed only over the other receptors, for which the smallest number of rays is not
+enough.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Quantities that differ between the episodes of a task: light, and sizes, colours, materials and places of objects.
 
 All lights of a world, including the sky, are multiplied by one spectrum. Since light is additive, this multiplies the
-radiance in each band by exactly the same factor. Each world may have its own sizes, colours, materials and places of
-objects (`sim.scene.world_models`), but all worlds share one kernel.
+radiance in each band by exactly the value of this spectrum in the band. Each world may have its own sizes, colours,
+materials and places of objects (`sim.scene.world_models`), but all worlds share one kernel.
 """
 
 from __future__ import annotations

@@ -56,8 +56,8 @@ class BatchTask(TaskSettings):
     The built-in tasks use `sim.SlidingAgents`. `sim.check_batch_task` tests whether a task follows this description.
 
     renders_early: if True, rendering may begin before an action is judged, which is faster. In this case, `rewards`,
-        `terminated`, `succeeded` and `proprioception` must not move bodies, unless `judge` returns the worlds in which
-        they do as `Outcome.changed`.
+        `terminated`, `succeeded` and `proprioception` must not move bodies in a world, unless `judge` returns an
+        outcome that lists this world in `Outcome.changed`.
     proprioception_ranges: (lowest, highest) value of each entry of `proprioception`, by name; an entry that is
         not listed has no limits
     ramped: terms of the reward whose weight `evolve` reduces at the beginning of training if the setting

@@ -13,7 +13,7 @@
                 λ      w_g    w_a    w_c
     training    0.25   1      -1     -1     reaching a goal or an adversary ends the episode
     evaluation  1.5    10     -10    -2     objects respawn and the episode continues; only a goal region ends it
-    test        1.5    10     -10    -2     the same, for final figures
+    test        1.5    10     -10    -2     the same, for final results
 
 Terms and weights follow the text of Tiwary, Young et al. (2025), "What if Eye...? Computationally Recreating Vision
 Evolution". The fitness is the sum of an evaluation episode's rewards, averaged over these episodes. In training, the

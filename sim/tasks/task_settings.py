@@ -57,7 +57,7 @@ class TaskSettings:
     name: name of the animal, if there are several; None: the name of the class
     failure_reward: reward of a step in which the world fails, as the term "failure". If rewards are negative costs, the
         default of 0 is better than any normal episode. In this case, set a value below the return of an episode.
-    mode: "training", "evaluation" or "test" (an evaluation for final figures). The environment sets it, and methods may
+    mode: "training", "evaluation" or "test" (an evaluation for final results). The environment sets it, and methods may
         read it; a class must not define it
     """
 

@@ -1,7 +1,7 @@
 """Families of random layouts for the tasks navigation and maze, in three sets that have no layout in common.
 
 An animal that is trained and judged in the same layouts may memorise them. A family therefore has a set for training, a
-set for the selection of animals and policies, and a set for final figures ("test"). A layout depends only on the
+set for the selection of animals and policies, and a set for final results ("test"). A layout depends only on the
 family's seed and size, the name of its set and its index in the set. A larger set thus begins with the layouts of a
 smaller one.
 """
@@ -81,7 +81,7 @@ class LayoutFamily:
 
     @property
     def test(self) -> LayoutSet:
-        """Layouts for final figures, in which nothing is selected."""
+        """Layouts for final results. Nothing is selected by the results in these layouts."""
         return LayoutSet(self, "test")
 
     def number(self, name: str) -> int:

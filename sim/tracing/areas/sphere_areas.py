@@ -215,7 +215,7 @@ def may_see(area: Area, centre: Array, radius: float) -> Array:
 
 
 def columns_of(texture: SphereTexture, patch: Patch, radius: float) -> tuple[Array, tuple[Array, Array]]:
-    """Return the column of the patch's middle in the texture, and the number of columns that each side spans."""
+    """Return the texture column at the patch's middle, and the number of columns that each of its two sides spans."""
     to_local = mi.Matrix3f(texture.frame.T.tolist())
     n, along, across = (to_local @ mi.Vector3f(v) for v in (patch.normal, patch.along, patch.across))
     per_u, per_v, at = map(float, texture.to_column)
