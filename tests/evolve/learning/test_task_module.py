@@ -125,9 +125,9 @@ def test_rays_are_the_runs_or_the_tasks_and_few_in_lessons():
     for rays in ("auto", "12"):
         config, animal = small(f"eye.rays_per_receptor={rays}", "learning.rays_per_receptor=1")
         life = worlds_of(animal, config, 1, 2)
-        with closing(life.training), closing(life.selection), closing(life.test):
+        with closing(life.training), closing(life.selection), closing(life.fitness):
             worlds[rays] = [
-                part.renderer.fidelity.rays_per_receptor for part in (life.training, life.selection, life.test)
+                part.renderer.fidelity.rays_per_receptor for part in (life.training, life.selection, life.fitness)
             ]
     assert worlds == {"auto": [1, 1, 2], "12": [1, 1, 12]}
 

@@ -274,7 +274,7 @@ def test_attributes_reach_the_one_environment():
 
 @pytest.mark.parametrize(
     ("arguments", "named"),
-    [({"memory": 0}, "memory"), ({"mode": "test"}, "mode"), ({"task": "chess"}, "chess")],
+    [({"memory": 0}, "memory"), ({"mode": "exam"}, "mode"), ({"task": "chess"}, "chess")],
 )
 def test_bad_arguments_are_named(arguments, named):
     with pytest.raises(ValueError, match=named):
