@@ -86,7 +86,7 @@ def test_other_search_than_the_one_on_record_is_refused(tmp_path):
     with pytest.raises(KeyboardInterrupt):
         carry(path, tiny(), until=6)
     config = path / "config.toml"
-    config.write_text(config.read_text().replace("seed = 0", "seed = 1"))
+    config.write_text(config.read_text().replace("\nseed = 0", "\nseed = 1"))
     kept = (path / "candidates.jsonl").read_bytes()
     with pytest.raises(RunError, match="cannot be continued: candidate 0 differs from the search's proposal") as caught:
         carry(path, tiny())
