@@ -24,7 +24,7 @@ NEAR_ZERO = 2.0
 
 
 @dataclass(frozen=True, eq=False)
-class ErrorCauses:
+class ErrorCauses(ReadOnlyArrays):
     """Parts of the error of contrasts, relative to all light that arrives, (wavelength,).
 
     lost: light outside the window, at most.
