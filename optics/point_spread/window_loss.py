@@ -13,6 +13,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from optics.numerics.read_only import ReadOnlyArrays
+
 __all__ = ["ErrorCauses", "spectrum_of_loss"]
 
 # Choices, see test_measure_bounds.py: positions where samples begin to fade, and sizes of inner windows, in half widths
