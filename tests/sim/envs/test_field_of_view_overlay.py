@@ -94,3 +94,19 @@ def test_the_own_body_does_not_hide_an_eye():
         overlay._draw_dot(shown, dot, lambda pixels, z=depth: np.full(len(pixels), 1 / z), np.full(3, 200.0))
         expected = [200, 0, 150, 100] if drawn else [100] * 4
         np.testing.assert_array_equal(shown, np.repeat(np.array(expected)[:, None], 3, axis=1))
+
+
+def test_an_eye_is_a_disc_of_the_right_size_with_a_soft_edge_one_pixel_wide():
+    """The opacities are the fractions of pixels that the disc covers, so that they add up to its area."""
+    size, radius = (120, 186), 0.12
+    eye = VIEW.position - 1.7 * VIEW.rotation[:, 2] + 0.2 * VIEW.rotation[:, 0]
+    dot = overlay._dot(eye, VIEW, size, radius)
+    pixel = 2 * 1.7 * math.tan(math.radians(VIEW.fovy_deg) / 2) / size[0]
+    assert dot.depth == pytest.approx(1.7)
+    for opacity, r in ((dot.iris, radius), (dot.pupil, radius * overlay.PUPIL / overlay.IRIS)):
+        assert opacity.sum() * pixel**2 == pytest.approx(math.pi * r**2, rel=0.02)
+        soft = ((opacity > 0) & (opacity < 1)).sum()
+        assert soft == pytest.approx(2 * math.pi * r / pixel, rel=0.35)  # a ring one pixel wide
+    row, column = (np.average(at, weights=dot.iris) for at in np.unravel_index(dot.pixels, size))
+    assert row == pytest.approx(size[0] / 2 - 0.5, abs=0.05)
+    assert column == pytest.approx(size[1] / 2 - 0.5 + 0.2 / pixel, abs=0.05)
