@@ -10,7 +10,7 @@ microvilli: test_microvilli.py
 converging: test_vector_focus.py, test_microvilli.py
 disk_sum: test_microvilli.py
 modulation_transfer: test_modulation_transfer.py
-contrast: test_measures.py, test_measure_errors.py
+contrast: test_measures.py, test_measure_errors.py, test_modulation_transfer.py
 mixture: test_mixture.py
 pictures: test_pictures.py
 planner: test_planner.py

@@ -8,6 +8,7 @@ import optics
 from optics.numerics.grid import Grid
 from optics.numerics.precision import precision
 from optics.point_spread import modulation_transfer
+from optics.point_spread.contrast import combined_mtf
 from optics.point_spread.modulation_transfer import MTF
 from optics.point_spread.window_loss import ErrorCauses
 from tests.optics.device_types import Float64
@@ -184,3 +185,14 @@ def test_the_phase_in_white_light_and_of_one_sample():
     single = optics.mtf(optics.Eye(None, resolution=(3, 3)).psf(), tolerance=1)
     assert single.phase.shape == single.mtf.shape == (4, 1, 1)
     assert not single.phase.any()
+
+
+def test_a_mixture_is_refused_if_the_contrasts_of_any_of_its_sums_are_uncertain():
+    """A difference of two wavelengths with almost the same light has a far larger relative error than their sum."""
+    lens = optics.Pupil(60e-6, thin_lens_focal_length=240e-6)
+    seen = optics.psf(lens, [520e-9, 560e-9], dx=0.5e-6, shape=(65, 65), tolerance=1e-3)
+    good, bad = np.array([1.0, 1.0]), np.array([1.0, -0.99])
+    assert combined_mtf(seen, np.stack([good, good]), 0.02).mtf.shape[0] == 2
+    for weights in ([bad], [good, bad], [bad, good]):
+        with pytest.raises(optics.AccuracyError, match=r"tolerance = 0\.02: contrasts have errors of up to"):
+            combined_mtf(seen, np.stack(weights), 0.02)
