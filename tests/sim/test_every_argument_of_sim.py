@@ -84,6 +84,17 @@ def written(tmp="view.exr", **given):
         return file.read().hex()
 
 
+SMALL_FAMILY = {"seed": 0, "n_training": 1, "n_selection": 1, "n_test": 1, "rows": 13, "columns": 21}
+FAMILY = sim.LayoutFamily(**SMALL_FAMILY)
+
+
+def drawn(family):
+    """Drawings of all courses, and the number of actions."""
+    sets = (family.training, family.selection, family.test)
+    steps = sim.build_world("navigation", layouts=family.training).episode_steps
+    return steps, [[course.drawing for course in one.courses] for one in sets]
+
+
 IN_WORLDS = {
     "make_vec_env": Walk(
         played,
@@ -98,6 +109,8 @@ IN_WORLDS = {
             "world_seed": With(2, {"task": "maze"}),
             "mazes": With(3, {"task": "maze", "n_envs": 6}),
             "course": With("long", {"task": "navigation"}),
+            "layouts": With(FAMILY.training, {"task": "maze"}),
+            "wall_height": With(0.5, {"task": "maze"}),
             "least_return": With(-0.01, {"steps": 30}),
             "episode_steps": With(2, {"steps": 4}),
             "spectra": {"light_0": "A"},
@@ -133,6 +146,8 @@ IN_WORLDS = {
             "seed": 3,
             "mazes": 2,
             "course": With("long", {"task": "navigation"}),
+            "layouts": FAMILY.training,
+            "wall_height": 0.5,
             "eyes": Eyes(),
             "spectra": {"wall": "foliage"},
         },
@@ -140,6 +155,11 @@ IN_WORLDS = {
     "make_env": Walk(
         lambda **given: sim.make_env("detection", rays_per_receptor=1, **given).observation_space.spaces.__repr__(),
         {"eyes": Eyes(resolution=(3, 3))},
+    ),
+    "LayoutFamily": Walk(
+        lambda **given: drawn(sim.LayoutFamily(**{**SMALL_FAMILY, **given})),
+        {"seed": 1, "n_training": 2, "n_selection": 2, "n_test": 2, "rows": 9, "columns": 17, "path_width": 1}
+        | {"episode_steps": 7},
     ),
     "make_parallel_env": Walk(met, {"seed": 3, "memory": 2, "render_mode": "eyes"}),
     "Course": Walk(
