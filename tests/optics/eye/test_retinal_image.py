@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from optics.eye.retinal_image import blur, centred, receptor_average
+from optics.eye.retinal_image import blur, centred, receptor_average, with_centre
 from optics.numerics.precision import precision
 
 
@@ -64,3 +64,13 @@ def test_receptors_average_their_own_cells():
 def test_receptors_must_be_centred(size):
     with pytest.raises(ValueError, match="centred on the axis"):
         centred(np.zeros((1, *size)), (8, 10))
+
+
+@pytest.mark.parametrize("size", [(5, 4), (4, 5), (4, 6), (5, 3)])
+def test_each_even_side_of_a_kernel_is_extended(size):
+    """Receptors that are not square can have kernels with only one even side."""
+    kernel = np.random.default_rng(3).random((2, *size))
+    odd = with_centre(precision("float64").Tensor(kernel)).numpy()
+    assert odd.shape == (2, *(side + 1 - side % 2 for side in size))
+    np.testing.assert_array_equal(odd[:, -size[0] :, -size[1] :], kernel)
+    assert odd.sum() == pytest.approx(kernel.sum())
