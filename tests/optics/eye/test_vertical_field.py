@@ -46,6 +46,16 @@ def test_high_receptors_are_rows_of_square_ones(seed, waveguide):
     assert np.abs(found - low).max() > 0.01 * eye.white_signal
 
 
+def test_zones_reach_the_edges_of_both_fields():
+    """Kernels in the corners of a wide retina with high receptors are those of light from the corners of the field."""
+    eye = Eye(LENS, (2, 5), 30.0, WIDTH, 1, vertical_fov_deg=40.0)
+    kernels = eye.sight(2, field_zones=3, light_from="centres").kernels
+    assert set(kernels) == {(0, row, column) for row in range(2) for column in range(3)}
+    for row, column, direction in ((0, 0, (-15.0, 20.0)), (1, 2, (15.0, -20.0)), (0, 1, (0.0, 20.0))):
+        expected = eye.kernel(2, direction_deg=direction)
+        np.testing.assert_allclose(kernels[0, row, column].numpy(), expected, rtol=1e-4, atol=1e-4 * expected.max())
+
+
 @pytest.mark.parametrize("ratio", [0.2, 1.0, 3.7])
 def test_fields_and_acuity_in_both_directions(ratio):
     eye = tall(3, 7, ratio, pupil=optics.Pupil(30e-6, thin_lens_focal_length=240e-6))
