@@ -83,6 +83,21 @@ def test_one_kernel_scale_for_all_rays_would_be_worse():
     assert (worse > ours).all()
 
 
+@pytest.mark.parametrize(
+    ("suitable", "unsuitable", "dx"),
+    [((0.04, 1.0), (0.05, 1.0), 0.3e-6), ((2e-6, 18e-6), (2e-6, 17e-6), 0.15e-6)],
+    ids=["too many waves for float32", "near field"],
+)
+def test_each_limit_alone_excludes_a_pupil(suitable, unsuitable, dx):
+    """The path has R²/(zλ) = 2,900 or 4,500 waves over the pupil, or kz is 206 or 194. The limits are 3,000 and 200."""
+    lenses = [
+        Member(optics.Pupil(radius, thin_lens_focal_length=z), LAMBDA, z, math.inf)
+        for radius, z in (suitable, unsuitable)
+    ]
+    found = population_pictures(lenses, Grid.square(17, dx), 5e-2)
+    assert [index for index, *_ in found] == [0]
+
+
 def test_bad_input_is_named():
     with pytest.raises(ValueError, match="sensor_distance = -1"):
         optics.psf_batch(list(eyes(1)), sensor_distance=-1, tolerance=1e-2)
