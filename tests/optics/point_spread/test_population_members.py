@@ -83,6 +83,24 @@ def test_powers_are_zernike_s_polynomials():
             np.testing.assert_allclose(waves, mode(n, m, np.zeros(1), np.zeros(1)) - mode(n, m, x, y), atol=1e-8)
 
 
+@pytest.mark.parametrize("side", [-1, 1])
+def test_light_from_one_side_of_a_near_pupil(side):
+    """The mask transmits more on one side, and a prism deflects the light to one side of the window. Light from the
+    same side of the pupil has a shorter path than light from the other side. Without the linear part of z²/D², errors
+    would be 0.042 and 0.101 instead of 0.021 and 0.066.
+    """
+    mask = optics.MaskMap(np.broadcast_to(0.45 + 0.4 * side * np.linspace(-1, 1, 5), (5, 5)))
+    prism = optics.Zernike({(1, 1): 0.375})
+    pupil = optics.Pupil(2e-6, thin_lens_focal_length=30e-6, mask=mask, wavefront=prism)
+    window = Grid.square(33, 0.375e-6)
+    [(_, image, plan)] = population_pictures([Member(pupil, LAMBDA, 30e-6, math.inf)], window, 0.1)
+    ask = {"dx": window.dx, "shape": window.shape, "tolerance": 1e-5, "dtype": "float64"}
+    exact = optics.psf(pupil, [LAMBDA], 30e-6, **ask).psf[0]
+    error = relative_l2(image, exact)
+    assert error <= plan.predicted_error <= 0.1
+    assert error < (0.03 if side < 0 else 0.08)
+
+
 def test_what_it_leaves_to_others():
     plain = optics.Pupil(10e-6, wavefront=optics.Zernike({(2, 0): 0.1}), mask=optics.GaussianMask(10e-6), object_n=1.2)
     assert Member(plain, LAMBDA, Z, math.inf).plain
