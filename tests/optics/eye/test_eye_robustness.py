@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from optics import AccuracyError, Eye, HumanEye, PhotonBudget, Pupil
 from optics.eye import receptive_field
 from optics.eye.band_choice import choose_bands
+from tests.optics.device_types import Float64
 from tests.slow_part import sweep
 
 ODD = [0, -1, 0.5, math.nan, math.inf, -math.inf, 1e-300, 1e300, "auto", "much", None, (1, 2), [], b"x"]
@@ -126,6 +127,17 @@ def test_what_is_of_another_kind_is_named():
         Eye(bands=1).see(np.zeros((1, 15, 15)), 1, sight="auto")
     with pytest.raises(ValueError, match="radiance: must be real numbers, not complex"):
         Eye(bands=1).see(np.zeros((1, 15, 15)) * 1j, 1)
+
+
+@pytest.mark.parametrize("wrong", [-1e-3, 0.0, math.nan])
+@pytest.mark.parametrize("kind", [float, Float64])
+def test_bad_distances_are_refused_with_given_kernels(wrong, kind):
+    """The message shows a Dr.Jit number as a list."""
+    eye = Eye(bands=1)
+    bank = eye.sight(1)
+    with pytest.raises(ValueError, match=r"^z .*must be (distances )?greater than 0, (in m, )?or infinite") as refusal:
+        eye.see(np.zeros((1, 15, 15)), 1, z=kind(wrong), sight=bank)
+    assert refused(refusal.value)
 
 
 def test_as_many_cells_as_a_spot_may_have_and_no_more(monkeypatch):

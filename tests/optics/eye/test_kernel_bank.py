@@ -12,7 +12,6 @@ from optics.eye.eye import LIGHT_FROM
 from optics.eye.kernel_bank import KernelBank
 from optics.eye.kernel_interpolation import NodeChoice, checks, nodes, worst_difference
 from optics.numerics.interpolation import linear_weights
-from tests.optics.device_types import Float64
 
 S = 2
 NEAR, FAR = 0.6e-3, 5e-3
@@ -237,15 +236,6 @@ def test_a_sight_of_another_eye():
 def test_depths_of_another_shape():
     with pytest.raises(ValueError, match="z has shape"):
         LENS.see(np.zeros((1, 14, 18)), S, z=np.full((3, 4), 1.0) + np.arange(4))
-
-
-@pytest.mark.parametrize("wrong", [-1e-3, 0.0, math.nan])
-@pytest.mark.parametrize("kind", [float, Float64])
-def test_bad_distances_are_refused_with_kernels_from_elsewhere(wrong, kind):
-    """One of them is a Dr.Jit number, which the message shows as a list."""
-    bank = LENS.sight(S)
-    with pytest.raises(ValueError, match=r"^z .*must be (distances )?greater than 0, (in m, )?or infinite[^\n]*$"):
-        LENS.see(np.zeros((1, 14, 18)), S, z=kind(wrong), sight=bank)
 
 
 @pytest.mark.parametrize("direction", [(90.0, 0.0), (0.0, math.nan)])
