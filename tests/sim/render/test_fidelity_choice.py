@@ -1,5 +1,4 @@
-"""The choice of a fidelity with levels whose errors are given: the limit is allowed, and every excess causes a warning.
-"""
+"""Levels with given errors: an error at the limit is allowed, and a larger one causes a warning."""
 
 import warnings
 from dataclasses import dataclass
