@@ -66,6 +66,7 @@ def record(
     if mode == "test":
         require_test_set(run.config)
     candidate = run.candidate(candidate_id)
+    _ = run.config.choice.named_code  # refuses, before any work, a user task that the user has not named
     recorder = Recorder(candidate.phenotype, run.config, trained_policy(run, candidate), radiance_every, pictures, mode)
     with damage_named(run.policy_path(candidate.id)):
         return recorder.play(candidate.id, seed)
@@ -76,11 +77,9 @@ def trained_policy(run: Run, candidate: Candidate) -> EyePolicy:
 
     Raises:
         RunError: the policy is missing or damaged.
-        ConfigError: the task is a user task, and the user has not named its code.
     """
     path = run.policy_path(candidate.id)
     require_policy(candidate, path)
-    _ = run.config.choice.named_code  # refuses, before any work, a user task that the user has not named
     try:
         return load_policy(path)
     except ValueError as error:

@@ -14,5 +14,5 @@ dask_executor: test_dask_executor.py, test_silent_cluster.py, test_dask_connecti
 dask_connection: test_dask_connection.py, test_silent_cluster.py
 signs_of_life: test_signs_of_life.py
 scheduler: test_scheduler.py, test_dask_connection.py, test_dask_executor.py
-dask_worker: test_dask_executor.py
+dask_worker: test_dask_worker.py, test_dask_executor.py, learning/test_task_module.py
 """

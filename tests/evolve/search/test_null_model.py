@@ -62,6 +62,12 @@ def test_every_search_has_a_seed_of_its_own():
     assert len(set(model.means["fov_deg"][:, 2])) == 5
 
 
+def test_progress_is_reported_after_every_search():
+    fractions = []
+    null_model(tiny(), measured, 1, 4, fractions.append)
+    assert fractions == [0.25, 0.5, 0.75, 1]
+
+
 def test_what_few_candidates_have_counts_by_how_many():
     """Generations are weighted by the number of candidates that have the quantity. A search without any such candidate
     is omitted.

@@ -5,7 +5,7 @@ record: test_record.py, test_chain.py, test_sizes.py
 chain: test_chain.py
 checksums: test_checksums.py, test_policies.py
 candidate: test_record.py, test_reads_back_equal.py, test_priced_record.py
-evaluation: test_record.py
+evaluation: test_sizes.py, test_record.py, analysis/test_episode_failures.py
 shipped_run: cli/test_demo.py
 policies: test_policies.py
 lock: test_lock.py, test_regular_files.py

@@ -115,6 +115,13 @@ def test_calls_in_any_order_work_or_raise_the_same_error(name):
                 pending = call == "step_async" or (pending and call == "close")
 
 
+@pytest.mark.parametrize("name", FACES)
+def test_no_reset_after_the_end(name):
+    face = made(name)
+    face.close()
+    assert refused(RuntimeError, name, face.reset) == CLOSED
+
+
 def test_nothing_works_after_the_end():
     face = made("VecEnv")
     face.reset()

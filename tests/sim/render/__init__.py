@@ -11,13 +11,13 @@ labels: test_labels.py
 world_scene: test_batched_renderer.py
 reference_renderer: test_reference_renderer.py, test_vertical_field.py
 fidelity: test_fidelity.py, eyes/test_depth_layers.py
-fidelity_choice: test_fidelity.py, test_model_fidelity.py
+fidelity_choice: test_fidelity_choice.py, test_fidelity.py, test_model_fidelity.py
 world_fidelity: test_fidelity.py, eyes/test_depth_layers.py
-fidelity_stages: test_fidelity.py, eyes/test_depth_layers.py
+fidelity_stages: test_fidelity_choice.py, test_fidelity.py, eyes/test_depth_layers.py
 sample_choice: test_sample_choice.py, test_fidelity.py
-random_views: test_fidelity.py
+random_views: test_fidelity_trials.py, test_fidelity.py
 populations: test_sample_choice.py, test_fidelity.py
-fidelity_trials: test_fidelity.py, eyes/test_depth_layers.py
+fidelity_trials: test_fidelity_trials.py, test_fidelity.py, eyes/test_depth_layers.py
 prepared_scene: test_batched_renderer.py, test_fidelity.py
 memory_budget: test_memory_budget.py, test_sample_choice.py
 receptor_noise: test_receptor_noise.py
