@@ -34,7 +34,7 @@ def draw(
     figure, (axes,) = new_figure(13.5, tall, columns=2, width_ratios=(1, 1))
     effects = {task: [one.of[factors] for factors, _ in names] for task, one in found.items()}
     _draw_intervals(axes[0], effects, [label for _, label in names])
-    axes[0].set_title("effect of each factor on fitness")
+    axes[0].set_title("effect of each factor on the mean return")
     advantages = {task: [by_task.get(task) for _, by_task in compared] for task in found}
     _draw_intervals(axes[1], advantages, [control.name for control, _ in compared])
     axes[1].set_title("advantage of many coarse eyes over few fine eyes")
