@@ -44,10 +44,9 @@ FACTORS = {
 }
 
 
-def _eyes(n: int, across: int, arc: float, **others: object) -> Design:
+def _eyes(n: int, across: int, arc: float) -> Design:
     """Return an animal with n square eyes of `across` x `across` receptors, spread over `arc` degrees."""
-    animal = Design("maze", n, across, across, arc, SIGMA, 0, FOV_DEG, vertical_fov_deg=FOV_DEG)
-    return replace(animal, **others)  # type: ignore[arg-type]
+    return Design("maze", n, across, across, arc, SIGMA, 0, FOV_DEG, vertical_fov_deg=FOV_DEG)
 
 
 COMPOUND, CAMERA = _eyes(10, 4, 135.0), _eyes(2, 15, 45.0)

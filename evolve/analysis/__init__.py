@@ -1,7 +1,7 @@
 """Analysis of a run's record and of its animals.
 
 statistics      statistics of fitness and genes per generation, image quality, confidence intervals
-fitness_parts   task fitness and costs, of which fitness consists
+fitness_parts   parts of fitness: task fitness and costs
 acuity          finest gratings that an animal resolves
 genealogy       a candidate's line of descent
 episode_failures  failures that ended training episodes, mostly of methods of a user task

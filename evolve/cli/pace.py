@@ -1,6 +1,6 @@
 """Measurement of the speed of this machine.
 
-A few seconds of real training are timed, in as many processes as the run will have.
+A few seconds of real training are timed, in the number of processes that the run will have.
 """
 
 from __future__ import annotations
@@ -114,7 +114,7 @@ def _slowest(paces: list[Pace]) -> Pace:
 def _short_life(config: RunConfig, animal: Phenotype, seed: int) -> Pace:
     """Time a training run of three short rollouts, followed by the evaluations.
 
-    The first update has the full number of passes over the samples, and the second may have only half as many. The time
+    The first update has the full number of passes over the samples, and the second may have only half of it. The time
     of a pass follows from the difference between the times of the two updates.
     """
     short = _with_short_rollouts(config.learning)

@@ -64,7 +64,7 @@ class RunPlan:
     def hours(self) -> dict[str, float]:
         """Predicted wall time of the run [h], for each of the animals.
 
-        It is assumed that all candidates take as much time as this animal and complete their training.
+        It is assumed that all candidates take the same time as this animal and complete their training.
         """
         search, learning = self.config.search, self.config.learning
         if search.steady_state:

@@ -1,6 +1,6 @@
 """Adam on a single vector of all weights. A step therefore needs only a few operations, not a few for each tensor.
 
-torch.optim would need ten times as many calls. Its first use also imports torch's compiler, which takes seconds in
+torch.optim would need ten times more calls. Its first use also imports torch's compiler, which takes seconds in
 every worker process.
 """
 

@@ -33,7 +33,6 @@ __all__ = [
 
 FILE, CONFIG = "versions.json", "config.toml"
 LARGEST_FILE = 2**24  # maximum size of the file [bytes], for thousands of starts
-NO_COSTS = ("per_receptor = 0.0", "per_eye = 0.0", "per_neuron = 0.0")  # lines of a config.toml
 PACKAGES = (
     "rhabdom",
     "numpy",
@@ -145,11 +144,10 @@ def fingerprint(config: str) -> str:
     """Return the fingerprint of a run's config.toml.
 
     The fingerprint ignores lines that do not influence training and evaluation: comments, the number of workers, and
-    the number of generations. It also ignores costs of 0, which files of former versions lack.
+    the number of generations.
     """
-    left_out = ("workers =", "generations =", "#", "[costs]")
+    left_out = ("workers =", "generations =", "#")
     lines = [line.strip() for line in config.splitlines() if line.strip() and not line.startswith(left_out)]
-    lines = [line for line in lines if line not in NO_COSTS]
     return hashlib.sha256("\n".join(lines).encode()).hexdigest()[:16]
 
 

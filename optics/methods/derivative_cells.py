@@ -25,7 +25,7 @@ NODES_PART = 0.7  # choice: part of the tolerance that the nodes in the cells ma
 MOST_NODES = 12  # choice: largest number of nodes along a cell; wider cells are divided
 MOST_CELLS = 4096  # choice, limited by memory: largest number of cells along a side
 # Chebyshev coefficients of a cubic spline through a single sample: root mean square over the cells between its knots,
-# relative to the constant coefficient. test_derivative_cells.py computes them.
+# relative to the constant coefficient. test_gradients.py computes them.
 SPLINE = (1.0, 0.970, 0.150, 0.076)
 # Choice: the error of cut cells is T^CUT_POWER, where T is the sum of the coefficients from degree n on. The power lies
 # between 1, for weights that are exact up to degree n - 1, and 2, for cells of which hardly anything is cut off. Both

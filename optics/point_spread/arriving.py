@@ -183,7 +183,8 @@ class _Sum:
     def fraction(self, beam: Beam, wavelength: float) -> Array:
         """Return h² Σ w |Σ u exp(2πi (W - h (sx x + sy y)))|², with h = R/λ and the waves W of the beam.
 
-        Derivatives come from the adjoint of the sum, which has as many terms as the sum itself.
+        Derivatives come from the adjoint of the sum, which consists of three sums of the same size. It is computed only
+        if a number of the beam carries a derivative.
         """
         import drjit as dr
 
@@ -196,9 +197,9 @@ class _Sum:
             u = u * beam.pupil.amplitude(x, y, types)
         at, steady = (h, waves, u), [dr.detach(one) for one in (h, waves, u)]
         with dr.suspend_grad():
-            turns, size = steady[0], steady[2]
-            re, im = _sums((turns * sx, turns * sy, 1.0), (x, y, steady[1], size, 0 * size))
-            total = dr.sum(w * (re * re + im * im)) * turns * turns
+            h0, waves0, u0 = steady
+            re, im = _sums((h0 * sx, h0 * sy, 1.0), (x, y, waves0, u0, 0 * u0))
+            total = dr.sum(w * (re * re + im * im)) * h0 * h0
         if not any(map(dr.grad_enabled, at)):
             return total
         with dr.suspend_grad():

@@ -18,10 +18,9 @@ from optics.numerics.read_only import ReadOnlyArrays
 __all__ = ["ErrorCauses", "spectrum_of_loss"]
 
 # Choices, see test_measure_bounds.py: positions where samples begin to fade, and sizes of inner windows, in half widths
-# of the window; factor on the estimate; number of steps between frequencies below which all lost light may matter.
+# of the window; number of steps between frequencies below which all lost light may matter.
 FADES = (0.5, 0.7)
 INNER = (0.5, 0.7, 0.9)
-CAUTION = 1.0
 NEAR_ZERO = 2.0
 
 
@@ -64,7 +63,7 @@ def spectrum_of_loss(image: np.ndarray, lost: float) -> np.ndarray:
     found = maximum_filter(np.abs(early) + np.abs(early - late) + _like_the_rest(image, lost), 3, mode="wrap")
     steps = np.arange(side) - side // 2
     near_zero = np.exp(-np.square(np.hypot.outer(steps, steps) / NEAR_ZERO))
-    return np.minimum(CAUTION * found + lost * near_zero, lost)
+    return np.minimum(found + lost * near_zero, lost)
 
 
 def _like_the_rest(image: np.ndarray, lost: float) -> np.ndarray:

@@ -35,9 +35,9 @@ PUPIL = optics.Pupil(10e-6, thin_lens_focal_length=240e-6)
 EYE = optics.Eye(None, (4, 4), 70.0, bands=3)
 
 
-def rendered(mount=Mount("eye"), **given):  # noqa: B008 (a frozen value)
-    """Return the signals of an eye on the model."""
-    renderer = sim.ModelRenderer(MODEL, EYE, [mount], **{"fidelity": RAYS, **given})
+def rendered(mount=None, **given):
+    """Return the signals of an eye on the model, by default at its camera."""
+    renderer = sim.ModelRenderer(MODEL, EYE, [mount or Mount("eye")], **{"fidelity": RAYS, **given})
     return np.asarray(renderer.signals([DATA] * renderer.n_envs))
 
 

@@ -137,7 +137,7 @@ def _generations(run: Run) -> list[dict[str, Any]]:
 
 
 def _generation(members: Sequence[Candidate]) -> dict[str, Any]:
-    """Return the state of a generation as JSON values; the task fitness and the costs are those of its best member."""
+    """Return the state of a generation as JSON values; task fitness and costs describe its best member."""
     done = [candidate for candidate in members if candidate.failure is None]
     best = max(done, key=lambda candidate: (candidate.fitness, -candidate.id), default=None)
     return {

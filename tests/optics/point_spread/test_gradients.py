@@ -122,20 +122,20 @@ def test_a_flat_map_of_every_user_s_first_step():
 @pytest.mark.parametrize("name", ["control points", "zernike 4", "zernike 9"])
 def test_gradients_by_smooth_coefficients(name, flat, tolerance):
     # With 7 borders and 9 nodes between them, the exact gradient by modes of order 9 has an error of 4e-5.
-    nodes = (
-        disk_nodes(np.linspace(-0.75, 0.75, 21), 11)
-        if name == "zernike 9"
-        else disk_nodes(np.linspace(-0.75, 0.75, 7), 9)
-    )
+    borders, across = (21, 11) if name == "zernike 9" else (7, 9)
+    nodes = disk_nodes(np.linspace(-0.75, 0.75, borders), across)
     if name == "control points":
         basis = np.einsum("ip,jp->ijp", cubic((nodes[1] + 1) / 2), cubic((nodes[0] + 1) / 2)).reshape(16, -1)
         scale, unit, factor = (4, 4), 0.5e-6, SCENE.n - 1
-        make = lambda values: Pupil(SCENE.radius, BSplineRelief(values), n=SCENE.n, thin_lens_focal_length=240e-6)  # noqa: E731
     else:
         order = int(name.split()[1])
         basis = np.stack([mode(n, m, *nodes[:2]) for n in range(order + 1) for m in range(-n, n + 1, 2)])
         scale, unit, factor = (len(basis),), 0.02, -1e-6
-        make = lambda values: Pupil(SCENE.radius, wavefront=Zernike(values), thin_lens_focal_length=240e-6)  # noqa: E731
+
+    def make(values):
+        bent = {"wavefront": Zernike(values)} if "zernike" in name else {"height": BSplineRelief(values), "n": SCENE.n}
+        return Pupil(SCENE.radius, thin_lens_focal_length=240e-6, **bent)
+
     values = np.zeros(scale) if flat else unit * np.random.default_rng(3).standard_normal(scale)
     _, q = psf_and_adjoint(SCENE, nodes, factor * (values.ravel() @ basis), np.ones_like(nodes[0]), WEIGHT.ravel())
     exact = basis @ (1j * SCENE.wavenumber * factor * q).real
