@@ -13,6 +13,8 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from optics import TurbidMedium
+from optics.elements.turbid_medium import medium_of
 from optics.numerics.arguments import did_you_mean, in_range, of_kind, shown, whole
 from optics.numerics.read_only import ReadOnlyArrays
 from optics.spectra.spectrum import Spectrum
@@ -61,6 +63,7 @@ class World(ReadOnlyArrays):
     training_starts: starting positions of the agent in training; None: `starts`
     episode_steps: number of actions after which an episode is truncated; None: the task's default
     mazes: number of mazes, or of courses, which are arranged from south to north; 1 in other tasks
+    medium: water or air that fills the world; None: clear air
     """
 
     task: str
@@ -74,6 +77,7 @@ class World(ReadOnlyArrays):
     training_starts: Starts | None = None
     episode_steps: int | None = None
     mazes: int = 1
+    medium: TurbidMedium | None = None
 
     @property
     def agent_spawn(self) -> np.ndarray:
@@ -93,6 +97,7 @@ def build_world(
     wall_height: float = WALL_HEIGHT,
     eyes: Eyes | None = None,
     spectra: Mapping[str, Spectrum | str] | None = None,
+    medium: TurbidMedium | str | None = None,
 ) -> World:
     """Build the world of a task.
 
@@ -108,6 +113,9 @@ def build_world(
     spectra: spectra of materials and lights, by name ("wall", "floor", "light_0" ...). They add to the spectra that the
         task defines, or replace them. Each is an `optics.Spectrum`, or a name that `optics.reflectance` or
         `optics.illuminant` accepts.
+    medium: water or air between surfaces and eyes: an `optics.TurbidMedium`, or one of its names ("clear_ocean",
+        "coastal_water", "fog"; see `optics.turbid_medium`). Under water, eyes are immersed (`optics.immersed`). None:
+        clear air
 
     Raises:
         ValueError: the task or the course is unknown, the seed is negative, `mazes`, `course` or `layouts` is given for
@@ -150,6 +158,7 @@ def build_world(
         training_starts=layout.training_starts,
         episode_steps=layout.episode_steps,
         mazes=mazes,
+        medium=medium_of("build_world: medium", medium),
     )
 
 
