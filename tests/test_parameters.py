@@ -127,6 +127,7 @@ FIELDS = {
     "world.selection_set": Case("world.selection_set=training", layouts, OF_FAMILY, "maze"),
     "world.wall_height": Case("world.wall_height=0.5", views),
     "world.least_light": Case("world.least_light=0.01", views),
+    "world.medium": Case("world.medium=fog", views),
     "world.encoded_textures": Case("world.encoded_textures=false", own_sight, task=TEXTURED),
     "search.optimizer": Case("search.optimizer=mutation", history),
     "search.steady_state": Case("search.steady_state=true", history),

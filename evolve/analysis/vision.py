@@ -45,13 +45,14 @@ class Vision:
 
 def vision(animal: Phenotype, config: RunConfig) -> Vision:
     """Return the measures of an animal's eyes in the run's task. If their optics cannot be computed, all are NaN."""
-    eyes = animal.eyes(config.eye)
+    medium = config.world.medium
+    eye = animal.eye(config.eye, medium)
     try:
-        quality, contrast = eye_image_quality(animal, config.eye), _contrast(eyes.eye())
+        quality, contrast = eye_image_quality(animal, config.eye, medium), _contrast(eye)
         seen, perfect = seen_and_perfect(animal, config)
     except optics.AccuracyError:
         return Vision(math.nan, math.nan, math.nan, math.nan)
-    gain = 1 / float(eyes.eye().white_signal)
+    gain = 1 / float(eye.white_signal)
     return Vision(quality, contrast, psnr(seen, perfect, gain), ssim(gain * seen, perfect))
 
 

@@ -129,6 +129,13 @@ class Phenotype:
             vertical_fov_deg=self.vertical_fov_deg,
         )
 
+    def eye(self, eye: EyeConfig, medium: str = "air") -> optics.Eye:
+        """Return the optics and retina of one eye in the medium of a run's worlds, one of `MEDIA_OF_WORLDS`."""
+        import optics
+
+        found: optics.Eye = optics.immersed(self.eyes(eye).eye(), optics.turbid_medium(medium))
+        return found
+
     def to_json(self) -> dict[str, Any]:
         """Return JSON values for a run file."""
         return {name: list(value) if isinstance(value, tuple) else value for name, value in vars(self).items()}

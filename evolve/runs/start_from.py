@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from evolve.analysis.statistics import gene_values
+from evolve.config.eye_checks import RHABDOMS
 from evolve.config.provenance import Source
-from evolve.config.run_config import RHABDOMS
 from evolve.genome.genes import ALL_GENES, INHERITED, SIDE, VERTICAL
 from evolve.store.directory import Run
 

@@ -25,7 +25,7 @@ from optics.spectra.spectrum import (
     water_absorption,
 )
 
-__all__ = ["MEDIA_OF_WORLDS", "BandMedium", "TurbidMedium", "fog", "medium_of", "sea_water", "turbid_medium"]
+__all__ = ["AIR", "MEDIA_OF_WORLDS", "BandMedium", "TurbidMedium", "fog", "medium_of", "sea_water", "turbid_medium"]
 
 # Contrast at which a black object is just visible in front of the horizon; it defines the visibility (Koschmieder 1924,
 # Beitraege zur Physik der freien Atmosphaere 12:33).
@@ -34,7 +34,8 @@ JUST_VISIBLE = 0.02
 # light comes from above, and all are in fog.
 FROM_ABOVE, FROM_EVERYWHERE = 0.5, 1.0
 STEP_NM = 5.0
-DISTANCES = np.geomspace(1e-2, 1e2, 81)  # distances at which errors are computed, in units of 1/c
+# Shortest and longest distance at which errors are computed, in units of 1/c for the largest and the mean c.
+SHORTEST, LONGEST = 1e-2, 1e2
 
 
 @dataclass(frozen=True)
@@ -80,8 +81,8 @@ class TurbidMedium:
     def in_bands(self, bands: SpectralBands, receptors: Any) -> BandMedium:
         """Return the medium in spectral bands.
 
-        The coefficient of a band is a mean, weighted with the receptors' catch of daylight. With it, the change of every
-        receptor's signal per metre is exact at short distances for a white surface. At longer distances, the
+        The coefficient of a band is a mean, weighted with the receptors' catch of daylight. At short distances, the
+        change of every receptor's signal per metre is then exact for a white surface. At longer distances, the
         transmission of a band is not an exponential function, and `band_error` returns the error.
 
         bands, receptors: as in `SpectralBands.band_values`
@@ -93,8 +94,8 @@ class TurbidMedium:
     def band_error(self, bands: int, receptors: Any) -> float:
         """Return the largest error of a signal due to this number of bands, relative to white in daylight.
 
-        It is the largest over receptor types, black and white surfaces, and distances from 0.01 to 100 attenuation
-        lengths. The reference is the integral over the spectrum in steps of 1 nm.
+        It is the largest over receptor types, black and white surfaces, and distances up to 100 attenuation lengths.
+        The reference is the integral over the spectrum in steps of 1 nm.
         """
         kinds = receptors_of(receptors)
         few = SpectralBands.uniform(bands, kinds)
@@ -103,13 +104,13 @@ class TurbidMedium:
         catch[:, [0, -1]] /= 2  # trapezoid rule
         catch /= catch.sum(axis=1, keepdims=True)
         fine, coarse = BandMedium(self.attenuation.at(nm * 1e-9), self.veil.at(nm * 1e-9)), self.in_bands(few, kinds)
-        middle = float(np.median(fine.attenuation))
-        if middle == 0:
+        if not fine.attenuation.any():
             return 0.0
+        distances = np.geomspace(SHORTEST / fine.attenuation.max(), LONGEST / fine.attenuation.mean(), 81)
         worst = 0.0
         for surface in (0.0, 1.0):
-            right = fine.through(np.full(len(nm), surface), DISTANCES / middle) @ catch.T
-            found = coarse.through(surface * daylight(few.wavelengths), DISTANCES / middle) @ few.weights.T
+            right = fine.through(np.full(len(nm), surface), distances) @ catch.T
+            found = coarse.through(surface * daylight(few.wavelengths), distances) @ few.weights.T
             worst = max(worst, float(np.abs(found - right).max()))
         return worst
 
@@ -123,9 +124,9 @@ def sea_water(chlorophyll: float) -> TurbidMedium:
     all directions of the upper hemisphere.
 
     Sources: Gordon & Morel (1983), Remote Assessment of Ocean Color; Morel (1974); Mobley (1994), Light and Water,
-    equations 3.27 and 3.40. For absorption: `water_absorption`, `phytoplankton_absorption`. Below 400 nm, A is constant,
-    which is uncertain. With 0.15 and 1 mg/m³, c at 514 nm is 0.15 and 0.40 per metre, as Petzold (1972) measured in a
-    clear and in a coastal ocean.
+    equations 3.27 and 3.40. For absorption: `water_absorption`, `phytoplankton_absorption`. Below 400 nm, A is
+    constant, which is uncertain. With 0.15 and 1 mg/m³, c at 514 nm is 0.15 and 0.40 per metre, as Petzold (1972)
+    measured in a clear and in a coastal ocean.
 
     Raises:
         ValueError: a concentration outside the range.

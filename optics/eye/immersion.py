@@ -16,7 +16,7 @@ def immersed(eye: Any, medium: TurbidMedium | None) -> Any:
     """Return an eye as it is in this medium.
 
     The medium is in front of the pupil (`Pupil.object_n`). A refracting surface between air and the eye, such as a
-    cornea, therefore loses power. The retina stays where it is, so the field of view changes by the ratio of the
+    cornea, therefore loses power. The retina does not move, so the field of view changes by the ratio of the
     indices at 550 nm. A pupil without `object_n` has the same medium on both sides; the medium then also fills the eye,
     and the field of view does not change. A perfect lens is perfect in every medium, and air (and fog) changes nothing.
 

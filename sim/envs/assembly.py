@@ -42,7 +42,10 @@ OF_TASKS = {  # arguments for built-in tasks only, with the place where a user t
     "eyes": "a user task defines its eyes by its settings eye and mounts",
     "rays_per_receptor": "a user task defines it by its setting fidelity",
     **dict.fromkeys(("world_seed", "mazes", "course", "layouts", "wall_height"), LAYOUT),
-    **{name: f"a user task defines it by its setting {name}" for name in ("fidelity", "spectra", "medium", "vary", "auxiliary")},
+    **{
+        name: f"a user task defines it by its setting {name}"
+        for name in ("fidelity", "spectra", "medium", "vary", "auxiliary")
+    },
 }
 IN_RESET = "pass it to reset(seed=...)"
 MOST = 1_000_000  # chosen limit for n_envs and for memory, more than any memory can hold

@@ -42,7 +42,8 @@ class ReferenceRenderer:
     seed: seed of the samples; the attribute may be changed between images
 
     Raises:
-        ValueError: an invalid argument, a world with a medium, or receptors whose sides are not in the ratio of small whole numbers.
+        ValueError: an invalid argument, a world with a medium, or receptors whose sides are not in the ratio of small
+            whole numbers.
         optics.AccuracyError: a pupil whose light spreads too far.
     """
 

@@ -12,7 +12,8 @@ import numpy as np
 from optics import BandMedium
 from optics.numerics.autodiff import Array
 
-FARTHEST = 1e9  # [m] replaces an infinite distance, because 0 · infinity is not a number
+FARTHEST = 1e9  # [m] replaces an infinite distance
+LEAST = 1e-6  # [1/m] smallest coefficient, with which nothing is visible through FARTHEST
 
 
 @dataclass(frozen=True)
@@ -30,7 +31,7 @@ class MediumOnRays:
     def from_bands(cls, medium: BandMedium, basis: np.ndarray) -> MediumOnRays:
         """Return the medium for a diagonal basis (component, band): radiance_b = basis[b, b] component_b."""
         veil = medium.veil / np.diag(basis)
-        return cls(tuple(map(float, medium.attenuation)), tuple(map(float, veil)))
+        return cls(tuple(map(float, np.maximum(medium.attenuation, LEAST))), tuple(map(float, veil)))
 
     def through(self, radiance: Sequence[Array], distance: Array) -> list[Array]:
         """Return the radiance L exp(-c d) + V (1 - exp(-c d)) of surfaces at these distances [m], per component.

@@ -114,6 +114,7 @@ IN_WORLDS = {
             "least_return": With(-0.01, {"steps": 30}),
             "episode_steps": With(2, {"steps": 4}),
             "spectra": {"light_0": "A"},
+            "medium": "fog",
             "vary": {"light": (0.1, 0.5)},
             "auxiliary": ("depth",),
             "render_mode": "eyes",
@@ -150,6 +151,7 @@ IN_WORLDS = {
             "wall_height": 0.5,
             "eyes": Eyes(),
             "spectra": {"wall": "foliage"},
+            "medium": "fog",
         },
     ),
     "make_env": Walk(

@@ -247,7 +247,9 @@ class AreaTracer:
             reflectance = self._stripes.mean_over(texture.texture, column, sides, now.inputs.stripes)
             light = sphere.light.on(slice_.patch.normal)
             if self._medium is not None:
-                light, reflectance = self._medium.reflected_contrasts(reflectance, light, [dr.norm(slice_.patch.point - area.origin)])
+                light, reflectance = self._medium.reflected_contrasts(
+                    reflectance, light, [dr.norm(slice_.patch.point - area.origin)]
+                )
             layers = _in_layers(depth, slice_.inverse_distance(area), light)
             sent_on = [bare / mi.Float(view.sides)]
             sent_on += [slice_.share * bare * r * e for r, e in zip(reflectance * depth.count, layers, strict=True)]

@@ -1,0 +1,77 @@
+"""Checks of the settings of eyes that depend on each other."""
+
+from __future__ import annotations
+
+import math
+
+from evolve.config.checks import ConfigError
+from evolve.genome.eye_config import VERTICAL_FOVS, EyeConfig
+from evolve.genome.genes import INHERITED
+from optics.spectra.receptors import RECEPTORS
+
+RHABDOMS = ("rhabdom_index", "rhabdom_surround", "rhabdom_length", "rhabdom_absorption")
+# Limits of the numerical aperture of rhabdoms. A fly's rhabdom has 0.25. Below the lower limit a rhabdom guides almost
+# no light, and above the upper limit it has hundreds of modes.
+LEAST_STEP, MOST_STEP = 0.2, 0.5
+# [lx s] smallest allowed exposure. A receptor that sees a white surface through a pupil with relative aperture 1 then
+# absorbs some 30 photons. With fewer photons, the approximation of shot noise fails.
+LEAST_EXPOSURE = 2e-4
+
+
+def check_eye(eye: EyeConfig) -> None:
+    """Check the names, the light and the rhabdoms of eyes.
+
+    Raises:
+        ConfigError: an unknown name, or settings that contradict each other.
+    """
+    for name, known in (("receptors", (*RECEPTORS, INHERITED)), ("vertical_fov", VERTICAL_FOVS)):
+        if (given := getattr(eye, name)) not in known:
+            raise ConfigError(f"eye.{name} = {given!r}: must be one of {', '.join(known)}", f"eye.{name}")
+    _check_light(eye)
+    _check_rhabdoms(eye)
+
+
+def _check_light(eye: EyeConfig) -> None:
+    """Check that light is not too weak, and that the integration time is changed only if there is shot noise."""
+    light, default = eye.illuminance, EyeConfig.integration_time
+    if 0 < light * eye.integration_time < LEAST_EXPOSURE:
+        raise ConfigError(
+            f"eye.illuminance = {light:g}, eye.integration_time = {eye.integration_time:g}: too few photons; "
+            f"must be at least {LEAST_EXPOSURE:g} lx s together, or eye.illuminance 0, no shot noise",
+            *("eye.illuminance", "eye.integration_time"),
+        )
+    if light == 0 and eye.integration_time != default:
+        raise ConfigError(
+            f"eye.integration_time = {eye.integration_time:g}: has no effect without shot noise: set "
+            f"eye.illuminance, or leave it at {default:g}",
+            *("eye.integration_time", "eye.illuminance"),
+        )
+
+
+def _check_rhabdoms(eye: EyeConfig) -> None:
+    """Check that eyes with rhabdoms have optics and a plausible numerical aperture.
+
+    Also check that settings of rhabdoms are changed only if receptors are rhabdoms.
+    """
+    default = EyeConfig()
+    for name in RHABDOMS if not eye.rhabdoms else ():
+        if getattr(eye, name) != getattr(default, name):
+            raise ConfigError(f"eye.{name}: is for rhabdoms: set eye.rhabdoms = true", f"eye.{name}", "eye.rhabdoms")
+    if eye.rhabdoms and not eye.optics:
+        raise ConfigError(
+            "eye.rhabdoms = true: needs the waves of a pupil; eye.optics = false gives none",
+            "eye.rhabdoms",
+            "eye.optics",
+        )
+    if eye.rhabdom_length == 0 and eye.rhabdom_absorption != default.rhabdom_absorption:
+        raise ConfigError(
+            f"eye.rhabdom_absorption = {eye.rhabdom_absorption:g}: needs a length: set eye.rhabdom_length",
+            *("eye.rhabdom_absorption", "eye.rhabdom_length"),
+        )
+    step = math.sqrt(max(eye.rhabdom_index**2 - eye.rhabdom_surround**2, 0.0))
+    if not LEAST_STEP <= step <= MOST_STEP:
+        raise ConfigError(
+            f"eye.rhabdom_index = {eye.rhabdom_index:g}, eye.rhabdom_surround = {eye.rhabdom_surround:g}: the root "
+            f"of the difference of their squares is {step:.3g}; must lie in [{LEAST_STEP:g}, {MOST_STEP:g}]",
+            *("eye.rhabdom_index", "eye.rhabdom_surround"),
+        )
