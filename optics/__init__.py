@@ -54,6 +54,7 @@ _CONTENTS = {
     "Polygon": "apertures.polygonal",
     "PropagationResult": "propagation.propagate",
     "Pupil": "elements.pupil",
+    "ReceptorDynamics": "eye.receptor_dynamics",
     "Receptors": "spectra.receptors",
     "RefractiveIndex": "elements.refractive_index",
     "Relief": "elements.relief",

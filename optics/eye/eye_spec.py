@@ -21,6 +21,7 @@ from optics.eye.geometry import (
 from optics.eye.guided_field import check_guide
 from optics.eye.photoreceptor import throughput
 from optics.eye.polarization import check_rays, microvilli_of
+from optics.eye.receptor_dynamics import ReceptorDynamics
 from optics.numerics.arguments import flag, in_range, of_kind, positive, shape_2d
 from optics.numerics.autodiff import Scalar, number
 from optics.ommatidia.waveguide import Waveguide
@@ -58,6 +59,7 @@ class EyeSpec:
     microvilli: Any = None
     pupil_turned: bool = False
     vertical_fov_deg: float | None = None
+    dynamics: ReceptorDynamics | None = None
     spectral_bands: SpectralBands = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -79,6 +81,8 @@ class EyeSpec:
             check_rays(self.pupil, number(self.retina_distance), self.tolerance)
         if self.photon_budget is not None:
             of_kind("photon_budget", self.photon_budget, PhotonBudget, "PhotonBudget(), or None")
+        if self.dynamics is not None:
+            of_kind("dynamics", self.dynamics, ReceptorDynamics, "ReceptorDynamics(time_constant_ms=20)")
         object.__setattr__(self, "receptors", receptors_of(self.receptors))
         auto = str(self.bands) == "auto"
         spectral = self.chosen_bands() if auto else SpectralBands.uniform(self.bands, self.receptors)

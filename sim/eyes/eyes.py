@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from optics.eye.receptor_dynamics import ReceptorDynamics
 from optics.numerics.arguments import shown
 from optics.numerics.renamed import warn_renamed
 from optics.spectra.bands import FINEST
@@ -51,6 +52,8 @@ class Eyes:
     pupil_turned: True if the pupils are rotated by 180° about their axes
     vertical_fov_deg: vertical field of view of one eye [deg], in [0.001, 170], which determines the height of the
         receptors. None: receptors are square.
+    dynamics: an optics.ReceptorDynamics: receptors that integrate, adapt or detect motion over time. None: receptors
+        without memory
 
     Raises:
         ValueError: a value is outside its range, or the receptors are unknown; the message suggests the nearest name.
@@ -69,6 +72,7 @@ class Eyes:
     waveguide: Waveguide | None = None
     pupil_turned: bool = False
     vertical_fov_deg: float | None = None
+    dynamics: ReceptorDynamics | None = None
 
     def __post_init__(self) -> None:
         def check(name: str, valid: Callable[[Any], bool], range_: str) -> None:
@@ -104,6 +108,8 @@ class Eyes:
             raise ValueError(
                 f"Eyes: photon_budget = {shown(self.photon_budget)}: must be an optics.PhotonBudget or None"
             )
+        if not isinstance(self.dynamics, ReceptorDynamics | None):
+            raise ValueError(f"Eyes: dynamics = {shown(self.dynamics)}: must be an optics.ReceptorDynamics or None")
         check("pupil_turned", lambda turned: isinstance(turned, bool | np.bool_), "True or False")
         if self.pupil_turned and self.optics is None:
             raise ValueError(
@@ -128,6 +134,7 @@ class Eyes:
             waveguide=self.waveguide,
             pupil_turned=self.pupil_turned,
             vertical_fov_deg=self.vertical_fov_deg,
+            dynamics=self.dynamics,
         )
 
     def _check_waveguide(self) -> None:

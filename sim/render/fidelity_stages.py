@@ -37,9 +37,9 @@ def bands(eye: optics.Eye, allowed: float, medium: optics.TurbidMedium | None = 
     if medium is None:
         return bands, Level("bands", f"{bands}", allowed, f"fewest for {allowed:.1e} with any colours up to white")
     errors = ((n, eye.throughput * medium.band_error(n, eye.receptors)) for n in range(bands, FINEST + 1))
-    bands, error = next(((n, float(error)) for n, error in errors if error <= allowed), (FINEST, allowed))
+    bands, worst = next(((n, float(found)) for n, found in errors if found <= allowed), (FINEST, math.inf))
     why = f"fewest for {allowed:.1e} with any colours up to white, and for white and black in the medium"
-    return bands, Level("bands", f"{bands}", max(allowed, error), why)
+    return bands, Level("bands", f"{bands}", max(allowed, worst), why)
 
 
 def own_bands(world: World, eye: optics.Eye) -> Level:

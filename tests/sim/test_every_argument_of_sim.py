@@ -67,6 +67,7 @@ def world(**given):
         sorted(found.spectra),
         found.mazes,
         found.episode_steps,
+        None if found.medium is None else found.medium.veil.values,
     )
 
 
@@ -193,6 +194,7 @@ ON_MODELS = {
             "spectra": {"lamp": "A"},
             "varied": NoEffect("it allows `Poses` with varied values: tests/sim/scene change them"),
             "tracer": NoEffect("all tracers give the same signals: tests/sim/tracing compare them"),
+            "medium": "fog",
         },
     ),
     "ModelRenderer.signals": Walk(
@@ -209,6 +211,7 @@ ON_MODELS = {
             "spectra": NoEffect("as in ModelRenderer"),
             "varied": NoEffect("as in ModelRenderer"),
             "light": "bounce",
+            "medium": "fog",
         },
     ),
     "View": Walk(
@@ -254,7 +257,7 @@ ELSEWHERE = {
             "tests/sim/render: it is the reference of other renderers",
         ),
         ("SlidingAgents", ("threads", "variation"), "tests/sim/physics; threads changes only the speed"),
-        ("World", ("alone", "episode_steps", "mazes", "spectra", "training_starts"), "build_world sets them"),
+        ("World", ("alone", "episode_steps", "mazes", "medium", "spectra", "training_starts"), "build_world sets them"),
         ("check_batch_task", ("n_envs", "steps"), "tests/sim/envs: it returns nothing"),
         ("choose_fidelity", ("bands", "tolerance", "tracer"), "tests/sim/render"),
     )
