@@ -12,6 +12,7 @@ batch_task_checker     check_batch_task: test of a batch task against the protoc
 animals                all agents of all worlds, learning or frozen
 senses                 observations of one agent
 eyes_of_kind           signals of one kind of an agent's eyes
+frame_choice           number of frames per action for receptors with dynamics
 renderers              renderers of all eyes
 observation            memory of past frames
 auxiliary              depth, geom ids and optic flow in observations
