@@ -7,8 +7,12 @@ import math
 from evolve.config.checks import ConfigError
 from evolve.genome.eye_config import VERTICAL_FOVS, EyeConfig
 from evolve.genome.genes import INHERITED
+from optics.eye.receptor_dynamics import ADAPTATIONS, MOTION
 from optics.spectra.receptors import RECEPTORS
 
+# Settings of receptors with memory, and settings that have an effect only with another one.
+IN_TIME = ("latency_ms", "adaptation", "adaptation_ms", "event_threshold", "motion_detectors", "motion_ms", "frames")
+NEEDED = {"adaptation_ms": "adaptation", "motion_ms": "motion_detectors"}
 RHABDOMS = ("rhabdom_index", "rhabdom_surround", "rhabdom_length", "rhabdom_absorption")
 # Limits of the numerical aperture of rhabdoms. A fly's rhabdom has 0.25. Below the lower limit a rhabdom guides almost
 # no light, and above the upper limit it has hundreds of modes.
@@ -19,16 +23,18 @@ LEAST_EXPOSURE = 2e-4
 
 
 def check_eye(eye: EyeConfig) -> None:
-    """Check the names, the light and the rhabdoms of eyes.
+    """Check the names, the light, the rhabdoms and the temporal settings of eyes.
 
     Raises:
         ConfigError: an unknown name, or settings that contradict each other.
     """
-    for name, known in (("receptors", (*RECEPTORS, INHERITED)), ("vertical_fov", VERTICAL_FOVS)):
+    names = {"receptors": (*RECEPTORS, INHERITED), "vertical_fov": VERTICAL_FOVS}
+    for name, known in {**names, "adaptation": ADAPTATIONS, "motion_detectors": MOTION}.items():
         if (given := getattr(eye, name)) not in known:
             raise ConfigError(f"eye.{name} = {given!r}: must be one of {', '.join(known)}", f"eye.{name}")
     _check_light(eye)
     _check_rhabdoms(eye)
+    _check_time(eye)
 
 
 def _check_light(eye: EyeConfig) -> None:
@@ -74,4 +80,23 @@ def _check_rhabdoms(eye: EyeConfig) -> None:
             f"eye.rhabdom_index = {eye.rhabdom_index:g}, eye.rhabdom_surround = {eye.rhabdom_surround:g}: the root "
             f"of the difference of their squares is {step:.3g}; must lie in [{LEAST_STEP:g}, {MOST_STEP:g}]",
             *("eye.rhabdom_index", "eye.rhabdom_surround"),
+        )
+
+
+def _check_time(eye: EyeConfig) -> None:
+    """Check that settings of receptors with memory are changed only if receptors have one, and where they matter."""
+    default = EyeConfig()
+    changed = [name for name in IN_TIME if getattr(eye, name) != getattr(default, name)]
+    if changed and eye.temporal_order == 0:
+        raise ConfigError(
+            f"eye.{changed[0]}: is for receptors with memory: set eye.temporal_order = 1 or 2",
+            *(f"eye.{changed[0]}", "eye.temporal_order"),
+        )
+    for name in changed:
+        if (other := NEEDED.get(name)) is not None and getattr(eye, other) == "none":
+            raise ConfigError(f"eye.{name}: has no effect with eye.{other} = none", f"eye.{name}", f"eye.{other}")
+    if eye.event_threshold > 0 and eye.adaptation != "none":
+        raise ConfigError(
+            f"eye.event_threshold = {eye.event_threshold:g}: must be 0 with eye.adaptation = {eye.adaptation}",
+            *("eye.event_threshold", "eye.adaptation"),
         )

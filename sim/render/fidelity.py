@@ -104,6 +104,7 @@ class Fidelity:
             Level("depth", f"{self.depth}", None, "as requested"),
             Level("light", self.light, None, "as requested"),
             Level(self.samples, f"{self.rays_per_receptor:g} per receptor", None, "as requested"),
+            *([Level("frames", f"{self.frames} per action", None, "as requested")] if self.frames else []),
         )
         rows = [("stage", "level", "error", "why")]
         for level in levels:
