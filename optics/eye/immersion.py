@@ -8,6 +8,8 @@ from typing import Any
 
 from optics.elements.pupil import MIDDLE
 from optics.elements.turbid_medium import TurbidMedium
+from optics.eye.eye_spec import EyeSpec
+from optics.numerics.arguments import of_kind
 
 __all__ = ["immersed"]
 
@@ -22,7 +24,13 @@ def immersed(eye: Any, medium: TurbidMedium | None) -> Any:
 
     eye: an `optics.Eye`
     medium: None: air
+
+    Raises:
+        ValueError: an argument of another type.
     """
+    of_kind("eye", eye, EyeSpec, "optics.Eye()")
+    if medium is not None:
+        of_kind("medium", medium, TurbidMedium, "optics.sea_water(1), or None")
     pupil = eye.pupil
     if medium is None or medium.refractive_index is None or pupil is None:
         return eye

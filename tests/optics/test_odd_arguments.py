@@ -101,6 +101,27 @@ EYES = {
         "pupil_turned": False,
     },
     "Microvilli": {"azimuth_deg": 0.0, "dichroic_ratio": 10.0},
+    "ReceptorDynamics": {
+        "time_constant_ms": 10.0,
+        "order": 1,
+        "latency_ms": 0.0,
+        "adaptation": "none",
+        "adaptation_ms": 1e3,
+        "dark_light": 1e-3,
+        "event_threshold": None,
+        "motion": "none",
+        "motion_ms": 35.0,
+        "frames": None,
+    },
+    "TurbidMedium": {
+        "attenuation": optics.Spectrum((500,), (0.1,)),
+        "veil": optics.Spectrum((500,), (0.5,)),
+        "refractive_index": None,
+    },
+    "fog": {"visibility": 20.0},
+    "immersed": {"eye": optics.Eye(LENS), "medium": optics.fog(20.0)},
+    "sea_water": {"chlorophyll": 1.0},
+    "turbid_medium": {"name": "fog"},
     "Waveguide": {"diameter": 2e-6, "n_core": 1.363, "n_clad": 1.34, "length": None, "absorption": 6e3},
     "hexagonal_directions": {"rings": 1, "interommatidial_deg": 2.0},
     "mean_human_mtf": {"cycles_per_degree": [1.0, 2.0], "pupil_diameter": 3e-3},
@@ -180,6 +201,7 @@ def test_nothing_of_the_face_is_forgotten():
     """Omitted names are results of optics itself, or take the same arguments as names that are tested here."""
     made = {"AccuracyError", "BackendError", "MTF", "Mode", "PSFBatch", "PSFResult", "Plan", "PropagationResult"}
     made |= {
+        "BandMedium",
         "ExitPupil",
         "SpectralBands",
         "StackResult",

@@ -140,6 +140,7 @@ IN_WORLDS = {
                 {"optics": optics.Pupil(20e-6, wavefront=optics.Zernike({(1, 1): 4.0}), thin_lens_focal_length=240e-6)},
             ),
             "vertical_fov_deg": 30.0,
+            "dynamics": optics.ReceptorDynamics(200.0),
         },
     ),
     "build_world": Walk(
@@ -241,7 +242,11 @@ ELSEWHERE = {
         ("BatchedRenderer.signals", ("light",), "as ModelRenderer.signals"),
         ("ModelRenderer.launch", ("light",), "as ModelRenderer.signals"),
         ("ModelRenderer.launch_some", ("light",), "as ModelRenderer.signals"),
-        ("Fidelity", ("depth", "levels", "light", "samples", "tolerance"), "tests/sim/render: they describe a choice"),
+        (
+            "Fidelity",
+            ("depth", "frames", "levels", "light", "samples", "tolerance"),
+            "tests/sim/render: they describe a choice",
+        ),
         ("Frozen", ("policy",), "tests/sim/envs"),
         ("Mirror.render", ("integrator", "sampler", "seed", "spp", "wavelengths"), "tests/sim/scene"),
         ("mirror", ("bodies", "data", "groups", "spectra", "variant"), "tests/sim/scene"),
