@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 import optics
 import sim
-from evolve.analysis.statistics import eye_image_quality, polychromatic, psnr
+from evolve.analysis.statistics import psnr
+from evolve.analysis.white_light import WhiteLight, eye_image_quality
 from evolve.config.run_config import RunConfig
 from evolve.genome.phenotype import Phenotype
 from evolve.learning.animal_task import animal_task
@@ -48,7 +49,11 @@ def vision(animal: Phenotype, config: RunConfig) -> Vision:
     medium = config.world.medium
     eye = animal.eye(config.eye, medium)
     try:
-        quality, contrast = eye_image_quality(animal, config.eye, medium), _contrast(eye)
+        if eye.pupil is None:
+            quality, contrast = eye_image_quality(animal, config.eye, medium), 1.0
+        else:
+            light = WhiteLight.from_eye(eye)
+            quality, contrast = light.image_quality, light.contrast
         seen, perfect = seen_and_perfect(animal, config)
     except optics.AccuracyError:
         return Vision(math.nan, math.nan, math.nan, math.nan)
@@ -88,11 +93,3 @@ def ssim(signals: Floats, reference: Floats) -> float:
         return math.nan
     pairs = zip(*(a.reshape(-1, *a.shape[-2:]).astype(np.float64) for a in (signals, reference)), strict=True)
     return float(np.mean([structural_similarity(a, b, win_size=window, data_range=1.0) for a, b in pairs]))
-
-
-def _contrast(eye: optics.Eye) -> float:
-    """Return the MTF at half the Nyquist frequency of the receptors; 1 for a perfect lens."""
-    if eye.pupil is None:
-        return 1.0
-    white = polychromatic(eye, eye.psf())
-    return float(optics.mtf(white).profile(np.array([1 / (4 * eye.receptor_pitch)]))[0, 0])

@@ -7,8 +7,9 @@ import pytest
 
 import optics
 from evolve.analysis.recorder import record
+from evolve.analysis.white_light import WhiteLight
 from evolve.report import eye_figures
-from evolve.report.eye_figures import WhiteLight, diffraction_limit, relief_heights
+from evolve.report.eye_figures import diffraction_limit, relief_heights
 from evolve.report.markup import html
 from evolve.report.views import through_optics
 from optics.spectra.bands import daylight
@@ -103,9 +104,9 @@ def test_a_figure_that_cannot_be_known_is_one_line(monkeypatch):
     class Animal:
         refractive_index = 1.5
 
-        def eyes(self, _):
+        def eye(self, *_):
             pupil = optics.Pupil(20e-6, thin_lens_focal_length=optics.Eye().sensor_distance)
-            return type("Eyes", (), {"eye": lambda _: optics.Eye(pupil, (5, 5))})()
+            return optics.Eye(pupil, (5, 5))
 
     monkeypatch.setattr(optics, "mtf", refused)
     page = str(eye_figures.eye_figures(Animal(), None))
