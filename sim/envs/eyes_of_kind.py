@@ -35,10 +35,10 @@ class EyesOfKind:
         self._normals: Normals = Normals(keys, frame)
         self._in_time: ReceptorsInTime | None = None
         self._shot: NoiseModel | None = None
-        self._frames = self._repeats = renderer.fidelity.frames or 1
         if (dynamics := renderer.eye.dynamics) is not None:
-            require_frames(simulation, self._frames)
-            seconds = simulation.physics.seconds / self._frames
+            frames = renderer.fidelity.frames or 1
+            require_frames(simulation, frames)
+            seconds = simulation.physics.seconds / frames
             self._in_time = ReceptorsInTime(dynamics, simulation.n, frame, seconds)
             budget = renderer.eye.photon_budget
             share = 1.0 if budget is None else seconds / budget.integration_time
@@ -85,8 +85,6 @@ class EyesOfKind:
             receptors.step(self._with_shot_noise(self.renderer.signals(earlier, light), chosen), chosen)
         if not first:
             receptors.store(chosen)
-            self._repeats = self._frames - len(passed)  # more than 1 if the physics of a world broke down
-        repeats = 1 if fresh else self._repeats
         seen = self.renderer.launch(poses, light) if worlds is None else self.renderer.launch_some(poses, worlds, light)
 
         def finish(signals: np.ndarray) -> np.ndarray:
@@ -94,8 +92,7 @@ class EyesOfKind:
                 receptors.start(signals, chosen)
             elif worlds is not None:
                 receptors.undo(chosen)
-            for _ in range(repeats):
-                found = receptors.step(self._with_shot_noise(signals.copy(), chosen), chosen)
+            found = receptors.step(self._with_shot_noise(signals, chosen), chosen)
             receptors.observed(chosen)
             return found if self._noise is None else self._noise(found, self._normals_of(chosen, found.shape))
 

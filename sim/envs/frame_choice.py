@@ -126,8 +126,6 @@ def _played(worlds: Simulation, renderers: Sequence[EyeRenderer]) -> list[np.nda
         commanded = [random.uniform(-1, 1, (worlds.n, agent.n_actions)) for agent in worlds.agents]
         worlds.move(np.concatenate(commanded, axis=1))
         moments = [*worlds.physics.passed, worlds.poses()]
-        if len(moments) < worlds.physics.frames:  # the physics of a world broke down
-            break
         for renderer, mine in zip(renderers, found, strict=True):
             mine.append([renderer.signals(poses) for poses in moments])
         if worlds.judge({}).done.any():

@@ -93,8 +93,17 @@ class MujocoWorlds:
         for _ in advance(self._move, moving):
             pass
         broken = {world: words for world in moving if (words := _broken(self.datas[world])) is not None}
-        self.passed = [] if broken else self.passed
+        if broken and self.passed:
+            self._replace_passed(list(broken))
         return broken
+
+    def _replace_passed(self, broken: list[int]) -> None:
+        """Replace the earlier poses of worlds whose physics broke down by their poses after the action."""
+        for world in broken:
+            self.require_places(world)
+        fine = [world for world in range(self.n) if world not in broken]
+        order, final = np.argsort([*fine, *broken]), self.poses().take(np.array(broken))
+        self.passed = [Poses.joined(earlier.take(np.array(fine, int)), final).take(order) for earlier in self.passed]
 
     def require_places(self, world: int) -> None:
         """Reset a world if its poses are not finite, because rendering would then fail for all worlds."""

@@ -148,14 +148,19 @@ class SlidingAgents:
             worlds = np.flatnonzero(motion.unstable | ~after.finite)
             after, broken = after.repaired(), dict.fromkeys(worlds.tolist(), UNSTABLE)
         self._state = after
-        self.passed = [] if broken else [self._between(before, after, k / self.frames) for k in range(1, self.frames)]
+        shares = [k / self.frames for k in range(1, self.frames)]
+        self.passed = [self._between(before, after, share, list(broken)) for share in shares]
         return broken
 
-    def _between(self, before: WorldState, after: WorldState, share: float) -> Poses:
-        """Return the poses when this share of the action has passed. The heading changes when an action begins."""
+    def _between(self, before: WorldState, after: WorldState, share: float, broken: list[int]) -> Poses:
+        """Return the poses when this share of the action has passed. The heading changes when an action begins.
+
+        broken: worlds whose physics broke down; their poses are already those after the action
+        """
         assert self.motion is not None
-        position = self.motion.path[:, round(share * SUBSTEPS) - 1]
+        position = self.motion.path[:, round(share * SUBSTEPS) - 1].copy()
         objects = before.objects + share * (after.objects - before.objects)
+        position[broken], objects[broken] = after.position[broken], after.objects[broken]
         return self._poses(replace(after, position=position, objects=objects))
 
     def poses(self) -> Poses:

@@ -1,6 +1,7 @@
 """Environments of eyes whose receptors have dynamics: frames within an action, noise, states and refusals."""
 
 from contextlib import closing
+from dataclasses import replace
 
 import mujoco
 import numpy as np
@@ -225,3 +226,35 @@ def test_dynamics_of_another_type_are_refused():
         eyes(20)
     with pytest.raises(ValueError, match="dynamics"):
         optics.Eye(dynamics=20)
+
+
+def test_a_world_that_breaks_down_leaves_the_others_as_they_are():
+    seen = []
+    for spoilt in (False, True):
+        with closing(sim.make_vec_env("detection", eyes(SLOW), 3, fidelity=RAYS)) as venv:
+            venv.reset()
+            venv.step(actions(3, 1)[0])
+            if spoilt:
+                position = venv.state.position.copy()
+                position[0] = np.nan
+                venv.simulation.state = replace(venv.state, position=position)
+            seen.append([venv.step(action)[0]["eyes"] for action in actions(3, 4, 1)])
+    assert np.isfinite(seen).all()
+    assert np.array_equal(*np.array(seen)[:, :, 1:])
+    assert not np.array_equal(*np.array(seen)[:, :, :1])
+
+
+def test_poses_of_a_model_that_breaks_down_are_those_after_the_action():
+    worlds = MujocoWorlds(SPINNING, mujoco.MjModel.from_xml_string(SPINNING), 3, substeps=20)
+    for world in range(3):
+        worlds.start_episode(world, {})
+    worlds.settle(np.arange(3))
+    worlds.frames = 4
+    worlds.datas[1].qvel[0] = 1e12
+    assert list(worlds.step(())) == [1]
+    after = worlds.poses()
+    assert len(worlds.passed) == 3
+    for earlier in worlds.passed:
+        assert np.isfinite(earlier.xpos).all()
+        assert np.array_equal(earlier.xpos[1], after.xpos[1])
+        assert not np.array_equal(earlier.xpos[[0, 2]], after.xpos[[0, 2]])
