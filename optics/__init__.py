@@ -54,7 +54,7 @@ _CONTENTS = {
     "Polygon": "apertures.polygonal",
     "PropagationResult": "propagation.propagate",
     "Pupil": "elements.pupil",
-    "ReceptorDynamics": "eye.receptor_dynamics",
+    "ReceptorDynamics": "spectra.receptor_dynamics",
     "Receptors": "spectra.receptors",
     "RefractiveIndex": "elements.refractive_index",
     "Relief": "elements.relief",

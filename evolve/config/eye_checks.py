@@ -7,7 +7,7 @@ import math
 from evolve.config.checks import ConfigError
 from evolve.genome.eye_config import VERTICAL_FOVS, EyeConfig
 from evolve.genome.genes import INHERITED
-from optics.eye.receptor_dynamics import ADAPTATIONS, MOTION
+from optics.spectra.receptor_dynamics import ADAPTATIONS, MOTION
 from optics.spectra.receptors import RECEPTORS
 
 # Settings of receptors with memory, and settings that have an effect only with another one.

@@ -2,7 +2,6 @@
 
 eye                   Eye
 eye_spec              EyeSpec: parameters of an eye
-receptor_dynamics     ReceptorDynamics: receptors in time
 immersion             immersed: an eye under water
 geometry              lengths and directions, and checks of the pupil's width
 cell_integrals        integrals of sampled functions over cells

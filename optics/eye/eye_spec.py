@@ -21,12 +21,12 @@ from optics.eye.geometry import (
 from optics.eye.guided_field import check_guide
 from optics.eye.photoreceptor import throughput
 from optics.eye.polarization import check_rays, microvilli_of
-from optics.eye.receptor_dynamics import ReceptorDynamics
 from optics.numerics.arguments import flag, in_range, of_kind, positive, shape_2d
 from optics.numerics.autodiff import Scalar, number
 from optics.ommatidia.waveguide import Waveguide
 from optics.spectra.bands import SpectralBands
 from optics.spectra.photon_budget import PhotonBudget
+from optics.spectra.receptor_dynamics import ReceptorDynamics
 from optics.spectra.receptors import receptors_of
 
 __all__ = ["EyeSpec"]

@@ -13,11 +13,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from optics.eye.receptor_dynamics import ReceptorDynamics
 from optics.numerics.arguments import shown
 from optics.numerics.renamed import warn_renamed
 from optics.spectra.bands import FINEST
 from optics.spectra.photon_budget import PhotonBudget
+from optics.spectra.receptor_dynamics import ReceptorDynamics
 from optics.spectra.receptors import receptors_of
 
 if TYPE_CHECKING:

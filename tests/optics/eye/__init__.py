@@ -13,7 +13,6 @@ polarization: test_polarization.py
 signals: test_eye.py, test_polarization.py
 receptive_field: test_receptive_field.py, test_scattered_light.py, test_axes.py, test_eye.py, test_eye_robustness.py
 guided_field: test_guided_field.py, test_axes.py
-receptor_dynamics: sim/render/test_receptors_in_time.py
 receptor_kernel: test_guided_field.py, test_eye.py
 retinal_image: test_retinal_image.py
 summary: test_summary.py

@@ -3,6 +3,7 @@
 bands: test_bands.py
 photon_budget: test_photon_budget.py
 pigment: test_pigment.py
+receptor_dynamics: sim/render/test_receptors_in_time.py
 receptors: test_receptors.py
 spectrum: test_spectrum.py
 """
