@@ -11,6 +11,7 @@ import numpy as np
 
 import optics
 from optics.spectra.spectrum import Spectrum
+from sim.eyes.compound_eye import WorldEye
 from sim.eyes.depth_layers import DepthLayers
 from sim.eyes.inside import depth_inside
 from sim.eyes.mounts import Mount
@@ -50,7 +51,7 @@ class PreparedScene:
     def __init__(
         self,
         model: mujoco.MjModel,
-        eye: optics.Eye,
+        eye: WorldEye,
         mounts: Sequence[Mount],
         *,
         spectra: Mapping[str, Spectrum | str] | None = None,
