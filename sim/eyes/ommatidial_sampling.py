@@ -5,23 +5,32 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial import KDTree
 
 from optics.ommatidia.acceptance import AcceptanceFunction
 from optics.spectra.spectrum import daylight
 from sim.eyes.compound_eye import CompoundEye
 from sim.eyes.depth_layers import ONE_PSF, DepthLayers
-from sim.eyes.receptive_fields import bounce_samples, low_discrepancy
+from sim.eyes.receptive_fields import bounce_samples
 from sim.eyes.sensor import Facets, OmmatidialSensor
 from sim.eyes.viewing_directions import facet_frames
+
+PATTERNS = 16  # choice: arrangements of rays that equal ommatidia share
+STEPS = 20  # choice: steps of Lloyd's algorithm
+# Choice: exponent of the acceptance function in Lloyd's algorithm. The density of rays is then its power 0.8, which
+# gives the smallest error at an edge in any place (the variance at an edge is ∫ density^-1.5 acceptance²).
+CROWDING = 1.6
+COARSE, CELLS = 7, 30  # choice: every seventh direction is used if this leaves at least 30 for each ray
 
 
 @dataclass(frozen=True)
 class OmmatidialSampling:
     """Samples of a compound eye.
 
-    All ommatidia use the same low-discrepancy points, shifted by a fixed random offset of each ommatidium, so that the
-    errors of neighbours are independent. The points are mapped to directions by the inverse of a cumulative
-    distribution, the mean over bands of the normalised acceptance functions.
+    An ommatidium's rays are spread over its field with a density that increases with the acceptance function. The
+    weight of a ray is the integral of the acceptance function over the directions that are nearest to the ray. Equal
+    ommatidia share PATTERNS arrangements of rays, one of which is drawn for each ommatidium, so that the errors of
+    neighbours are nearly independent.
     """
 
     eye: CompoundEye
@@ -30,14 +39,14 @@ class OmmatidialSampling:
     def sensor(self, rays_per_receptor: float) -> OmmatidialSensor:
         """Return the eye's sensor with this number of rays per ommatidium, rounded to a whole number."""
         eye, rays = self.eye, max(1, round(rays_per_receptor))
-        shifts, turns = (np.random.default_rng(seed).random((len(eye), 1, 2)) for seed in (0, 1))
-        points = (low_discrepancy(rays) + shifts) % 1.0
+        turns = np.random.default_rng(1).random((len(eye), 1, 2))
+        pattern = np.random.default_rng(0).integers(PATTERNS, size=len(eye))
         local = np.empty((len(eye), rays, 3), np.float32)
         weights = np.empty((len(eye), rays, eye.bands), np.float32)
-        kinds, index = eye.kinds
-        for kind in range(len(kinds)):
-            mine = np.flatnonzero(index == kind)
-            local[mine], weights[mine] = _drawn(eye.acceptance(kind), points[mine])
+        _, index = eye.kinds
+        for kind, seed in sorted({*zip(index.tolist(), pattern.tolist(), strict=True)}):
+            mine, found = (index == kind) & (pattern == seed), _pattern(eye.acceptance(kind), rays, seed)
+            local[mine], weights[mine] = found.directions, found.weights
         frames = facet_frames(eye.directions).astype(np.float32)
         share = eye.solid_angles / eye.solid_angles.mean(axis=1, keepdims=True)
         weights *= share[:, None].astype(np.float32)
@@ -58,30 +67,48 @@ class OmmatidialSampling:
         return found
 
 
-def _drawn(accepted: AcceptanceFunction, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return directions (..., 3) in a facet's frame (right, up, axis), and their weights in each band, (..., band).
+@dataclass(frozen=True)
+class _RayPattern:
+    """Rays of one ommatidium.
 
-    The weights in each band sum to 1 over the last axis but one.
+    directions: unit vectors in a facet's frame (right, up, axis), (ray, 3)
+    weights: fraction of the acceptance function in each ray's cell, (ray, band)
+    """
 
-    points: points in the unit square, (..., 2)
+    directions: np.ndarray
+    weights: np.ndarray
+
+
+def _pattern(accepted: AcceptanceFunction, rays: int, seed: int) -> _RayPattern:
+    """Return rays at the centroids of a Voronoi tessellation of directions, by Lloyd's algorithm (1982).
+
+    Compared with importance weights at random points, the integrals over cells halve the error at edges, because bands
+    differ in their acceptance functions.
+
+    seed: determines the initial points
     """
     powers = accepted.values * accepted.solid_angles
-    powers /= powers.sum(axis=(1, 2), keepdims=True)
-    density = powers.mean(axis=0)
-    side, pitch = len(accepted.sines), accepted.sines[1] - accepted.sines[0]
-    ends = np.concatenate([[0.0], np.cumsum(density)])
-    ends /= ends[-1]
-    rows = ends[::side]
-    row = np.clip(np.searchsorted(rows, points[..., 0], side="right") - 1, 0, side - 1)
-    mass = rows[row + 1] - rows[row]
-    within = (points[..., 0] - rows[row]) / mass
-    target = rows[row] + points[..., 1] * mass
-    cell = np.clip(np.searchsorted(ends, target, side="right") - 1, row * side, row * side + side - 1)
-    along = (target - ends[cell]) / np.maximum(ends[cell + 1] - ends[cell], np.finfo(float).tiny)
-    up = accepted.sines[row] + (within - 0.5) * pitch
-    # The x axis of a pupil points to the owner's left (docs/architecture.md, "Coordinates and orientation").
-    right = -(accepted.sines[cell - row * side] + (np.clip(along, 0, 1) - 0.5) * pitch)
-    directions = np.stack([right, up, np.sqrt(np.maximum(1 - right**2 - up**2, 0))], axis=-1)
-    weights = np.moveaxis(powers.reshape(len(powers), -1)[:, cell] / density.ravel()[cell], 0, -1)
-    total = weights.sum(axis=-2, keepdims=True)
-    return directions, weights / total
+    powers = (powers / powers.sum(axis=(1, 2), keepdims=True)).reshape(len(powers), -1)
+    density, places = powers.mean(axis=0), np.stack(np.meshgrid(accepted.sines, accepted.sines), axis=-1).reshape(-1, 2)
+    strata = (np.arange(rays) + np.random.default_rng(seed).random(rays)) / rays
+    points = places[np.searchsorted(np.cumsum(density / density.sum()), strata).clip(0, len(places) - 1)]
+    coarse = slice(seed % COARSE, None, COARSE) if rays * CELLS < len(places) / COARSE else slice(None)
+    for _ in range(STEPS):
+        points = _centroids(points, places[coarse], density[coarse] ** CROWDING)
+    nearest = KDTree(points).query(places)[1]
+    points = _centroids(points, places, density, nearest)
+    weights = np.stack([np.bincount(nearest, power, rays) for power in powers], axis=-1)
+    up, right = points[:, 1], -points[:, 0]  # the x axis of a pupil points to the owner's left
+    return _RayPattern(np.stack([right, up, np.sqrt(1 - right**2 - up**2)], axis=-1), weights)
+
+
+def _centroids(
+    points: np.ndarray, places: np.ndarray, masses: np.ndarray, nearest: np.ndarray | None = None
+) -> np.ndarray:
+    """Return the centres of mass of the places nearest to each point; points without any mass stay where they are."""
+    nearest = KDTree(points).query(places)[1] if nearest is None else nearest
+    total = np.bincount(nearest, masses, len(points))
+    safe = np.where(total > 0, total, 1)
+    sums = [np.bincount(nearest, masses * axis, len(points)) for axis in places.T]
+    found: np.ndarray = np.where(total[:, None] > 0, np.stack(sums, axis=-1) / safe[:, None], points)
+    return found

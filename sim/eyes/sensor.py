@@ -143,12 +143,11 @@ class ReceptiveFieldSensor(ReadOnlyArrays):
 
 @dataclass(frozen=True)
 class OmmatidialSensor(ReadOnlyArrays):
-    """Sensor of a compound eye, whose ommatidia have their own rays, drawn from their acceptance functions.
+    """Sensor of a compound eye, whose ommatidia have their own rays.
 
-    The kernel multiplies the light along each ray by its weight A_b(s) / q(s), and sums over an ommatidium's rays. A_b
-    is the acceptance function in band b, and q the density from which the directions s are drawn. The weights are
-    normalised (self-normalised importance sampling): their sum in band b is Ω_b, relative to the mean of Ω over all
-    bands, with the integral Ω_b of A_b. The signal of type t is Σ_b mixing[t, b] times the sum in band b, divided by
+    The kernel multiplies the light along each ray by its weight, the integral of the acceptance function in each band
+    over the directions near the ray, and sums over an ommatidium's rays. The weights in band b sum to Ω_b, the integral
+    over all directions, relative to the mean of Ω over all bands. The signal of type t is Σ_b mixing[t, b] times the sum in band b, divided by
     the same expression for white light.
 
     directions, bounce_samples, rays_per_receptor: see `BoxSensor`
