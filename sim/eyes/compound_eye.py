@@ -111,6 +111,11 @@ class CompoundEye:
         return None if self.types is None else self.types.T
 
     @property
+    def fov_deg(self) -> float:
+        """Horizontal angle [degrees] around straight ahead that contains all viewing directions, at most 360."""
+        return float(2 * np.degrees(np.abs(np.arctan2(self.directions[:, 1], self.directions[:, 0])).max()))
+
+    @property
     def throughput(self) -> float:
         """Signal of a white surface, 1."""
         return 1.0

@@ -105,7 +105,7 @@ def whole_head(interommatidial_deg: float) -> np.ndarray:
     """Return viewing directions all around a head, unit vectors (n, 3).
 
     They are the 10 f² + 2 nodes of an icosahedron whose edges are divided into f parts. All but twelve of them have six
-    neighbours. The number f is the smallest for which the mean angle between neighbours is at most the given one; 5.7
+    neighbours. The number f is the smallest for which the mean angle between neighbours is at most the given one; 5.8
     degrees give 1442 ommatidia.
 
     interommatidial_deg: largest mean angle between neighbours [degrees]
