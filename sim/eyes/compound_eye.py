@@ -42,8 +42,8 @@ class CompoundEye:
         have different pigments in pale and yellow ommatidia. None: every ommatidium has receptors of all types.
     bands: number of spectral bands, 1 to 64
     noise_sigma: standard deviation of a receptor's Gaussian noise, in the unit of signals
-    photon_budget: an `optics.PhotonBudget`. Photons are counted in each ommatidium: a facet of twice the area catches
-        twice as many photons from the same field, and has less shot noise. None: no shot noise
+    photon_budget: an `optics.PhotonBudget`. Photons are counted in each ommatidium before its signal is normalised, so a
+        wide facet has less shot noise than a narrow one with the same field. None: no shot noise
     radius: radius [m] of the eye's surface, a sphere around the mount on which the facets lie. Facets must not overlap.
         None: all facets are at the mount, and their diameters are not compared with their distances
 

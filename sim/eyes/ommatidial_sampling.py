@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,10 +18,8 @@ from sim.eyes.viewing_directions import facet_frames
 
 PATTERNS = 16  # choice: arrangements of rays that equal ommatidia share
 STEPS = 20  # choice: steps of Lloyd's algorithm
-# Choice: exponent of the acceptance function in Lloyd's algorithm. The density of rays is then its power 0.8, which
-# gives the smallest error at an edge in any place (the variance at an edge is ∫ density^-1.5 acceptance²).
-CROWDING = 1.6
 COARSE, CELLS = 7, 30  # choice: every seventh direction is used if this leaves at least 30 for each ray
+CORRECTED = 8  # choice: smallest number of rays with corrected weights; fewer would need negative weights
 
 
 @dataclass(frozen=True)
@@ -94,12 +93,38 @@ def _pattern(accepted: AcceptanceFunction, rays: int, seed: int) -> _RayPattern:
     points = places[np.searchsorted(np.cumsum(density / density.sum()), strata).clip(0, len(places) - 1)]
     coarse = slice(seed % COARSE, None, COARSE) if rays * CELLS < len(places) / COARSE else slice(None)
     for _ in range(STEPS):
-        points = _centroids(points, places[coarse], density[coarse] ** CROWDING)
+        points = _centroids(points, places[coarse], density[coarse])
     nearest = KDTree(points).query(places)[1]
     points = _centroids(points, places, density, nearest)
     weights = np.stack([np.bincount(nearest, power, rays) for power in powers], axis=-1)
+    if rays >= CORRECTED:
+        spread = (accepted.sines[1] - accepted.sines[0]) ** 2 / (density**2).sum() / (2 * math.pi)
+        weights = _corrected(weights, *(_tests(at, spread) for at in (points, places)), powers)
     up, right = points[:, 1], -points[:, 0]  # the x axis of a pupil points to the owner's left
     return _RayPattern(np.stack([right, up, np.sqrt(1 - right**2 - up**2)], axis=-1), weights)
+
+
+def _tests(places: np.ndarray, spread: float) -> np.ndarray:
+    """Return the values of two scenes at these places: uniform light, and a Gaussian of this variance on the axis."""
+    return np.stack([np.ones(len(places)), np.exp(-(places**2).sum(axis=-1) / (2 * spread))], axis=-1)
+
+
+def _corrected(weights: np.ndarray, at_rays: np.ndarray, everywhere: np.ndarray, powers: np.ndarray) -> np.ndarray:
+    """Return weights with which every band sees the test scenes exactly.
+
+    All bands share the centroids of cells. Without the correction, a band with a wide acceptance function would see too
+    narrow a field.
+
+    at_rays, everywhere: test scenes at the rays and at the places of the table, (place, scene)
+    powers: acceptance function of each band at the places of the table, (band, place)
+    """
+    found = weights.copy()
+    for band, power in enumerate(powers):
+        own = weights[:, band]
+        missing = everywhere.T @ power - at_rays.T @ own
+        normal = (at_rays * own[:, None]).T @ at_rays
+        found[:, band] *= 1 + at_rays @ np.linalg.lstsq(normal, missing, rcond=1e-6)[0]
+    return found
 
 
 def _centroids(
