@@ -12,6 +12,7 @@ from sim.eyes.compound_eye import CompoundEye
 from sim.scene.color import encode_srgb
 
 RIM = 0.93  # choice: radius of a drawn hexagon, relative to a hexagon that touches its neighbours
+OUTER = 0.95  # choice: largest radius of a hexagon without neighbours on all sides, relative to the corner's radius
 ALONE = 0.05  # choice: radius [rad] of the hexagon of a single ommatidium
 
 
@@ -57,7 +58,7 @@ def _numbers(eye: CompoundEye) -> np.ndarray:
     ways, inside = _unprojected(*np.meshgrid(x, y))
     distance, number = tree.query(ways)
     margin = _margin(eye.directions, tree, ways, number)
-    seen = inside & (distance <= 1.15 * corner[number]) & (margin >= 1 - RIM)
+    seen = inside & (distance <= OUTER * corner[number]) & (margin >= 1 - RIM)
     return np.where(seen, number, len(eye))
 
 

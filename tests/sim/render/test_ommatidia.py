@@ -76,12 +76,12 @@ def comatic():
 
 @pytest.mark.parametrize("make", [lambda: OMMATIDIUM, comatic], ids=["facet", "coma"])
 def test_signals_equal_those_of_the_same_eye_made_of_mounts(world, make):
-    """Also without symmetry: a coma that is reversed along x or y changes signals by more than the tolerance."""
+    """Also without symmetry: with a coma reversed along x or y, signals differ by more than ten times the tolerance."""
     ommatidium = make()
     found = signals(world, sim.CompoundEye(DEGREES, ommatidium), (sim.Mount("head"),))[0, :, 0]
     expected = of_mounts(world, ommatidium, DEGREES)
     assert np.all(expected.max(axis=0) > 0.05)
-    assert found == pytest.approx(expected, abs=4e-3)
+    assert found == pytest.approx(expected, rel=0.01, abs=4e-3)
 
 
 def test_signals_are_integrals_of_radiance_times_acceptance(world):
