@@ -122,7 +122,9 @@ class Ommatidium:
         above = np.flatnonzero(seen >= seen.max() / 2)
         first, last = int(above[0]), int(above[-1])
         if first == 0 or last == ALONG - 1:
-            raise ValueError(f"distance = {self.rhabdom_distance:.3g} m: must be nearer to the focus, for a peak to be seen")
+            raise ValueError(
+                f"distance = {self.rhabdom_distance:.3g} m: must be nearer to the focus, for a peak to be seen"
+            )
         near = range(max(0, int(seen.argmax()) - 1), min(ALONG, int(seen.argmax()) + 2))
         peak = float(np.polynomial.Polynomial.fit(at[near], seen[near], 2)(self._top(at[near], seen[near])))
         flanks = (at[first - 1], at[first]), (at[last], at[last + 1])

@@ -21,5 +21,6 @@ one_environment        methods of a stable-baselines3 VecEnv that are the same f
 world_pictures         images of worlds for human viewers
 follow_camera          a camera behind the agent
 field_of_view_overlay  fields of view of the agent's eyes, drawn into an image
+hexagon_images         signals of compound eyes as hexagons
 retina_images          signals of eyes as images
 """

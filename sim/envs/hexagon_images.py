@@ -63,7 +63,7 @@ def _numbers(eye: CompoundEye) -> np.ndarray:
 
 
 def _margin(directions: np.ndarray, tree: KDTree, ways: np.ndarray, number: np.ndarray) -> np.ndarray:
-    """Return each pixel's distance from the border to the next ommatidium, relative to half the distance between both."""
+    """Return each pixel's distance from the border to the next ommatidium, relative to half their distance."""
     if len(directions) == 1:
         return np.ones(number.shape)
     second = tree.query(ways, k=[2])[1][..., 0]

@@ -108,9 +108,7 @@ class _ModelCameras:
 
 def _of_all_kinds(senses: Senses) -> list[np.ndarray]:
     """Return an image of each world, with a row for each kind of eyes."""
-    rows = [
-        [_drawn(frame, sight.renderer.eye) for frame in sight.memory.newest] for sight in senses.sights.values()
-    ]
+    rows = [[_drawn(frame, sight.renderer.eye) for frame in sight.memory.newest] for sight in senses.sights.values()]
     return [one_above_another(pictures) for pictures in zip(*rows, strict=True)]
 
 

@@ -3,9 +3,9 @@ for Spectral Images", JCGT 10(3).
 
 A file has up to two parts for each eye. For an eye named "left", these are `left.spectral` (spectral radiance, channels
 `S0.450,000000nm` ..., and reflectance, channels `T.450,000000nm` ...) and `left.receptors` (photoreceptor signals,
-channels `receptor_0` ..., and viewing directions, `direction_ahead` ...). Each part also contains a linear sRGB preview in the channels R, G and B, which plain
-viewers show. Readers that support only one part, such as colour-science, read the first part. Spectral parts precede
-receptor parts. Pixels are 32-bit floats with ZIP compression.
+channels `receptor_0` ..., and viewing directions, `direction_ahead` ...). Each part also contains a linear sRGB preview
+in the channels R, G and B, which plain viewers show. Readers that support only one part, such as colour-science, read
+the first part. Spectral parts precede receptor parts. Pixels are 32-bit floats with ZIP compression.
 
 A file is written completely or not at all. Each part stores a SHA-256 hash of its contents. Files of other programs
 need the spectral layout and have no hash.

@@ -10,8 +10,8 @@ import numpy as np
 
 from optics.numerics.arguments import shown
 from optics.numerics.number_types import full_precision
-from sim.eyes.compound_eye import CompoundEye
 from sim.exr.spectral_layout import channel, require_nanometres
+from sim.eyes.compound_eye import CompoundEye
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,9 @@ class View:
             ValueError: the frame has another shape.
         """
         if _shape(frame) != (len(eye), eye.channels):
-            raise ValueError(f"frame {_kind(frame)}: must be an array (ommatidium, channel), {(len(eye), eye.channels)}")
+            raise ValueError(
+                f"frame {_kind(frame)}: must be an array (ommatidium, channel), {(len(eye), eye.channels)}"
+            )
         peaks = [kind.peak_nm for kind in eye.receptors.types] if eye.types is None else None
         signals, ways = (np.asarray(values, np.float32).T[:, None] for values in (frame, eye.directions))
         return cls(name, receptors=signals, peaks_nm=peaks, directions=ways, **others)
@@ -81,7 +83,9 @@ class View:
         if self.directions is not None:
             seen = None if self.receptors is None else (3, *self.receptors.shape[1:])
             if self.directions.shape != seen:
-                raise ValueError(f"{where}: directions {_kind(self.directions)}: must be an array {seen}, for receptors")
+                raise ValueError(
+                    f"{where}: directions {_kind(self.directions)}: must be an array {seen}, for receptors"
+                )
         if self.peaks_nm is not None:
             peaks = require_nanometres(f"{where}: peaks_nm", self.peaks_nm)
             if self.receptors is None or peaks.shape != (len(self.receptors),):

@@ -9,7 +9,7 @@ field_areas       rectangles of the visual field, and the fraction of each recep
 receptor_sums     weighted sums over samples for each receptor
 depth_layers      distances for which an eye has a PSF
 allowed_error     largest acceptable error of a signal, small compared with the receptors' noise
-compound_eye      CompoundEye: ommatidia with any viewing directions
+compound_eye         CompoundEye: ommatidia with any viewing directions
 viewing_directions  hexagonal patches, whole heads, measured directions
 ommatidial_sampling  rays drawn from the acceptance functions of ommatidia
 mounts            Mount: position and direction of an eye on a model; fan, ring, both_sides

@@ -42,8 +42,8 @@ class CompoundEye:
         have different pigments in pale and yellow ommatidia. None: every ommatidium has receptors of all types.
     bands: number of spectral bands, 1 to 64
     noise_sigma: standard deviation of a receptor's Gaussian noise, in the unit of signals
-    photon_budget: an `optics.PhotonBudget`. Photons are counted in each ommatidium before its signal is normalised, so a
-        wide facet has less shot noise than a narrow one with the same field. None: no shot noise
+    photon_budget: an `optics.PhotonBudget`. Photons are counted in each ommatidium before its signal is normalised. A
+        wide facet therefore has less shot noise than a narrow one with the same field. None: no shot noise
     radius: radius [m] of the eye's surface, a sphere around the mount on which the facets lie. Facets must not overlap.
         None: all facets are at the mount, and their diameters are not compared with their distances
 
@@ -171,7 +171,9 @@ class CompoundEye:
     def _one_for_each(self, given: Any) -> tuple[optics.Ommatidium, ...]:
         where = "CompoundEye: ommatidium"
         if not isinstance(given, Sequence) or len(given) != len(self):
-            raise ValueError(f"{where} = {shown(given)}: must be an Ommatidium, or one for each of {len(self)} directions")
+            raise ValueError(
+                f"{where} = {shown(given)}: must be an Ommatidium, or one for each of {len(self)} directions"
+            )
         for number, one in enumerate(given):
             of_kind(f"{where}[{number}]", one, optics.Ommatidium, EXAMPLE)
         return tuple(given)
@@ -207,7 +209,7 @@ class CompoundEye:
             if chord < least:
                 gap = "in the same direction"
                 if self.radius is not None:
-                    gap = f"{chord * self.radius:.3g} m apart, closer than their mean diameter, on a radius of {self.radius:g} m"
+                    gap = f"{chord * self.radius:.3g} m apart, less than their diameter, for radius = {self.radius:g}"
                 raise ValueError(f"CompoundEye: facets {one} and {other} overlap: they are {gap}")
 
 

@@ -99,7 +99,7 @@ def _pattern(accepted: AcceptanceFunction, rays: int, seed: int) -> _RayPattern:
     weights = np.stack([np.bincount(nearest, power, rays) for power in powers], axis=-1)
     if rays >= CORRECTED:
         spread = (accepted.sines[1] - accepted.sines[0]) ** 2 / (density**2).sum() / (2 * math.pi)
-        weights = _corrected(weights, *(_tests(at, spread) for at in (points, places)), powers)
+        weights = _corrected(weights, _tests(points, spread), _tests(places, spread), powers)
     up, right = points[:, 1], -points[:, 0]  # the x axis of a pupil points to the owner's left
     return _RayPattern(np.stack([right, up, np.sqrt(1 - right**2 - up**2)], axis=-1), weights)
 

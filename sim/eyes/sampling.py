@@ -239,8 +239,9 @@ def _bounce_samples(draw: Draw) -> np.ndarray:
     return bounce_samples(len(draw)).astype(np.float32)
 
 
-# Factory of the sensors of one eye, for any number of rays.
-EyeSampling = BoxSampling | FieldSampling | OmmatidialSampling
+# Factories of the sensors of one eye, for any number of rays: of eyes with a flat retina, and of all eyes.
+EyeSampling = BoxSampling | FieldSampling
+WorldSampling = EyeSampling | OmmatidialSampling
 
 
 def beyond_rim_of(resolution: tuple[int, int]) -> np.ndarray:
@@ -249,7 +250,7 @@ def beyond_rim_of(resolution: tuple[int, int]) -> np.ndarray:
     return np.pad(np.zeros(resolution, bool), 1, constant_values=True)
 
 
-def eye_sampling(eye: WorldEye, depth: DepthLayers = ONE_PSF) -> EyeSampling:
+def eye_sampling(eye: WorldEye, depth: DepthLayers = ONE_PSF) -> WorldSampling:
     """Return the sampling of an eye.
 
     It is `OmmatidialSampling` for a compound eye, `BoxSampling` for a perfect lens, and otherwise `FieldSampling`.

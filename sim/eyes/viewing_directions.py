@@ -96,7 +96,9 @@ def hexagonal_patch(
         )
     angle, turn = 2 * np.arcsin(radius / 2), np.arctan2(up, right)
     local = np.stack([np.sin(angle) * np.cos(turn), np.sin(angle) * np.sin(turn), np.cos(angle)], axis=-1)
-    centre = _from_angles("centre", np.array([[finite("azimuth_deg", azimuth_deg), in_range("elevation_deg", elevation_deg, -90, 90)]]))
+    centre = _from_angles(
+        "centre", np.array([[finite("azimuth_deg", azimuth_deg), in_range("elevation_deg", elevation_deg, -90, 90)]])
+    )
     found = local @ facet_frames(centre)[0].T
     return np.stack([found[:, 2], -found[:, 0], found[:, 1]], axis=-1)
 

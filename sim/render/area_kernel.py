@@ -79,6 +79,7 @@ class AreaKernel(RayKernel):
             whole.along,
             self._areas.inputs,
             None,
+            None,
             floats(np.array(self._extent)),
             self._border_inputs() if self._borders.shared else None,
             counted(self.n_envs * places) if places else None,

@@ -19,6 +19,7 @@ from optics.numerics.arguments import whole
 from optics.numerics.renamed import renamed
 from optics.spectra.spectrum import Spectrum
 from sim.eyes.allowed_error import allowed_error
+from sim.eyes.ommatidial_sampling import OmmatidialSampling
 from sim.eyes.sampling import BoxSampling, FieldSampling
 from sim.eyes.sensor import Sensor
 from sim.render.area_kernel import AreaKernel
@@ -71,6 +72,7 @@ class EyeRenderer:
         asked = fidelity.rays_per_receptor
         self.sensor: Sensor
         if fidelity.samples == AREAS:
+            assert not isinstance(sampling, OmmatidialSampling)
             self.sensor = scene.area_sensor(sampling, asked)
         else:
             self.sensor = sampling.sensor(FIRST if fidelity.samples == EDGES else asked)

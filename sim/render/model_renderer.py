@@ -27,7 +27,7 @@ class ModelRenderer(EyeRenderer):
     """A renderer of many worlds of one model, with eyes of one kind that are mounted anywhere on it.
 
     model: an MjModel, or a source that compiles to one (`sim.mirror`)
-    eye: an `optics.Eye`, the optics and retina of all eyes, or a `sim.CompoundEye`; the fidelity's bands replace its bands
+    eye: optics and retina of all eyes (`optics.Eye`), or a `sim.CompoundEye`; the fidelity's bands replace its bands
     mounts: places of the eyes on the model
     n_envs: number of worlds
     fidelity: samples, bands and light. None: 16 rays per receptor, direct light of lamps, and the eye's own bands, 4 by

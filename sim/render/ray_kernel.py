@@ -84,9 +84,7 @@ class RayKernel:
     def __init__(self, tracer: Tracer, eyes: EyeRays, n_envs: int, n_eyes: int, depth: DepthLayers) -> None:
         self.tracer, self.eyes, self.n_envs, self.n_eyes, self.depth = tracer, eyes, n_envs, n_eyes, depth
 
-    def inputs(
-        self, ways: np.ndarray, bounces: np.ndarray | None = None, facets: Facets | None = None
-    ) -> KernelInputs:
+    def inputs(self, ways: np.ndarray, bounces: np.ndarray | None = None, facets: Facets | None = None) -> KernelInputs:
         """Return the inputs for these samples (ray, 3) of every eye.
 
         facets: weights and starting points of the samples; None: all weights are 1, and samples start at the pupil

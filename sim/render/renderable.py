@@ -49,6 +49,6 @@ def _check_ommatidia(fidelity: Fidelity) -> None:
         )
     if fidelity.depth.count > 1:
         raise ValueError(
-            f"fidelity: depth: {fidelity.depth.count} layers: must be one for a compound eye, whose facets have a large "
-            "depth of field"
+            f"fidelity: depth: {fidelity.depth.count} layers: must be one for a compound eye, whose facets have a "
+            "large depth of field"
         )

@@ -37,9 +37,7 @@ def lights_in_bands(
     return found, off
 
 
-def _in_bands(
-    name: str, light: Spectrum, bands: SpectralBands, receptors: Receptors
-) -> tuple[Spectrum, list[str]]:
+def _in_bands(name: str, light: Spectrum, bands: SpectralBands, receptors: Receptors) -> tuple[Spectrum, list[str]]:
     found = bands.band_values(light, receptors, nonnegative=True)
     fine = SpectralBands.uniform(FINE_BANDS, receptors)
     caught, due = bands.weights @ found, fine.weights @ fine.band_values(light, receptors)

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from optics import FacetLens, Ommatidium, Pupil, Waveguide, WavefrontMap, acceptance_function
+from optics import FacetLens, Ommatidium, Pupil, WavefrontMap, Waveguide, acceptance_function
 
 WAVELENGTHS = np.array([450e-9, 550e-9])
 EYE = Ommatidium(FacetLens(16e-6, 12e-6), Waveguide(1.9e-6))

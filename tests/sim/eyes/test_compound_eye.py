@@ -54,7 +54,9 @@ def test_a_facet_with_more_light_catches_more_photons_in_its_own_type():
 def test_a_wider_facet_with_the_same_focal_length_catches_more_photons():
     """Its acceptance angle hardly changes, but its area is four times as large. The rhabdom accepts both cones."""
     narrow, wide = (
-        sim.CompoundEye(AHEAD, optics.Ommatidium(optics.FacetLens(d, 24e-6), optics.Waveguide(4e-6)), photon_budget=BUDGET)
+        sim.CompoundEye(
+            AHEAD, optics.Ommatidium(optics.FacetLens(d, 24e-6), optics.Waveguide(4e-6)), photon_budget=BUDGET
+        )
         for d in (12e-6, 24e-6)
     )
     assert np.all(wide.photons > 2.5 * narrow.photons)
@@ -105,7 +107,9 @@ def test_neighbours_have_different_rays():
 def test_facets_may_touch_but_not_overlap():
     apart = np.degrees(2 * np.arcsin(16e-6 / 400e-6 / 2))
     eye = sim.CompoundEye(sim.hexagonal_patch(1, apart * 1.01), SMALL, radius=400e-6)
-    assert OmmatidialSampling(eye).sensor(1).facets.origins == pytest.approx(eye.directions[:, [1, 2, 0]] * [-4e-4, 4e-4, 4e-4])
+    assert OmmatidialSampling(eye).sensor(1).facets.origins == pytest.approx(
+        eye.directions[:, [1, 2, 0]] * [-4e-4, 4e-4, 4e-4]
+    )
     with pytest.raises(ValueError, match=r"facets \d+ and \d+ overlap: they are 1.52e-05 m apart"):
         sim.CompoundEye(sim.hexagonal_patch(1, apart * 0.95), SMALL, radius=400e-6)
     mixed = [SMALL] * 6 + [LARGE]

@@ -98,7 +98,9 @@ def test_signals_are_integrals_of_radiance_times_acceptance(world):
     right = (np.arange(side) + 0.5) / side * 2 * half - half
     up = -right[:, None]
     cosine = 1 / np.sqrt(1 + right**2 + up**2)
-    accepted = RegularGridInterpolator((table.sines, table.sines), np.moveaxis(table.values, 0, -1), bounds_error=False, fill_value=0.0)
+    accepted = RegularGridInterpolator(
+        (table.sines, table.sines), np.moveaxis(table.values, 0, -1), bounds_error=False, fill_value=0.0
+    )
     weights = accepted(np.stack([up * cosine, -right * cosine], axis=-1)) * (cosine**3)[..., None]
     light = np.einsum("benm,nmb->be", radiance, weights)
     white = daylight(bands.wavelengths) * weights.sum(axis=(0, 1))
@@ -158,9 +160,7 @@ def test_rays_start_at_the_facets(world):
 
 def test_shot_noise_is_that_of_each_facets_photons():
     """The variance of a signal s is s / N, with N the photons for white of this facet: a Poisson distribution."""
-    narrow, wide = (
-        optics.Ommatidium(optics.FacetLens(d, 24e-6), optics.Waveguide(4e-6)) for d in (12e-6, 24e-6)
-    )
+    narrow, wide = (optics.Ommatidium(optics.FacetLens(d, 24e-6), optics.Waveguide(4e-6)) for d in (12e-6, 24e-6))
     eye = sim.CompoundEye(
         [[0.0, 0], [30, 0]], [narrow, wide], (520,), bands=1, photon_budget=optics.PhotonBudget(10.0), noise_sigma=0.0
     )
