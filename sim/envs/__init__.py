@@ -14,6 +14,7 @@ senses                 observations of one agent
 eyes_of_kind           signals of one kind of an agent's eyes
 renderers              renderers of all eyes
 observation            memory of past frames
+ommatidia_space        space of the signals of a compound eye
 auxiliary              depth, geom ids and optic flow in observations
 held_state             checks of stored states
 calls                  checks of the calls of all environments: their order, seeds and actions

@@ -6,6 +6,7 @@ import numpy as np
 from gymnasium import spaces
 
 from sim.envs.observation import ROUNDING, SIGMAS, Memory
+from sim.envs.ommatidia_space import OmmatidiaBox
 from sim.eyes.compound_eye import CompoundEye
 from sim.render.eye_renderer import EyeRenderer
 from sim.render.pending_frame import PendingFrame
@@ -73,7 +74,10 @@ class EyesOfKind:
         margin = SIGMAS * spread + ROUNDING * brightest
         # The light from a point light has no upper bound, because it increases as the distance to the light decreases.
         high = 2 * brightest + margin if self.renderer.only_directional else np.inf
-        return spaces.Box(-margin if np.isfinite(high) else -np.inf, high, frames, np.float32)
+        low, eye = -margin if np.isfinite(high) else -np.inf, self.renderer.eye
+        if isinstance(eye, CompoundEye):
+            return OmmatidiaBox(low, high, frames, np.tile(eye.directions, (len(self.renderer.mounts), 1)))
+        return spaces.Box(low, high, frames, np.float32)
 
     def _brightest(self) -> float:
         """Return the signal of a white surface that faces all directional lights at once.
