@@ -8,14 +8,18 @@ directions may be any set; on a hexagonal lattice the neighbourhoods are hexagon
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 import numpy as np
 import torch
 from scipy.spatial import KDTree
 from torch import Tensor, nn
 
 from evolve.learning.per_eye_layers import AdaptedLinear, PerEyeLinear
+from sim.eyes.viewing_directions import unit_directions
 
-__all__ = ["HexagonalLayers", "neighbourhoods"]
+__all__ = ["HexagonalLayers", "directions_from_record", "neighbourhoods"]
 
 NEIGHBOURS = 7  # a place and its six neighbours
 WIDTHS = 8, 16  # choice: numbers of units of the two layers at each place
@@ -94,3 +98,17 @@ def _in_order(directions: np.ndarray, near: np.ndarray) -> np.ndarray:
     # Azimuths count from -30 degrees, so that a neighbour on the right is first, even after rounding.
     azimuths = (np.arctan2(offsets @ upwards, offsets @ rightwards) + np.pi / 6) % (2 * np.pi)
     return np.concatenate([near[:1], near[1:][np.argsort(azimuths, kind="stable")]])
+
+
+def directions_from_record(stored: Mapping[str, Any]) -> tuple[tuple[float, ...], ...]:
+    """Return the directions in the record of a policy, none for eyes without ommatidia.
+
+    Raises:
+        ValueError: they do not fit the shape of the eyes, or are not unit vectors.
+    """
+    found = tuple(tuple(float(part) for part in way) for way in stored.get("directions", ()))
+    if len(stored["eyes"]) != (3 if found else 5) or (found and len(found) != int(stored["eyes"][1])):
+        raise ValueError(f"{len(found)} directions do not fit eyes of the shape {stored['eyes']}")
+    if found:
+        unit_directions("directions", found)
+    return found

@@ -28,13 +28,12 @@ from evolve.genome.phenotype import FORMER_ENCODER
 from evolve.learning.adam import Adam
 from evolve.learning.distribution import Gaussian, Within
 from evolve.learning.eye_features import UNITS, EyeFeatures
-from evolve.learning.observed import CONTACT, Entry, entries_of, known_beside_eyes
+from evolve.learning.hexagonal_layers import directions_from_record
+from evolve.learning.observed import CONTACT, FEELS, Entry, entries_from_record, entries_of, known_beside_eyes
 from evolve.learning.tensor_file import read_tensors
 from evolve.store.atomic_files import write_whole
 from sim.envs.ommatidia_space import OmmatidiaBox
-from sim.eyes.viewing_directions import unit_directions
 
-FEELS = "feels"  # name of the proprioception of a `sim.Task` in observations
 LARGEST_COUNT = 4096  # upper limit of each number in the shape of a policy in a file; genes allow at most 512
 MOST_SIGNALS = 2**24  # upper limit for the number of signals in a policy's memory; genes allow at most half of it
 FIRST_SPREAD = 0.5  # standard deviation of an untrained policy's actions; with 1, a third of them would be clipped
@@ -139,34 +138,16 @@ class PolicyConfig:
             layers=int(stored.get("layers", 2)),
             encoder=int(stored.get("encoder", FORMER_ENCODER)),
             actions=int(stored.get("actions", 2)),
-            beside=_entries(stored),
+            beside=entries_from_record(stored),
             wiring=_wiring(stored.get("wiring", {})),
-            directions=_directions(stored),
+            directions=directions_from_record(stored),
         )
-
-
-def _directions(stored: Mapping[str, Any]) -> tuple[tuple[float, ...], ...]:
-    found = tuple(tuple(float(part) for part in way) for way in stored.get("directions", ()))
-    if len(stored["eyes"]) != (3 if found else 5) or (found and len(found) != int(stored["eyes"][1])):
-        raise ValueError(f"{len(found)} directions do not fit eyes of the shape {stored['eyes']}")
-    if found:
-        unit_directions("directions", found)
-    return found
 
 
 def _wiring(stored: Mapping[str, Any]) -> WiringConfig:
     wiring = WiringConfig(**stored)
     check_values(wiring, prefix="wiring.")
     return wiring
-
-
-def _entries(stored: Mapping[str, Any]) -> tuple[Entry, ...]:
-    if "beside" in stored:
-        return tuple(Entry.from_record(entry) for entry in stored["beside"])
-    if FEELS in stored:
-        size = int(stored[FEELS])
-        return (Entry(FEELS, size),) if size else ()
-    return (CONTACT,)
 
 
 class EyePolicy(MultiInputActorCriticPolicy):

@@ -22,5 +22,3 @@ class OmmatidiaBox(spaces.Box):
 
     def __eq__(self, other: Any) -> bool:
         return super().__eq__(other) and np.array_equal(self.directions, getattr(other, "directions", None))
-
-    __hash__ = None  # type: ignore[assignment]
