@@ -76,7 +76,7 @@ class EyesOfKind:
         high = 2 * brightest + margin if self.renderer.only_directional else np.inf
         low, eye = -margin if np.isfinite(high) else -np.inf, self.renderer.eye
         if isinstance(eye, CompoundEye):
-            return OmmatidiaBox(low, high, frames, np.tile(eye.directions, (len(self.renderer.mounts), 1)))
+            return OmmatidiaBox(low, high, frames, eye.directions_on(self.renderer.mounts))
         return spaces.Box(low, high, frames, np.float32)
 
     def _brightest(self) -> float:

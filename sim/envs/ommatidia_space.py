@@ -13,7 +13,7 @@ from optics.numerics.read_only import read_only
 class OmmatidiaBox(spaces.Box):
     """A box of signals (memory, ommatidium, channel).
 
-    directions: viewing directions of the ommatidia in the frame of their mount, unit vectors (ommatidium, 3)
+    directions: viewing directions of the ommatidia, unit vectors (ommatidium, 3), see `CompoundEye.directions_on`
     """
 
     def __init__(self, low: float, high: float, shape: tuple[int, ...], directions: np.ndarray) -> None:
@@ -21,4 +21,5 @@ class OmmatidiaBox(spaces.Box):
         self.directions = read_only(directions)
 
     def __eq__(self, other: Any) -> bool:
-        return super().__eq__(other) and np.array_equal(self.directions, getattr(other, "directions", None))
+        same = isinstance(other, OmmatidiaBox) and super().__eq__(other)
+        return same and np.array_equal(self.directions, other.directions)

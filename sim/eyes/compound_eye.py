@@ -15,6 +15,7 @@ from optics.numerics.read_only import read_only
 from optics.ommatidia.acceptance import AcceptanceFunction, acceptance_function
 from optics.spectra.receptors import receptors_of
 from optics.spectra.spectrum import daylight
+from sim.eyes.mounts import Mount
 from sim.eyes.viewing_directions import unit_directions
 
 EXAMPLE = "optics.Ommatidium(optics.FacetLens(25e-6, 14e-6), optics.Waveguide(2e-6))"
@@ -94,6 +95,15 @@ class CompoundEye:
         each = self.ommatidium if isinstance(self.ommatidium, optics.Ommatidium) else (*self.ommatidium,) * 2
         types = None if self.types is None else np.concatenate([self.types, self.types])
         return replace(self, directions=both, ommatidium=each, types=types)
+
+    def directions_on(self, mounts: Sequence[Mount]) -> np.ndarray:
+        """Return the viewing directions on these mounts, unit vectors (ommatidia of all mounts, 3).
+
+        They are relative to the forward, left and upward directions of the object that carries the mounts.
+        """
+        ahead, left, up = self.directions.T
+        in_eye = np.stack([-left, up, ahead], axis=-1)
+        return np.concatenate([in_eye @ mount.local("body")[1].T for mount in mounts])
 
     @property
     def resolution(self) -> tuple[int, int]:

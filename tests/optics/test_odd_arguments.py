@@ -183,7 +183,17 @@ def test_masked_elements_are_refused(name):
 
 def test_nothing_of_the_face_is_forgotten():
     """Omitted names are results of optics itself, or take the same arguments as names that are tested here."""
-    made = {"AcceptanceFunction", "AccuracyError", "BackendError", "MTF", "Mode", "PSFBatch", "PSFResult", "Plan", "PropagationResult"}
+    made = {
+        "AcceptanceFunction",
+        "AccuracyError",
+        "BackendError",
+        "MTF",
+        "Mode",
+        "PSFBatch",
+        "PSFResult",
+        "Plan",
+        "PropagationResult",
+    }
     made |= {
         "ExitPupil",
         "SpectralBands",

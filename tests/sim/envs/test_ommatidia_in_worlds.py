@@ -1,11 +1,14 @@
 """Compound eyes in environments: observations, noise, images, and files."""
 
+import pickle
+
 import numpy as np
 import pytest
 
 import optics
 import sim
 from sim.envs.hexagon_images import hexagon_map
+from sim.envs.ommatidia_space import OmmatidiaBox
 from sim.envs.retina_images import BETWEEN
 
 OMMATIDIUM = optics.Ommatidium(optics.FacetLens(16e-6, 12e-6), optics.Waveguide(1.9e-6))
@@ -50,6 +53,15 @@ def test_observations_are_the_renderers_signals_by_ommatidium():
     env.close()
 
 
+def test_the_space_survives_storage_and_differs_with_the_directions():
+    env = sim.make_vec_env(Turning(), n_envs=1)
+    space = env.observation_space["eyes"]
+    assert pickle.loads(pickle.dumps(space)) == space
+    other = OmmatidiaBox(space.low.min(), space.high.max(), space.shape, -space.directions)
+    assert other != space
+    env.close()
+
+
 def test_two_mounts_follow_each_other_in_an_observation():
     class Twice(Turning):
         mounts = (sim.Mount("robot", offset=(0, 0, 0.2)), sim.Mount("robot", azimuth_deg=90.0, offset=(0, 0, 0.2)))
@@ -59,6 +71,9 @@ def test_two_mounts_follow_each_other_in_an_observation():
     assert found.shape == (1, 1, 76, 3)
     signals = env.renderer.signals(env.simulation.poses())[0]
     assert found[0, 0] == pytest.approx(np.concatenate([signals[0, :, 0].T, signals[1, :, 0].T]))
+    ways, own = env.observation_space["eyes"].directions, Twice.eye.directions
+    assert ways[:38] == pytest.approx(own)
+    assert ways[38:] == pytest.approx(own[:, [1, 0, 2]] * [-1, 1, 1])  # ahead of the second mount is left
     env.close()
 
 
