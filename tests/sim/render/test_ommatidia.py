@@ -74,7 +74,9 @@ def comatic():
     return optics.Ommatidium(lens, optics.Waveguide(1.9e-6))
 
 
-@pytest.mark.parametrize("make", [lambda: OMMATIDIUM, comatic], ids=["facet", "coma"])
+@pytest.mark.parametrize(
+    "make", [pytest.param(lambda: OMMATIDIUM, marks=pytest.mark.slow), comatic], ids=["facet", "coma"]
+)
 def test_signals_equal_those_of_the_same_eye_made_of_mounts(world, make):
     """Also without symmetry: with a coma reversed along x or y, signals differ by more than ten times the tolerance."""
     ommatidium = make()
