@@ -50,6 +50,17 @@ class ExitPupil:
     _wave: ConvergingWave | None = field(default=None, repr=False)
     _order: int = field(default=8, repr=False)
 
+    @property
+    def image_height(self) -> float:
+        """Distance [m] of the image plane from the origin of the object's coordinates, along the plane's normal.
+
+        Raises:
+            ValueError: the object does not contain it (prysm).
+        """
+        if self._wave is None or self._wave.height is None:
+            raise ValueError("the position of the image plane is unknown: this object does not contain it")
+        return self._wave.height
+
     def moved(self, shift: float, origin: tuple[float, float] | None = None) -> ExitPupil:
         """Return the exit pupil for a parallel image plane, `shift` [m] farther along the light.
 
