@@ -32,6 +32,7 @@ class ConvergingWave:
     sines: components along the image plane's axes x and y of the unit vectors from this point to the samples, (2, n).
     ahead: distance [m] by which the wavefront is ahead of the sphere, times the refractive index, (n,).
     rim: rim of the pupil, in sines.
+    on_plane: the rim [m] on the plane behind which the image lies at `distance`.
     distance: radius of the sphere [m].
     wavelength: vacuum wavelength [m].
     position: the point (x, y) [m] on the image plane; None if the object does not contain it.
@@ -41,6 +42,7 @@ class ConvergingWave:
     sines: np.ndarray
     ahead: np.ndarray
     rim: Rim
+    on_plane: Rim
     distance: float
     wavelength: float
     position: tuple[float, float] | None = None
@@ -100,7 +102,9 @@ def of_rays(system: Any, wavelength: float, image_normal: Any) -> ConvergingWave
     rim = rim_around(sines[:, lit], dark)
     if rim.contains(*dark, INSIDE).any():
         raise ValueError("the pupil is obscured or not convex: only open, convex pupils can be read")
-    return ConvergingWave(sines[:, lit], ahead[lit], rim, radius, wavelength, position, float(normal @ centre))
+    return ConvergingWave(
+        sines[:, lit], ahead[lit], rim, rim.onto_plane(radius), radius, wavelength, position, float(normal @ centre)
+    )
 
 
 def of_samples(system: Any, wavelength: float, distance: float) -> ConvergingWave:
@@ -128,7 +132,8 @@ def of_samples(system: Any, wavelength: float, distance: float) -> ConvergingWav
         raise ValueError("data: the pupil is obscured, not convex, or unevenly lit: only open pupils can be read")
     at = np.stack([x[columns], y[rows]]) - rim.middle[:, None]
     ahead = -_unwrapped(data, illuminated)[lit] * wavelength / (2 * np.pi)
-    return ConvergingWave(at / np.hypot(distance, np.hypot(*at)), ahead, rim.in_sines(distance), distance, wavelength)
+    sines, on_plane = at / np.hypot(distance, np.hypot(*at)), replace(rim, middle=np.zeros(2))
+    return ConvergingWave(sines, ahead, rim.in_sines(distance), on_plane, distance, wavelength)
 
 
 def _alike(system: Any) -> list[np.ndarray]:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from optics.elements.converging_wave import UM, ConvergingWave, is_of_rays, is_of_samples, of_rays, of_samples
 from optics.elements.pupil import Pupil
-from optics.elements.pupil_rim import Rim
 from optics.elements.refractive_index import index_of
 from optics.elements.wavefront import Zernike, mode
 from optics.numerics.arguments import finite, positive, vacuum_wavelength, whole
@@ -34,7 +34,6 @@ class ExitPupil:
     pupil: an ideal lens focused on the centre of the reference sphere, with the wavefront as Zernike modes. Its PSF at
         `distance` has the axes of the image plane, and its origin is the centre of the sphere.
     distance: radius [m] of the reference sphere, whose centre is the image position in the other program.
-    rms: root mean square of the wavefront [m] over the pupil, without piston and tilt.
     residual: root mean square [m] of the difference between wavefront and fit.
     position: centre (x, y) [m] of the sphere on the image plane; None if the object does not contain it (prysm).
     sines: components (x, y) along the image plane of the direction of the light at the pupil's centre. (0, 0):
@@ -43,12 +42,22 @@ class ExitPupil:
 
     pupil: Pupil
     distance: float
-    rms: float
     residual: float
     position: tuple[float, float] | None = None
     sines: tuple[float, float] = (0.0, 0.0)
     _wave: ConvergingWave | None = field(default=None, repr=False)
     _order: int = field(default=8, repr=False)
+
+    @cached_property
+    def rms(self) -> float:
+        """Root mean square of the wavefront [m] over the pupil, without piston and tilt."""
+        waves = self.pupil.wavefront
+        assert isinstance(waves, Zernike)
+        nodes = self.pupil.aperture.nodes(2.0 * max(1, waves.order), RMS_DIGITS)
+        weight = np.sqrt(nodes.weight / nodes.weight.sum())
+        flat = np.stack([np.ones_like(nodes.x), nodes.x, nodes.y], axis=1) * weight[:, None]
+        values = waves.at(nodes.x, nodes.y) * weight
+        return float(np.linalg.norm(values - flat @ np.linalg.lstsq(flat, values, rcond=None)[0]))
 
     @property
     def image_height(self) -> float:
@@ -130,7 +139,7 @@ def _fitted(wave: ConvergingWave, medium_n: float, order: int) -> ExitPupil:
     modes = [(n, m) for n in range(order + 1) for m in range(-n, n + 1, 2)]
     if wave.ahead.size < RAYS_PER_MODE * len(modes):
         raise ValueError(f"{wave.ahead.size} samples of the wavefront: must be {RAYS_PER_MODE * len(modes)} or more")
-    rim, on_plane = wave.rim, wave.rim.onto_plane(wave.distance)
+    rim, on_plane = wave.rim, wave.on_plane
     from_middle = wave.sines - rim.middle[:, None]
     if np.mean(np.hypot(*from_middle) < CENTRE * rim.radius) < FILLED * CENTRE**2:
         raise ValueError("the pupil is obscured: only open pupils can be read")
@@ -149,14 +158,4 @@ def _fitted(wave: ConvergingWave, medium_n: float, order: int) -> ExitPupil:
         wavefront=waves,
     )
     sines = float(-rim.middle[0]), float(-rim.middle[1])
-    return ExitPupil(pupil, wave.distance, _rms(waves, on_plane), residual, wave.position, sines, wave, order)
-
-
-def _rms(waves: Zernike, rim: Rim) -> float:
-    """Return the root mean square [m] over the pupil, without piston and tilt."""
-    nodes = rim.aperture.nodes(2.0 * max(1, waves.order), RMS_DIGITS)
-    weight = np.sqrt(nodes.weight / nodes.weight.sum())
-    flat = np.stack([np.ones_like(nodes.x), nodes.x, nodes.y], axis=1) * weight[:, None]
-    values = waves.at(nodes.x, nodes.y) * weight
-    rest = values - flat @ np.linalg.lstsq(flat, values, rcond=None)[0]
-    return float(np.linalg.norm(rest))
+    return ExitPupil(pupil, wave.distance, residual, wave.position, sines, wave, order)

@@ -25,7 +25,7 @@ RAGGED = 0.5  # choice: accepted residual in units of the distance between sampl
 NEXT = 3.0  # choice: distance of dark samples that limit an edge of the hull, in units of that between samples
 SHORTEST = 1e-6  # choice, radii: shorter edges are omitted
 RESOLVED = 0.02  # choice, radii: largest distance between the samples of a pupil that is neither circle nor ellipse
-SIDES = 128  # choice: sides of the polygon that represents an oval
+SIDES = 64  # choice: sides of the polygon that represents an oval
 HARMONICS = 4  # choice: orders of the Fourier series that corrects an ellipse
 CORNERS_PER_TERM = 4  # choice: corners of the hull per term of this series
 
