@@ -48,22 +48,36 @@ class ConvergingWave:
     position: tuple[float, float] | None = None
     height: float | None = None
 
-    def moved(self, shift: float, medium_n: float, chief: np.ndarray) -> ConvergingWave:
-        """Return the wave relative to an image plane that lies farther along the light by `shift` [m].
+    def moved(self, shift: float, medium_n: float, position: tuple[float, float] | None = None) -> ConvergingWave:
+        """Return the wave relative to a sphere around another point.
 
-        The point moves along the ray with the sines `chief` (2,).
+        shift: distance [m] by which the image plane is moved along the light.
+        position: the point (x, y) [m] on the image plane. None: the point on the ray through the pupil's centre.
+
+        Raises:
+            ValueError: a position is given, and the present one is unknown.
         """
-        cosine = math.sqrt(1 - float(chief @ chief))
-        longer = np.sqrt(1 - np.sum(self.sines**2, axis=0)) + chief @ self.sines / cosine
-        position = self.position and tuple(float(at - shift * s / cosine) for at, s in zip(self.position, chief))
-        return replace(self, ahead=self.ahead - medium_n * shift * longer, position=position)
-
-    def around(self, origin: tuple[float, float], medium_n: float) -> ConvergingWave:
-        """Return the wave relative to a sphere around another point (x, y) [m] of the image plane."""
-        if self.position is None:
+        if position is not None and self.position is None:
             raise ValueError("the position of the image is unknown: this object does not contain it")
-        away = np.subtract(self.position, origin)
-        return replace(self, ahead=self.ahead - medium_n * (away @ self.sines), position=origin)
+        middle = self.rim.middle
+        x, y = -shift * middle / math.sqrt(1 - float(middle @ middle))
+        if self.position is not None:
+            position = position or (self.position[0] + x, self.position[1] + y)
+            x, y = np.subtract(position, self.position)
+        sines, apart = self._seen_from(np.array([[x], [y], [shift]]), self.sines)
+        centre, (distance,) = self._seen_from(np.array([[x], [y], [shift]]), middle[:, None])
+        rim = replace(self.rim, middle=centre[:, 0], radius=self.rim.radius * self.distance / float(distance))
+        ahead = self.ahead - medium_n * (apart - distance)
+        return replace(self, sines=sines, ahead=ahead, rim=rim, distance=float(distance), position=position)
+
+    def _seen_from(self, to: np.ndarray, sines: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return sines of directions (2, n) to points of the sphere, and their distances [m], from another point.
+
+        to: the other point (x, y, z) [m] relative to the centre, with z along the light, (3, 1).
+        """
+        away = self.distance * np.stack([*sines, -np.sqrt(1 - np.sum(sines**2, axis=0))]) - to
+        apart = np.linalg.norm(away, axis=0)
+        return away[:2] / apart, apart
 
 
 def is_of_rays(system: Any) -> bool:

@@ -12,7 +12,7 @@ from optics.elements.converging_wave import UM, ConvergingWave, is_of_rays, is_o
 from optics.elements.pupil import Pupil
 from optics.elements.refractive_index import index_of
 from optics.elements.wavefront import Zernike, mode
-from optics.numerics.arguments import finite, positive, vacuum_wavelength, whole
+from optics.numerics.arguments import finite, point_2d, positive, vacuum_wavelength, whole
 from optics.numerics.autodiff import number
 
 __all__ = ["ExitPupil", "read_exit_pupil"]
@@ -84,8 +84,8 @@ class ExitPupil:
         """
         assert self._wave is not None
         index = number(index_of("medium_n", self.pupil.medium_n).at(self._wave.wavelength))
-        wave = self._wave.moved(finite("shift", shift), index, -np.array(self.sines))
-        return _fitted(wave if origin is None else wave.around(origin, index), self.pupil.medium_n, self._order)
+        place = None if origin is None else point_2d("origin", origin, "lengths (x, y) [m]")
+        return _fitted(self._wave.moved(finite("shift", shift), index, place), self.pupil.medium_n, self._order)
 
 
 def read_exit_pupil(

@@ -21,7 +21,9 @@ MUCH_BETTER = 0.1  # choice: the same for a Fourier series; those of square grid
 FULL = 0.8  # choice: part of a circle that the hull must fill. A hexagon fills 0.83, a square 0.64.
 LEAST_CORNERS = 8  # choice: corners of the hull that an oval, which has at least 5 parameters, needs
 EXACT = 1e-4  # choice, radii: a residual below this is always accepted
-RAGGED = 0.5  # choice: accepted residual in units of the distance between samples
+# Choice: accepted residual in units of the distance between samples. If some samples are dark, it is also limited to
+# half of RESOLVED, because the rim may be cut.
+RAGGED = 0.5
 NEXT = 3.0  # choice: distance of dark samples that limit an edge of the hull, in units of that between samples
 SHORTEST = 1e-6  # choice, radii: shorter edges are omitted
 RESOLVED = 0.02  # choice, radii: largest distance between the samples of a pupil that is neither circle nor ellipse
@@ -87,14 +89,15 @@ def rim_around(lit: np.ndarray, dark: np.ndarray | None = None) -> Rim:
     corners = hull.points[hull.vertices]
     apart = math.sqrt(hull.volume / lit.shape[1])
     middle, radius, vertices, ragged = _round(hull)
-    if ragged > max(EXACT, RAGGED * apart / radius):
+    cut = dark is not None and dark.size > 0
+    if ragged > max(EXACT, min(RAGGED * apart / radius, RESOLVED / 2 if cut else math.inf)):
         if apart > RESOLVED * radius:
             needed = math.ceil(lit.shape[1] * (apart / radius / RESOLVED) ** 2)
             raise ValueError(
                 f"the pupil is neither a circle nor an ellipse, and its {lit.shape[1]} samples are "
                 f"{apart / radius:.2g} radii apart: must be at most {RESOLVED:g} radii apart, as about {needed} are"
             )
-        vertices = corners if dark is None or not dark.size else _cut(hull, dark.T / scale, apart)
+        vertices = _cut(hull, dark.T / scale, apart) if dark is not None and cut else corners
     if vertices is None:
         return Rim(middle * scale, radius * scale)
     middle = (vertices.max(axis=0) + vertices.min(axis=0)) / 2

@@ -115,3 +115,36 @@ def contrast(image, pitch, frequency, tangential=True):
     at = (np.arange(image.shape[0]) - image.shape[0] // 2) * pitch
     wave = np.exp(-2j * np.pi * frequency * at)
     return abs(np.sum(image * (wave[:, None] if tangential else wave))) / image.sum()
+
+
+def gauss_rays(radii=24, turns=90):
+    """Points of the unit disk, the centre first, and their weights in integrals over the disk."""
+    s, weight = np.polynomial.legendre.leggauss(radii)
+    r, angle = np.sqrt((s + 1) / 2), 2 * np.pi * np.arange(turns) / turns
+    x, y = np.outer(r, np.cos(angle)).ravel(), np.outer(r, np.sin(angle)).ravel()
+    return (np.insert(x, 0, 0.0), np.insert(y, 0, 0.0)), np.insert(np.repeat(weight, turns), 0, 0.0)
+
+
+def grid_rays(n):
+    """Points of the unit disk on a square grid with n points across, the centre first."""
+    x, y = (part.ravel() for part in np.meshgrid(np.linspace(-1, 1, n), np.linspace(-1, 1, n)))
+    inside = np.hypot(x, y) <= 1
+    return np.insert(x[inside], 0, 0.0), np.insert(y[inside], 0, 0.0)
+
+
+def solid_angles(at, wave, normal=(0.0, 0.0, 1.0)):
+    """Area in the sines along the image plane that belongs to each point of the entrance pupil.
+
+    It is the Jacobian of polynomials that are fitted to the sines of all rays.
+    """
+    normal = np.array(normal) / np.linalg.norm(normal)
+    right = np.array([1.0, 0, 0]) - normal[0] * normal
+    right /= np.linalg.norm(right)
+    points = np.stack([wave.pupil_x, wave.pupil_y, wave.pupil_z]) - np.asarray(wave.reference_center)[:, None]
+    sines = np.stack([right, np.cross(normal, right)]) @ points / wave.radius
+    x, y = at
+    powers = [(i, j) for i in range(8) for j in range(8 - i)]
+    found = np.linalg.lstsq(np.stack([x**i * y**j for i, j in powers], axis=1), sines.T, rcond=None)[0]
+    by_x = np.stack([i * x ** max(i - 1, 0) * y**j for i, j in powers], axis=1) @ found
+    by_y = np.stack([j * x**i * y ** max(j - 1, 0) for i, j in powers], axis=1) @ found
+    return np.abs(by_x[:, 0] * by_y[:, 1] - by_x[:, 1] * by_y[:, 0])
