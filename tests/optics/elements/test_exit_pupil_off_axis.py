@@ -41,16 +41,16 @@ def apart(image, other):
 
 
 def test_tangential_contrast_at_20_degrees():
-    """A Huygens sum gives 0.137 at 50 cycles per mm over a window of 130 µm, with the same amplitude at all rays.
+    """A Huygens sum gives 0.139 at 50 cycles per mm over a window of 82 µm, with the same amplitude at all rays.
 
     A pupil that ignores the tilt of the image plane gives 0.076.
     """
     read = optics.read_exit_pupil(triplet(20, WAVE), WAVE)
-    ours, rays = image(read, 65), huygens_image(*gauss_rays(30, 120), n=65, even=False)
+    ours, rays = image(read), huygens_image(*gauss_rays(), even=False)
     for tangential in (True, False):
         assert contrast(ours, PITCH, 50e3, tangential) == pytest.approx(contrast(rays, PITCH, 50e3, tangential), abs=3e-3)
     assert contrast(ours, PITCH, 50e3) > 0.13
-    assert apart(ours, rays) < 0.015
+    assert apart(ours, rays) < 0.015  # most of it is due to the amplitudes
     assert apart(ours[::-1], rays) > 0.5  # coma points outwards
 
 
@@ -85,12 +85,12 @@ def test_a_vignetted_pupil_has_the_shape_that_the_rays_leave():
     rays = grid_rays(141)
     read = optics.read_exit_pupil(triplet(20, WAVE, rays, limit=6.0), WAVE)
     whole = optics.read_exit_pupil(triplet(20, WAVE), WAVE)
-    fine = grid_rays(601)
+    fine = grid_rays(401)
     kept = (triplet(20, WAVE, fine, limit=6.0).intensity > 0).mean()
     assert read.pupil.area / whole.pupil.area == pytest.approx(kept, rel=3e-3)
-    exact = huygens_image(*gauss_rays(40, 160), limit=6.0)
-    assert apart(image(read), exact) < 0.015
-    assert apart(image(whole), exact) > 0.1
+    exact = huygens_image(*gauss_rays(30, 120), n=33, limit=6.0)
+    assert apart(image(read, 33), exact) < 0.02
+    assert apart(image(whole, 33), exact) > 0.1
 
 
 def test_moving_the_image_plane_equals_tracing_to_another_plane():

@@ -111,7 +111,7 @@ def sensor_grid(wave, n, pitch, normal=(0.0, 0.0, 1.0)):
 
 
 def contrast(image, pitch, frequency, tangential=True):
-    """|OTF| of a picture at one frequency [1/m] along y (tangential) or x."""
+    """|OTF| of a picture at one frequency [1/m] along y (tangential) or x, relative to the light in the picture."""
     at = (np.arange(image.shape[0]) - image.shape[0] // 2) * pitch
     wave = np.exp(-2j * np.pi * frequency * at)
     return abs(np.sum(image * (wave[:, None] if tangential else wave))) / image.sum()
