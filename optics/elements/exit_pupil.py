@@ -38,15 +38,17 @@ class ExitPupil:
     position: centre (x, y) [m] of the sphere on the image plane; None if the object does not contain it (prysm).
     sines: components (x, y) along the image plane of the direction of the light at the pupil's centre. (0, 0):
         perpendicular to the image plane.
+    wave: the samples from the other program.
+    order: highest radial order of the Zernike modes.
     """
 
     pupil: Pupil
     distance: float
     residual: float
-    position: tuple[float, float] | None = None
-    sines: tuple[float, float] = (0.0, 0.0)
-    _wave: ConvergingWave | None = field(default=None, repr=False)
-    _order: int = field(default=8, repr=False)
+    position: tuple[float, float] | None
+    sines: tuple[float, float]
+    wave: ConvergingWave = field(repr=False)
+    order: int = field(repr=False)
 
     @cached_property
     def rms(self) -> float:
@@ -66,9 +68,9 @@ class ExitPupil:
         Raises:
             ValueError: the object does not contain it (prysm).
         """
-        if self._wave is None or self._wave.height is None:
+        if self.wave.height is None:
             raise ValueError("the position of the image plane is unknown: this object does not contain it")
-        return self._wave.height
+        return self.wave.height
 
     def moved(self, shift: float, origin: tuple[float, float] | None = None) -> ExitPupil:
         """Return the exit pupil for a parallel image plane, `shift` [m] farther along the light.
@@ -82,10 +84,9 @@ class ExitPupil:
         Raises:
             ValueError: an argument is not finite, or the position of the image is unknown.
         """
-        assert self._wave is not None
-        index = number(index_of("medium_n", self.pupil.medium_n).at(self._wave.wavelength))
+        index = number(index_of("medium_n", self.pupil.medium_n).at(self.wave.wavelength))
         place = None if origin is None else point_2d("origin", origin, "lengths (x, y) [m]")
-        return _fitted(self._wave.moved(finite("shift", shift), index, place), self.pupil.medium_n, self._order)
+        return _fitted(self.wave.moved(finite("shift", shift), index, place), self.pupil.medium_n, self.order)
 
 
 def read_exit_pupil(

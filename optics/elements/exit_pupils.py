@@ -80,7 +80,9 @@ def read_exit_pupils(
         raise ValueError("remove_tilt = True: the positions of the images are lost; compute the wavefront without it")
     fields, microns = tuple(dict.fromkeys(k[0] for k in held)), sorted({k[1] for k in held})
     for key in ((each, um) for each in fields for um in microns if (each, um) not in held):
-        raise ValueError(f"system lacks the field {shown(key[0])} at {key[1]:g} µm: must have every field at each wavelength")
+        raise ValueError(
+            f"system lacks the field {shown(key[0])} at {key[1]:g} µm: must have every field at each wavelength"
+        )
     wavelengths = np.array([positive("wavelength", um, "µm") * UM for um in microns])
     rows = tuple(
         tuple(
@@ -92,7 +94,7 @@ def read_exit_pupils(
     heights = [pupil.image_height for row in rows for pupil in row]
     if max(heights) - min(heights) > FLAT:
         raise ValueError(
-            f"the images lie {max(heights) - min(heights):.3g} m apart along image_normal: must lie on one plane. Trace "
-            "with the reference sphere at the chief ray, and specify image_normal if the image plane is tilted"
+            f"the images lie {max(heights) - min(heights):.3g} m apart along image_normal: must lie on one plane; use "
+            "reference spheres around the image of the chief ray, and specify the normal of a tilted image plane"
         )
     return ExitPupils(fields, wavelengths, rows)

@@ -94,7 +94,9 @@ def lens_mtf(
         if values.ndim != 1 or not values.size or not np.isfinite(values).all():
             raise ValueError(f"{name} = {shown(values)}: must be a row of finite numbers, at least one")
     parts = np.ones(len(lens.wavelengths)) if weights is None else reals("weights", weights)
-    if parts.shape != lens.wavelengths.shape or not ((parts >= 0).all() and np.isfinite(parts).all() and parts.sum() > 0):
+    if parts.shape != lens.wavelengths.shape or not (
+        (parts >= 0).all() and np.isfinite(parts).all() and parts.sum() > 0
+    ):
         raise ValueError(f"weights = {shown(weights)}: must be {lens.wavelengths.size} shares of 0 or more, not all 0")
     parts = parts / parts.sum()
     contrasts = np.empty((2, len(lens.fields), moves.size, f.size))

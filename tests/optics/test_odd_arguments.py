@@ -181,6 +181,8 @@ def test_nothing_of_the_face_is_forgotten():
     made = {"AccuracyError", "BackendError", "MTF", "Mode", "PSFBatch", "PSFResult", "Plan", "PropagationResult"}
     made |= {
         "ExitPupil",
+        "ExitPupils",
+        "LensMTF",
         "SpectralBands",
         "StackResult",
         "VectorFocus",
@@ -197,7 +199,9 @@ def test_nothing_of_the_face_is_forgotten():
         "Grid",
         "Ommatidium",
         "white_psf",
+        "lens_mtf",
         "read_exit_pupil",
+        "read_exit_pupils",
         "require",
     }
     assert CALLS.keys() | made | like_others == set(optics.__all__)

@@ -54,9 +54,17 @@ def test_the_pupils_of_a_field_have_one_origin():
         (triplet(0, 0.55e-6), {}, "must be optiland's Wavefront, or"),
         ({"green": triplet(0, 0.55e-6)}, {}, "must be optiland's Wavefront, or"),
         (SimpleNamespace(data=traced((0,)), remove_tilt=True), {}, "remove_tilt = True: the positions of the images"),
-        ({k: v for k, v in traced((0, 20)).items() if k != ((0.0, 1.0), 0.65)}, {}, r"lacks the field \(0.0, 1.0\) at 0.65"),
+        (
+            {k: v for k, v in traced((0, 20)).items() if k != ((0.0, 1.0), 0.65)},
+            {},
+            r"lacks the field \(0.0, 1.0\) at 0.65",
+        ),
         ({(0, -0.5): triplet(0, 0.55e-6)}, {}, "wavelength = -0.5: must be"),
-        (traced((14, 20)), {"image_normal": (0.0, 0.1, 1.0)}, "the images lie 0.000569 m apart along image_normal: must"),
+        (
+            traced((14, 20)),
+            {"image_normal": (0.0, 0.1, 1.0)},
+            "the images lie 0.000569 m apart along image_normal: must",
+        ),
         (
             {(0, 0.55): SimpleNamespace(data=np.ones((64, 64), complex), dx=0.02, wavelength=0.55)},
             {},

@@ -53,9 +53,10 @@ def hexapolar(rings):
 def triplet(angle_deg, wavelength, at=None, limit=None, normal=(0.0, 0.0, 1.0), shift=0.0):
     """The triplet's wavefront for light that comes from `angle_deg` below the axis.
 
-    at: points of the entrance pupil, in radii, the chief ray first. limit: radius [mm] of the last
-    surface; rays beyond it have no intensity. normal: normal of the image plane, which is turned about the image. shift:
-    distance [mm] by which the image plane is moved.
+    at: points of the entrance pupil, in radii, the chief ray first.
+    limit: radius [mm] of the last surface; rays beyond it have no intensity.
+    normal: normal of the image plane, which is turned about the image.
+    shift: distance [mm] by which the image plane is moved.
     """
     x, y = hexapolar(12) if at is None else at
     angle, count = np.deg2rad(angle_deg), len(x)

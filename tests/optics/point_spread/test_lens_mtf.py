@@ -47,7 +47,7 @@ def displaced(x, y, angle=0):
     """The rays of the triplet at 0.55 µm, whose image is moved by (x, y) [mm]."""
     wave = triplet(angle, 0.55e-6)
     wave.pupil_x, wave.pupil_y = wave.pupil_x + x, wave.pupil_y + y
-    wave.reference_center = np.asarray(wave.reference_center) + [x, y, 0]
+    wave.reference_center = np.add(wave.reference_center, (x, y, 0))
     return wave
 
 
@@ -89,8 +89,10 @@ def test_the_plot_shows_contrasts_over_shift_or_frequency():
     axes = Figure().subplots()
     through.plot(axes, 20e3)
     solid, dashed = axes.lines
-    assert np.allclose(solid.get_xdata(), [-0.1, 0, 0.1]) and np.allclose(solid.get_ydata(), contrasts[0, :, 1])
-    assert np.allclose(dashed.get_ydata(), contrasts[0, :, 1] / 2) and dashed.get_linestyle() == "--"
+    assert np.allclose(solid.get_xdata(), [-0.1, 0, 0.1])
+    assert np.allclose(solid.get_ydata(), contrasts[0, :, 1])
+    assert np.allclose(dashed.get_ydata(), contrasts[0, :, 1] / 2)
+    assert dashed.get_linestyle() == "--"
     assert axes.get_ylabel() == "contrast at 20 cycles/mm"
     one = optics.LensMTF(((0, 1),), shifts[:1], f, contrasts[:, :1], contrasts[:, :1] / 2, np.zeros((1, 1)))
     axes = Figure().subplots()
