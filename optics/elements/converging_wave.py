@@ -111,10 +111,10 @@ def of_rays(system: Any, wavelength: float, image_normal: Any) -> ConvergingWave
     axes = np.stack([right, np.cross(normal, right)])
     away = places - centre[:, None]
     sines = axes @ away / np.linalg.norm(away, axis=0)
-    position = tuple(float(at) for at in axes @ centre)
+    position = float(axes[0] @ centre), float(axes[1] @ centre)
     dark = sines[:, known & ~lit]
     rim = rim_around(sines[:, lit], dark)
-    if rim.contains(*dark, INSIDE).any():
+    if rim.contains(dark[0], dark[1], INSIDE).any():
         raise ValueError("the pupil is obscured or not convex: only open, convex pupils can be read")
     return ConvergingWave(
         sines[:, lit], ahead[lit], rim, rim.onto_plane(radius), radius, wavelength, position, float(normal @ centre)
@@ -140,7 +140,7 @@ def of_samples(system: Any, wavelength: float, distance: float) -> ConvergingWav
     lit = amplitude > HALF * np.median(amplitude[illuminated])
     rows, columns = np.nonzero(lit)
     rim = rim_around(np.stack([x[columns], y[rows]]))
-    within = amplitude[rim.contains(*np.broadcast_arrays(x[None, :], y[:, None]), INSIDE)]
+    within = amplitude[rim.contains(x[None, :], y[:, None], INSIDE)]
     middle = np.median(within) if within.size else 0.0
     if within.size and np.abs(within - middle).max() > EVEN * middle:
         raise ValueError("data: the pupil is obscured, not convex, or unevenly lit: only open pupils can be read")

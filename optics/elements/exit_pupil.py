@@ -10,7 +10,7 @@ import numpy as np
 
 from optics.elements.converging_wave import UM, ConvergingWave, is_of_rays, is_of_samples, of_rays, of_samples
 from optics.elements.pupil import Pupil
-from optics.elements.refractive_index import index_of
+from optics.elements.refractive_index import Dispersion, index_of
 from optics.elements.wavefront import Zernike, mode
 from optics.numerics.arguments import finite, point_2d, positive, vacuum_wavelength, whole
 from optics.numerics.autodiff import number
@@ -135,7 +135,7 @@ def read_exit_pupil(
     return _fitted(wave, medium_n, count)
 
 
-def _fitted(wave: ConvergingWave, medium_n: float, order: int) -> ExitPupil:
+def _fitted(wave: ConvergingWave, medium_n: float | Dispersion, order: int) -> ExitPupil:
     """Return the exit pupil with Zernike modes fitted to the samples of a wave."""
     modes = [(n, m) for n in range(order + 1) for m in range(-n, n + 1, 2)]
     if wave.ahead.size < RAYS_PER_MODE * len(modes):

@@ -11,6 +11,7 @@ import numpy as np
 from optics.elements.converging_wave import UM
 from optics.elements.exit_pupil import ExitPupil, read_exit_pupil
 from optics.numerics.arguments import positive, shown, whole
+from optics.numerics.read_only import ReadOnlyArrays
 
 __all__ = ["ExitPupils", "read_exit_pupils"]
 
@@ -18,7 +19,7 @@ FLAT = 1e-9  # choice [m]: largest distance of images from a common plane
 
 
 @dataclass(frozen=True, eq=False)
-class ExitPupils:
+class ExitPupils(ReadOnlyArrays):
     """Exit pupils of a lens whose images lie on one plane.
 
     fields: points of the field in the other program's order and units.

@@ -49,8 +49,8 @@ class Rim:
     def aperture(self) -> Aperture:
         return Circle() if self.vertices is None else Polygon(self.vertices)
 
-    def contains(self, x: np.ndarray, y: np.ndarray, part: float = 1.0) -> np.ndarray:
-        """Return a mask of the points inside the rim, or inside the rim reduced to a part of its size."""
+    def contains(self, x: np.ndarray, y: np.ndarray, part: float) -> np.ndarray:
+        """Return a mask of the points inside the rim reduced to a part of its size."""
         scale = 1 / (part * self.radius)
         return self.aperture.contains((x - self.middle[0]) * scale, (y - self.middle[1]) * scale)
 
