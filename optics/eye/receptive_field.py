@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
@@ -29,7 +31,6 @@ __all__ = ["Retina", "perfect_psf", "retinal_psf", "visual_kernel"]
 WIDEST_TANGENT = math.tan(math.radians(50))
 BESIDE = 4  # choice: samples beyond either end of the light, because a spline is least accurate at its ends
 MOST_CELLS = 2049  # choice: largest number of cells of a kernel along an axis
-MOST_SECONDS = 3.0  # choice: time limit for the PSF of a band [s]
 
 
 @dataclass(frozen=True)
@@ -38,6 +39,7 @@ class Retina:
 
     cell: height and width of a cell [m].
     pupil_turned: True if the pupil is rotated by 180° about the axis.
+    most_seconds: largest predicted time [s] of the PSF of a band.
     """
 
     distance: Scalar
@@ -46,6 +48,7 @@ class Retina:
     tolerance: float
     dtype: str = "float32"
     pupil_turned: bool = False
+    most_seconds: float = 3.0  # choice
 
     def across_pupil(self, direction: tuple[float, float]) -> tuple[float, float]:
         """Return the tangents (x, y), in the pupil's axes, of the direction in which the light of a source travels.
@@ -127,7 +130,9 @@ def visual_kernel(
     ]
     rows, columns = (Tiles(spot.cells(side) + 2 * from_cell, side, from_cell) for side in retina.cell)
     types, kernels = precision(retina.dtype), []
-    for request, picture in zip(requests, pictures(requests, alike=True), strict=True):
+    with _more_time():
+        found = pictures(requests, alike=True)
+    for request, picture in zip(requests, found, strict=True):
         window = request.problem.window
         # Samples and cells both run backwards. A symmetric pupil thus has the same sums, in the same order, as a turned
         # one, whose samples run forwards.
@@ -193,13 +198,28 @@ def _pitch_for_cells(pitch: float, retina: Retina) -> float:
 
 def _spread(beams: list[Beam], spot: Spot, retina: Retina) -> PSFResult:
     window = spot.window(spot.pitch)
-    return spread([_request(beam, spot, need, window, retina) for beam, need in zip(beams, spot.needs, strict=True)])
+    with _more_time():
+        return spread(
+            [_request(beam, spot, need, window, retina) for beam, need in zip(beams, spot.needs, strict=True)]
+        )
+
+
+@contextmanager
+def _more_time() -> Iterator[None]:
+    """Name the argument of an eye that allows a computation, if it is refused because of its predicted time only."""
+    try:
+        yield
+    except AccuracyError as refused:
+        if refused.seconds is None:
+            raise
+        allowed = f"most_seconds={math.ceil(1.1 * refused.seconds)} allows the eye this time"
+        raise AccuracyError(f"{refused}; {allowed}", seconds=refused.seconds) from None
 
 
 def _request(beam: Beam, spot: Spot, need: _WindowNeeds, window: Grid, retina: Retina) -> Request:
     reach = spot.half + math.hypot(*spot.centre)
     problem = Problem.from_beam(beam, window, retina.tolerance, retina.dtype)
-    return Request(beam, replace(problem, widest_band=need.band, reach=reach), most_seconds=MOST_SECONDS)
+    return Request(beam, replace(problem, widest_band=need.band, reach=reach), most_seconds=retina.most_seconds)
 
 
 def perfect_psf(retina: Retina, radius: float) -> PSFResult:

@@ -130,7 +130,7 @@ OF_PUPILS = {
     ),
     "HumanEye": Walk(
         lambda **given: human(**given),
-        {"aperture_radius": 1e-3, "wavefront": None},
+        {"aperture_radius": 1e-3, "wavefront": None, "centered": True},
     ),
     "MaskMap": Walk(lambda **given: bright(mask=optics.MaskMap(RAMP * 8e5, **given)), {"reach": 2e-5}),
     "WavefrontMap": Walk(lambda **given: bright(wavefront=optics.WavefrontMap(RAMP, **given)), {"radius": 2e-5}),

@@ -202,3 +202,25 @@ def test_a_mixture_is_refused_if_the_contrasts_of_any_of_its_sums_are_uncertain(
     for weights in ([bad], [good, bad], [bad, good]):
         with pytest.raises(optics.AccuracyError, match=r"tolerance = 0\.02: contrasts have errors of up to"):
             combined_mtf(seen, np.stack(weights), 0.02)
+
+
+def test_a_window_that_is_too_wide_names_a_tolerance_that_works():
+    pupil = optics.Pupil(1e-3, thin_lens_focal_length=5e-3, wavefront=optics.Zernike({(4, 0): 0.2}))
+    seen = optics.psf(pupil, [550e-9], dx=0.7e-6, shape=(65, 65))
+    with pytest.raises(optics.AccuracyError, match="; tolerance=0.0[0-9]* needs fewer samples$") as refused:
+        optics.mtf(seen, tolerance=1e-3)
+    works = float(str(refused.value).rpartition("tolerance=")[2].split()[0])
+    assert works <= 0.02
+    assert optics.mtf(seen, tolerance=works).predicted_error.max() <= works
+
+
+def test_transfer_at_any_frequency_is_that_of_the_grid():
+    pupil = optics.Pupil(30e-6, thin_lens_focal_length=2e-4, wavefront=optics.Zernike({(3, 1): 0.1}))
+    view = {"dx": 0.5e-6, "shape": (33, 41), "centre": (2e-6, -1e-6)}
+    found = optics.mtf(optics.psf(pupil, [500e-9, 600e-9], **view), tolerance=0.1)
+    rows, columns = np.array([10, 20, 25]), np.array([12, 22, 20])
+    otf = found.otf(found.fx[columns], found.fy[rows])
+    assert np.abs(otf) == pytest.approx(found.mtf[:, rows, columns], abs=1e-6)
+    assert np.angle(otf / np.exp(1j * found.phase[:, rows, columns])) == pytest.approx(0, abs=1e-5)
+    with pytest.raises(ValueError, match="fx, fy: must be finite and at most"):
+        found.otf(1e9, 0.0)
