@@ -1,5 +1,7 @@
 """Contrasts between the grid's frequencies, over all orientations, against the sums themselves."""
 
+from dataclasses import replace
+
 import drjit as dr
 import numpy as np
 import pytest
@@ -204,13 +206,15 @@ def test_a_mixture_is_refused_if_the_contrasts_of_any_of_its_sums_are_uncertain(
             combined_mtf(seen, np.stack(weights), 0.02)
 
 
-def test_a_window_that_is_too_wide_names_a_tolerance_that_works():
+@pytest.mark.parametrize("again", [False, pytest.param(True, marks=pytest.mark.slow)])
+def test_a_window_that_is_too_wide_names_a_tolerance_that_works(again):
     pupil = optics.Pupil(1e-3, thin_lens_focal_length=5e-3, wavefront=optics.Zernike({(4, 0): 0.2}))
     seen = optics.psf(pupil, [550e-9], dx=0.7e-6, shape=(65, 65))
-    with pytest.raises(optics.AccuracyError, match="; tolerance=0.0[0-9]* needs fewer samples$") as refused:
+    seen = seen if again else replace(seen, requests=())
+    with pytest.raises(optics.AccuracyError, match=r"; tolerance=0\.0\d+ needs fewer samples$") as refused:
         optics.mtf(seen, tolerance=1e-3)
     works = float(str(refused.value).rpartition("tolerance=")[2].split()[0])
-    assert works <= 0.02
+    assert works <= (0.02 if again else 0.09)
     assert optics.mtf(seen, tolerance=works).predicted_error.max() <= works
 
 
