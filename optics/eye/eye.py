@@ -13,8 +13,9 @@ from optics.eye.eye_spec import EyeSpec
 from optics.eye.geometry import direction, tangents
 from optics.eye.kernel_bank import KernelBank, distances_of, prepare
 from optics.eye.polarization import taken_by
-from optics.eye.receptive_field import Retina, perfect_psf, retinal_psf
+from optics.eye.receptive_field import perfect_psf, retinal_psf
 from optics.eye.receptor_kernel import CELLS_FOR_BANDS, bands_for, receptor_kernel, white_share
+from optics.eye.retina import Retina
 from optics.eye.retinal_image import centred, with_centre
 from optics.eye.signals import signals, with_noise
 from optics.eye.summary import Description, describe
