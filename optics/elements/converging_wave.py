@@ -48,6 +48,13 @@ class ConvergingWave:
     position: tuple[float, float] | None = None
     height: float | None = None
 
+    @property
+    def pupil_points(self) -> np.ndarray:
+        """Positions of the samples on the plane of the pupil, in units of its radius, (2, n)."""
+        sines = self.sines - self.rim.middle[:, None]
+        found: np.ndarray = self.distance / self.on_plane.radius * sines / np.sqrt(1 - np.sum(sines**2, axis=0))
+        return found
+
     def moved(self, shift: float, medium_n: float, position: tuple[float, float] | None = None) -> ConvergingWave:
         """Return the wave relative to a sphere around another point.
 

@@ -61,6 +61,21 @@ class ExitPupil:
         values = waves.at(nodes.x, nodes.y) * weight
         return float(np.linalg.norm(values - flat @ np.linalg.lstsq(flat, values, rcond=None)[0]))
 
+    @cached_property
+    def spot_radius(self) -> float:
+        """Largest distance [m] from the origin at which a ray of the fitted wavefront hits the image plane.
+
+        The gradient of the wavefront, times the distance and divided by the refractive index, displaces a ray.
+        """
+        waves, step = self.pupil.wavefront, 1e-4
+        assert isinstance(waves, Zernike)
+        x, y = self.wave.pupil_points
+        slopes = [
+            (waves.at(x + dx, y + dy) - waves.at(x - dx, y - dy)) / (2 * step) for dx, dy in ((step, 0.0), (0.0, step))
+        ]
+        index = self.pupil.index_behind(self.wave.wavelength)
+        return float(np.hypot(*slopes).max()) * self.distance / self.pupil.radius / index
+
     @property
     def image_height(self) -> float:
         """Distance [m] of the image plane from the origin of the object's coordinates, along the plane's normal.
@@ -140,11 +155,9 @@ def _fitted(wave: ConvergingWave, medium_n: float | Dispersion, order: int) -> E
     modes = [(n, m) for n in range(order + 1) for m in range(-n, n + 1, 2)]
     if wave.ahead.size < RAYS_PER_MODE * len(modes):
         raise ValueError(f"{wave.ahead.size} samples of the wavefront: must be {RAYS_PER_MODE * len(modes)} or more")
-    rim, on_plane = wave.rim, wave.on_plane
-    from_middle = wave.sines - rim.middle[:, None]
-    if np.mean(np.hypot(*from_middle) < CENTRE * rim.radius) < FILLED * CENTRE**2:
+    x, y = wave.pupil_points
+    if np.mean(np.hypot(x, y) < CENTRE) < FILLED * CENTRE**2:
         raise ValueError("the pupil is obscured: only open pupils can be read")
-    x, y = wave.distance * from_middle / np.sqrt(1 - np.sum(from_middle**2, axis=0)) / on_plane.radius
     basis = np.stack([mode(n, m, x, y) for n, m in modes], axis=1)
     ahead = wave.ahead - wave.ahead.mean()
     bounds = BOUNDED * np.sqrt(len(x)) * np.eye(len(modes))
@@ -152,11 +165,11 @@ def _fitted(wave: ConvergingWave, medium_n: float | Dispersion, order: int) -> E
     residual = float(np.sqrt(np.mean(np.square(ahead - basis @ found))))
     waves = Zernike({key: float(value) / UM for key, value in zip(modes, found, strict=True) if key != (0, 0)})
     pupil = Pupil(
-        on_plane.radius,
+        wave.on_plane.radius,
         medium_n=medium_n,
         thin_lens_focal_length=wave.distance,
-        aperture=on_plane.aperture,
+        aperture=wave.on_plane.aperture,
         wavefront=waves,
     )
-    sines = float(-rim.middle[0]), float(-rim.middle[1])
+    sines = float(-wave.rim.middle[0]), float(-wave.rim.middle[1])
     return ExitPupil(pupil, wave.distance, residual, wave.position, sines, wave, order)

@@ -107,19 +107,19 @@ def _wide(result: PSFResult, known: np.ndarray, unsure: np.ndarray, tolerance: f
         try:
             seen = seen.recompute_on(Grid((side, side), pitch, seen.centre), "the MTF")
         except AccuracyError as refused:
-            widest = MOST_AGAIN if seen.can_recompute else max(seen.tensor.shape[1:])
-            part = min(1.0, 2 ** ((1 + ROOM) / 2) * max(seen.tensor.shape[1:]) * seen.dx / (widest * pitch))
-            others = (2 * unsure + seen.sum_error) / known
-            raise AccuracyError(
-                f"{refused}; {_looser(lost * part + float(others.max()))} needs fewer samples"
-            ) from None
+            own = max(seen.tensor.shape[1:]) * seen.dx
+            widest = MOST_AGAIN * pitch if seen.can_recompute and side > MOST_AGAIN else own
+            part = min(1.0, 2 ** ((1 + ROOM) / 2) * own / widest)
+            others = float(((2 * unsure + seen.sum_error) / known).max())
+            raise AccuracyError(f"{refused}{_looser(lost * part + others)}") from None
     return seen
 
 
 def _looser(error: float) -> str:
-    """Return the next larger tolerance with one digit, as an argument."""
+    """Return a note on the next tolerance with one digit above this error; empty if it would be 1 or more."""
     step = 10.0 ** math.floor(math.log10(error))
-    return f"tolerance={step * math.ceil(error / step):.3g}"
+    enough = step * math.ceil(error / step)
+    return f"; tolerance={enough:.3g} needs fewer samples" if enough < 1 else ""
 
 
 def _transformed(seen: PSFResult, light: Array, causes: ErrorCauses) -> MTF:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,7 +17,9 @@ from optics.point_spread.psf import psf
 
 __all__ = ["LensMTF", "lens_mtf"]
 
-SAMPLES = 65  # choice: samples along a side of the first window; the MTF enlarges it if it loses too much light
+# Choice: samples along a side of the first window for a pupil without aberrations, and the half side of the window in
+# units of the spot's radius. The MTF enlarges the window if it loses too much light.
+SAMPLES, AROUND = 65, 1.2
 PITCH = 0.5  # samples per cycle of the highest frequency, which the MTF needs
 OF_PSF = 0.1  # choice: part of the tolerance that a PSF may use
 MM = 1e-3
@@ -127,14 +130,9 @@ def _otf(
                 f"frequencies: {np.abs(f).max():.4g} per metre is beyond the cutoff of the lens at {wavelength:g} m, "
                 f"{cutoff:.4g} per metre"
             )
-        seen = psf(
-            pupil.pupil,
-            [float(wavelength)],
-            pupil.distance,
-            dx=PITCH / cutoff,
-            shape=(SAMPLES, SAMPLES),
-            tolerance=OF_PSF * tolerance,
-        )
+        side = SAMPLES + 2 * math.ceil(AROUND * pupil.spot_radius * cutoff / PITCH)
+        window = {"dx": PITCH / cutoff, "shape": (side, side)}
+        seen = psf(pupil.pupil, [float(wavelength)], pupil.distance, tolerance=OF_PSF * tolerance, **window)
         transfer = mtf(seen, tolerance=tolerance)
         total += part * transfer.otf(*f)[0]
         error += part * float(transfer.predicted_error[0])
