@@ -32,15 +32,15 @@ def huygens_contrasts(shift, weights, n=49):
     return light * np.array([[contrast(total, PITCH, f, tangential) for f in F] for tangential in (True, False)])
 
 
-def test_contrasts_through_focus_are_those_of_a_huygens_sum(lens):
-    weights, shifts = (0.2, 0.5, 0.3), (-0.1e-3, 0.05e-3)
-    found = optics.lens_mtf(lens, F, shifts, weights=np.array(weights) * 7)
-    for index, shift in enumerate(shifts):
-        rays = huygens_contrasts(shift * 1e3, weights)
-        assert found.tangential[0, index] == pytest.approx(rays[0], abs=0.006)
-        assert found.sagittal[0, index] == pytest.approx(rays[1], abs=0.006)
+@pytest.mark.fast_cases(1)
+@pytest.mark.parametrize("shift", [-0.1e-3, 0.05e-3])
+def test_contrasts_through_focus_are_those_of_a_huygens_sum(lens, shift):
+    weights = (0.2, 0.5, 0.3)
+    found = optics.lens_mtf(lens, F, [shift], weights=np.array(weights) * 7)
+    rays = huygens_contrasts(shift * 1e3, weights)
+    assert found.tangential[0, 0] == pytest.approx(rays[0], abs=0.006)
+    assert found.sagittal[0, 0] == pytest.approx(rays[1], abs=0.006)
     assert found.predicted_error.max() <= 0.02
-    assert abs(found.tangential[0, 0, 0] - found.tangential[0, 1, 0]) > 0.15
 
 
 def displaced(x, y, angle=0):
