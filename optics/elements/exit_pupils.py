@@ -32,7 +32,8 @@ class ExitPupils(ReadOnlyArrays):
     pupils: tuple[tuple[ExitPupil, ...], ...]
 
     def __repr__(self) -> str:
-        return f"<ExitPupils of {len(self.fields)} fields at {len(self.wavelengths)} wavelengths>"
+        fields, waves = len(self.fields), len(self.wavelengths)
+        return f"<ExitPupils of {fields} field{'s' * (fields > 1)} at {waves} wavelength{'s' * (waves > 1)}>"
 
     @property
     def positions(self) -> np.ndarray:

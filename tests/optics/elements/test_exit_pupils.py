@@ -88,4 +88,4 @@ def test_fields_are_counted_from_0():
     lens = optics.read_exit_pupils(traced((0,)))
     with pytest.raises(ValueError, match="field = 1: must be"):
         lens.at(1)
-    assert repr(lens) == "<ExitPupils of 1 fields at 3 wavelengths>"
+    assert repr(lens) == "<ExitPupils of 1 field at 3 wavelengths>"
