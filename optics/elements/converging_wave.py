@@ -36,7 +36,8 @@ class ConvergingWave:
     distance: radius of the sphere [m].
     wavelength: vacuum wavelength [m].
     position: the point (x, y) [m] on the image plane; None if the object does not contain it.
-    height: distance [m] of the image plane from the origin along its normal; None if the object does not contain it.
+    height: position [m] of the image plane relative to the origin, along the light and perpendicular to the plane; None
+        if the object does not contain it.
     """
 
     sines: np.ndarray
@@ -75,7 +76,9 @@ class ConvergingWave:
         centre, (distance,) = self._seen_from(np.array([[x], [y], [shift]]), middle[:, None])
         rim = replace(self.rim, middle=centre[:, 0], radius=self.rim.radius * self.distance / float(distance))
         ahead = self.ahead - medium_n * (apart - distance)
-        return replace(self, sines=sines, ahead=ahead, rim=rim, distance=float(distance), position=position)
+        height = None if self.height is None else self.height + shift
+        moved = {"sines": sines, "ahead": ahead, "rim": rim, "distance": float(distance)}
+        return replace(self, position=position, height=height, **moved)
 
     def _seen_from(self, to: np.ndarray, sines: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return sines of directions (2, n) to points of the sphere, and their distances [m], from another point.
@@ -119,13 +122,12 @@ def of_rays(system: Any, wavelength: float, image_normal: Any) -> ConvergingWave
     away = places - centre[:, None]
     sines = axes @ away / np.linalg.norm(away, axis=0)
     position = float(axes[0] @ centre), float(axes[1] @ centre)
+    height = float(normal @ centre) * (-1.0 if (normal @ away[:, lit]).mean() > 0 else 1.0)
     dark = sines[:, known & ~lit]
     rim = rim_around(sines[:, lit], dark)
     if rim.contains(dark[0], dark[1], INSIDE).any():
         raise ValueError("the pupil is obscured or not convex: only open, convex pupils can be read")
-    return ConvergingWave(
-        sines[:, lit], ahead[lit], rim, rim.onto_plane(radius), radius, wavelength, position, float(normal @ centre)
-    )
+    return ConvergingWave(sines[:, lit], ahead[lit], rim, rim.onto_plane(radius), radius, wavelength, position, height)
 
 
 def of_samples(system: Any, wavelength: float, distance: float) -> ConvergingWave:

@@ -12,7 +12,7 @@ from optics.elements.converging_wave import UM, ConvergingWave, is_of_rays, is_o
 from optics.elements.pupil import Pupil
 from optics.elements.refractive_index import Dispersion, index_of
 from optics.elements.wavefront import Zernike, mode
-from optics.numerics.arguments import finite, point_2d, positive, vacuum_wavelength, whole
+from optics.numerics.arguments import in_range, point_2d, positive, vacuum_wavelength, whole
 from optics.numerics.autodiff import number
 
 __all__ = ["ExitPupil", "read_exit_pupil"]
@@ -78,7 +78,9 @@ class ExitPupil:
 
     @property
     def image_height(self) -> float:
-        """Distance [m] of the image plane from the origin of the object's coordinates, along the plane's normal.
+        """Position [m] of the image plane relative to the origin of the object's coordinates.
+
+        It is measured along the light and perpendicular to the plane.
 
         Raises:
             ValueError: the object does not contain it (prysm).
@@ -97,11 +99,13 @@ class ExitPupil:
             wavelengths with a common origin include lateral colour. None: the ray through the pupil's centre.
 
         Raises:
-            ValueError: an argument is not finite, or the position of the image is unknown.
+            ValueError: an argument is not finite, the shift is longer than half the distance to the pupil, or the
+                position of the image is unknown.
         """
+        in_range("shift", shift, -self.distance / 2, self.distance / 2)
         index = number(index_of("medium_n", self.pupil.medium_n).at(self.wave.wavelength))
         place = None if origin is None else point_2d("origin", origin, "lengths (x, y) [m]")
-        return _fitted(self.wave.moved(finite("shift", shift), index, place), self.pupil.medium_n, self.order)
+        return _fitted(self.wave.moved(shift, index, place), self.pupil.medium_n, self.order)
 
 
 def read_exit_pupil(

@@ -100,6 +100,9 @@ def test_moving_the_image_plane_equals_tracing_to_another_plane():
     read, there = (optics.read_exit_pupil(triplet(20, WAVE, shift=shift), WAVE) for shift in (0.0, 0.1))
     moved = read.moved(0.1e-3)
     assert moved.position == pytest.approx(there.position, abs=0.2e-6)
+    assert moved.image_height - read.image_height == pytest.approx(there.image_height - read.image_height, rel=1e-9)
+    with pytest.raises(ValueError, match="shift = 0.03: must lie in"):
+        read.moved(0.03)
     assert apart(image(read.moved(0.1e-3, there.position)), image(there)) < 2e-3
     assert apart(image(read), image(there)) > 0.1
     aside = image(read.moved(0.1e-3, (there.position[0], there.position[1] - 5 * PITCH)))
