@@ -101,7 +101,7 @@ def test_moving_the_image_plane_equals_tracing_to_another_plane():
     moved = read.moved(0.1e-3)
     assert moved.position == pytest.approx(there.position, abs=0.2e-6)
     assert moved.image_height - read.image_height == pytest.approx(there.image_height - read.image_height, rel=1e-9)
-    with pytest.raises(ValueError, match="shift = 0.03: must lie in"):
+    with pytest.raises(ValueError, match=r"shift = 0\.03: must lie in"):
         read.moved(0.03)
     assert apart(image(read.moved(0.1e-3, there.position)), image(there)) < 2e-3
     assert apart(image(read), image(there)) > 0.1
