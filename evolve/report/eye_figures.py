@@ -132,7 +132,7 @@ def _psf(light: WhiteLight) -> Html:
         "<b>{}</b> of a distant point, all {} weighted by white daylight; logarithmic, "
         "{} decades. White square: one {}, {} µm wide. Least accurate band: {}, predicted error {}.",
         *(hint("psf", "Point spread function"), hint("bands"), DECADES, hint("receptor"), rounded(pitch)),
-        *(plan.method.replace("_", " "), f"{plan.predicted_error:.1g}"),
+        *(plan.method.replace("_", " "), f"{plan.predicted_error:.2g}"),
     )
     return figure(svg, caption)
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
+from dataclasses import fields, is_dataclass
 from typing import Any
 
 import numpy as np
@@ -14,11 +16,14 @@ __all__ = [
     "Scalar",
     "carries_derivative",
     "grad_enabled",
+    "holds_arrays",
     "is_differentiable",
     "number",
     "plain",
     "to_user",
 ]
+
+DEEPEST = 20  # choice: levels of objects within objects
 
 # Dr.Jit creates its types when a backend is first loaded, so type checkers cannot see them. These names are aliases of
 # `Any` that document the intended type.
@@ -29,6 +34,24 @@ Scalar = Any  # a number, or a Dr.Jit array of one element that carries a deriva
 def is_differentiable(value: Any) -> bool:
     """Return whether `value` is a Dr.Jit array or tensor, as opposed to a Python or NumPy number."""
     return type(value) is not float and type(value).__module__.startswith("drjit")
+
+
+def holds_arrays(value: Any, depth: int = 0) -> bool:
+    """Return whether `value` is a Dr.Jit array or may contain one, in its elements, fields or attributes.
+
+    The result is True for objects that are nested more than DEEPEST times, such as those that contain themselves.
+    """
+    if isinstance(value, np.ndarray | str | bytes | int | float | None):
+        return False
+    if is_differentiable(value) or depth > DEEPEST:
+        return True
+    if is_dataclass(value):
+        parts: Iterable[Any] = (getattr(value, field.name) for field in fields(value))
+    elif isinstance(value, tuple | list):
+        parts = value
+    else:
+        parts = (value if isinstance(value, Mapping) else getattr(value, "__dict__", {})).values()
+    return any(holds_arrays(part, depth + 1) for part in parts)
 
 
 def grad_enabled(value: Array) -> bool:

@@ -20,6 +20,7 @@ contrast       mtf, image_quality
 mixture        sums over wavelengths
 white          white_psf: light of a lamp, weighted by receptors
 through_focus  through_focus: PSFs at several distances of the sensor
+lens_mtf       lens_mtf: lenses of other programs in light of several wavelengths, through focus
 circle_sums    sums over samples within circles, for any number of radii
 concentration  encircled_energy
 strehl         strehl_ratio

@@ -67,7 +67,8 @@ class Request:
             bent = " and ".join(name for name in ("height", "wavefront") if getattr(pupil, name) is not None)
             advice = _wrapped(jump) if jump else f"a flatter {bent} needs less" if bent else ""
             advice = "" if "use method=" in str(error) else advice  # another method helps, and not another relief
-            raise AccuracyError(f"{error}; {advice}" if advice else str(error)) from None
+            seconds = None if jump and (error.seconds or 0) > MOST_SECONDS_OF_JUMPS else error.seconds
+            raise AccuracyError(f"{error}; {advice}" if advice else str(error), seconds=seconds) from None
         if jump and plan.seconds > MOST_SECONDS_OF_JUMPS:
             raise AccuracyError(f"about {plan.seconds:.2g} s by {plan.method}: {_wrapped(jump)}")
         return plan, sampling

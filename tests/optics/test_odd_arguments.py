@@ -196,6 +196,8 @@ def test_nothing_of_the_face_is_forgotten():
     }
     made |= {
         "ExitPupil",
+        "ExitPupils",
+        "LensMTF",
         "SpectralBands",
         "StackResult",
         "VectorFocus",
@@ -212,7 +214,9 @@ def test_nothing_of_the_face_is_forgotten():
         "Grid",
         "Ommatidium",
         "white_psf",
+        "lens_mtf",
         "read_exit_pupil",
+        "read_exit_pupils",
         "require",
     }
     assert CALLS.keys() | made | like_others == set(optics.__all__)

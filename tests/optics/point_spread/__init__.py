@@ -2,6 +2,7 @@
 
 arriving: test_measure_bounds.py
 batch: test_batch.py
+lens_mtf: test_lens_mtf.py
 circle_sums: test_circle_sums.py
 concentration: test_measures.py, test_measure_errors.py, test_measure_bounds.py
 strehl: test_measures.py, test_measure_errors.py, test_measure_bounds.py
