@@ -122,4 +122,4 @@ def _relief_carries(relief: Relief | None) -> bool:
     if hasattr(relief, "samples"):
         return carries_derivative(relief.samples)
     types = precision("float64")
-    return carries_derivative(relief.height(types.Float64(0), types.Float64(0), types))
+    return carries_derivative(relief.height(types.Float64(0), types.Float64(0)))

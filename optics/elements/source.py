@@ -6,8 +6,8 @@ import math
 from dataclasses import dataclass
 
 from optics.numerics.arguments import in_range, point_2d, positive
+from optics.numerics.array_library import library, like
 from optics.numerics.autodiff import Array, Scalar, number
-from optics.numerics.precision import Precision, opaque
 
 __all__ = ["PointSource"]
 
@@ -30,17 +30,18 @@ class PointSource:
         angle = in_range("source_angle", tx, -1.5, 1.5), in_range("source_angle", ty, -1.5, 1.5)
         object.__setattr__(self, "angle", angle)
 
-    def path(self, x: Array, y: Array, types: Precision) -> Array:
-        """Return the optical path [m] in vacuum at points of the pupil, relative to the centre; flat float64 arrays."""
-        import drjit as dr
+    def path(self, x: Array, y: Array) -> Array:
+        """Return the optical path [m] in vacuum at points (x, y) [m] of the pupil, relative to the centre.
 
+        x, y: see `Pupil.path`.
+        """
         tx, ty = (math.tan(theta) for theta in self.angle)
         norm = math.sqrt(1 + tx * tx + ty * ty)
-        along = x * opaque(types, tx / norm) + y * opaque(types, ty / norm)
+        along = x * like(x, tx / norm) + y * like(x, ty / norm)
         if math.isinf(number(self.distance)):
             return along
-        centre = opaque(types, self.distance) * norm
+        centre = like(x, self.distance) * norm
         # The form ρ - ρ₀ = (r² + 2 ρ₀ (x, y)·t) / (ρ + ρ₀) avoids a difference of nearly equal numbers.
         excess = x * x + y * y + 2 * centre * along
-        rho = dr.sqrt(excess + centre * centre)
+        rho = library(x).sqrt(excess + centre * centre)
         return excess / (rho + centre)

@@ -14,6 +14,7 @@ from optics.apertures.pixelated import PixelatedAperture
 from optics.elements.beam import Beam
 from optics.elements.derivative_knots import DerivativeKnots, carries_derivatives, derivative_knots
 from optics.elements.source import PointSource
+from optics.elements.torch_numbers import refuse_torch
 from optics.elements.wavefront_slopes import Slopes
 from optics.methods.derivative_cells import derivative_cells
 from optics.methods.rays import Rays
@@ -97,7 +98,8 @@ class Problem:
         derivatives: whether the samples must also be suitable for the derivatives that the beam carries.
 
         Raises:
-            ValueError: the distance is not positive, the tolerance is not in [1e-12, 0.5], or the dtype is invalid.
+            ValueError: the distance is not positive, the tolerance is not in [1e-12, 0.5], the dtype is invalid, or a
+                tensor of PyTorch requires a gradient.
         """
         distance = positive("sensor_distance", beam.distance, carried=True)
         tolerance = in_range("tolerance", tolerance, 1e-12, 0.5)
@@ -106,6 +108,7 @@ class Problem:
         plain = Beam(beam.pupil, source, beam.wavelength, distance)
         if not (derivatives and carries_derivatives(beam)):
             return _problem(plain, window, tolerance, dtype)
+        refuse_torch(beam)
         return _differentiated(plain, window, tolerance, dtype, derivative_knots(beam.pupil, beam.wavelength))
 
     @cached_property

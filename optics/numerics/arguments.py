@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from optics.numerics.autodiff import grad_enabled, is_differentiable, number, plain
+from optics.numerics.autodiff import carries_derivative, is_differentiable, number, plain
 from optics.numerics.number_types import as_array, full_precision, readable
 
 __all__ = [
@@ -104,7 +104,7 @@ def without_derivative(name: str, value: Any) -> Any:
             without_derivative(name, entry)
     elif isinstance(value, np.ma.MaskedArray):
         readable(name, value)
-    elif getattr(value, "requires_grad", False) or (is_differentiable(value) and grad_enabled(value)):
+    elif carries_derivative(value):
         raise ValueError(f"{name} requires a derivative, but none is propagated through it: pass a plain number")
     return value
 
@@ -273,8 +273,7 @@ def of_kind(name: str, value: Any, kind: type, example: str) -> Any:
 
 
 def _number(name: str, value: Any, carried: bool = False) -> float:
-    # Derivatives of PyTorch would be lost even if those of Dr.Jit are propagated.
-    if not carried or getattr(value, "requires_grad", False):
+    if not carried:
         without_derivative(name, value)
     value = full_precision(name, value)
     try:

@@ -81,8 +81,8 @@ def _check_plain(pupil: Pupil, wavelength: float) -> None:
     """Raise a ValueError if a parameter of the pupil carries a derivative."""
     types = precision("float64")
     at, middle = types.Float64(0.5), types.Float64(0.0)
-    path = pupil.path(at * pupil.radius, middle, wavelength, PointSource(), types)
-    for part in (pupil.aperture_radius, path, pupil.amplitude(at, middle, types)):
+    path = pupil.path(at * pupil.radius, middle, wavelength, PointSource())
+    for part in (pupil.aperture_radius, path, pupil.amplitude(at, middle)):
         without_derivative("pupil", part)
 
 
