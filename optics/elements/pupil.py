@@ -223,10 +223,7 @@ class Pupil:
         return self.aperture.mirror_symmetric and relief_is and wavefront_is and mask_is
 
     def path(self, x: Array, y: Array, wavelength: float, source: PointSource) -> Array:
-        """Return the optical path [m] from the source through the pupil at points (x, y) [m].
-
-        x, y: arrays of NumPy or PyTorch whose shapes broadcast, or flat Float64 arrays of Dr.Jit.
-        """
+        """Return the optical path [m] from the source through the pupil at points (x, y) [m]; see `Relief.height`."""
         total = source.path(x, y) * like(x, self.index_before(wavelength))
         if self.thin_lens_focal_length is not None:
             f, own = like(x, self.thin_lens_focal_length), library(x)

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 
@@ -17,9 +16,9 @@ import numpy as np
 from optics.elements.fine_detail import band_of, power_beyond, reach_of
 from optics.elements.square_samples import on_both_sides, square_samples
 from optics.numerics.arguments import finite, plain_reals, positive
-from optics.numerics.array_library import fma, gather, indices, library, like, matrix_like
+from optics.numerics.array_library import gather, indices, library, like, matrix_like
 from optics.numerics.autodiff import Array, is_differentiable, plain
-from optics.numerics.interpolation import cubic_bsplines
+from optics.numerics.interpolation import cubic_bsplines, tensor_product
 
 __all__ = ["BSplineRelief", "HeightMap", "Relief"]
 
@@ -125,7 +124,7 @@ class BSplineRelief(Relief):
     def height(self, x: Array, y: Array) -> Array:
         points = like(x, self.control_points)
         across, along = cubic_bsplines((x + 1) / 2), cubic_bsplines((y + 1) / 2)
-        return _tensor_product(lambda i, j: gather(points, 4 * i + j), across, along)
+        return tensor_product(lambda i, j: gather(points, 4 * i + j), across, along)
 
     @property
     def span(self) -> float:
@@ -213,7 +212,7 @@ class HeightMap(Relief):
         values = self._values(x)
         (column, across), (row, along) = (self._cell(position) for position in (x, y))
         columns = like(row, self._width)
-        return _tensor_product(lambda i, j: gather(values, (row + i) * columns + column + j), across, along)
+        return tensor_product(lambda i, j: gather(values, (row + i) * columns + column + j), across, along)
 
     def on_grid(self, at: np.ndarray) -> np.ndarray:
         """Return heights (y, x) at positions in units of the radius; NumPy arrays without derivatives."""
@@ -258,17 +257,6 @@ class HeightMap(Relief):
     @property
     def mirror_symmetric(self) -> bool:
         return not is_differentiable(self.samples) and on_both_sides(self._heights)
-
-
-def _tensor_product(value: Callable[[int, int], Array], across: list[Array], along: list[Array]) -> Array:
-    """Return Σ_ij a_i b_j value(i, j), with a_i the weights along y and b_j those along x."""
-    total = 0.0
-    for i, down in enumerate(along):
-        line = 0.0
-        for j, right in enumerate(across):
-            line = fma(right, value(i, j), line)
-        total = fma(down, line, total)
-    return total
 
 
 def _open_grid(x: Array, y: Array) -> bool:

@@ -33,7 +33,7 @@ class PointSource:
     def path(self, x: Array, y: Array) -> Array:
         """Return the optical path [m] in vacuum at points (x, y) [m] of the pupil, relative to the centre.
 
-        x, y: see `Pupil.path`.
+        x, y: see `Relief.height`.
         """
         tx, ty = (math.tan(theta) for theta in self.angle)
         norm = math.sqrt(1 + tx * tx + ty * ty)
