@@ -244,7 +244,7 @@ class Pupil:
         # The path depends on the wavelength only through these indices. Equal indices therefore give equal slopes.
         indices = number(self.index_step(wavelength)), self.index_before(wavelength), self.index_behind(wavelength)
         same = self._first_with.setdefault(indices, wavelength)
-        return _slopes(self._level if self.pixels else self, same, number(source.distance), source.angle)
+        return _slopes(self._level if self.pixels else self, same, number(source.distance), source.plain.angle)
 
     @cached_property
     def _first_with(self) -> dict[tuple[float, float, float], float]:

@@ -27,8 +27,9 @@ def with_numbers(element: Any, numbers: Mapping[str, Any]) -> Any:
 
 def refuse_torch(beam: Beam) -> None:
     """Raise a ValueError if a tensor of PyTorch requires a gradient, since Dr.Jit carries none for PyTorch."""
-    distances = {"sensor_distance": beam.distance, "source_distance": beam.source.distance}
-    for name in [*torch_numbers(beam.pupil), *(name for name, value in distances.items() if of_torch(value))]:
+    own = {"sensor_distance": beam.distance, "source_distance": beam.source.distance}
+    own |= {"source_angle": next(filter(of_torch, beam.source.angle), None)}
+    for name in [*torch_numbers(beam.pupil), *(name for name, value in own.items() if of_torch(value))]:
         raise ValueError(
             f"{name} requires a gradient of PyTorch, which would be lost here: must be passed to optics.torch.psf, or "
             "without its gradient, as in tensor.detach()"

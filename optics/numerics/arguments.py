@@ -20,6 +20,7 @@ __all__ = [
     "items",
     "of_kind",
     "one_of",
+    "pair",
     "plain_reals",
     "point_2d",
     "positive",
@@ -182,12 +183,17 @@ def close_match(word: str, known: Iterable[str], cutoff: float = 0.5) -> str | N
 
 def point_2d(name: str, value: Any, what: str = "lengths (x, y) [m]") -> tuple[float, float]:
     """Return (x, y) as finite floats."""
-    without_derivative(name, value)
+    x, y = pair(name, without_derivative(name, value), what)
+    return in_range(name, x, -LARGEST, LARGEST), in_range(name, y, -LARGEST, LARGEST)
+
+
+def pair(name: str, value: Any, what: str) -> tuple[Any, Any]:
+    """Return the two entries of `value`, which may carry derivatives; ValueError unless there are two."""
     try:
         x, y = value
     except (TypeError, ValueError):
         raise ValueError(f"{name} = {shown(value)}: must be two {what}") from None
-    return in_range(name, x, -LARGEST, LARGEST), in_range(name, y, -LARGEST, LARGEST)
+    return x, y
 
 
 def reals(name: str, values: Any) -> np.ndarray:

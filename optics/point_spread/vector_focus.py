@@ -63,7 +63,8 @@ def vector_focus(
             aplanatic lens is below 20, so that its rays do not meet in a point.
     """
     of_kind("pupil", pupil, Pupil, "Pupil(25e-6)")
-    lambda_, source = vacuum_wavelength(wavelength), PointSource(math.inf, source_angle)
+    lambda_ = vacuum_wavelength(wavelength)
+    source = PointSource(math.inf, without_derivative("source_angle", source_angle))
     one_of("apodization", apodization, ("flat", "aplanatic"))
     z = pupil.image_distance(math.inf) if sensor_distance is None else positive("sensor_distance", sensor_distance)
     _check_plain(pupil, lambda_)

@@ -42,7 +42,7 @@ def corners():
 DROPPED = {
     "wavelength": lambda: optics.psf(PUPIL, [asking(550e-9)]),
     "wavelengths": lambda: optics.psf(PUPIL, asking([500e-9, 600e-9])),
-    "source_angle": lambda: optics.psf(PUPIL, source_angle=(asking(0.1), 0.0)),
+    "source_angle": lambda: optics.vector_focus(WIDE, source_angle=(asking(0.1), 0.0)),
     "centre": lambda: optics.psf(PUPIL, centre=(0.0, asking(1e-6))),
     "dx": lambda: optics.psf(PUPIL, dx=asking(1e-6)),
     "object_n": lambda: optics.Pupil(10e-6, object_n=asking(1.3)),

@@ -35,6 +35,8 @@ INPUTS = {
         lambda v: {"aperture_radius": v, "height": MAP, "wavefront": optics.Zernike([0, 0.1, 0.3])},
     ),
     "source distance": (np.array(1e-3), lambda v: {"source": PointSource(v, (0.1, -0.2))}),
+    "source angle": (np.array(-0.2), lambda v: {"source": PointSource(1e-3, (0.1, v))}),
+    "angle of a plane wave": (np.array(-0.2), lambda v: {"source": PointSource(angle=(0.1, v))}),
 }
 
 
