@@ -200,11 +200,14 @@ def _former_pupil(heights: Any, given: Mapping[str, Any]) -> Any:
     if "radius" not in given:
         raise ValueError("radius is missing: must be that of the pupil [m]; or pass optics.Pupil(radius, heights)")
     radius, n = (full_precision(name, given.get(name, 1.5)) for name in ("radius", "n"))
-    return Pupil(radius, _guessed(heights), n=n, **(given.get("pupil") or {}))
+    return Pupil(radius, _guessed(heights, 5), n=n, **(given.get("pupil") or {}))
 
 
-def _guessed(heights: torch.Tensor) -> Relief:
-    """Return the relief that a tensor of heights meant before reliefs were passed: 4 x 4 heights are control points."""
+def _guessed(heights: torch.Tensor, stacklevel: int) -> Relief:
+    """Return the relief that a tensor of heights meant before reliefs were passed: 4 x 4 heights are control points.
+
+    stacklevel: number of calls from `warnings.warn` to the user's code.
+    """
     full_precision("heights", heights)
     if heights.shape != (4, 4):
         return HeightMap(heights)
@@ -212,6 +215,7 @@ def _guessed(heights: torch.Tensor) -> Relief:
         "heights of optics.torch",
         "heights of 4 x 4 are taken as control points: pass optics.BSplineRelief(heights) in a Pupil to say so, or "
         "optics.HeightMap(heights) for samples; the guess will be removed in version 0.3",
+        stacklevel,
     )
     return BSplineRelief(heights)
 
@@ -245,7 +249,7 @@ class PointSpread(torch.nn.Module):
         super().__init__()
         relief = BSplineRelief(np.zeros((4, 4))) if heights is None else heights
         if not isinstance(relief, Relief):
-            relief = _guessed(of_kind("heights", heights, torch.Tensor, "torch.zeros(4, 4)"))
+            relief = _guessed(of_kind("heights", heights, torch.Tensor, "torch.zeros(4, 4)"), 4)
         start = relief.control_points if isinstance(relief, BSplineRelief) else getattr(relief, "samples", None)
         if start is None:
             raise ValueError(f"heights = {shown(relief)}: must be a BSplineRelief, HeightMap or PixelRelief")

@@ -110,7 +110,7 @@ def sensor_place(pupil: Pupil, sensor_distance: Scalar | None, source_distance: 
         if focal is not None and carries_derivative(value):
             raise ValueError(
                 f"sensor_distance is missing: {name} carries a derivative, but the default distance of the sensor, "
-                "which depends on it, carries none; specify the distance [m], which may be a Dr.Jit number"
+                "which depends on it, carries none; specify the distance [m], which may carry a derivative"
             )
     return pupil.image_distance(number(source_distance))
 
