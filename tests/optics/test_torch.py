@@ -23,6 +23,9 @@ WIDE, SQUARE = RNG.random((4, 7)), RNG.random((5, 5))
 LENS = {"aperture_radius": R, "thin_lens_focal_length": 150e-6}
 
 
+CHECK = {"rtol": 1e-3, "atol": 1e-6, "nondet_tol": 1e-9, "fast_mode": True}  # parallel sums differ by rounding
+
+
 def asking(value, **options):
     return torch.tensor(value, **{"dtype": torch.float64, "requires_grad": True, **options})
 
@@ -55,7 +58,7 @@ INPUTS = {
 }
 # These cover an array, a scalar, a mask, a distance and an angle; all others run in the slow part.
 FAST = {
-    "wide samples",
+    "control points",
     "pixels",
     "mode of Zernike",
     "waist",
@@ -74,17 +77,17 @@ def test_gradients_of_every_input(name):
     """The method's own error is the same on both sides, so the tolerance of the PSF need not be small."""
     value = asking(INPUTS[name][0])
     step = 1e-5 * max(1.0, float(value.detach().abs().max()))
-    assert torch.autograd.gradcheck(
-        lambda v: spread(name, v) * 1e-9, (value,), eps=step, rtol=1e-3, atol=1e-6, nondet_tol=1e-9, fast_mode=True
-    )
+    assert torch.autograd.gradcheck(lambda v: spread(name, v) * 1e-9, (value,), eps=step, **CHECK)
 
 
+@pytest.mark.slow
 def test_gradients_through_means_over_pixels():
     value = asking(WIDE)
     assert torch.autograd.gradcheck(
         lambda v: spread("wide samples", v, pixel_means=True) * 1e-9,
         (value,),
-        **{"eps": 1e-5, "rtol": 1e-3, "atol": 1e-6, "nondet_tol": 1e-9, "fast_mode": True},
+        eps=1e-5,
+        **CHECK,
     )
 
 
@@ -120,7 +123,7 @@ def test_axes_of_pupils_distances_and_wavelengths():
 
 @pytest.mark.parametrize(("shape", "dx", "centre"), [((4, 3), 4e-6, (2e-6, -1e-6)), ((5, 6), 0.4e-6, (0.0, 0.0))])
 def test_means_over_pixels(shape, dx, centre):
-    """An odd number of samples per pixel fills each pixel; their mean is that of the pixel, but for 1/24 (dx/n)² f''."""
+    """An odd number of samples per pixel fills each pixel; their mean is nearly that of the pixel."""
     n, pupil, z = 61, lens(height=BSplineRelief(RNG.random((4, 4)) * 1e-6)), 160e-6
     x, y = (at - dx / n * (n - 1) / 2 * (side % 2 == 0) for at, side in zip(centre, shape[::-1], strict=True))
     fine = {"dx": dx / n, "shape": (n * shape[0], n * shape[1]), "centre": (x, y)}

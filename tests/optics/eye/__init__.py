@@ -14,5 +14,6 @@ receptive_field: test_receptive_field.py, test_scattered_light.py, test_axes.py,
 guided_field: test_guided_field.py, test_axes.py
 receptor_kernel: test_guided_field.py, test_eye.py
 retinal_image: test_retinal_image.py
+sensor_pixels: test_torch.py
 summary: test_summary.py
 """
