@@ -157,7 +157,7 @@ REFUSALS: tuple[tuple[str, Callable[[], Any], str], ...] = (
     (
         "DOE of no pixel",
         lambda: Pupil(RADIUS, np.zeros((0, 0))),
-        r"height has shape \(0, 0\): must be \(rows, columns\)",
+        r"height has shape \(0, 0\): must be \(rows",
     ),
     ("pixels not square", lambda: optics.PixelRelief(np.zeros((2, 3))), r"height has shape \(2, 3\): must be square"),
     ("DOE with NaN", lambda: Pupil(RADIUS, np.full((4, 4), math.nan)), "height holds NaN"),
