@@ -92,6 +92,8 @@ def psf(
     if flag("requires_grad", requires_grad) and not numbers:
         raise ValueError("no number of the pupil requires a gradient: must hold a tensor with requires_grad=True")
     place = torch.device(device) if device is not None else _common_device(numbers)
+    if not torch.is_grad_enabled():
+        light, numbers = with_numbers(light, {name: plain(tensor)[()] for name, tensor in numbers.items()}), {}
     integrated = flag("pixel_means", pixel_means) and view.get("method") not in OF_CELLS
     pixels = _pixels(light, lambdas, view) if integrated else None
 
@@ -99,7 +101,7 @@ def psf(
         changed = with_numbers(light, dict(zip(numbers, own, strict=True)))
         return changed.images(lambdas, view if pixels is None else {**view, **vars(pixels.samples)})
 
-    found = _Evaluation.apply(images, torch.is_grad_enabled(), *numbers.values()).to(place)
+    found = _Evaluation.apply(images, *numbers.values()).to(place)
     if pixels is not None:
         rows, columns = (torch.tensor(part).to(found) for part in (pixels.rows, pixels.columns))
         found = rows @ found @ columns.T
@@ -117,13 +119,12 @@ class _Evaluation(torch.autograd.Function):
     """A function of Dr.Jit arrays as an operation of PyTorch. Its graph serves any number of backward passes."""
 
     @staticmethod
-    def forward(ctx: Any, function: Callable[[list[Array]], Array], differentiated: bool, *numbers: Any) -> Any:
+    def forward(ctx: Any, function: Callable[[list[Array]], Array], *numbers: Any) -> Any:
         import drjit as dr
 
         place, types = _place(), precision("float64")
         own = [_on_drjit(tensor.double(), types.Tensor64, place) for tensor in numbers]
-        if differentiated:
-            dr.enable_grad(own)
+        dr.enable_grad(own)
         found = function(own)
         dr.eval(found)
         ctx.own, ctx.found, ctx.kinds = own, found, [(t.shape, t.dtype, t.device) for t in numbers]
@@ -145,7 +146,7 @@ class _Evaluation(torch.autograd.Function):
         dr.clear_grad(ctx.own)
         if torch.is_grad_enabled():
             found = _FirstDerivative.apply(*(slope.requires_grad_() for slope in found))
-        return None, None, *found
+        return None, *found
 
 
 class _FirstDerivative(torch.autograd.Function):

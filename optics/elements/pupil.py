@@ -27,7 +27,7 @@ from optics.numerics.precision import precision
 __all__ = ["MIDDLE", "Pupil"]
 
 TALLEST = 100.0  # choice, radii: highest relief to which the thin-element model applies
-ANY_HEIGHT = 1e-3  # choice [m]: reliefs up to this height are allowed on every pupil
+ANY_HEIGHT, OTHER_UNIT = 1e-3, 0.05  # choice [m]: height allowed on every pupil; height that has another unit
 LEVEL, TRANSMISSION_DIGITS = 1e-6, 9.0  # choice: neglected level of a mask's spectrum; digits of its transmission
 MIDDLE = 550e-9  # choice [m]: wavelength that defines the image distance
 SENSOR_DISTANCE = 240e-6  # choice [m]: default distance of the sensor behind a pupil without a lens
@@ -79,12 +79,12 @@ class Pupil:
         if self.height is not None and not isinstance(self.height, Relief):
             height = self.height if is_differentiable(self.height) else reals("height", self.height)
             object.__setattr__(self, "height", HeightMap(height))
-        if self.height is not None and self.height.span > max(TALLEST * number(self.aperture_radius), ANY_HEIGHT):
-            span, unit = self.height.span, "radians or micrometres" if self.height.span < 50 else "nanometres"
+        if self.height is not None and (span := self.height.span) > max(TALLEST * self.radius, ANY_HEIGHT):
+            unit = "radians or micrometres" if span < 50 else "nanometres"
+            looks = f", as if in {unit}" if span > OTHER_UNIT else ""
             raise ValueError(
-                f"height spans {span:.3g} m over a pupil of radius {number(self.aperture_radius):.3g} m, as if "
-                f"in {unit}: must be in metres, at most {TALLEST:g} radii or {ANY_HEIGHT:g} m "
-                "(a phase φ [rad] is a height φ λ / (2π (n - object_n)))"
+                f"height spans {span:.3g} m over a pupil of radius {self.radius:.3g} m{looks}: must be in metres, at "
+                f"most {TALLEST:g} radii or {ANY_HEIGHT:g} m (a phase φ [rad] is a height φ λ / (2π (n - object_n)))"
             )
         if self.wavefront is not None:
             self._check_wavefront(of_kind("wavefront", self.wavefront, Aberration, "Zernike({(2, 0): 0.1})"))
