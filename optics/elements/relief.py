@@ -84,7 +84,7 @@ class BSplineRelief(Relief):
     polynomial, so paraboloids are exact (`paraboloid`). Outside the square the polynomial continues. Source: Piegl &
     Tiller, The NURBS Book, ch. 2.
 
-    A Dr.Jit tensor of control points carries derivatives.
+    A tensor of Dr.Jit or PyTorch carries derivatives.
 
     Raises:
         ValueError: not 4 x 4 finite numbers.
@@ -164,7 +164,7 @@ class HeightMap(Relief):
 
     samples: (rows, columns), (y, x). Beyond the outermost centres the spline continues for one cell, then linearly.
 
-    A Dr.Jit tensor of samples, or a tensor of PyTorch, carries derivatives.
+    A tensor of Dr.Jit or PyTorch carries derivatives.
 
     Raises:
         ValueError: not of two dimensions, empty, or not finite.

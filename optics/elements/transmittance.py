@@ -64,7 +64,7 @@ class GaussianMask(Mask):
 
     At r = w the intensity is 1/e².
 
-    waist: w [m]; a Dr.Jit number may carry a derivative.
+    waist: w [m]; a number of Dr.Jit or PyTorch may carry a derivative.
 
     Raises:
         ValueError: not positive.
@@ -107,7 +107,7 @@ class MaskMap(Mask):
     samples: (rows, columns), (y, x).
     reach: half side [m] of the square, at least the pupil's radius. None: equal to the pupil's radius.
 
-    A Dr.Jit tensor of samples carries derivatives.
+    A tensor of Dr.Jit or PyTorch carries derivatives.
 
     Raises:
         ValueError: samples that have not two dimensions, or are empty or not finite; or an amplitude beyond [-1, 1].

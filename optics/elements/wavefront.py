@@ -88,7 +88,7 @@ class Zernike(Aberration):
     radius: radius [m] of the circle to which the coefficients refer, at least the pupil's radius. None: the pupil's
         radius.
 
-    A Dr.Jit vector, or Dr.Jit numbers in a dictionary, carry derivatives.
+    A vector of Dr.Jit or PyTorch, or their numbers in a dictionary, carry derivatives.
 
     Raises:
         ValueError: an unknown mode, an order above 30, or a coefficient that is not finite.
@@ -203,7 +203,7 @@ class WavefrontMap(Aberration):
         negative of an optical path difference. They must be unwrapped, and finite and smooth outside the pupil, too.
     radius: half side [m] of the square, at least the pupil's radius. None: the pupil's radius.
 
-    A Dr.Jit tensor of samples carries derivatives.
+    A tensor of Dr.Jit or PyTorch carries derivatives.
 
     Raises:
         ValueError: not of two dimensions, empty, or not finite.
@@ -243,7 +243,7 @@ class WavefrontMap(Aberration):
 
 
 def mode(n: int, m: int, x: Any, y: Any) -> Any:
-    """Return Z_n^m at (x, y), NumPy or Dr.Jit: ρ^|m| P_k^(0, |m|)(2ρ² - 1) {cos, sin} with k = (n - |m|)/2.
+    """Return Z_n^m at (x, y): ρ^|m| P_k^(0, |m|)(2ρ² - 1) {cos, sin} with k = (n - |m|)/2.
 
     The recurrence of Jacobi's polynomials loses no digits at high orders (Abramowitz & Stegun 22.7.1).
     """
