@@ -23,7 +23,7 @@ from optics.elements.pupil import Pupil
 from optics.elements.relief import BSplineRelief, HeightMap, Relief
 from optics.elements.torch_numbers import torch_numbers, with_numbers
 from optics.eye.sensor_pixels import SensorPixels
-from optics.numerics.arguments import flag, of_kind, shown, vacuum_wavelengths
+from optics.numerics.arguments import flag, in_range, of_kind, shown, vacuum_wavelengths
 from optics.numerics.autodiff import Array, plain
 from optics.numerics.backend import BackendError
 from optics.numerics.device import VARIABLE, make_ready
@@ -112,7 +112,8 @@ def psf(
 def _pixels(light: LightBatch, wavelengths: np.ndarray, view: Mapping[str, Any]) -> SensorPixels:
     asked = {name: value.default for name, value in inspect.signature(drjit_psf).parameters.items()} | dict(view)
     window = Grid(asked["shape"], asked["dx"], asked["centre"])
-    return SensorPixels.around(window, light.cutoff(wavelengths), asked["tolerance"])
+    tolerance = in_range("tolerance", asked["tolerance"], 1e-12, 0.5)
+    return SensorPixels.around(window, light.cutoff(wavelengths), tolerance)
 
 
 class _Evaluation(torch.autograd.Function):

@@ -256,6 +256,17 @@ NAN = np.full((5, 5), np.nan)
         ),
         (lambda: optics.torch.psf(lens(), source_angle=0.1, **VIEW), r"source_angle = 0\.1: must be two angles"),
         (lambda: optics.torch.psf(lens(), field=True, **VIEW), r"field: only `optics\.psf` returns it"),
+        (
+            lambda: optics.torch.psf(lens(), pixel_means=True, tolerance=-1, **VIEW),
+            r"tolerance = -1: must lie in \[1e-12",
+        ),
+        (lambda: optics.torch.psf(lens(), dx=asking(1e-6), pixel_means=True), "dx requires a derivative, but none is"),
+        (lambda: optics.torch.psf(lens(), asking([5e-7]), **VIEW), "wavelengths requires a derivative, but none is"),
+        (
+            lambda: optics.torch.psf(lens(), sensor_distance=[1e-4, -1e-4]),
+            r"sensor_distance = -0\.0001: must be greater",
+        ),
+        (lambda: optics.torch.psf(lens(), 5e-7, 1e-4, [math.nan]), "source_distance = nan: must be greater than 0"),
         (lambda: optics.torch.psf(lens(), pixel_means=2, **VIEW), "pixel_means = 2: must be True or False"),
         (
             lambda: optics.torch.psf(lens(height=torch.zeros(5, 5)), requires_grad=True, **VIEW),
