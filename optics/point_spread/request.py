@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 from optics.elements.beam import Beam
 from optics.elements.pupil import Pupil
+from optics.elements.ray_field import RayField
 from optics.elements.source import PointSource
 from optics.methods.method_sampling import Sampling
 from optics.methods.problem import Problem
@@ -65,11 +66,11 @@ class Request:
             plan, sampling = self._as_before() or choose(self.problem, self._methods, self.most_seconds)
         except AccuracyError as error:
             bent = " and ".join(name for name in ("height", "wavefront") if getattr(pupil, name) is not None)
-            advice = _wrapped(jump) if jump else f"a flatter {bent} needs less" if bent else ""
+            advice = _wrapped(pupil) if jump else f"a flatter {bent} needs less" if bent else ""
             advice = "" if "use method=" in str(error) else advice  # another method helps, and not another relief
             raise AccuracyError(f"{error}; {advice}" if advice else str(error)) from None
         if jump and plan.seconds > MOST_SECONDS_OF_JUMPS:
-            raise AccuracyError(f"about {plan.seconds:.2g} s by {plan.method}: {_wrapped(jump)}")
+            raise AccuracyError(f"about {plan.seconds:.2g} s by {plan.method}: {_wrapped(pupil)}")
         return plan, sampling
 
     @property
@@ -89,10 +90,14 @@ class Request:
         return replace(plan, why=plan.why.replace("requested", "same method as at the previous wavelength")), sampling
 
 
-def _wrapped(jump: float) -> str:
+def _wrapped(pupil: Pupil) -> str:
+    """Return advice on a height map that jumps. Fields of rays need one slope at each point, so they have no pixels."""
+    remedy = "optics.PixelRelief(height) represents the steps"
+    if isinstance(pupil.mask, RayField):
+        remedy = "must be smooth, for each point to have one ray"
     return (
-        f"height jumps by {jump:.3g} m from sample to sample, as in a wrapped lens, and HeightMap connects them by "
-        "steep slopes: optics.PixelRelief(height) represents the steps"
+        f"height jumps by {pupil.height.jump:.3g} m from sample to sample, as in a wrapped lens, and HeightMap "
+        f"connects them by steep slopes: {remedy}"
     )
 
 

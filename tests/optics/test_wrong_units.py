@@ -36,6 +36,14 @@ def test_a_refusal_names_what_there_is():
         optics.psf(optics.Pupil(25e-6, np.random.default_rng(0).random((8, 8)) * 0.9e-3))
 
 
+def test_a_wrapped_height_map_before_a_vector_focus_needs_no_pixels():
+    """`optics.vector_focus` refuses pixels, so its message does not recommend them."""
+    x = (np.arange(128) + 0.5) / 64 - 1
+    wrapped = (-(60e-6**2) * (x**2 + x[:, None] ** 2) / 480e-6) % 1.1e-6
+    with pytest.raises(optics.AccuracyError, match=r"height jumps by .*: must be smooth, for each point to have one"):
+        optics.vector_focus(optics.Pupil(60e-6, wrapped, thin_lens_focal_length=480e-6), sensor_distance=480e-6)
+
+
 def test_a_wrapped_height_map_points_at_pixels():
     x = (np.arange(128) + 0.5) / 64 - 1
     for radius in (60e-6, 200e-6):  # too slow, and refused in any case
