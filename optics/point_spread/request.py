@@ -92,9 +92,12 @@ class Request:
 
 def _wrapped(pupil: Pupil) -> str:
     """Return advice on a height map that jumps. Fields of rays need one slope at each point, so they have no pixels."""
+    rows, columns = pupil.height.samples.shape
     remedy = "optics.PixelRelief(height) represents the steps"
     if isinstance(pupil.mask, RayField):
         remedy = "must be smooth, for each point to have one ray"
+    elif rows != columns:
+        remedy += " of as many rows as columns"
     return (
         f"height jumps by {pupil.height.jump:.3g} m from sample to sample, as in a wrapped lens, and HeightMap "
         f"connects them by steep slopes: {remedy}"
