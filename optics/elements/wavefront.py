@@ -243,7 +243,7 @@ class WavefrontMap(Aberration):
 
 
 def mode(n: int, m: int, x: Any, y: Any) -> Any:
-    """Return Z_n^m at (x, y): ρ^|m| P_k^(0, |m|)(2ρ² - 1) {cos, sin} with k = (n - |m|)/2.
+    """Return Z_n^m at (x, y), NumPy or Dr.Jit: ρ^|m| P_k^(0, |m|)(2ρ² - 1) {cos, sin} with k = (n - |m|)/2.
 
     The recurrence of Jacobi's polynomials loses no digits at high orders (Abramowitz & Stegun 22.7.1).
     """
