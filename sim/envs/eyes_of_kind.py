@@ -5,8 +5,10 @@ from __future__ import annotations
 import numpy as np
 from gymnasium import spaces
 
-from sim.envs.frame_choice import require_frames
+from sim.envs.frame_choice import dynamics_of, require_frames
 from sim.envs.observation import ROUNDING, SIGMAS, Memory
+from sim.envs.ommatidia_space import OmmatidiaBox
+from sim.eyes.compound_eye import CompoundEye
 from sim.render.eye_renderer import EyeRenderer
 from sim.render.pending_frame import PendingFrame
 from sim.render.receptor_noise import NoiseModel, Normals
@@ -31,15 +33,16 @@ class EyesOfKind:
         self.renderer, self._simulation = renderer, simulation
         self._wavelengths = np.asarray(renderer.eye.spectral_bands.wavelengths)
         self.memory, self._noise = Memory(memory), NoiseModel.from_eye(renderer.eye)
-        frame = (len(renderer.mounts), renderer.eye.channels, *renderer.eye.resolution)
-        self._normals: Normals = Normals(keys, frame)
+        receptors = (len(renderer.mounts), renderer.eye.channels, *renderer.eye.resolution)
+        self._normals: Normals = Normals(keys, receptors)
         self._in_time: ReceptorsInTime | None = None
         self._shot: NoiseModel | None = None
-        if (dynamics := renderer.eye.dynamics) is not None:
+        frame = self._as_frames(np.empty(receptors)).shape
+        if (dynamics := dynamics_of(renderer.eye)) is not None:
             frames = renderer.fidelity.frames or 1
             require_frames(simulation, frames)
             seconds = simulation.physics.seconds / frames
-            self._in_time = ReceptorsInTime(dynamics, simulation.n, frame, seconds)
+            self._in_time = ReceptorsInTime(dynamics, simulation.n, receptors, seconds)
             budget = renderer.eye.photon_budget
             share = 1.0 if budget is None else seconds / budget.integration_time
             self._shot, self._noise = (None, None) if self._noise is None else self._noise.in_frames(share)
@@ -66,10 +69,15 @@ class EyesOfKind:
         else:
             seen = self.renderer.launch_some(poses, worlds, light)
         noise = self._noise
-        if noise is None:
-            return seen
-        normals = self._normals.launch(worlds)
-        return seen.then(lambda signals: noise(signals, normals.wait()))
+        if noise is not None:
+            normals, noiseless = self._normals.launch(worlds), seen
+            seen = noiseless.then(lambda signals: noise(signals, normals.wait()))
+        return seen.then(self._as_frames)
+
+    def _as_frames(self, signals: np.ndarray) -> np.ndarray:
+        """Return signals (..., eye, channel, h, w) in the form of an observation."""
+        eye = self.renderer.eye
+        return eye.as_frames(signals) if isinstance(eye, CompoundEye) else signals
 
     def _launch_in_time(
         self, receptors: ReceptorsInTime, poses: Poses, worlds: np.ndarray | None, fresh: bool
@@ -119,7 +127,7 @@ class EyesOfKind:
             self._in_time.state[:] = receptors
 
     def _space(self, frames: tuple[int, ...]) -> spaces.Box:
-        dynamics = self.renderer.eye.dynamics
+        dynamics = dynamics_of(self.renderer.eye)
         if dynamics is not None and (dynamics.adaptation, dynamics.event_threshold, dynamics.motion) != UNCHANGED:
             return spaces.Box(-np.inf, np.inf, frames, np.float32)
         brightest = self._brightest()
@@ -127,7 +135,10 @@ class EyesOfKind:
         margin = SIGMAS * spread + ROUNDING * brightest
         # The light from a point light has no upper bound, because it increases as the distance to the light decreases.
         high = 2 * brightest + margin if self.renderer.only_directional else np.inf
-        return spaces.Box(-margin if np.isfinite(high) else -np.inf, high, frames, np.float32)
+        low, eye = -margin if np.isfinite(high) else -np.inf, self.renderer.eye
+        if isinstance(eye, CompoundEye):
+            return OmmatidiaBox(low, high, frames, eye.directions_on(self.renderer.mounts))
+        return spaces.Box(low, high, frames, np.float32)
 
     def _brightest(self) -> float:
         """Return the signal of a white surface that faces all directional lights at once.

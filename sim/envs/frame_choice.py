@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from contextlib import closing
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -22,10 +23,15 @@ from sim.render.world_scene import WorldScene
 from sim.tasks.batch_task import BatchTask
 from sim.tasks.simulation import Simulation
 
-__all__ = ["require_frames", "with_frames"]
+__all__ = ["dynamics_of", "require_frames", "with_frames"]
 
 Fidelities = Mapping[str, Fidelity]
 WORLDS, ACTIONS, FINEST = 4, 6, 20  # chosen: size of a trial, and largest number of frames per action
+
+
+def dynamics_of(eye: Any) -> Any:
+    """Return the dynamics of an eye's receptors; None without dynamics, as for all compound eyes."""
+    return getattr(eye, "dynamics", None)
 
 
 def with_frames(
@@ -41,10 +47,10 @@ def with_frames(
     """
     kinds = [kind for agent, of in zip(task.agents(), fidelities, strict=True) if of for kind in agent.kinds]
     given = [of[name] for of in fidelities if of for name in of]
-    in_time = [(kind.eye, of) for kind, of in zip(kinds, given, strict=True) if kind.eye.dynamics is not None]
+    in_time = [(kind.eye, of) for kind, of in zip(kinds, given, strict=True) if dynamics_of(kind.eye) is not None]
     if not in_time or all(of.frames is not None for _, of in in_time):
         return list(fidelities)
-    stated = [of.frames or eye.dynamics.frames for eye, of in in_time]
+    stated = [of.frames or dynamics_of(eye).frames for eye, of in in_time]
     known = max((n for n in stated if n is not None), default=None)
     level = _chosen(task, fidelities, scenes) if known is None else (known, Level("frames", _named(known), None, ASKED))
     frames, reason = level
@@ -96,7 +102,7 @@ def _chosen(
             renderer
             for of in renderers_for(worlds, worlds.agents, fidelities, scenes)
             for renderer in ({} if of is None else of.eyes).values()
-            if renderer.eye.dynamics is not None
+            if dynamics_of(renderer.eye) is not None
         ]
         if len(numbers) == 1:
             return 1, Level("frames", _named(1), None, "an action is one physics step")
@@ -106,9 +112,9 @@ def _chosen(
     chosen, worst = 1, 0.0
     for renderer, signals in zip(renderers, seen, strict=True):
         allowed = allowed_error(renderer.eye, renderer.fidelity.tolerance)
-        truth = _responses(renderer.eye.dynamics, signals, numbers[-1], seconds)
+        truth = _responses(dynamics_of(renderer.eye), signals, numbers[-1], seconds)
         for frames in numbers:
-            off = _responses(renderer.eye.dynamics, signals, frames, seconds) - truth
+            off = _responses(dynamics_of(renderer.eye), signals, frames, seconds) - truth
             error = float(np.sqrt(np.mean(np.square(off, dtype=np.float64))))
             if error <= allowed:
                 break

@@ -12,10 +12,11 @@ import numpy as np
 import optics
 from optics.numerics.arguments import of_kind
 from optics.spectra.spectrum import Spectrum
+from sim.eyes.compound_eye import CompoundEye, WorldEye
 from sim.eyes.depth_layers import DepthLayers
 from sim.eyes.inside import depth_inside
 from sim.eyes.mounts import Mount
-from sim.eyes.sampling import EyeSampling, FieldSampling, Trial, eye_sampling
+from sim.eyes.sampling import EyeSampling, FieldSampling, Trial, WorldSampling, eye_sampling
 from sim.eyes.sensor import Sensor
 from sim.render.eye_rays import EyeRays, FreeEyes, UprightEyes
 from sim.scene.appearances import Varied
@@ -42,7 +43,8 @@ class PreparedScene:
     varied: see `sim.ModelRenderer`
     tracer: method of tracing rays, see `sim.BatchedRenderer`
     stand: the body that the eyes are fixed to, if they stand upright on one; None: derived from the mounts
-    medium: water or air that fills the world; under water, `eye` is the immersed eye. None: clear air
+    medium: water or air that fills the world; under water, an `optics.Eye` is immersed, and the
+        facets of a compound eye keep the index in front of them. None: clear air
 
     Raises:
         ValueError: a mount on a part that the model lacks, an eye inside a geom in the model's reference pose, or a
@@ -52,7 +54,7 @@ class PreparedScene:
     def __init__(
         self,
         model: mujoco.MjModel,
-        eye: optics.Eye,
+        eye: WorldEye,
         mounts: Sequence[Mount],
         *,
         spectra: Mapping[str, Spectrum | str] | None = None,
@@ -64,13 +66,14 @@ class PreparedScene:
     ) -> None:
         if medium is not None:
             of_kind("medium", medium, optics.TurbidMedium, "optics.sea_water(1), or None for clear air")
-        self.model, self.eye, self.places = model, optics.immersed(eye, medium), EyePlaces(model, mounts)
+        self.eye = eye if isinstance(eye, CompoundEye) else optics.immersed(eye, medium)
+        self.model, self.places = model, EyePlaces(model, mounts)
         self.medium = medium
         self.scene = ModelScene(model, self.eye, groups, spectra, varied, medium)
         if stand is None:
             self._refuse_eyes_inside()
         self.tracers = Tracers(self.scene, self.places, tracer, stand)
-        self._samplings: dict[DepthLayers, EyeSampling] = {}
+        self._samplings: dict[DepthLayers, WorldSampling] = {}
         self._has_warned = False
 
     @property
@@ -140,7 +143,7 @@ class PreparedScene:
         upright = self.tracers.upright
         return isinstance(upright, UprightScene) and len(upright.spheres) > 0
 
-    def sampling(self, depth: DepthLayers, tolerance: float | None = None) -> EyeSampling:
+    def sampling(self, depth: DepthLayers, tolerance: float | None = None) -> WorldSampling:
         """Return the sampling of the eye with these depth layers; its PSFs are computed once, on first use.
 
         tolerance: allowed error of a signal, see `sim.eyes.allowed_error`
