@@ -21,6 +21,7 @@ __all__ = [
     "FOURIER_ENTRY",
     "ITEM_BYTES",
     "KERNEL_ENTRY",
+    "KERNEL_SAMPLE",
     "MATMUL_FLOPS",
     "NODE",
     "NODE_BYTES",
@@ -35,6 +36,7 @@ __all__ = [
     "PUPIL_SAMPLE",
     "RAY",
     "RAY_BYTES",
+    "SERIES_TERM",
     "SOFT_EDGE_SAMPLE",
     "SOFT_SIDE_SAMPLE",
     "SPECTRUM_SAMPLE",
@@ -69,6 +71,8 @@ SOFT_EDGE_SAMPLE = 1e-8  # soft edge from a table along one edge
 SOFT_SIDE_SAMPLE = 2.5e-8  # soft edge of one straight side; an arc takes three times as long
 SPECTRUM_SAMPLE = 1e-8  # transfer function
 KERNEL_ENTRY = 2e-8  # entry of the slow factor between pupil and window
+KERNEL_SAMPLE = 1e-7  # value of a separable kernel, in NumPy
+SERIES_TERM = 4e-9  # term of a series, evaluated at many points by NumPy
 FOURIER_ENTRY = 1e-8  # entry of the Fourier kernel between pupil and window, in NumPy
 NODE_FOURIER_ENTRY = 4e-8  # entry of the Fourier kernel between nodes and frequencies, in Dr.Jit
 WINDOW_SAMPLE = 1e-7  # sample of the window, interpolated from 8 x 8 directions
