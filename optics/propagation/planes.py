@@ -20,21 +20,30 @@ from optics.methods.problem import SLOPE_MARGIN
 from optics.numerics.accuracy import MOST_SAMPLES, AccuracyError
 from optics.numerics.grid import Grid
 from optics.numerics.precision import precision
-from optics.propagation.propagate import WRAP_RIPPLE_PER_TOLERANCE, PropagationResult, propagate
-from optics.propagation.transfer_function import kept_band, kept_square
+from optics.propagation.propagate import WRAP_RIPPLE_PER_TOLERANCE, PropagationResult, propagated_field
+from optics.propagation.transfer_function import EVERYTHING, Passage, kept_band, kept_square, limited_band
 
 __all__ = ["PlaneField", "PupilSampling", "StepSettings", "Stop"]
 
+RIPPLE_OF_LIMITED = 0.03  # choice: WRAP_RIPPLE_PER_TOLERANCE of fields without part of their diffracted light
+FADE = 0.2  # choice: width of the fade that removes such light, relative to the frequency where it begins
 REACH_MARGIN = 1.02  # choice: factor on the planes' half widths, because `propagate` extends each plane by a sample
 
 
 @dataclass(frozen=True)
 class PlaneField:
-    """The field on the samples of a plane. band: highest frequency [1/m] in the field."""
+    """The field on the samples of a plane.
+
+    band: highest frequency [1/m] in the field.
+    rays: highest frequency [1/m] of geometrical rays in the field.
+    kept: frequency [1/m] beyond which the field is to be faded out until `band`; None for no fade.
+    """
 
     u: np.ndarray
     dx: float
     band: float
+    rays: float
+    kept: float | None = None
 
     @property
     def half_width(self) -> float:
@@ -49,13 +58,16 @@ class PlaneField:
 class Stop:
     """A pupil, or the output window, at a distance from the previous stop.
 
-    pupil: None for the output window.
     distance: distance [m] from the previous stop, negative for backward propagation.
+    pupil: None for the output window.
+    half_width: half width [m] of the pupil with its soft edge, or of the window.
+    window: None for a pupil.
     """
 
     distance: float
     pupil: Pupil | None
     half_width: float
+    window: Grid | None = None
 
 
 @dataclass(frozen=True)
@@ -64,6 +76,8 @@ class StepSettings:
 
     tolerance: tolerance of each step.
     wavelength: wavelength in vacuum [m].
+    margin: frequencies [cycles per radius of a pupil] of diffracted light beyond those of geometrical rays. Light of
+        higher frequencies is removed. Infinite: all light is propagated that can reach the next plane.
     """
 
     wavelength: float
@@ -71,10 +85,11 @@ class StepSettings:
     backward: bool
     tolerance: float
     dtype: str
+    margin: float = math.inf
 
     @property
     def ripple(self) -> float:
-        return WRAP_RIPPLE_PER_TOLERANCE * self.tolerance
+        return (WRAP_RIPPLE_PER_TOLERANCE if math.isinf(self.margin) else RIPPLE_OF_LIMITED) * self.tolerance
 
     @property
     def edge_ripple(self) -> float:
@@ -102,39 +117,36 @@ class StepSettings:
 
     def carried(self, field: PlaneField, distance: float, window: Grid) -> PropagationResult:
         """Return the field after propagation through free space, on the samples of another plane."""
-        return propagate(
-            field.u,
-            dx=field.dx,
-            wavelength=self.wavelength,
-            distance=distance,
-            out_dx=window.dx,
-            out_shape=window.shape,
-            medium_n=self.medium_n,
-            tolerance=self.tolerance,
-            dtype=self.dtype,
-        )
+        wavelength, limit = self.wavelength / self.medium_n, None
+        if field.kept is not None:
+            limit = limited_band(field.kept, field.band - field.kept, wavelength, abs(distance), self.ripple)
+        passage = Passage(wavelength, distance, False, EVERYTHING, self.ripple, window.centre, limit)
+        return propagated_field(field.u, field.dx, passage, window, self.tolerance, self.dtype)
 
 
 @dataclass(frozen=True)
 class PupilSampling:
-    """Samples of a pupil, its soft aperture, and the highest frequency [1/m] (`band`) that they transmit."""
+    """Samples of a pupil, its soft aperture, and the frequencies [1/m] that they transmit (see PlaneField)."""
 
     pupil: Pupil
     source: PointSource
     grid: Grid
     soft: SoftAperture
     band: float
+    rays: float
+    kept: float | None
 
     @classmethod
     def for_stop(
-        cls, stop: Stop, following: Stop, settings: StepSettings, source: PointSource, arriving: float
+        cls, stop: Stop, following: Stop, settings: StepSettings, source: PointSource, field: PlaneField | None
     ) -> PupilSampling:
         """Return the sampling of the pupil at a stop.
 
         The band is the sum of the frequencies of the arriving light, of the pupil's phase and of the pupil's edge.
         Frequencies beyond the band may be aliased, but not into the band.
 
-        arriving: highest frequency [1/m] of the arriving light.
+        field: arriving field, before its propagation to the pupil. None: the source illuminates the pupil. Its
+            frequencies are then part of the pupil's phase.
 
         Raises:
             AccuracyError: more samples are necessary than the limit allows.
@@ -145,11 +157,20 @@ class PupilSampling:
             raise ValueError(
                 "elements: a PixelRelief has jumps, which the grids between planes cannot represent: use psf for it"
             )
-        slope = SLOPE_MARGIN * pupil.slopes(settings.wavelength, source).steepest / settings.wavelength
+        slopes = pupil.slopes(settings.wavelength, source)
+        slope, inside = (SLOPE_MARGIN * s / settings.wavelength for s in (slopes.steepest, slopes.steepest_inside))
+        arriving = rays = 0.0
+        if field is not None:
+            reaching = settings.reaching(field.half_width + stop.half_width, stop.distance)
+            arriving, rays = min(field.band, reaching), min(field.rays, reaching)
         turns = arriving + slope + pupil.bandwidth(settings.wavelength, settings.edge_ripple)
-        band = settings.reaching(stop.half_width + following.half_width, following.distance)
+        band, kept = settings.reaching(stop.half_width + following.half_width, following.distance), None
         if math.isinf(band):
             band = turns  # coinciding planes: the edge is as soft as the finest detail
+        rays += inside + pupil.scatter(settings.wavelength, settings.ripple)
+        limit = rays + settings.margin / pupil.radius
+        if (1 + FADE) * limit < band:
+            band, kept = (1 + FADE) * limit, limit
         soft = pupil.aperture.soften((turns + band) * pupil.radius, settings.edge_ripple, EDGE_REACH)
         pitch = 1 / (turns + band + soft.stopband / pupil.radius)
         across = 2 * math.ceil((1 + soft.reach) * pupil.radius / pitch) + 1
@@ -158,15 +179,16 @@ class PupilSampling:
                 f"a pupil of radius {pupil.radius:.3g} m needs {across} samples across; the limit is {MOST_SAMPLES}: "
                 "widen the tolerance, flatten its relief, or move the adjacent planes further away"
             )
-        return cls(pupil, source, Grid.square(across, pitch), soft, band)
+        return cls(pupil, source, Grid.square(across, pitch), soft, band, rays, kept)
 
     def transmitted(self, u: np.ndarray | float, settings: StepSettings) -> PlaneField:
         """Return the field u on the grid times the pupil's transmittance; backwards, times its conjugate."""
         import drjit as dr
 
         beam = Beam(self.pupil, self.source, settings.wavelength, math.inf)
-        field = beam.behind(self.soft, self.grid, precision(settings.dtype))
-        if dr.grad_enabled(field.re, field.im):
+        found = beam.behind(self.soft, self.grid, precision(settings.dtype))
+        if dr.grad_enabled(found.re, found.im):
             raise ValueError("elements: a system has no derivatives; use psf for a single pupil")
-        transmittance = field.numpy()
-        return PlaneField(u * (transmittance.conj() if settings.backward else transmittance), self.grid.dx, self.band)
+        transmittance = found.numpy()
+        field = u * (transmittance.conj() if settings.backward else transmittance)
+        return PlaneField(field, self.grid.dx, self.band, self.rays, self.kept)

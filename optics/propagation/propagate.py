@@ -28,7 +28,7 @@ from optics.propagation.spectrum_filter import PropagatedPlane, evanescent_share
 from optics.propagation.transfer_function import EVERYTHING, Passage
 from optics.propagation.transform_sampling import TransformSampling, blur_left, most_spare, sampling
 
-__all__ = ["PROPAGATION_METHODS", "WRAP_RIPPLE_PER_TOLERANCE", "PropagationResult", "propagate"]
+__all__ = ["PROPAGATION_METHODS", "WRAP_RIPPLE_PER_TOLERANCE", "PropagationResult", "propagate", "propagated_field"]
 
 PROPAGATION_METHODS = ("angular_spectrum", "fresnel")
 # Choice: fraction of the removed light that may still reach the window, relative to the tolerance. It is small, because
@@ -108,11 +108,6 @@ def propagate(
         without_derivative(name, value)
     given = _field(u)
     window = Grid(given.shape[-2:] if out_shape is None else out_shape, dx if out_dx is None else out_dx, out_centre)
-    lit = _lit(given)
-    source = Grid(lit.shape[-2:], dx)
-    sources = lit.reshape(-1, *source.shape)
-    if np.may_share_memory(sources, given):  # the result stores the sources, so later changes of u must not affect them
-        sources = sources.copy()
     in_range("tolerance", tolerance, 10 * FLOAT_NOISE[precision(dtype).dtype], 0.5)
     passage = Passage(
         vacuum_wavelength(wavelength) / in_range("medium_n", medium_n, 1.0, 10.0),
@@ -122,6 +117,22 @@ def propagate(
         WRAP_RIPPLE_PER_TOLERANCE * tolerance,
         window.centre,
     )
+    return propagated_field(given, dx, passage, window, tolerance, dtype)
+
+
+def propagated_field(
+    given: np.ndarray, dx: float, passage: Passage, window: Grid, tolerance: float, dtype: str
+) -> PropagationResult:
+    """Return the field (…, y, x) after a passage. The arguments are those of `propagate`, and valid.
+
+    Raises:
+        AccuracyError: no sampling meets the tolerance.
+    """
+    lit = _lit(given)
+    source = Grid(lit.shape[-2:], dx)
+    sources = lit.reshape(-1, *source.shape)
+    if np.may_share_memory(sources, given):  # the result stores the sources, so later changes of u must not affect them
+        sources = sources.copy()
     how, planes = _propagated(sources, passage, (source, window), tolerance, precision(dtype))
     out = np.stack([plane.u for plane in planes]).reshape(*given.shape[:-2], *window.shape)
     return PropagationResult(out, window.dx, _plan(how, planes, tolerance, dtype), window, sources, how)

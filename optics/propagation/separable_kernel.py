@@ -118,11 +118,13 @@ class SeparableSampling:
 def separable(passage: Passage, source: Grid, window: Grid, allowed: float) -> SeparableSampling | None:
     """Return a sampling of the separable kernel whose predicted error of the intensity is at most `allowed`.
 
-    The result is None if the samples of the source represent too few of the frequencies that reach the window, or if
-    more than MOST_TERMS terms are necessary.
+    The result is None if the samples of the source represent too few of the frequencies that reach the window, if light
+    is to be removed that could reach the window, or if more than MOST_TERMS terms are necessary.
     """
     largest = max(*source.shape, *window.shape)
-    if passage.z == 0 or largest > MOST_SAMPLES or not kept_light(passage, source, window).band.fade:
+    if passage.z == 0 or passage.limit is not None or largest > MOST_SAMPLES:
+        return None
+    if not kept_light(passage, source, window).band.fade:
         return None
     ranges = [
         (float(w[0] - s[-1]), float(w[-1] - s[0])) for w, s in ((window.x, source.x), (window.y, source.y))

@@ -21,6 +21,13 @@ from optics.propagation.planes import PlaneField, PupilSampling, StepSettings, S
 
 __all__ = ["FreeSpace", "StackResult", "SystemStep", "propagate_through"]
 
+# Choice: margins of frequencies around geometrical rays [cycles per radius], and the smallest tolerance for which they
+# are tried. At smaller tolerances, all light that can reach the next plane is usually necessary.
+MARGINS, LEAST_TOLERANCE = (4.0, 8.0, 16.0, 32.0), 3e-3
+# Choice: predicted error of a margin, divided by the change from half the margin. It exceeds 1, because light that needs
+# more than both margins is in neither of the two results.
+CHANGE_MARGIN = 4.0
+
 
 @dataclass(frozen=True)
 class FreeSpace:
@@ -122,24 +129,80 @@ def propagate_through(
     settings = StepSettings(
         vacuum_wavelength(wavelength), _medium(elements), backward, max(each, 10 * FLOAT_NOISE[dtype]), dtype
     )
+    found = _converged(stops, field, source or PointSource(), settings, tolerance)
+    power = brightest**2
+    told = (replace(one, power_in=one.power_in * power, power_out=one.power_out * power) for one in found.steps)
+    return StackResult(found.u * found.u.dtype.type(brightest), window.dx, tuple(told), found.error, window)
+
+
+@dataclass(frozen=True)
+class _Passed:
+    """The field behind a system.
+
+    error: predicted error of the intensity, without that of removed light.
+    complete: True if all light is included that can reach the next plane.
+    """
+
+    u: np.ndarray
+    steps: tuple[SystemStep, ...]
+    error: float
+    complete: bool
+
+
+def _converged(
+    stops: list[Stop], field: PlaneField | None, source: PointSource, settings: StepSettings, tolerance: float
+) -> _Passed:
+    """Return the field with as much diffracted light as the tolerance requires.
+
+    Most light follows geometrical rays. The margin of frequencies around them is doubled until the intensity changes by
+    less than the tolerance. Otherwise all light is included that can reach the next plane.
+    """
+    before = None
+    for margin in MARGINS if tolerance >= LEAST_TOLERANCE else ():
+        try:
+            found = _passed(stops, field, source, replace(settings, margin=margin), tolerance)
+        except AccuracyError:
+            before = None
+            continue
+        if found.complete:
+            return found
+        if before is not None:
+            error = found.error + CHANGE_MARGIN * _change(before.u, found.u)
+            if error <= tolerance:
+                return replace(found, error=error)
+        before = found
+    return _passed(stops, field, source, settings, tolerance)
+
+
+def _change(before: np.ndarray, after: np.ndarray) -> float:
+    """Return the relative L2 difference of two intensities."""
+    old, new = (np.square(u.real) + np.square(u.imag) for u in (before, after))
+    size = float(np.linalg.norm(new))
+    return float(np.linalg.norm(new - old)) / size if size else math.inf
+
+
+def _passed(
+    stops: list[Stop], field: PlaneField | None, source: PointSource, settings: StepSettings, tolerance: float
+) -> _Passed:
+    """Return the field behind the last stop."""
     steps: list[SystemStep] = []
+    complete = True
     for i, stop in enumerate(stops):
         sampling = None
         if stop.pupil is not None:
-            at = source or PointSource() if field is None else PointSource()
-            sampling = PupilSampling.for_stop(stop, stops[i + 1], settings, at, _arriving(field, stop, settings))
-        grid = window if sampling is None else sampling.grid
+            at = source if field is None else PointSource()
+            sampling = PupilSampling.for_stop(stop, stops[i + 1], settings, at, field)
+            complete = complete and sampling.kept is None
+        grid = stop.window if sampling is None else sampling.grid
         if field is not None:
             out = settings.carried(field, stop.distance, grid)
-            arrived = PlaneField(out.u, out.dx, field.band)
+            arrived = PlaneField(out.u, out.dx, field.band, field.rays)
             steps.append(SystemStep(stop.distance, out.plan, field.power, arrived.power, out.evanescent_power))
             field = arrived
         if sampling is not None:
             field = sampling.transmitted(1.0 if field is None else field.u, settings)
     assert field is not None
-    error, power = _error(steps, tolerance, settings), brightest**2
-    told = (replace(one, power_in=one.power_in * power, power_out=one.power_out * power) for one in steps)
-    return StackResult(field.u * field.u.dtype.type(brightest), window.dx, tuple(told), error, window)
+    return _Passed(field.u, tuple(steps), _error(steps, tolerance, settings), complete)
 
 
 def _start(
@@ -160,7 +223,7 @@ def _start(
     if dx is None:
         raise ValueError("dx: must be given with u")
     brightest = float(np.abs(samples).max()) or 1.0
-    field = PlaneField(samples / brightest, positive("dx", dx), math.sqrt(0.5) / dx)
+    field = PlaneField(samples / brightest, positive("dx", dx), math.sqrt(0.5) / dx, math.sqrt(0.5) / dx)
     shape = (samples.shape[0], samples.shape[1]) if out_shape is None else shape_2d("out_shape", out_shape)
     window = Grid(shape, field.dx if out_dx is None else positive("out_dx", out_dx))
     return field, window, brightest
@@ -185,7 +248,7 @@ def _stops(elements: Sequence[Pupil | FreeSpace], backward: bool, window: Grid) 
         else:
             stops.append(Stop(distance, element, (1 + EDGE_REACH) * element.radius))
             distance, touching = 0.0, True
-    return [*stops, Stop(distance, None, window.half_width)]
+    return [*stops, Stop(distance, None, window.half_width, window)]
 
 
 def _medium(elements: Sequence[Pupil | FreeSpace]) -> float:
@@ -201,16 +264,6 @@ def _medium(elements: Sequence[Pupil | FreeSpace]) -> float:
     if len(media) > 1:
         raise ValueError(f"medium_n = {', '.join(f'{n:g}' for n in media)}: must be the same throughout the elements")
     return media[0]
-
-
-def _arriving(field: PlaneField | None, stop: Stop, settings: StepSettings) -> float:
-    """Return the highest frequency [1/m] of the light that arrives at a stop.
-
-    It does not include the frequencies of a source, because they are part of the first pupil's phase.
-    """
-    if field is None:
-        return 0.0
-    return min(field.band, settings.reaching(field.half_width + stop.half_width, stop.distance))
 
 
 def _error(steps: list[SystemStep], tolerance: float, settings: StepSettings) -> float:

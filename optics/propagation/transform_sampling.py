@@ -108,7 +108,8 @@ def kept_light(passage: Passage, source: Grid, window: Grid) -> KeptLight:
         kept_square(reach, wavelength, z, ripple, paraxial),
         kept_band(corner, wavelength, z, ripple, paraxial),
     )
-    band, nyquist = min(bands, key=lambda band: band.walk), 0.5 / source.dx
+    band = min(bands, key=lambda band: band.walk) if passage.limit is None else passage.limit
+    nyquist = 0.5 / source.dx
     everything = band.end >= (nyquist if band.square else math.sqrt(2) * nyquist)
     return KeptLight(EVERYTHING if everything else band, reach)
 
