@@ -8,7 +8,7 @@ then converge spectrally.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -20,6 +20,7 @@ from optics.methods.problem import SLOPE_MARGIN
 from optics.numerics.accuracy import MOST_SAMPLES, AccuracyError
 from optics.numerics.grid import Grid
 from optics.numerics.precision import precision
+from optics.propagation.misalignment import ALIGNED, Alignment, Misaligned, seen_from, shortened
 from optics.propagation.propagate import WRAP_RIPPLE_PER_TOLERANCE, PropagationResult, propagated_field
 from optics.propagation.transfer_function import EVERYTHING, Passage, kept_band, kept_square, limited_band
 
@@ -37,6 +38,7 @@ class PlaneField:
     band: highest frequency [1/m] in the field.
     rays: highest frequency [1/m] of geometrical rays in the field.
     kept: frequency [1/m] beyond which the field is to be faded out until `band`; None for no fade.
+    alignment: position of the plane. Samples are counted from its centre.
     """
 
     u: np.ndarray
@@ -44,6 +46,7 @@ class PlaneField:
     band: float
     rays: float
     kept: float | None = None
+    alignment: Alignment = ALIGNED
 
     @property
     def half_width(self) -> float:
@@ -62,12 +65,25 @@ class Stop:
     pupil: None for the output window.
     half_width: half width [m] of the pupil with its soft edge, or of the window.
     window: None for a pupil.
+    alignment: position of the pupil.
     """
 
     distance: float
     pupil: Pupil | None
     half_width: float
     window: Grid | None = None
+    alignment: Alignment = ALIGNED
+
+    @classmethod
+    def at(cls, element: Pupil | Misaligned, distance: float) -> Stop:
+        pupil, alignment = element, ALIGNED
+        if isinstance(element, Misaligned):
+            pupil, alignment = element.pupil, Alignment.of(element)
+        return cls(distance, pupil, (1 + EDGE_REACH) * pupil.radius, None, alignment)
+
+    def apart(self, other: Alignment) -> float:
+        """Return the largest distance [m] of the centres along an axis."""
+        return max(map(abs, self.alignment.beside(other)))
 
 
 @dataclass(frozen=True)
@@ -115,18 +131,50 @@ class StepSettings:
             return max(round_.end, square.diagonal(wavelength) if math.isfinite(square.kept) else 0)
         return math.hypot(1 / wavelength, math.log(1 / self.ripple) / (2 * math.pi * z))
 
-    def carried(self, field: PlaneField, distance: float, window: Grid) -> PropagationResult:
-        """Return the field after propagation through free space, on the samples of another plane."""
+    def carried(self, field: PlaneField, stop: Stop, grid: Grid) -> PropagationResult:
+        """Return the field after propagation through free space, on the samples of the next stop."""
         wavelength, limit = self.wavelength / self.medium_n, None
         if field.kept is not None:
-            limit = limited_band(field.kept, field.band - field.kept, wavelength, abs(distance), self.ripple)
-        passage = Passage(wavelength, distance, False, EVERYTHING, self.ripple, window.centre, limit)
-        return propagated_field(field.u, field.dx, passage, window, self.tolerance, self.dtype)
+            limit = limited_band(field.kept, field.band - field.kept, wavelength, abs(stop.distance), self.ripple)
+        window = grid.moved(stop.alignment.beside(field.alignment))
+        leaving, arriving = (
+            self._depths(alignment, half_width, self.steep(field))
+            for alignment, half_width in ((field.alignment, field.half_width), (stop.alignment, stop.half_width))
+        )
+        found: list[PropagationResult] = []
+        into = stop.alignment.weights(arriving, grid)
+        for start, share in zip(leaving, field.alignment.weights(leaving, Grid(field.u.shape, field.dx)), strict=True):
+            for end, weight in zip(arriving, into, strict=True):
+                distance = stop.distance + float(end - start)
+                passage = Passage(wavelength, distance, False, EVERYTHING, self.ripple, window.centre, limit)
+                out = propagated_field(field.u * share, field.dx, passage, window, self.tolerance, self.dtype)
+                if len(leaving) + len(arriving) == 2:
+                    return out
+                turned = np.exp(-2j * np.pi * (end - start) / wavelength)
+                found.append(replace(out, u=(out.u * (weight * turned)).astype(out.u.dtype)))
+        worst = max(found, key=lambda result: result.plan.predicted_error)
+        return replace(worst, u=np.sum([result.u for result in found], axis=0))
+
+    def _depths(self, alignment: Alignment, half_width: float, sine: float) -> np.ndarray:
+        """Return the depths of a tilted plane between which fields are interpolated."""
+        return alignment.nodes(half_width, sine, 2 * math.pi * self.medium_n / self.wavelength, self.tolerance / 2)
+
+    def steep(self, field: PlaneField) -> float:
+        """Return the largest sin θ to the axis that tilts must represent.
+
+        If diffracted light is removed, the remaining light beyond geometrical rays is too weak to matter here.
+        """
+        frequency = field.band if field.kept is None else field.rays
+        return min(frequency * self.wavelength / self.medium_n, 1.0)
 
 
 @dataclass(frozen=True)
 class PupilSampling:
-    """Samples of a pupil, its soft aperture, and the frequencies [1/m] that they transmit (see PlaneField)."""
+    """Samples of a pupil, its soft aperture, and the frequencies [1/m] that they transmit (see PlaneField).
+
+    source: source relative to the pupil's centre, which illuminates the pupil if no field arrives.
+    path: path [m] of the source's light to the pupil's centre, minus that to the axis.
+    """
 
     pupil: Pupil
     source: PointSource
@@ -135,6 +183,8 @@ class PupilSampling:
     band: float
     rays: float
     kept: float | None
+    alignment: Alignment
+    path: float
 
     @classmethod
     def for_stop(
@@ -157,14 +207,19 @@ class PupilSampling:
             raise ValueError(
                 "elements: a PixelRelief has jumps, which the grids between planes cannot represent: use psf for it"
             )
+        path = 0.0
+        if field is None:
+            source, path = seen_from(source, stop.alignment.centre)
         slopes = pupil.slopes(settings.wavelength, source)
         slope, inside = (SLOPE_MARGIN * s / settings.wavelength for s in (slopes.steepest, slopes.steepest_inside))
         arriving = rays = 0.0
         if field is not None:
-            reaching = settings.reaching(field.half_width + stop.half_width, stop.distance)
+            widths = field.half_width + stop.half_width + stop.apart(field.alignment)
+            reaching = settings.reaching(widths, stop.distance)
             arriving, rays = min(field.band, reaching), min(field.rays, reaching)
         turns = arriving + slope + pupil.bandwidth(settings.wavelength, settings.edge_ripple)
-        band, kept = settings.reaching(stop.half_width + following.half_width, following.distance), None
+        widths = stop.half_width + following.half_width + following.apart(stop.alignment)
+        band, kept = settings.reaching(widths, following.distance), None
         if math.isinf(band):
             band = turns  # coinciding planes: the edge is as soft as the finest detail
         rays += inside + pupil.scatter(settings.wavelength, settings.ripple)
@@ -179,16 +234,25 @@ class PupilSampling:
                 f"a pupil of radius {pupil.radius:.3g} m needs {across} samples across; the limit is {MOST_SAMPLES}: "
                 "widen the tolerance, flatten its relief, or move the adjacent planes further away"
             )
-        return cls(pupil, source, Grid.square(across, pitch), soft, band, rays, kept)
+        return cls(pupil, source, Grid.square(across, pitch), soft, band, rays, kept, stop.alignment, path)
 
-    def transmitted(self, u: np.ndarray | float, settings: StepSettings) -> PlaneField:
-        """Return the field u on the grid times the pupil's transmittance; backwards, times its conjugate."""
+    def transmitted(self, u: np.ndarray | None, settings: StepSettings) -> PlaneField:
+        """Return the field u on the grid times the pupil's transmittance; backwards, times its conjugate.
+
+        u: None for light from the source.
+        """
         import drjit as dr
 
+        types = precision(settings.dtype)
         beam = Beam(self.pupil, self.source, settings.wavelength, math.inf)
-        found = beam.behind(self.soft, self.grid, precision(settings.dtype))
+        x, y = self.alignment.on_element(*self.grid.coordinates(types), types)
+        found = beam.at(self.soft, x, y, self.grid, types)
         if dr.grad_enabled(found.re, found.im):
             raise ValueError("elements: a system has no derivatives; use psf for a single pupil")
         transmittance = found.numpy()
+        if u is None:
+            path = self.path + shortened(self.source, self.alignment, self.grid)
+            u = np.exp(2j * np.pi * settings.medium_n / settings.wavelength * path).astype(transmittance.dtype)
         field = u * (transmittance.conj() if settings.backward else transmittance)
-        return PlaneField(field, self.grid.dx, self.band, self.rays, self.kept)
+        field = self.alignment.leaving(field, self.grid.dx, settings.wavelength / settings.medium_n)
+        return PlaneField(field, self.grid.dx, self.band, self.rays, self.kept, self.alignment)

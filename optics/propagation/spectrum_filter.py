@@ -102,7 +102,8 @@ def filtered(given: np.ndarray, how: TransformSampling, types: Precision) -> Pro
 def evanescent_share(plane: np.ndarray, how: TransformSampling) -> float:
     """Return the evanescent fraction of a plane's power."""
     total = _power(plane)
-    if total == 0 or how.passage.paraxial:
+    highest = math.sqrt(0.5) / how.source.dx * how.passage.wavelength  # sine, at the corner of the spectrum
+    if total == 0 or how.passage.paraxial or highest * (1 + 2 / how.period) < 1:
         return 0.0
     spectrum = periodic_spectrum(plane, how.period, how.period)
     weights = evanescent(how.period, how.source.dx, how.passage.wavelength)

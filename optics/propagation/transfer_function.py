@@ -112,6 +112,7 @@ def limited_band(kept: float, fade: float, wavelength: float, z: float, ripple: 
     return Band(kept, fade, walk(kept + fade, wavelength, z) + OUTWARDS * blur)
 
 
+@lru_cache(maxsize=256)
 def _shortest(distance: float, wavelength: float, z: float, ripple: float, paraxial: bool, square: bool) -> Band:
     blur = kaiser_beta(ripple) / math.pi
     steepest = STEEPEST_SQUARE if square else PERIOD_MAX_SINE

@@ -103,13 +103,14 @@ def kept_light(passage: Passage, source: Grid, window: Grid) -> KeptLight:
         (n // 2 + 1) * source.dx + (m // 2) * window.dx + abs(middle)
         for n, m, middle in zip(source.shape, window.shape, window.centre[::-1], strict=True)
     )
-    corner = source.half_diagonal + source.dx + window.half_diagonal
-    bands = (
-        kept_square(reach, wavelength, z, ripple, paraxial),
-        kept_band(corner, wavelength, z, ripple, paraxial),
-    )
-    band = min(bands, key=lambda band: band.walk) if passage.limit is None else passage.limit
-    nyquist = 0.5 / source.dx
+    band, nyquist = passage.limit, 0.5 / source.dx
+    if band is None:
+        corner = source.half_diagonal + source.dx + window.half_diagonal
+        bands = (
+            kept_square(reach, wavelength, z, ripple, paraxial),
+            kept_band(corner, wavelength, z, ripple, paraxial),
+        )
+        band = min(bands, key=lambda band: band.walk)
     everything = band.end >= (nyquist if band.square else math.sqrt(2) * nyquist)
     return KeptLight(EVERYTHING if everything else band, reach)
 
