@@ -7,8 +7,8 @@ the depth. It is therefore interpolated between a few planes at Chebyshev nodes 
 
     U(x, ζ(x)) = Σ_j L_j(ζ(x)) U(x, z_j),   and correspondingly   w → Σ_j P(-z_j) [L_j(ζ) w]
 
-for light that leaves the tilted plane, where P is the propagation to the next plane. The second formula is the adjoint of
-the first one. It becomes the inverse through the obliquity factor 1 - tan α tan θ for light at the angle θ to the axis.
+for light that leaves the tilted plane, where P is the propagation to the next plane. The second formula is the adjoint
+of the first one. It becomes the inverse if light at the angle θ to the axis is multiplied by 1 - tan α tan θ.
 """
 
 from __future__ import annotations
@@ -147,10 +147,14 @@ ALIGNED = Alignment()
 
 
 def shortened(source: PointSource, alignment: Alignment, grid: Grid) -> np.ndarray:
-    """Return the path [m] from the plane of the pupil's centre to its tilted plane, minus ζ, at the samples of a grid."""
+    """Return the path [m] of a source's light from the plane of a pupil's centre to its tilted plane, minus ζ.
+
+    The result is for the samples of a grid about the centre, (y, x).
+    """
     tangents = [math.tan(angle) for angle in source.angle]
     distance = number(source.distance)
-    x, y = (t + (0.0 if math.isinf(distance) else at / distance) for t, at in zip(tangents, (grid.x, grid.y), strict=True))
+    per = 0.0 if math.isinf(distance) else 1 / distance
+    x, y = tangents[0] + grid.x * per, tangents[1] + grid.y * per
     squared = np.add.outer(np.square(y), np.square(x))
     # cos θ - 1 = -tan²θ / (1 + tan²θ + √(1 + tan²θ))
     found: np.ndarray = -alignment.depth(grid) * squared / (1 + squared + np.sqrt(1 + squared))

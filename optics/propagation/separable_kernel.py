@@ -4,14 +4,14 @@ The field is the sum over samples of Rayleigh and Sommerfeld's kernel (Goodman, 
 
     U(x) = Σ_j u[j] A(ρ) exp(ikD(ρ)) dx²,   D(ρ) = √(z² + ρ²),   A(ρ) = |z| / (2πD²) (1/D - ik),   ρ = x - ξ_j.
 
-Let c be the centre of the window. D is the sum of a function of ρx, a function of ρy, and a coupling e, which vanishes if
-ρx = cx or ρy = cy:
+Let c be the centre of the window. D is the sum of a function of ρx, a function of ρy, and a coupling e, which vanishes
+if ρx = cx or ρy = cy:
 
     D(ρ) = D(ρx, cy) + D(cx, ρy) - D(c) + e(ρ).
 
 In a distant window, A exp(ike) varies so slowly that a few terms a_k(ρx) b_k(ρy) approximate it. They follow from the
-singular value decomposition of its values at Chebyshev nodes. Each term is then one matrix product along x and one along
-y. Fresnel's kernel exp(ikρ²/2z) needs a single term, without an approximation.
+singular value decomposition of its values at Chebyshev nodes. Each term is then one matrix product along x and one
+along y. Fresnel's kernel exp(ikρ²/2z) needs a single term, without an approximation.
 
 A sum over samples contains the light of all replicas of the spectrum. None of it reaches the window if light at the
 Nyquist frequency passes beside it.
@@ -126,9 +126,7 @@ def separable(passage: Passage, source: Grid, window: Grid, allowed: float) -> S
         return None
     if not kept_light(passage, source, window).band.fade:
         return None
-    ranges = [
-        (float(w[0] - s[-1]), float(w[-1] - s[0])) for w, s in ((window.x, source.x), (window.y, source.y))
-    ]
+    ranges = [(float(w[0] - s[-1]), float(w[-1] - s[0])) for w, s in ((window.x, source.x), (window.y, source.y))]
     if passage.paraxial:
         one = np.ones((1, 1))
         return SeparableSampling(passage, source, window, Terms(one * _amplitude(passage, 0.0, 0.0), one, *ranges, 0.0))
@@ -165,7 +163,7 @@ def _series(coefficients: np.ndarray, span: Range, at: np.ndarray) -> np.ndarray
 
 @lru_cache(maxsize=2)
 def _matrices(how: SeparableSampling, dtype: str) -> tuple[np.ndarray, np.ndarray]:
-    """Return the factors of the kernel along x and along y: (term, x, ξ) and (y, term, η), times dx² and the carrier."""
+    """Return the factors of the kernel along x and along y: (term, x, ξ) and (y, term, η), with dx² and the carrier."""
     passage, (cx, cy), terms = how.passage, how.passage.centre, how.terms
     x, y = np.subtract.outer(how.window.x, how.source.x), np.subtract.outer(how.window.y, how.source.y)
     carrier = _phasor(passage, math.fmod(abs(passage.z), passage.wavelength) + _sag(passage, cx, cy))

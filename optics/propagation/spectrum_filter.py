@@ -1,4 +1,4 @@
-"""Propagation of one plane by a filter in its spectrum: transform, multiply by the transfer function, transform back."""
+"""Propagation of one plane by a filter: transform, multiply by the transfer function, transform back."""
 
 from __future__ import annotations
 

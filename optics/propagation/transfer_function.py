@@ -32,7 +32,16 @@ from optics.numerics.grid import Grid
 from optics.numerics.interpolation import Interpolant
 from optics.numerics.precision import Precision, opaque, padded_for_packets
 
-__all__ = ["PERIOD_MAX_SINE", "Band", "TransferFunction", "evanescent", "kept_band", "kept_square", "limited_band", "walk"]
+__all__ = [
+    "PERIOD_MAX_SINE",
+    "Band",
+    "TransferFunction",
+    "evanescent",
+    "kept_band",
+    "kept_square",
+    "limited_band",
+    "walk",
+]
 
 # Choice: the period is long enough for light up to this sin θ. z tan θ has no bound at grazing incidence.
 PERIOD_MAX_SINE = 0.995

@@ -29,7 +29,15 @@ import numpy as np
 from optics.numerics.accuracy import MOST_SAMPLES, AccuracyError
 from optics.numerics.fourier import fast_length, predicted_seconds
 from optics.numerics.grid import Grid
-from optics.propagation.transfer_function import EVERYTHING, PERIOD_MAX_SINE, Band, Passage, kept_band, kept_square, walk
+from optics.propagation.transfer_function import (
+    EVERYTHING,
+    PERIOD_MAX_SINE,
+    Band,
+    Passage,
+    kept_band,
+    kept_square,
+    walk,
+)
 
 __all__ = ["KeptLight", "TransformSampling", "blur_left", "blurred_back", "kept_light", "most_spare", "sampling"]
 

@@ -1,5 +1,7 @@
 """Distant and shifted windows against Rayleigh-Sommerfeld's sum at single points, closed forms, and transforms."""
 
+import itertools
+
 import numpy as np
 import pytest
 
@@ -111,7 +113,7 @@ def test_each_term_divides_the_error():
         errors[terms.count] = terms.error
     counts = sorted(errors)
     assert len(counts) >= 4
-    for fewer, more in zip(counts[:-1], counts[1:], strict=True):
+    for fewer, more in itertools.pairwise(counts):
         assert errors[more] < 0.2 * errors[fewer]
 
 
