@@ -172,7 +172,8 @@ def _propagated(
         how = sampling(passage, *grids, 0.0)
     except AccuracyError:
         how = None
-    if how is None or direct.seconds < how.seconds:
+    count = len(sources)
+    if how is None or direct.seconds(types.dtype, count) < how.seconds(types.dtype, count):
         return direct, [direct.propagated(plane, types) for plane in sources]
     return how, [filtered(plane, how, types) for plane in sources]
 
@@ -225,4 +226,11 @@ def _plan(
             f"tolerance = {tolerance:g}: the error reaches {above(error, tolerance)}, because too much of the light is "
             "near grazing incidence or too little of it hits the window; widen the tolerance or enlarge out_shape"
         )
-    return Plan(how.method, how.samples, dtype, error, how.why + _sample_note(planes, tolerance), how.seconds)
+    return Plan(
+        how.method,
+        how.samples,
+        dtype,
+        error,
+        how.why + _sample_note(planes, tolerance),
+        how.seconds(dtype, len(planes)),
+    )

@@ -27,7 +27,8 @@ import numpy as np
 from numpy.polynomial import chebyshev
 
 from optics.numerics.accuracy import FLOAT_NOISE, MOST_SAMPLES
-from optics.numerics.cost import KERNEL_SAMPLE, MATMUL_FLOPS, SERIES_TERM
+from optics.numerics.array_sum_cost import products_seconds
+from optics.numerics.cost import PASSAGE_CALL, SEPARABLE_ENTRY, SERIES_TERM
 from optics.numerics.grid import Grid
 from optics.numerics.precision import Precision
 from optics.propagation.spectrum_filter import PropagatedPlane, ScaledPlane
@@ -84,12 +85,15 @@ class SeparableSampling:
     def period(self) -> int:
         return max(self.source.shape)
 
-    @property
-    def seconds(self) -> float:
-        """Predicted time of the propagation of one plane, including the matrices."""
-        (ny, nx), (my, mx), terms = self.source.shape, self.window.shape, self.terms.count
-        products = 8 * terms * (ny * nx * mx + ny * mx * my) / MATMUL_FLOPS["float32"]
-        return products + (my * ny + mx * nx) * (KERNEL_SAMPLE + terms * self.terms.along_x.shape[0] * SERIES_TERM)
+    def seconds(self, real: str, planes: int = 1) -> float:
+        """Return the predicted time of the propagation of planes, including the matrices.
+
+        real: type of real and imaginary parts, "float32" or "float64".
+        """
+        (ny, nx), (my, mx), (degree, terms) = self.source.shape, self.window.shape, self.terms.along_x.shape
+        products = products_seconds((nx, ny), (mx, my), real, terms)
+        entries = (my * ny + mx * nx) * (SEPARABLE_ENTRY + terms * degree * SERIES_TERM)
+        return PASSAGE_CALL["separable_kernel"] + planes * products + entries
 
     @property
     def why(self) -> str:

@@ -27,7 +27,9 @@ from functools import lru_cache
 import numpy as np
 
 from optics.numerics.accuracy import MOST_SAMPLES, AccuracyError
-from optics.numerics.fourier import fast_length, predicted_seconds
+from optics.numerics.array_sum_cost import lines_seconds, sum_seconds
+from optics.numerics.cost import PASSAGE_CALL, TRANSFER_SAMPLE
+from optics.numerics.fourier import fast_length
 from optics.numerics.grid import Grid
 from optics.propagation.transfer_function import (
     EVERYTHING,
@@ -74,12 +76,20 @@ class TransformSampling:
     def samples(self) -> tuple[int, int]:
         return self.period, self.period
 
-    @property
-    def seconds(self) -> float:
-        """Predicted time of the propagation of one plane."""
-        spectrum = self.across, self.across
-        there = predicted_seconds(self.source.shape, self.period, spectrum)
-        return there + predicted_seconds(spectrum, self.period * self.source.dx / self.window.dx, self.window.shape)
+    def seconds(self, real: str, planes: int = 1) -> float:
+        """Return the predicted time of the propagation of planes, including the transfer function.
+
+        real: type of real and imaginary parts, "float32" or "float64".
+        """
+        period, across = self.period, self.across
+        if self.step:
+            sums = lines_seconds(self.source.shape[0] + 2 * across + self.window.shape[0], period, real)
+        else:
+            back = period * self.source.dx / self.window.dx
+            sums = sum_seconds(self.source.shape, period, (across, across), real)
+            sums += sum_seconds((across, across), back, self.window.shape, real)
+        transfer = across * (period if self.step else across) * TRANSFER_SAMPLE
+        return PASSAGE_CALL["angular_spectrum"] + planes * sums + transfer
 
     @property
     def why(self) -> str:
