@@ -2,13 +2,14 @@
 
 Each plane has its own lateral coordinates about the centre of its pupil, so a decentred pupil only moves the window of
 the propagation to its plane. The plane of a tilted pupil has the depth ζ(x) = x·tan α. Light arrives there as the field
-at the depth ζ, and it leaves from there. Apart from the carrier exp(ikζ), which cancels, the field varies slowly with
-the depth. It is therefore interpolated between a few planes at Chebyshev nodes z_j,
+at the depth ζ, and it leaves from there. If its angles to the axis are at most θ, the field is a carrier exp(ikcζ) with
+c = (1 + cos θ)/2 times a function that varies slowly with the depth. This function is interpolated between a few planes
+at Chebyshev nodes z_j. For light that arrives at the tilted plane, and for light that leaves it,
 
-    U(x, ζ(x)) = Σ_j L_j(ζ(x)) U(x, z_j),   and correspondingly   w → Σ_j P(-z_j) [L_j(ζ) w]
+    U(x, ζ) = exp(ikcζ) Σ_j L_j(ζ) exp(-ikcz_j) U(x, z_j),   w → Σ_j exp(ikcz_j) P(-z_j) [L_j(ζ) exp(-ikcζ) w],
 
-for light that leaves the tilted plane, where P is the propagation to the next plane. The second formula is the adjoint
-of the first one. It becomes the inverse if light at the angle θ to the axis is multiplied by 1 - tan α tan θ.
+where P is the propagation to the next plane. The second formula is the adjoint of the first one. It becomes the inverse
+if light at the angle θ is multiplied by 1 - tan α tan θ. Fields on tilted planes are stored without exp(ikζ).
 """
 
 from __future__ import annotations
@@ -26,10 +27,13 @@ from optics.numerics.autodiff import Array, number
 from optics.numerics.grid import Grid
 from optics.numerics.precision import Precision, opaque
 
-__all__ = ["ALIGNED", "Alignment", "Misaligned", "seen_from", "shortened"]
+__all__ = ["ALIGNED", "Alignment", "Misaligned", "seen_from", "shortened", "slowness"]
 
 STEEPEST_TILT = 0.2  # choice [rad]: largest tilt; a thin element at a larger tilt is no longer thin along the axis
 MOST_NODES = 8  # choice: largest number of depths between which fields are interpolated
+
+# Choice: error of the interpolation over the pupil, relative to that of the steepest light at the deepest point.
+MEAN_OVER_PUPIL = 1 / 3
 
 Point = tuple[float, float]
 
@@ -77,37 +81,41 @@ class Alignment:
         """Return the centre (x, y) [m] relative to that of another plane."""
         return self.centre[0] - other.centre[0], self.centre[1] - other.centre[1]
 
-    def nodes(self, radius: float, sine: float, k: float, allowed: float) -> np.ndarray:
-        """Return the depths [m] between which fields are interpolated; 0 alone if the tilt has no effect.
+    def nodes(self, radius: float, sine: float, wavelength: float, allowed: float) -> tuple[np.ndarray, float]:
+        """Return the depths [m] between which fields are interpolated, or 0 alone, and the error of the intensity.
 
-        Along a ray at the angle θ, the phase without its carrier changes by up to φ = kζ (1 - cos θ). Interpolation
-        between n Chebyshev nodes has an error of at most φⁿ / (2ⁿ⁻¹ n!).
+        Along a ray, the phase without the carrier changes by up to φ = kζ (1 - cos θ)/2. Interpolation between n
+        Chebyshev nodes has an error of at most φⁿ / (2ⁿ⁻¹ n!).
 
         radius: largest distance [m] from the centre.
         sine: largest sin θ of the light.
-        k: wave number [1/m] in the medium.
-        allowed: largest error of the amplitude.
+        wavelength: wavelength [m] in the medium.
+        allowed: largest error of the intensity.
 
         Raises:
             AccuracyError: the tilt is too large for this interpolation.
         """
         deepest = self.steepness * radius
-        phase = k * deepest * sine**2 / (1 + math.sqrt(max(1 - sine**2, 0)))
+        phase = 2 * math.pi / wavelength * deepest * slowness(sine)
         for count in range(1, MOST_NODES + 1):
-            if phase**count / (2 ** (count - 1) * math.factorial(count)) <= allowed:
-                return deepest * np.cos(np.pi * (np.arange(count) + 0.5) / count) * (count > 1)
+            error = 2 * MEAN_OVER_PUPIL * phase**count / (2 ** (count - 1) * math.factorial(count))
+            if error <= allowed:
+                return deepest * np.cos(np.pi * (np.arange(count) + 0.5) / count) * (count > 1), error
         raise AccuracyError(
             f"tilt: {math.atan(self.steepness):.2g} rad over a radius of {radius:.3g} m is too large for light at "
             f"{math.degrees(math.asin(min(sine, 1))):.2g}° to the axis: widen the tolerance"
         )
 
-    def weights(self, nodes: np.ndarray, grid: Grid) -> list[np.ndarray]:
-        """Return Lagrange's polynomials L_j(ζ) at the samples of a grid about the centre, (y, x) each."""
+    def weights(self, nodes: np.ndarray, grid: Grid, turns: float) -> list[np.ndarray]:
+        """Return L_j(ζ) exp(2πi ζ turns) at the samples of a grid about the centre, (y, x) each.
+
+        turns: waves per depth [1/m].
+        """
         depth, found = self.depth(grid), []
         for j, at in enumerate(nodes):
             others = np.delete(nodes, j)
             found.append(np.prod([(depth - other) / (at - other) for other in others], axis=0))
-        return found
+        return [weight * np.exp(2j * np.pi * turns * depth) for weight in found]
 
     def depth(self, grid: Grid) -> np.ndarray:
         """Return ζ [m] at the samples of a grid about the centre, (y, x)."""
@@ -144,6 +152,11 @@ class Alignment:
 
 
 ALIGNED = Alignment()
+
+
+def slowness(sine: float) -> float:
+    """Return 1 - c = (1 - cos θ)/2."""
+    return sine**2 / (2 * (1 + math.sqrt(max(1 - sine**2, 0))))
 
 
 def shortened(source: PointSource, alignment: Alignment, grid: Grid) -> np.ndarray:

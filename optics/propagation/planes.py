@@ -20,7 +20,7 @@ from optics.methods.problem import SLOPE_MARGIN
 from optics.numerics.accuracy import MOST_SAMPLES, AccuracyError
 from optics.numerics.grid import Grid
 from optics.numerics.precision import precision
-from optics.propagation.misalignment import ALIGNED, Alignment, Misaligned, seen_from, shortened
+from optics.propagation.misalignment import ALIGNED, Alignment, Misaligned, seen_from, shortened, slowness
 from optics.propagation.propagate import WRAP_RIPPLE_PER_TOLERANCE, PropagationResult, propagated_field
 from optics.propagation.transfer_function import EVERYTHING, Passage, kept_band, kept_square, limited_band
 
@@ -137,27 +137,25 @@ class StepSettings:
         if field.kept is not None:
             limit = limited_band(field.kept, field.band - field.kept, wavelength, abs(stop.distance), self.ripple)
         window = grid.moved(stop.alignment.beside(field.alignment))
-        leaving, arriving = (
-            self._depths(alignment, half_width, self.steep(field))
-            for alignment, half_width in ((field.alignment, field.half_width), (stop.alignment, stop.half_width))
-        )
+        if not (field.alignment.steepness or stop.alignment.steepness):
+            passage = Passage(wavelength, stop.distance, False, EVERYTHING, self.ripple, window.centre, limit)
+            return propagated_field(field.u, field.dx, passage, window, self.tolerance, self.dtype)
+        sine = self.steep(field)
+        turns, source = slowness(sine) / wavelength, Grid(field.u.shape, field.dx)
+        leaving, error_out = field.alignment.nodes(field.half_width, sine, wavelength, self.tolerance / 2)
+        arriving, error_in = stop.alignment.nodes(stop.half_width, sine, wavelength, self.tolerance / 2)
         found: list[PropagationResult] = []
-        into = stop.alignment.weights(arriving, grid)
-        for start, share in zip(leaving, field.alignment.weights(leaving, Grid(field.u.shape, field.dx)), strict=True):
+        into = stop.alignment.weights(arriving, grid, -turns)
+        for start, share in zip(leaving, field.alignment.weights(leaving, source, turns), strict=True):
             for end, weight in zip(arriving, into, strict=True):
                 distance = stop.distance + float(end - start)
                 passage = Passage(wavelength, distance, False, EVERYTHING, self.ripple, window.centre, limit)
                 out = propagated_field(field.u * share, field.dx, passage, window, self.tolerance, self.dtype)
-                if len(leaving) + len(arriving) == 2:
-                    return out
-                turned = np.exp(-2j * np.pi * (end - start) / wavelength)
-                found.append(replace(out, u=(out.u * (weight * turned)).astype(out.u.dtype)))
+                carrier = np.exp(2j * np.pi * (end - start) * (turns - 1 / wavelength))
+                found.append(replace(out, u=(out.u * (weight * carrier)).astype(out.u.dtype)))
         worst = max(found, key=lambda result: result.plan.predicted_error)
-        return replace(worst, u=np.sum([result.u for result in found], axis=0))
-
-    def _depths(self, alignment: Alignment, half_width: float, sine: float) -> np.ndarray:
-        """Return the depths of a tilted plane between which fields are interpolated."""
-        return alignment.nodes(half_width, sine, 2 * math.pi * self.medium_n / self.wavelength, self.tolerance / 2)
+        plan = replace(worst.plan, predicted_error=worst.plan.predicted_error + error_out + error_in)
+        return replace(worst, plan=plan, u=np.sum([result.u for result in found], axis=0))
 
     def steep(self, field: PlaneField) -> float:
         """Return the largest sin θ to the axis that tilts must represent.
