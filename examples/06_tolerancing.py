@@ -17,7 +17,7 @@ import optics
 
 WAVELENGTH, RADIUS = 550e-9, 0.3e-3
 FOCAL_LENGTHS, SPACINGS = (24e-3, -15e-3, 24e-3), (6e-3, 6e-3)
-DECENTRE, TILT, SPACING = 20e-6, np.radians(0.2), 150e-6  # standard deviations [m], [rad] and [m] at scale 1
+DECENTRE, TILT, SPACING = 20e-6, np.radians(0.2), 250e-6  # standard deviations [m], [rad] and [m] at scale 1
 SCALES = (0.5, 1.0, 2.0)
 PITCH, SIDE = 5e-6, 96
 

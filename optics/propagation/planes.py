@@ -142,8 +142,8 @@ class StepSettings:
             return propagated_field(field.u, field.dx, passage, window, self.tolerance, self.dtype)
         sine = self.steep(field)
         turns, source = slowness(sine) / wavelength, Grid(field.u.shape, field.dx)
-        leaving, error_out = field.alignment.nodes(field.half_width, sine, wavelength, self.tolerance / 2)
-        arriving, error_in = stop.alignment.nodes(stop.half_width, sine, wavelength, self.tolerance / 2)
+        leaving, error_out = field.alignment.nodes(field.half_width, sine, wavelength, self.tolerance / 4)
+        arriving, error_in = stop.alignment.nodes(stop.half_width, sine, wavelength, self.tolerance / 4)
         found: list[PropagationResult] = []
         into = stop.alignment.weights(arriving, grid, -turns)
         for start, share in zip(leaving, field.alignment.weights(leaving, source, turns), strict=True):
