@@ -76,9 +76,10 @@ class Stop:
 
     @classmethod
     def at(cls, element: Pupil | Misaligned, distance: float) -> Stop:
-        pupil, alignment = element, ALIGNED
         if isinstance(element, Misaligned):
             pupil, alignment = element.pupil, Alignment.of(element)
+        else:
+            pupil, alignment = element, ALIGNED
         return cls(distance, pupil, (1 + EDGE_REACH) * pupil.radius, None, alignment)
 
     def apart(self, other: Alignment) -> float:

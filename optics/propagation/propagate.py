@@ -70,7 +70,8 @@ class PropagationResult(ReadOnlyArrays, OnWindow):
         In forward propagation, these waves decay. In backward propagation they are omitted, because undoing the decay
         would amplify noise without bound.
         """
-        return max(evanescent_share(plane, self._sampling) for plane in self._source)
+        how = self._sampling
+        return max(evanescent_share(plane, how.period, how.source.dx, how.passage) for plane in self._source)
 
 
 def propagate(

@@ -104,7 +104,7 @@ class SeparableSampling:
     def propagated(self, plane: np.ndarray, types: Precision) -> PropagatedPlane:
         """Return a plane (y, x) after propagation."""
         scaled = ScaledPlane.of(plane, types)
-        along_x, along_y = _matrices(self, types.complex_dtype)
+        along_x, along_y = _matrices(self, types)
         (ny, nx), (my, mx) = self.source.shape, self.window.shape
         over_x = (along_x.reshape(-1, nx) @ scaled.u.T).reshape(-1, mx, ny)  # (term, x, η)
         result = along_y.reshape(my, -1) @ over_x.transpose(0, 2, 1).reshape(-1, mx)
@@ -130,11 +130,14 @@ def separable(passage: Passage, source: Grid, window: Grid, allowed: float) -> S
         return None
     if not kept_light(passage, source, window).band.fade:
         return None
-    ranges = [(float(w[0] - s[-1]), float(w[-1] - s[0])) for w, s in ((window.x, source.x), (window.y, source.y))]
+    range_x, range_y = (
+        (float(w[0] - s[-1]), float(w[-1] - s[0])) for w, s in ((window.x, source.x), (window.y, source.y))
+    )
     if passage.paraxial:
         one = np.ones((1, 1))
-        return SeparableSampling(passage, source, window, Terms(one * _amplitude(passage, 0.0, 0.0), one, *ranges, 0.0))
-    terms = _terms(passage, ranges[0], ranges[1], allowed / (2 * TERM_MARGIN))
+        only = Terms(one * _amplitude(passage, 0.0, 0.0), one, range_x, range_y, 0.0)
+        return SeparableSampling(passage, source, window, only)
+    terms = _terms(passage, range_x, range_y, allowed / (2 * TERM_MARGIN))
     return None if terms is None else SeparableSampling(passage, source, window, terms)
 
 
@@ -166,7 +169,7 @@ def _series(coefficients: np.ndarray, span: Range, at: np.ndarray) -> np.ndarray
 
 
 @lru_cache(maxsize=2)
-def _matrices(how: SeparableSampling, dtype: str) -> tuple[np.ndarray, np.ndarray]:
+def _matrices(how: SeparableSampling, types: Precision) -> tuple[np.ndarray, np.ndarray]:
     """Return the factors of the kernel along x and along y: (term, x, ξ) and (y, term, η), with dx² and the carrier."""
     passage, (cx, cy), terms = how.passage, how.passage.centre, how.terms
     x, y = np.subtract.outer(how.window.x, how.source.x), np.subtract.outer(how.window.y, how.source.y)
@@ -174,6 +177,7 @@ def _matrices(how: SeparableSampling, dtype: str) -> tuple[np.ndarray, np.ndarra
     fast_x = _phasor(passage, _longer(passage, x, cx, cy)) * (carrier * how.source.dx**2)
     along_x = fast_x * _series(terms.along_x, terms.range_x, x)
     along_y = _phasor(passage, _longer(passage, y, cy, cx)) * _series(terms.along_y, terms.range_y, y)
+    dtype = types.complex_dtype
     return along_x.astype(dtype), np.ascontiguousarray(along_y.transpose(1, 0, 2), dtype)
 
 

@@ -12,7 +12,7 @@ from optics.numerics.accuracy import FLOAT_NOISE
 from optics.numerics.fourier import fourier_sum, kept_indices, periodic_spectrum, periodic_sum
 from optics.numerics.grid import Grid
 from optics.numerics.precision import Precision, precision
-from optics.propagation.transfer_function import TransferFunction, evanescent
+from optics.propagation.transfer_function import Passage, TransferFunction, evanescent
 from optics.propagation.transform_sampling import TransformSampling, blurred_back
 
 __all__ = ["PropagatedPlane", "ScaledPlane", "evanescent_share", "filtered"]
@@ -90,7 +90,7 @@ def filtered(given: np.ndarray, how: TransformSampling, types: Precision) -> Pro
     if not arrived:
         return PropagatedPlane(result, math.inf, math.inf)
     if faded > MUCH * arrived:
-        faded = max(faded - total * evanescent_share(plane, how), 0.0)
+        faded = max(faded - total * evanescent_share(plane, how.period, how.source.dx, how.passage), 0.0)
     rounding = FLOAT_NOISE[types.dtype] * (1 + math.sqrt(total / arrived))
     # Light at the start of a fade is blurred but hardly weaker. It is assumed to be as bright as the light that
     # arrives.
@@ -99,15 +99,15 @@ def filtered(given: np.ndarray, how: TransformSampling, types: Precision) -> Pro
     return PropagatedPlane(scaled.restored(result), error, 2 * math.sqrt(blurred / arrived))
 
 
-def evanescent_share(plane: np.ndarray, how: TransformSampling) -> float:
+def evanescent_share(plane: np.ndarray, period: int, dx: float, passage: Passage) -> float:
     """Return the evanescent fraction of a plane's power."""
     total = _power(plane)
-    highest = math.sqrt(0.5) / how.source.dx * how.passage.wavelength  # sine, at the corner of the spectrum
-    if total == 0 or how.passage.paraxial or highest * (1 + 2 / how.period) < 1:
+    highest = math.sqrt(0.5) / dx * passage.wavelength  # sine, at the corner of the spectrum
+    if total == 0 or passage.paraxial or highest * (1 + 2 / period) < 1:
         return 0.0
-    spectrum = periodic_spectrum(plane, how.period, how.period)
-    weights = evanescent(how.period, how.source.dx, how.passage.wavelength)
-    lost = float(np.sum(weights * (spectrum.real**2 + spectrum.imag**2), dtype=np.float64)) / how.period**2
+    spectrum = periodic_spectrum(plane, period, period)
+    weights = evanescent(period, dx, passage.wavelength)
+    lost = float(np.sum(weights * (spectrum.real**2 + spectrum.imag**2), dtype=np.float64)) / period**2
     return min(lost / total, 1.0)
 
 
