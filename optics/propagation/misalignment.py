@@ -27,7 +27,7 @@ from optics.numerics.autodiff import Array, number
 from optics.numerics.grid import Grid
 from optics.numerics.precision import Precision, opaque
 
-__all__ = ["ALIGNED", "Alignment", "Misaligned", "seen_from", "shortened", "slowness"]
+__all__ = ["ALIGNED", "Alignment", "Misaligned", "path_to_tilted_plane", "seen_from", "slowness"]
 
 STEEPEST_TILT = 0.2  # choice [rad]: largest tilt; a thin element at a larger tilt is no longer thin along the axis
 MOST_NODES = 8  # choice: largest number of depths between which fields are interpolated
@@ -159,7 +159,7 @@ def slowness(sine: float) -> float:
     return sine**2 / (2 * (1 + math.sqrt(max(1 - sine**2, 0))))
 
 
-def shortened(source: PointSource, alignment: Alignment, grid: Grid) -> np.ndarray:
+def path_to_tilted_plane(source: PointSource, alignment: Alignment, grid: Grid) -> np.ndarray:
     """Return the path [m] of a source's light from the plane of a pupil's centre to its tilted plane, minus ζ.
 
     The result is for the samples of a grid about the centre, (y, x).

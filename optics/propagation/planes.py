@@ -20,7 +20,7 @@ from optics.methods.problem import SLOPE_MARGIN
 from optics.numerics.accuracy import MOST_SAMPLES, AccuracyError
 from optics.numerics.grid import Grid
 from optics.numerics.precision import precision
-from optics.propagation.misalignment import ALIGNED, Alignment, Misaligned, seen_from, shortened, slowness
+from optics.propagation.misalignment import ALIGNED, Alignment, Misaligned, path_to_tilted_plane, seen_from, slowness
 from optics.propagation.propagate import WRAP_RIPPLE_PER_TOLERANCE, PropagationResult, propagated_field
 from optics.propagation.transfer_function import EVERYTHING, Passage, kept_band, kept_square, limited_band
 
@@ -250,7 +250,7 @@ class PupilSampling:
             raise ValueError("elements: a system has no derivatives; use psf for a single pupil")
         transmittance = found.numpy()
         if u is None:
-            path = self.path + shortened(self.source, self.alignment, self.grid)
+            path = self.path + path_to_tilted_plane(self.source, self.alignment, self.grid)
             u = np.exp(2j * np.pi * settings.medium_n / settings.wavelength * path).astype(transmittance.dtype)
         field = u * (transmittance.conj() if settings.backward else transmittance)
         field = self.alignment.leaving(field, self.grid.dx, settings.wavelength / settings.medium_n)

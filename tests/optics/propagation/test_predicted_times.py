@@ -27,7 +27,7 @@ def random_passage(rng):
 
 @pytest.mark.slow
 def test_predicted_times_are_right_within_a_factor_of_two():
-    """At distances that were not used before, since transfer functions and kernels are cached."""
+    """Each distance is new, because transfer functions and kernels are cached."""
     rng, ratios = np.random.default_rng(3), []
     while len(ratios) < 24:
         u, settings = random_passage(rng)
