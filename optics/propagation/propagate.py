@@ -97,7 +97,8 @@ def propagate(
         shape equal those of u, and the centre is on the axis.
     tolerance: relative L2 error of the intensity over the output, for exact samples u. If u contains light at its
         Nyquist frequency, that is, if it is sampled too coarsely, the plan states the additional error.
-    method: "auto" and "angular_spectrum" are exact. "fresnel" is the paraxial approximation.
+    method: "auto" and "angular_spectrum" are exact. "auto" replaces the transforms by matrix products if these are
+        faster, in distant or shifted windows. "fresnel" is the paraxial approximation.
 
     Raises:
         ValueError: an argument is invalid; the message names it with its value and valid range.
@@ -117,6 +118,7 @@ def propagate(
         EVERYTHING,
         WRAP_RIPPLE_PER_TOLERANCE * tolerance,
         window.centre,
+        by_transforms=method == "angular_spectrum",
     )
     return propagated_field(given, dx, passage, window, tolerance, dtype)
 

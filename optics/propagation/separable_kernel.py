@@ -123,10 +123,11 @@ def separable(passage: Passage, source: Grid, window: Grid, allowed: float) -> S
     """Return a sampling of the separable kernel whose predicted error of the intensity is at most `allowed`.
 
     The result is None if the samples of the source represent too few of the frequencies that reach the window, if light
-    is to be removed that could reach the window, or if more than MOST_TERMS terms are necessary.
+    is to be removed that could reach the window, if transforms are requested, or if more than MOST_TERMS terms are
+    necessary.
     """
     largest = max(*source.shape, *window.shape)
-    if passage.z == 0 or passage.limit is not None or largest > MOST_SAMPLES:
+    if passage.z == 0 or passage.by_transforms or passage.limit is not None or largest > MOST_SAMPLES:
         return None
     if not kept_light(passage, source, window).band.fade:
         return None

@@ -203,6 +203,7 @@ class Passage:
     centre: position (x, y) [m] of the window.
     ripple: fraction of the light that remains beyond a fade.
     limit: band beyond which light is removed although it could reach the window; None if there is no limit.
+    by_transforms: True if matrix products must not replace transforms.
 
     Evanescent waves decay in forward propagation and are omitted in backward propagation (z < 0).
     """
@@ -214,6 +215,7 @@ class Passage:
     ripple: float
     centre: tuple[float, float]
     limit: Band | None = None
+    by_transforms: bool = False
 
     def over(self, fx: np.ndarray, fy: np.ndarray, types: Precision) -> TransferFunction:
         """Return the transfer function at frequencies fx (column), fy (row) [1/m]."""

@@ -117,6 +117,14 @@ def test_each_term_divides_the_error():
         assert errors[more] < 0.2 * errors[fewer]
 
 
+def test_the_angular_spectrum_can_be_requested():
+    u = tilted(64, 10e-6, 100e-6, (0.0, 0.0))
+    settings = {"dx": 10e-6, "wavelength": WAVELENGTH, "distance": 0.2, "out_dx": 30e-6, "out_shape": (96, 96)}
+    auto, requested = (optics.propagate(u, **settings, method=method) for method in ("auto", "angular_spectrum"))
+    assert (auto.plan.method, requested.plan.method) == ("separable_kernel", "angular_spectrum")
+    assert relative_l2(np.abs(auto.u) ** 2, np.abs(requested.u) ** 2) < auto.plan.predicted_error
+
+
 def test_a_near_window_is_left_to_transforms():
     u = tilted(128, 1e-6, 20e-6, (0.0, 0.0))
     near = optics.propagate(u, dx=1e-6, wavelength=WAVELENGTH, distance=0.2e-3, out_dx=2e-6, out_shape=(512, 512))
