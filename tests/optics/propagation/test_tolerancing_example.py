@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-SCRIPT = Path(__file__).parents[3] / "examples" / "06_tolerancing.py"
+SCRIPT = Path(__file__).parents[3] / "examples" / "08_tolerancing.py"
 
 
 def aligned(example, shift):

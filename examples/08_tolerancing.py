@@ -3,7 +3,7 @@
 Each trial draws the errors of all elements from normal distributions. The criterion is the brightest point of the
 image, relative to that of the nominal lens: the Strehl ratio at the best position in a fixed image plane.
 
-python examples/06_tolerancing.py [--trials 100] [--out yield.png]
+python examples/08_tolerancing.py [--trials 100] [--out yield.png]
 """
 
 from __future__ import annotations
