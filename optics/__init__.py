@@ -12,6 +12,7 @@ point_spread  psf and plan: choice of the method and check of its result
 propagation   propagation of sampled fields between planes
 eye           Eye: signals of its receptors
 ommatidia     Ommatidium: facet lenses and rhabdoms as waveguides
+animals       eyes of honeybees, flies, fish, humans and other animals
 torch         psf as a function in a PyTorch graph
 """
 
@@ -105,10 +106,12 @@ _CONTENTS = {
     "white_psf": "point_spread.white",
 }
 
-__all__ = sorted(_CONTENTS)
+__all__ = sorted([*_CONTENTS, "animals"])
 
 
 def __getattr__(name: str) -> Any:
+    if name == "animals":
+        return import_module("optics.animals")
     if name not in _CONTENTS:
         raise AttributeError(f"module 'optics' has no attribute {name!r}")
     value = getattr(import_module(f"optics.{_CONTENTS[name]}"), name)

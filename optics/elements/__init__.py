@@ -13,7 +13,7 @@ transmittance     GaussianMask, MaskMap
 human_eye         HumanEye, mean_human_mtf: published models
 exit_pupil        read_exit_pupil: lenses from other programs
 ball_lens         BallLens: gradient-index ball lenses
-radial_profile    rays through spheres with a radial index profile
+spherical_index   rays through spheres with a radial index profile
 refractive_index  RefractiveIndex, Sellmeier, Cornu; media of eyes
 wavefront_slopes  directions of a wavefront's rays
 beam              light of one wavelength between source and sensor plane

@@ -12,7 +12,7 @@ import numpy as np
 
 from optics.elements.exit_pupil import ExitPupil
 from optics.elements.pupil import MIDDLE, Pupil
-from optics.elements.radial_profile import RadialProfile, generalized_luneburg
+from optics.elements.spherical_index import SphericalIndex, generalized_luneburg
 from optics.elements.refractive_index import Dispersion, index_of
 from optics.elements.wavefront import UM, Zernike, mode
 from optics.numerics.arguments import in_range, positive, reals, shown
@@ -180,6 +180,6 @@ class BallLens:
 
 
 @lru_cache(maxsize=64)
-def _profile(lens: BallLens, wavelength: float) -> RadialProfile:
+def _profile(lens: BallLens, wavelength: float) -> SphericalIndex:
     core, surface, medium = lens._indices(wavelength)
-    return RadialProfile.from_function(lambda u: (surface + (core - surface) * np.asarray(lens.shape(u))) / medium)
+    return SphericalIndex.from_function(lambda u: (surface + (core - surface) * np.asarray(lens.shape(u))) / medium)

@@ -1,4 +1,4 @@
-"""Gradient-index ball lenses: closed forms of Luneburg and Maxwell, rays by an ODE solver, and the pupil's wavefront."""
+"""Gradient-index ball lenses: closed forms of Luneburg and Maxwell, rays by an ODE solver, and the wavefront."""
 
 import math
 
@@ -78,7 +78,7 @@ def test_rays_agree_with_an_ode_solver():
 
 def test_the_wavefront_of_a_perfect_lens_is_flat_and_its_psf_that_of_an_ideal_lens():
     found = BallLens.luneburg(R, 1.336, 2.5).exit_pupil(0.2 * R)
-    assert found.rms < 1e-11 and found.residual < 1e-11
+    assert max(found.rms, found.residual) < 1e-11
     assert found.distance == pytest.approx(2.5 * R, rel=1e-7)
     sine = 0.2 / 2.5  # Abbe's sine condition
     assert found.pupil.radius == pytest.approx(2.5 * R * sine / math.sqrt(1 - sine**2), rel=1e-6)

@@ -48,7 +48,8 @@ def test_a_budget_counts_the_photons_of_this_sensitivity():
 
 def test_light_levels_rise_from_starlight_to_sunlight():
     levels = [light_level(name) for name in ("starlight", "quarter moon", "full moon", "civil dusk", "sunset")]
-    assert levels == sorted(levels) and levels[0] == 2e-3
+    assert levels == sorted(levels)
+    assert levels[0] == 2e-3
     for name in ("starlight", "sunlight"):
         PhotonBudget(light_level(name))
 

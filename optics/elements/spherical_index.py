@@ -7,8 +7,9 @@ about the centre by
     ψ(h) = 2 ∫ h dr / (r √(n² r² - h²)),
 
 integrated from the turning point, n r = h, to the surface. Its optical path is 2 ∫ n² r dr / √(n² r² - h²). Both
-integrals become smooth with r² = a² + y², where a is the turning point. Source: Luneburg, Mathematical Theory of Optics,
-1964, §27.
+integrals become smooth with r² = a² + y², where a is the turning point.
+
+Source: Luneburg, Mathematical Theory of Optics, 1964, §27.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ from numpy.polynomial.chebyshev import Chebyshev
 from optics.numerics.arguments import in_range
 from optics.numerics.quadrature import gauss_legendre
 
-__all__ = ["RadialProfile", "generalized_luneburg"]
+__all__ = ["SphericalIndex", "generalized_luneburg"]
 
 NODES = 64  # choice: quadrature nodes of an integral along a ray; errors below 1e-9 for the lenses in this folder
 TERMS = 96  # choice: Chebyshev terms of a profile in (r/R)²
@@ -33,13 +34,13 @@ ROUNDING = 1e-9  # margin for n r in the check of a profile
 
 
 @dataclass(frozen=True, eq=False)
-class RadialProfile:
+class SphericalIndex:
     """The index of a sphere, relative to its medium, as a polynomial in t = (r/R)²."""
 
     index: Chebyshev
 
     @classmethod
-    def from_function(cls, relative: Callable[[np.ndarray], np.ndarray]) -> RadialProfile:
+    def from_function(cls, relative: Callable[[np.ndarray], np.ndarray]) -> SphericalIndex:
         """Interpolate a relative index, given as a function of r/R, at Chebyshev points in (r/R)².
 
         Raises:
