@@ -106,7 +106,7 @@ _CONTENTS = {
     "white_psf": "point_spread.white",
 }
 
-__all__ = sorted([*_CONTENTS, "animals"])
+__all__ = sorted(_CONTENTS)
 
 
 def __getattr__(name: str) -> Any:

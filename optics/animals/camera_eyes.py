@@ -129,15 +129,15 @@ def goldfish(receptors_across: int = 40, radius: float = 1.4e-3) -> Eye:
 SPIDER_EYES = {"principal": (2.4, 780e-6, 1980e-6), "secondary": (42.0, 380e-6, 254e-6)}
 
 
-def jumping_spider(eye: str = "principal", receptors_across: int = 30) -> Eye:
+def jumping_spider(receptors_across: int = 30, eye: str = "principal") -> Eye:
     """Return an eye of the jumping spider *Portia*: receptors "jumping_spider".
 
     Source of the 2.4 minutes of arc between receptors of the principal eyes: Land, in Neurobiology of Arachnids, p. 53,
     1985, after Williams & McIntyre, Nature 288, 578, 1980. No source has been read for the widths and focal lengths of
     the lenses, nor for the 0.7° between receptors of the secondary (anterior lateral) eyes.
 
-    eye: "principal" or "secondary".
     receptors_across: receptors along each side of the patch, 1 to 1000.
+    eye: "principal" or "secondary".
 
     Raises:
         ValueError: an unknown eye, or receptors_across outside its range.

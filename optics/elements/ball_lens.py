@@ -12,8 +12,8 @@ import numpy as np
 
 from optics.elements.exit_pupil import ExitPupil
 from optics.elements.pupil import MIDDLE, Pupil
-from optics.elements.spherical_index import SphericalIndex, generalized_luneburg
 from optics.elements.refractive_index import Dispersion, index_of
+from optics.elements.spherical_index import SphericalIndex, generalized_luneburg
 from optics.elements.wavefront import UM, Zernike, mode
 from optics.numerics.arguments import in_range, positive, reals, shown
 from optics.numerics.quadrature import gauss_legendre

@@ -67,7 +67,7 @@ def test_an_eye_of_a_mouse_gives_signals_of_two_receptor_types():
 
 
 def test_the_two_kinds_of_spider_eyes():
-    fine, coarse = (animals.jumping_spider(eye) for eye in ("principal", "secondary"))
+    fine, coarse = (animals.jumping_spider(eye=eye) for eye in ("principal", "secondary"))
     assert fine.fov_deg / fine.resolution[1] == pytest.approx(2.4 / 60, rel=1e-3)
     assert coarse.fov_deg / coarse.resolution[1] == pytest.approx(0.7, rel=0.02)
 
@@ -97,7 +97,7 @@ def test_cirolana_accepts_light_from_a_wide_angle():
     [
         (lambda: animals.honeybee("melifera"), "species"),
         (lambda: animals.honeybee(rings=61), "rings"),
-        (lambda: animals.jumping_spider("median"), "eye"),
+        (lambda: animals.jumping_spider(eye="median"), "eye"),
         (lambda: animals.human(0), "receptors_across"),
         (lambda: animals.human(pupil_diameter=9e-3), "aperture_radius"),
         (lambda: animals.goldfish(radius=-1.0), "radius"),

@@ -32,7 +32,7 @@ def test_at_the_least_parameter_lattice_and_facet_stop_at_the_same_grating(latti
 
 
 def test_a_hexagonal_lattice_resolves_finer_gratings_than_a_square_one_of_equal_density():
-    """By (4/3)^¼ = 1.075: the reciprocal lattice of a hexagonal one is hexagonal."""
+    """The ratio is (4/3)^¼ = 1.075, because the reciprocal lattice of a hexagonal one is hexagonal."""
     ratio = anatomical_acuity(1e11, 16.7e-3) / anatomical_acuity(1e11, 16.7e-3, "square")
     assert ratio == pytest.approx((4 / 3) ** 0.25)
 
@@ -47,7 +47,7 @@ def test_a_lattice_of_points_aliases_beyond_its_acuity():
 
 
 def test_an_ideal_observer_detects_at_the_predicted_threshold():
-    """In random draws of photons, the likelihood ratio picks the right one of two intervals in 75 % of trials."""
+    """The likelihood ratio of random draws of photons picks the right one of two intervals in 75 % of trials."""
     rng = np.random.default_rng(3)
     x = np.arange(64) / 64 * 4 * 2 * np.pi
     grating, mean = np.tile(np.sin(x), (16, 1)), 40.0

@@ -30,7 +30,7 @@ def test_a_short_receptor_absorbs_in_proportion_to_its_length():
 
 
 def test_a_budget_counts_the_photons_of_this_sensitivity():
-    """At one wavelength, N = S · radiance · Δt, with Geisler's conversion of candelas to photons at 555 nm.
+    """Photons at one wavelength are S · radiance · Δt, with Geisler's conversion of candelas to photons at 555 nm.
 
     Geisler, J. Opt. Soc. Am. A 1, 775, 1984: a receptor of 1 min² behind 1 mm² of pupil receives 347.8 photons per
     second and cd/m². With K_m = 683 lm/W it is 346.1.
