@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -25,12 +25,15 @@ ORDER = 12  # choice: highest radial order of the wavefront
 STEEPEST = 0.95  # largest sine of a ray behind the lens
 
 
+Shape: TypeAlias = Callable[[np.ndarray], np.ndarray]
+
+
 def parabola(u: np.ndarray) -> np.ndarray:
     """Return 1 - u², Matthiessen's profile."""
     return 1 - u * u
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class BallLens:
     """A sphere with the index n(r, λ) = n_surface(λ) + (n_core(λ) - n_surface(λ)) shape(r/R), in one medium.
 
@@ -52,7 +55,7 @@ class BallLens:
     core_n: float | Dispersion
     surface_n: float | Dispersion
     medium_n: float | Dispersion
-    shape: Callable[[np.ndarray], np.ndarray] = field(default=parabola)
+    shape: Shape = parabola
 
     def __post_init__(self) -> None:
         positive("radius", self.radius)
