@@ -41,6 +41,7 @@ EXAMPLES = {
     "replay": "  evolve replay runs/first --open\n  evolve replay runs/first --candidate 12 --seed 3\n",
     "report": "  evolve report runs/first --open\n",
     "export": "  evolve export runs/first --candidate 12 --out frames\n  evolve export runs/first --every 1\n",
+    "see": "  evolve see photo.jpg --animal honeybee --width-deg 60\n",
     "list": "  evolve list\n  evolve list /data/runs --json\n",
     "validate": "  evolve validate --list\n  evolve validate psf_error_prediction aliasing\n",
     "config": "  evolve config show detection --preset quick\n  evolve config schema > settings.schema.json\n",
@@ -238,6 +239,14 @@ def _add_products(commands: Commands) -> None:
     )
     demo.add_argument("--open", action="store_true", help="open the report in a browser")
     _add_voice(demo)
+    see = _command(commands, "see", "see.see", "show a photograph through an animal's eye")
+    see.add_argument("photograph", type=Path, metavar="FILE", help="opaque colour image, such as a JPEG or PNG file")
+    see.add_argument("--animal", required=True, metavar="NAME", help="animal, such as honeybee, goldfish or eagle")
+    angle = "angle that the width of the photograph covers in the visual field [degrees]"
+    see.add_argument("--width-deg", type=float, required=True, metavar="DEG", help=angle)
+    ultraviolet = "ultraviolet reflectance of white surfaces, which no photograph contains, 0 to 1 (default: 1)"
+    see.add_argument("--uv", type=float, default=1.0, metavar="SHARE", help=ultraviolet)
+    see.add_argument("--out", type=Path, default=Path(), metavar="DIR", help="output directory (default: this one)")
 
 
 def _add_task(command: argparse.ArgumentParser) -> None:

@@ -4,16 +4,18 @@ compound_eyes  honeybee, fruit_fly, blowfly, dragonfly, megalopta: an Apposition
 camera_eyes    human, mouse, eagle, goldfish, jumping_spider: an Eye, a patch of the retina
 """
 
-from optics.animals.camera_eyes import eagle, goldfish, human, jumping_spider, mouse
-from optics.animals.compound_eyes import blowfly, cirolana, dragonfly, fruit_fly, honeybee, megalopta
+from optics.animals.camera_eyes import eagle, goldfish, goldfish_lens, human, jumping_spider, mouse
+from optics.animals.compound_eyes import COMPOUND, blowfly, cirolana, dragonfly, fruit_fly, honeybee, megalopta
 
 __all__ = [
+    "COMPOUND",
     "blowfly",
     "cirolana",
     "dragonfly",
     "eagle",
     "fruit_fly",
     "goldfish",
+    "goldfish_lens",
     "honeybee",
     "human",
     "jumping_spider",

@@ -18,8 +18,16 @@ from optics.ommatidia.ommatidium import Ommatidium
 from optics.ommatidia.waveguide import Waveguide
 from optics.spectra.optical_sensitivity import INVERTEBRATE_ABSORPTION
 
-__all__ = ["HONEYBEES", "Facet", "blowfly", "cirolana", "dragonfly", "fruit_fly", "honeybee", "megalopta"]
+__all__ = ["COMPOUND", "HONEYBEES", "Facet", "blowfly", "cirolana", "dragonfly", "fruit_fly", "honeybee", "megalopta"]
 
+# Names of compound eyes with many ommatidia, and their receptors for `optics.receptors_of`.
+COMPOUND = {
+    "honeybee": "honeybee",
+    "fruit_fly": "fruit_fly",
+    "blowfly": "blowfly",
+    "dragonfly": "dragonfly",
+    "megalopta": "honeybee",
+}
 LENS_N = 1.45  # Stavenga 2003: index of the facet lens of a fly
 CRUSTACEAN_N = 1.34  # index of the crystalline cone
 

@@ -18,5 +18,6 @@ commands.demo: test_demo.py
 commands.completion: test_main.py
 commands.validate: test_validate.py
 commands.compare: test_status_and_compare.py, test_generations.py
+commands.see: test_see.py
 commands.drift: report/test_gene_drift.py, test_generations.py
 """
