@@ -99,6 +99,7 @@ _CONTENTS = {
     "require": "numerics.backend",
     "sampling_acuity": "eye.acuity",
     "snyder_acceptance": "ommatidia.ommatidium",
+    "srgb_basis": "spectra.spectrum",
     "strehl_ratio": "point_spread.strehl",
     "through_focus": "point_spread.through_focus",
     "union": "apertures.combined",
