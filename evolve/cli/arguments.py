@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, NoReturn, TypeAlias
 
 from evolve.cli.argument_values import every, searches, seed
+from evolve.cli.commands.see import add_arguments
 from evolve.runs.output import say
 
 __all__ = ["SHELLS", "build_parser", "parse"]
@@ -231,22 +232,13 @@ def _add_products(commands: Commands) -> None:
             product.add_argument("--open", action="store_true", help="open the page in a browser")
         product.add_argument("--out", type=Path, metavar=out, help="output path (default: in the run directory)")
         _add_voice(product)
-    demo = _command(
-        commands, "demo", "demo.demo", "look at a finished run that ships with rhabdom: report, replay, EXR"
-    )
+    demo = _command(commands, "demo", "demo.demo", "look at a finished run: report, replay and EXR files")
     demo.add_argument(
         "--out", type=Path, metavar="DIR", default=Path("runs/demo"), help="output directory (default: runs/demo)"
     )
     demo.add_argument("--open", action="store_true", help="open the report in a browser")
     _add_voice(demo)
-    see = _command(commands, "see", "see.see", "show a photograph through an animal's eye")
-    see.add_argument("photograph", type=Path, metavar="FILE", help="opaque colour image, such as a JPEG or PNG file")
-    see.add_argument("--animal", required=True, metavar="NAME", help="animal, such as honeybee, goldfish or eagle")
-    angle = "angle that the width of the photograph covers in the visual field [degrees]"
-    see.add_argument("--width-deg", type=float, required=True, metavar="DEG", help=angle)
-    ultraviolet = "ultraviolet reflectance of white surfaces, which no photograph contains, 0 to 1 (default: 1)"
-    see.add_argument("--uv", type=float, default=1.0, metavar="SHARE", help=ultraviolet)
-    see.add_argument("--out", type=Path, default=Path(), metavar="DIR", help="output directory (default: this one)")
+    add_arguments(_command(commands, "see", "see.through_eye", "show a photograph through an animal's eye"))
 
 
 def _add_task(command: argparse.ArgumentParser) -> None:
