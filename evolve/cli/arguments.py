@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, NoReturn, TypeAlias
 
 from evolve.cli.argument_values import every, searches, seed
-from evolve.cli.commands.see import add_arguments
+from evolve.cli.photograph_arguments import add_photograph
 from evolve.runs.output import say
 
 __all__ = ["SHELLS", "build_parser", "parse"]
@@ -238,7 +238,7 @@ def _add_products(commands: Commands) -> None:
     )
     demo.add_argument("--open", action="store_true", help="open the report in a browser")
     _add_voice(demo)
-    add_arguments(_command(commands, "see", "see.through_eye", "show a photograph through an animal's eye"))
+    add_photograph(_command(commands, "see", "see.through_eye", "show a photograph through an animal's eye"))
 
 
 def _add_task(command: argparse.ArgumentParser) -> None:

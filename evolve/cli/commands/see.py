@@ -2,31 +2,18 @@
 
 from __future__ import annotations
 
-from argparse import ArgumentParser, Namespace
-from pathlib import Path
+from argparse import Namespace
 
+from evolve.cli.waiting import Waiting
+from evolve.config.run_config import ConfigError
 from evolve.runs.output import say
+from sim.pictures.photograph import read_photograph, see_photograph
 
-__all__ = ["add_arguments", "through_eye"]
-
-
-def add_arguments(command: ArgumentParser) -> None:
-    """Add the arguments of `evolve see`."""
-    command.add_argument("photograph", type=Path, metavar="FILE", help="opaque colour image, such as a JPEG file")
-    command.add_argument("--animal", required=True, metavar="NAME", help="animal, such as honeybee, goldfish or eagle")
-    angle = "angle that the width of the photograph covers in the visual field [degrees]"
-    command.add_argument("--width-deg", type=float, required=True, metavar="DEG", help=angle)
-    ultraviolet = "ultraviolet reflectance of white surfaces, which no photograph contains, 0 to 1 (default: 1)"
-    command.add_argument("--uv", type=float, default=1.0, metavar="SHARE", help=ultraviolet)
-    command.add_argument("--out", type=Path, default=Path(), metavar="DIR", help="output directory (default: this one)")
+__all__ = ["through_eye"]
 
 
 def through_eye(arguments: Namespace) -> int:
     """Write a PNG with the photograph and the animal's view, and an EXR with the signals. Print their paths."""
-    from evolve.cli.waiting import Waiting
-    from evolve.config.run_config import ConfigError
-    from sim.pictures.photograph import read_photograph, see_photograph
-
     animal, said = arguments.animal, f"signals of the receptors of a {arguments.animal}"
     try:
         photograph = read_photograph(arguments.photograph)

@@ -2,6 +2,7 @@
 
 main: test_main.py
 arguments: test_options.py, test_main.py
+photograph_arguments: test_see.py, test_options.py
 argument_values: store/test_sizes.py, report/test_gene_drift.py, interactive/test_run_products.py
 waiting: test_products.py
 notes: test_notes.py
