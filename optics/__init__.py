@@ -20,6 +20,7 @@ from importlib import import_module
 from typing import Any
 
 _CONTENTS = {
+    "AcceptanceFunction": "ommatidia.acceptance",
     "AccuracyError": "numerics.accuracy",
     "Annulus": "apertures.circular",
     "AppositionEye": "ommatidia.mosaic",
@@ -71,6 +72,7 @@ _CONTENTS = {
     "Waveguide": "ommatidia.waveguide",
     "WhitePSF": "point_spread.white",
     "Zernike": "elements.wavefront",
+    "acceptance_function": "ommatidia.acceptance",
     "anatomical_acuity": "eye.acuity",
     "difference": "apertures.combined",
     "encircled_energy": "point_spread.concentration",

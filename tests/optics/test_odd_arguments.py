@@ -90,6 +90,11 @@ SPECTRA = {
     "reflectance": {"name": "foliage"},
 }
 EYES = {
+    "acceptance_function": {
+        "ommatidium": optics.Ommatidium(optics.FacetLens(25e-6, 30e-6), optics.Waveguide(2e-6)),
+        "wavelengths": [500e-9, 550e-9],
+        "loss": 5e-3,
+    },
     "AppositionEye": {
         "ommatidium": optics.Ommatidium(optics.FacetLens(25e-6, 30e-6), optics.Waveguide(2e-6)),
         "rings": 1,
@@ -199,7 +204,17 @@ def test_masked_elements_are_refused(name):
 
 def test_nothing_of_the_face_is_forgotten():
     """Omitted names are results of optics itself, or take the same arguments as names that are tested here."""
-    made = {"AccuracyError", "BackendError", "MTF", "Mode", "PSFBatch", "PSFResult", "Plan", "PropagationResult"}
+    made = {
+        "AcceptanceFunction",
+        "AccuracyError",
+        "BackendError",
+        "MTF",
+        "Mode",
+        "PSFBatch",
+        "PSFResult",
+        "Plan",
+        "PropagationResult",
+    }
     made |= {
         "ExitPupil",
         "SpectralBands",
