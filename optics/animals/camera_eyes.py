@@ -121,8 +121,8 @@ def goldfish(receptors_across: int = 40, radius: float = 1.4e-3) -> Eye:
     Raises:
         ValueError: an argument outside its range.
     """
-    found = goldfish_lens(radius).exit_pupil(0.9 * radius)
-    return _patch(found.pupil, 60 / 26, found.distance, receptors_across, "goldfish")
+    lens = goldfish_lens(radius)
+    return _patch(lens.pupil(0.9 * radius), 60 / 26, lens.focal_length(), receptors_across, "goldfish")
 
 
 # Angle between receptors [minutes of arc], diameter of the lens [m], and focal length [m].

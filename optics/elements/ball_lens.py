@@ -10,7 +10,6 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from optics.elements.exit_pupil import ExitPupil
 from optics.elements.pupil import MIDDLE, Pupil
 from optics.elements.refractive_index import Dispersion, index_of
 from optics.elements.spherical_index import SphericalIndex, generalized_luneburg
@@ -132,11 +131,12 @@ class BallLens:
             raise ValueError(f"core_n = {self.core_n}: must make a lens that focuses parallel light")
         return self.radius / power
 
-    def exit_pupil(self, aperture_radius: float, wavelength: float = MIDDLE) -> ExitPupil:
+    def pupil(self, aperture_radius: float, wavelength: float = MIDDLE) -> Pupil:
         """Return the pupil through the centre of the lens, with the wavefront of parallel light behind the lens.
 
-        The wavefront refers to a sphere about the paraxial focus. The pupil's amplitude is uniform over its plane,
-        although rays farther from the axis are denser or sparser behind a thick lens.
+        The wavefront refers to a sphere about the paraxial focus, which is the default distance of a sensor. The
+        pupil's amplitude is uniform over its plane, although rays are denser or sparser towards the rim of a thick
+        lens.
 
         aperture_radius: largest distance [m] of parallel rays from the axis, below R.
         wavelength: vacuum wavelength [m]. The focal length of the pupil is that for this wavelength.
@@ -152,11 +152,9 @@ class BallLens:
         share = np.sqrt(weights * rho)  # samples count by the area of their rings
         basis = np.stack([mode(n, 0, rho, np.zeros_like(rho)) for n in orders], axis=1)
         found = np.linalg.lstsq(basis * share[:, None], ahead[:-1] * share, rcond=None)[0]
-        residual = float(np.sqrt(np.sum((share * (ahead[:-1] - basis @ found)) ** 2) / np.sum(share**2)))
         modes = {(n, 0): float(value) / UM for n, value in zip(orders, found, strict=True) if n}
         medium = float(index_of("medium_n", self.medium_n).at(wavelength))
-        pupil = Pupil(edge, medium_n=medium, thin_lens_focal_length=focal, wavefront=Zernike(modes, edge))
-        return ExitPupil(pupil, focal, float(np.sqrt(np.sum(found[1:] ** 2))), residual)
+        return Pupil(edge, medium_n=medium, thin_lens_focal_length=focal, wavefront=Zernike(modes, edge))
 
     def _wavefront(self, h: np.ndarray, focal: float, wavelength: float) -> tuple[np.ndarray, np.ndarray]:
         """Return the places [m] of rays on the pupil's plane, and the wavefront [m] there, for relative heights."""

@@ -37,7 +37,6 @@ from sim.exr.spectral_layout import (
 from sim.exr.view import View
 
 LAYOUT_VERSION = "1.0"
-UNITS = "W.m^-2.sr^-1"
 SCALE = "relative: a white Lambertian facing unit daylight has radiance D65, 1 at 560 nm"
 # Default limit on the unpacked size of a file's pixels [bytes]. Sixteen eyes of 128 x 128 receptors in 64 bands need a
 # fifteenth of it.
@@ -151,7 +150,7 @@ def _part(view: View, kind: str) -> tuple[str, dict[str, np.ndarray], dict[str, 
         rgb = preview_of_spectra(view.radiance, view.reflectance, nm) if view.rgb is None else view.rgb
         attributes = {"spectralLayoutVersion": LAYOUT_VERSION}
         if view.radiance is not None:
-            attributes |= {"emissiveUnits": UNITS, "radianceScale": SCALE}
+            attributes["radianceScale"] = SCALE
     else:
         assert view.receptors is not None
         planes = {f"receptor_{c}": plane for c, plane in enumerate(view.receptors)}
@@ -190,6 +189,7 @@ def _digest(name: str, channels: Mapping[str, np.ndarray], attributes: Mapping[s
     return digest.hexdigest()
 
 
+# Older files have the attribute emissiveUnits, too, which contradicts their scale.
 _OWN_ATTRIBUTES = ("spectralLayoutVersion", "emissiveUnits", "radianceScale", _HELD, "parts")
 
 

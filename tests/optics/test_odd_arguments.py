@@ -217,6 +217,8 @@ def test_nothing_of_the_face_is_forgotten():
     }
     made |= {
         "ExitPupil",
+        "ExitPupils",
+        "LensMTF",
         "SpectralBands",
         "StackResult",
         "VectorFocus",
@@ -233,7 +235,9 @@ def test_nothing_of_the_face_is_forgotten():
         "Grid",
         "Ommatidium",
         "white_psf",
+        "lens_mtf",
         "read_exit_pupil",
+        "read_exit_pupils",
         "require",
         "srgb_basis",  # has no argument
     }

@@ -58,6 +58,7 @@ OF_EYES = {
             "receptors": "honeybee",
             "full_aperture": 2e-5,
             "eccentricity_deg": (5.0, 0.0),
+            "most_seconds": NoEffect("it only refuses: test_kept_kernels"),
             "waveguide": Waveguide(2e-6),
             "microvilli": optics.Microvilli(),
             "pupil_turned": With(True, {"pupil": Pupil(**LENS, wavefront=Zernike({(3, 1): 0.2}))}),
