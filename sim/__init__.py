@@ -23,6 +23,7 @@ make_vec_env, make_env              environments of many worlds in one batch, or
                                     (or gymnasium.make("rhabdom/Detection-v0"), "rhabdom/Maze-v0" ...)
 register_task                       registration of a user task under a Gymnasium id
 View, write_exr, read_exr           images of eyes in EXR files
+read_photograph, see_photograph     a photograph through an animal's eye, as a ReceptorMosaic
 """
 
 from __future__ import annotations
@@ -48,6 +49,8 @@ if TYPE_CHECKING:
     from sim.physics.array_worlds import ArrayWorlds
     from sim.physics.physics import Physics
     from sim.physics.sliding_agents import SlidingAgents
+    from sim.pictures.photograph import read_photograph, see_photograph
+    from sim.pictures.receptor_mosaic import ReceptorMosaic
     from sim.render.batched_renderer import BatchedRenderer
     from sim.render.fidelity import Fidelity
     from sim.render.fidelity_choice import FidelityWarning
@@ -106,6 +109,9 @@ _HOME = {
     "View": "sim.exr.view",
     "read_exr": "sim.exr.files",
     "write_exr": "sim.exr.files",
+    "ReceptorMosaic": "sim.pictures.receptor_mosaic",
+    "read_photograph": "sim.pictures.photograph",
+    "see_photograph": "sim.pictures.photograph",
 }
 
 __all__ = [
@@ -128,6 +134,7 @@ __all__ = [
     "Outcome",
     "Physics",
     "Poses",
+    "ReceptorMosaic",
     "ReferenceRenderer",
     "RewardTerms",
     "SlidingAgents",
@@ -146,8 +153,10 @@ __all__ = [
     "make_vec_env",
     "mirror",
     "read_exr",
+    "read_photograph",
     "register_task",
     "ring",
+    "see_photograph",
     "whole_head",
     "write_exr",
 ]

@@ -36,7 +36,9 @@ class EyeConfig:
         0.02, Interval(1e-6, 1e3), "time over which a receptor sums photons [s]; used only if illuminance is above 0"
     )
     receptors: str = setting(
-        "rgb", None, "receptor types: rgb, lms, honeybee or goldfish; genes: from each animal's spectral genes"
+        "rgb",
+        None,
+        "receptor types: rgb, lms or an animal's, such as honeybee; genes: from each animal's spectral genes",
     )
     bands: int = setting(4, Interval(1, 64), "spectral bands")
     relief_height: float = setting(100e-6, Interval(0, 1e-2, open_low=True), "height of the relief at gene value 1 [m]")

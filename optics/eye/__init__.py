@@ -18,4 +18,5 @@ polarization          microvilli over a retina and polarised scenes
 signals               signals of a scene
 photoreceptor         throughput, spectral weighting, noise
 summary               table of an eye's limits
+acuity                limits by the spacing of receptors, diffraction and photons
 """

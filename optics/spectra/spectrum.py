@@ -27,6 +27,7 @@ __all__ = [
     "illuminant",
     "phytoplankton_absorption",
     "reflectance",
+    "srgb_basis",
     "water_absorption",
 ]
 
@@ -174,6 +175,19 @@ def reflectance(name: str) -> Spectrum:
     """
     one_of("reflectance", name, REFLECTANCES)
     return _spectrum(_table("reflectances.csv")[1][0], _columns("reflectances.csv")[name])
+
+
+def srgb_basis() -> tuple[Spectrum, Spectrum, Spectrum]:
+    """Return the reflectances of red, green and blue surfaces whose mixtures have all colours of sRGB in daylight.
+
+    A surface with the linear sRGB values (r, g, b) has the reflectance r red + g green + b blue. The three add up to 1.
+    Infinitely many other spectra have the same colours. The tables cover 380-780 nm, and values are constant below.
+
+    Source: Mallett & Yuksel (2019), Spectral primary decomposition for rendering with sRGB reflectance, EGSR.
+    """
+    nm, columns = _table("srgb_basis.csv")[1][0], _columns("srgb_basis.csv")
+    red, green, blue = (_spectrum(nm, columns[name]) for name in ("red", "green", "blue"))
+    return red, green, blue
 
 
 def cone_fundamentals() -> tuple[Spectrum, Spectrum, Spectrum]:

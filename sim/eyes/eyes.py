@@ -42,9 +42,10 @@ class Eyes:
     noise_sigma: standard deviation of a receptor's noise, in the unit of signals: white in full daylight behind a
         perfect lens gives 1
     bands: number of spectral bands, 1 to 64
-    receptors: receptor types: "rgb" (three channels), "lms" (human cones), "honeybee", "goldfish", peak wavelengths of
-        visual pigments [nm] such as (350, 440, 530), or an `optics.Receptors`, which can also describe a mosaic. The
-        attribute is always converted to optics.Receptors.
+    receptors: receptor types: "rgb" (three channels), "lms" (human cones), "honeybee", "goldfish", "mouse",
+        "fruit_fly", "blowfly", "dragonfly", "jumping_spider", peak wavelengths of visual pigments [nm] such as (350,
+        440, 530), or an `optics.Receptors`, which can also describe a mosaic. The attribute is always converted to
+        optics.Receptors.
     photon_budget: an optics.PhotonBudget, which defines the amount of light and the integration time of the receptors.
         The resulting shot noise is added to the noise of `noise_sigma`. None: unlimited light, without shot noise.
     waveguide: an optics.Waveguide: receptors are rhabdoms, which receive light in waveguide modes; this requires

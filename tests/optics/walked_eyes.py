@@ -116,6 +116,16 @@ OF_EYES = {
             "light_from": "centres",
         },
     ),
+    "anatomical_acuity": Walk(lambda **asked: optics.anatomical_acuity(1e11, 0.017, **asked), {"lattice": "square"}),
+    "ideal_contrast_sensitivity": Walk(
+        lambda **asked: optics.ideal_contrast_sensitivity(1.0, 0.5, 1e6, 1.0, **asked), {"d_prime": 2.0}
+    ),
+    "least_eye_parameter": Walk(lambda **asked: optics.least_eye_parameter(5e-7, **asked), {"lattice": "square"}),
+    "optical_sensitivity": Walk(
+        lambda **asked: optics.optical_sensitivity(2e-5, 5e-5, 2e-6, **asked),
+        {"length": 1e-4, "absorption": With(1e4, {"length": 1e-4}), "light": With("peak", {"length": 1e-4})},
+    ),
+    "sampling_acuity": Walk(lambda **asked: optics.sampling_acuity(1.0, **asked), {"lattice": "square"}),
     "PhotonBudget": Walk(
         lambda **given: looked(photon_budget=optics.PhotonBudget(**given)),
         {"illuminance": 100.0, "integration_time": 0.1, "quantum_efficiency": 0.1},

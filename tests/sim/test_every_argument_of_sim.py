@@ -33,6 +33,8 @@ PERFECT = {"resolution": (4, 4), "n_eyes": 1, "bands": 3, "fov_deg": 70.0}
 RAYS = Fidelity(2, bands=3)
 PUPIL = optics.Pupil(10e-6, thin_lens_focal_length=240e-6)
 EYE = optics.Eye(None, (4, 4), 70.0, bands=3)
+PHOTO = np.full((12, 16, 3), 0.5)
+MOSAIC = sim.ReceptorMosaic("mouse", np.linspace(0, 1, 24).reshape(2, 3, 4), (508.0, 360.0), 20.0, False)
 
 
 def rendered(mount=None, **given):
@@ -90,6 +92,12 @@ def written(tmp="view.exr", **given):
     view = sim.View("left", **{"wavelengths_nm": np.array([500.0]), "radiance": np.full((1, 2, 2), 0.5), **given})
     sim.write_exr(tmp, [view], **({} if aspect is None else {"pixel_aspect": aspect}))
     with open(tmp, "rb") as file:
+        return file.read().hex()
+
+
+def image_file(**given):
+    MOSAIC.write_png("mosaic.png", **given)
+    with open("mosaic.png", "rb") as file:
         return file.read().hex()
 
 
@@ -252,6 +260,12 @@ ON_MODELS = {
             "directions": With(np.ones((3, 2, 2)), {"receptors": np.ones((2, 2, 2))}),
         },
     ),
+    "see_photograph": Walk(
+        lambda progress=None, **given: sim.see_photograph(PHOTO, "mouse", 20.0, progress=progress, **given).signals,
+        {"uv": 0.0, "progress": NoEffect("sim/pictures/test_photograph.py: the calls of this function")},
+    ),
+    "ReceptorMosaic.image": Walk(MOSAIC.image, {"photograph": PHOTO, "height": 40}),
+    "ReceptorMosaic.write_png": Walk(image_file, {"photograph": PHOTO, "height": 40}),
     "write_exr": Walk(written, {"pixel_aspect": 2.0}),
     "read_exr": Walk(lambda **given: outcome(lambda: sim.read_exr("view.exr", **given)), {"most_bytes": 10}, {}),
 }
@@ -313,7 +327,17 @@ def test_the_table_names_every_optional_argument():
     assert missing(sim, TABLE) == []
 
 
-QUICK = ("View", "write_exr", "read_exr", "fan", "Course", "build_world")
+QUICK = (
+    "View",
+    "see_photograph",
+    "ReceptorMosaic.image",
+    "ReceptorMosaic.write_png",
+    "write_exr",
+    "read_exr",
+    "fan",
+    "Course",
+    "build_world",
+)
 
 
 @pytest.mark.parametrize(

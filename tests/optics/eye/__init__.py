@@ -1,5 +1,6 @@
 """Tests that fail when a module of optics/eye is broken.
 
+acuity: test_acuity.py
 band_choice: spectra/test_bands.py, test_sight_tolerance.py
 cell_integrals: test_cell_integrals.py
 eye: test_eye.py, test_kept_kernels.py, test_axes.py, test_eye_derivatives.py, test_eye_robustness.py
