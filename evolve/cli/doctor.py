@@ -28,12 +28,12 @@ PACKAGES = (
     "stable-baselines3",
     "safetensors",
     "nevergrad",
+    "cma",
     "OpenEXR",
     "matplotlib",
     "pillow",
     "rich",
     "shtab",
-    "scikit-image",
     "tomli-w",
     "pandas",
 )
