@@ -37,6 +37,7 @@ PACKAGES = (
     "pillow",
     "rich",
     "shtab",
+    "threadpoolctl",
     "tomli-w",
     "pandas",
 )

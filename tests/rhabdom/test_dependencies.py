@@ -44,7 +44,7 @@ def test_what_is_demanded_is_what_is_imported():
     needed = declared(PROJECT["dependencies"])
     modules = {MODULES.get(name, name) for name in needed}
     found = imported("rhabdom", "optics", "sim", "evolve")
-    assert THROUGH_OTHERS <= needed - found
+    assert needed - found >= THROUGH_OTHERS
     assert modules - THROUGH_OTHERS <= found
     assert found - modules <= {MODULES.get(name, name) for name in extras} | {"rerun"}
 
@@ -59,7 +59,8 @@ def test_optics_alone_runs_its_tutorial_on_three_packages():
     """The tutorial and the how-to pages that need only optics run with three packages. All other packages are refused,
     except dependencies of the three."""
     paths = [ROOT / "docs/tutorial/optics.md", *sorted((ROOT / "docs/how_to").glob("*.md"))]
-    pages = [page for page in (path.read_text() for path in paths) if not re.search(r"^from rhabdom import .*(sim|evolve)", page, re.M)]
+    more = re.compile(r"^from rhabdom import .*(sim|evolve)", re.MULTILINE)
+    pages = [page for page in (path.read_text() for path in paths) if not more.search(page)]
     blocks = re.findall(r"```python\n(.*?)```", "".join(pages), re.DOTALL)
     blocks = [block for block in blocks if not any(f"import {more}" in block for more in ("torch", "colour"))]
     assert len(blocks) > 20
