@@ -21,5 +21,6 @@ senses: test_task_vec_env.py, test_task_state.py, test_encounter.py
 eyes_of_kind: test_eyes_of_kind.py, test_eye_kinds.py, test_features.py
 renderers: test_features.py, test_light_levels.py, test_receptor_shapes.py
 held_state: test_task_state.py
+threads: test_threads.py
 world_pictures: test_task_vec_env.py, test_pictures.py, test_parallel_env.py
 """
