@@ -12,7 +12,8 @@ from scipy.ndimage import uniform_filter
 
 import optics
 import sim
-from evolve.analysis.statistics import eye_image_quality, polychromatic, psnr
+from evolve.analysis.statistics import psnr
+from evolve.analysis.white_light import WhiteLight, eye_image_quality
 from evolve.config.run_config import RunConfig
 from evolve.genome.phenotype import Phenotype
 from evolve.learning.animal_task import animal_task
@@ -46,13 +47,17 @@ class Vision:
 
 def vision(animal: Phenotype, config: RunConfig) -> Vision:
     """Return the measures of an animal's eyes in the run's task. If their optics cannot be computed, all are NaN."""
-    eyes = animal.eyes(config.eye)
+    eye = animal.eyes(config.eye).eye()
     try:
-        quality, contrast = eye_image_quality(animal, config.eye), _contrast(eyes.eye())
+        if eye.pupil is None:
+            quality, contrast = eye_image_quality(animal, config.eye), 1.0
+        else:
+            light = WhiteLight.from_eye(eye)
+            quality, contrast = light.image_quality, light.contrast
         seen, perfect = seen_and_perfect(animal, config)
     except optics.AccuracyError:
         return Vision(math.nan, math.nan, math.nan, math.nan)
-    gain = 1 / float(eyes.eye().white_signal)
+    gain = 1 / float(eye.white_signal)
     return Vision(quality, contrast, psnr(seen, perfect, gain), ssim(gain * seen, perfect))
 
 
@@ -99,11 +104,3 @@ def ssim(signals: Floats, reference: Floats) -> float:
     c1, c2 = 0.01**2, 0.03**2
     similarity = (2 * mean_x * mean_y + c1) * (2 * covariance + c2)
     return float(np.mean(similarity / ((mean_x**2 + mean_y**2 + c1) * (variances + c2))))
-
-
-def _contrast(eye: optics.Eye) -> float:
-    """Return the MTF at half the Nyquist frequency of the receptors; 1 for a perfect lens."""
-    if eye.pupil is None:
-        return 1.0
-    white = polychromatic(eye, eye.psf())
-    return float(optics.mtf(white).profile(np.array([1 / (4 * eye.receptor_pitch)]))[0, 0])

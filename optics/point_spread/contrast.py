@@ -121,7 +121,7 @@ def _transformed(seen: PSFResult, light: Array, causes: ErrorCauses) -> MTF:
 
 
 def image_quality(
-    result: PSFResult | Mixture,
+    result: PSFResult | Mixture | MTF,
     nyquist: float,
     throughput: Scalar = 1.0,
     noise_sigma: float = 0.0,
@@ -134,10 +134,11 @@ def image_quality(
 
     The noise floor σ / T rises as the pupil closes. Source: Tiwary, Young et al. (2025).
 
+    result: a PSF, or its MTF if this is known already.
     nyquist: Nyquist frequency of the retina, f_N = 1 / (2 receptor pitch) [1/m].
     throughput: T = a².
     noise_sigma: σ, in units of the signal.
-    tolerance: see `optics.mtf`.
+    tolerance: see `optics.mtf`. A known MTF has its own tolerance.
     with_error: True to return (value, predicted error), each (wavelength,).
 
     Raises:
@@ -150,7 +151,7 @@ def image_quality(
     in_range("throughput", throughput, 0, 1, carried=True)
     in_range("noise_sigma", noise_sigma, 0, 1e6)
     flag("with_error", with_error)
-    transfer = mtf(result, tolerance=tolerance)
+    transfer = result if isinstance(result, MTF) else mtf(result, tolerance=tolerance)
     waves = transfer.tensor.shape[0]
     if number(throughput) == 0:
         return (np.zeros(waves), np.zeros(waves)) if with_error else np.zeros(waves)

@@ -278,7 +278,6 @@ OF_PARTS = {
         for name in ("Annulus", "Circle", "Combined", "Polygon", "Rings", "Slit")
     },
     **{f"{name}.detail": Walk(bright, {"part": INTERNAL}) for name in ("HeightMap", "WavefrontMap", "Zernike")},
-    "PSFResult.recompute_on": Walk(bright, {"waves": INTERNAL}),
     "PSFResult": Walk(bright, dict.fromkeys(("centre", "requests", "shares", "field_parts"), SAME)),
     "MTF": Walk(bright, dict.fromkeys(("centre", "causes"), SAME)),
     "Plan": Walk(bright, dict.fromkeys(("seconds", "options", "padding", "scalar_error", "derivative_error"), SAME)),
