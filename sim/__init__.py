@@ -9,6 +9,7 @@ choose_fidelity, Fidelity           rendering accuracy, chosen to match the rece
 FidelityWarning                     warning that no level of fidelity is accurate enough
 ReferenceRenderer                   slow reference: Mitsuba's integrators and the convolution in `optics`
 ModelRenderer, Mount, Poses         eyes on any MuJoCo model; fan, ring and both_sides return several mounts
+CompoundEye                         ommatidia with any viewing directions; hexagonal_patch, whole_head
 choose_model_fidelity               rendering accuracy for eyes on a model
 Task                                a user task for a robot with eyes, written for one world at a time
 BatchTask                           a user task written for arrays of all worlds, which runs faster
@@ -42,8 +43,10 @@ if TYPE_CHECKING:
     from sim.envs.threads import set_threads
     from sim.exr.files import read_exr, write_exr
     from sim.exr.view import View
+    from sim.eyes.compound_eye import CompoundEye
     from sim.eyes.eyes import Eyes
     from sim.eyes.mounts import Mount, both_sides, fan, ring
+    from sim.eyes.viewing_directions import hexagonal_patch, whole_head
     from sim.physics.array_worlds import ArrayWorlds
     from sim.physics.physics import Physics
     from sim.physics.sliding_agents import SlidingAgents
@@ -65,6 +68,9 @@ if TYPE_CHECKING:
     from sim.worlds.world import World, build_world
 
 _HOME = {
+    "CompoundEye": "sim.eyes.compound_eye",
+    "hexagonal_patch": "sim.eyes.viewing_directions",
+    "whole_head": "sim.eyes.viewing_directions",
     "Eyes": "sim.eyes.eyes",
     "Course": "sim.worlds.course",
     "LayoutFamily": "sim.worlds.layout_family",
@@ -110,6 +116,7 @@ __all__ = [
     "ArrayWorlds",
     "BatchTask",
     "BatchedRenderer",
+    "CompoundEye",
     "Course",
     "Encounter",
     "Eyes",
@@ -136,6 +143,7 @@ __all__ = [
     "choose_fidelity",
     "choose_model_fidelity",
     "fan",
+    "hexagonal_patch",
     "make_env",
     "make_parallel_env",
     "make_vec_env",
@@ -144,6 +152,7 @@ __all__ = [
     "register_task",
     "ring",
     "set_threads",
+    "whole_head",
     "write_exr",
 ]
 

@@ -102,7 +102,7 @@ def relief_heights(pupil: optics.Pupil) -> tuple[np.ndarray, np.ndarray]:
     if pupil.height is None:
         heights = np.zeros(x.size)
     else:
-        heights = pupil.height.height(types.Float64(x), types.Float64(y), types).numpy()
+        heights = pupil.height.height(types.Float64(x), types.Float64(y)).numpy()
     shape = (PIXELS, PIXELS)
     return heights.reshape(shape), np.reshape(pupil.aperture.contains(x, y), shape)
 
@@ -132,7 +132,7 @@ def _psf(light: WhiteLight) -> Html:
         "<b>{}</b> of a distant point, all {} weighted by white daylight; logarithmic, "
         "{} decades. White square: one {}, {} µm wide. Least accurate band: {}, predicted error {}.",
         *(hint("psf", "Point spread function"), hint("bands"), DECADES, hint("receptor"), rounded(pitch)),
-        *(plan.method.replace("_", " "), f"{plan.predicted_error:.1g}"),
+        *(plan.method.replace("_", " "), f"{plan.predicted_error:.2g}"),
     )
     return figure(svg, caption)
 

@@ -12,9 +12,13 @@ zernike_order     numberings of Zernike polynomials: OSA, Noll, Fringe
 transmittance     GaussianMask, MaskMap
 human_eye         HumanEye, mean_human_mtf: published models
 exit_pupil        read_exit_pupil: lenses from other programs
+exit_pupils       read_exit_pupils: several fields and wavelengths
+converging_wave   rays and samples of other programs as a wave near its image
+pupil_rim         circle, ellipse or polygon around the samples of a pupil
 refractive_index  RefractiveIndex, Sellmeier, Cornu; media of eyes
 wavefront_slopes  directions of a wavefront's rays
 beam              light of one wavelength between source and sensor plane
 derivative_knots  cells in which derivatives by the samples of maps are polynomials
+torch_numbers     tensors of PyTorch in a pupil
 ray_field         polarised light along rays
 """

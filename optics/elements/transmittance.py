@@ -9,10 +9,10 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from optics.elements.relief import HeightMap
-from optics.elements.square_samples import square_samples
+from optics.elements.square_samples import map_samples
 from optics.numerics.arguments import positive, shown
+from optics.numerics.array_library import library, like
 from optics.numerics.autodiff import Array, Scalar, is_differentiable, number
-from optics.numerics.precision import Precision, opaque, padded_for_packets, precision
 
 __all__ = ["GaussianMask", "Mask", "MaskMap"]
 
@@ -24,8 +24,11 @@ class Mask(ABC):
     """Amplitude transmittance, between -1 and 1; its square is the intensity transmittance."""
 
     @abstractmethod
-    def amplitude(self, x: Array, y: Array, radius: Scalar, types: Precision) -> Array:
-        """Return the amplitude at points (x, y) [m] of a pupil of this radius [m], flat Dr.Jit Float64 arrays."""
+    def amplitude(self, x: Array, y: Array, radius: Scalar) -> Array:
+        """Return the amplitude at points (x, y) [m] of a pupil of this radius [m].
+
+        x, y: arrays of NumPy or PyTorch whose shapes broadcast, or flat Float64 arrays of Dr.Jit.
+        """
 
     @abstractmethod
     def bandwidth(self, level: float, radius: float) -> float:
@@ -61,7 +64,7 @@ class GaussianMask(Mask):
 
     At r = w the intensity is 1/e².
 
-    waist: w [m]; a Dr.Jit number may carry a derivative.
+    waist: w [m]; a number of Dr.Jit or PyTorch may carry a derivative.
 
     Raises:
         ValueError: not positive.
@@ -72,10 +75,9 @@ class GaussianMask(Mask):
     def __post_init__(self) -> None:
         positive("waist", self.waist, carried=True)
 
-    def amplitude(self, x: Array, y: Array, radius: Scalar, types: Precision) -> Array:
-        import drjit as dr
-
-        return dr.exp(-(x * x + y * y) / dr.square(opaque(types, self.waist)))
+    def amplitude(self, x: Array, y: Array, radius: Scalar) -> Array:
+        waist = like(x, self.waist)
+        return library(x).exp(-(x * x + y * y) / (waist * waist))
 
     def bandwidth(self, level: float, radius: float) -> float:
         """Return the frequency at which the mask's spectrum exp(-π²w²f²) has fallen to `level`."""
@@ -102,14 +104,14 @@ class MaskMap(Mask):
 
     The interpolation is that of HeightMap. For hard edges use apertures instead.
 
-    samples: (n, n), (y, x).
+    samples: (rows, columns), (y, x).
     reach: half side [m] of the square, at least the pupil's radius. None: equal to the pupil's radius.
 
-    A Dr.Jit tensor of samples carries derivatives.
+    A tensor of Dr.Jit or PyTorch carries derivatives.
 
     Raises:
-        ValueError: samples that are not square, empty or not finite; or an amplitude beyond [-1, 1]. The spline can
-            exceed this range at jumps of the samples.
+        ValueError: samples that have not two dimensions, or are empty or not finite; or an amplitude beyond [-1, 1].
+            The spline can exceed this range at jumps of the samples.
     """
 
     samples: np.ndarray | Array
@@ -117,7 +119,7 @@ class MaskMap(Mask):
     _map: HeightMap = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        values = square_samples(self.samples, "samples", "amplitudes")
+        values = map_samples(self.samples, "samples", "amplitudes")
         if np.abs(values).max() > 1 + 1e-9:
             raise ValueError(f"samples reach {shown(float(np.abs(values).max()))}: must be amplitudes in [-1, 1]")
         if self.reach is not None:
@@ -133,16 +135,13 @@ class MaskMap(Mask):
 
     def _most(self) -> float:
         """Largest amplitude of the mask within the circle."""
-        n = FINER * len(self._map._heights)
+        n = FINER * self._map.knots
         at = (np.arange(n) + 0.5) * 2 / n - 1
-        x, y = (padded_for_packets(axis[np.hypot(*np.meshgrid(at, at)) <= 1]) for axis in np.meshgrid(at, at))
-        types = precision("float64")
-        spline = HeightMap(self._map._heights)
-        return float(np.abs(spline.height(types.Float64(x), types.Float64(y), types).numpy()).max())
+        return float(np.abs(self._map.on_grid(at)[np.hypot(*np.meshgrid(at, at)) <= 1]).max())
 
-    def amplitude(self, x: Array, y: Array, radius: Scalar, types: Precision) -> Array:
-        scale = 1 / opaque(types, radius if self.reach is None else self.reach)
-        return self._map.height(x * scale, y * scale, types)
+    def amplitude(self, x: Array, y: Array, radius: Scalar) -> Array:
+        scale = 1 / like(x, radius if self.reach is None else self.reach)
+        return self._map.height(x * scale, y * scale)
 
     def on_grid(self, at: np.ndarray, radius: float) -> np.ndarray:
         """Return amplitudes (y, x) at positions along either axis, without derivatives.

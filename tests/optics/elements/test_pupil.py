@@ -15,7 +15,7 @@ X, Y = np.random.default_rng(0).uniform(-30e-6, 30e-6, (2, 50))
 
 
 def path(pupil, wavelength=550e-9):
-    return pupil.path(TYPES.Float64(X), TYPES.Float64(Y), wavelength, PointSource(), TYPES).numpy()
+    return pupil.path(TYPES.Float64(X), TYPES.Float64(Y), wavelength, PointSource()).numpy()
 
 
 @pytest.mark.parametrize("f", [100e-6, -100e-6])
@@ -26,7 +26,7 @@ def test_ideal_lens(f):
 
 def test_glass_of_height_h_adds_the_index_step_times_h():
     relief = BSplineRelief(np.random.default_rng(1).random((4, 4)) * 1e-5)
-    height = relief.height(TYPES.Float64(X / 30e-6), TYPES.Float64(Y / 30e-6), TYPES).numpy()
+    height = relief.height(TYPES.Float64(X / 30e-6), TYPES.Float64(Y / 30e-6)).numpy()
     np.testing.assert_allclose(path(Pupil(30e-6, relief, n=1.6, medium_n=1.25)), 0.35 * height, rtol=1e-12)
 
 
@@ -89,7 +89,7 @@ def test_slopes_of_a_lens_hold_out_to_the_rim_of_its_soft_edge():
         ({"aperture_radius": 1e-5, "n": 0.5}, r"n = 0\.5: must lie in \[1, 10\]"),
         ({"aperture_radius": 1e-5, "medium_n": 0.0}, "medium_n"),
         ({"aperture_radius": 1e-5, "thin_lens_focal_length": 0.0}, "thin_lens_focal_length"),
-        ({"aperture_radius": 1e-5, "height": np.zeros((2, 3))}, "height has shape"),
+        ({"aperture_radius": 1e-5, "height": np.zeros(3)}, "height has shape"),
         ({"aperture_radius": 1e-5, "height": np.full((4, 4), np.nan)}, "height holds NaN"),
         ({"aperture_radius": "20e-6"}, "aperture_radius = '20e-6': must be a number"),
         (
