@@ -43,6 +43,7 @@ _CONTENTS = {
     "MTF": "point_spread.modulation_transfer",
     "MaskMap": "elements.transmittance",
     "Microvilli": "point_spread.microvilli",
+    "Misaligned": "propagation.misalignment",
     "Mode": "ommatidia.waveguide",
     "Oblong": "apertures.shapes",
     "Ommatidium": "ommatidia.ommatidium",

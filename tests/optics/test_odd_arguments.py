@@ -49,6 +49,7 @@ ELEMENTS = {
     "HeightMap": {"samples": np.zeros((4, 4))},
     "HumanEye": {"aperture_radius": 1e-3, "wavefront": "standard_observer"},
     "MaskMap": {"samples": np.ones((4, 4)), "reach": 1e-4},
+    "Misaligned": {"pupil": LENS, "decentre": (1e-6, 0.0), "tilt": (1e-3, 0.0)},
     "PixelRelief": {"samples": np.zeros((4, 4))},
     "PointSource": {"distance": 1.0, "angle": (0.0, 0.0)},
     "Pupil": {

@@ -244,6 +244,10 @@ OF_PSFS = {
         lambda **given: through(u=U, dx=1e-6, elements=[FreeSpace(1e-4, **given)]),
         {"medium_n": 1.3},
     ),
+    "Misaligned": Walk(
+        lambda **given: through(elements=[optics.Misaligned(Pupil(**LENS), **given), FreeSpace(8e-5)], tolerance=0.05),
+        {"decentre": (1e-6, 0.0), "tilt": (0.05, 0.0)},
+    ),
     "Grid": Walk(lambda **given: Grid((3, 3), 1.0, **given).x, {"centre": (1.0, 0.0)}),
 }
 ERROR = {"with_error": True}

@@ -4,7 +4,7 @@ A lens is in focus at one distance of the sensor. A plate in front of it, a map 
 the share of the light on the middle 3 x 3 pixels becomes as equal and as large as possible at three distances. Each
 call of `optics.torch.psf` returns all nine PSFs, integrated over the pixels.
 
-    python examples/06_three_distances_in_torch.py
+    python examples/07_three_distances_in_torch.py
 """
 
 from __future__ import annotations
