@@ -13,7 +13,7 @@ import time
 
 import numpy as np
 
-import optics
+from rhabdom import optics
 
 WAVELENGTH, RADIUS = 550e-9, 0.3e-3
 FOCAL_LENGTHS, SPACINGS = (24e-3, -15e-3, 24e-3), (6e-3, 6e-3)

@@ -19,6 +19,7 @@ ommatidia_space        space of the signals of a compound eye
 auxiliary              depth, geom ids and optic flow in observations
 held_state             checks of stored states
 calls                  checks of the calls of all environments: their order, seeds and actions
+threads                set_threads: number of threads of the libraries
 one_environment        methods of a stable-baselines3 VecEnv that are the same for all worlds
 world_pictures         images of worlds for human viewers
 follow_camera          a camera behind the agent

@@ -163,7 +163,11 @@ class Eyes:
         return np.linspace(half, -half, self.n_eyes)
 
     def names(self) -> tuple[str, ...]:
-        """Return the labels of the eyes' views from left to right: ("left", "right") for two eyes."""
+        """Return the names of the eyes from left to right.
+
+        One eye is "center", two are "left" and "right", and three are "left", "center" and "right". More eyes are
+        numbered: "eye_0", "eye_1" and so on. Files, reports, cameras and recordings use these names.
+        """
         special = {1: ("center",), 2: ("left", "right"), 3: ("left", "center", "right")}
         return special.get(self.n_eyes, tuple(f"eye_{i}" for i in range(self.n_eyes)))
 

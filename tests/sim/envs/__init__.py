@@ -24,5 +24,6 @@ eyes_of_kind: test_receptors_in_time.py, test_eyes_of_kind.py, test_eye_kinds.py
 frame_choice: test_receptors_in_time.py
 renderers: test_features.py, test_light_levels.py, test_receptor_shapes.py
 held_state: test_task_state.py
+threads: test_threads.py
 world_pictures: test_task_vec_env.py, test_pictures.py, test_parallel_env.py
 """
