@@ -64,6 +64,7 @@ class Problem:
     differentiated: whether the PSF carries derivatives.
     knots: cells that derivatives by the samples of maps require; None if no such derivatives are requested.
     other_detail: `detail` without that of these maps.
+    mask_detail: bandwidth [1/m] of the amplitude of the mask.
     """
 
     aperture: Aperture
@@ -87,6 +88,7 @@ class Problem:
     differentiated: bool = False
     knots: DerivativeKnots | None = None
     other_detail: float = 0.0
+    mask_detail: float = 0.0
 
     @classmethod
     def from_beam(
@@ -276,6 +278,7 @@ def _problem(beam: Beam, window: Grid, tolerance: float, dtype: str, part: float
         tolerance=tolerance,
         dtype=dtype,
         masked=pupil.mask is not None,
+        mask_detail=0.0 if pupil.mask is None else pupil.mask.bandwidth(min(tolerance, 0.1), pupil.radius),
         medium_n=beam.index,
         spread=light_spread(pupil),
         even=on_axis and window.centre == (0.0, 0.0) and pupil.mirror_symmetric(wavelength),

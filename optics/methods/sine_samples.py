@@ -26,7 +26,7 @@ from optics.numerics.field import Field
 from optics.numerics.grid import Grid
 from optics.numerics.precision import Precision, opaque, padded_for_packets
 
-__all__ = ["SineSamples", "sine_samples"]
+__all__ = ["SineSamples", "evenly_in_sines", "sine_samples"]
 
 # Choice: largest ratio between the distances of samples in the pupil; above it, too many samples are necessary.
 MOST_STRETCH = 3.0
@@ -72,6 +72,17 @@ class SineSamples:
         """Return s - s₀ of points of the pupil [m]."""
         sx, sy = _sines(x, y, self.centre, self.distance)
         return sx - self._middle[0], sy - self._middle[1]
+
+    @cached_property
+    def points(self) -> tuple[np.ndarray, np.ndarray]:
+        """Points ξ (x, y) [m] of all samples, (y, x)."""
+        return self.points_at(*np.meshgrid(self.at, self.at))
+
+    def points_at(self, s: np.ndarray, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the points ξ (x, y) [m] of the pupil in the directions s - s₀."""
+        sx, sy = s + self._middle[0], t + self._middle[1]
+        slant = self.distance / np.sqrt(1 - np.minimum(sx * sx + sy * sy, self.steepest**2))
+        return sx * slant + self.centre[0], sy * slant + self.centre[1]
 
     def places(self, i: Array, j: Array, beam: Beam, types: Precision) -> tuple[Array, Array]:
         """Return ξ = c + z s/√(1 - s²) [m] of sample i along x and j along y, which are float64 indices."""
@@ -122,15 +133,22 @@ def _middle(centre: tuple[float, float], distance: float) -> tuple[float, float]
 
 
 def sine_samples(problem: Problem) -> SineSamples | None:
-    """Return the fewest samples that resolve the combined phase of pupil and path.
+    """Return the fewest samples that resolve the combined phase of pupil and path; see `evenly_in_sines`."""
+    edge = problem.soft_edge(problem.turning)
+    return evenly_in_sines(problem, edge, problem.turning + edge.stopband)
+
+
+def evenly_in_sines(problem: Problem, edge: PupilEdge, cycles: float, shift: float = 0.0) -> SineSamples | None:
+    """Return samples that resolve a number of cycles per metre of the pupil.
 
     The result is None if samples that are evenly spaced in sines are too uneven in the pupil, or if the grid would be
     too large.
 
     The distance of two points in the pupil is at most z/cos³θ times the distance of their sines. The number of cycles
     per unit of sine is therefore the number of cycles per metre times this factor.
+
+    shift: distance by which the grid is shifted along both axes, in units of its pitch, at most 1.
     """
-    edge = problem.soft_edge(problem.turning)
     angle = np.linspace(0, 2 * np.pi, RIM, endpoint=False)
     centre = problem.window.centre
     rim = _sines(edge.outermost * np.cos(angle), edge.outermost * np.sin(angle), centre, problem.distance)
@@ -139,9 +157,10 @@ def sine_samples(problem: Problem) -> SineSamples | None:
     stretch = (1 - steepest**2) ** -1.5
     if stretch > MOST_STRETCH * (1 - math.hypot(*middle) ** 2) ** -1.5:
         return None
-    pitch = 1 / (stretch * problem.distance * (problem.turning + edge.stopband))
+    pitch = 1 / (stretch * problem.distance * cycles)
     half = max(float(np.abs(at - middle_at).max()) for at, middle_at in zip(rim, middle, strict=True))
     if half / pitch > MOST_ACROSS:
         return None
-    grid = Grid.square(2 * math.ceil(half / pitch) + 1, pitch)
+    count = 2 * math.ceil(half / pitch + shift) + 1
+    grid = Grid((count, count), pitch, (shift * pitch, shift * pitch))
     return SineSamples(edge, grid, centre, problem.distance, steepest)

@@ -13,6 +13,7 @@ import numpy as np
 from optics.methods.geometric import NoDerivativesError
 from optics.methods.method_sampling import Sampling, WithField
 from optics.methods.problem import Problem
+from optics.methods.window_sampling import WindowSampling
 from optics.numerics.accuracy import FLOAT_NOISE, AccuracyError, Plan, above
 from optics.numerics.autodiff import Array
 from optics.numerics.field import Field
@@ -157,7 +158,10 @@ def _checked(attempt: _Attempt, asked: Request, tries: int) -> PSFPicture:
     """
     problem, tolerance = attempt.request.problem, asked.problem.tolerance
     image = attempt.image.numpy()
-    error = spot_check(attempt.request.beam, problem, image, attempt.sampling.seconds)
+    if isinstance(attempt.sampling, WindowSampling):
+        error = attempt.sampling.error(attempt.request.beam, problem, image)
+    else:
+        error = spot_check(attempt.request.beam, problem, image, attempt.sampling.seconds)
     if error is None:
         return attempt.stated(_predicted_error(image, attempt.sampling, problem))
     named = attempt.approximates and asked.method == attempt.plan.method

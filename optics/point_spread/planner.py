@@ -113,8 +113,8 @@ class Weighing:
 # Methods are compared in this order. For approximations, `asking` is three times the actual time (a choice), because
 # most of them turn out to be too inaccurate.
 WEIGHING = {
+    "low_rank": Weighing(0.0),
     "hankel": Weighing(CALL["hankel"]),
-    "low_rank": Weighing(CALL["low_rank"]),
     "rayleigh_sommerfeld": Weighing(CALL["rayleigh_sommerfeld"], 1 / PAIRS_PER_SECOND["float32"], 1e-4),
     "fresnel": Weighing(CALL["fresnel"] + DFT_CALL, 0.0, 3e-3),
     "fraunhofer": Weighing(CALL["fresnel"] + DFT_CALL, 0.0, 3e-3),

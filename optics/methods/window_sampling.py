@@ -1,0 +1,292 @@
+"""The method "low_rank" at coarse tolerances: as few samples of the pupil as the light in the window needs.
+
+Samples at the pitch Δs, in sines, repeat the light of the window with the period λ/Δs. The period must be half the
+width of the window, plus the distance from the middle within which nearly all light arrives. The light that is
+diffracted at the edge of the pupil spreads further. A soft edge keeps it out of the window, and the softer edge changes
+only light that is far from the geometrical rays of the edge, where there is little of it.
+
+All these are estimates. Every PSF is therefore compared, at a few points, with a sum over finer and shifted samples
+with a sharper edge and with the exact kernel, see `error`.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from optics.elements.beam import Beam
+from optics.methods.problem import Problem, PupilEdge
+from optics.methods.sine_samples import SineSamples, evenly_in_sines
+from optics.methods.slow_factor import RANKS, Path, fourier_kernel, slow_factor, uniform_rank
+from optics.methods.window_sums import WindowSums, intensity_of, recorded_intensity
+from optics.numerics.autodiff import Array
+from optics.numerics.grid import sample_positions
+from optics.numerics.interpolation import chebyshev_points, lagrange_basis
+from optics.numerics.precision import padded_for_packets, precision
+
+__all__ = ["WindowSampling", "window_sampling"]
+
+TIGHTEST = 3e-4  # choice: smallest tolerance at which this way of sampling saves time
+# Choices for the soft edge: ripple of its spectrum, and width of the passband relative to that of the whole spectrum.
+# tests/optics/methods/test_window_sampling.py compares the errors.
+RIPPLE, PASSBAND = 0.1, 0.35
+# Choices for the samples, in cycles per radius, at a tolerance of 0.01: light that is neglected, as a share of all
+# light; cycles for the edge; the same, relative to the cycles of the rays at the edge; exponent of the tolerance.
+NEGLECTED, EDGE_CYCLES, RIM_CYCLES, EXPONENT = 3e-4, 5.0, 2.0, -0.4
+RIM = 0.85  # choice, radii: rays farther out count as rays of the edge
+# Choices for derivatives by the samples of maps: cycles per cell between knots, and their growth per digit.
+CELL_CYCLES, CELL_DIGIT = 0.45, 0.35
+STEPS = 6  # choice: sampling densities per octave; equal densities share arrays
+FINER, SHIFT = 2.0 ** (2 / STEPS), (math.sqrt(5) - 1) / 2  # choices for the finer samples of the check
+RANK_SHARE = 0.3  # choice: part of the tolerance that the rank may take
+RAYS = 60  # choice: number of rays from which the rank is determined
+BLUR = 1.2  # choice, in λz/2R: distance from the end points of rays at which diffraction spreads their light
+MOST_RANK = 12  # choice: largest rank
+CAUTION = 3.0  # choice: safety factor on the estimated error; see test_window_sampling.py
+POINTS = 40  # choice: number of points of the check
+EVEN = 0.4  # choice: share of these points that is drawn evenly, and not by intensity
+INTERPOLATED = 0.02  # choice: error of the interpolated kernel of the check, relative to the tolerance
+ORDERS = (3, 4, 5, 6, 8, 10, 13, 16)  # choice: numbers of interpolation points across the pupil
+# Time [s]: per PSF, per sample of the pupil, per entry of the slow factor, and per multiplication.
+PER_PSF, PER_SAMPLE, PER_ENTRY, PER_PRODUCT = 6e-4, 3e-7, 1.5e-7, 2.5e-10
+MOST_ENTRIES = 4e6  # choice, limited by memory: largest number of entries of the slow factor
+
+
+@dataclass(frozen=True)
+class WindowSampling:
+    """Samples of the pupil, finer samples for the check, and the rank of the slow factor over the window.
+
+    half_width: distance [m] from the middle of the window within which the interpolation points lie.
+    """
+
+    pupil: SineSamples
+    finer: SineSamples
+    rank: int
+    half_width: float
+    seconds: float
+    bytes: float
+    method: str = "low_rank"
+    model_error: float = 0.0
+    padding: float = 1.0
+
+    def intensity(self, beam: Beam, problem: Problem) -> Array:
+        """Return |U|² over the window for unit amplitude at the pupil, a flat Dr.Jit array."""
+        types = precision(problem.dtype)
+        light = self.pupil.field(beam, types)
+        sums = _window_sums(self.pupil, self.rank, self.half_width, Path.from_problem(problem), problem.dtype)
+        if problem.differentiated:
+            return recorded_intensity(light, beam.distance, sums)
+        return types.Float(padded_for_packets(intensity_of(sums.field(light.numpy()))))
+
+    def plane(self, problem: Problem) -> float:
+        """Return the width [m] of the plane over which rounding errors spread light."""
+        return problem.wavelength / self.pupil.grid.dx
+
+    @property
+    def samples(self) -> tuple[int, int]:
+        return self.pupil.grid.shape
+
+    def error(self, beam: Beam, problem: Problem, image: np.ndarray) -> float | None:
+        """Return the relative L2 error of the intensity over the window, estimated at a few points.
+
+        The result is None for a window without light.
+
+        The reference is a sum over finer samples, whose grid is shifted and whose edge is sharper. Its kernel is exact:
+        at each point, the slow factor is interpolated over the pupil, and not over the window.
+
+        image: |U|² over the window, divided by the area of the pupil, flat.
+        """
+        import drjit as dr
+
+        total = float(np.sum(np.square(image, dtype=np.float64)))
+        if not total > 0:
+            return None
+        drawn, chance = _drawn(image.reshape(problem.window.shape))
+        row, column = np.divmod(drawn, problem.window.shape[1])
+        u, v = (
+            (at - count // 2) * problem.window.dx
+            for at, count in zip((column, row), problem.window.shape[::-1], strict=True)
+        )
+        with dr.suspend_grad():
+            light = self.finer.field(beam, precision(problem.dtype)).numpy()
+        exact = _at_points(self.finer, Path.from_problem(problem), light, u, v) / beam.pupil.area
+        squared = float(np.mean(np.square(image[drawn] - exact) / chance))
+        if squared > 0.01 * total:  # choice: the PSF may be too bright, and errors are relative to the exact one
+            total = min(total, float(np.mean(np.square(exact) / chance)))
+        rounding = float(np.finfo(precision(problem.dtype).dtype).eps)
+        return CAUTION * math.sqrt(squared / total) + rounding
+
+
+def window_sampling(problem: Problem) -> WindowSampling | None:
+    """Return the samples for a coarse tolerance. The result is None if the method is not suitable."""
+    fine = problem.tolerance < TIGHTEST or problem.reach is not None or math.isfinite(problem.widest_band)
+    if fine or problem.pixelated is not None:
+        return None
+    half = max(problem.window.own_half_width, problem.window.dx)
+    density = 2.0 ** (math.ceil(STEPS * math.log2(_density(problem, half)) - 1e-9) / STEPS)
+    pupil, finer = (_samples(problem, each, half, shift) for each, shift in ((density, 0.0), (FINER * density, SHIFT)))
+    if pupil is None or finer is None:
+        return None
+    rank = _rank(problem, pupil, half)
+    across, (height, width) = len(pupil.at), problem.window.shape
+    if rank is None or (rank * across) ** 2 > MOST_ENTRIES or len(finer.at) ** 2 > MOST_ENTRIES:
+        return None
+    inner = rank * across
+    products = inner * inner * width + height * inner * width
+    samples = across**2 + len(finer.at) ** 2
+    entries = 0 if rank == 1 else inner * inner
+    seconds = PER_PSF + samples * PER_SAMPLE + entries * PER_ENTRY + products * PER_PRODUCT
+    size = 16 * (4 * inner * inner + inner * (height + 2 * width) + samples)
+    return WindowSampling(pupil, finer, rank, half, seconds, size)
+
+
+def _density(problem: Problem, half: float) -> float:
+    """Return the number of samples per radius, which is also the number of cycles per radius that they resolve."""
+    radius, tolerance = problem.radius, problem.tolerance
+    along, outward = problem.slopes.to_window(problem.distance, problem.window.centre, problem.medium_n)
+    cycles = np.sort(along) * radius / (problem.wavelength * problem.medium_n)
+    share = NEGLECTED * min(tolerance / 0.01, 1.0) ** 2
+    reach = float(cycles[max(0, math.ceil(len(cycles) * (1 - share)) - 1)])
+    rim = float(np.median(along[outward > RIM])) * radius / (problem.wavelength * problem.medium_n)
+    window = half * radius / (problem.wavelength * problem.distance)
+    edge = (EDGE_CYCLES + RIM_CYCLES * rim) * (tolerance / 0.01) ** EXPONENT
+    cells = 0.0
+    if problem.knots is not None:
+        digits = max(0.0, -2 - math.log10(tolerance))
+        cells = (len(problem.knots.borders) - 1) * CELL_CYCLES * (1 + CELL_DIGIT * digits)
+    return window + reach + edge + problem.mask_detail * radius + cells
+
+
+def _samples(problem: Problem, density: float, half: float, shift: float) -> SineSamples | None:
+    """Return samples with a soft edge. Both are as sharp as the density allows."""
+    window = half * problem.radius / (problem.wavelength * problem.distance)
+    stopband = max(density - window / 2, density / 2)
+    edge = PupilEdge(problem.aperture.with_edge(PASSBAND * stopband, stopband, RIPPLE), problem.radius)
+    return evenly_in_sines(problem, edge, density / problem.radius, shift)
+
+
+def _rank(problem: Problem, pupil: SineSamples, half: float) -> int | None:
+    """Return the necessary rank.
+
+    It is sufficient for the end points of rays, around which the light is. Derivatives may change this light, so the
+    rank is then sufficient for all points. The Fourier kernel does not change with the distance of the window, so that
+    a derivative with respect to the distance needs at least linear interpolation.
+    """
+    if problem.differentiated:
+        rank = uniform_rank(problem, pupil, half, 1.0, MOST_RANK)
+        return rank and max(rank, 3)
+    path = Path.from_problem(problem)
+    xi, eta, u, v = problem.slopes.end_points(problem.distance, problem.window.centre, problem.medium_n, RAYS)
+    blur = BLUR * problem.wavelength * problem.distance / (2 * problem.radius)
+    u = np.clip(u + blur * np.sign(u), -half, half)
+    v = np.clip(v + blur * np.sign(v), -half, half)
+    s, t = pupil.directions(xi, eta)
+    exact = slow_factor(path, (xi, eta), (s, t), (u, v))
+    for rank in RANKS:
+        if rank > MOST_RANK:
+            return None
+        nodes = half * chebyshev_points(rank)
+        at = np.meshgrid(nodes, nodes)
+        known = slow_factor(path, (xi, eta), (s, t), (at[0][..., None], at[1][..., None]))
+        between = np.einsum("bj,aj,baj->j", lagrange_basis(v, nodes), lagrange_basis(u, nodes), known)
+        if 2 * math.sqrt(float(np.mean(np.square(np.abs(exact - between))))) < RANK_SHARE * problem.tolerance:
+            return rank
+    return None
+
+
+@lru_cache(maxsize=16)
+def _window_sums(pupil: SineSamples, rank: int, half: float, path: Path, dtype: str) -> WindowSums:
+    complex_dtype, nodes = precision(dtype).complex_dtype, half * chebyshev_points(rank)
+    column, row = pupil.at[None, :], pupil.at[:, None]
+    u, v = nodes[None, :, None, None], nodes[:, None, None, None]
+    x, y = u + path.window.centre[0], v + path.window.centre[1]
+    (xi, eta), z = pupil.points, path.distance
+    distance = np.sqrt((x - xi) ** 2 + (y - eta) ** 2 + z * z)
+    near = path.wavelength / (2 * np.pi * distance) - 1j
+    kernel = slow_factor(path, (xi, eta), (column, row), (u, v)) * near / (path.wavelength * z)
+
+    def by_distance() -> np.ndarray:
+        """Return the derivative of z/(λD²) (1/(kD) - i) e^{ik(D - ρ)} with respect to z."""
+        turns = 2j * np.pi / path.wavelength * (z / distance - z / np.sqrt(x * x + y * y + z * z))
+        near_by = -(near.real * z / distance**2) / near
+        return np.asarray(kernel * (1 / z - 2 * z / distance**2 + turns + near_by), complex_dtype)
+
+    down, across = (
+        fourier_kernel(sample_positions(count, path.window.dx), pupil.at / path.wavelength, nodes, dtype)
+        for count in path.window.shape
+    )
+    return WindowSums(kernel.astype(complex_dtype), down, across, by_distance)
+
+
+def _at_points(samples: SineSamples, path: Path, light: np.ndarray, u: np.ndarray, v: np.ndarray) -> np.ndarray:
+    """Return |U|² at points (u, v) [m], relative to the middle of the window.
+
+    The slow factor is interpolated from `order` x `order` points of the pupil, with weights L_a(ξ) and L_b(η):
+
+        U(u, v) = Σ_ba G(ξ_a, η_b; u, v)/G(ξ_a, η_b; 0, 0) Σ_ηξ L_b e^{-ik v t} P G(ξ, η; 0, 0) L_a e^{-ik u s}.
+    """
+    at, middle = samples.at, np.zeros(1)
+    order, nodes, ratio = _ratios(samples, path, u, v)
+    weight = lagrange_basis(at, nodes).T
+    across, down = (
+        (weight[None] * np.exp(-2j * np.pi / path.wavelength * np.outer(part, at))[:, :, None]) for part in (u, v)
+    )
+    xi, eta = samples.points
+    light = light * slow_factor(path, (xi, eta), (at[None, :], at[:, None]), (middle, middle))
+    size = len(at)
+    inner = light @ across.swapaxes(0, 1).reshape(size, -1)
+    sums = down.swapaxes(1, 2) @ inner.reshape(size, len(u), order).swapaxes(0, 1)
+    distance = np.sqrt((u + path.window.centre[0]) ** 2 + (v + path.window.centre[1]) ** 2 + path.distance**2)
+    near = 1 + (path.wavelength / (2 * np.pi * distance)) ** 2
+    found: np.ndarray = np.abs((ratio * sums).sum((1, 2))) ** 2 * near / (path.wavelength * path.distance) ** 2
+    return found
+
+
+def _ratios(
+    samples: SineSamples, path: Path, u: np.ndarray, v: np.ndarray
+) -> tuple[int, np.ndarray, np.ndarray]:
+    """Return the number and positions of interpolation points in sines, and the slow factor there, (point, b, a)."""
+    ends = samples.at[0], samples.at[-1]
+
+    def ratio(s: np.ndarray, t: np.ndarray) -> np.ndarray:
+        xi, eta = samples.points_at(s, t)
+        parts = [slow_factor(path, (xi, eta), (s, t), at) for at in ((u[:, None, None], v[:, None, None]), (0.0, 0.0))]
+        found: np.ndarray = parts[0] / parts[1]
+        return found
+
+    angle = 2 * np.pi * np.arange(12) / 12
+    s, t = samples.directions(*(samples.outermost * part[None, :] for part in (np.cos(angle), np.sin(angle))))
+    exact = ratio(s, t)[:, 0]
+    for order in ORDERS:
+        nodes = (ends[0] + ends[1]) / 2 + (ends[1] - ends[0]) / 2 * chebyshev_points(order)
+        found = ratio(*np.meshgrid(nodes, nodes))
+        between = np.einsum("bj,aj,kba->kj", lagrange_basis(t[0], nodes), lagrange_basis(s[0], nodes), found)
+        if np.abs(between - exact).max() < INTERPOLATED * 1e-2:
+            break
+    return order, nodes, found
+
+
+def _drawn(image: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the flat indices of POINTS samples, and the probability with which each was drawn.
+
+    A sample is drawn with a probability that is partly even and partly proportional to its intensity. If the amplitude
+    has the same error everywhere, the error of the intensity is proportional to the square root of the intensity. Rows
+    are drawn at even steps of the cumulative probability, and columns within them at steps of the golden ratio.
+    """
+    height, width = image.shape
+    points = min(POINTS, image.size)
+    if points == image.size:
+        return np.arange(points), np.full(points, 1 / points)
+    rows = image.sum(axis=1, dtype=np.float64)
+    chance = EVEN / height + (1 - EVEN) * rows / rows.sum()
+    levels = (np.arange(points) + 0.5) / points
+    row = np.searchsorted(np.cumsum(chance), levels * chance.sum()).clip(max=height - 1)
+    light = image[row] / rows[row][:, None].clip(1e-300)
+    within = EVEN / height / width + (1 - EVEN) * rows[row][:, None] / rows.sum() * light
+    steps = np.cumsum(within, axis=1)
+    place = (0.5 + np.arange(points) * SHIFT) % 1
+    column = (steps < (place * steps[:, -1])[:, None]).sum(axis=1).clip(max=width - 1)
+    return row * width + column, within[np.arange(points), column]
