@@ -12,11 +12,14 @@ with a sharper edge and with the exact kernel, see `error`.
 from __future__ import annotations
 
 import math
+from bisect import bisect
 from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 
+from optics.apertures.aperture import EDGE_REACH
+from optics.apertures.soft_edge import SoftEdge
 from optics.elements.beam import Beam
 from optics.methods.problem import Problem, PupilEdge
 from optics.methods.sine_samples import SineSamples, evenly_in_sines
@@ -30,12 +33,12 @@ from optics.numerics.precision import padded_for_packets, precision
 __all__ = ["WindowSampling", "window_sampling"]
 
 TIGHTEST = 3e-4  # choice: smallest tolerance at which this way of sampling saves time
-# Choices for the soft edge: ripple of its spectrum, and width of the passband relative to that of the whole spectrum.
-# tests/optics/methods/test_window_sampling.py compares the errors.
-RIPPLE, PASSBAND = 0.1, 0.35
+# Choices for the soft edge: ripple of its spectrum, of the samples and of the finer samples of the check, and width of
+# the passband relative to that of the whole spectrum.
+RIPPLES, PASSBAND = (0.03, 0.0075), 0.35
 # Choices for the samples, in cycles per radius, at a tolerance of 0.01: light that is neglected, as a share of all
 # light; cycles for the edge; the same, relative to the cycles of the rays at the edge; exponent of the tolerance.
-NEGLECTED, EDGE_CYCLES, RIM_CYCLES, EXPONENT = 3e-4, 5.0, 2.0, -0.4
+NEGLECTED, EDGE_CYCLES, RIM_CYCLES, EXPONENT = 3e-4, 4.0, 2.0, -0.4
 RIM = 0.85  # choice, radii: rays farther out count as rays of the edge
 # Choices for derivatives by the samples of maps: cycles per cell between knots, and their growth per digit.
 CELL_CYCLES, CELL_DIGIT = 0.45, 0.35
@@ -48,10 +51,11 @@ MOST_RANK = 12  # choice: largest rank
 CAUTION = 3.0  # choice: safety factor on the estimated error; see test_window_sampling.py
 POINTS = 40  # choice: number of points of the check
 EVEN = 0.4  # choice: share of these points that is drawn evenly, and not by intensity
-INTERPOLATED = 0.02  # choice: error of the interpolated kernel of the check, relative to the tolerance
-ORDERS = (3, 4, 5, 6, 8, 10, 13, 16)  # choice: numbers of interpolation points across the pupil
+INTERPOLATED = 2e-4  # choice: error of the interpolated kernel of the check
+# Choices: numbers of interpolation points across the pupil, and phases [rad] up to which the earlier ones may suffice.
+ORDERS, PHASES = (3, 5, 7, 9, 12, 16), (0.1, 0.6, 1.5, 3.0, 6.0)
 # Time [s]: per PSF, per sample of the pupil, per entry of the slow factor, and per multiplication.
-PER_PSF, PER_SAMPLE, PER_ENTRY, PER_PRODUCT = 6e-4, 3e-7, 1.5e-7, 2.5e-10
+PER_PSF, PER_SAMPLE, PER_ENTRY, PER_PRODUCT = 8e-4, 6e-8, 3e-8, 2.5e-10
 MOST_ENTRIES = 4e6  # choice, limited by memory: largest number of entries of the slow factor
 
 
@@ -127,7 +131,10 @@ def window_sampling(problem: Problem) -> WindowSampling | None:
         return None
     half = max(problem.window.own_half_width, problem.window.dx)
     density = 2.0 ** (math.ceil(STEPS * math.log2(_density(problem, half)) - 1e-9) / STEPS)
-    pupil, finer = (_samples(problem, each, half, shift) for each, shift in ((density, 0.0), (FINER * density, SHIFT)))
+    pupil, finer = (
+        _samples(problem, half, each, ripple, shift)
+        for each, ripple, shift in zip((density, FINER * density), RIPPLES, (0.0, SHIFT), strict=True)
+    )
     if pupil is None or finer is None:
         return None
     rank = _rank(problem, pupil, half)
@@ -157,14 +164,16 @@ def _density(problem: Problem, half: float) -> float:
     if problem.knots is not None:
         digits = max(0.0, -2 - math.log10(tolerance))
         cells = (len(problem.knots.borders) - 1) * CELL_CYCLES * (1 + CELL_DIGIT * digits)
-    return window + reach + edge + problem.mask_detail * radius + cells
+    # The soft edge must not extend beyond EDGE_REACH, and its width is inversely proportional to the stopband.
+    widest = SoftEdge(PASSBAND, 1.0, RIPPLES[1]).reach / EDGE_REACH
+    return max(window + reach + edge + problem.mask_detail * radius + cells, widest + window / 2)
 
 
-def _samples(problem: Problem, density: float, half: float, shift: float) -> SineSamples | None:
-    """Return samples with a soft edge. Both are as sharp as the density allows."""
+def _samples(problem: Problem, half: float, density: float, ripple: float, shift: float) -> SineSamples | None:
+    """Return samples with a soft edge, which is as sharp as the density allows."""
     window = half * problem.radius / (problem.wavelength * problem.distance)
     stopband = max(density - window / 2, density / 2)
-    edge = PupilEdge(problem.aperture.with_edge(PASSBAND * stopband, stopband, RIPPLE), problem.radius)
+    edge = PupilEdge(problem.aperture.with_edge(PASSBAND * stopband, stopband, ripple), problem.radius)
     return evenly_in_sines(problem, edge, density / problem.radius, shift)
 
 
@@ -191,7 +200,7 @@ def _rank(problem: Problem, pupil: SineSamples, half: float) -> int | None:
         nodes = half * chebyshev_points(rank)
         at = np.meshgrid(nodes, nodes)
         known = slow_factor(path, (xi, eta), (s, t), (at[0][..., None], at[1][..., None]))
-        between = np.einsum("bj,aj,baj->j", lagrange_basis(v, nodes), lagrange_basis(u, nodes), known)
+        between = (lagrange_basis(v, nodes)[:, None] * lagrange_basis(u, nodes) * known).sum((0, 1))
         if 2 * math.sqrt(float(np.mean(np.square(np.abs(exact - between))))) < RANK_SHARE * problem.tolerance:
             return rank
     return None
@@ -224,49 +233,64 @@ def _window_sums(pupil: SineSamples, rank: int, half: float, path: Path, dtype: 
 def _at_points(samples: SineSamples, path: Path, light: np.ndarray, u: np.ndarray, v: np.ndarray) -> np.ndarray:
     """Return |U|² at points (u, v) [m], relative to the middle of the window.
 
-    The slow factor is interpolated from `order` x `order` points of the pupil, with weights L_a(ξ) and L_b(η):
+    The slow factor is interpolated from a few points (ξ_a, η_b) of the pupil, with weights L_a and L_b:
 
         U(u, v) = Σ_ba G(ξ_a, η_b; u, v)/G(ξ_a, η_b; 0, 0) Σ_ηξ L_b e^{-ik v t} P G(ξ, η; 0, 0) L_a e^{-ik u s}.
     """
-    at, middle = samples.at, np.zeros(1)
-    order, nodes, ratio = _ratios(samples, path, u, v)
-    weight = lagrange_basis(at, nodes).T
-    across, down = (
-        (weight[None] * np.exp(-2j * np.pi / path.wavelength * np.outer(part, at))[:, :, None]) for part in (u, v)
-    )
-    xi, eta = samples.points
-    light = light * slow_factor(path, (xi, eta), (at[None, :], at[:, None]), (middle, middle))
-    size = len(at)
-    inner = light @ across.swapaxes(0, 1).reshape(size, -1)
-    sums = down.swapaxes(1, 2) @ inner.reshape(size, len(u), order).swapaxes(0, 1)
+    size, at = len(samples.at), samples.at
+    nodes, ratio = _ratios(samples, path, u, v)
+    weight, across, down = lagrange_basis(at, nodes).T, _turned(path, u, at), _turned(path, v, at)
+    inner = (light * _in_middle(samples, path)) @ (across.T[:, :, None] * weight[:, None, :]).reshape(size, -1)
+    down = (down[:, :, None] * weight).swapaxes(1, 2)
+    sums = down @ inner.reshape(size, len(u), len(nodes)).swapaxes(0, 1)
     distance = np.sqrt((u + path.window.centre[0]) ** 2 + (v + path.window.centre[1]) ** 2 + path.distance**2)
     near = 1 + (path.wavelength / (2 * np.pi * distance)) ** 2
     found: np.ndarray = np.abs((ratio * sums).sum((1, 2))) ** 2 * near / (path.wavelength * path.distance) ** 2
     return found
 
 
-def _ratios(
-    samples: SineSamples, path: Path, u: np.ndarray, v: np.ndarray
-) -> tuple[int, np.ndarray, np.ndarray]:
-    """Return the number and positions of interpolation points in sines, and the slow factor there, (point, b, a)."""
-    ends = samples.at[0], samples.at[-1]
+@lru_cache(maxsize=16)
+def _in_middle(samples: SineSamples, path: Path) -> np.ndarray:
+    """Return the slow factor of all samples for the middle of the window, (y, x)."""
+    middle = np.zeros(1), np.zeros(1)
+    return slow_factor(path, samples.points, (samples.at[None, :], samples.at[:, None]), middle)
+
+
+def _turned(path: Path, place: np.ndarray, sines: np.ndarray) -> np.ndarray:
+    """Return e^{-ik u s}, (place, sine)."""
+    angle = np.outer(place, sines * (-2 * np.pi / path.wavelength))
+    found = np.empty(angle.shape, complex)
+    found.real, found.imag = np.cos(angle), np.sin(angle)
+    return found
+
+
+def _ratios(samples: SineSamples, path: Path, u: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return interpolation points in sines, and the slow factor there relative to the middle, (point, b, a).
+
+    The interpolation is compared with the factor at the rim. It starts with a number of points that is usually
+    sufficient for the phase at the rim.
+    """
 
     def ratio(s: np.ndarray, t: np.ndarray) -> np.ndarray:
-        xi, eta = samples.points_at(s, t)
-        parts = [slow_factor(path, (xi, eta), (s, t), at) for at in ((u[:, None, None], v[:, None, None]), (0.0, 0.0))]
-        found: np.ndarray = parts[0] / parts[1]
+        points = samples.points_at(s, t)
+        here, middle = (
+            slow_factor(path, points, (s, t), at) for at in ((u[:, None, None], v[:, None, None]), (0.0, 0.0))
+        )
+        found: np.ndarray = here / middle
         return found
 
     angle = 2 * np.pi * np.arange(12) / 12
-    s, t = samples.directions(*(samples.outermost * part[None, :] for part in (np.cos(angle), np.sin(angle))))
+    s, t = samples.directions(samples.outermost * np.cos(angle), samples.outermost * np.sin(angle))
     exact = ratio(s, t)[:, 0]
-    for order in ORDERS:
-        nodes = (ends[0] + ends[1]) / 2 + (ends[1] - ends[0]) / 2 * chebyshev_points(order)
+    phase = float(np.abs(np.angle(exact)).max())
+    for order in ORDERS[bisect(PHASES, phase) :]:
+        nodes = (at := samples.at[[0, -1]]).mean() + (at[1] - at[0]) / 2 * chebyshev_points(order)
         found = ratio(*np.meshgrid(nodes, nodes))
-        between = np.einsum("bj,aj,kba->kj", lagrange_basis(t[0], nodes), lagrange_basis(s[0], nodes), found)
-        if np.abs(between - exact).max() < INTERPOLATED * 1e-2:
+        weight = lagrange_basis(s, nodes)[:, None] * lagrange_basis(t, nodes)
+        between = found.swapaxes(1, 2).reshape(len(u), -1) @ weight.reshape(order * order, -1)
+        if np.abs(between - exact).max() < INTERPOLATED:
             break
-    return order, nodes, found
+    return nodes, found
 
 
 def _drawn(image: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

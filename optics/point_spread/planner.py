@@ -114,8 +114,8 @@ class Weighing:
 # most of them turn out to be too inaccurate.
 WEIGHING = {
     "low_rank": Weighing(0.0),
-    "hankel": Weighing(CALL["hankel"]),
-    "rayleigh_sommerfeld": Weighing(CALL["rayleigh_sommerfeld"], 1 / PAIRS_PER_SECOND["float32"], 1e-4),
+    "hankel": Weighing(CALL["hankel"], 0.0, 1e-3),
+    "rayleigh_sommerfeld": Weighing(CALL["rayleigh_sommerfeld"], 1 / PAIRS_PER_SECOND["float32"], 1e-3),
     "fresnel": Weighing(CALL["fresnel"] + DFT_CALL, 0.0, 3e-3),
     "fraunhofer": Weighing(CALL["fresnel"] + DFT_CALL, 0.0, 3e-3),
     "geometric": Weighing(CALL["geometric"], 0.0, 3e-3),
