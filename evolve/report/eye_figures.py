@@ -123,7 +123,7 @@ def relief_heights(pupil: optics.Pupil) -> tuple[np.ndarray, np.ndarray]:
     if pupil.height is None:
         heights = np.zeros(x.size)
     else:
-        heights = pupil.height.height(types.Float64(x), types.Float64(y), types).numpy()
+        heights = pupil.height.height(types.Float64(x), types.Float64(y)).numpy()
     shape = (PIXELS, PIXELS)
     return heights.reshape(shape), np.reshape(pupil.aperture.contains(x, y), shape)
 

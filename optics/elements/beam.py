@@ -8,6 +8,7 @@ from optics.apertures.aperture import SoftAperture
 from optics.elements.pupil import Pupil
 from optics.elements.source import PointSource
 from optics.numerics.arguments import of_kind
+from optics.numerics.array_library import like
 from optics.numerics.autodiff import Array, Scalar
 from optics.numerics.field import Field
 from optics.numerics.grid import Grid
@@ -41,9 +42,9 @@ class Beam:
         """Refractive index of the medium behind the pupil."""
         return self.pupil.index_behind(self.wavelength)
 
-    def waves(self, x: Array, y: Array, types: Precision) -> Array:
-        """Return the optical path at points of the pupil, in wavelengths, as float64."""
-        return self.pupil.path(x, y, self.wavelength, self.source, types) * opaque(types, 1 / self.wavelength)
+    def waves(self, x: Array, y: Array) -> Array:
+        """Return the optical path at points (x, y) [m] of the pupil, in wavelengths. Arrays: see `Relief.height`."""
+        return self.pupil.path(x, y, self.wavelength, self.source) * like(x, 1 / self.wavelength)
 
     def behind(self, soft: SoftAperture, grid: Grid, types: Precision) -> Field:
         """Return the field just behind the pupil on a grid [m]. The aperture's edge is softened."""
@@ -54,5 +55,5 @@ class Beam:
         scale = 1 / opaque(types, self.radius)
         size = soft.transmittance(x * scale, y * scale, types)
         if self.pupil.mask is not None:
-            size *= self.pupil.amplitude(x * scale, y * scale, types)
-        return Field.from_waves(size, self.waves(x, y, types), grid, types)
+            size *= self.pupil.amplitude(x * scale, y * scale)
+        return Field.from_waves(size, self.waves(x, y), grid, types)

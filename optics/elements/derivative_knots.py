@@ -72,6 +72,7 @@ def carries_derivatives(beam: Beam) -> bool:
     """Return whether any number of the light carries a derivative."""
     pupil = beam.pupil
     numbers: list[Any] = [pupil.aperture_radius, pupil.thin_lens_focal_length, beam.distance, beam.source.distance]
+    numbers += beam.source.angle
     numbers += [pupil.mask.waist] if isinstance(pupil.mask, GaussianMask) else []
     numbers += [pupil.mask.samples] if isinstance(pupil.mask, MaskMap) else []
     numbers += [pupil.wavefront.samples] if isinstance(pupil.wavefront, WavefrontMap) else []
@@ -122,4 +123,4 @@ def _relief_carries(relief: Relief | None) -> bool:
     if hasattr(relief, "samples"):
         return carries_derivative(relief.samples)
     types = precision("float64")
-    return carries_derivative(relief.height(types.Float64(0), types.Float64(0), types))
+    return carries_derivative(relief.height(types.Float64(0), types.Float64(0)))

@@ -10,8 +10,8 @@ import numpy as np
 from optics.apertures.aperture import Aperture
 from optics.elements.relief import Relief
 from optics.elements.square_samples import square_samples
+from optics.numerics.array_library import gather, indices, library, like
 from optics.numerics.autodiff import Array, is_differentiable
-from optics.numerics.precision import Precision, padded_for_packets
 
 __all__ = ["PixelRelief"]
 
@@ -40,13 +40,10 @@ class PixelRelief(Relief):
         if not is_differentiable(self.samples):
             object.__setattr__(self, "samples", heights)
 
-    def height(self, x: Array, y: Array, types: Precision) -> Array:
-        import drjit as dr
-
-        n = len(self._heights)
-        known = dr.ravel(self.samples) if is_differentiable(self.samples) else padded_for_packets(self._heights)
-        column, row = (dr.clip(dr.floor((place + 1) * (n / 2)), 0, n - 1) for place in (x, y))
-        return dr.gather(types.Float64, types.Float64(known), types.Index(row * n + column))
+    def height(self, x: Array, y: Array) -> Array:
+        own, n = library(x), len(self._heights)
+        column, row = (own.clip(own.floor((place + 1) * (n / 2)), 0, n - 1) for place in (x, y))
+        return gather(like(x, self.samples), indices(row * n + column))
 
     @property
     def span(self) -> float:

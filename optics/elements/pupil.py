@@ -19,9 +19,10 @@ from optics.elements.transmittance import Mask
 from optics.elements.wavefront import Aberration
 from optics.elements.wavefront_slopes import Slopes, _derivative
 from optics.numerics.arguments import finite, of_kind, positive, reals
+from optics.numerics.array_library import library, like
 from optics.numerics.autodiff import Array, Scalar, is_differentiable, number
 from optics.numerics.grid import Grid
-from optics.numerics.precision import Precision, opaque, precision
+from optics.numerics.precision import precision
 
 __all__ = ["MIDDLE", "Pupil"]
 
@@ -138,15 +139,15 @@ class Pupil:
 
         types = precision("float64")
         nodes = self.aperture.nodes(2 * self.mask.bandwidth(LEVEL, self.radius) * self.radius, TRANSMISSION_DIGITS)
-        amplitude = self.amplitude(types.Float64(nodes.x), types.Float64(nodes.y), types)
+        amplitude = self.amplitude(types.Float64(nodes.x), types.Float64(nodes.y))
         return dr.sum(types.Float64(nodes.weight) * dr.square(amplitude)) / self.aperture.area
 
-    def amplitude(self, x: Array, y: Array, types: Precision) -> Array:
-        """Return the amplitude that the mask transmits at points in units of R."""
+    def amplitude(self, x: Array, y: Array) -> Array:
+        """Return the amplitude that the mask transmits at points in units of R. Arrays: see `Relief.height`."""
         if self.mask is None:
-            return types.Float64(1)
-        radius = opaque(types, self.aperture_radius)
-        return self.mask.amplitude(x * radius, y * radius, self.aperture_radius, types)
+            return like(x, 1.0)
+        radius = like(x, self.aperture_radius)
+        return self.mask.amplitude(x * radius, y * radius, self.aperture_radius)
 
     @property
     def pixels(self) -> int:
@@ -221,23 +222,21 @@ class Pupil:
         mask_is = self.mask is None or self.mask.rotationally_symmetric
         return self.aperture.mirror_symmetric and relief_is and wavefront_is and mask_is
 
-    def path(self, x: Array, y: Array, wavelength: float, source: PointSource, types: Precision) -> Array:
-        """Return the optical path [m] from the source through the pupil at points (x, y) [m], flat float64 arrays."""
-        import drjit as dr
-
-        total = source.path(x, y, types) * opaque(types, self.index_before(wavelength))
+    def path(self, x: Array, y: Array, wavelength: float, source: PointSource) -> Array:
+        """Return the optical path [m] from the source through the pupil at points (x, y) [m]; see `Relief.height`."""
+        total = source.path(x, y) * like(x, self.index_before(wavelength))
         if self.thin_lens_focal_length is not None:
-            f = opaque(types, self.thin_lens_focal_length)
+            f, own = like(x, self.thin_lens_focal_length), library(x)
             r2 = x * x + y * y
-            bent = r2 / (dr.sqrt(r2 + f * f) + dr.abs(f)) * dr.sign(f)
-            total -= bent * opaque(types, self.index_behind(wavelength))
+            bent = r2 / (own.sqrt(r2 + f * f) + own.abs(f)) * own.sign(f)
+            total = total - bent * like(x, self.index_behind(wavelength))
         if self.bends(wavelength):
-            scale = 1 / opaque(types, self.aperture_radius)
-            total += opaque(types, self.index_step(wavelength)) * self.height.height(x * scale, y * scale, types)
+            scale = 1 / like(x, self.aperture_radius)
+            total = total + like(x, self.index_step(wavelength)) * self.height.height(x * scale, y * scale)
         if self.wavefront is not None:
             own = self.aperture_radius if self.wavefront.radius is None else self.wavefront.radius
-            scale = 1 / opaque(types, own)
-            total -= self.wavefront.ahead(x * scale, y * scale, types)
+            scale = 1 / like(x, own)
+            total = total - self.wavefront.ahead(x * scale, y * scale)
         return total
 
     def slopes(self, wavelength: float, source: PointSource) -> Slopes:
@@ -245,7 +244,7 @@ class Pupil:
         # The path depends on the wavelength only through these indices. Equal indices therefore give equal slopes.
         indices = number(self.index_step(wavelength)), self.index_before(wavelength), self.index_behind(wavelength)
         same = self._first_with.setdefault(indices, wavelength)
-        return _slopes(self._level if self.pixels else self, same, number(source.distance), source.angle)
+        return _slopes(self._level if self.pixels else self, same, number(source.distance), source.plain.angle)
 
     @cached_property
     def _first_with(self) -> dict[tuple[float, float, float], float]:
@@ -296,5 +295,5 @@ def _slopes(pupil: Pupil, wavelength: float, distance: float, angle: tuple[float
     n = int(min(1025, max(65 if pieces else 33, 4 * pieces + 1)))
     grid = Grid.square(n, 2 * (1 + EDGE_REACH) * pupil.radius / (n - 1))
     x, y = grid.coordinates(types)
-    path = pupil.path(x, y, wavelength, PointSource(distance, angle), types).numpy().reshape(grid.shape)
+    path = pupil.path(x, y, wavelength, PointSource(distance, angle)).numpy().reshape(grid.shape)
     return Slopes(grid, _derivative(path.T, grid.dx).T, _derivative(path, grid.dx), pupil.radius)

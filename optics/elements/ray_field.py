@@ -15,8 +15,8 @@ from optics.elements.beam import Beam
 from optics.elements.pupil import Pupil
 from optics.elements.source import PointSource
 from optics.elements.transmittance import Mask
+from optics.numerics.array_library import library, like
 from optics.numerics.autodiff import Array, Scalar, number
-from optics.numerics.precision import Precision, opaque
 
 __all__ = ["SCALAR", "RayField", "Vector", "Weights", "before_pupil", "rays_behind", "turned"]
 
@@ -47,22 +47,21 @@ def before_pupil(source: PointSource, axis: int) -> tuple[Vector, Vector]:
     return along, turned((1.0 - axis, 0.0 + axis, 0.0), (0.0, 0.0, 1.0), along)
 
 
-def rays_behind(beam: Beam, x: Array, y: Array, types: Precision) -> Vector:
-    """Return the directions of rays that leave the pupil at points (x, y) [m]: unit vectors of float64 arrays.
+def rays_behind(beam: Beam, x: Array, y: Array) -> Vector:
+    """Return the directions of rays that leave the pupil at points (x, y) [m]: unit vectors of arrays like x.
 
     The z component is 0 for evanescent light.
     """
-    import drjit as dr
-
     radius, bare = beam.pupil.radius, replace(beam.pupil, mask=None)
-    step, per = opaque(types, STEP * radius), opaque(types, 1 / (2 * STEP * radius * beam.index))
+    step, per = like(x, STEP * radius), like(x, 1 / (2 * STEP * radius * beam.index))
 
     def path(x: Array, y: Array) -> Array:
-        return bare.path(x, y, beam.wavelength, beam.source, types)
+        return bare.path(x, y, beam.wavelength, beam.source)
 
     along_x = (path(x + step, y) - path(x - step, y)) * per
     along_y = (path(x, y + step) - path(x, y - step)) * per
-    return along_x, along_y, dr.sqrt(dr.maximum(1 - along_x * along_x - along_y * along_y, 0))
+    own = library(x)
+    return along_x, along_y, own.sqrt(own.maximum(1 - along_x * along_x - along_y * along_y, like(x, 0.0)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,16 +88,16 @@ class RayField(Mask):
         """The pupil with this mask."""
         return replace(self.beam.pupil, mask=self)
 
-    def amplitude(self, x: Array, y: Array, radius: Scalar, types: Precision) -> Array:
+    def amplitude(self, x: Array, y: Array, radius: Scalar) -> Array:
         along, before = (
-            tuple(opaque(types, part) for part in vector) for vector in before_pupil(self.beam.source, self.axis)
+            tuple(like(x, part) for part in vector) for vector in before_pupil(self.beam.source, self.axis)
         )
-        ex, ey, _ = turned(before, along, rays_behind(self.beam, x, y, types))
-        per = 1 / opaque(types, radius)
-        one, of_x, of_xx, of_y, of_yy = (opaque(types, weight) for weight in self.weights)
+        ex, ey, _ = turned(before, along, rays_behind(self.beam, x, y))
+        per = 1 / like(x, radius)
+        one, of_x, of_xx, of_y, of_yy = (like(x, weight) for weight in self.weights)
         found = one + ex * (of_x + of_xx * x * per) + ey * (of_y + of_yy * y * per)
         own = self.beam.pupil.mask
-        return found if own is None else found * own.amplitude(x, y, radius, types)
+        return found if own is None else found * own.amplitude(x, y, radius)
 
     def bandwidth(self, level: float, radius: float) -> float:
         """Return the bandwidth of the path plus that of ray directions, which have poles at a lens' focal distance."""

@@ -16,10 +16,9 @@ import numpy as np
 from optics.elements.fine_detail import band_of, power_beyond, reach_of
 from optics.elements.square_samples import on_both_sides, square_samples
 from optics.numerics.arguments import finite, plain_reals, positive
+from optics.numerics.array_library import gather, indices, library, like, matrix_like
 from optics.numerics.autodiff import Array, is_differentiable, plain
-from optics.numerics.interpolation import cubic_bsplines
-from optics.numerics.matrices import matmul
-from optics.numerics.precision import Precision, padded_for_packets
+from optics.numerics.interpolation import cubic_bsplines, tensor_product
 
 __all__ = ["BSplineRelief", "HeightMap", "Relief"]
 
@@ -32,8 +31,11 @@ class Relief(ABC):
     scatters = True  # True if fine detail may scatter light into directions that do not follow from the slopes
 
     @abstractmethod
-    def height(self, x: Array, y: Array, types: Precision) -> Array:
-        """Return heights [m] at positions in units of the aperture radius; flat Dr.Jit Float64 arrays."""
+    def height(self, x: Array, y: Array) -> Array:
+        """Return heights [m] at positions in units of the aperture radius.
+
+        x, y: arrays of NumPy or PyTorch whose shapes broadcast, or flat Float64 arrays of Dr.Jit.
+        """
 
     @abstractmethod
     def bandwidth(self, level: float) -> float:
@@ -119,20 +121,10 @@ class BSplineRelief(Relief):
         square = greville**2 - (2 * radius) ** 2 / 3
         return cls(height - curvature * (square[:, None] + square[None, :]) / 2)
 
-    def height(self, x: Array, y: Array, types: Precision) -> Array:
-        import drjit as dr
-
-        points = types.Float64(
-            dr.ravel(self.control_points) if is_differentiable(self.control_points) else self.control_points.ravel()
-        )
+    def height(self, x: Array, y: Array) -> Array:
+        points = like(x, self.control_points)
         across, along = cubic_bsplines((x + 1) / 2), cubic_bsplines((y + 1) / 2)
-        total = types.Float64(0)
-        for i in range(4):
-            row = types.Float64(0)
-            for j in range(4):
-                row = dr.fma(across[j], dr.gather(types.Float64, points, types.Index(4 * i + j)), row)
-            total = dr.fma(along[i], row, total)
-        return total
+        return tensor_product(lambda i, j: gather(points, 4 * i + j), across, along)
 
     @property
     def span(self) -> float:
@@ -205,53 +197,47 @@ class HeightMap(Relief):
         along_y = _spline_coefficients(self._heights, self._margin)
         return np.ascontiguousarray(_spline_coefficients(along_y.T, self._margin).T)
 
-    def _values(self, types: Precision) -> Array:
-        """Return the spline coefficients as a flat array. They are linear in the samples, M h Mᵀ."""
-        import drjit as dr
+    def _values(self, x: Array) -> Array:
+        """Return the spline coefficients as an array like `x`. They are linear in the samples, M h Mᵀ."""
+        if not is_differentiable(self.samples) or library(x) is np:
+            return like(x, self._coefficients)
+        fit = np.ascontiguousarray(_spline_coefficients(np.eye(len(self._heights)), self._margin))
+        found = matrix_like(x, fit) @ matrix_like(x, self.samples) @ matrix_like(x, np.ascontiguousarray(fit.T))
+        return like(x, found)
 
-        if not is_differentiable(self.samples):
-            return types.Float64(padded_for_packets(self._coefficients))
-        n = len(self._heights)
-        tensor: Array = types.Tensor64(types.Float64(dr.ravel(self.samples)), (n, n))
-        matrix = types.Tensor64(np.ascontiguousarray(_spline_coefficients(np.eye(n), self._margin)))
-        return matmul(matmul(matrix, tensor), matrix, transposed=True).array
-
-    def height(self, x: Array, y: Array, types: Precision) -> Array:
-        import drjit as dr
-
-        n = len(self._heights)
-        width = n + 2 * self._margin
-        values = self._values(types)
-        columns = dr.opaque(types.Index, width)
-        (column, across), (row, along) = (self._cell(position, n, width, types) for position in (x, y))
-        total = types.Float64(0)
-        for i in range(4):
-            start = (row + i) * columns + column
-            line = types.Float64(0)
-            for j in range(4):
-                line = dr.fma(across[j], dr.gather(types.Float64, values, start + j), line)
-            total = dr.fma(along[i], line, total)
-        return total
+    def height(self, x: Array, y: Array) -> Array:
+        if _open_grid(x, y):
+            found: np.ndarray = self._basis(y[:, 0]) @ self._coefficients @ self._basis(x[0]).T
+            return found
+        values = self._values(x)
+        (column, across), (row, along) = (self._cell(position) for position in (x, y))
+        columns = like(row, self._width)
+        return tensor_product(lambda i, j: gather(values, (row + i) * columns + column + j), across, along)
 
     def on_grid(self, at: np.ndarray) -> np.ndarray:
         """Return heights (y, x) at positions in units of the radius; NumPy arrays without derivatives."""
-        n, width = len(self._heights), len(self._coefficients)
-        place = (at + 1) * (n / 2) + self._margin - 0.5
-        cell = np.clip(np.floor(place), 1, width - 3)
-        basis, row = np.zeros((len(at), width)), np.arange(len(at))
-        for k, weight in enumerate(cubic_bsplines(place - cell)):
-            basis[row, cell.astype(np.intp) - 1 + k] = weight
-        found: np.ndarray = basis @ self._coefficients @ basis.T
+        found: np.ndarray = self.height(at[None, :], at[:, None])
         return found
 
-    def _cell(self, position: Array, n: int, width: int, types: Precision) -> tuple[Array, list[Array]]:
-        """Return the index of the first of the four spline coefficients at a position, and the weights of all four."""
-        import drjit as dr
+    @property
+    def _width(self) -> int:
+        """Number of spline coefficients along a side."""
+        return len(self._heights) + 2 * self._margin
 
-        half, shift = dr.opaque(types.Float64, n / 2), dr.opaque(types.Float64, self._margin - 0.5)
+    def _basis(self, at: np.ndarray) -> np.ndarray:
+        """Return the B-splines of all coefficients at positions along an axis, (position, coefficient)."""
+        first, weights = self._cell(at)
+        basis, row = np.zeros((len(at), self._width)), np.arange(len(at))
+        for k, weight in enumerate(weights):
+            basis[row, first + k] = weight
+        return basis
+
+    def _cell(self, position: Array) -> tuple[Array, list[Array]]:
+        """Return the index of the first of the four spline coefficients at a position, and the weights of all four."""
+        own, half, shift = library(position), like(position, len(self._heights) / 2), like(position, self._margin - 0.5)
         place = position * half + half + shift
-        cell = dr.clip(dr.floor(place), 1, dr.opaque(types.Float64, width - 3))
-        return types.Index(cell) - 1, cubic_bsplines(place - cell)
+        cell = own.clip(own.floor(place), like(position, 1.0), like(position, self._width - 3.0))
+        return indices(cell) - 1, cubic_bsplines(place - cell)
 
     def bandwidth(self, level: float) -> float:
         return band_of(self._heights, level)
@@ -271,6 +257,11 @@ class HeightMap(Relief):
     @property
     def mirror_symmetric(self) -> bool:
         return not is_differentiable(self.samples) and on_both_sides(self._heights)
+
+
+def _open_grid(x: Array, y: Array) -> bool:
+    """Return whether x is a row and y a column of NumPy, whose heights are a product of matrices."""
+    return library(x) is np and x.ndim == y.ndim == 2 and len(x) == 1 and y.shape[1] == 1
 
 
 def _spline_coefficients(samples: np.ndarray, margin: int) -> np.ndarray:

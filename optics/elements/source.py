@@ -5,11 +5,13 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from optics.numerics.arguments import in_range, point_2d, positive
-from optics.numerics.autodiff import Array, Scalar, number
-from optics.numerics.precision import Precision, opaque
+from optics.numerics.arguments import in_range, pair, positive
+from optics.numerics.array_library import library, like
+from optics.numerics.autodiff import Array, Scalar, is_differentiable, number
 
 __all__ = ["PointSource"]
+
+STEEPEST = 1.5  # choice [rad]: largest angle of the light to the axis
 
 
 @dataclass(frozen=True)
@@ -19,28 +21,41 @@ class PointSource:
     distance: distance [m] in front of the pupil, along the axis. An infinite distance gives a plane wave.
     angle: (θx, θy) [rad], the direction in which the light travels. A thin lens focuses it near f (tan θx, tan θy),
     with the off-axis aberrations of a single stigmatic lens.
+
+    These numbers may carry derivatives.
     """
 
     distance: Scalar = math.inf
-    angle: tuple[float, float] = (0.0, 0.0)
+    angle: tuple[Scalar, Scalar] = (0.0, 0.0)
 
     def __post_init__(self) -> None:
         positive("source_distance", self.distance, infinite=True, carried=True)
-        tx, ty = point_2d("source_angle", self.angle, "angles (x, y) [rad]")
-        angle = in_range("source_angle", tx, -1.5, 1.5), in_range("source_angle", ty, -1.5, 1.5)
-        object.__setattr__(self, "angle", angle)
+        kept = []
+        for angle in pair("source_angle", self.angle, "angles (x, y) [rad]"):
+            value = in_range("source_angle", angle, -STEEPEST, STEEPEST, carried=True)
+            kept.append(angle if is_differentiable(angle) else value)
+        object.__setattr__(self, "angle", tuple(kept))
 
-    def path(self, x: Array, y: Array, types: Precision) -> Array:
-        """Return the optical path [m] in vacuum at points of the pupil, relative to the centre; flat float64 arrays."""
-        import drjit as dr
+    @property
+    def plain(self) -> PointSource:
+        """The same source without derivatives."""
+        x, y = map(number, self.angle)
+        return PointSource(number(self.distance), (x, y))
 
-        tx, ty = (math.tan(theta) for theta in self.angle)
-        norm = math.sqrt(1 + tx * tx + ty * ty)
-        along = x * opaque(types, tx / norm) + y * opaque(types, ty / norm)
+    def path(self, x: Array, y: Array) -> Array:
+        """Return the optical path [m] in vacuum at points (x, y) [m] of the pupil, relative to the centre.
+
+        x, y: see `Relief.height`.
+        """
+        carried = any(map(is_differentiable, self.angle))
+        own, angle = (library(x), [like(x, part) for part in self.angle]) if carried else (math, self.angle)
+        tx, ty = map(own.tan, angle)
+        norm = own.sqrt(1 + tx * tx + ty * ty)
+        along = x * like(x, tx / norm) + y * like(x, ty / norm)
         if math.isinf(number(self.distance)):
             return along
-        centre = opaque(types, self.distance) * norm
+        centre = like(x, self.distance) * norm
         # The form ρ - ρ₀ = (r² + 2 ρ₀ (x, y)·t) / (ρ + ρ₀) avoids a difference of nearly equal numbers.
         excess = x * x + y * y + 2 * centre * along
-        rho = dr.sqrt(excess + centre * centre)
+        rho = library(x).sqrt(excess + centre * centre)
         return excess / (rho + centre)

@@ -11,8 +11,8 @@ import numpy as np
 from optics.elements.relief import HeightMap
 from optics.elements.square_samples import square_samples
 from optics.numerics.arguments import positive, shown
+from optics.numerics.array_library import library, like
 from optics.numerics.autodiff import Array, Scalar, is_differentiable, number
-from optics.numerics.precision import Precision, opaque, padded_for_packets, precision
 
 __all__ = ["GaussianMask", "Mask", "MaskMap"]
 
@@ -24,8 +24,11 @@ class Mask(ABC):
     """Amplitude transmittance, between -1 and 1; its square is the intensity transmittance."""
 
     @abstractmethod
-    def amplitude(self, x: Array, y: Array, radius: Scalar, types: Precision) -> Array:
-        """Return the amplitude at points (x, y) [m] of a pupil of this radius [m], flat Dr.Jit Float64 arrays."""
+    def amplitude(self, x: Array, y: Array, radius: Scalar) -> Array:
+        """Return the amplitude at points (x, y) [m] of a pupil of this radius [m].
+
+        x, y: arrays of NumPy or PyTorch whose shapes broadcast, or flat Float64 arrays of Dr.Jit.
+        """
 
     @abstractmethod
     def bandwidth(self, level: float, radius: float) -> float:
@@ -72,10 +75,9 @@ class GaussianMask(Mask):
     def __post_init__(self) -> None:
         positive("waist", self.waist, carried=True)
 
-    def amplitude(self, x: Array, y: Array, radius: Scalar, types: Precision) -> Array:
-        import drjit as dr
-
-        return dr.exp(-(x * x + y * y) / dr.square(opaque(types, self.waist)))
+    def amplitude(self, x: Array, y: Array, radius: Scalar) -> Array:
+        waist = like(x, self.waist)
+        return library(x).exp(-(x * x + y * y) / (waist * waist))
 
     def bandwidth(self, level: float, radius: float) -> float:
         """Return the frequency at which the mask's spectrum exp(-π²w²f²) has fallen to `level`."""
@@ -135,14 +137,11 @@ class MaskMap(Mask):
         """Largest amplitude of the mask within the circle."""
         n = FINER * len(self._map._heights)
         at = (np.arange(n) + 0.5) * 2 / n - 1
-        x, y = (padded_for_packets(axis[np.hypot(*np.meshgrid(at, at)) <= 1]) for axis in np.meshgrid(at, at))
-        types = precision("float64")
-        spline = HeightMap(self._map._heights)
-        return float(np.abs(spline.height(types.Float64(x), types.Float64(y), types).numpy()).max())
+        return float(np.abs(self._map.on_grid(at)[np.hypot(*np.meshgrid(at, at)) <= 1]).max())
 
-    def amplitude(self, x: Array, y: Array, radius: Scalar, types: Precision) -> Array:
-        scale = 1 / opaque(types, radius if self.reach is None else self.reach)
-        return self._map.height(x * scale, y * scale, types)
+    def amplitude(self, x: Array, y: Array, radius: Scalar) -> Array:
+        scale = 1 / like(x, radius if self.reach is None else self.reach)
+        return self._map.height(x * scale, y * scale)
 
     def on_grid(self, at: np.ndarray, radius: float) -> np.ndarray:
         """Return amplitudes (y, x) at positions along either axis, without derivatives.

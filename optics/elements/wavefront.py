@@ -19,8 +19,8 @@ from optics.elements.relief import HeightMap
 from optics.elements.square_samples import square_samples
 from optics.elements.zernike_order import HIGHEST, fringe_mode, noll_mode, numbered, osa_mode
 from optics.numerics.arguments import finite, plain_reals, positive, reals, shown
+from optics.numerics.array_library import gather, like
 from optics.numerics.autodiff import Array, is_differentiable, number
-from optics.numerics.precision import Precision, opaque
 
 __all__ = ["HIGHEST", "Aberration", "WavefrontMap", "Zernike", "mode"]
 
@@ -39,8 +39,8 @@ class Aberration(ABC):
     radius: float | None
 
     @abstractmethod
-    def ahead(self, x: Array, y: Array, types: Precision) -> Array:
-        """Return the length [m] by which the wavefront is ahead at (x, y) [radii]; flat Dr.Jit Float64 arrays."""
+    def ahead(self, x: Array, y: Array) -> Array:
+        """Return the length [m] by which the wavefront is ahead at (x, y) [radii]. Arrays: see `Relief.height`."""
 
     @abstractmethod
     def bandwidth(self, level: float) -> float:
@@ -137,11 +137,11 @@ class Zernike(Aberration):
         named = numbered(coefficients_um, fringe_mode)
         return cls({key: value / _norm(*key) for key, value in named.items()}, radius)
 
-    def ahead(self, x: Array, y: Array, types: Precision) -> Array:
-        total = types.Float64(0)
+    def ahead(self, x: Array, y: Array) -> Array:
+        total = like(x, 0.0)
         for (n, m), value in self.modes.items():
             if value != 0 or self.asks:
-                total += self._coefficient(n, m, value, types) * mode(n, m, x, y)
+                total = total + self._coefficient(n, m, x) * mode(n, m, x, y)
         return total
 
     def at(self, x: Any, y: Any) -> np.ndarray:
@@ -187,16 +187,12 @@ class Zernike(Aberration):
         """Highest radial order."""
         return max((n for (n, _), value in self.modes.items() if value != 0 or self.asks), default=0)
 
-    def _coefficient(self, n: int, m: int, value: float, types: Precision) -> Array:
-        """Return the coefficient [m] of a mode."""
-        import drjit as dr
-
+    def _coefficient(self, n: int, m: int, x: Array) -> Array:
+        """Return the coefficient [m] of a mode as a number like `x`."""
         given = self.coefficients_um
-        if isinstance(given, dict):
-            return opaque(types, given[n, m]) * UM
-        if not is_differentiable(given):
-            return opaque(types, value) * UM
-        return dr.gather(types.Float64, types.Float64(dr.ravel(given)), types.Index((n * (n + 2) + m) // 2)) * UM
+        if not isinstance(given, dict) and is_differentiable(given):
+            return gather(like(x, given), (n * (n + 2) + m) // 2) * UM
+        return like(x, given[n, m] if isinstance(given, dict) else self.modes[n, m]) * UM
 
 
 @dataclass(frozen=True, eq=False)
@@ -224,8 +220,8 @@ class WavefrontMap(Aberration):
             object.__setattr__(self, "samples", values)
         object.__setattr__(self, "_map", HeightMap(self.samples))
 
-    def ahead(self, x: Array, y: Array, types: Precision) -> Array:
-        return self._map.height(x, y, types)
+    def ahead(self, x: Array, y: Array) -> Array:
+        return self._map.height(x, y)
 
     def bandwidth(self, level: float) -> float:
         return self._map.bandwidth(level)

@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from optics.numerics.arguments import finite, is_sized, shown, whole
-from optics.numerics.autodiff import is_differentiable
+from optics.numerics.autodiff import is_differentiable, of_torch
 
 __all__ = ["FRINGE", "HIGHEST", "NOLL", "fringe_mode", "noll_mode", "numbered", "osa_mode"]
 
@@ -69,6 +69,6 @@ def numbered(given: Any, mode: Callable[[int], Mode]) -> dict[Mode, Any]:
         for j, value in given.items():
             finite(f"coefficients_um[{shown(j)}]", value, carried=True)
         return {mode(j): value for j, value in given.items()}
-    if is_differentiable(given) or isinstance(given, str) or not is_sized(given):
+    if (is_differentiable(given) and not of_torch(given)) or isinstance(given, str) or not is_sized(given):
         raise ValueError(f"coefficients_um = {shown(given)}: must be {{number: µm}}, or a row [µm] from number 1 on")
     return numbered(dict(enumerate(given, start=1)), mode)

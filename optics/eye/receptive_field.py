@@ -282,7 +282,7 @@ def _rim(pupil: Pupil) -> float:
         return 1.0
     types, (x, y) = precision("float64"), pupil.aperture.outline.points().T
     with dr.suspend_grad():
-        along = pupil.amplitude(types.Float64(padded_for_packets(x)), types.Float64(padded_for_packets(y)), types)
+        along = pupil.amplitude(types.Float64(padded_for_packets(x)), types.Float64(padded_for_packets(y)))
     return max(1.0, float(np.square(along.numpy()).mean()) / number(pupil.transmission))
 
 

@@ -60,7 +60,7 @@ class RaySampling:
         x, y = types.Float64(nodes.x) * radius, types.Float64(nodes.y) * radius
         weight = types.Float64(nodes.weight) * dr.square(radius)
         if beam.pupil.mask is not None:
-            weight *= dr.square(beam.pupil.amplitude(types.Float64(nodes.x), types.Float64(nodes.y), types))
+            weight *= dr.square(beam.pupil.amplitude(types.Float64(nodes.x), types.Float64(nodes.y)))
         x, y, propagates = _landings(beam, x, y, types)
         if device() == "cuda" and dr.grad_enabled(x, y):
             raise NoDerivativesError(
@@ -156,8 +156,8 @@ def _landings(beam: Beam, x: Array, y: Array, types: Precision) -> tuple[Array, 
 
     step = opaque(types, STEP * beam.pupil.radius)
     scale = opaque(types, beam.wavelength / beam.index) / (2 * step)
-    px = (beam.waves(x + step, y, types) - beam.waves(x - step, y, types)) * scale
-    py = (beam.waves(x, y + step, types) - beam.waves(x, y - step, types)) * scale
+    px = (beam.waves(x + step, y) - beam.waves(x - step, y)) * scale
+    py = (beam.waves(x, y + step) - beam.waves(x, y - step)) * scale
     squared = px * px + py * py
     propagates = squared < 1 - 1e-9
     # dr.rsqrt has an error of 1e-6 on a GPU, also in float64.

@@ -119,8 +119,8 @@ def _hankel(beam: Beam, problem: Problem, how: HankelSampling, types: Precision)
     zero = dr.zeros(types.Float64, len(nodes))
     area = types.Float64(padded_for_packets(2 * np.pi * weights * nodes)) * dr.square(opaque(types, beam.radius))
     if beam.pupil.mask is not None:
-        area *= beam.pupil.amplitude(types.Float64(padded_for_packets(nodes)), zero, types)
-    pupil = Field.from_waves(area, beam.waves(r, zero, types), Grid((1, len(nodes)), 1.0), types)
+        area *= beam.pupil.amplitude(types.Float64(padded_for_packets(nodes)), zero)
+    pupil = Field.from_waves(area, beam.waves(r, zero), Grid((1, len(nodes)), 1.0), types)
     edge = math.asin(how.taper.end * problem.wavelength)
     nodes, weights = gauss_legendre(how.angles)
     theta, sine, cosine = (

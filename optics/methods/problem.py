@@ -13,13 +13,13 @@ from optics.apertures.aperture import EDGE_REACH, Aperture, SoftAperture
 from optics.apertures.pixelated import PixelatedAperture
 from optics.elements.beam import Beam
 from optics.elements.derivative_knots import DerivativeKnots, carries_derivatives, derivative_knots
-from optics.elements.source import PointSource
+from optics.elements.torch_numbers import refuse_torch
 from optics.elements.wavefront_slopes import Slopes
 from optics.methods.derivative_cells import derivative_cells
 from optics.methods.rays import Rays
 from optics.methods.scalar_theory import ROUND, light_spread, scalar_theory_error, steepest_sine
 from optics.numerics.arguments import in_range, positive
-from optics.numerics.autodiff import number
+from optics.numerics.autodiff import carries_derivative
 from optics.numerics.grid import Grid
 from optics.numerics.precision import precision
 from optics.numerics.quadrature import stepped_up
@@ -99,16 +99,19 @@ class Problem:
         derivatives: whether the samples must also be suitable for the derivatives that the beam carries.
 
         Raises:
-            ValueError: the distance is not positive, the tolerance is not in [1e-12, 0.5], or the dtype is invalid.
+            ValueError: the distance is not positive, the tolerance is not in [1e-12, 0.5], the dtype is invalid, or a
+                tensor of PyTorch requires a gradient.
         """
         distance = positive("sensor_distance", beam.distance, carried=True)
         tolerance = in_range("tolerance", tolerance, 1e-12, 0.5)
         precision(dtype)
-        source = PointSource(number(beam.source.distance), beam.source.angle)
-        plain = Beam(beam.pupil, source, beam.wavelength, distance)
+        plain = Beam(beam.pupil, beam.source.plain, beam.wavelength, distance)
         if not (derivatives and carries_derivatives(beam)):
             return _problem(plain, window, tolerance, dtype)
-        return _differentiated(plain, window, tolerance, dtype, derivative_knots(beam.pupil, beam.wavelength))
+        refuse_torch(beam)
+        found = _differentiated(plain, window, tolerance, dtype, derivative_knots(beam.pupil, beam.wavelength))
+        # A small change of the angle breaks the symmetry of light along the axis.
+        return replace(found, symmetric=False, even=False) if any(map(carries_derivative, beam.source.angle)) else found
 
     @cached_property
     def turning(self) -> float:

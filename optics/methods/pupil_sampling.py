@@ -123,9 +123,9 @@ class PixelSamples:
         x, y = (types.Float64(padded_for_packets(axis)) for axis in np.meshgrid(at, at))
         weight = types.Float64(padded_for_packets(self.aperture.weights(self.across))) * radius * radius
         if beam.pupil.mask is not None:
-            weight *= beam.pupil.amplitude(x, y, types)
+            weight *= beam.pupil.amplitude(x, y)
         grid = Grid.square(len(at), 2 * self.radius / len(at))
-        return Field.from_waves(weight, beam.waves(x * radius, y * radius, types), grid, types)
+        return Field.from_waves(weight, beam.waves(x * radius, y * radius), grid, types)
 
 
 def pixel_samples(aperture: PixelatedAperture, cycles: float, digits: float, radius: float) -> PixelSamples | None:

@@ -223,8 +223,8 @@ def _added(
     z, wavelength = opaque(types, beam.distance), opaque(types, beam.wavelength / beam.index)
     weight = found_weight * dr.square(radius) * z / (2 * math.pi)
     if beam.pupil.mask is not None:
-        weight *= beam.pupil.amplitude(found_x, found_y, types)
-    waves = beam.waves(nodes_x, nodes_y, types)
+        weight *= beam.pupil.amplitude(found_x, found_y)
+    waves = beam.waves(nodes_x, nodes_y)
     dr.eval(nodes_x, nodes_y, weight, waves, x, y)
     count = dr.opaque(types.Index, len(rule[0]))
     cycles = 1 / wavelength  # multiplication by this number is faster than division by the wavelength

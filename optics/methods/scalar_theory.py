@@ -78,7 +78,7 @@ def light_spread(pupil: Pupil) -> float:
         return _open_spread(pupil.aperture)
     types = precision("float64")
     nodes = pupil.aperture.nodes(CYCLES + pupil.mask.bandwidth(LEVEL, pupil.radius) * pupil.radius, DIGITS)
-    passed = pupil.amplitude(types.Float64(nodes.x), types.Float64(nodes.y), types)
+    passed = pupil.amplitude(types.Float64(nodes.x), types.Float64(nodes.y))
     return _spread(nodes, nodes.weight * np.abs(passed.numpy()))
 
 

@@ -82,7 +82,7 @@ class VectorSum:
             return -x / z, -y / z, np.sqrt(1 - (x * x + y * y) / z**2)
         types = precision("float64")
         at_x, at_y = (types.Float64(padded_for_packets(at)) for at in (x, y))
-        along_x, along_y, axial = (part.numpy() for part in rays_behind(self.beam, at_x, at_y, types))
+        along_x, along_y, axial = (part.numpy() for part in rays_behind(self.beam, at_x, at_y))
         return along_x, along_y, axial
 
     @property
@@ -108,9 +108,9 @@ class VectorSum:
             return x, y, weight / z * (1 - (x * x + y * y) / z**2) ** -0.25
         at = types.Float64(padded_for_packets(x)), types.Float64(padded_for_packets(y))
         inside = types.Float64(padded_for_packets(nodes.x)), types.Float64(padded_for_packets(nodes.y))
-        passed = pupil.amplitude(*inside, types).numpy() * np.ones(len(x))
+        passed = pupil.amplitude(*inside).numpy() * np.ones(len(x))
         cx, cy = self.window.centre
         across = (cx - x) ** 2 + (cy - y) ** 2
         d2 = across + z * z
-        phase = 2 * np.pi * beam.waves(*at, types).numpy() + k * across / (np.sqrt(d2) + z)
+        phase = 2 * np.pi * beam.waves(*at).numpy() + k * across / (np.sqrt(d2) + z)
         return x, y, weight * passed * z / d2 * np.exp(1j * phase)

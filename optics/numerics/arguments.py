@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from optics.numerics.autodiff import grad_enabled, is_differentiable, number, plain
+from optics.numerics.autodiff import carries_derivative, is_differentiable, number, plain
 from optics.numerics.number_types import as_array, full_precision, readable
 
 __all__ = [
@@ -20,6 +20,7 @@ __all__ = [
     "items",
     "of_kind",
     "one_of",
+    "pair",
     "plain_reals",
     "point_2d",
     "positive",
@@ -104,7 +105,7 @@ def without_derivative(name: str, value: Any) -> Any:
             without_derivative(name, entry)
     elif isinstance(value, np.ma.MaskedArray):
         readable(name, value)
-    elif getattr(value, "requires_grad", False) or (is_differentiable(value) and grad_enabled(value)):
+    elif carries_derivative(value):
         raise ValueError(f"{name} requires a derivative, but none is propagated through it: pass a plain number")
     return value
 
@@ -182,12 +183,17 @@ def close_match(word: str, known: Iterable[str], cutoff: float = 0.5) -> str | N
 
 def point_2d(name: str, value: Any, what: str = "lengths (x, y) [m]") -> tuple[float, float]:
     """Return (x, y) as finite floats."""
-    without_derivative(name, value)
+    x, y = pair(name, without_derivative(name, value), what)
+    return in_range(name, x, -LARGEST, LARGEST), in_range(name, y, -LARGEST, LARGEST)
+
+
+def pair(name: str, value: Any, what: str) -> tuple[Any, Any]:
+    """Return the two entries of `value`, which may carry derivatives; ValueError unless there are two."""
     try:
         x, y = value
     except (TypeError, ValueError):
         raise ValueError(f"{name} = {shown(value)}: must be two {what}") from None
-    return in_range(name, x, -LARGEST, LARGEST), in_range(name, y, -LARGEST, LARGEST)
+    return x, y
 
 
 def reals(name: str, values: Any) -> np.ndarray:
@@ -273,8 +279,7 @@ def of_kind(name: str, value: Any, kind: type, example: str) -> Any:
 
 
 def _number(name: str, value: Any, carried: bool = False) -> float:
-    # Derivatives of PyTorch would be lost even if those of Dr.Jit are propagated.
-    if not carried or getattr(value, "requires_grad", False):
+    if not carried:
         without_derivative(name, value)
     value = full_precision(name, value)
     try:

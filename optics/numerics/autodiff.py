@@ -16,6 +16,7 @@ __all__ = [
     "grad_enabled",
     "is_differentiable",
     "number",
+    "of_torch",
     "plain",
     "to_user",
 ]
@@ -27,8 +28,16 @@ Scalar = Any  # a number, or a Dr.Jit array of one element that carries a deriva
 
 
 def is_differentiable(value: Any) -> bool:
-    """Return whether `value` is a Dr.Jit array or tensor, as opposed to a Python or NumPy number."""
-    return type(value) is not float and type(value).__module__.startswith("drjit")
+    """Return whether `value` is an array of Dr.Jit, or a tensor of PyTorch that requires a gradient.
+
+    Python's and NumPy's numbers carry no derivatives. Tensors that require none are treated as numbers.
+    """
+    return type(value) is not float and (type(value).__module__.startswith("drjit") or of_torch(value))
+
+
+def of_torch(value: Any) -> bool:
+    """Return whether `value` is a tensor of PyTorch that requires a gradient."""
+    return bool(getattr(value, "requires_grad", False))
 
 
 def grad_enabled(value: Array) -> bool:
@@ -39,8 +48,8 @@ def grad_enabled(value: Array) -> bool:
 
 
 def carries_derivative(value: Any) -> bool:
-    """Return whether `value` is a Dr.Jit array or tensor whose gradient is enabled; numbers are not."""
-    return is_differentiable(value) and grad_enabled(value)
+    """Return whether the gradient of `value`, an array of Dr.Jit or a tensor of PyTorch, is enabled."""
+    return of_torch(value) or (is_differentiable(value) and grad_enabled(value))
 
 
 def number(value: Any) -> float:
@@ -64,7 +73,9 @@ def plain(value: Any) -> np.ndarray:
     Raises:
         BackendError: a Dr.Jit array is on a device other than the selected one.
     """
-    if is_differentiable(value):
+    if of_torch(value):
+        value = value.detach().cpu().resolve_neg()
+    elif is_differentiable(value):
         import drjit as dr
 
         _on_the_device(value)

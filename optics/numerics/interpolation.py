@@ -13,6 +13,7 @@ from math import pi
 
 import numpy as np
 
+from optics.numerics.array_library import fma
 from optics.numerics.autodiff import Array
 from optics.numerics.precision import Precision, opaque, padded_for_packets
 
@@ -26,6 +27,7 @@ __all__ = [
     "lagrange_basis",
     "lagrange_weights",
     "linear_weights",
+    "tensor_product",
 ]
 
 # Choice: number of samples along an axis for interpolation onto a grid. The error falls with the eighth power of their
@@ -125,6 +127,17 @@ def cubic_bsplines(t: Array) -> list[Array]:
     """
     s = 1 - t
     return [s * s * s / 6, (3 * t * t * t - 6 * t * t + 4) / 6, (3 * s * s * s - 6 * s * s + 4) / 6, t * t * t / 6]
+
+
+def tensor_product(value: Callable[[int, int], Array], across: list[Array], along: list[Array]) -> Array:
+    """Return Σ_ij a_i b_j value(i, j), with a_i the weights along y and b_j those along x."""
+    total = 0.0
+    for i, down in enumerate(along):
+        line = 0.0
+        for j, right in enumerate(across):
+            line = fma(right, value(i, j), line)
+        total = fma(down, line, total)
+    return total
 
 
 def chebyshev_points(n: int) -> np.ndarray:

@@ -116,7 +116,7 @@ def modes_at_pupil(
     x, y = nodes.x * pupil.radius, nodes.y * pupil.radius
     at = types.Float64(padded_for_packets(x)), types.Float64(padded_for_packets(y))
     inside = types.Float64(padded_for_packets(nodes.x)), types.Float64(padded_for_packets(nodes.y))
-    waves, passed = beam.waves(*at, types), pupil.amplitude(*inside, types)
+    waves, passed = beam.waves(*at), pupil.amplitude(*inside)
     known = (("aperture_radius", pupil.aperture_radius), ("lens", waves), ("lens.mask", passed))
     for name, value in (*known, ("distance", beam.distance)):
         without_derivative(name, value)

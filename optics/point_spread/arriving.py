@@ -68,7 +68,7 @@ def _not_evanescent(result: PSFResult) -> tuple[Array, np.ndarray]:
     light, rim = pupil.transmission, 1.0
     if pupil.mask is not None:
         x, y = (types.Float64(np.ascontiguousarray(at)) for at in outline.points().T)
-        rim = dr.mean(dr.square(pupil.amplitude(x, y, types))) / light
+        rim = dr.mean(dr.square(pupil.amplitude(x, y))) / light
     edge = wavelength * ratio / opaque(types, pupil.aperture_radius) * rim
     tilted, bent = types.Float(1.0), np.zeros((2, len(result.wavelengths)))
     if result.can_recompute:
@@ -116,7 +116,7 @@ def _at_edge(request: Request) -> Array:
 
     def waves(dx: float, dy: float) -> Array:
         x, y = (types.Float64(padded_for_packets(at)) for at in (places + np.array([dx, dy])).T)
-        return beam.waves(x * radius, y * radius, types)
+        return beam.waves(x * radius, y * radius)
 
     per_wave = request.problem.wavelength / (2 * step * radius)
     sx, sy = ((waves(dx, dy) - waves(-dx, -dy)) * per_wave for dx, dy in ((step, 0.0), (0.0, step)))
@@ -192,9 +192,9 @@ class _Sum:
         x, y, u = (types.Float64(padded_for_packets(at)) for at in (self.x, self.y, self.weight))
         sx, sy, w = (types.Float64(padded_for_packets(at)) for at in (self.seen.x, self.seen.y, self.seen.weight))
         radius = opaque(types, beam.pupil.aperture_radius)
-        h, waves = radius / wavelength, beam.waves(x * radius, y * radius, types)
+        h, waves = radius / wavelength, beam.waves(x * radius, y * radius)
         if beam.pupil.mask is not None:
-            u = u * beam.pupil.amplitude(x, y, types)
+            u = u * beam.pupil.amplitude(x, y)
         at, steady = (h, waves, u), [dr.detach(one) for one in (h, waves, u)]
         with dr.suspend_grad():
             h0, waves0, u0 = steady

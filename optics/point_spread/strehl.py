@@ -94,7 +94,7 @@ def _unaberrated(result: PSFResult, wavelengths: np.ndarray) -> Array:
         np.array([2 * np.pi * result.pupil.index_behind(at) / at for at in map(float, wavelengths)])
     )
     if mask is not None:
-        size = size * dr.abs(result.pupil.amplitude(types.Float64(nodes.x), types.Float64(nodes.y), types))
+        size = size * dr.abs(result.pupil.amplitude(types.Float64(nodes.x), types.Float64(nodes.y)))
     near, far = dr.sum(size / slant), dr.sum(size) * wavenumber
     return (near * near + far * far) * radius * radius / result.pupil.aperture.area
 

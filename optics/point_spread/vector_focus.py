@@ -63,7 +63,8 @@ def vector_focus(
             aplanatic lens is below 20, so that its rays do not meet in a point.
     """
     of_kind("pupil", pupil, Pupil, "Pupil(25e-6)")
-    lambda_, source = vacuum_wavelength(wavelength), PointSource(math.inf, source_angle)
+    lambda_ = vacuum_wavelength(wavelength)
+    source = PointSource(math.inf, without_derivative("source_angle", source_angle))
     one_of("apodization", apodization, ("flat", "aplanatic"))
     z = pupil.image_distance(math.inf) if sensor_distance is None else positive("sensor_distance", sensor_distance)
     _check_plain(pupil, lambda_)
@@ -81,8 +82,8 @@ def _check_plain(pupil: Pupil, wavelength: float) -> None:
     """Raise a ValueError if a parameter of the pupil carries a derivative."""
     types = precision("float64")
     at, middle = types.Float64(0.5), types.Float64(0.0)
-    path = pupil.path(at * pupil.radius, middle, wavelength, PointSource(), types)
-    for part in (pupil.aperture_radius, path, pupil.amplitude(at, middle, types)):
+    path = pupil.path(at * pupil.radius, middle, wavelength, PointSource())
+    for part in (pupil.aperture_radius, path, pupil.amplitude(at, middle)):
         without_derivative("pupil", part)
 
 

@@ -42,7 +42,7 @@ def corners():
 DROPPED = {
     "wavelength": lambda: optics.psf(PUPIL, [asking(550e-9)]),
     "wavelengths": lambda: optics.psf(PUPIL, asking([500e-9, 600e-9])),
-    "source_angle": lambda: optics.psf(PUPIL, source_angle=(asking(0.1), 0.0)),
+    "source_angle": lambda: optics.vector_focus(WIDE, source_angle=(asking(0.1), 0.0)),
     "centre": lambda: optics.psf(PUPIL, centre=(0.0, asking(1e-6))),
     "dx": lambda: optics.psf(PUPIL, dx=asking(1e-6)),
     "object_n": lambda: optics.Pupil(10e-6, object_n=asking(1.3)),
@@ -132,18 +132,45 @@ def test_plain_arrays_of_drjit_are_numbers():
     assert optics.Annulus(Float64(0.5)).area == pytest.approx(np.pi * 0.75)
 
 
-@pytest.mark.parametrize(
-    "make",
-    [
-        lambda asked: optics.Pupil(asked),
-        lambda asked: optics.Pupil(1e-5, thin_lens_focal_length=asked),
-        lambda asked: optics.Zernike({(2, 0): asked}),
-        lambda asked: optics.GaussianMask(asked),
-    ],
-    ids=["radius", "focal length", "coefficient", "waist"],
-)
-def test_torch_asks_in_vain_where_drjit_is_carried(make):
-    """PyTorch's derivatives would be dropped; `optics.torch` accepts its tensors."""
+def of_torch(value):
     torch = pytest.importorskip("torch")
-    with pytest.raises(ValueError, match="requires a derivative, but none is propagated"):
-        make(torch.tensor(1e-5, dtype=torch.float64, requires_grad=True))
+    return torch.tensor(value, dtype=torch.float64, requires_grad=True)
+
+
+LENS = {"aperture_radius": 1e-5, "thin_lens_focal_length": 1e-4}
+# A pupil with a tensor of PyTorch, and the name of the tensor in the message.
+PUPILS = {
+    "aperture_radius": lambda: optics.Pupil(**LENS | {"aperture_radius": of_torch(1e-5)}),
+    "thin_lens_focal_length": lambda: optics.Pupil(1e-5, thin_lens_focal_length=of_torch(1e-4)),
+    "height.control_points": lambda: optics.Pupil(**LENS, height=optics.BSplineRelief(of_torch(np.zeros((4, 4))))),
+    "n.a": lambda: optics.Pupil(**LENS, height=np.eye(5) * 1e-7, n=of_torch(1.4)),
+    r"wavefront.coefficients_um\[2, 0\]": lambda: optics.Pupil(
+        **LENS, wavefront=optics.Zernike({(2, 0): of_torch(0.1)})
+    ),
+    "mask.waist": lambda: optics.Pupil(**LENS, mask=optics.GaussianMask(of_torch(1e-5))),
+}
+SMALL = {"sensor_distance": 1e-4, "shape": (9, 9)}
+REFUSED = r" requires a gradient of PyTorch, which would be lost here: must be passed to optics\.torch\.psf"
+
+
+@pytest.mark.parametrize("name", PUPILS)
+def test_a_gradient_of_torch_is_refused_outside_of_optics_torch(name):
+    with pytest.raises(ValueError, match=f"^{name}{REFUSED}"):
+        optics.psf(PUPILS[name](), **SMALL)
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        lambda pupil: optics.plan(pupil, **SMALL),
+        lambda pupil: optics.psf_batch([pupil], **SMALL),
+        lambda pupil: optics.white_psf(pupil, **SMALL),
+        lambda pupil: optics.Eye(pupil, resolution=(5, 5)).kernel(2),
+        lambda pupil: optics.vector_focus(pupil, sensor_distance=1e-4),
+        seen_by_a_rhabdom,
+    ],
+    ids=["plan", "psf_batch", "white_psf", "Eye", "vector_focus", "Ommatidium"],
+)
+def test_every_function_refuses_a_gradient_of_torch(call):
+    with pytest.raises(ValueError, match=r"requires a (gradient|derivative)"):
+        call(PUPILS["height.control_points"]())

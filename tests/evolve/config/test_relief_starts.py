@@ -24,7 +24,7 @@ def test_relief_may_have_more_points_and_keeps_the_presets_surface():
         assert sum(name.startswith("doe_") for name in config.genome) == points**2
         pupil = develop(Genotype(config.genome).start, config).pupil(config.eye)
         assert isinstance(pupil, optics.Pupil)
-        heights[points] = pupil.height.height(x, y, types).numpy()
+        heights[points] = pupil.height.height(x, y).numpy()
     # A spline through a bicubic polynomial equals that polynomial, up to rounding.
     for points in (5, 9):
         assert heights[points] == pytest.approx(heights[4], rel=1e-9)

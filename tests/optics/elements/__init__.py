@@ -13,6 +13,7 @@ refractive_index: test_refractive_index.py, test_media.py
 relief: test_relief.py
 source: test_source.py
 square_samples: test_relief.py, methods/test_even_pupils.py
+torch_numbers: test_derivatives_refused.py, test_torch.py
 transmittance: test_transmittance.py
 wavefront: test_wavefront.py
 wavefront_slopes: test_pupil.py

@@ -95,7 +95,7 @@ def test_what_slopes_tell_scatters_nothing():
 
 def test_a_mask_of_ones_own_reaches_as_far_as_its_band():
     class Cosine(Mask):
-        def amplitude(self, x, y, radius, types):
+        def amplitude(self, x, y, radius):
             raise NotImplementedError
 
         def bandwidth(self, level, radius):
@@ -123,7 +123,7 @@ def test_what_a_mask_scatters_is_a_share_of_what_comes_through_the_opening():
 class Faint(Mask):
     """A mask with stripes of five per radius, of amplitude 0.05."""
 
-    def amplitude(self, x, y, radius, types):
+    def amplitude(self, x, y, radius):
         return 0.05 * (1 + dr.cos(10 * math.pi * x)) / 2
 
     def bandwidth(self, level, radius):

@@ -61,7 +61,7 @@ def test_picture_is_the_direct_sum(source):
     from optics.numerics.precision import precision
 
     types = precision("float64")
-    height = relief.height(types.Float64(x.ravel() / R), types.Float64(y.ravel() / R), types).numpy().reshape(x.shape)
+    height = relief.height(types.Float64(x.ravel() / R), types.Float64(y.ravel() / R)).numpy().reshape(x.shape)
     r2 = x * x + y * y
     path = (glass - before) * height - behind * (np.sqrt(r2 + z * z) - z)
     path -= pupil.wavefront.at(x / R, y / R)

@@ -15,7 +15,7 @@ X, Y = np.random.default_rng(0).uniform(-30e-6, 30e-6, (2, 50))
 
 
 def path(pupil, wavelength=550e-9):
-    return pupil.path(TYPES.Float64(X), TYPES.Float64(Y), wavelength, PointSource(), TYPES).numpy()
+    return pupil.path(TYPES.Float64(X), TYPES.Float64(Y), wavelength, PointSource()).numpy()
 
 
 @pytest.mark.parametrize("f", [100e-6, -100e-6])
@@ -26,7 +26,7 @@ def test_ideal_lens(f):
 
 def test_glass_of_height_h_adds_the_index_step_times_h():
     relief = BSplineRelief(np.random.default_rng(1).random((4, 4)) * 1e-5)
-    height = relief.height(TYPES.Float64(X / 30e-6), TYPES.Float64(Y / 30e-6), TYPES).numpy()
+    height = relief.height(TYPES.Float64(X / 30e-6), TYPES.Float64(Y / 30e-6)).numpy()
     np.testing.assert_allclose(path(Pupil(30e-6, relief, n=1.6, medium_n=1.25)), 0.35 * height, rtol=1e-12)
 
 

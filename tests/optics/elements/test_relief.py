@@ -12,7 +12,7 @@ TYPES = precision("float64")
 
 def heights(relief, x, y):
     x, y = np.broadcast_arrays(x, y)
-    flat = relief.height(TYPES.Float64(np.ravel(x)), TYPES.Float64(np.ravel(y)), TYPES).numpy()
+    flat = relief.height(TYPES.Float64(np.ravel(x)), TYPES.Float64(np.ravel(y))).numpy()
     return flat.reshape(x.shape)
 
 

@@ -13,7 +13,7 @@ X, Y = np.random.default_rng(0).uniform(-50e-6, 50e-6, (2, 50))
 
 
 def path(source):
-    return source.path(TYPES.Float64(X), TYPES.Float64(Y), TYPES).numpy()
+    return source.path(TYPES.Float64(X), TYPES.Float64(Y)).numpy()
 
 
 def test_plane_wave_on_axis_is_flat():

@@ -33,7 +33,7 @@ def written_out(pupil, x, y):
     from optics.numerics.precision import precision
 
     types = precision("float64")
-    path = pupil.path(types.Float64(px.ravel()), types.Float64(py.ravel()), WAVE, PointSource(), types).numpy()
+    path = pupil.path(types.Float64(px.ravel()), types.Float64(py.ravel()), WAVE, PointSource()).numpy()
     k, n = 2 * np.pi / WAVE, pupil.medium_n
     found = np.empty((y.size, x.size), dtype=complex)
     for row, column in np.ndindex(found.shape):
