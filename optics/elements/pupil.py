@@ -288,12 +288,10 @@ class Pupil:
 
 @lru_cache(maxsize=64)
 def _slopes(pupil: Pupil, wavelength: float, distance: float, angle: tuple[float, float]) -> Slopes:
-    types = precision("float64")
     pieces = max(
         pupil.height.knots if pupil.bends(wavelength) else 0, 0 if pupil.wavefront is None else pupil.wavefront.knots
     )
     n = int(min(1025, max(65 if pieces else 33, 4 * pieces + 1)))
     grid = Grid.square(n, 2 * (1 + EDGE_REACH) * pupil.radius / (n - 1))
-    x, y = grid.coordinates(types)
-    path = pupil.path(x, y, wavelength, PointSource(distance, angle)).numpy().reshape(grid.shape)
+    path = pupil.path(grid.x[None, :], grid.y[:, None], wavelength, PointSource(distance, angle))
     return Slopes(grid, _derivative(path.T, grid.dx).T, _derivative(path, grid.dx), pupil.radius)

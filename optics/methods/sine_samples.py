@@ -13,7 +13,8 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
+from typing import Any
 
 import numpy as np
 
@@ -24,7 +25,7 @@ from optics.numerics.autodiff import Array
 from optics.numerics.cost import PUPIL_SAMPLE
 from optics.numerics.field import Field
 from optics.numerics.grid import Grid
-from optics.numerics.precision import Precision, opaque, padded_for_packets
+from optics.numerics.precision import Precision, opaque, padded_for_packets, precision
 
 __all__ = ["SineSamples", "evenly_in_sines", "sine_samples"]
 
@@ -73,10 +74,26 @@ class SineSamples:
         sx, sy = _sines(x, y, self.centre, self.distance)
         return sx - self._middle[0], sy - self._middle[1]
 
-    @cached_property
+    @property
     def points(self) -> tuple[np.ndarray, np.ndarray]:
         """Points ξ (x, y) [m] of all samples, (y, x)."""
-        return self.points_at(*np.meshgrid(self.at, self.at))
+        x, y, _ = _layout(self)
+        return x, y
+
+    def light(self, beam: Beam, dtype: Any) -> np.ndarray:
+        """Return the result of `field` as a complex NumPy array (y, x), without derivatives.
+
+        dtype: type of the real and imaginary parts, in which the phase is rounded.
+        """
+        x, y, weight = _layout(self)
+        if beam.pupil.mask is not None:
+            weight = weight * beam.pupil.amplitude(x / self.edge.radius, y / self.edge.radius)
+        waves = beam.waves(x, y)
+        waves = ((waves - np.rint(waves)) * (2 * np.pi)).astype(dtype)
+        found = np.empty(waves.shape, np.result_type(dtype, np.complex64))
+        np.multiply(np.cos(waves), weight, out=found.real)
+        np.multiply(np.sin(waves), weight, out=found.imag)
+        return found
 
     def points_at(self, s: np.ndarray, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the points ξ (x, y) [m] of the pupil in the directions s - s₀."""
@@ -117,6 +134,18 @@ class SineSamples:
         area = dr.square(z * opaque(types, self.grid.dx) / dr.square(cosine))
         behind = beam.at(self.edge.aperture, x, y, self.grid, types)
         return Field(behind.re * types.Float(area), behind.im * types.Float(area), self.grid, types)
+
+
+@lru_cache(maxsize=16)
+def _layout(samples: SineSamples) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return x and y [m] of the samples, and their areas [m²] times the transmittance of the aperture, (y, x)."""
+    types, radius = precision("float64"), samples.edge.radius
+    sx, sy = np.meshgrid(samples.at + samples._middle[0], samples.at + samples._middle[1])
+    x, y = samples.points_at(sx - samples._middle[0], sy - samples._middle[1])
+    at = (types.Float64(padded_for_packets(part / radius)) for part in (x, y))
+    soft = samples.edge.aperture.transmittance(*at, types).numpy().reshape(x.shape)
+    cosine2 = 1 - np.minimum(sx * sx + sy * sy, samples.steepest**2)
+    return x, y, soft * (samples.distance * samples.grid.dx / cosine2) ** 2
 
 
 def _sines(x: np.ndarray, y: np.ndarray, centre: tuple[float, float], distance: float) -> tuple[np.ndarray, np.ndarray]:

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 from bisect import bisect
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
@@ -21,14 +21,16 @@ import numpy as np
 from optics.apertures.aperture import EDGE_REACH
 from optics.apertures.soft_edge import SoftEdge
 from optics.elements.beam import Beam
+from optics.methods.carrier import on_window
 from optics.methods.problem import Problem, PupilEdge
 from optics.methods.sine_samples import SineSamples, evenly_in_sines
 from optics.methods.slow_factor import RANKS, Path, fourier_kernel, slow_factor, uniform_rank
-from optics.methods.window_sums import WindowSums, intensity_of, recorded_intensity
+from optics.methods.window_sums import WindowSums, intensity_of, recorded_field
 from optics.numerics.autodiff import Array
+from optics.numerics.field import Field
 from optics.numerics.grid import sample_positions
 from optics.numerics.interpolation import chebyshev_points, lagrange_basis
-from optics.numerics.precision import padded_for_packets, precision
+from optics.numerics.precision import precision
 
 __all__ = ["WindowSampling", "window_sampling"]
 
@@ -77,13 +79,30 @@ class WindowSampling:
     padding: float = 1.0
 
     def intensity(self, beam: Beam, problem: Problem) -> Array:
-        """Return |U|² over the window for unit amplitude at the pupil, a flat Dr.Jit array."""
-        types = precision(problem.dtype)
-        light = self.pupil.field(beam, types)
-        sums = _window_sums(self.pupil, self.rank, self.half_width, Path.from_problem(problem), problem.dtype)
+        """Return |U|² over the window for unit amplitude at the pupil, flat.
+
+        The result is a Dr.Jit array if the PSF carries derivatives, else a NumPy array.
+        """
         if problem.differentiated:
-            return recorded_intensity(light, beam.distance, sums)
-        return types.Float(padded_for_packets(intensity_of(sums.field(light.numpy()))))
+            return self._recorded(beam, problem).intensity
+        return intensity_of(self._field(beam, problem)).ravel()
+
+    def field(self, beam: Beam, problem: Problem) -> Field:
+        """Return U over the window, without the carrier e^{ikz}."""
+        if problem.differentiated:
+            return on_window(self._recorded(beam, problem), beam, problem)
+        u = Field.from_numpy(self._field(beam, problem), problem.window.dx, precision(problem.dtype))
+        return on_window(replace(u, grid=problem.window), beam, problem)
+
+    def _field(self, beam: Beam, problem: Problem) -> np.ndarray:
+        return self._sums(problem).field(self.pupil.light(beam, problem.dtype))
+
+    def _recorded(self, beam: Beam, problem: Problem) -> Field:
+        light = self.pupil.field(beam, precision(problem.dtype))
+        return recorded_field(light, beam.distance, self._sums(problem), problem.window)
+
+    def _sums(self, problem: Problem) -> WindowSums:
+        return _window_sums(self.pupil, self.rank, self.half_width, Path.from_problem(problem), problem.dtype)
 
     def plane(self, problem: Problem) -> float:
         """Return the width [m] of the plane over which rounding errors spread light."""
@@ -103,8 +122,6 @@ class WindowSampling:
 
         image: |U|² over the window, divided by the area of the pupil, flat.
         """
-        import drjit as dr
-
         total = float(np.sum(np.square(image, dtype=np.float64)))
         if not total > 0:
             return None
@@ -114,8 +131,7 @@ class WindowSampling:
             (at - count // 2) * problem.window.dx
             for at, count in zip((column, row), problem.window.shape[::-1], strict=True)
         )
-        with dr.suspend_grad():
-            light = self.finer.field(beam, precision(problem.dtype)).numpy()
+        light = self.finer.light(beam, problem.dtype)
         exact = _at_points(self.finer, Path.from_problem(problem), light, u, v) / beam.pupil.area
         squared = float(np.mean(np.square(image[drawn] - exact) / chance))
         if squared > 0.01 * total:  # choice: the PSF may be too bright, and errors are relative to the exact one

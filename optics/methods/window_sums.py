@@ -21,9 +21,10 @@ import numpy as np
 
 from optics.numerics.autodiff import Array, Scalar, carries_derivative
 from optics.numerics.field import Field
-from optics.numerics.precision import padded_for_packets
+from optics.numerics.grid import Grid
+from optics.numerics.precision import Precision, padded_for_packets
 
-__all__ = ["WindowSums", "intensity_of", "pupil_gradient", "recorded_intensity", "window_field"]
+__all__ = ["WindowSums", "intensity_of", "pupil_gradient", "recorded_field", "window_field"]
 
 
 def window_field(pupil: Any, kernel: Any, down: Any, across: Any) -> Any:
@@ -90,38 +91,41 @@ class WindowSums:
         return found
 
 
-def recorded_intensity(pupil: Field, distance: Scalar, sums: WindowSums) -> Array:
-    """Return |U|² as a flat Dr.Jit array with derivatives with respect to the pupil's light and the distance."""
+def recorded_field(pupil: Field, distance: Scalar, sums: WindowSums, window: Grid) -> Field:
+    """Return the field over the window, with derivatives with respect to the pupil's light and the distance."""
     import drjit as dr
 
     types, shape = pupil.types, pupil.grid.shape
     moves = carries_derivative(distance)
 
-    class Intensity(dr.CustomOp):
-        """|U|² as one operation. It stores the pupil and the field for its derivatives."""
+    class WindowField(dr.CustomOp):
+        """The sums as one operation. For derivatives with respect to the distance, it stores the pupil's light."""
 
-        def eval(self, re: Array, im: Array, distance: Array) -> Array:
+        def eval(self, re: Array, im: Array, distance: Array) -> tuple[Array, Array]:
             self.pupil = _complex(re, im, shape)
-            self.window = sums.field(self.pupil)
-            return types.Float(padded_for_packets(intensity_of(self.window)))
+            return _parts(sums.field(self.pupil), types)
 
         def forward(self) -> None:
             changed = sums.field(_complex(self.grad_in("re"), self.grad_in("im"), shape))
             if moves:
                 changed = changed + sums.moved(self.pupil) * self.grad_in("distance").numpy()[0]
-            self.set_grad_out(types.Float(padded_for_packets(2 * (self.window.conj() * changed).real)))
+            self.set_grad_out(_parts(changed, types))
 
         def backward(self) -> None:
-            cotangent = 2 * self.window * self.grad_out().numpy().reshape(self.window.shape)
-            found = sums.gradient(cotangent)
-            self.set_grad_in("re", types.Float(padded_for_packets(found.real)))
-            self.set_grad_in("im", types.Float(padded_for_packets(found.imag)))
+            cotangent = _complex(*self.grad_out(), window.shape)
+            re, im = _parts(sums.gradient(cotangent), types)
+            self.set_grad_in("re", re)
+            self.set_grad_in("im", im)
             if moves:
-                along = np.vdot(cotangent, sums.moved(self.pupil)).real
-                self.set_grad_in("distance", types.Float64(float(along)))
+                self.set_grad_in("distance", types.Float64(float(np.vdot(cotangent, sums.moved(self.pupil)).real)))
 
     place = types.Float64(dr.ravel(distance)) if moves else types.Float64(0)
-    return dr.custom(Intensity, pupil.re, pupil.im, place)
+    return Field(*dr.custom(WindowField, pupil.re, pupil.im, place), window, types)
+
+
+def _parts(values: np.ndarray, types: Precision) -> tuple[Array, Array]:
+    """Return real and imaginary part as flat Dr.Jit arrays."""
+    return types.Float(padded_for_packets(values.real)), types.Float(padded_for_packets(values.imag))
 
 
 def _complex(re: Array, im: Array, shape: tuple[int, int]) -> np.ndarray:
