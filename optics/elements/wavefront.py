@@ -10,7 +10,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any, ClassVar
 
 import numpy as np
@@ -25,6 +25,7 @@ from optics.numerics.autodiff import Array, is_differentiable, number
 __all__ = ["HIGHEST", "Aberration", "WavefrontMap", "Zernike", "mode"]
 
 UM = 1e-6
+MOST_CACHED = 5_000_000  # choice, limited by memory: largest number of values of polynomials that are cached together
 
 
 class Aberration(ABC):
@@ -138,10 +139,13 @@ class Zernike(Aberration):
         return cls({key: value / _norm(*key) for key, value in named.items()}, radius)
 
     def ahead(self, x: Array, y: Array) -> Array:
+        named = [key for key, value in self.modes.items() if value != 0 or self.asks]
+        if named and isinstance(x, np.ndarray) and isinstance(y, np.ndarray):
+            coefficients = UM * np.array([self.modes[key] for key in named])
+            return _weighted_modes(coefficients, tuple(named), x, y)
         total = like(x, 0.0)
-        for (n, m), value in self.modes.items():
-            if value != 0 or self.asks:
-                total = total + self._coefficient(n, m, x) * mode(n, m, x, y)
+        for n, m in named:
+            total = total + self._coefficient(n, m, x) * mode(n, m, x, y)
         return total
 
     def at(self, x: Any, y: Any) -> np.ndarray:
@@ -260,6 +264,27 @@ def mode(n: int, m: int, x: Any, y: Any) -> Any:
         raised = (c - 1) * (c * (c - 2) * t - order**2) * now - 2 * (k - 1) * (k + order - 1) * c * before
         before, now = now, raised / (2 * k * (k + order) * (c - 2))
     return _norm(n, m) * now * (cosine if m >= 0 else sine)
+
+
+def _weighted_modes(
+    weights: np.ndarray, named: tuple[tuple[int, int], ...], x: np.ndarray, y: np.ndarray
+) -> np.ndarray:
+    """Return Σ w Z_n^m at (x, y). Many wavefronts have the same samples, so the polynomials are cached for them."""
+    size = np.broadcast_shapes(x.shape, y.shape)
+    if len(named) * math.prod(size) > MOST_CACHED:
+        return np.asarray(sum((w * mode(n, m, x, y) for w, (n, m) in zip(weights, named, strict=True)), np.zeros(size)))
+    known = _modes(named, x.tobytes(), x.shape, y.tobytes(), y.shape)
+    return np.asarray((weights @ known).reshape(size))
+
+
+@lru_cache(maxsize=4)
+def _modes(
+    named: tuple[tuple[int, int], ...], x: bytes, columns: tuple[int, ...], y: bytes, rows: tuple[int, ...]
+) -> np.ndarray:
+    """Return the polynomials at (x, y), (mode, point). Positions are float64."""
+    at = np.frombuffer(x).reshape(columns), np.frombuffer(y).reshape(rows)
+    size = np.broadcast_shapes(columns, rows)
+    return np.stack([np.broadcast_to(mode(n, m, *at), size).ravel() for n, m in named])
 
 
 def _norm(n: int, m: int) -> float:

@@ -31,6 +31,7 @@ __all__ = ["SineSamples", "evenly_in_sines", "sine_samples"]
 
 # Choice: largest ratio between the distances of samples in the pupil; above it, too many samples are necessary.
 MOST_STRETCH = 3.0
+MOST_SQUARE = 0.95  # choice: largest square of a sine outside the pupil, where there is no light
 RIM = 64  # number of points on the rim from which the range of the sines is determined
 
 
@@ -98,7 +99,7 @@ class SineSamples:
     def points_at(self, s: np.ndarray, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the points ξ (x, y) [m] of the pupil in the directions s - s₀."""
         sx, sy = s + self._middle[0], t + self._middle[1]
-        slant = self.distance / np.sqrt(1 - np.minimum(sx * sx + sy * sy, self.steepest**2))
+        slant = self.distance / np.sqrt(1 - np.minimum(sx * sx + sy * sy, max(self.steepest**2, MOST_SQUARE)))
         return sx * slant + self.centre[0], sy * slant + self.centre[1]
 
     def places(self, i: Array, j: Array, beam: Beam, types: Precision) -> tuple[Array, Array]:
@@ -144,7 +145,7 @@ def _layout(samples: SineSamples) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     x, y = samples.points_at(sx - samples._middle[0], sy - samples._middle[1])
     at = (types.Float64(padded_for_packets(part / radius)) for part in (x, y))
     soft = samples.edge.aperture.transmittance(*at, types).numpy().reshape(x.shape)
-    cosine2 = 1 - np.minimum(sx * sx + sy * sy, samples.steepest**2)
+    cosine2 = 1 - np.minimum(sx * sx + sy * sy, max(samples.steepest**2, MOST_SQUARE))
     return x, y, soft * (samples.distance * samples.grid.dx / cosine2) ** 2
 
 

@@ -72,9 +72,9 @@ class _Attempt:
         problem, beam = request.problem, request.beam
         if not request.keeps_field:
             try:
-                image = sampling.intensity(beam, problem)
-                plain = isinstance(image, np.ndarray)
-                return cls(request, plan, sampling, image / (beam.pupil.area if plain else _area(beam, problem)))
+                if isinstance(sampling, WindowSampling) and not problem.differentiated:
+                    return cls(request, plan, sampling, sampling.plain_intensity(beam, problem) / beam.pupil.area)
+                return cls(request, plan, sampling, sampling.intensity(beam, problem) / _area(beam, problem))
             except NoDerivativesError:
                 if request.method != "auto":
                     raise
