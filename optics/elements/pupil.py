@@ -29,6 +29,7 @@ __all__ = ["MIDDLE", "Pupil"]
 TALLEST = 100.0  # choice, radii: highest relief to which the thin-element model applies
 ANY_HEIGHT = 1e-3  # choice [m]: reliefs up to this height are allowed on every pupil
 LEVEL, TRANSMISSION_DIGITS = 1e-6, 9.0  # choice: neglected level of a mask's spectrum; digits of its transmission
+SAMPLED = 65  # choice: largest number of points along a side of `sampled_slopes`
 MIDDLE = 550e-9  # choice [m]: wavelength that defines the image distance
 SENSOR_DISTANCE = 240e-6  # choice [m]: default distance of the sensor behind a pupil without a lens
 
@@ -246,6 +247,28 @@ class Pupil:
         same = self._first_with.setdefault(indices, wavelength)
         return _slopes(self._level if self.pixels else self, same, number(source.distance), source.plain.angle)
 
+    def sampled_slopes(self, wavelength: float, source: PointSource) -> Slopes:
+        """Return `slopes` at a limited number of points. Each slope is exact, but the steepest point may be missed."""
+        pieces = self._pieces(wavelength)
+        if 4 * pieces + 1 <= SAMPLED:
+            return self.slopes(wavelength, source)
+        grid = Grid.square(SAMPLED, 2 * (1 + EDGE_REACH) * self.radius / (SAMPLED - 1))
+        step, x, y = self.radius / (8 * pieces), grid.x[None, :], grid.y[:, None]
+        level = self._level if self.pixels else self
+        place = PointSource(number(source.distance), source.angle)
+        ahead, behind, above, below = (
+            level.path(x + sign * dx, y + sign * dy, wavelength, place)
+            for dx, dy in ((step, 0.0), (0.0, step))
+            for sign in (1, -1)
+        )
+        return Slopes(grid, (ahead - behind) / (2 * step), (above - below) / (2 * step), self.radius)
+
+    def _pieces(self, wavelength: float) -> int:
+        """Return the number of polynomial pieces across the pupil."""
+        pieces = [self.height.knots if self.bends(wavelength) else 0]
+        pieces += [0 if self.wavefront is None else self.wavefront.knots]
+        return max(pieces)
+
     @cached_property
     def _first_with(self) -> dict[tuple[float, float, float], float]:
         """For each set of refractive indices, the first wavelength that was requested."""
@@ -288,9 +311,7 @@ class Pupil:
 
 @lru_cache(maxsize=64)
 def _slopes(pupil: Pupil, wavelength: float, distance: float, angle: tuple[float, float]) -> Slopes:
-    pieces = max(
-        pupil.height.knots if pupil.bends(wavelength) else 0, 0 if pupil.wavefront is None else pupil.wavefront.knots
-    )
+    pieces = pupil._pieces(wavelength)
     n = int(min(1025, max(65 if pieces else 33, 4 * pieces + 1)))
     grid = Grid.square(n, 2 * (1 + EDGE_REACH) * pupil.radius / (n - 1))
     path = pupil.path(grid.x[None, :], grid.y[:, None], wavelength, PointSource(distance, angle))

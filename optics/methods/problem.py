@@ -43,39 +43,33 @@ BRIGHT_EDGE_RIPPLE_PER_TOLERANCE = 0.3
 class Problem:
     """One monochromatic propagation from a pupil to a window, described by numbers.
 
+    light: the light, without derivatives by the distances.
     aperture: shape of the pupil.
     radius, distance: radius of the pupil and distance of the window's plane [m].
     wavelength: wavelength [m] in the medium.
     window: grid of the output.
-    phase_band: highest spatial frequency [1/m] in the pupil's phase, over the disk and its soft edge.
-    phase_band_inside: the same over the disk alone, because a relief may be steep in the soft edge.
-    detail: bandwidth [1/m] of the phase that the slopes of the wavefront do not include.
     symmetric: True if the light behind the pupil is rotationally symmetric.
     even: True if it is even in x and in y.
     widest_band: frequency [1/m] beyond which light may be omitted (infinite: all light that reaches the window counts).
     reach: distance [m] from the axis within which all light lies, except for a fraction of the tolerance. Samples
         beyond it may be wrong, and edge-diffracted light may be less accurate (None: the whole window must be
         accurate).
-    slopes: slopes of the wavefront.
     medium_n: refractive index behind the pupil.
     masked: True if a mask scatters light to places that rays do not predict, so that approximations cannot predict
         their error.
     spread: spread of the light over the pupil, see `light_spread`.
     differentiated: whether the PSF carries derivatives.
     knots: cells that derivatives by the samples of maps require; None if no such derivatives are requested.
-    other_detail: `detail` without that of these maps.
     mask_detail: bandwidth [1/m] of the amplitude of the mask.
+    detail_part: phase [rad] of neglected detail, relative to the tolerance.
     """
 
+    light: Beam
     aperture: Aperture
     radius: float
     wavelength: float
     distance: float
     window: Grid
-    phase_band: float
-    phase_band_inside: float
-    detail: float
-    slopes: Slopes
     symmetric: bool
     tolerance: float
     dtype: str = "float32"
@@ -87,8 +81,8 @@ class Problem:
     even: bool = False
     differentiated: bool = False
     knots: DerivativeKnots | None = None
-    other_detail: float = 0.0
     mask_detail: float = 0.0
+    detail_part: float = DETAIL_PART
 
     @classmethod
     def from_beam(
@@ -112,6 +106,38 @@ class Problem:
         found = _differentiated(plain, window, tolerance, dtype, derivative_knots(beam.pupil, beam.wavelength))
         # A small change of the angle breaks the symmetry of light along the axis.
         return replace(found, symmetric=False, even=False) if any(map(carries_derivative, beam.source.angle)) else found
+
+    @cached_property
+    def slopes(self) -> Slopes:
+        """Slopes of the wavefront, on a grid that resolves all maps."""
+        return self.light.pupil.slopes(self.light.wavelength, self.light.source)
+
+    @cached_property
+    def sampled_slopes(self) -> Slopes:
+        """Slopes of the wavefront at a limited number of points, which may miss the steepest point."""
+        return self.light.pupil.sampled_slopes(self.light.wavelength, self.light.source)
+
+    @cached_property
+    def detail(self) -> float:
+        """Bandwidth [1/m] of the phase that the slopes of the wavefront do not include."""
+        return self.light.pupil.bandwidth(self.light.wavelength, self.detail_part * self.tolerance)
+
+    @cached_property
+    def other_detail(self) -> float:
+        """The same without the maps whose derivatives are requested."""
+        assert self.knots is not None
+        others = self.knots.without_maps(self.light.pupil)
+        return others.bandwidth(self.light.wavelength, DETAIL_PART * self.tolerance)
+
+    @cached_property
+    def phase_band(self) -> float:
+        """Highest spatial frequency [1/m] in the pupil's phase, over the disk and its soft edge."""
+        return SLOPE_MARGIN * self.slopes.steepest / self.light.wavelength + self.detail
+
+    @cached_property
+    def phase_band_inside(self) -> float:
+        """The same over the disk alone, because a relief may be steep in the soft edge."""
+        return SLOPE_MARGIN * self.slopes.steepest_inside / self.light.wavelength + self.detail
 
     @cached_property
     def turning(self) -> float:
@@ -253,30 +279,21 @@ class PupilEdge:
 @lru_cache(maxsize=256)
 def _differentiated(beam: Beam, window: Grid, tolerance: float, dtype: str, knots: DerivativeKnots | None) -> Problem:
     part = DETAIL_PART / (1 if knots else FINER_DETAIL)
-    found = replace(_problem(beam, window, tolerance, dtype, part), differentiated=True, knots=knots)
-    if knots is None:
-        return found
-    others = knots.without_maps(beam.pupil)
-    return replace(found, other_detail=others.bandwidth(beam.wavelength, DETAIL_PART * tolerance))
+    return replace(_problem(beam, window, tolerance, dtype, part), differentiated=True, knots=knots)
 
 
 @lru_cache(maxsize=256)
 def _problem(beam: Beam, window: Grid, tolerance: float, dtype: str, part: float = DETAIL_PART) -> Problem:
-    pupil, wavelength, distance = beam.pupil, beam.wavelength, beam.distance
-    slopes = pupil.slopes(wavelength, beam.source)
+    pupil, wavelength = beam.pupil, beam.wavelength
     pixels = pupil.pixels if pupil.bends(wavelength) else 0
     on_axis = beam.source.angle == (0.0, 0.0)
-    detail = pupil.bandwidth(wavelength, part * tolerance)
     return Problem(
+        light=beam,
         aperture=PixelatedAperture(pupil.aperture, pixels) if pixels else pupil.aperture,
         radius=pupil.radius,
         wavelength=wavelength / beam.index,
-        distance=distance,
+        distance=beam.distance,
         window=window,
-        phase_band=SLOPE_MARGIN * slopes.steepest / wavelength + detail,
-        phase_band_inside=SLOPE_MARGIN * slopes.steepest_inside / wavelength + detail,
-        detail=detail,
-        slopes=slopes,
         symmetric=pupil.rotationally_symmetric(wavelength) and on_axis,
         tolerance=tolerance,
         dtype=dtype,
@@ -285,4 +302,5 @@ def _problem(beam: Beam, window: Grid, tolerance: float, dtype: str, part: float
         medium_n=beam.index,
         spread=light_spread(pupil),
         even=on_axis and window.centre == (0.0, 0.0) and pupil.mirror_symmetric(wavelength),
+        detail_part=part,
     )

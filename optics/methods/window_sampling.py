@@ -170,7 +170,7 @@ def window_sampling(problem: Problem) -> WindowSampling | None:
 def _density(problem: Problem, half: float) -> float:
     """Return the number of samples per radius, which is also the number of cycles per radius that they resolve."""
     radius, tolerance = problem.radius, problem.tolerance
-    along, outward = problem.slopes.to_window(problem.distance, problem.window.centre, problem.medium_n)
+    along, outward = problem.sampled_slopes.to_window(problem.distance, problem.window.centre, problem.medium_n)
     cycles = np.sort(along) * radius / (problem.wavelength * problem.medium_n)
     share = NEGLECTED * min(tolerance / 0.01, 1.0) ** 2
     reach = float(cycles[max(0, math.ceil(len(cycles) * (1 - share)) - 1)])
@@ -205,7 +205,7 @@ def _rank(problem: Problem, pupil: SineSamples, half: float) -> int | None:
         rank = uniform_rank(problem, pupil, half, 1.0, MOST_RANK)
         return rank and max(rank, 3)
     path = Path.from_problem(problem)
-    xi, eta, u, v = problem.slopes.end_points(problem.distance, problem.window.centre, problem.medium_n, RAYS)
+    xi, eta, u, v = problem.sampled_slopes.end_points(problem.distance, problem.window.centre, problem.medium_n, RAYS)
     blur = BLUR * problem.wavelength * problem.distance / (2 * problem.radius)
     u = np.clip(u + blur * np.sign(u), -half, half)
     v = np.clip(v + blur * np.sign(v), -half, half)

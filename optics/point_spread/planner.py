@@ -114,15 +114,15 @@ class Weighing:
 # most of them turn out to be too inaccurate.
 WEIGHING = {
     "low_rank": Weighing(0.0),
-    "hankel": Weighing(CALL["hankel"], 0.0, 1e-3),
-    "rayleigh_sommerfeld": Weighing(CALL["rayleigh_sommerfeld"], 1 / PAIRS_PER_SECOND["float32"], 1e-3),
-    "fresnel": Weighing(CALL["fresnel"] + DFT_CALL, 0.0, 3e-3),
-    "fraunhofer": Weighing(CALL["fresnel"] + DFT_CALL, 0.0, 3e-3),
+    "hankel": Weighing(CALL["hankel"], 0.0, 2e-3),
+    "rayleigh_sommerfeld": Weighing(CALL["rayleigh_sommerfeld"], 1 / PAIRS_PER_SECOND["float32"], 4e-3),
+    "fresnel": Weighing(CALL["fresnel"] + DFT_CALL, 0.0, 4e-3),
+    "fraunhofer": Weighing(CALL["fresnel"] + DFT_CALL, 0.0, 4e-3),
     "geometric": Weighing(CALL["geometric"], 0.0, 3e-3),
     "pinhole": Weighing(CALL["pinhole"], 0.0, math.inf),
-    "far_field": Weighing(CALL["far_field"] + 2 * DFT_CALL, WINDOW_SAMPLE, 6e-4),
-    "angular_spectrum": Weighing(CALL["angular_spectrum"] + 2 * DFT_CALL, 0.0, 6e-4),
-    "split_angular_spectrum": Weighing(CALL["angular_spectrum"] + 3 * DFT_CALL, 0.0, 6e-4),
+    "far_field": Weighing(CALL["far_field"] + 2 * DFT_CALL, WINDOW_SAMPLE, 3e-3),
+    "angular_spectrum": Weighing(CALL["angular_spectrum"] + 2 * DFT_CALL, 0.0, 2e-3),
+    "split_angular_spectrum": Weighing(CALL["angular_spectrum"] + 3 * DFT_CALL, 0.0, 2e-3),
 }
 
 
