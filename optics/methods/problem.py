@@ -236,6 +236,9 @@ class Problem:
     @property
     def steepest_sine(self) -> float:
         """Largest sine of the rays that meet in a point of the window; see `scalar_theory.steepest_sine`."""
+        straight, per_slope = self.radius / math.hypot(self.radius, self.distance), SLOPE_MARGIN / self.medium_n
+        if per_slope * self.sampled_slopes.steepest_inside >= straight:
+            return straight  # all slopes and finer detail can only increase the sine of light that leaves the pupil
         leaving = self.phase_band_inside * self.wavelength + self.wavelength / self.radius
         return steepest_sine(self.radius, self.distance, leaving)
 

@@ -42,8 +42,8 @@ RIPPLES, PASSBAND = (0.03, 0.0075), 0.35
 # light; cycles for the edge; the same, relative to the cycles of the rays at the edge; exponent of the tolerance.
 NEGLECTED, EDGE_CYCLES, RIM_CYCLES, EXPONENT = 3e-4, 4.0, 2.0, -0.4
 RIM = 0.85  # choice, radii: rays farther out count as rays of the edge
-# Choices for derivatives by the samples of maps: cycles per cell between knots, and their growth per digit.
-CELL_CYCLES, CELL_DIGIT = 0.45, 0.35
+CELL_CYCLES = 0.5  # choice: cycles per cell between knots, for derivatives by the samples of maps
+DERIVATIVE_ERROR = 3.0  # choice: bound on the error of derivatives, relative to the tolerance; see test_gradients.py
 STEPS = 6  # choice: sampling densities per octave; equal densities share arrays
 FINER, SHIFT = 2.0 ** (2 / STEPS), (math.sqrt(5) - 1) / 2  # choices for the finer samples of the check
 RANK_SHARE = 0.3  # choice: part of the tolerance that the rank may take
@@ -113,6 +113,11 @@ class WindowSampling:
     def samples(self) -> tuple[int, int]:
         return self.pupil.grid.shape
 
+    @staticmethod
+    def derivative_error(problem: Problem) -> float:
+        """Return the upper bound on the error of derivatives that the plan states."""
+        return DERIVATIVE_ERROR * problem.tolerance
+
     def error(self, beam: Beam, problem: Problem, image: np.ndarray) -> float | None:
         """Return the relative L2 error of the intensity over the window, estimated at a few points.
 
@@ -176,14 +181,11 @@ def _density(problem: Problem, half: float) -> float:
     reach = float(cycles[max(0, math.ceil(len(cycles) * (1 - share)) - 1)])
     rim = float(np.median(along[outward > RIM])) * radius / (problem.wavelength * problem.medium_n)
     window = half * radius / (problem.wavelength * problem.distance)
-    edge = (EDGE_CYCLES + RIM_CYCLES * rim) * (tolerance / 0.01) ** EXPONENT
-    cells = 0.0
-    if problem.knots is not None:
-        digits = max(0.0, -2 - math.log10(tolerance))
-        cells = (len(problem.knots.borders) - 1) * CELL_CYCLES * (1 + CELL_DIGIT * digits)
+    cells = 0.0 if problem.knots is None else (len(problem.knots.borders) - 1) * CELL_CYCLES
+    edge = (EDGE_CYCLES + RIM_CYCLES * rim + cells) * (tolerance / 0.01) ** EXPONENT
     # The soft edge must not extend beyond EDGE_REACH, and its width is inversely proportional to the stopband.
     widest = SoftEdge(PASSBAND, 1.0, RIPPLES[1]).reach / EDGE_REACH
-    return max(window + reach + edge + problem.mask_detail * radius + cells, widest + window / 2)
+    return max(window + reach + edge + problem.mask_detail * radius, widest + window / 2)
 
 
 def _samples(problem: Problem, half: float, density: float, ripple: float, shift: float) -> SineSamples | None:

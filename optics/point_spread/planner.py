@@ -45,6 +45,7 @@ from optics.methods.method_sampling import Sampling
 from optics.methods.pixelated_spectrum import split_pixel_spectrum, whole_pixel_spectrum
 from optics.methods.problem import Problem
 from optics.methods.rayleigh_sommerfeld import nodes
+from optics.methods.window_sampling import WindowSampling
 from optics.numerics.accuracy import (
     FLOAT_NOISE,
     MOST_BYTES,
@@ -222,7 +223,10 @@ def _plan(problem: Problem, best: Sampling, weighed: dict[str, Sampling], most_s
     )
     error = _sampling_error(problem) + best.model_error
     sampled = best.method, best.samples, problem.dtype, error, why, _seconds(best, problem)
-    derivatives = problem.tolerance if problem.differentiated and not best.model_error else None
+    derivatives = None
+    if problem.differentiated and not best.model_error:
+        coarse = isinstance(best, WindowSampling)
+        derivatives = best.derivative_error(problem) if coarse else problem.tolerance
     return Plan(*sampled, tuple(options), best.padding, problem.scalar_error, derivatives)
 
 

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import optics
+from optics.methods.window_sampling import WindowSampling
 from optics.numerics.accuracy import FLOAT_NOISE
 from optics.point_spread import pictures
 from optics.point_spread.request import Request
@@ -29,7 +30,11 @@ def told(monkeypatch):
             checked.append(problem)
             return next(left)
 
+        def error(sampling, beam, problem, image):
+            return spot_check(beam, problem, image, sampling.seconds)
+
         monkeypatch.setattr(pictures, "spot_check", spot_check)
+        monkeypatch.setattr(WindowSampling, "error", error)
         return checked
 
     return tell
