@@ -29,7 +29,7 @@ __all__ = ["MIDDLE", "Pupil"]
 TALLEST = 100.0  # choice, radii: highest relief to which the thin-element model applies
 ANY_HEIGHT = 1e-3  # choice [m]: reliefs up to this height are allowed on every pupil
 LEVEL, TRANSMISSION_DIGITS = 1e-6, 9.0  # choice: neglected level of a mask's spectrum; digits of its transmission
-SAMPLED = 65  # choice: largest number of points along a side of `sampled_slopes`
+FEW_SAMPLED, SAMPLED = 33, 65  # choices: numbers of points along a side of `sampled_slopes`
 MIDDLE = 550e-9  # choice [m]: wavelength that defines the image distance
 SENSOR_DISTANCE = 240e-6  # choice [m]: default distance of the sensor behind a pupil without a lens
 
@@ -249,13 +249,15 @@ class Pupil:
 
     def sampled_slopes(self, wavelength: float, source: PointSource) -> Slopes:
         """Return `slopes` at a limited number of points. Each slope is exact, but the steepest point may be missed."""
-        pieces = self._pieces(wavelength)
-        if 4 * pieces + 1 <= SAMPLED:
-            return self.slopes(wavelength, source)
-        grid = Grid.square(SAMPLED, 2 * (1 + EDGE_REACH) * self.radius / (SAMPLED - 1))
-        step, x, y = self.radius / (8 * pieces), grid.x[None, :], grid.y[:, None]
-        level = self._level if self.pixels else self
+        pieces, level = self._pieces(wavelength), self._level if self.pixels else self
         place = PointSource(number(source.distance), source.angle)
+        n = FEW_SAMPLED if 4 * pieces < FEW_SAMPLED else SAMPLED
+        grid = Grid.square(n, 2 * (1 + EDGE_REACH) * self.radius / (n - 1))
+        x, y = grid.x[None, :], grid.y[:, None]
+        if n == FEW_SAMPLED:
+            path = level.path(x, y, wavelength, place)
+            return Slopes(grid, _derivative(path.T, grid.dx).T, _derivative(path, grid.dx), self.radius)
+        step = self.radius / (8 * pieces)
         ahead, behind, above, below = (
             level.path(x + sign * dx, y + sign * dy, wavelength, place)
             for dx, dy in ((step, 0.0), (0.0, step))

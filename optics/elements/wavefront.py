@@ -25,7 +25,7 @@ from optics.numerics.autodiff import Array, is_differentiable, number
 __all__ = ["HIGHEST", "Aberration", "WavefrontMap", "Zernike", "mode"]
 
 UM = 1e-6
-MOST_CACHED = 5_000_000  # choice, limited by memory: largest number of values of polynomials that are cached together
+MOST_CACHED = 4_000_000  # choice, limited by memory: largest number of values of polynomials that are cached together
 
 
 class Aberration(ABC):
@@ -277,7 +277,7 @@ def _weighted_modes(
     return np.asarray((weights @ known).reshape(size))
 
 
-@lru_cache(maxsize=4)
+@lru_cache(maxsize=8)
 def _modes(
     named: tuple[tuple[int, int], ...], x: bytes, columns: tuple[int, ...], y: bytes, rows: tuple[int, ...]
 ) -> np.ndarray:

@@ -137,7 +137,7 @@ class SineSamples:
         return Field(behind.re * types.Float(area), behind.im * types.Float(area), self.grid, types)
 
 
-@lru_cache(maxsize=16)
+@lru_cache(maxsize=64)
 def _layout(samples: SineSamples) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return x and y [m] of the samples, and their areas [m²] times the transmittance of the aperture, (y, x)."""
     types, radius = precision("float64"), samples.edge.radius

@@ -44,10 +44,10 @@ NEGLECTED, EDGE_CYCLES, RIM_CYCLES, EXPONENT = 3e-4, 4.0, 2.0, -0.4
 RIM = 0.85  # choice, radii: rays farther out count as rays of the edge
 CELL_CYCLES = 0.5  # choice: cycles per cell between knots, for derivatives by the samples of maps
 DERIVATIVE_ERROR = 3.0  # choice: bound on the error of derivatives, relative to the tolerance; see test_gradients.py
-STEPS = 6  # choice: sampling densities per octave; equal densities share arrays
-FINER, SHIFT = 2.0 ** (2 / STEPS), (math.sqrt(5) - 1) / 2  # choices for the finer samples of the check
+STEPS = 4  # choice: sampling densities per octave; equal densities share arrays
+FINER, SHIFT = 2.0 ** (1 / 3), (math.sqrt(5) - 1) / 2  # choices for the finer samples of the check
 RANK_SHARE = 0.3  # choice: part of the tolerance that the rank may take
-RAYS = 60  # choice: number of rays from which the rank is determined
+RAYS = 40  # choice: number of rays from which the rank is determined
 BLUR = 1.2  # choice, in λz/2R: distance from the end points of rays at which diffraction spreads their light
 MOST_RANK = 12  # choice: largest rank
 CAUTION = 3.0  # choice: safety factor on the estimated error; see test_window_sampling.py
@@ -225,7 +225,7 @@ def _rank(problem: Problem, pupil: SineSamples, half: float) -> int | None:
     return None
 
 
-@lru_cache(maxsize=16)
+@lru_cache(maxsize=64)
 def _window_sums(pupil: SineSamples, rank: int, half: float, path: Path, dtype: str) -> WindowSums:
     complex_dtype, nodes = precision(dtype).complex_dtype, half * chebyshev_points(rank)
     column, row = pupil.at[None, :], pupil.at[:, None]
@@ -258,8 +258,11 @@ def _at_points(samples: SineSamples, path: Path, light: np.ndarray, u: np.ndarra
     """
     size, at = len(samples.at), samples.at
     nodes, ratio = _ratios(samples, path, u, v)
-    weight, across, down = lagrange_basis(at, nodes).T, _turned(path, u, at), _turned(path, v, at)
-    inner = (light * _in_middle(samples, path)) @ (across.T[:, :, None] * weight[:, None, :]).reshape(size, -1)
+    real = light.real.dtype
+    across, down = (_turned(path, part, at, real) for part in (u, v))
+    weight = lagrange_basis(at, nodes).T.astype(real)
+    light = light * _in_middle(samples, path).astype(light.dtype)
+    inner = light @ (across.T[:, :, None] * weight[:, None, :]).reshape(size, -1)
     down = (down[:, :, None] * weight).swapaxes(1, 2)
     sums = down @ inner.reshape(size, len(u), len(nodes)).swapaxes(0, 1)
     distance = np.sqrt((u + path.window.centre[0]) ** 2 + (v + path.window.centre[1]) ** 2 + path.distance**2)
@@ -268,17 +271,18 @@ def _at_points(samples: SineSamples, path: Path, light: np.ndarray, u: np.ndarra
     return found
 
 
-@lru_cache(maxsize=16)
+@lru_cache(maxsize=64)
 def _in_middle(samples: SineSamples, path: Path) -> np.ndarray:
     """Return the slow factor of all samples for the middle of the window, (y, x)."""
     middle = np.zeros(1), np.zeros(1)
     return slow_factor(path, samples.points, (samples.at[None, :], samples.at[:, None]), middle)
 
 
-def _turned(path: Path, place: np.ndarray, sines: np.ndarray) -> np.ndarray:
+def _turned(path: Path, place: np.ndarray, sines: np.ndarray, dtype: np.dtype) -> np.ndarray:
     """Return e^{-ik u s}, (place, sine)."""
-    angle = np.outer(place, sines * (-2 * np.pi / path.wavelength))
-    found = np.empty(angle.shape, complex)
+    waves = np.outer(place, sines / -path.wavelength)
+    angle = ((waves - np.rint(waves)) * (2 * np.pi)).astype(dtype)
+    found = np.empty(angle.shape, np.result_type(dtype, np.complex64))
     found.real, found.imag = np.cos(angle), np.sin(angle)
     return found
 
