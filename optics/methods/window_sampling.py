@@ -51,8 +51,8 @@ RAYS = 40  # choice: number of rays from which the rank is determined
 BLUR = 1.2  # choice, in λz/2R: distance from the end points of rays at which diffraction spreads their light
 MOST_RANK = 12  # choice: largest rank
 CAUTION = 3.0  # choice: safety factor on the estimated error; see test_window_sampling.py
-POINTS = 40  # choice: number of points of the check
-EVEN = 0.4  # choice: share of these points that is drawn evenly, and not by intensity
+ACROSS = 16  # choice: number of rows and of columns in which the check computes the PSF
+SHARES = (0.3, 0.3, 0.3, 0.1)  # choices: weights of the probabilities with which these are drawn, see `_drawn`
 INTERPOLATED = 2e-4  # choice: error of the interpolated kernel of the check
 # Choices: numbers of interpolation points across the pupil, and phases [rad] up to which the earlier ones may suffice.
 ORDERS, PHASES = (3, 5, 7, 9, 12, 16), (0.1, 0.6, 1.5, 3.0, 6.0)
@@ -119,7 +119,7 @@ class WindowSampling:
         return DERIVATIVE_ERROR * problem.tolerance
 
     def error(self, beam: Beam, problem: Problem, image: np.ndarray) -> float | None:
-        """Return the relative L2 error of the intensity over the window, estimated at a few points.
+        """Return the relative L2 error of the intensity over the window, estimated in a few rows and columns.
 
         The result is None for a window without light.
 
@@ -128,18 +128,16 @@ class WindowSampling:
 
         image: |U|² over the window, divided by the area of the pupil, flat.
         """
-        total = float(np.sum(np.square(image, dtype=np.float64)))
+        window = problem.window
+        image = image.reshape(window.shape)
+        total = float(np.vdot(image, image))
         if not total > 0:
             return None
-        drawn, chance = _drawn(image.reshape(problem.window.shape))
-        row, column = np.divmod(drawn, problem.window.shape[1])
-        u, v = (
-            (at - count // 2) * problem.window.dx
-            for at, count in zip((column, row), problem.window.shape[::-1], strict=True)
-        )
+        rows, columns, chance = _drawn(image)
+        u, v = ((at - n // 2) * window.dx for at, n in zip((columns, rows), window.shape[::-1], strict=True))
         light = self.finer.light(beam, problem.dtype)
         exact = _at_points(self.finer, Path.from_problem(problem), light, u, v) / beam.pupil.area
-        squared = float(np.mean(np.square(image[drawn] - exact) / chance))
+        squared = float(np.mean(np.square(image[np.ix_(rows, columns)] - exact) / chance))
         if squared > 0.01 * total:  # choice: the PSF may be too bright, and errors are relative to the exact one
             total = min(total, float(np.mean(np.square(exact) / chance)))
         rounding = float(np.finfo(precision(problem.dtype).dtype).eps)
@@ -250,25 +248,23 @@ def _window_sums(pupil: SineSamples, rank: int, half: float, path: Path, dtype: 
 
 
 def _at_points(samples: SineSamples, path: Path, light: np.ndarray, u: np.ndarray, v: np.ndarray) -> np.ndarray:
-    """Return |U|² at points (u, v) [m], relative to the middle of the window.
+    """Return |U|² in columns u and rows v [m], relative to the middle of the window, (v, u).
 
     The slow factor is interpolated from a few points (ξ_a, η_b) of the pupil, with weights L_a and L_b:
 
         U(u, v) = Σ_ba G(ξ_a, η_b; u, v)/G(ξ_a, η_b; 0, 0) Σ_ηξ L_b e^{-ik v t} P G(ξ, η; 0, 0) L_a e^{-ik u s}.
     """
-    size, at = len(samples.at), samples.at
+    size, real = len(samples.at), light.real.dtype
     nodes, ratio = _ratios(samples, path, u, v)
-    real = light.real.dtype
-    across, down = (_turned(path, part, at, real) for part in (u, v))
-    weight = lagrange_basis(at, nodes).T.astype(real)
-    light = light * _in_middle(samples, path).astype(light.dtype)
-    inner = light @ (across.T[:, :, None] * weight[:, None, :]).reshape(size, -1)
-    down = (down[:, :, None] * weight).swapaxes(1, 2)
-    sums = down @ inner.reshape(size, len(u), len(nodes)).swapaxes(0, 1)
-    distance = np.sqrt((u + path.window.centre[0]) ** 2 + (v + path.window.centre[1]) ** 2 + path.distance**2)
-    near = 1 + (path.wavelength / (2 * np.pi * distance)) ** 2
-    found: np.ndarray = np.abs((ratio * sums).sum((1, 2))) ** 2 * near / (path.wavelength * path.distance) ** 2
-    return found
+    weight = lagrange_basis(samples.at, nodes).astype(real)
+    across, down = (
+        (_turned(path, part, samples.at, real)[:, None, :] * weight).reshape(-1, size) for part in (u, v)
+    )
+    sums = down @ (light * _in_middle(samples, path).astype(light.dtype)) @ across.T
+    found = (ratio * sums.reshape(len(v), len(nodes), len(u), len(nodes)).swapaxes(1, 2)).sum((2, 3))
+    x, y = u + path.window.centre[0], v[:, None] + path.window.centre[1]
+    near = 1 + (path.wavelength / (2 * np.pi)) ** 2 / (x * x + y * y + path.distance**2)
+    return intensity_of(found) * near / (path.wavelength * path.distance) ** 2
 
 
 @lru_cache(maxsize=64)
@@ -288,52 +284,53 @@ def _turned(path: Path, place: np.ndarray, sines: np.ndarray, dtype: np.dtype) -
 
 
 def _ratios(samples: SineSamples, path: Path, u: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return interpolation points in sines, and the slow factor there relative to the middle, (point, b, a).
+    """Return interpolation points in sines, and the slow factor there relative to the middle, (v, u, b, a).
 
-    The interpolation is compared with the factor at the rim. It starts with a number of points that is usually
-    sufficient for the phase at the rim.
+    The interpolation is compared with the factor at the rim, for the outermost columns and rows. It starts with a
+    number of points that is usually sufficient for the phase there.
     """
 
-    def ratio(s: np.ndarray, t: np.ndarray) -> np.ndarray:
-        points = samples.points_at(s, t)
-        here, middle = (
-            slow_factor(path, points, (s, t), at) for at in ((u[:, None, None], v[:, None, None]), (0.0, 0.0))
-        )
-        found: np.ndarray = here / middle
+    def ratio(s: np.ndarray, t: np.ndarray, u: np.ndarray, v: np.ndarray) -> np.ndarray:
+        points, place = samples.points_at(s, t), (u[None, :, None, None], v[:, None, None, None])
+        found: np.ndarray = slow_factor(path, points, (s, t), place) / slow_factor(path, points, (s, t), (0.0, 0.0))
         return found
 
     angle = 2 * np.pi * np.arange(12) / 12
-    s, t = samples.directions(samples.outermost * np.cos(angle), samples.outermost * np.sin(angle))
-    exact = ratio(s, t)[:, 0]
+    rim = samples.directions(samples.outermost * np.cos(angle), samples.outermost * np.sin(angle))
+    ends = u[[0, -1]], v[[0, -1]]
+    exact = ratio(*rim, *ends)[:, :, 0]
     phase = float(np.abs(np.angle(exact)).max())
     for order in ORDERS[bisect(PHASES, phase) :]:
         nodes = (at := samples.at[[0, -1]]).mean() + (at[1] - at[0]) / 2 * chebyshev_points(order)
-        found = ratio(*np.meshgrid(nodes, nodes))
-        weight = lagrange_basis(s, nodes)[:, None] * lagrange_basis(t, nodes)
-        between = found.swapaxes(1, 2).reshape(len(u), -1) @ weight.reshape(order * order, -1)
-        if np.abs(between - exact).max() < INTERPOLATED:
+        at_nodes = np.meshgrid(nodes, nodes)
+        weight = lagrange_basis(rim[1], nodes)[:, None] * lagrange_basis(rim[0], nodes)
+        if np.abs(np.tensordot(ratio(*at_nodes, *ends), weight, 2) - exact).max() < INTERPOLATED:
             break
-    return nodes, found
+    return nodes, ratio(*at_nodes, u, v)
 
 
-def _drawn(image: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the flat indices of POINTS samples, and the probability with which each was drawn.
+def _drawn(image: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the rows and columns of a grid of samples, and the probability with which each sample was drawn.
 
-    A sample is drawn with a probability that is partly even and partly proportional to its intensity. If the amplitude
-    has the same error everywhere, the error of the intensity is proportional to the square root of the intensity. Rows
-    are drawn at even steps of the cumulative probability, and columns within them at steps of the golden ratio.
+    Rows and columns are drawn at even steps of their cumulative probabilities. If the amplitude has the same error
+    everywhere, the error of the intensity is proportional to its square root. Other errors are next to the brightest
+    samples, or at the sides of the window, where phases change fastest.
     """
-    height, width = image.shape
-    points = min(POINTS, image.size)
-    if points == image.size:
-        return np.arange(points), np.full(points, 1 / points)
-    rows = image.sum(axis=1, dtype=np.float64)
-    chance = EVEN / height + (1 - EVEN) * rows / rows.sum()
-    levels = (np.arange(points) + 0.5) / points
-    row = np.searchsorted(np.cumsum(chance), levels * chance.sum()).clip(max=height - 1)
-    light = image[row] / rows[row][:, None].clip(1e-300)
-    within = EVEN / height / width + (1 - EVEN) * rows[row][:, None] / rows.sum() * light
-    steps = np.cumsum(within, axis=1)
-    place = (0.5 + np.arange(points) * SHIFT) % 1
-    column = (steps < (place * steps[:, -1])[:, None]).sum(axis=1).clip(max=width - 1)
-    return row * width + column, within[np.arange(points), column]
+    found = []
+    for along in (1, 0):
+        root = np.sqrt(image).sum(axis=along, dtype=np.float64)
+        bright = np.square(image).sum(axis=along, dtype=np.float64)
+        bright[1:-1] = bright[:-2] + bright[1:-1] + bright[2:]
+        sides = np.zeros(len(root))
+        sides[[0, -1]] = 0.5
+        shares = np.full(len(root), 1 / len(root)), root / root.sum(), bright / bright.sum(), sides
+        chance = np.tensordot(SHARES, shares, 1)
+        count = min(ACROSS, len(root))
+        if count == len(root):
+            found.append((np.arange(count), np.full(count, 1 / count)))
+            continue
+        levels = np.cumsum(chance)
+        place = np.searchsorted(levels, (np.arange(count) + 0.5) / count * levels[-1]).clip(max=len(root) - 1)
+        found.append((place, chance[place]))
+    (rows, down), (columns, across) = found
+    return rows, columns, np.outer(down, across)
