@@ -238,6 +238,8 @@ def _why_for_derivatives(problem: Problem, best: Sampling) -> str:
         return "; an approximation predicts no error of derivatives"
     if problem.knots is None:
         return "; derivatives exclude approximations"
+    if isinstance(best, WindowSampling):
+        return f"; derivatives by the samples of maps need more samples ({problem.knots.maps})"
     return f"; derivatives by the samples of maps need nodes in each cell between knots ({problem.knots.maps})"
 
 
