@@ -21,6 +21,7 @@ import numpy as np
 from optics.apertures.aperture import EDGE_REACH
 from optics.apertures.soft_edge import SoftEdge
 from optics.elements.beam import Beam
+from optics.elements.wavefront import Zernike
 from optics.methods.carrier import on_window
 from optics.methods.problem import Problem, PupilEdge
 from optics.methods.sine_samples import SineSamples, evenly_in_sines
@@ -43,6 +44,7 @@ RIPPLES, PASSBAND = (0.03, 0.0075), 0.35
 NEGLECTED, EDGE_CYCLES, RIM_CYCLES, EXPONENT = 3e-4, 4.0, 2.0, -0.4
 RIM = 0.85  # choice, radii: rays farther out count as rays of the edge
 CELL_CYCLES = 0.5  # choice: cycles per cell between knots, for derivatives by the samples of maps
+DERIVATIVE_PART = 0.1  # choice: tolerance of the edge if the PSF carries derivatives, relative to that of the PSF
 DERIVATIVE_ERROR = 3.0  # choice: bound on the error of derivatives, relative to the tolerance; see test_gradients.py
 STEPS = 4  # choice: sampling densities per octave; equal densities share arrays
 FINER, SHIFT = 2.0 ** (1 / 3), (math.sqrt(5) - 1) / 2  # choices for the finer samples of the check
@@ -180,7 +182,12 @@ def _density(problem: Problem, half: float) -> float:
     rim = float(np.median(along[outward > RIM])) * radius / (problem.wavelength * problem.medium_n)
     window = half * radius / (problem.wavelength * problem.distance)
     cells = 0.0 if problem.knots is None else (len(problem.knots.borders) - 1) * CELL_CYCLES
-    edge = (EDGE_CYCLES + RIM_CYCLES * rim + cells) * (tolerance / 0.01) ** EXPONENT
+    sharp = EDGE_CYCLES + RIM_CYCLES * rim
+    if problem.differentiated:
+        wavefront = problem.light.pupil.wavefront
+        # High modes grow outside the circle, so that their derivatives need a sharper edge.
+        sharp = sharp * DERIVATIVE_PART**EXPONENT + (wavefront.order if isinstance(wavefront, Zernike) else 0)
+    edge = (sharp + cells) * (tolerance / 0.01) ** EXPONENT
     # The soft edge must not extend beyond EDGE_REACH, and its width is inversely proportional to the stopband.
     widest = SoftEdge(PASSBAND, 1.0, RIPPLES[1]).reach / EDGE_REACH
     return max(window + reach + edge + problem.mask_detail * radius, widest + window / 2)
