@@ -4,24 +4,24 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
-from functools import cached_property, lru_cache
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from optics.apertures.aperture import EDGE_REACH, Aperture
+from optics.apertures.aperture import Aperture
 from optics.apertures.circular import Circle
 from optics.elements.pixel_relief import PixelRelief
+from optics.elements.pupil_slopes import all_slopes, sampled_slopes
 from optics.elements.refractive_index import Dispersion, index_of, material
 from optics.elements.relief import HeightMap, Relief
 from optics.elements.source import PointSource
 from optics.elements.transmittance import Mask
 from optics.elements.wavefront import Aberration
-from optics.elements.wavefront_slopes import Slopes, _derivative
+from optics.elements.wavefront_slopes import Slopes
 from optics.numerics.arguments import finite, of_kind, positive, reals
 from optics.numerics.array_library import library, like
 from optics.numerics.autodiff import Array, Scalar, is_differentiable, number
-from optics.numerics.grid import Grid
 from optics.numerics.precision import precision
 
 __all__ = ["MIDDLE", "Pupil"]
@@ -29,7 +29,6 @@ __all__ = ["MIDDLE", "Pupil"]
 TALLEST = 100.0  # choice, radii: highest relief to which the thin-element model applies
 ANY_HEIGHT = 1e-3  # choice [m]: reliefs up to this height are allowed on every pupil
 LEVEL, TRANSMISSION_DIGITS = 1e-6, 9.0  # choice: neglected level of a mask's spectrum; digits of its transmission
-FEW_SAMPLED, SAMPLED = 33, 65  # choices: numbers of points along a side of `sampled_slopes`
 MIDDLE = 550e-9  # choice [m]: wavelength that defines the image distance
 SENSOR_DISTANCE = 240e-6  # choice [m]: default distance of the sensor behind a pupil without a lens
 
@@ -245,25 +244,12 @@ class Pupil:
         # The path depends on the wavelength only through these indices. Equal indices therefore give equal slopes.
         indices = number(self.index_step(wavelength)), self.index_before(wavelength), self.index_behind(wavelength)
         same = self._first_with.setdefault(indices, wavelength)
-        return _slopes(self._level if self.pixels else self, same, number(source.distance), source.plain.angle)
+        level = self._level if self.pixels else self
+        return all_slopes(level, same, number(source.distance), source.plain.angle, self._pieces(same))
 
     def sampled_slopes(self, wavelength: float, source: PointSource) -> Slopes:
         """Return `slopes` at a limited number of points. Each slope is exact, but the steepest point may be missed."""
-        pieces, level = self._pieces(wavelength), self._level if self.pixels else self
-        place = PointSource(number(source.distance), source.angle)
-        n = FEW_SAMPLED if 4 * pieces < FEW_SAMPLED else SAMPLED
-        grid = Grid.square(n, 2 * (1 + EDGE_REACH) * self.radius / (n - 1))
-        x, y = grid.x[None, :], grid.y[:, None]
-        if n == FEW_SAMPLED:
-            path = level.path(x, y, wavelength, place)
-            return Slopes(grid, _derivative(path.T, grid.dx).T, _derivative(path, grid.dx), self.radius)
-        step = self.radius / (8 * pieces)
-        ahead, behind, above, below = (
-            level.path(x + sign * dx, y + sign * dy, wavelength, place)
-            for dx, dy in ((step, 0.0), (0.0, step))
-            for sign in (1, -1)
-        )
-        return Slopes(grid, (ahead - behind) / (2 * step), (above - below) / (2 * step), self.radius)
+        return sampled_slopes(self._level if self.pixels else self, wavelength, source, self._pieces(wavelength))
 
     def _pieces(self, wavelength: float) -> int:
         """Return the number of polynomial pieces across the pupil."""
@@ -309,12 +295,3 @@ class Pupil:
         if self.wavefront is not None:
             found = max(found, self.wavefront.bandwidth(level) / self.radius)
         return found if self.mask is None else found + self.mask.bandwidth(min(tolerance, 0.1), self.radius)
-
-
-@lru_cache(maxsize=64)
-def _slopes(pupil: Pupil, wavelength: float, distance: float, angle: tuple[float, float]) -> Slopes:
-    pieces = pupil._pieces(wavelength)
-    n = int(min(1025, max(65 if pieces else 33, 4 * pieces + 1)))
-    grid = Grid.square(n, 2 * (1 + EDGE_REACH) * pupil.radius / (n - 1))
-    path = pupil.path(grid.x[None, :], grid.y[:, None], wavelength, PointSource(distance, angle))
-    return Slopes(grid, _derivative(path.T, grid.dx).T, _derivative(path, grid.dx), pupil.radius)

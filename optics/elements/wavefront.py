@@ -10,13 +10,14 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import cached_property, lru_cache
+from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
 
 from optics.elements.relief import HeightMap
 from optics.elements.square_samples import square_samples
+from optics.elements.zernike_modes import mode, norm, weighted_modes
 from optics.elements.zernike_order import HIGHEST, fringe_mode, noll_mode, numbered, osa_mode
 from optics.numerics.arguments import finite, plain_reals, positive, reals, shown
 from optics.numerics.array_library import gather, like
@@ -25,7 +26,6 @@ from optics.numerics.autodiff import Array, is_differentiable, number
 __all__ = ["HIGHEST", "Aberration", "WavefrontMap", "Zernike", "mode"]
 
 UM = 1e-6
-MOST_CACHED = 4_000_000  # choice, limited by memory: largest number of values of polynomials that are cached together
 
 
 class Aberration(ABC):
@@ -136,13 +136,13 @@ class Zernike(Aberration):
             ValueError: a number outside 1 to 36, or see `Zernike`.
         """
         named = numbered(coefficients_um, fringe_mode)
-        return cls({key: value / _norm(*key) for key, value in named.items()}, radius)
+        return cls({key: value / norm(*key) for key, value in named.items()}, radius)
 
     def ahead(self, x: Array, y: Array) -> Array:
         named = [key for key, value in self.modes.items() if value != 0 or self.asks]
         if named and isinstance(x, np.ndarray) and isinstance(y, np.ndarray):
             coefficients = UM * np.array([self.modes[key] for key in named])
-            return _weighted_modes(coefficients, tuple(named), x, y)
+            return weighted_modes(coefficients, tuple(named), x, y)
         total = like(x, 0.0)
         for n, m in named:
             total = total + self._coefficient(n, m, x) * mode(n, m, x, y)
@@ -174,7 +174,7 @@ class Zernike(Aberration):
 
     @property
     def span(self) -> float:
-        return 2 * UM * sum(abs(value) * _norm(*key) for key, value in self.modes.items() if key != (0, 0))
+        return 2 * UM * sum(abs(value) * norm(*key) for key, value in self.modes.items() if key != (0, 0))
 
     @property
     def rotationally_symmetric(self) -> bool:
@@ -244,51 +244,6 @@ class WavefrontMap(Aberration):
     @property
     def rotationally_symmetric(self) -> bool:
         return self._map.rotationally_symmetric
-
-
-def mode(n: int, m: int, x: Any, y: Any) -> Any:
-    """Return Z_n^m at (x, y), NumPy or Dr.Jit: ρ^|m| P_k^(0, |m|)(2ρ² - 1) {cos, sin} with k = (n - |m|)/2.
-
-    The recurrence of Jacobi's polynomials loses no digits at high orders (Abramowitz & Stegun 22.7.1).
-    """
-    sine, cosine = x * 0, x * 0 + 1.0
-    for _ in range(abs(m)):
-        cosine, sine = cosine * x - sine * y, cosine * y + sine * x
-    t, order = 2 * (x * x + y * y) - 1, abs(m)
-    before, now = x * 0, x * 0 + 1.0
-    for k in range(1, (n - order) // 2 + 1):
-        c = 2 * k + order
-        if k == 1:
-            before, now = now, 1 + (order + 2) / 2 * (t - 1)
-            continue
-        raised = (c - 1) * (c * (c - 2) * t - order**2) * now - 2 * (k - 1) * (k + order - 1) * c * before
-        before, now = now, raised / (2 * k * (k + order) * (c - 2))
-    return _norm(n, m) * now * (cosine if m >= 0 else sine)
-
-
-def _weighted_modes(
-    weights: np.ndarray, named: tuple[tuple[int, int], ...], x: np.ndarray, y: np.ndarray
-) -> np.ndarray:
-    """Return Σ w Z_n^m at (x, y). Many wavefronts have the same samples, so the polynomials are cached for them."""
-    size = np.broadcast_shapes(x.shape, y.shape)
-    if len(named) * math.prod(size) > MOST_CACHED:
-        return np.asarray(sum((w * mode(n, m, x, y) for w, (n, m) in zip(weights, named, strict=True)), np.zeros(size)))
-    known = _modes(named, x.tobytes(), x.shape, y.tobytes(), y.shape)
-    return np.asarray((weights @ known).reshape(size))
-
-
-@lru_cache(maxsize=8)
-def _modes(
-    named: tuple[tuple[int, int], ...], x: bytes, columns: tuple[int, ...], y: bytes, rows: tuple[int, ...]
-) -> np.ndarray:
-    """Return the polynomials at (x, y), (mode, point). Positions are float64."""
-    at = np.frombuffer(x).reshape(columns), np.frombuffer(y).reshape(rows)
-    size = np.broadcast_shapes(columns, rows)
-    return np.stack([np.broadcast_to(mode(n, m, *at), size).ravel() for n, m in named])
-
-
-def _norm(n: int, m: int) -> float:
-    return math.sqrt((2 - (m == 0)) * (n + 1))
 
 
 def _check_mode(key: Any) -> None:

@@ -15,7 +15,7 @@ from optics.apertures.aperture import EDGE_REACH
 from optics.numerics.grid import Grid
 from optics.numerics.read_only import ReadOnlyArrays, read_only
 
-__all__ = ["Slopes"]
+__all__ = ["Slopes", "derivative"]
 
 
 GROUPS = 400  # choice: number of groups of slopes in `spread`
@@ -26,7 +26,7 @@ AT_END = np.array([-25, 48, -36, 16, -3]) / 12
 BESIDE_END = np.array([-3, -10, 18, -6, 1]) / 12
 
 
-def _derivative(values: np.ndarray, step: float) -> np.ndarray:
+def derivative(values: np.ndarray, step: float) -> np.ndarray:
     """Return the derivative along axis 0 by differences of fourth order, also at both ends."""
     slope = np.empty_like(values)
     for place, weights in ((0, AT_END), (1, BESIDE_END)):
@@ -131,9 +131,7 @@ class Slopes(ReadOnlyArrays):
             found.append(max(steepest, _total(rest, around, bend).max(initial=0)))
         return float(found[0]), float(found[1])
 
-    def to_window(
-        self, distance: float, centre: tuple[float, float], medium_n: float
-    ) -> tuple[np.ndarray, np.ndarray]:
+    def to_window(self, distance: float, centre: tuple[float, float], medium_n: float) -> tuple[np.ndarray, np.ndarray]:
         """Return slopes |∇L + n (ξ - c) / D| of paths to the centre of a window, and distances of the points.
 
         The slopes are those along x or y, whichever is larger, at points of the disk, flat. The distances of these

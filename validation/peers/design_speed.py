@@ -1,7 +1,7 @@
 """Times and errors of single PSFs and of their gradients, for pupils that somebody designs.
 
 Each pupil is new: its PSF is planned, computed and checked in the measured time. The yardstick is a matrix Fourier
-transform in NumPy, from direction sines to the window, with a grey edge. It plans nothing and predicts no error, and the
+transform in NumPy, from direction sines to the window, with a grey edge. It plans nothing and predicts no error. The
 number of its samples is chosen in advance such that its error is near the tolerance.
 """
 
