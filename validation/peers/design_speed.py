@@ -21,7 +21,7 @@ __all__ = ["Design", "DesignRow", "design_rows", "design_table", "designs"]
 
 WAVE, RADIUS, FOCUS, N, DX = 550e-9, 1e-3, 10e-3, 65, 1.4e-6
 TOLERANCE, EXACT = 1e-2, 2e-4
-REPEATED = 5  # new pupils per design
+REPEATED = 3  # new pupils per design
 SUBSAMPLES = 4  # subsamples of a cell along an axis, for the grey edge of the yardstick
 
 

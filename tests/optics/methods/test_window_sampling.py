@@ -1,4 +1,4 @@
-"""At coarse tolerances, samples follow from the light in the window, and the check finds the error of every PSF."""
+"""Samples follow from the light in the window at coarse tolerances, and the check finds the error of every PSF."""
 
 import numpy as np
 import pytest
@@ -53,7 +53,7 @@ def test_predicted_errors_hold_and_little_is_wasted():
 
 
 def test_a_rough_relief_needs_samples_for_its_light_alone():
-    """With samples for all of the relief's detail, the PSF was refused."""
+    """Samples for all of the detail of the relief would be too many, and the PSF would be refused."""
     plan = optics.psf(lens(height=rough(150e-9)), [WAVE], **WINDOW, tolerance=1e-2).plan
     assert plan.predicted_error < 1e-2
     assert plan.samples[0] < 130
