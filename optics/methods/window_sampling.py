@@ -41,12 +41,13 @@ TIGHTEST = 3e-4  # choice: smallest tolerance at which this way of sampling save
 RIPPLES, PASSBAND = (0.03, 0.0075), 0.35
 # Choices for the samples, in cycles per radius, at a tolerance of 0.01: light that is neglected, as a share of all
 # light; cycles for the edge; the same, relative to the cycles of the rays at the edge; exponent of the tolerance.
-NEGLECTED, EDGE_CYCLES, RIM_CYCLES, EXPONENT = 3e-4, 4.0, 2.0, -0.4
+NEGLECTED, EDGE_CYCLES, RIM_CYCLES, EXPONENT = 3e-4, 4.0, 3.0, -0.4
 RIM = 0.85  # choice, radii: rays farther out count as rays of the edge
 CELL_CYCLES = 0.5  # choice: cycles per cell between knots, for derivatives by the samples of maps
 DERIVATIVE_PART = 0.1  # choice: tolerance of the edge if the PSF carries derivatives, relative to that of the PSF
 DERIVATIVE_ERROR = 3.0  # choice: bound on the error of derivatives, relative to the tolerance; see test_gradients.py
-STEPS = 4  # choice: sampling densities per octave; equal densities share arrays
+# Choices: sampling densities and sharpnesses of the edge per octave; equal ones share arrays and tables.
+STEPS, EDGES = 4, 8
 FINER, SHIFT = 2.0 ** (1 / 3), (math.sqrt(5) - 1) / 2  # choices for the finer samples of the check, see `window_check`
 RANK_SHARE = 0.3  # choice: part of the tolerance that the rank may take
 RAYS = 40  # choice: number of rays from which the rank is determined
@@ -165,7 +166,7 @@ def _density(problem: Problem, half: float) -> float:
         sharp = sharp * DERIVATIVE_PART**EXPONENT + (wavefront.order if isinstance(wavefront, Zernike) else 0)
     edge = (sharp + cells) * (tolerance / 0.01) ** EXPONENT
     # The soft edge must not extend beyond EDGE_REACH, and its width is inversely proportional to the stopband.
-    widest = SoftEdge(PASSBAND, 1.0, RIPPLES[1]).reach / EDGE_REACH
+    widest = SoftEdge(PASSBAND, 1.0, RIPPLES[1]).reach / EDGE_REACH * 2.0 ** (1 / EDGES)
     return max(window + reach + edge + problem.mask_detail * radius, widest + window / 2)
 
 
@@ -173,6 +174,7 @@ def _samples(problem: Problem, half: float, density: float, ripple: float, shift
     """Return samples with a soft edge, which is as sharp as the density allows."""
     window = half * problem.radius / (problem.wavelength * problem.distance)
     stopband = max(density - window / 2, density / 2)
+    stopband = 2.0 ** (math.floor(EDGES * math.log2(stopband)) / EDGES)
     edge = PupilEdge(problem.aperture.with_edge(PASSBAND * stopband, stopband, ripple), problem.radius)
     return evenly_in_sines(problem, edge, density / problem.radius, shift)
 
