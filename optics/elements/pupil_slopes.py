@@ -11,6 +11,7 @@ from optics.apertures.aperture import EDGE_REACH
 from optics.elements.source import PointSource
 from optics.elements.wavefront_slopes import Slopes, derivative
 from optics.numerics.grid import Grid
+from optics.numerics.precision import precision
 
 __all__ = ["all_slopes", "sampled_slopes"]
 
@@ -31,14 +32,19 @@ class HasPath(Protocol):
 def all_slopes(pupil: HasPath, wavelength: float, distance: float, angle: tuple[float, float], pieces: int) -> Slopes:
     """Return slopes on a grid that resolves all polynomial pieces, of which there are `pieces` across the pupil."""
     n = int(min(MOST, max(MANY if pieces else FEW, 4 * pieces + 1)))
-    return _by_neighbours(pupil, wavelength, PointSource(distance, angle), _grid(pupil, n))
+    grid = _grid(pupil, n)
+    x, y = grid.coordinates(precision("float64"))
+    path = pupil.path(x, y, wavelength, PointSource(distance, angle)).numpy().reshape(grid.shape)
+    return _by_neighbours(path, grid, pupil.radius)
 
 
 def sampled_slopes(pupil: HasPath, wavelength: float, source: PointSource, pieces: int) -> Slopes:
     """Return slopes at a limited number of points, by differences over a part of a polynomial piece."""
     place = source.plain
     if 4 * pieces < FEW:
-        return _by_neighbours(pupil, wavelength, place, _grid(pupil, FEW))
+        grid = _grid(pupil, FEW)
+        path = pupil.path(grid.x[None, :], grid.y[:, None], wavelength, place)
+        return _by_neighbours(path, grid, pupil.radius)
     grid, step = _grid(pupil, MANY), pupil.radius / (8 * pieces)
     x, y = grid.x[None, :], grid.y[:, None]
     ahead, behind, above, below = (
@@ -54,6 +60,5 @@ def _grid(pupil: HasPath, n: int) -> Grid:
     return Grid.square(n, 2 * (1 + EDGE_REACH) * pupil.radius / (n - 1))
 
 
-def _by_neighbours(pupil: HasPath, wavelength: float, source: PointSource, grid: Grid) -> Slopes:
-    path = np.asarray(pupil.path(grid.x[None, :], grid.y[:, None], wavelength, source))
-    return Slopes(grid, derivative(path.T, grid.dx).T, derivative(path, grid.dx), pupil.radius)
+def _by_neighbours(path: np.ndarray, grid: Grid, radius: float) -> Slopes:
+    return Slopes(grid, derivative(path.T, grid.dx).T, derivative(path, grid.dx), radius)

@@ -132,9 +132,9 @@ def _low_rank(beam: Beam, problem: Problem, how: LowRankSampling, types: Precisi
     halves the cost of the first product.
     """
     window = problem.window
-    nodes, frequencies = how.half_width * chebyshev_points(how.rank), how.directions / problem.wavelength
+    nodes = how.half_width * chebyshev_points(how.rank)
     across_y, along_x = (
-        fourier_kernel(at, frequencies, nodes, problem.dtype)
+        fourier_kernel(at, how.directions, nodes, problem.wavelength, problem.dtype)
         for at in (sample_positions(window.shape[0], window.dx), np.arange(window.shape[1] // 2 + 1) * window.dx)
     )
     across_x = _halves(along_x)

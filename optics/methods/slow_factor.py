@@ -98,14 +98,16 @@ def slow_factor(
     return z * z / distance**2 * np.exp(2j * np.pi * waves)
 
 
-def fourier_kernel(at: np.ndarray, waves_per_metre: np.ndarray, nodes: np.ndarray, dtype: str) -> np.ndarray:
-    """Return A[x, (a, ξ)] = L_a(u) e^{-2πi u f} for positions u [m] along an axis, relative to the window's centre.
+def fourier_kernel(
+    at: np.ndarray, directions: np.ndarray, nodes: np.ndarray, wavelength: float, dtype: str
+) -> np.ndarray:
+    """Return A[x, (a, ξ)] = L_a(u) e^{-ik s u} for positions u [m] along an axis, relative to the window's centre.
 
-    waves_per_metre: f, the direction of each sample divided by the wavelength [1/m].
+    directions: s of each sample.
     nodes: interpolation points a [m].
     dtype: "float32" or "float64".
     """
-    waves = np.outer(at, -waves_per_metre)
+    waves = np.outer(at, directions) / -wavelength
     angle = (2 * np.pi * (waves - np.rint(waves))).astype(dtype)
     weight = lagrange_basis(at, nodes).T.astype(dtype)
     found: np.ndarray = weight[:, :, None] * (np.cos(angle) + 1j * np.sin(angle))[:, None, :]

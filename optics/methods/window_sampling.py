@@ -226,7 +226,7 @@ def _window_sums(pupil: SineSamples, rank: int, half: float, path: Path, dtype: 
         return np.asarray(kernel * (1 / z - 2 * z / distance**2 + turns + near_by), complex_dtype)
 
     down, across = (
-        fourier_kernel(sample_positions(count, path.window.dx), pupil.at / path.wavelength, nodes, dtype)
+        fourier_kernel(sample_positions(count, path.window.dx), pupil.at, nodes, path.wavelength, dtype)
         for count in path.window.shape
     )
     return WindowSums(kernel.astype(complex_dtype), down, across, by_distance)

@@ -146,19 +146,13 @@ def chebyshev_points(n: int) -> np.ndarray:
 
 
 def lagrange_basis(x: np.ndarray, nodes: np.ndarray) -> np.ndarray:
-    """Return the values at x of the Lagrange polynomials of arbitrary nodes, (node, *x.shape).
-
-    Each numerator is the product over the nodes before i times the product over the nodes after i.
-    """
-    steps = np.subtract.outer(nodes, x)
-    products = np.ones((2, len(nodes), *np.shape(x)))
-    np.cumprod(steps[:-1], axis=0, out=products[0, 1:])
-    np.cumprod(steps[:0:-1], axis=0, out=products[1, 1:])
-    apart = np.subtract.outer(nodes, nodes)
-    np.fill_diagonal(apart, 1.0)
-    scale = (-1.0) ** (len(nodes) - 1) / apart.prod(axis=1)
-    found: np.ndarray = products[0] * products[1, ::-1] * scale.reshape(-1, *(1,) * np.ndim(x))
-    return found
+    """Return the values at x of the Lagrange polynomials of arbitrary nodes, (node, *x.shape)."""
+    basis = np.ones((len(nodes), *np.shape(x)))
+    for i, node in enumerate(nodes):
+        for j, other in enumerate(nodes):
+            if j != i:
+                basis[i] *= (x - other) / (node - other)
+    return basis
 
 
 def chebyshev_basis(x: np.ndarray, n: int) -> np.ndarray:

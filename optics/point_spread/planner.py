@@ -45,7 +45,7 @@ from optics.methods.method_sampling import Sampling
 from optics.methods.pixelated_spectrum import split_pixel_spectrum, whole_pixel_spectrum
 from optics.methods.problem import Problem
 from optics.methods.rayleigh_sommerfeld import nodes
-from optics.methods.window_sampling import WindowSampling
+from optics.methods.window_sampling import WindowSampling, window_sampling
 from optics.numerics.accuracy import (
     FLOAT_NOISE,
     MOST_BYTES,
@@ -114,17 +114,19 @@ class Weighing:
 # Methods are compared in this order. For approximations, `asking` is three times the actual time (a choice), because
 # most of them turn out to be too inaccurate.
 WEIGHING = {
-    "low_rank": Weighing(0.0),
-    "hankel": Weighing(CALL["hankel"], 0.0, 2e-3),
-    "rayleigh_sommerfeld": Weighing(CALL["rayleigh_sommerfeld"], 1 / PAIRS_PER_SECOND["float32"], 4e-3),
-    "fresnel": Weighing(CALL["fresnel"] + DFT_CALL, 0.0, 4e-3),
-    "fraunhofer": Weighing(CALL["fresnel"] + DFT_CALL, 0.0, 4e-3),
+    "hankel": Weighing(CALL["hankel"]),
+    "low_rank": Weighing(CALL["low_rank"]),
+    "rayleigh_sommerfeld": Weighing(CALL["rayleigh_sommerfeld"], 1 / PAIRS_PER_SECOND["float32"], 1e-4),
+    "fresnel": Weighing(CALL["fresnel"] + DFT_CALL, 0.0, 3e-3),
+    "fraunhofer": Weighing(CALL["fresnel"] + DFT_CALL, 0.0, 3e-3),
     "geometric": Weighing(CALL["geometric"], 0.0, 3e-3),
     "pinhole": Weighing(CALL["pinhole"], 0.0, math.inf),
-    "far_field": Weighing(CALL["far_field"] + 2 * DFT_CALL, WINDOW_SAMPLE, 3e-3),
-    "angular_spectrum": Weighing(CALL["angular_spectrum"] + 2 * DFT_CALL, 0.0, 2e-3),
-    "split_angular_spectrum": Weighing(CALL["angular_spectrum"] + 3 * DFT_CALL, 0.0, 2e-3),
+    "far_field": Weighing(CALL["far_field"] + 2 * DFT_CALL, WINDOW_SAMPLE, 6e-4),
+    "angular_spectrum": Weighing(CALL["angular_spectrum"] + 2 * DFT_CALL, 0.0, 6e-4),
+    "split_angular_spectrum": Weighing(CALL["angular_spectrum"] + 3 * DFT_CALL, 0.0, 6e-4),
 }
+# Choice: time [s] of planning any other method. At coarse tolerances, "low_rank" is planned first.
+OTHERS = 4e-3
 
 
 @lru_cache(maxsize=256)
@@ -153,12 +155,17 @@ def choose(problem: Problem, method: str = "auto", most_seconds: float = MOST_SE
     known = FOR_PIXELS if problem.divided else METHODS
     weighed: dict[str, Sampling] = {}
     best: Sampling | None = None
-    for name in sorted(set(asked) & set(known), key=list(WEIGHING).index):
-        if best is not None and not WEIGHING[name].pays(best.seconds, outputs):
+    names = sorted(set(asked) & set(known), key=list(WEIGHING).index)
+    coarse = window_sampling(problem) if "low_rank" in names else None
+    if coarse is not None:
+        names.sort(key="low_rank".__ne__)
+    for name in names:
+        spare = 0.0 if best is None or coarse is None else OTHERS
+        if best is not None and not WEIGHING[name].pays(best.seconds - spare, outputs):
             continue
         if name == "fraunhofer" and "fresnel" in weighed and weighed["fresnel"].model_error > allowed:
             continue  # Fraunhofer's integral is less accurate than Fresnel's
-        samplings = known[name](problem)
+        samplings = [coarse] if coarse is not None and name == "low_rank" else known[name](problem)
         if not samplings:
             continue
         weighed[name] = option = min(samplings, key=lambda each: _cost(each, problem))
