@@ -9,13 +9,14 @@ from itertools import pairwise
 
 import numpy as np
 
-from optics.apertures.aperture import EDGE_REACH, Aperture, SoftAperture
+from optics.apertures.aperture import EDGE_REACH, Aperture
 from optics.apertures.pixelated import PixelatedAperture
 from optics.elements.beam import Beam
 from optics.elements.derivative_knots import DerivativeKnots, carries_derivatives, derivative_knots
 from optics.elements.torch_numbers import refuse_torch
 from optics.elements.wavefront_slopes import Slopes
 from optics.methods.derivative_cells import derivative_cells
+from optics.methods.pupil_edge import PupilEdge
 from optics.methods.rays import Rays
 from optics.methods.scalar_theory import ROUND, light_spread, scalar_theory_error, steepest_sine
 from optics.numerics.arguments import in_range, positive
@@ -24,7 +25,7 @@ from optics.numerics.grid import Grid
 from optics.numerics.precision import precision
 from optics.numerics.quadrature import stepped_up
 
-__all__ = ["SLOPE_MARGIN", "Problem", "PupilEdge"]
+__all__ = ["SLOPE_MARGIN", "Problem"]
 
 # Choice: factor on the steepest slope of a wavefront, because the grid of slopes may miss the steepest point.
 SLOPE_MARGIN = 1.02
@@ -129,12 +130,12 @@ class Problem:
         others = self.knots.without_maps(self.light.pupil)
         return others.bandwidth(self.light.wavelength, DETAIL_PART * self.tolerance)
 
-    @cached_property
+    @property
     def phase_band(self) -> float:
         """Highest spatial frequency [1/m] in the pupil's phase, over the disk and its soft edge."""
         return SLOPE_MARGIN * self.slopes.steepest / self.light.wavelength + self.detail
 
-    @cached_property
+    @property
     def phase_band_inside(self) -> float:
         """The same over the disk alone, because a relief may be steep in the soft edge."""
         return SLOPE_MARGIN * self.slopes.steepest_inside / self.light.wavelength + self.detail
@@ -255,28 +256,6 @@ class Problem:
         """Return the highest frequency [1/m] of light from the disk that can land within `margin` [m] of the window."""
         reach = (1 + EDGE_REACH) * self.radius + self.outermost + margin
         return min(self.widest_band, reach / math.hypot(reach, self.distance) / self.wavelength)
-
-
-@dataclass(frozen=True)
-class PupilEdge:
-    """A soft aperture, scaled to a pupil of the given radius [m]."""
-
-    aperture: SoftAperture
-    radius: float
-
-    @property
-    def outermost(self) -> float:
-        """Distance from the axis [m] beyond which the aperture is closed."""
-        return (1 + self.aperture.reach) * self.radius
-
-    @property
-    def stopband(self) -> float:
-        """Frequency [1/m] beyond which the spectrum is below the ripple."""
-        return self.aperture.stopband / self.radius
-
-    @property
-    def seconds_per_point(self) -> float:
-        return self.aperture.seconds_per_point
 
 
 @lru_cache(maxsize=256)

@@ -19,7 +19,8 @@ from typing import Any
 import numpy as np
 
 from optics.elements.beam import Beam
-from optics.methods.problem import Problem, PupilEdge
+from optics.methods.problem import Problem
+from optics.methods.pupil_edge import PupilEdge
 from optics.methods.pupil_sampling import MOST_ACROSS
 from optics.numerics.autodiff import Array
 from optics.numerics.cost import PUPIL_SAMPLE

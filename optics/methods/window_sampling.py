@@ -22,7 +22,8 @@ from optics.apertures.soft_edge import SoftEdge
 from optics.elements.beam import Beam
 from optics.elements.wavefront import Zernike
 from optics.methods.carrier import on_window
-from optics.methods.problem import Problem, PupilEdge
+from optics.methods.problem import Problem
+from optics.methods.pupil_edge import PupilEdge
 from optics.methods.sine_samples import SineSamples, evenly_in_sines
 from optics.methods.slow_factor import RANKS, Path, fourier_kernel, slow_factor, uniform_rank
 from optics.methods.window_check import window_error
@@ -33,7 +34,7 @@ from optics.numerics.grid import sample_positions
 from optics.numerics.interpolation import chebyshev_points, lagrange_basis
 from optics.numerics.precision import padded_for_packets, precision
 
-__all__ = ["WindowSampling", "window_sampling"]
+__all__ = ["DERIVATIVE_ERROR", "WindowSampling", "window_sampling"]
 
 TIGHTEST = 3e-4  # choice: smallest tolerance at which this way of sampling saves time
 # Choices for the soft edge: ripple of its spectrum, of the samples and of the finer samples of the check, and width of
@@ -109,11 +110,6 @@ class WindowSampling:
     @property
     def samples(self) -> tuple[int, int]:
         return self.pupil.grid.shape
-
-    @staticmethod
-    def derivative_error(problem: Problem) -> float:
-        """Return the upper bound on the error of derivatives that the plan states."""
-        return DERIVATIVE_ERROR * problem.tolerance
 
     def error(self, beam: Beam, problem: Problem, image: np.ndarray) -> float | None:
         """Return the relative L2 error of the intensity over the window, see `window_error`.

@@ -45,7 +45,7 @@ from optics.methods.method_sampling import Sampling
 from optics.methods.pixelated_spectrum import split_pixel_spectrum, whole_pixel_spectrum
 from optics.methods.problem import Problem
 from optics.methods.rayleigh_sommerfeld import nodes
-from optics.methods.window_sampling import WindowSampling, window_sampling
+from optics.methods.window_sampling import DERIVATIVE_ERROR, WindowSampling, window_sampling
 from optics.numerics.accuracy import (
     FLOAT_NOISE,
     MOST_BYTES,
@@ -125,15 +125,12 @@ WEIGHING = {
     "angular_spectrum": Weighing(CALL["angular_spectrum"] + 2 * DFT_CALL, 0.0, 6e-4),
     "split_angular_spectrum": Weighing(CALL["angular_spectrum"] + 3 * DFT_CALL, 0.0, 6e-4),
 }
-# Choice: time [s] of planning any other method. At coarse tolerances, "low_rank" is planned first.
-OTHERS = 4e-3
+OTHERS = 4e-3  # choice: time [s] of planning any other method if "low_rank" is planned first, at coarse tolerances
 
 
 @lru_cache(maxsize=256)
 def choose(problem: Problem, method: str = "auto", most_seconds: float = MOST_SECONDS) -> tuple[Plan, Sampling]:
-    """Return the plan and the fastest sampling that meets the problem's tolerance.
-
-    Planning takes as long as a small PSF, so plans are cached.
+    """Return the plan and the fastest sampling that meets the problem's tolerance. Plans are cached.
 
     method: "auto" compares all methods that may save time, "exact" only exact methods, and "field" only exact methods
         with a complex field. A method's name selects that method. Its sampling must then meet the tolerance, but the
@@ -155,13 +152,11 @@ def choose(problem: Problem, method: str = "auto", most_seconds: float = MOST_SE
     known = FOR_PIXELS if problem.divided else METHODS
     weighed: dict[str, Sampling] = {}
     best: Sampling | None = None
-    names = sorted(set(asked) & set(known), key=list(WEIGHING).index)
-    coarse = window_sampling(problem) if "low_rank" in names else None
-    if coarse is not None:
-        names.sort(key="low_rank".__ne__)
+    coarse = window_sampling(problem) if {"low_rank"} <= {*asked} & {*known} else None
+    first = "" if coarse is None else "low_rank"
+    names = sorted({*asked} & {*known}, key=lambda name: (name != first, list(WEIGHING).index(name)))
     for name in names:
-        spare = 0.0 if best is None or coarse is None else OTHERS
-        if best is not None and not WEIGHING[name].pays(best.seconds - spare, outputs):
+        if best is not None and not WEIGHING[name].pays(best.seconds - (OTHERS if first else 0.0), outputs):
             continue
         if name == "fraunhofer" and "fresnel" in weighed and weighed["fresnel"].model_error > allowed:
             continue  # Fraunhofer's integral is less accurate than Fresnel's
@@ -230,10 +225,8 @@ def _plan(problem: Problem, best: Sampling, weighed: dict[str, Sampling], most_s
     )
     error = _sampling_error(problem) + best.model_error
     sampled = best.method, best.samples, problem.dtype, error, why, _seconds(best, problem)
-    derivatives = None
-    if problem.differentiated and not best.model_error:
-        coarse = isinstance(best, WindowSampling)
-        derivatives = best.derivative_error(problem) if coarse else problem.tolerance
+    factor = DERIVATIVE_ERROR if isinstance(best, WindowSampling) else 1.0
+    derivatives = factor * problem.tolerance if problem.differentiated and not best.model_error else None
     return Plan(*sampled, tuple(options), best.padding, problem.scalar_error, derivatives)
 
 

@@ -2,7 +2,9 @@
 
 beam: methods/test_textbook.py
 derivative_knots: point_spread/test_gradients.py
-exit_pupil: test_exit_pupil.py
+exit_pupil_slopes: test_pupil.py
+zernike_modes: test_wavefront.py
+pupil: test_exit_pupil.py
 fine_detail: test_fine_detail.py, eye/test_scattered_light.py
 human_eye: test_human_eye.py
 phase_pupil: test_phase_pupil.py
