@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import optics
-from evolve.analysis.statistics import polychromatic
+from evolve.analysis.white_light import polychromatic
 from experiments.page import Figure, Page, exit_code, markdown_table, new_figure, parser, save
 from experiments.store import DATA, Origin, read_rows, write_rows
 from sim.worlds import materials

@@ -12,8 +12,9 @@ import torch
 
 import optics
 from evolve.analysis.acuity import acuity_cpd
-from evolve.analysis.statistics import succeeded, white_strehl
+from evolve.analysis.statistics import succeeded
 from evolve.analysis.vision import vision
+from evolve.analysis.white_light import white_strehl
 from evolve.config.run_config import EyeConfig, RunConfig
 from evolve.genome.phenotype import Phenotype
 from evolve.learning.policy import PolicyConfig, build_policy, learnt

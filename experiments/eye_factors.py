@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from experiments import designed, eye_factors_figure
-from experiments.designed import Trained
+from experiments.designed import Design, Trained
 from experiments.eye_factors_design import (
     FACTORS,
     LEARNER,
@@ -24,6 +24,7 @@ from experiments.eye_factors_design import (
     factorial,
     runs_of,
 )
+from experiments.eye_prices import PRICES, fittest, probability_of_finer
 from experiments.factorial import Effects, effects
 from experiments.means import Interval, difference, mean_of
 from experiments.page import Figure, Page, markdown_table
@@ -53,6 +54,7 @@ def page(rows: Sequence[Trained], origin: Origin, answer: str) -> Page:
             "fitness": _fitness_table(rows),
             "effects": _effects_table(rows),
             "controls": _controls_table(rows),
+            "prices": _prices_table(rows),
         },
         figures=[Figure(NAME, lambda path: _draw(rows, path))],
         origin=origin,
@@ -122,6 +124,30 @@ def _controls_table(rows: Sequence[Trained]) -> str:
         found = [advantage(rows, task, control) for task in TASKS]
         lines.append([control.name, *("-" if one is None else str(one) for one in found)])
     return markdown_table(["comparison", *TASKS], lines)
+
+
+def _prices_table(rows: Sequence[Trained]) -> str:
+    """Return a table of the animal with the highest mean return minus costs in each task, for several prices."""
+    returns = {task: _returns(rows, task) for task in TASKS}
+    if not all(returns.values()):
+        return "Too few training runs."
+    lines, rng = [], np.random.default_rng(0)
+    for prices in PRICES:
+        best = [_eyes_of(fittest(returns[task], prices)) for task in TASKS]
+        finer, coarser = probability_of_finer(returns["detection"], returns["maze"], prices, rng)
+        lines.append([f"{prices.per_eye:g}", f"{prices.per_receptor:g}", *best, f"{finer:.2f}", f"{coarser:.2f}"])
+    return markdown_table(["per eye", "per receptor", *TASKS, "finer", "coarser"], lines)
+
+
+def _returns(rows: Sequence[Trained], task: str) -> dict[Design, np.ndarray]:
+    """Return the returns of the training runs of animals without controls. Animals with fewer than two are left out."""
+    found = {one: np.array([row.held_out for row in runs_of(rows, task, one)]) for one in (*factorial(), *OTHERS)}
+    return {animal: values for animal, values in found.items() if values.size > 1}
+
+
+def _eyes_of(animal: Design) -> str:
+    size = f"{animal.n_eyes} of {animal.height} x {animal.width}"
+    return f"{size} over {animal.placement_range_deg:g}°, {animal.vertical_fov_deg:g}° high"
 
 
 EXPERIMENT = designed.Experiment(NAME, __doc__ or "", designs, LEARNER, page, tested=True)

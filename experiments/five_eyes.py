@@ -16,8 +16,9 @@ from numpy.typing import NDArray
 
 import optics
 import sim
-from evolve.analysis.statistics import psnr, white_strehl
+from evolve.analysis.statistics import psnr
 from evolve.analysis.vision import ssim
+from evolve.analysis.white_light import white_strehl
 from evolve.report.picture import display
 from experiments.page import Figure, Page, markdown_table, new_figure, parser, save
 from experiments.store import Origin

@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from evolve.analysis.statistics import white_strehl
+from evolve.analysis.white_light import white_strehl
 from evolve.config.assemble import assemble
 from evolve.config.run_config import EyeConfig
 from evolve.genome.phenotype import Phenotype, develop

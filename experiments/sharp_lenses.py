@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from evolve.analysis.statistics import white_strehl
+from evolve.analysis.white_light import white_strehl
 from evolve.config.run_config import EyeConfig
 from experiments import designed
 from experiments.best_pupil import contrast_of, measures

@@ -19,6 +19,7 @@ from importlib import import_module
 from typing import Any
 
 _CONTENTS = {
+    "AcceptanceFunction": "ommatidia.acceptance",
     "AccuracyError": "numerics.accuracy",
     "Annulus": "apertures.circular",
     "AppositionEye": "ommatidia.mosaic",
@@ -30,6 +31,7 @@ _CONTENTS = {
     "Cornu": "elements.refractive_index",
     "Disk": "apertures.shapes",
     "ExitPupil": "elements.exit_pupil",
+    "ExitPupils": "elements.exit_pupils",
     "Eye": "eye.eye",
     "FacetLens": "ommatidia.facet",
     "FreeSpace": "propagation.system",
@@ -37,6 +39,7 @@ _CONTENTS = {
     "Grid": "numerics.grid",
     "HeightMap": "elements.relief",
     "HumanEye": "elements.human_eye",
+    "LensMTF": "point_spread.lens_mtf",
     "MTF": "point_spread.modulation_transfer",
     "MaskMap": "elements.transmittance",
     "Microvilli": "point_spread.microvilli",
@@ -69,6 +72,7 @@ _CONTENTS = {
     "Waveguide": "ommatidia.waveguide",
     "WhitePSF": "point_spread.white",
     "Zernike": "elements.wavefront",
+    "acceptance_function": "ommatidia.acceptance",
     "difference": "apertures.combined",
     "encircled_energy": "point_spread.concentration",
     "hexagonal_directions": "ommatidia.mosaic",
@@ -76,6 +80,7 @@ _CONTENTS = {
     "illuminant": "spectra.spectrum",
     "image_quality": "point_spread.contrast",
     "intersection": "apertures.combined",
+    "lens_mtf": "point_spread.lens_mtf",
     "mean_human_mtf": "elements.human_eye",
     "medium": "elements.refractive_index",
     "mtf": "point_spread.contrast",
@@ -86,6 +91,7 @@ _CONTENTS = {
     "psf": "point_spread.psf",
     "psf_batch": "point_spread.batch",
     "read_exit_pupil": "elements.exit_pupil",
+    "read_exit_pupils": "elements.exit_pupils",
     "receptors_of": "spectra.receptors",
     "reflectance": "spectra.spectrum",
     "require": "numerics.backend",

@@ -1,66 +1,174 @@
-"""PSFs inside a PyTorch graph. Gradients flow from a loss on the PSF back to the relief.
+"""PSFs inside a PyTorch graph. Gradients flow from a loss on the PSF back to every tensor in the pupil.
 
-lens = optics.torch.PointSpread(radius=30e-6, sensor_distance=240e-6, wavelengths=[550e-9], dx=1e-6, shape=(33, 33))
-psf = lens()                    # torch tensor (wavelength, y, x)
-loss(psf).backward()            # fills lens.relief.grad
+psf(pupil, wavelengths, sensor_distance, ...)     PSFs of one or several pupils, as a tensor
+PointSpread(radius, wavelengths, ...)             module with a learnable relief
+
+heights = torch.zeros(32, 32, dtype=torch.float64, requires_grad=True)    # [m]
+pupil = optics.Pupil(30e-6, optics.HeightMap(heights), thin_lens_focal_length=240e-6)
+psf = optics.torch.psf(pupil, 550e-9, 240e-6, dx=1e-6, shape=(33, 33))    # tensor (wavelength, y, x)
+loss(psf).backward()                                                      # fills heights.grad
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import inspect
+import math
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
+import numpy as np
 import torch
 
 from optics.elements.pupil import Pupil
-from optics.elements.relief import BSplineRelief, HeightMap
-from optics.numerics.arguments import of_kind, vacuum_wavelengths
-from optics.numerics.autodiff import Array, Scalar
+from optics.elements.relief import BSplineRelief, HeightMap, Relief
+from optics.elements.torch_numbers import torch_numbers, with_numbers
+from optics.eye.sensor_pixels import SensorPixels
+from optics.numerics.arguments import flag, in_range, of_kind, shown, vacuum_wavelengths
+from optics.numerics.autodiff import Array, plain
 from optics.numerics.backend import BackendError
 from optics.numerics.device import VARIABLE, make_ready
+from optics.numerics.grid import Grid
 from optics.numerics.number_types import full_precision
-from optics.numerics.precision import precision
+from optics.numerics.precision import padded_for_packets, precision
+from optics.numerics.renamed import warn_once
+from optics.point_spread.light_batch import LightBatch, is_row
 from optics.point_spread.psf import psf as drjit_psf
+from optics.point_spread.psf_result import OF_CELLS
 
 __all__ = ["PointSpread", "psf"]
 
+FORMER = "heights", "radius", "n", "pupil"  # arguments that `psf` had before it accepted pupils
+
 
 def psf(
-    heights: torch.Tensor, *, radius: Any, n: Any = 1.5, pupil: dict[str, Any] | None = None, **view: Any
+    pupil: Pupil | Sequence[Pupil] | None = None,
+    /,
+    wavelengths: Sequence[float] | float = (550e-9,),
+    sensor_distance: Any = None,
+    source_distance: Any = math.inf,
+    source_angle: Any = (0.0, 0.0),
+    *,
+    pixel_means: bool = False,
+    requires_grad: bool = False,
+    device: torch.device | str | None = None,
+    **view: Any,
 ) -> torch.Tensor:
-    """Return `optics.psf` of a relief as a torch tensor that is differentiable with respect to the heights.
+    """Return `optics.psf` as a tensor with gradients to every tensor in the pupil, the distances and the angle.
 
-    heights: heights [m]. A (4, 4) tensor holds the control points of a BSplineRelief. A square tensor of any other size
-        holds the samples of a HeightMap.
-    radius, n: radius [m] of the pupil and refractive index of the relief. If they are one-element tensors, gradients
-        flow back to them, too.
-    pupil: further arguments of `optics.Pupil`, as a dictionary.
-    view: arguments of `optics.psf` except the pupil.
+    pupil: a pupil, or a sequence of pupils. Its numbers may be tensors that require gradients: the samples of a
+        `HeightMap`, `PixelRelief`, `WavefrontMap` or `MaskMap`, the control points of a `BSplineRelief`, the
+        coefficients of a `Zernike`, the waist of a `GaussianMask`, the radius, the refractive index and the focal
+        length. Tensors that require no gradients are treated as numbers.
+    wavelengths: one or several wavelengths [m] in vacuum.
+    sensor_distance, source_distance: distances [m] behind and in front of the pupil. Each is a number, or a row of
+        numbers: a sequence, or a tensor of one axis. Two rows have the same length and are used pairwise.
+    source_angle: direction (x, y) [rad] of the source: two numbers, or a tensor of two elements.
+    pixel_means: True for the mean of the PSF over each square pixel of side dx, as a sensor measures it. False for the
+        PSF at the middle of each pixel.
+    requires_grad: True to refuse light without any tensor that requires a gradient.
+    device: device of the result. None: the device of the tensors that require gradients, or the processor.
+    view: dx, shape, tolerance, method, dtype and centre, see `optics.psf`.
 
-    Returns a tensor (wavelength, y, x) [1/m²]. It is float32 unless dtype="float64".
+    Returns a tensor (pupil, distance, wavelength, y, x) [1/m²], float32 unless dtype="float64". It has an axis of
+    pupils only if a sequence of pupils is passed, and an axis of distances only if a distance is a row. Each gradient
+    has the device and the precision of its tensor. There are first derivatives only.
+
+    A call psf(heights, radius=..., n=..., pupil={...}) with a square tensor of heights [m] still works.
 
     Raises:
-        ValueError: see `optics.psf`.
+        ValueError: an argument is invalid; the message names it with its value and valid range. See `optics.psf`.
         AccuracyError: see `optics.psf`.
         BackendError: RHABDOM_DEVICE requires a GPU that torch cannot use.
+        RuntimeError: second derivatives are requested.
     """
-    import drjit as dr
-
-    of_kind("heights", heights, torch.Tensor, "torch.zeros(4, 4)")
-    place = _place()
+    former = {name: view.pop(name) for name in FORMER if name in view}
+    if former or isinstance(pupil, torch.Tensor):
+        device = getattr(former.get("heights", pupil), "device", None) if device is None else device
+        pupil = _former_pupil(pupil, former)
     if view.get("field"):
         raise ValueError("field: only `optics.psf` returns it; this function returns the intensity")
-    precision(view.get("dtype", "float32"))  # refuses other types
+    light = LightBatch.from_arguments(pupil, sensor_distance, source_distance, source_angle)
+    lambdas, numbers = np.atleast_1d(vacuum_wavelengths(wavelengths)), torch_numbers(light)
+    if flag("requires_grad", requires_grad) and not numbers:
+        raise ValueError("no number of the pupil requires a gradient: must hold a tensor with requires_grad=True")
+    place = torch.device(device) if device is not None else _common_device(numbers)
+    if not torch.is_grad_enabled():
+        light, numbers = with_numbers(light, {name: plain(tensor)[()] for name, tensor in numbers.items()}), {}
+    integrated = flag("pixel_means", pixel_means) and view.get("method") not in OF_CELLS
+    pixels = _pixels(light, lambdas, view) if integrated else None
 
-    @dr.wrap(source="torch", target="drjit")
-    def spread(heights: Array, radius: Scalar, n: Scalar) -> Array:
-        relief = BSplineRelief(heights) if heights.shape == (4, 4) else HeightMap(heights)
-        return drjit_psf(Pupil(radius, relief, n=n, **(pupil or {})), **view).tensor
+    def images(own: Sequence[Array]) -> Array:
+        changed = with_numbers(light, dict(zip(numbers, own, strict=True)))
+        return changed.images(lambdas, view if pixels is None else {**view, **vars(pixels.samples)})
 
-    tensor: torch.Tensor = spread(
-        _moved("heights", heights, place), _moved("radius", radius, place), _moved("n", n, place)
-    )
-    return tensor.to(heights.device)
+    found = _Evaluation.apply(images, *numbers.values()).to(place)
+    if pixels is not None:
+        rows, columns = (torch.tensor(part).to(found) for part in (pixels.rows, pixels.columns))
+        found = rows @ found @ columns.T
+    found = found if is_row(sensor_distance) or is_row(source_distance) else found[:, 0]
+    return found[0] if isinstance(pupil, Pupil) else found
+
+
+def _pixels(light: LightBatch, wavelengths: np.ndarray, view: Mapping[str, Any]) -> SensorPixels:
+    asked = {name: value.default for name, value in inspect.signature(drjit_psf).parameters.items()} | dict(view)
+    window = Grid(asked["shape"], asked["dx"], asked["centre"])
+    tolerance = in_range("tolerance", asked["tolerance"], 1e-12, 0.5)
+    return SensorPixels.around(window, light.cutoff(wavelengths), tolerance)
+
+
+class _Evaluation(torch.autograd.Function):
+    """A function of Dr.Jit arrays as an operation of PyTorch. Its graph serves any number of backward passes."""
+
+    @staticmethod
+    def forward(ctx: Any, function: Callable[[list[Array]], Array], *numbers: Any) -> Any:
+        import drjit as dr
+
+        place, types = _place(), precision("float64")
+        own = [_on_drjit(tensor.double(), types.Tensor64, place) for tensor in numbers]
+        dr.enable_grad(own)
+        found = function(own)
+        dr.eval(found)
+        ctx.own, ctx.found, ctx.kinds = own, found, [(t.shape, t.dtype, t.device) for t in numbers]
+        return _on_torch(dr.detach(found), place)
+
+    @staticmethod
+    def backward(ctx: Any, *gradients: Any) -> Any:
+        import drjit as dr
+
+        place = _place()
+        dr.set_grad(ctx.found, _on_drjit(gradients[0], type(ctx.found), place))
+        dr.backward_from(ctx.found, flags=dr.ADFlag.ClearVertices)  # keeps the edges for further passes
+        slopes = dr.grad(ctx.own)
+        dr.eval(slopes)
+        found = [
+            _on_torch(slope, place).reshape(shape).to(place_of, dtype)
+            for slope, (shape, dtype, place_of) in zip(slopes, ctx.kinds, strict=True)
+        ]
+        dr.clear_grad(ctx.own)
+        if torch.is_grad_enabled():
+            found = _FirstDerivative.apply(*(slope.requires_grad_() for slope in found))
+        return None, *found
+
+
+class _FirstDerivative(torch.autograd.Function):
+    """First derivatives, which refuse to be differentiated."""
+
+    @staticmethod
+    def forward(ctx: Any, *slopes: Any) -> Any:
+        return tuple(slope.clone() for slope in slopes)
+
+    @staticmethod
+    def backward(ctx: Any, *gradients: Any) -> Any:
+        raise RuntimeError("optics.torch.psf has no second derivatives: must be differentiated once")
+
+
+def _on_drjit(tensor: torch.Tensor, kind: Any, place: str) -> Array:
+    tensor = tensor.detach().resolve_neg().to(place).reshape(tensor.shape or (1,)).contiguous()
+    return kind(padded_for_packets(tensor.numpy()), tuple(tensor.shape)) if place == "cpu" else kind(tensor)
+
+
+def _on_torch(tensor: Array, place: str) -> torch.Tensor:
+    return torch.from_numpy(np.array(tensor.numpy())) if place == "cpu" else tensor.torch().clone()
 
 
 def _place() -> str:
@@ -75,19 +183,56 @@ def _place() -> str:
     return place
 
 
-def _moved(name: str, value: Any, place: str) -> Any:
-    value = full_precision(name, value)
-    return value.double().to(place) if isinstance(value, torch.Tensor) else value
+def _common_device(numbers: Mapping[str, torch.Tensor]) -> torch.device:
+    """Return the device of all tensors; single numbers on the processor fit any device, as in torch."""
+    places = {name: t.device for name, t in numbers.items() if t.ndim or t.device.type != "cpu"}
+    for first, known in places.items():
+        for name, place in places.items():
+            if place != known:
+                raise ValueError(f"{name} is on {place} and {first} on {known}: must be on one device, or pass device=")
+        return known
+    return torch.device("cpu")
+
+
+def _former_pupil(heights: Any, given: Mapping[str, Any]) -> Any:
+    """Return the pupil of a call that passes heights and arguments of `Pupil`."""
+    if heights is None and given.keys() == {"pupil"}:
+        return given["pupil"]
+    heights = of_kind("heights", given.get("heights", heights), torch.Tensor, "torch.zeros(4, 4)")
+    if "radius" not in given:
+        raise ValueError("radius is missing: must be that of the pupil [m]; or pass optics.Pupil(radius, heights)")
+    radius, n = (full_precision(name, given.get(name, 1.5)) for name in ("radius", "n"))
+    return Pupil(radius, _guessed(heights, 5), n=n, **(given.get("pupil") or {}))
+
+
+def _guessed(heights: torch.Tensor, stacklevel: int) -> Relief:
+    """Return the relief that a tensor of heights meant before reliefs were passed: 4 x 4 heights are control points.
+
+    stacklevel: number of calls from `warnings.warn` to the user's code.
+    """
+    full_precision("heights", heights)
+    if heights.shape != (4, 4):
+        return HeightMap(heights)
+    warn_once(
+        "heights of optics.torch",
+        "heights of 4 x 4 are taken as control points: pass optics.BSplineRelief(heights) in a Pupil to say so, or "
+        "optics.HeightMap(heights) for samples; the guess will be removed in version 0.3",
+        stacklevel,
+    )
+    return BSplineRelief(heights)
 
 
 class PointSpread(torch.nn.Module):
     """Module with a learnable relief: forward() returns the pupil's PSF, (wavelength, y, x).
 
     radius: radius [m] of the pupil.
-    wavelengths, sensor_distance, dx, shape, ...: arguments of `optics.psf`.
-    heights: initial heights [m], (4, 4) control points (default: flat) or (n, n) samples.
+    wavelengths, sensor_distance, dx, shape, ...: arguments of `psf`.
+    heights: initial relief, a `BSplineRelief`, `HeightMap` or `PixelRelief`. None: a flat `BSplineRelief`. A tensor of
+        heights [m] is guessed to hold control points if it is 4 x 4, and else samples of a `HeightMap`.
+    n: refractive index of the relief.
     unit: length [m] of one unit of the learnt parameter. Choose it such that the parameter is near 1, as optimisers
         expect.
+    pupil: further arguments of `optics.Pupil`, as a dictionary.
 
     The only learnt parameter is `relief`, which equals heights / unit.
     """
@@ -97,18 +242,22 @@ class PointSpread(torch.nn.Module):
         radius: float,
         wavelengths: Sequence[float] | float = (550e-9,),
         *,
-        heights: torch.Tensor | None = None,
+        heights: Relief | torch.Tensor | None = None,
         n: float = 1.5,
         unit: float = 1e-6,
+        pupil: Mapping[str, Any] | None = None,
         **view: Any,
     ) -> None:
         super().__init__()
-        if heights is not None:
-            of_kind("heights", heights, torch.Tensor, "torch.zeros(4, 4)")
-        known = torch.zeros(4, 4) if heights is None else full_precision("heights", heights)
-        start = known.detach().double()
-        self.relief = torch.nn.Parameter(start / unit)
-        self.radius, self.n, self.unit = radius, n, unit
+        relief = BSplineRelief(np.zeros((4, 4))) if heights is None else heights
+        if not isinstance(relief, Relief):
+            relief = _guessed(of_kind("heights", heights, torch.Tensor, "torch.zeros(4, 4)"), 4)
+        start = relief.control_points if isinstance(relief, BSplineRelief) else getattr(relief, "samples", None)
+        if start is None:
+            raise ValueError(f"heights = {shown(relief)}: must be a BSplineRelief, HeightMap or PixelRelief")
+        self.relief = torch.nn.Parameter(torch.tensor(plain(start)) / unit)
+        self._kind: Callable[[torch.Tensor], Relief] = type(relief)
+        self.radius, self.n, self.unit, self.pupil = radius, n, unit, dict(pupil or {})
         self.view = {"wavelengths": vacuum_wavelengths(wavelengths), **view}
 
     @property
@@ -117,4 +266,5 @@ class PointSpread(torch.nn.Module):
         return self.relief * self.unit
 
     def forward(self) -> torch.Tensor:
-        return psf(self.heights, radius=self.radius, n=self.n, **self.view)
+        pupil = Pupil(self.radius, self._kind(self.heights), n=self.n, **self.pupil)
+        return psf(pupil, device=self.relief.device, **self.view)

@@ -9,6 +9,7 @@ choose_fidelity, Fidelity           rendering accuracy, chosen to match the rece
 FidelityWarning                     warning that no level of fidelity is accurate enough
 ReferenceRenderer                   slow reference: Mitsuba's integrators and the convolution in `optics`
 ModelRenderer, Mount, Poses         eyes on any MuJoCo model; fan, ring and both_sides return several mounts
+CompoundEye                         ommatidia with any viewing directions; hexagonal_patch, whole_head
 choose_model_fidelity               rendering accuracy for eyes on a model
 Task                                a user task for a robot with eyes, written for one world at a time
 BatchTask                           a user task written for arrays of all worlds, which runs faster
@@ -40,8 +41,10 @@ if TYPE_CHECKING:
     from sim.envs.registration import register_task
     from sim.exr.files import read_exr, write_exr
     from sim.exr.view import View
+    from sim.eyes.compound_eye import CompoundEye
     from sim.eyes.eyes import Eyes
     from sim.eyes.mounts import Mount, both_sides, fan, ring
+    from sim.eyes.viewing_directions import hexagonal_patch, whole_head
     from sim.physics.array_worlds import ArrayWorlds
     from sim.physics.physics import Physics
     from sim.physics.sliding_agents import SlidingAgents
@@ -63,6 +66,9 @@ if TYPE_CHECKING:
     from sim.worlds.world import World, build_world
 
 _HOME = {
+    "CompoundEye": "sim.eyes.compound_eye",
+    "hexagonal_patch": "sim.eyes.viewing_directions",
+    "whole_head": "sim.eyes.viewing_directions",
     "Eyes": "sim.eyes.eyes",
     "Course": "sim.worlds.course",
     "LayoutFamily": "sim.worlds.layout_family",
@@ -107,6 +113,7 @@ __all__ = [
     "ArrayWorlds",
     "BatchTask",
     "BatchedRenderer",
+    "CompoundEye",
     "Course",
     "Encounter",
     "Eyes",
@@ -133,6 +140,7 @@ __all__ = [
     "choose_fidelity",
     "choose_model_fidelity",
     "fan",
+    "hexagonal_patch",
     "make_env",
     "make_parallel_env",
     "make_vec_env",
@@ -140,6 +148,7 @@ __all__ = [
     "read_exr",
     "register_task",
     "ring",
+    "whole_head",
     "write_exr",
 ]
 

@@ -19,7 +19,6 @@ from evolve.genome.phenotype import Phenotype
 from optics.numerics.number_types import full_precision
 
 if TYPE_CHECKING:
-    import optics
     from evolve.config.run_config import EyeConfig
     from evolve.store.candidate import Candidate
 
@@ -28,14 +27,11 @@ __all__ = [
     "Trajectory",
     "bootstrap_interval",
     "champions",
-    "eye_image_quality",
     "gene_values",
     "generation_statistics",
-    "polychromatic",
     "psnr",
     "succeeded",
     "trajectory",
-    "white_strehl",
 ]
 
 Floats = NDArray[np.float64]
@@ -184,54 +180,6 @@ def gene_values(phenotype: Phenotype, eye: EyeConfig | None = None) -> dict[str,
             **dict(zip(LAMBDA_MAX, phenotype.lambda_max_nm, strict=False)),
         }
     return values if eye is None else {name: value for name, value in values.items() if name in eye.genes}
-
-
-def polychromatic(eye: optics.Eye, psf: optics.PSFResult) -> optics.PSFResult:
-    """Return the PSF in white daylight, (1, y, x). Bands are weighted by the mean sensitivity of the channels."""
-    return psf.mean(_of_daylight(eye))
-
-
-def white_strehl(eye: optics.Eye, psf: optics.PSFResult) -> float:
-    """Return the Strehl ratio in white daylight; NaN if the PSF's window does not contain the maximum.
-
-    The reference is the PSF of the same aperture without aberrations at any wavelength, in the same light. Its maximum
-    is higher than that at the mean wavelength, because maxima are proportional to 1/λ².
-    """
-    import optics
-
-    try:
-        return float(optics.strehl_ratio(polychromatic(eye, psf))[0])
-    except optics.AccuracyError:
-        return math.nan
-
-
-def _of_daylight(eye: optics.Eye) -> NDArray[np.float64]:
-    """Return the fraction of each band in the receptors' mean response to white daylight. Fractions sum to 1."""
-    from optics.spectra.bands import daylight
-
-    weights = eye.spectral_bands.weights.mean(axis=0) * daylight(eye.spectral_bands.wavelengths)
-    share: NDArray[np.float64] = weights / weights.sum()
-    return share
-
-
-def eye_image_quality(phenotype: Phenotype, config: EyeConfig) -> float:
-    """Return `optics.image_quality` of the phenotype's eye in white daylight, in [0, 1].
-
-    The quality is averaged over frequencies up to the Nyquist frequency of the receptors. A perfect lens has contrast 1
-    at all frequencies.
-
-    Raises:
-        optics.AccuracyError: the PSF cannot be computed.
-    """
-    import optics
-    from optics.eye.summary import noise_of
-
-    eye = phenotype.eyes(config).eye()
-    if eye.pupil is None:
-        return max(1 - noise_of(eye, eye.white_signal), 0.0)
-    white = polychromatic(eye, eye.psf())
-    light, nyquist = eye.white_signal, 1 / (2 * eye.receptor_pitch)
-    return float(optics.image_quality(white, nyquist, light, noise_of(eye, light))[0])
 
 
 def bootstrap_interval(

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 import optics
 import sim
-from evolve.analysis.statistics import eye_image_quality, polychromatic, psnr
+from evolve.analysis.statistics import psnr
+from evolve.analysis.white_light import WhiteLight, eye_image_quality
 from evolve.config.run_config import RunConfig
 from evolve.genome.phenotype import Phenotype
 from evolve.learning.animal_task import animal_task
@@ -45,13 +46,17 @@ class Vision:
 
 def vision(animal: Phenotype, config: RunConfig) -> Vision:
     """Return the measures of an animal's eyes in the run's task. If their optics cannot be computed, all are NaN."""
-    eyes = animal.eyes(config.eye)
+    eye = animal.eyes(config.eye).eye()
     try:
-        quality, contrast = eye_image_quality(animal, config.eye), _contrast(eyes.eye())
+        if eye.pupil is None:
+            quality, contrast = eye_image_quality(animal, config.eye), 1.0
+        else:
+            light = WhiteLight.from_eye(eye)
+            quality, contrast = light.image_quality, light.contrast
         seen, perfect = seen_and_perfect(animal, config)
     except optics.AccuracyError:
         return Vision(math.nan, math.nan, math.nan, math.nan)
-    gain = 1 / float(eyes.eye().white_signal)
+    gain = 1 / float(eye.white_signal)
     return Vision(quality, contrast, psnr(seen, perfect, gain), ssim(gain * seen, perfect))
 
 
@@ -87,11 +92,3 @@ def ssim(signals: Floats, reference: Floats) -> float:
         return math.nan
     pairs = zip(*(a.reshape(-1, *a.shape[-2:]).astype(np.float64) for a in (signals, reference)), strict=True)
     return float(np.mean([structural_similarity(a, b, win_size=window, data_range=1.0) for a, b in pairs]))
-
-
-def _contrast(eye: optics.Eye) -> float:
-    """Return the MTF at half the Nyquist frequency of the receptors; 1 for a perfect lens."""
-    if eye.pupil is None:
-        return 1.0
-    white = polychromatic(eye, eye.psf())
-    return float(optics.mtf(white).profile(np.array([1 / (4 * eye.receptor_pitch)]))[0, 0])

@@ -12,9 +12,10 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Rectangle, Wedge
 
 import optics
+from evolve.analysis.white_light import WhiteLight
 from evolve.config.run_config import EyeConfig
 from evolve.genome.phenotype import Phenotype
-from evolve.report.eye_figures import DECADES, WhiteLight, middle_of_psf, relief_heights
+from evolve.report.eye_figures import DECADES, middle_of_psf, relief_heights
 
 __all__ = ["eye_picture"]
 

@@ -12,6 +12,7 @@ distribution      normal distribution of a policy's actions
 observed          entries of an observation other than the eyes' signals
 eye_features      encoder of each eye
 per_eye_layers    linear layers for each eye, with its own or with shared weights
+hexagonal_layers  convolution over the ommatidia of a compound eye
 regridding        averaging and repetition of signals before the encoder
 schedule          decrease of Adam's step size and of the passes over the samples during training
 training_rewards  scaling of rewards for the learner, with lower costs at the start

@@ -22,9 +22,11 @@ from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
 from torch import Tensor, nn
 
 from evolve.config.settings import DIRECT, WiringConfig
+from evolve.learning.hexagonal_layers import HexagonalLayers
 from evolve.learning.observed import entries_of, known_beside_eyes
 from evolve.learning.per_eye_layers import DARK, AdaptedLinear, MemoryLinear, PerEyeLinear
 from evolve.learning.regridding import Regridding
+from sim.envs.ommatidia_space import OmmatidiaBox
 
 __all__ = ["UNITS", "EyeFeatures"]
 
@@ -64,20 +66,30 @@ class EyeFeatures(BaseFeaturesExtractor):
     `frames` (memory - 1 + step, segment, eye, channel, height, width) and `age` (step, segment), the number of steps
     since the first frame of the episode. Samples are then (step, segment) flattened.
 
+    Frames of a compound eye have the axes (ommatidium, channel) instead of (eye, channel, height, width). Two layers of
+    `hexagonal_layers` come before the encoder, and all ommatidia of the observation count as one eye.
+
     At the start of an episode, the memory is not yet full. As in sim's environments, the first frame of the episode
     fills the missing places.
     """
 
     def __init__(self, observation_space: spaces.Dict, width: int, wiring: WiringConfig = DIRECT) -> None:
-        self.memory, self.n_eyes, *retina = observation_space["eyes"].shape
-        self.grid = Regridding((retina[1], retina[2]), wiring)
+        eyes, first = observation_space["eyes"], AdaptedLinear
+        grid: HexagonalLayers | Regridding
+        if isinstance(eyes, OmmatidiaBox):
+            self.memory, self.n_eyes, first = eyes.shape[0], 1, PerEyeLinear
+            grid = HexagonalLayers(eyes.directions, eyes.shape[2], UNITS)
+            inputs = grid.outputs
+        else:
+            self.memory, self.n_eyes, channels, *retina = eyes.shape
+            grid = Regridding((retina[0], retina[1]), wiring)
+            inputs = channels * math.prod(grid.shape)
         beside = known_beside_eyes(observation_space)
         super().__init__(observation_space, width * self.n_eyes + sum(beside.values()))
         self.beside = tuple(beside)
-        self.width = width
-        self.n_inputs = retina[0] * math.prod(self.grid.shape)
+        self.width, self.n_inputs, self.grid = width, inputs, grid
         widths, shared = (self.n_inputs, *(width,) * ENCODER_LAYERS), wiring.shared_encoder
-        layers: list[nn.Module] = [AdaptedLinear(self.n_eyes, widths[0], widths[1], shared), UNITS(inplace=True)]
+        layers: list[nn.Module] = [first(self.n_eyes, widths[0], widths[1], shared), UNITS(inplace=True)]
         for inputs, outputs in itertools.pairwise(widths[1:]):
             layers += [PerEyeLinear(self.n_eyes, inputs, outputs, shared), UNITS(inplace=True)]
         self.encoder = nn.Sequential(*layers)
@@ -118,7 +130,10 @@ class EyeFeatures(BaseFeaturesExtractor):
         frames: frames, (..., eye, channel, height, width), for the receptors
         beside: other entries of the observations by name, (..., number), for their normalisation
         """
-        self.encoder[0].adapt(self._signals(frames))
+        if isinstance(self.grid, HexagonalLayers):
+            self.grid.adapt(frames)
+        else:
+            self.encoder[0].adapt(self._signals(frames))
         if self.felt is not None and beside is not None:
             felt = torch.cat([beside[name] for name in self.normalised], dim=-1)
             self.felt.adapt(felt.reshape(-1, felt.shape[-1]))

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from gymnasium import spaces
 
-__all__ = ["CONTACT", "Entry", "entries_of", "known_beside_eyes"]
+__all__ = ["CONTACT", "FEELS", "Entry", "entries_from_record", "entries_of", "known_beside_eyes"]
 
 EYES, LAST = "eyes", "previous_action"
+FEELS = "feels"  # name of the proprioception of a `sim.Task` in observations
 
 
 @dataclass(frozen=True)
@@ -74,3 +75,13 @@ def entries_of(space: spaces.Dict) -> tuple[Entry, ...]:
         for name, size in sizes.items()
         if name != LAST
     )
+
+
+def entries_from_record(stored: Mapping[str, Any]) -> tuple[Entry, ...]:
+    """Return the entries in the record of a policy. Former versions stored only the size of the proprioception."""
+    if "beside" in stored:
+        return tuple(Entry.from_record(entry) for entry in stored["beside"])
+    if FEELS in stored:
+        size = int(stored[FEELS])
+        return (Entry(FEELS, size),) if size else ()
+    return (CONTACT,)

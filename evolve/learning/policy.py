@@ -28,11 +28,12 @@ from evolve.genome.phenotype import FORMER_ENCODER
 from evolve.learning.adam import Adam
 from evolve.learning.distribution import Gaussian, Within
 from evolve.learning.eye_features import UNITS, EyeFeatures
-from evolve.learning.observed import CONTACT, Entry, entries_of, known_beside_eyes
+from evolve.learning.hexagonal_layers import directions_from_record
+from evolve.learning.observed import CONTACT, FEELS, Entry, entries_from_record, entries_of, known_beside_eyes
 from evolve.learning.tensor_file import read_tensors
 from evolve.store.atomic_files import write_whole
+from sim.envs.ommatidia_space import OmmatidiaBox
 
-FEELS = "feels"  # name of the proprioception of a `sim.Task` in observations
 LARGEST_COUNT = 4096  # upper limit of each number in the shape of a policy in a file; genes allow at most 512
 MOST_SIGNALS = 2**24  # upper limit for the number of signals in a policy's memory; genes allow at most half of it
 FIRST_SPREAD = 0.5  # standard deviation of an untrained policy's actions; with 1, a third of them would be clipped
@@ -61,10 +62,11 @@ class Brain:
 class PolicyConfig:
     """Shape of a policy, from which it can be built again.
 
-    eyes: shape of the observation's `eyes` (memory, eye, channel, height, width)
+    eyes: shape of the observation's `eyes` (memory, eye, channel, height, width), or (memory, ommatidium, channel)
     neurons, layers, encoder, wiring: see `Brain`
     actions: number of elements of an action
     beside: entries of the observation other than the eyes' signals and the previous action
+    directions: viewing directions of the ommatidia of a compound eye, unit vectors; empty for other eyes
     """
 
     eyes: tuple[int, ...]
@@ -74,13 +76,18 @@ class PolicyConfig:
     actions: int = 2
     beside: tuple[Entry, ...] = (CONTACT,)
     wiring: WiringConfig = DIRECT
+    directions: tuple[tuple[float, ...], ...] = ()
 
     @classmethod
     def from_space(cls, space: spaces.Dict, brain: Brain) -> PolicyConfig:
         """Return the shape of a policy for these observations."""
         actions = known_beside_eyes(space)["previous_action"]
         sizes = (brain.neurons, brain.layers, brain.encoder)
-        return cls(tuple(space["eyes"].shape), *sizes, actions, entries_of(space), brain.wiring)
+        eyes = space["eyes"]
+        found: tuple[tuple[float, ...], ...] = ()
+        if isinstance(eyes, OmmatidiaBox):
+            found = tuple(tuple(way) for way in eyes.directions.tolist())
+        return cls(tuple(eyes.shape), *sizes, actions, entries_of(space), brain.wiring, found)
 
     @property
     def brain(self) -> Brain:
@@ -89,8 +96,11 @@ class PolicyConfig:
 
     def observation_space(self) -> spaces.Dict:
         """Return the observation space of sim's environments with these eyes."""
+        eyes = spaces.Box(-np.inf, np.inf, self.eyes, np.float32)
+        if self.directions:
+            eyes = OmmatidiaBox(-np.inf, np.inf, self.eyes, np.array(self.directions))
         known: dict[str, spaces.Space[Any]] = {
-            "eyes": spaces.Box(-np.inf, np.inf, self.eyes, np.float32),
+            "eyes": eyes,
             "previous_action": spaces.Box(-1.0, 1.0, (self.actions,), np.float32),
         }
         return spaces.Dict(known | {entry.name: entry.space for entry in self.beside})
@@ -102,7 +112,8 @@ class PolicyConfig:
         by all versions. Former versions had neither a list of other entries nor a choice of wiring, so their form is
         used for shapes that they could describe.
         """
-        left_out = ("beside", "wiring") if self.wiring == DIRECT else ("beside",)
+        left_out = {"beside"} | ({"wiring"} if self.wiring == DIRECT else set())
+        left_out |= set() if self.directions else {"directions"}
         values = {name: value for name, value in asdict(self).items() if name not in left_out}
         if self.beside == (CONTACT,) and self.actions == 2:
             del values["actions"]
@@ -127,8 +138,9 @@ class PolicyConfig:
             layers=int(stored.get("layers", 2)),
             encoder=int(stored.get("encoder", FORMER_ENCODER)),
             actions=int(stored.get("actions", 2)),
-            beside=_entries(stored),
+            beside=entries_from_record(stored),
             wiring=_wiring(stored.get("wiring", {})),
+            directions=directions_from_record(stored),
         )
 
 
@@ -136,15 +148,6 @@ def _wiring(stored: Mapping[str, Any]) -> WiringConfig:
     wiring = WiringConfig(**stored)
     check_values(wiring, prefix="wiring.")
     return wiring
-
-
-def _entries(stored: Mapping[str, Any]) -> tuple[Entry, ...]:
-    if "beside" in stored:
-        return tuple(Entry.from_record(entry) for entry in stored["beside"])
-    if FEELS in stored:
-        size = int(stored[FEELS])
-        return (Entry(FEELS, size),) if size else ()
-    return (CONTACT,)
 
 
 class EyePolicy(MultiInputActorCriticPolicy):
@@ -263,7 +266,14 @@ def set_learnt(policy: EyePolicy, tensors: Mapping[str, Tensor]) -> None:
 def _require_shape(config: PolicyConfig, tensors: Mapping[str, Tensor]) -> None:
     """Check that a policy of this shape has these tensors, before memory for it is allocated."""
     known = sum(entry.size for entry in config.beside)
-    counts = [*config.eyes, config.neurons, config.layers, config.encoder, config.actions, known + 1]
+    counts = [
+        *(config.eyes[::2] if config.directions else config.eyes),
+        config.neurons,
+        config.layers,
+        config.encoder,
+        config.actions,
+        known + 1,
+    ]
     if min(counts) < 1 or max(counts) > LARGEST_COUNT or math.prod(config.eyes) > MOST_SIGNALS:
         raise ValueError(f"its shape is impossible: {config}")
     if config.layers > len(tensors):

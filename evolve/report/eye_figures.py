@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -12,42 +11,22 @@ from matplotlib.colors import LogNorm
 from matplotlib.patches import Circle, Rectangle
 
 import optics
-from evolve.analysis.statistics import polychromatic
+from evolve.analysis.white_light import WhiteLight
 from evolve.config.run_config import EyeConfig
 from evolve.genome.phenotype import Phenotype
 from evolve.report.hints import hint
 from evolve.report.markup import Html, figure, html, joined, key, rounded
 from evolve.report.svg import drawing, inline
 from evolve.report.theme import ACCENT, INK, LINES, MUTED, VERMILLION
-from optics.eye.summary import noise_of
 from optics.numerics.precision import precision
 from optics.spectra.bands import daylight
 
-__all__ = ["DECADES", "WhiteLight", "eye_figures", "middle_of_psf", "relief_heights"]
+__all__ = ["DECADES", "eye_figures", "middle_of_psf", "relief_heights"]
 
 SIZE = (370, 310)
 PIXELS = 161  # maximum number of pixels along a side of an image; more would be invisible on the page
 DECADES = 4  # range of the PSF's logarithmic colour scale [powers of ten]
 SHOWN_POWER = 0.98  # fraction of the PSF's light that lies within the image
-
-
-@dataclass(frozen=True)
-class WhiteLight:
-    """An eye with its PSF in each band (`psf`) and in white daylight (`white`)."""
-
-    eye: optics.Eye
-    psf: optics.PSFResult
-    white: optics.PSFResult
-
-    @classmethod
-    def from_eye(cls, eye: optics.Eye) -> WhiteLight:
-        psf = eye.psf()
-        return cls(eye, psf, polychromatic(eye, psf))
-
-    @property
-    def per_degree(self) -> float:
-        """Distance on the retina per degree near the axis [m]."""
-        return self.eye.sensor_distance * np.pi / 180
 
 
 def eye_figures(phenotype: Phenotype, config: EyeConfig) -> Html:
@@ -153,7 +132,7 @@ def _psf(light: WhiteLight) -> Html:
         "<b>{}</b> of a distant point, all {} weighted by white daylight; logarithmic, "
         "{} decades. White square: one {}, {} µm wide. Least accurate band: {}, predicted error {}.",
         *(hint("psf", "Point spread function"), hint("bands"), DECADES, hint("receptor"), rounded(pitch)),
-        *(plan.method.replace("_", " "), f"{plan.predicted_error:.1g}"),
+        *(plan.method.replace("_", " "), f"{plan.predicted_error:.2g}"),
     )
     return figure(svg, caption)
 
@@ -203,9 +182,9 @@ def _mtf(light: WhiteLight) -> Html:
     """Return the figure of the MTF (contrast over spatial frequency), with the diffraction limit of the aperture."""
     eye, scale = light.eye, light.per_degree
     cutoff = light.psf.cutoff
-    nyquist = 1 / (2 * eye.receptor_pitch)
+    nyquist = light.nyquist
     frequency = np.geomspace(min(nyquist / 8, cutoff.max() / 100), cutoff.max(), 240)
-    contrast = optics.mtf(light.white).profile(frequency)[0]
+    contrast = light.mtf.profile(frequency)[0]
     with drawing(*SIZE) as drawn:
         axes = drawn.subplots()
         axes.semilogx(frequency * scale, diffraction_limit(light, frequency), color=INK, lw=1.2, ls="--")
@@ -218,9 +197,8 @@ def _mtf(light: WhiteLight) -> Html:
             drawn, "mtf", f"Modulation transfer function; {at_nyquist:.2g} at the receptors' Nyquist frequency."
         )
     green = int(np.argmin(np.abs(light.psf.wavelengths - 550e-9)))
-    strehl = optics.strehl_ratio(light.psf)[green]
+    strehl = optics.strehl_ratio(light.psf.of_wavelength(green))[0]
     of_whom = "" if _is_round(eye.pupil) else " of a circle of this width"
-    quality = optics.image_quality(light.white, nyquist, eye.white_signal, noise_of(eye, eye.white_signal))[0]
     caption = html(
         "<b>{}</b> in white daylight, mean of all orientations ({}), and the diffraction "
         "limit{} (dashed). Dotted: the receptors' Nyquist frequency, {} cycles per degree; contrast there {}. {} "
@@ -231,7 +209,7 @@ def _mtf(light: WhiteLight) -> Html:
             hint("Strehl ratio"),
             rounded(strehl),
             f"{1e9 * light.psf.wavelengths[green]:.0f}",
-            rounded(quality),
+            rounded(light.image_quality),
         ),
     )
     return figure(svg, caption)

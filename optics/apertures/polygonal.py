@@ -89,9 +89,7 @@ class Polygon(Aperture):
         else:
             following = np.roll(self.vertices, -1, axis=0)
             parts = np.stack([np.broadcast_to(centre, following.shape), self.vertices, following], axis=1)
-        pieces = [triangle_nodes(part, cycles, digits) for part in parts]
-        x, y, weight = (np.concatenate(column) for column in zip(*pieces, strict=True))
-        return Nodes(x, y, weight)
+        return Nodes(*triangle_nodes(np.asarray(parts), cycles, digits))
 
     def _softened(self, edge: SoftEdge) -> SoftAperture:
         return SoftPolygon(edge, self.vertices)

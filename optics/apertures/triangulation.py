@@ -93,20 +93,22 @@ def _is_ear(vertices: np.ndarray, a: int, b: int, c: int, left: list[int]) -> bo
     return not np.any(sides[0] & sides[1] & sides[2])
 
 
-def triangle_nodes(corners: np.ndarray, cycles: float, digits: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return x, y and weights of Gauss-Legendre nodes over a triangle (Duffy 1982).
+def triangle_nodes(parts: np.ndarray, cycles: float, digits: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return x, y and weights of Gauss-Legendre nodes over triangles (Duffy 1982).
 
-    The nodes lie on lines parallel to the side opposite the first corner. Shorter lines have fewer nodes.
+    The nodes of a triangle lie on lines parallel to the side opposite the first corner. Shorter lines have fewer nodes.
+
+    parts: corners, (triangle, 3, 2).
     """
-    apex, side = corners[0], corners[2] - corners[1]
-    far = max(np.hypot(*(corners[1] - apex)), np.hypot(*(corners[2] - apex)))
-    u, u_weight = gauss_legendre(gauss_legendre_count(cycles * far, digits, degree=1))
-    counts = (harmonics(np.pi * cycles * np.hypot(*side) * u, digits) + 1) // 2
-    twice = abs(_cross(corners[1] - apex, side))
-    rows = []
-    for n, at, weight in zip(counts, u, u_weight, strict=True):
-        v, v_weight = gauss_legendre(int(n))
-        points = apex + at * (corners[1] - apex + v[:, None] * side)
-        rows.append(np.column_stack([points, twice * at * weight * v_weight]))
-    x, y, weight = np.concatenate(rows).T
-    return x, y, weight
+    apex, first, side = parts[:, 0], parts[:, 1] - parts[:, 0], parts[:, 2] - parts[:, 1]
+    far = np.linalg.norm(parts[:, 1:] - apex[:, None], axis=2).max(axis=1)
+    rules = [gauss_legendre(gauss_legendre_count(cycles * reach, digits, degree=1)) for reach in far.tolist()]
+    line = np.repeat(np.arange(len(parts)), [len(u) for u, _ in rules])  # triangle of each line
+    u, u_weight = (np.concatenate(column) for column in zip(*rules, strict=True))
+    counts = (harmonics(np.pi * cycles * np.linalg.norm(side, axis=1)[line] * u, digits) + 1) // 2
+    along = [gauss_legendre(n) for n in counts.tolist()]
+    v, v_weight = (np.concatenate(column) for column in zip(*along, strict=True))
+    twice, node = np.abs(_cross(first, side)), np.repeat(np.arange(len(line)), counts)  # line of each node
+    of = line[node]
+    x, y = (apex[of] + u[node, None] * (first[of] + v[:, None] * side[of])).T
+    return x, y, twice[of] * u[node] * u_weight[node] * v_weight

@@ -13,6 +13,9 @@ zernike_order     numberings of Zernike polynomials: OSA, Noll, Fringe
 transmittance     GaussianMask, MaskMap
 human_eye         HumanEye, mean_human_mtf: published models
 exit_pupil        read_exit_pupil: lenses from other programs
+exit_pupils       read_exit_pupils: several fields and wavelengths
+converging_wave   rays and samples of other programs as a wave near its image
+pupil_rim         circle, ellipse or polygon around the samples of a pupil
 refractive_index  RefractiveIndex, Sellmeier, Cornu; media of eyes
 pupil_slopes      slopes of the wavefront behind a pupil
 wavefront_slopes  directions of a wavefront's rays

@@ -21,7 +21,7 @@ __all__ = ["Beam"]
 class Beam:
     """Light of one vacuum wavelength [m] from a source through a pupil to a plane at `distance` [m].
 
-    The pupil's radius, relief and index, and all distances, may be Dr.Jit arrays that carry derivatives.
+    The numbers of the pupil, all distances and the source's angle may carry derivatives.
     """
 
     pupil: Pupil

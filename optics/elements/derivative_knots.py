@@ -35,7 +35,7 @@ class DerivativeKnots:
     borders: ascending borders of the cells along x and along y, in units of the pupil's radius, from -1 to 1. They
         include the borders of a relief of pixels.
     splines: number of cubic splines by which the derivatives multiply the light in each cell.
-    maps: names and samples along a side of the maps, such as "height: 32 x 32".
+    maps: names, rows and columns of the maps, such as "height: 32 x 32".
     names: names of these maps, as arguments of `Pupil`.
     """
 
@@ -58,13 +58,13 @@ def derivative_knots(pupil: Pupil, wavelength: float) -> DerivativeKnots | None:
     maps = dict(_maps(pupil, wavelength))
     if not maps:
         return None
-    inner = np.concatenate([*maps.values(), _borders_of_pixels(pupil)])
+    inner = np.concatenate([*(knots for _, knots in maps.values()), _borders_of_pixels(pupil)])
     inner = np.unique(inner[np.abs(inner) < 1 - APART])
     kept = inner[np.diff(inner, prepend=-1.0) > APART]
     paths = len(maps.keys() - {"mask"})
     # A derivative by a sample of the relief or wavefront is a spline, times the mask, which may be a spline as well.
     splines = 2 if paths and "mask" in maps else 1
-    sizes = ", ".join(f"{name}: {len(knots)} x {len(knots)}" for name, knots in maps.items())
+    sizes = ", ".join(f"{name}: {rows} x {columns}" for name, ((rows, columns), _) in maps.items())
     return DerivativeKnots((-1.0, *kept.tolist(), 1.0), splines, sizes, tuple(maps))
 
 
@@ -82,22 +82,25 @@ def carries_derivatives(beam: Beam) -> bool:
     return any(map(carries_derivative, numbers)) or _index_carries(pupil) or _relief_carries(pupil.height)
 
 
-def _maps(pupil: Pupil, wavelength: float) -> Iterator[tuple[str, np.ndarray]]:
-    """Yield the names and knots, in units of the pupil's radius, of the maps whose derivatives are requested."""
+def _maps(pupil: Pupil, wavelength: float) -> Iterator[tuple[str, tuple[tuple[int, int], np.ndarray]]]:
+    """Yield the names, shapes and knots, in units of the pupil's radius, of the maps with requested derivatives."""
     relief, wavefront, mask = pupil.height, pupil.wavefront, pupil.mask
     bent = isinstance(relief, HeightMap) and pupil.bends(wavelength)
     if bent and (carries_derivative(relief.samples) or _index_carries(pupil)):
-        yield "height", _knots(relief.samples)
+        yield "height", _knots(relief.samples, 1.0)
     if isinstance(wavefront, WavefrontMap) and carries_derivative(wavefront.samples):
-        yield "wavefront", _knots(wavefront.samples) * _ratio(wavefront.radius, pupil)
+        yield "wavefront", _knots(wavefront.samples, _ratio(wavefront.radius, pupil))
     if isinstance(mask, MaskMap) and carries_derivative(mask.samples):
-        yield "mask", _knots(mask.samples) * _ratio(mask.reach, pupil)
+        yield "mask", _knots(mask.samples, _ratio(mask.reach, pupil))
 
 
-def _knots(samples: Any) -> np.ndarray:
-    """Return the positions of the samples, which are the knots of the spline, in units of half the side of the map."""
-    count = samples.shape[0]
-    return (np.arange(count) + 0.5) * 2 / count - 1
+def _knots(samples: Any, side: float) -> tuple[tuple[int, int], np.ndarray]:
+    """Return the shape of a map, and the positions of its rows and columns, which are the knots of the spline.
+
+    side: half the side of the map, in the unit of the positions.
+    """
+    rows, columns = samples.shape
+    return (rows, columns), side * np.union1d(*((np.arange(n) + 0.5) * 2 / n - 1 for n in (rows, columns)))
 
 
 def _ratio(half_side: float | None, pupil: Pupil) -> float:

@@ -18,23 +18,22 @@ def band_of(samples: np.ndarray, level: float) -> float:
     Interpolation by cubic splines repeats a component of frequency f around multiples of the sampling rate. A copy at
     the frequency F is weaker by the factor (f/F)⁴.
     """
-    n = len(samples)
-    if n < 4:
+    if max(samples.shape) < 4:
         return 1.0
-    window = np.hanning(n + 2)[1:-1]
+    down, across = (np.hanning(n + 2)[1:-1] for n in samples.shape)
     residue = samples - _plane(samples)
-    spectrum = np.abs(np.fft.fft2(residue * window[:, None] * window)) / n
-    frequency = np.abs(np.fft.fftfreq(n, 2 / n))
-    radial = np.maximum(frequency[:, None], frequency[None, :])
+    spectrum = np.abs(np.fft.fft2(residue * down[:, None] * across)) / samples.size
+    fy, fx = (np.abs(np.fft.fftfreq(n, 2 / n)) for n in samples.shape)
+    radial = np.maximum(fy[:, None], fx[None, :])
     order = np.argsort(radial, axis=None)[::-1]
-    power = np.cumsum((spectrum.ravel()[order] / n) ** 2)
+    power = np.cumsum(spectrum.ravel()[order] ** 2)
     reached = radial.ravel()[order][int(np.searchsorted(power, level**2).clip(max=power.size - 1))]
-    images = (np.sum((spectrum / n * radial**4) ** 2) / level**2) ** 0.125
-    return float(max(1.0, reached, images if images > n / 2 - reached else 0.0))
+    images = (np.sum((spectrum * radial**4) ** 2) / level**2) ** 0.125
+    return float(max(1.0, reached, images if images > min(samples.shape) / 2 - reached else 0.0))
 
 
 def power_beyond(samples: np.ndarray) -> np.ndarray:
-    """Return the samples' power spectrum, summed from each frequency upwards: mean squares (n,).
+    """Return the samples' power spectrum, summed from each frequency upwards: mean squares, (longer side,).
 
     Entry k contains all components whose frequency along x or along y is at least k/4 cycles per half a side.
 
@@ -44,13 +43,13 @@ def power_beyond(samples: np.ndarray) -> np.ndarray:
     """
     from scipy.fft import dctn
 
-    n = len(samples)
+    n = max(samples.shape)
     if n <= CUBIC:
         return np.zeros(n)
-    basis = np.linalg.qr(np.vander(np.linspace(-1, 1, n), CUBIC))[0]
-    residue = samples - basis @ (basis.T @ samples @ basis) @ basis.T
-    power = np.square(dctn(residue, norm="ortho")) / n**2
-    farthest = np.maximum.outer(np.arange(n), np.arange(n))
+    down, across = (np.linalg.qr(np.vander(np.linspace(-1, 1, side), min(side, CUBIC)))[0] for side in samples.shape)
+    residue = samples - down @ (down.T @ samples @ across) @ across.T
+    power = np.square(dctn(residue, norm="ortho")) / samples.size
+    farthest = np.maximum.outer(*map(np.arange, samples.shape))
     found: np.ndarray = np.cumsum(np.bincount(farthest.ravel(), power.ravel(), n)[::-1])[::-1]
     return found
 
@@ -66,6 +65,6 @@ def reach_of(beyond: np.ndarray, level: float) -> float:
 
 def _plane(samples: np.ndarray) -> np.ndarray:
     """Return the least-squares plane through the samples."""
-    position = np.linspace(-1, 1, len(samples))
-    slope = position / np.sum(position**2) / len(samples)
-    return samples.mean() + (slope @ samples.sum(axis=1)) * position[:, None] + (samples.sum(axis=0) @ slope) * position
+    y, x = (np.linspace(-1, 1, n) if n > 1 else np.zeros(1) for n in samples.shape)
+    down, across = (at / max(np.sum(at**2), 1.0) for at in (y, x))
+    return samples.mean() + down @ samples.mean(axis=1) * y[:, None] + samples.mean(axis=0) @ across * x

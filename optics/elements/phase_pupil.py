@@ -41,10 +41,10 @@ def phase_pupil(aperture_radius: Scalar, phase: Any, *, pixels: bool = False, **
     A lens of such a phase has a focal length proportional to 1/λ. A positive phase delays the wave, as glass does.
 
     aperture_radius: R [m].
-    phase: φ [rad], (n, n), (y, x), samples at cell centres over the pupil's square [-R, R]². A Dr.Jit tensor carries
-        derivatives.
-    pixels: True if each sample fills its square cell, so that phases may jump, for example by 2π. False if cubic
-        splines join the samples, which must then be unwrapped.
+    phase: φ [rad], (y, x), samples at cell centres over the pupil's square [-R, R]². A tensor of Dr.Jit or PyTorch
+        carries derivatives.
+    pixels: True if each of n x n samples fills its square cell, so that phases may jump, for example by 2π. False if
+        cubic splines join the samples, which must then be unwrapped.
     more: further arguments of `Pupil`, apart from height and n.
 
     Raises:

@@ -27,7 +27,7 @@ from optics.numerics.precision import precision
 __all__ = ["MIDDLE", "Pupil"]
 
 TALLEST = 100.0  # choice, radii: highest relief to which the thin-element model applies
-ANY_HEIGHT = 1e-3  # choice [m]: reliefs up to this height are allowed on every pupil
+ANY_HEIGHT, OTHER_UNIT = 1e-3, 0.05  # choice [m]: height allowed on every pupil; height that has another unit
 LEVEL, TRANSMISSION_DIGITS = 1e-6, 9.0  # choice: neglected level of a mask's spectrum; digits of its transmission
 MIDDLE = 550e-9  # choice [m]: wavelength that defines the image distance
 SENSOR_DISTANCE = 240e-6  # choice [m]: default distance of the sensor behind a pupil without a lens
@@ -38,7 +38,7 @@ class Pupil:
     """A thin element with the amplitude transmittance A(x, y) M(x, y) exp(ik [(n - object_n) h(x, y) - W(x, y)]).
 
     aperture_radius: R [m].
-    height: h. None; a square array [m] (y, x) of samples at cell centres over [-R, R]² (HeightMap); or any Relief.
+    height: h. None; an array [m] (y, x) of samples at cell centres over [-R, R]² (HeightMap); or any Relief.
     n: refractive index of the relief, constant or dispersive.
     medium_n: refractive index behind the pupil, constant or dispersive (`optics.medium`).
     object_n: refractive index in front of the pupil and around the relief. None: equal to medium_n.
@@ -50,8 +50,8 @@ class Pupil:
     mask: M, the transmitted amplitude: GaussianMask or MaskMap. A PSF is relative to the light that falls on the open
         aperture, so absorption in a mask reduces the PSF's sum.
 
-    Radius, height, n, focal length and the numbers of W and M may be Dr.Jit arrays (tensors for maps) that carry
-    derivatives.
+    Radius, height, n, focal length and the numbers of W and M may be Dr.Jit arrays (tensors for maps) or tensors of
+    PyTorch that carry derivatives. Tensors of PyTorch are for `optics.torch.psf`.
 
     Raises:
         ValueError: an argument is outside its valid range, which the message states.
@@ -79,11 +79,12 @@ class Pupil:
         if self.height is not None and not isinstance(self.height, Relief):
             height = self.height if is_differentiable(self.height) else reals("height", self.height)
             object.__setattr__(self, "height", HeightMap(height))
-        if self.height is not None and self.height.span > max(TALLEST * number(self.aperture_radius), ANY_HEIGHT):
+        if self.height is not None and (span := self.height.span) > max(TALLEST * self.radius, ANY_HEIGHT):
+            unit = "radians or micrometres" if span < 50 else "nanometres"
+            looks = f", as if in {unit}" if span > OTHER_UNIT else ""
             raise ValueError(
-                f"height spans {self.height.span:.3g} m over a pupil of radius {number(self.aperture_radius):.3g} m: "
-                f"must be in metres, at most {TALLEST:g} radii or {ANY_HEIGHT:g} m "
-                "(a phase φ [rad] is a height φ λ / (2π (n - object_n)))"
+                f"height spans {span:.3g} m over a pupil of radius {self.radius:.3g} m{looks}: must be in metres, at "
+                f"most {TALLEST:g} radii or {ANY_HEIGHT:g} m (a phase φ [rad] is a height φ λ / (2π (n - object_n)))"
             )
         if self.wavefront is not None:
             self._check_wavefront(of_kind("wavefront", self.wavefront, Aberration, "Zernike({(2, 0): 0.1})"))

@@ -22,7 +22,7 @@ class Dispersion(ABC):
     """A material's refractive index over wavelength, between 1 (vacuum) and 10."""
 
     def at(self, wavelength: float) -> Scalar:
-        """Return n at a vacuum wavelength [m]. It is a Dr.Jit array if the coefficients are Dr.Jit arrays.
+        """Return n at a vacuum wavelength [m]. It carries derivatives if the coefficients do.
 
         Raises:
             ValueError: n is outside [1, 10] at this wavelength.

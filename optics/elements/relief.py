@@ -14,7 +14,7 @@ from functools import cached_property, lru_cache
 import numpy as np
 
 from optics.elements.fine_detail import band_of, power_beyond, reach_of
-from optics.elements.square_samples import on_both_sides, square_samples
+from optics.elements.square_samples import map_samples, on_both_sides
 from optics.numerics.arguments import finite, plain_reals, positive
 from optics.numerics.array_library import gather, indices, library, like, matrix_like
 from optics.numerics.autodiff import Array, is_differentiable, plain
@@ -84,7 +84,7 @@ class BSplineRelief(Relief):
     polynomial, so paraboloids are exact (`paraboloid`). Outside the square the polynomial continues. Source: Piegl &
     Tiller, The NURBS Book, ch. 2.
 
-    A Dr.Jit tensor of control points carries derivatives.
+    A tensor of Dr.Jit or PyTorch carries derivatives.
 
     Raises:
         ValueError: not 4 x 4 finite numbers.
@@ -98,8 +98,10 @@ class BSplineRelief(Relief):
         points = np.array(plain_reals("control_points", given))
         if is_differentiable(self.control_points) and points.size == 16:
             points = points.reshape(4, 4)
-        if points.shape != (4, 4) or not np.isfinite(points).all():
+        if points.shape != (4, 4):
             raise ValueError(f"control_points has shape {points.shape}: must be 4 x 4 finite heights [m]")
+        if not np.isfinite(points).all():
+            raise ValueError("control_points holds NaN or infinity: must be 4 x 4 finite heights [m]")
         if not is_differentiable(self.control_points):
             points.setflags(write=False)
             object.__setattr__(self, "control_points", points)
@@ -160,19 +162,19 @@ class BSplineRelief(Relief):
 class HeightMap(Relief):
     """Heights [m] sampled at cell centres over the square [-a, a]², joined by cubic splines (not-a-knot ends).
 
-    samples: (n, n), (y, x). Beyond the outermost centres the spline continues for one cell, then linearly.
+    samples: (rows, columns), (y, x). Beyond the outermost centres the spline continues for one cell, then linearly.
 
-    A Dr.Jit tensor of samples carries derivatives.
+    A tensor of Dr.Jit or PyTorch carries derivatives.
 
     Raises:
-        ValueError: not square, empty, or not finite.
+        ValueError: not of two dimensions, empty, or not finite.
     """
 
     samples: np.ndarray | Array
     _heights: np.ndarray = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        samples = square_samples(self.samples)
+        samples = map_samples(self.samples)
         object.__setattr__(self, "_heights", samples)
         if not is_differentiable(self.samples):
             object.__setattr__(self, "samples", samples)
@@ -184,60 +186,36 @@ class HeightMap(Relief):
     @property
     def jump(self) -> float:
         """Largest step [m] between neighbours if it exceeds half the span, as in a wrapped lens; else 0."""
-        many = len(self._heights) >= FEWEST_FOR_JUMPS
+        many = min(self._heights.shape) >= FEWEST_FOR_JUMPS
         steepest = max(np.abs(np.diff(self._heights, axis=axis)).max() for axis in (0, 1)) if many else 0.0
         return float(steepest) if steepest > self.span / 2 else 0.0
 
     @cached_property
-    def _margin(self) -> int:
-        return max(3, len(self._heights) // 4)
-
-    @cached_property
     def _coefficients(self) -> np.ndarray:
-        along_y = _spline_coefficients(self._heights, self._margin)
-        return np.ascontiguousarray(_spline_coefficients(along_y.T, self._margin).T)
+        return np.ascontiguousarray(_spline_coefficients(_spline_coefficients(self._heights).T).T)
 
     def _values(self, x: Array) -> Array:
-        """Return the spline coefficients as an array like `x`. They are linear in the samples, M h Mᵀ."""
+        """Return the spline coefficients as an array like `x`. They are linear in the samples, M h Nᵀ."""
         if not is_differentiable(self.samples) or library(x) is np:
             return like(x, self._coefficients)
-        fit = np.ascontiguousarray(_spline_coefficients(np.eye(len(self._heights)), self._margin))
-        found = matrix_like(x, fit) @ matrix_like(x, self.samples) @ matrix_like(x, np.ascontiguousarray(fit.T))
+        down, across = (_spline_coefficients(np.eye(n)) for n in self._heights.shape)
+        found = matrix_like(x, down) @ matrix_like(x, self.samples) @ matrix_like(x, np.ascontiguousarray(across.T))
         return like(x, found)
 
     def height(self, x: Array, y: Array) -> Array:
+        rows, columns = self._heights.shape
         if _open_grid(x, y):
-            found: np.ndarray = self._basis(y[:, 0]) @ self._coefficients @ self._basis(x[0]).T
+            found: np.ndarray = _basis(y[:, 0], rows) @ self._coefficients @ _basis(x[0], columns).T
             return found
         values = self._values(x)
-        (column, across), (row, along) = (self._cell(position) for position in (x, y))
-        columns = like(row, self._width)
-        return tensor_product(lambda i, j: gather(values, (row + i) * columns + column + j), across, along)
+        (column, across), (row, along) = _cell(x, columns), _cell(y, rows)
+        stride = like(row, _width(columns))
+        return tensor_product(lambda i, j: gather(values, (row + i) * stride + column + j), across, along)
 
     def on_grid(self, at: np.ndarray) -> np.ndarray:
         """Return heights (y, x) at positions in units of the radius; NumPy arrays without derivatives."""
         found: np.ndarray = self.height(at[None, :], at[:, None])
         return found
-
-    @property
-    def _width(self) -> int:
-        """Number of spline coefficients along a side."""
-        return len(self._heights) + 2 * self._margin
-
-    def _basis(self, at: np.ndarray) -> np.ndarray:
-        """Return the B-splines of all coefficients at positions along an axis, (position, coefficient)."""
-        first, weights = self._cell(at)
-        basis, row = np.zeros((len(at), self._width)), np.arange(len(at))
-        for k, weight in enumerate(weights):
-            basis[row, first + k] = weight
-        return basis
-
-    def _cell(self, position: Array) -> tuple[Array, list[Array]]:
-        """Return the index of the first of the four spline coefficients at a position, and the weights of all four."""
-        own, half, shift = library(position), like(position, len(self._heights) / 2), like(position, self._margin - 0.5)
-        place = position * half + half + shift
-        cell = own.clip(own.floor(place), like(position, 1.0), like(position, self._width - 3.0))
-        return indices(cell) - 1, cubic_bsplines(place - cell)
 
     def bandwidth(self, level: float) -> float:
         return band_of(self._heights, level)
@@ -248,11 +226,11 @@ class HeightMap(Relief):
 
     @property
     def knots(self) -> int:
-        return len(self._heights)
+        return max(self._heights.shape)
 
     @property
     def rotationally_symmetric(self) -> bool:
-        return len(self._heights) == 1
+        return self._heights.size == 1
 
     @property
     def mirror_symmetric(self) -> bool:
@@ -264,11 +242,38 @@ def _open_grid(x: Array, y: Array) -> bool:
     return library(x) is np and x.ndim == y.ndim == 2 and len(x) == 1 and y.shape[1] == 1
 
 
-def _spline_coefficients(samples: np.ndarray, margin: int) -> np.ndarray:
-    """Return B-spline coefficients c = s - s''/6 of a cubic spline s along axis 0, with `margin` more at either end."""
+def _margin(n: int) -> int:
+    """Return the number of spline coefficients beyond either end of n samples."""
+    return max(3, n // 4)
+
+
+def _width(n: int) -> int:
+    """Return the number of spline coefficients for n samples along an axis."""
+    return n + 2 * _margin(n)
+
+
+def _cell(position: Array, n: int) -> tuple[Array, list[Array]]:
+    """Return the index of the first of the four spline coefficients at a position, and the weights of all four."""
+    own, half, shift = library(position), like(position, n / 2), like(position, _margin(n) - 0.5)
+    place = position * half + half + shift
+    cell = own.clip(own.floor(place), like(position, 1.0), like(position, _width(n) - 3.0))
+    return indices(cell) - 1, cubic_bsplines(place - cell)
+
+
+def _basis(at: np.ndarray, n: int) -> np.ndarray:
+    """Return the B-splines of all coefficients at positions along an axis of n samples, (position, coefficient)."""
+    first, weights = _cell(at, n)
+    basis, place = np.zeros((len(at), _width(n))), np.arange(len(at))
+    for k, weight in enumerate(weights):
+        basis[place, first + k] = weight
+    return basis
+
+
+def _spline_coefficients(samples: np.ndarray) -> np.ndarray:
+    """Return B-spline coefficients c = s - s''/6 of a cubic spline s along axis 0, also beyond both ends."""
     from scipy.interpolate import make_interp_spline
 
-    n = len(samples)
+    n, margin = len(samples), _margin(len(samples))
     places = np.arange(-2, n + 2)
     if n < 4:
         fitted = np.polynomial.polynomial.polyfit(np.arange(n), samples, n - 1)

@@ -8,7 +8,7 @@ import numpy as np
 
 from optics.numerics.arguments import plain_reals
 
-__all__ = ["on_both_sides", "square_samples"]
+__all__ = ["map_samples", "on_both_sides", "square_samples"]
 
 
 def on_both_sides(heights: np.ndarray) -> bool:
@@ -17,14 +17,26 @@ def on_both_sides(heights: np.ndarray) -> bool:
 
 
 def square_samples(samples: Any, name: str = "height", what: str = "heights [m]") -> np.ndarray:
-    """Return the samples without derivatives, as a read-only array.
+    """Return as many rows as columns of samples without derivatives, as a read-only array.
 
     Raises:
         ValueError: not square, empty, or not finite.
     """
-    heights = np.array(plain_reals(name, samples))
-    if heights.ndim != 2 or heights.shape[0] != heights.shape[1] or heights.size == 0:
+    heights = map_samples(samples, name, what)
+    if heights.shape[0] != heights.shape[1]:
         raise ValueError(f"{name} has shape {heights.shape}: must be square (n, n), n at least 1")
+    return heights
+
+
+def map_samples(samples: Any, name: str = "height", what: str = "heights [m]") -> np.ndarray:
+    """Return rows and columns of samples without derivatives, as a read-only array.
+
+    Raises:
+        ValueError: not of two dimensions, empty, or not finite.
+    """
+    heights = np.array(plain_reals(name, samples))
+    if heights.ndim != 2 or heights.size == 0:
+        raise ValueError(f"{name} has shape {heights.shape}: must be (rows, columns), each at least 1")
     if not np.isfinite(heights).all():
         raise ValueError(f"{name} holds NaN or infinity: must be finite {what}")
     heights.setflags(write=False)

@@ -15,7 +15,7 @@ __all__ = ["refuse_torch", "torch_numbers", "with_numbers"]
 def torch_numbers(element: Any) -> dict[str, Any]:
     """Return the tensors that require a gradient, by their place, such as {"height.samples": tensor}.
 
-    element: a pupil or another dataclass. Its fields, and their entries, are searched.
+    element: a pupil, or another dataclass, dictionary or tuple, which is searched with all its entries.
     """
     return dict(_tensors(element, ""))
 
@@ -37,9 +37,11 @@ def refuse_torch(beam: Beam) -> None:
 
 
 def _children(element: Any) -> list[tuple[str, Any, Any]]:
-    """Return (name in messages, key, value) of the fields of a dataclass or the entries of a dictionary."""
+    """Return (name in messages, key, value) of the fields of a dataclass or the entries of a dictionary or tuple."""
     if is_dataclass(element) and not isinstance(element, type):
         return [(f".{field.name}", field.name, getattr(element, field.name)) for field in fields(element) if field.init]
+    if isinstance(element, tuple):
+        return [(f"[{place}]", place, value) for place, value in enumerate(element)]
     if isinstance(element, dict):
         return [(f"[{str(key).strip('()')}]", key, value) for key, value in element.items()]
     return []
@@ -58,4 +60,6 @@ def _replaced(element: Any, place: str, numbers: Mapping[str, Any]) -> Any:
     changed = {key: _replaced(value, place + name, numbers) for name, key, value in _children(element)}
     if all(changed[key] is value for _, key, value in _children(element)):
         return element
+    if isinstance(element, tuple):
+        return tuple(changed.values())
     return changed if isinstance(element, dict) else replace(element, **changed)

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from optics.elements.relief import HeightMap
-from optics.elements.square_samples import square_samples
+from optics.elements.square_samples import map_samples
 from optics.numerics.arguments import positive, shown
 from optics.numerics.array_library import library, like
 from optics.numerics.autodiff import Array, Scalar, is_differentiable, number
@@ -64,7 +64,7 @@ class GaussianMask(Mask):
 
     At r = w the intensity is 1/e².
 
-    waist: w [m]; a Dr.Jit number may carry a derivative.
+    waist: w [m]; a number of Dr.Jit or PyTorch may carry a derivative.
 
     Raises:
         ValueError: not positive.
@@ -104,14 +104,14 @@ class MaskMap(Mask):
 
     The interpolation is that of HeightMap. For hard edges use apertures instead.
 
-    samples: (n, n), (y, x).
+    samples: (rows, columns), (y, x).
     reach: half side [m] of the square, at least the pupil's radius. None: equal to the pupil's radius.
 
-    A Dr.Jit tensor of samples carries derivatives.
+    A tensor of Dr.Jit or PyTorch carries derivatives.
 
     Raises:
-        ValueError: samples that are not square, empty or not finite; or an amplitude beyond [-1, 1]. The spline can
-            exceed this range at jumps of the samples.
+        ValueError: samples that have not two dimensions, or are empty or not finite; or an amplitude beyond [-1, 1].
+            The spline can exceed this range at jumps of the samples.
     """
 
     samples: np.ndarray | Array
@@ -119,7 +119,7 @@ class MaskMap(Mask):
     _map: HeightMap = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        values = square_samples(self.samples, "samples", "amplitudes")
+        values = map_samples(self.samples, "samples", "amplitudes")
         if np.abs(values).max() > 1 + 1e-9:
             raise ValueError(f"samples reach {shown(float(np.abs(values).max()))}: must be amplitudes in [-1, 1]")
         if self.reach is not None:
@@ -135,7 +135,7 @@ class MaskMap(Mask):
 
     def _most(self) -> float:
         """Largest amplitude of the mask within the circle."""
-        n = FINER * len(self._map._heights)
+        n = FINER * self._map.knots
         at = (np.arange(n) + 0.5) * 2 / n - 1
         return float(np.abs(self._map.on_grid(at)[np.hypot(*np.meshgrid(at, at)) <= 1]).max())
 

@@ -16,7 +16,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from optics.elements.relief import HeightMap
-from optics.elements.square_samples import square_samples
+from optics.elements.square_samples import map_samples
 from optics.elements.zernike_modes import mode, norm, weighted_modes
 from optics.elements.zernike_order import HIGHEST, fringe_mode, noll_mode, numbered, osa_mode
 from optics.numerics.arguments import finite, plain_reals, positive, reals, shown
@@ -89,7 +89,7 @@ class Zernike(Aberration):
     radius: radius [m] of the circle to which the coefficients refer, at least the pupil's radius. None: the pupil's
         radius.
 
-    A Dr.Jit vector, or Dr.Jit numbers in a dictionary, carry derivatives.
+    A vector of Dr.Jit or PyTorch, or their numbers in a dictionary, carry derivatives.
 
     Raises:
         ValueError: an unknown mode, an order above 30, or a coefficient that is not finite.
@@ -203,14 +203,14 @@ class Zernike(Aberration):
 class WavefrontMap(Aberration):
     """A wavefront W [m], sampled at cell centres over the square [-radius, radius]² and interpolated by cubic splines.
 
-    samples: W, (n, n), (y, x). Values are positive if the wavefront is ahead, as in Zernike: they are the negative of
-        an optical path difference. They must be unwrapped. Outside the pupil they must also be finite and smooth.
+    samples: W, (rows, columns), (y, x). Values are positive if the wavefront is ahead, as in Zernike: they are the
+        negative of an optical path difference. They must be unwrapped, and finite and smooth outside the pupil, too.
     radius: half side [m] of the square, at least the pupil's radius. None: the pupil's radius.
 
-    A Dr.Jit tensor of samples carries derivatives.
+    A tensor of Dr.Jit or PyTorch carries derivatives.
 
     Raises:
-        ValueError: not square, empty, or not finite.
+        ValueError: not of two dimensions, empty, or not finite.
     """
 
     samples: np.ndarray | Array
@@ -219,7 +219,7 @@ class WavefrontMap(Aberration):
 
     def __post_init__(self) -> None:
         self._check_radius()
-        values = square_samples(self.samples, "samples", "[m], also outside the pupil")
+        values = map_samples(self.samples, "samples", "[m], also outside the pupil")
         if not is_differentiable(self.samples):
             object.__setattr__(self, "samples", values)
         object.__setattr__(self, "_map", HeightMap(self.samples))

@@ -4,6 +4,8 @@ eye                   Eye
 eye_spec              EyeSpec: parameters of an eye
 geometry              lengths and directions, and checks of the pupil's width
 cell_integrals        integrals of sampled functions over cells
+retina                the retina as a plane of cells
+sensor_pixels         means over the pixels of a sensor
 receptive_field       kernels: receptive fields of receptors
 guided_field          kernels of receptors that are waveguides
 receptor_kernel       kernel of any receptor

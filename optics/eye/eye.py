@@ -11,20 +11,22 @@ import numpy as np
 
 from optics.eye.eye_spec import EyeSpec
 from optics.eye.geometry import direction, tangents
-from optics.eye.kernel_bank import KernelBank, prepare
+from optics.eye.kernel_bank import KernelBank, distances_of, prepare
 from optics.eye.polarization import taken_by
-from optics.eye.receptive_field import Retina, perfect_psf, retinal_psf
+from optics.eye.receptive_field import perfect_psf, retinal_psf
 from optics.eye.receptor_kernel import CELLS_FOR_BANDS, bands_for, receptor_kernel, white_share
+from optics.eye.retina import Retina
 from optics.eye.retinal_image import centred, with_centre
 from optics.eye.signals import signals, with_noise
 from optics.eye.summary import Description, describe
 from optics.numerics.arguments import in_range, of_kind, one_of, positive, radiance_cube, whole
-from optics.numerics.autodiff import Array, Scalar, number, plain, to_user
+from optics.numerics.autodiff import Array, Scalar, holds_arrays, number, plain, to_user
 from optics.point_spread.psf_result import PSFResult
 from optics.spectra.bands import SpectralBands
 
 __all__ = ["Eye"]
 
+LAST = "_kept_sight"  # attribute that stores the last kernels of `see`
 LIGHT_FROM = ("cells", "centres")  # positions within scene cells from which light comes
 
 
@@ -61,6 +63,7 @@ class Eye(EyeSpec):
     pupil_turned: True if the pupil is rotated by 180° about the axis. The axes of `psf` are then those of the pupil.
     vertical_fov_deg: vertical field of view [degrees], 0.001 to 170, which determines the height of the receptors.
         None: receptors are square, and the height of the retina follows from the number of rows.
+    most_seconds: largest predicted time [s] of the PSF of a band. Pupils that need more are refused.
     tolerance: relative L2 error of the PSF. It is also the largest error that each automatic choice may cause in a
         receptor's signal, relative to the signal that a white surface gives.
     dtype: "float32" or "float64", the type of PSF, kernel and signals.
@@ -139,7 +142,8 @@ class Eye(EyeSpec):
     def _retina_for(self, wavelengths: np.ndarray, samples_per_receptor: int) -> Retina:
         height, width = self.receptor_size
         cell = height / samples_per_receptor, width / samples_per_receptor
-        return Retina(self.retina_distance, wavelengths, cell, self.tolerance, self.dtype, self.pupil_turned)
+        settings = self.tolerance, self.dtype, self.pupil_turned, self.most_seconds
+        return Retina(self.retina_distance, wavelengths, cell, *settings)
 
     def chosen_bands(self) -> SpectralBands:
         """Return the fewest bands that keep a receptor's predicted error within the tolerance."""
@@ -211,7 +215,8 @@ class Eye(EyeSpec):
         rng: random generator of the noise; None for signals without noise. Noise carries no derivative.
         z: distance [m] of the scene along the axis, a number or one per cell (Y, X).
         sight: kernels from `Eye.sight` with the same samples_per_receptor; None computes them. Objects outside its
-            range of distances are rendered with the kernel of the nearest or the farthest distance.
+            range of distances are rendered with the kernel of the nearest or the farthest distance. The kernels of the
+            last call are kept.
         polarization: (degree, angle_deg) of the light, for an eye with microvilli: the degree of linear polarisation in
             [0, 1], and the angle of the electric field, from right towards up. Each is a number or an array (band,),
             (Y, X) or (band, Y, X). None: unpolarised or circularly polarised light, which microvilli do not
@@ -228,10 +233,26 @@ class Eye(EyeSpec):
         scene = radiance_cube(radiance, self.bands, shape)
         centred(scene, shape)
         parts = taken_by(self.microvilli, self.resolution, scene, polarization)
-        bank = self.sight(s, z) if sight is None else of_kind("sight", sight, KernelBank, "eye.sight(4)")
+        bank = self._last_sight(s, z) if sight is None else of_kind("sight", sight, KernelBank, "eye.sight(4)")
         bank.check(shape, self.bands, averaged=self.waveguide is None)
         found = signals(self, parts, bank, s, z)
         return to_user(found if rng is None else with_noise(self, found, rng))
+
+    def _last_sight(self, samples_per_receptor: int, z: Any) -> KernelBank:
+        """Return `sight` for these samples and distances, from the preceding call of `see` if possible.
+
+        Kernels that depend on Dr.Jit arrays are computed again, because these may carry derivatives.
+        """
+        if holds_arrays(z) or holds_arrays(self):
+            return self.sight(samples_per_receptor, z)
+        key = samples_per_receptor, distances_of(z)
+        if vars(self).get(LAST, (None,))[0] != key:
+            vars(self)[LAST] = key, self.sight(samples_per_receptor, z)
+        bank: KernelBank = vars(self)[LAST][1]
+        return bank
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {name: value for name, value in vars(self).items() if name != LAST}
 
     def in_bands(self, radiance: Any) -> np.ndarray:
         """Convert a spectral radiance to values for this eye's bands (band,), for `see`.

@@ -58,6 +58,7 @@ class EyeSpec:
     microvilli: Any = None
     pupil_turned: bool = False
     vertical_fov_deg: float | None = None
+    most_seconds: float = 3.0
     spectral_bands: SpectralBands = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -70,6 +71,7 @@ class EyeSpec:
         in_range("tolerance", self.tolerance, 1e-6, 0.5)
         if self.dtype not in ("float32", "float64"):
             raise ValueError(f"dtype = {self.dtype!r}: must be 'float32' or 'float64'")
+        positive("most_seconds", self.most_seconds, "s")
         check_pupil(self.pupil, self.sensor_width, self.full_aperture)
         if flag("pupil_turned", self.pupil_turned) and self.pupil is None:
             raise ValueError("pupil_turned = True and pupil = None: must be False, or a Pupil that can be turned")

@@ -17,7 +17,8 @@ import numpy as np
 from optics.elements.beam import Beam
 from optics.elements.pupil import Pupil
 from optics.eye.cell_integrals import samples_per_cycle
-from optics.eye.receptive_field import Retina, Spot, beams_to, spot_of
+from optics.eye.receptive_field import Spot, beams_to, spot_of
+from optics.eye.retina import Retina
 from optics.numerics.accuracy import AccuracyError
 from optics.numerics.arguments import of_kind
 from optics.numerics.autodiff import Array, Scalar

@@ -24,7 +24,7 @@ from optics.numerics.autodiff import Array, Scalar, is_differentiable, number, p
 from optics.numerics.interpolation import linear_weights
 from optics.numerics.number_types import full_precision
 
-__all__ = ["KernelBank", "prepare"]
+__all__ = ["KernelBank", "distances_of", "prepare"]
 
 MOST_NODES = 64  # choice: largest number of layers or zones that can be requested
 # Choice: numbers of nodes to try. The nodes of each number include the nodes of all smaller numbers.
@@ -113,6 +113,11 @@ class _Range:
         near, far = self.inverse_distance
         at = (near + far + place * (near - far)) / 2
         return 1 / at if at > 0 else math.inf
+
+
+def distances_of(z: Any) -> tuple[float, float]:
+    """Return 1/z [1/m] of the (nearest, farthest) distance, on which alone a bank depends."""
+    return _Range.from_distances(z).inverse_distance
 
 
 def prepare(

@@ -13,6 +13,7 @@ from optics.elements.pupil import Pupil
 from optics.elements.source import PointSource
 from optics.elements.wavefront_slopes import Slopes
 from optics.eye.cell_integrals import Tiles, cell_integrals, samples_per_cycle
+from optics.eye.retina import Retina, more_time
 from optics.methods.problem import Problem
 from optics.numerics.accuracy import AccuracyError, Plan
 from optics.numerics.autodiff import Array, Scalar, is_differentiable, number
@@ -23,39 +24,12 @@ from optics.point_spread.pictures import pictures
 from optics.point_spread.psf_result import PSFResult, spread
 from optics.point_spread.request import Request
 
-__all__ = ["Retina", "perfect_psf", "retinal_psf", "visual_kernel"]
+__all__ = ["perfect_psf", "retinal_psf", "visual_kernel"]
 
 # Choice: light at more than 50° from a receptor's direction counts as blocked by the rim of the eye.
 WIDEST_TANGENT = math.tan(math.radians(50))
 BESIDE = 4  # choice: samples beyond either end of the light, because a spline is least accurate at its ends
 MOST_CELLS = 2049  # choice: largest number of cells of a kernel along an axis
-MOST_SECONDS = 3.0  # choice: time limit for the PSF of a band [s]
-
-
-@dataclass(frozen=True)
-class Retina:
-    """Properties of the retina that define the PSF: distance [m], wavelengths [m], cells, tolerance, dtype.
-
-    cell: height and width of a cell [m].
-    pupil_turned: True if the pupil is rotated by 180° about the axis.
-    """
-
-    distance: Scalar
-    wavelengths: np.ndarray
-    cell: tuple[float, float]
-    tolerance: float
-    dtype: str = "float32"
-    pupil_turned: bool = False
-
-    def across_pupil(self, direction: tuple[float, float]) -> tuple[float, float]:
-        """Return the tangents (x, y), in the pupil's axes, of the direction in which the light of a source travels.
-
-        Light from the right travels to the left of the eye's owner, which is +x. Light from below travels up, to +y.
-
-        direction: tangents (right, down) of the source's direction in the visual field.
-        """
-        right, down = direction
-        return (-right, -down) if self.pupil_turned else (right, down)
 
 
 @dataclass(frozen=True)
@@ -127,7 +101,9 @@ def visual_kernel(
     ]
     rows, columns = (Tiles(spot.cells(side) + 2 * from_cell, side, from_cell) for side in retina.cell)
     types, kernels = precision(retina.dtype), []
-    for request, picture in zip(requests, pictures(requests, alike=True), strict=True):
+    with more_time():
+        found = pictures(requests, alike=True)
+    for request, picture in zip(requests, found, strict=True):
         window = request.problem.window
         # Samples and cells both run backwards. A symmetric pupil thus has the same sums, in the same order, as a turned
         # one, whose samples run forwards.
@@ -193,13 +169,16 @@ def _pitch_for_cells(pitch: float, retina: Retina) -> float:
 
 def _spread(beams: list[Beam], spot: Spot, retina: Retina) -> PSFResult:
     window = spot.window(spot.pitch)
-    return spread([_request(beam, spot, need, window, retina) for beam, need in zip(beams, spot.needs, strict=True)])
+    with more_time():
+        return spread(
+            [_request(beam, spot, need, window, retina) for beam, need in zip(beams, spot.needs, strict=True)]
+        )
 
 
 def _request(beam: Beam, spot: Spot, need: _WindowNeeds, window: Grid, retina: Retina) -> Request:
     reach = spot.half + math.hypot(*spot.centre)
     problem = Problem.from_beam(beam, window, retina.tolerance, retina.dtype)
-    return Request(beam, replace(problem, widest_band=need.band, reach=reach), most_seconds=MOST_SECONDS)
+    return Request(beam, replace(problem, widest_band=need.band, reach=reach), most_seconds=retina.most_seconds)
 
 
 def perfect_psf(retina: Retina, radius: float) -> PSFResult:

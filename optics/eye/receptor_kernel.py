@@ -10,7 +10,8 @@ import numpy as np
 from optics.eye.band_choice import choose_bands
 from optics.eye.eye_spec import EyeSpec
 from optics.eye.guided_field import Guide, guided_kernel
-from optics.eye.receptive_field import Retina, visual_kernel
+from optics.eye.receptive_field import visual_kernel
+from optics.eye.retina import Retina
 from optics.numerics.arguments import without_derivative
 from optics.numerics.autodiff import Array, Scalar, number, plain
 from optics.numerics.precision import precision

@@ -36,11 +36,12 @@ class AccuracyError(ValueError):
 
     what: description of the problem.
     remedy: settings that would work; omitted unless the caller can change them.
+    seconds: predicted time [s] of a sufficient computation, if only a limit on the time prevents it.
     """
 
-    def __init__(self, what: str, remedy: str | None = None):
+    def __init__(self, what: str, remedy: str | None = None, seconds: float | None = None):
         super().__init__(what if remedy is None else f"{what}: {remedy}")
-        self.what, self.remedy = what, remedy
+        self.what, self.remedy, self.seconds = what, remedy, seconds
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
+from dataclasses import fields, is_dataclass
 from typing import Any
 
 import numpy as np
@@ -14,12 +16,15 @@ __all__ = [
     "Scalar",
     "carries_derivative",
     "grad_enabled",
+    "holds_arrays",
     "is_differentiable",
     "number",
     "of_torch",
     "plain",
     "to_user",
 ]
+
+DEEPEST = 20  # choice: levels of objects within objects
 
 # Dr.Jit creates its types when a backend is first loaded, so type checkers cannot see them. These names are aliases of
 # `Any` that document the intended type.
@@ -38,6 +43,24 @@ def is_differentiable(value: Any) -> bool:
 def of_torch(value: Any) -> bool:
     """Return whether `value` is a tensor of PyTorch that requires a gradient."""
     return bool(getattr(value, "requires_grad", False))
+
+
+def holds_arrays(value: Any, depth: int = 0) -> bool:
+    """Return whether `value` is a Dr.Jit array or may contain one, in its elements, fields or attributes.
+
+    The result is True for objects that are nested more than DEEPEST times, such as those that contain themselves.
+    """
+    if isinstance(value, np.ndarray | str | bytes | int | float | None):
+        return False
+    if is_differentiable(value) or depth > DEEPEST:
+        return True
+    if is_dataclass(value):
+        parts: Iterable[Any] = (getattr(value, field.name) for field in fields(value))
+    elif isinstance(value, tuple | list):
+        parts = value
+    else:
+        parts = (value if isinstance(value, Mapping) else getattr(value, "__dict__", {})).values()
+    return any(holds_arrays(part, depth + 1) for part in parts)
 
 
 def grad_enabled(value: Array) -> bool:

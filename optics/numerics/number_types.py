@@ -16,8 +16,12 @@ DRJIT_HALF = "Float16", "f16"  # ends of names of Dr.Jit's types
 def readable(name: str, value: Any) -> Any:
     """Return `value`, with PyTorch's lazy conjugation and negation carried out; ValueError if elements are masked.
 
-    NumPy cannot read tensors that are marked as conjugate or negative, such as `tensor.conj()` and its imaginary part.
-    It would use masked elements (numpy.ma) as data. Entries of lists and tuples are treated in the same way.
+    NumPy cannot read tensors that are marked as conjugate or negative, such as `tensor.conj()` and its imaginary part,
+    or that are on a GPU. A copy on the processor is returned, unless the tensor requires a gradient. NumPy would use
+    masked elements (numpy.ma) as data. Entries of lists and tuples are treated in the same way.
+
+    Raises:
+        ValueError: masked elements, or a tensor on the device "meta", which has no numbers.
     """
     if isinstance(value, (list, tuple)):
         entries = [readable(name, entry) for entry in value]
@@ -26,7 +30,10 @@ def readable(name: str, value: Any) -> Any:
         raise ValueError(f"{name} has masked elements: must be without them, so fill or remove them (numpy.ma)")
     if not hasattr(value, "resolve_conj"):
         return value
-    return value.resolve_conj().resolve_neg() if value.is_conj() or value.is_neg() else value
+    if value.device.type == "meta":
+        raise ValueError(f"{name} is a tensor on the device 'meta', which has no numbers: must be on cpu or cuda")
+    value = value.resolve_conj().resolve_neg() if value.is_conj() or value.is_neg() else value
+    return value if value.requires_grad else value.cpu()
 
 
 def full_precision(name: str, value: Any) -> Any:

@@ -1,22 +1,25 @@
-"""Deprecated names that keep working for one version."""
+"""Deprecated names and calls that keep working for one version."""
 
 from __future__ import annotations
 
 import warnings
 from typing import Any
 
-__all__ = ["renamed", "warn_renamed"]
+__all__ = ["renamed", "warn_once", "warn_renamed"]
 
 _warned: set[str] = set()
 
 
 def warn_renamed(old: str, new: str, stacklevel: int = 3) -> None:
     """Warn once per process that a name has changed."""
-    if old not in _warned:
-        _warned.add(old)
-        warnings.warn(
-            f"{old} is now called {new}; the old name will be removed in version 0.3", FutureWarning, stacklevel
-        )
+    warn_once(old, f"{old} is now called {new}; the old name will be removed in version 0.3", stacklevel + 1)
+
+
+def warn_once(subject: str, message: str, stacklevel: int = 4) -> None:
+    """Warn once per process and subject that a call will have another form."""
+    if subject not in _warned:
+        _warned.add(subject)
+        warnings.warn(message, FutureWarning, stacklevel)
 
 
 def renamed(new: str) -> Any:

@@ -60,9 +60,9 @@ class Ommatidium:
             ValueError: the principal plane of the lens lies behind the end of the rhabdom.
         """
         if not isinstance(self.lens, FacetLens):
-            return Beam(self.lens, PointSource(), wavelength, self._distance())
+            return Beam(self.lens, PointSource(), wavelength, self.rhabdom_distance)
         here, there = (self.lens.principal_planes(at)[1] for at in (MIDDLE, wavelength))
-        distance = positive("distance", self._distance() + here - there)
+        distance = positive("distance", self.rhabdom_distance + here - there)
         return Beam(self.lens.pupil(wavelength), PointSource(), wavelength, distance)
 
     def modes(self, wavelength: float = 500e-9) -> tuple[Mode, ...]:
@@ -90,7 +90,7 @@ class Ommatidium:
         sines = -tx / norm, -ty / norm
         steepest = float(np.hypot(*sines).max(initial=0.0))
         wide = next((limit for limit in STEEPEST if limit >= steepest), 1.0)
-        found = _coupled(self, vacuum_wavelength(wavelength), wide).power(*sines)
+        found = coupled_modes(self, vacuum_wavelength(wavelength), wide).power(*sines)
         return found.reshape(len(found), *x.shape)
 
     def sensitivity(self, angle_x: np.ndarray, angle_y: np.ndarray, wavelength: float = 500e-9) -> np.ndarray:
@@ -115,14 +115,16 @@ class Ommatidium:
         """
         pupil = self.pupil
         turn = math.radians(in_range("azimuth_deg", azimuth_deg, -360, 360))
-        expected = vacuum_wavelength(wavelength) / pupil.radius + self.rhabdom.diameter / self._distance()
+        expected = vacuum_wavelength(wavelength) / pupil.radius + self.rhabdom.diameter / self.rhabdom_distance
         half = min(WIDE / 2 * expected, math.asin(STEEPEST[-1]))
         at = np.linspace(-half, half, ALONG)
         seen = self.sensitivity(at * math.cos(turn), at * math.sin(turn), wavelength)
         above = np.flatnonzero(seen >= seen.max() / 2)
         first, last = int(above[0]), int(above[-1])
         if first == 0 or last == ALONG - 1:
-            raise ValueError(f"distance = {self._distance():.3g} m: must be nearer to the focus, for a peak to be seen")
+            raise ValueError(
+                f"distance = {self.rhabdom_distance:.3g} m: must be nearer to the focus, for a peak to be seen"
+            )
         near = range(max(0, int(seen.argmax()) - 1), min(ALONG, int(seen.argmax()) + 2))
         peak = float(np.polynomial.Polynomial.fit(at[near], seen[near], 2)(self._top(at[near], seen[near])))
         flanks = (at[first - 1], at[first]), (at[last], at[last + 1])
@@ -142,12 +144,15 @@ class Ommatidium:
         seen = self.sensitivity(at * math.cos(turn), at * math.sin(turn), wavelength)
         return float(np.polynomial.polynomial.polyval(peak / 2, np.polynomial.polynomial.polyfit(seen, at, 3)))
 
-    def _distance(self) -> float:
+    @property
+    def rhabdom_distance(self) -> float:
+        """Distance [m] from the plane of the lens to the end of the rhabdom, at 550 nm."""
         return self.pupil.image_distance(math.inf) if self.distance is None else self.distance
 
 
 @lru_cache(maxsize=32)
-def _coupled(eye: Ommatidium, wavelength: float, steepest: float) -> ModesAtPupil:
+def coupled_modes(eye: Ommatidium, wavelength: float, steepest: float) -> ModesAtPupil:
+    """Return the modes of an ommatidium's rhabdom, propagated back to its pupil; see `modes_at_pupil`."""
     modes = eye.modes(wavelength)
     if not modes:
         raise ValueError(f"rhabdom: guides nothing at {wavelength:g} m; must be wider, or of a higher index")

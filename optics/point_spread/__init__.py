@@ -3,6 +3,7 @@
 psf            psf, plan
 psf_result     PSFResult: a PSF that can be recomputed over other windows
 request        Request: the parameters of one PSF
+light_batch    light through several pupils, for several distances
 planner        the cheapest method within the tolerance
 pictures       computation of requested PSFs, which is repeated if a check fails
 window_cost    time and memory of a window, and their limits
@@ -20,6 +21,7 @@ contrast       mtf, image_quality
 mixture        sums over wavelengths
 white          white_psf: light of a lamp, weighted by receptors
 through_focus  through_focus: PSFs at several distances of the sensor
+lens_mtf       lens_mtf: lenses of other programs in light of several wavelengths, through focus
 circle_sums    sums over samples within circles, for any number of radii
 concentration  encircled_energy
 strehl         strehl_ratio

@@ -19,7 +19,7 @@ from optics.numerics.precision import opaque, precision
 from optics.point_spread.arriving import arriving_light
 from optics.point_spread.mixture import Mixture, a_mixture, flat, mixed
 from optics.point_spread.modulation_transfer import MTF
-from optics.point_spread.psf_result import PSFResult
+from optics.point_spread.psf_result import MOST_AGAIN, PSFResult
 from optics.point_spread.window_loss import ErrorCauses
 
 __all__ = ["combined_mtf", "image_quality", "mtf"]
@@ -51,7 +51,7 @@ def mtf(result: PSFResult | Mixture, arriving: Any = None, tolerance: float = 0.
         return mixture
     light, unsure = arriving_light(result, arriving)
     known = light.numpy()
-    seen = _wide(result.with_pitch(0.5 / result.highest_cutoff, "the MTF"), known, tolerance)
+    seen = _wide(result.with_pitch(0.5 / result.highest_cutoff, "the MTF"), known, unsure, tolerance)
     lost = np.maximum(known - plain(seen.window_sums), 0)
     causes = ErrorCauses((lost + unsure) / known, unsure / known, seen.sum_error / known)
     error = causes.total
@@ -73,7 +73,7 @@ def combined_mtf(result: PSFResult, weights: np.ndarray, tolerance: float) -> MT
     positive("tolerance", tolerance, "contrast")
     light, unsure = arriving_light(result, None)
     known = light.numpy()
-    seen = _wide(result.with_pitch(0.5 / float(result.cutoff.max()), "the MTF"), known, tolerance)
+    seen = _wide(result.with_pitch(0.5 / float(result.cutoff.max()), "the MTF"), known, unsure, tolerance)
     lost, size = np.maximum(known - plain(seen.window_sums), 0) + unsure, np.abs(weights)
     causes = ErrorCauses(*(size @ part / (weights @ known) for part in (lost, unsure, seen.sum_error)))
     error = causes.total
@@ -85,11 +85,15 @@ def combined_mtf(result: PSFResult, weights: np.ndarray, tolerance: float) -> MT
     return _transformed(sums, flat(arriving), causes)
 
 
-def _wide(result: PSFResult, known: np.ndarray, tolerance: float) -> PSFResult:
+def _wide(result: PSFResult, known: np.ndarray, unsure: np.ndarray, tolerance: float) -> PSFResult:
     """Return the PSF over a window that loses at most the tolerance.
+
+    If no such window can be computed, the error message states a tolerance that smaller windows meet.
 
     The intensity of diffracted light falls like r⁻³ with the distance r, so the loss of a window is proportional to the
     inverse of its width. Widths and pitches change in steps, so that a small change of the pupil changes neither.
+
+    known, unsure: fraction of the light that arrives, and its uncertainty, (wavelength,).
     """
     seen, coarsest = result, 0.5 / result.highest_cutoff
     for _ in range(GROWTHS):
@@ -100,8 +104,22 @@ def _wide(result: PSFResult, known: np.ndarray, tolerance: float) -> PSFResult:
         half *= 2 ** (math.ceil(2 * math.log2(lost / tolerance) + ROOM) / 2)
         pitch = seen.dx * max(1, math.floor(coarsest / seen.dx * (1 + 1e-9)))
         side = 2 * math.ceil(half / pitch - 1e-6) + 1
-        seen = seen.recompute_on(Grid((side, side), pitch, seen.centre), "the MTF")
+        try:
+            seen = seen.recompute_on(Grid((side, side), pitch, seen.centre), "the MTF")
+        except AccuracyError as refused:
+            own = max(seen.tensor.shape[1:]) * seen.dx
+            widest = MOST_AGAIN * pitch if seen.can_recompute and side > MOST_AGAIN else own
+            part = min(1.0, 2 ** ((1 + ROOM) / 2) * own / widest)
+            others = float(((2 * unsure + seen.sum_error) / known).max())
+            raise AccuracyError(f"{refused}{_looser(lost * part + others)}") from None
     return seen
+
+
+def _looser(error: float) -> str:
+    """Return a note on the next tolerance with one digit above this error; empty if it would be 1 or more."""
+    step = 10.0 ** math.floor(math.log10(error))
+    enough = step * math.ceil(error / step)
+    return f"; tolerance={enough:.3g} needs fewer samples" if enough < 1 else ""
 
 
 def _transformed(seen: PSFResult, light: Array, causes: ErrorCauses) -> MTF:
@@ -121,7 +139,7 @@ def _transformed(seen: PSFResult, light: Array, causes: ErrorCauses) -> MTF:
 
 
 def image_quality(
-    result: PSFResult | Mixture,
+    result: PSFResult | Mixture | MTF,
     nyquist: float,
     throughput: Scalar = 1.0,
     noise_sigma: float = 0.0,
@@ -134,10 +152,11 @@ def image_quality(
 
     The noise floor σ / T rises as the pupil closes. Source: Tiwary, Young et al. (2025).
 
+    result: a PSF, or its MTF if this is known already.
     nyquist: Nyquist frequency of the retina, f_N = 1 / (2 receptor pitch) [1/m].
     throughput: T = a².
     noise_sigma: σ, in units of the signal.
-    tolerance: see `optics.mtf`.
+    tolerance: see `optics.mtf`. A known MTF has its own tolerance.
     with_error: True to return (value, predicted error), each (wavelength,).
 
     Raises:
@@ -150,7 +169,7 @@ def image_quality(
     in_range("throughput", throughput, 0, 1, carried=True)
     in_range("noise_sigma", noise_sigma, 0, 1e6)
     flag("with_error", with_error)
-    transfer = mtf(result, tolerance=tolerance)
+    transfer = result if isinstance(result, MTF) else mtf(result, tolerance=tolerance)
     waves = transfer.tensor.shape[0]
     if number(throughput) == 0:
         return (np.zeros(waves), np.zeros(waves)) if with_error else np.zeros(waves)

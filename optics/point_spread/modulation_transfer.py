@@ -96,6 +96,28 @@ class MTF(ReadOnlyArrays):
         planes = [otf.numpy() * there for otf in _transforms(self.shares, self._dx)]
         return read_only(np.angle(np.stack(planes)))
 
+    def otf(self, fx: Any, fy: Any) -> np.ndarray:
+        """Return the optical transfer function at any frequencies [1/m], (wavelength, frequency), without derivatives.
+
+        Its modulus is the contrast, and its argument the phase (see `phase`).
+
+        fx, fy: components of each frequency along x and y, of equal or broadcastable shapes. They are flattened.
+
+        Raises:
+            ValueError: a frequency is not finite, or beyond the Nyquist frequency of the PSF's samples.
+        """
+        f = np.stack([part.ravel() for part in np.broadcast_arrays(reals("fx", fx), reals("fy", fy))])
+        nyquist = 0.5 / self._dx
+        if not (np.abs(f) <= nyquist * (1 + 1e-9)).all():
+            raise ValueError(f"fx, fy: must be finite and at most {nyquist:.4g} per metre, half a cycle per sample")
+        shares = np.asarray(self.shares.numpy(), dtype=np.float64)
+        waves = [
+            np.exp(-2j * np.pi * np.outer(part, (np.arange(n) - n // 2) * self._dx + at))
+            for part, n, at in zip(f, shares.shape[:0:-1], self.centre, strict=True)
+        ]
+        found: np.ndarray = np.einsum("wyx,fx,fy->wf", shares, *waves, optimize=True)
+        return found
+
     @cached_property
     def errors(self) -> np.ndarray:
         """Predicted error of each contrast, in the shape of `mtf`. Most are far smaller than `predicted_error`.

@@ -168,7 +168,8 @@ def choose(problem: Problem, method: str = "auto", most_seconds: float = MOST_SE
             best = option if option.model_error <= allowed else best
     if best is None:
         candidates = [option for option in weighed.values() if option.model_error <= allowed]
-        raise AccuracyError(_refusal(problem, candidates, most_seconds, method))
+        in_memory = [_seconds(each, problem) for each in candidates if _bytes(each, problem) <= MOST_BYTES]
+        raise AccuracyError(_refusal(problem, candidates, most_seconds, method), seconds=min(in_memory, default=None))
     in_order = {name: weighed[name] for name in asked if name in weighed}
     return _plan(problem, best, in_order, most_seconds), best
 
@@ -251,7 +252,7 @@ def _verdict(option: Sampling, best: Sampling, problem: Problem, most_seconds: f
     if _seconds(option, problem) > most_seconds:
         return f"too slow: at most {most_seconds:g} s"
     if option.model_error > _model_tolerance(problem):
-        return f"approximation with an error of {option.model_error:.1g}"
+        return f"approximation with an error of {option.model_error:.2g}"
     return f"{_seconds(option, problem) / _seconds(best, problem):.1f} times as slow"
 
 

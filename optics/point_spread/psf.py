@@ -26,7 +26,7 @@ def psf(
     wavelengths: Sequence[float] | np.ndarray = (550e-9,),
     sensor_distance: Scalar | None = None,
     source_distance: Scalar = math.inf,
-    source_angle: tuple[float, float] = (0.0, 0.0),
+    source_angle: tuple[Scalar, Scalar] = (0.0, 0.0),
     dx: float = 0.25e-6,
     shape: tuple[int, int] = (129, 129),
     tolerance: float = 1e-3,
@@ -50,7 +50,8 @@ def psf(
     field: True to return the complex amplitude as well (`PSFResult.field`). Only methods that compute it are then
         compared; it takes no additional time.
 
-    Both distances and all parameters of the pupil may be Dr.Jit arrays that carry derivatives: see PSFResult.tensor.
+    Both distances, the angle and all parameters of the pupil may be Dr.Jit arrays that carry derivatives: see
+    PSFResult.tensor. For tensors of PyTorch, use `optics.torch.psf`.
 
     Raises:
         ValueError: an argument is invalid; the message names it with its value and valid range.
@@ -77,7 +78,7 @@ def plan(
     wavelength: float = 550e-9,
     sensor_distance: Scalar | None = None,
     source_distance: Scalar = math.inf,
-    source_angle: tuple[float, float] = (0.0, 0.0),
+    source_angle: tuple[Scalar, Scalar] = (0.0, 0.0),
     dx: float = 0.25e-6,
     shape: tuple[int, int] = (129, 129),
     tolerance: float = 1e-3,

@@ -18,7 +18,7 @@ import numpy as np
 from optics.elements.pupil import Pupil
 from optics.methods.problem import Problem
 from optics.numerics.accuracy import AccuracyError, Plan
-from optics.numerics.arguments import reals, shown
+from optics.numerics.arguments import reals, shown, whole
 from optics.numerics.autodiff import Array, Scalar, number, to_user
 from optics.numerics.grid import Grid, OnWindow
 from optics.numerics.precision import precision
@@ -194,11 +194,29 @@ class PSFResult(ReadOnlyArrays, OnWindow):
             field_parts=None,
         )
 
-    def recompute_on(self, window: Grid, what: str, waves: slice = slice(None)) -> PSFResult:
-        """Return the PSF of the same light over another window, to the same tolerance, for some of the wavelengths.
+    def of_wavelength(self, index: int) -> PSFResult:
+        """Return the PSF of one of the wavelengths, (1, y, x), with derivatives. A mean has one wavelength.
+
+        Raises:
+            ValueError: there is no such wavelength.
+        """
+        count = self.tensor.shape[0]
+        one = slice(whole("index", index, 0, count - 1), index + 1)
+        if count == 1:
+            return self
+        return replace(
+            self,
+            tensor=self.tensor[one],
+            wavelengths=self.wavelengths[one],
+            plans=self.plans[one] if len(self.plans) == count else self.plans,
+            requests=self.requests[one] if self.can_recompute else (),
+            field_parts=None if self.field_parts is None else tuple(part[one] for part in self.field_parts),
+        )
+
+    def recompute_on(self, window: Grid, what: str) -> PSFResult:
+        """Return the PSF of the same light over another window, to the same tolerance.
 
         what: name of the measure, for the error message.
-        waves: slice of the wavelengths.
 
         Raises:
             AccuracyError: the requests of the PSF are not known, or the window is too large.
@@ -211,27 +229,26 @@ class PSFResult(ReadOnlyArrays, OnWindow):
         try:
             if self.shares is not None:
                 return spread([_through(request, window) for request in self.requests]).mean(self.shares)
-            return spread([_through(request, window) for request in self.requests[waves]])
+            return spread([_through(request, window) for request in self.requests])
         except AccuracyError as error:
             raise AccuracyError(f"{needs}, which fails: {error}") from None
 
     def with_pitch(self, coarsest: float, what: str) -> PSFResult:
         """Return a PSF whose samples are at most `coarsest` [m] apart.
 
-        If the samples of this PSF are fine enough, it is this PSF. Otherwise each sample is replaced by an odd number
-        of samples along each axis, which fill the same cell.
+        If the samples of this PSF are fine enough, it is this PSF. Otherwise several samples along each axis fill the
+        cell of each sample.
 
         Raises:
             AccuracyError: see `recompute_on`.
         """
         if self.dx <= coarsest or self.holds_cells:
             return self
-        parts = 2 * math.ceil((self.dx / coarsest - 1) / 2 - 1e-9) + 1
+        parts = math.ceil(self.dx / coarsest * (1 - 1e-9))
         pitch, (height, width) = self.dx / parts, self.tensor.shape[1:]
-        # With an even number of samples, the cell of sample n//2 begins at the middle of the window. The cell of the
-        # new sample n//2 must begin there, too.
-        shift = pitch * (parts - 1) / 2
-        x, y = (at - shift * (n % 2 == 0) for at, n in zip(self.centre, (width, height), strict=True))
+        # Sample n//2 of a grid lies in the middle of its cell, and both grids begin with the same rim of a cell.
+        shifts = ((parts * n // 2 + 0.5) * pitch - (n // 2 + 0.5) * self.dx for n in (width, height))
+        x, y = (at + shift for at, shift in zip(self.centre, shifts, strict=True))
         return self.recompute_on(Grid((parts * height, parts * width), pitch, (x, y)), what)
 
     @cached_property

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 from optics.elements.beam import Beam
 from optics.elements.pupil import Pupil
+from optics.elements.ray_field import RayField
 from optics.elements.source import PointSource
 from optics.methods.method_sampling import Sampling
 from optics.methods.problem import Problem
@@ -65,11 +66,12 @@ class Request:
             plan, sampling = self._as_before() or choose(self.problem, self._methods, self.most_seconds)
         except AccuracyError as error:
             bent = " and ".join(name for name in ("height", "wavefront") if getattr(pupil, name) is not None)
-            advice = _wrapped(jump) if jump else f"a flatter {bent} needs less" if bent else ""
+            advice = _wrapped(pupil) if jump else f"a flatter {bent} needs less" if bent else ""
             advice = "" if "use method=" in str(error) else advice  # another method helps, and not another relief
-            raise AccuracyError(f"{error}; {advice}" if advice else str(error)) from None
+            seconds = None if jump and (error.seconds or 0) > MOST_SECONDS_OF_JUMPS else error.seconds
+            raise AccuracyError(f"{error}; {advice}" if advice else str(error), seconds=seconds) from None
         if jump and plan.seconds > MOST_SECONDS_OF_JUMPS:
-            raise AccuracyError(f"about {plan.seconds:.2g} s by {plan.method}: {_wrapped(jump)}")
+            raise AccuracyError(f"about {plan.seconds:.2g} s by {plan.method}: {_wrapped(pupil)}")
         return plan, sampling
 
     @property
@@ -89,10 +91,17 @@ class Request:
         return replace(plan, why=plan.why.replace("requested", "same method as at the previous wavelength")), sampling
 
 
-def _wrapped(jump: float) -> str:
+def _wrapped(pupil: Pupil) -> str:
+    """Return advice on a height map that jumps. Fields of rays need one slope at each point, so they have no pixels."""
+    rows, columns = pupil.height.samples.shape
+    remedy = "optics.PixelRelief(height) represents the steps"
+    if isinstance(pupil.mask, RayField):
+        remedy = "must be smooth, for each point to have one ray"
+    elif rows != columns:
+        remedy += " of as many rows as columns"
     return (
-        f"height jumps by {jump:.3g} m from sample to sample, as in a wrapped lens, and HeightMap connects them by "
-        "steep slopes: optics.PixelRelief(height) represents the steps"
+        f"height jumps by {pupil.height.jump:.3g} m from sample to sample, as in a wrapped lens, and HeightMap "
+        f"connects them by steep slopes: {remedy}"
     )
 
 
@@ -110,7 +119,7 @@ def sensor_place(pupil: Pupil, sensor_distance: Scalar | None, source_distance: 
         if focal is not None and carries_derivative(value):
             raise ValueError(
                 f"sensor_distance is missing: {name} carries a derivative, but the default distance of the sensor, "
-                "which depends on it, carries none; specify the distance [m], which may be a Dr.Jit number"
+                "which depends on it, carries none; specify the distance [m], which may carry a derivative"
             )
     return pupil.image_distance(number(source_distance))
 

@@ -60,12 +60,13 @@ def strehl_ratio(result: PSFResult | Mixture, with_error: bool = False) -> Any:
     if not isinstance(result, PSFResult):
         return a_mixture(result).strehl_ratio(with_error)
     types = precision("float64")
-    found = [_peak(result, index) for index in range(result.tensor.shape[0])]
-    for index, each in enumerate(found):
-        _refuse_brighter_outside(result, index, number(each.value) * (1 + each.error))
-    peaks, errors = [each.value for each in found], [each.error for each in found]
+    each = [result.of_wavelength(index) for index in range(result.tensor.shape[0])]
+    found = [_peak(one) for one in each]
+    for one, peak in zip(each, found, strict=True):
+        _refuse_brighter_outside(one, number(peak.value) * (1 + peak.error))
+    peaks, errors = [peak.value for peak in found], [peak.error for peak in found]
     if with_error:
-        errors = [_measured_error(result, index, each) for index, each in enumerate(found)]
+        errors = [_measured_error(*of) for of in zip(each, found, strict=True)]
     peak = types.Float(peaks[0] if len(peaks) == 1 else dr.concat(peaks))
     mixed = result.shares is not None and result.can_recompute
     waves = [request.beam.wavelength for request in result.requests] if mixed else result.wavelengths
@@ -107,27 +108,27 @@ class Peak(NamedTuple):
     at: tuple[float, float]
 
 
-def _peak(result: PSFResult, index: int) -> Peak:
-    """Return the highest value near the brightest sample at one wavelength."""
-    fine = AT_A_PEAK / float(result.cutoff[index])
-    image, wanted = result.psf[index], "the Strehl ratio"
+def _peak(result: PSFResult) -> Peak:
+    """Return the highest value near the brightest sample of a PSF of one wavelength, or of a mean."""
+    fine = AT_A_PEAK / float(result.cutoff[0])
+    image, wanted = result.psf[0], "the Strehl ratio"
     if result.holds_cells or (min(image.shape) > 2 and result.dx <= fine and not _at_rim(image)):
-        return _vertex(result, index)
-    if not (result.can_recompute or _at_rim(image)) and result.dx * float(result.cutoff[index]) <= LOBES:
-        return _vertex(result, index)
+        return _vertex(result)
+    if not (result.can_recompute or _at_rim(image)) and result.dx * float(result.cutoff[0]) <= LOBES:
+        return _vertex(result)
     seen = result.with_pitch(LOBES / result.highest_cutoff, wanted)
-    centre, pitch = _brightest(seen, index), min(seen.dx, fine)
+    centre, pitch = _brightest(seen), min(seen.dx, fine)
     for _ in range(CLIMBS):
         _check_inside(result, centre)
-        seen = result.recompute_on(Grid.square(NEIGHBOURHOOD, pitch).moved(centre), wanted, slice(index, index + 1))
+        seen = result.recompute_on(Grid.square(NEIGHBOURHOOD, pitch).moved(centre), wanted)
         if not _at_rim(seen.psf[0]):
-            return _vertex(seen, 0)
+            return _vertex(seen)
         row, column = np.unravel_index(seen.psf[0].argmax(), seen.psf[0].shape)
         centre = float(seen.x[column]), float(seen.y[row])
     raise AccuracyError(f"no peak was found within {CLIMBS} windows of {NEIGHBOURHOOD} samples, {pitch:.3g} m apart")
 
 
-def _brightest(result: PSFResult, index: int) -> tuple[float, float]:
+def _brightest(result: PSFResult) -> tuple[float, float]:
     """Return the point (x, y) at which the spline through the samples is brightest.
 
     The brightest sample need not belong to the highest lobe. A non-negative function with the maximum p and no
@@ -137,8 +138,8 @@ def _brightest(result: PSFResult, index: int) -> tuple[float, float]:
     """
     from scipy.ndimage import map_coordinates, spline_filter
 
-    image = result.psf[index].astype(np.float64)
-    apart = result.dx * (result.highest_cutoff if result.shares is not None else float(result.cutoff[index]))
+    image = result.psf[0].astype(np.float64)
+    apart = result.dx * result.highest_cutoff
     least = NOT_YET * math.cos(math.pi * min(apart / math.sqrt(2), 0.5)) ** 2 * image.max()
     bright = np.flatnonzero(image >= least)
     bright = bright[np.argsort(image.ravel()[bright])[-MOST_SPLINED:]]
@@ -169,9 +170,9 @@ def _check_inside(result: PSFResult, at: tuple[float, float]) -> None:
             )
 
 
-def _refuse_brighter_outside(result: PSFResult, index: int, peak: float) -> None:
+def _refuse_brighter_outside(result: PSFResult, peak: float) -> None:
     """Raise an AccuracyError if the PSF is brighter outside the window, at a point that rays hit."""
-    rays = result.requests[index].problem.rays if result.can_recompute and not result.holds_cells else None
+    rays = result.requests[0].problem.rays if result.can_recompute and not result.holds_cells else None
     if rays is None or not len(rays):
         return
     pitch = LOBES / result.highest_cutoff
@@ -180,7 +181,7 @@ def _refuse_brighter_outside(result: PSFResult, index: int, peak: float) -> None
         if max(beyond) <= result.dx:
             continue
         window = Grid.square(NEIGHBOURHOOD, pitch).moved(at)
-        there = result.recompute_on(window, "the Strehl ratio", slice(index, index + 1))
+        there = result.recompute_on(window, "the Strehl ratio")
         if float(there.psf.max()) > peak * (1 + there.plan.predicted_error):
             raise AccuracyError(
                 f"rays land around ({at[0]:.3g}, {at[1]:.3g}) m, outside the window, where the PSF is brighter: the "
@@ -188,20 +189,20 @@ def _refuse_brighter_outside(result: PSFResult, index: int, peak: float) -> None
             )
 
 
-def _vertex(result: PSFResult, index: int, middle: tuple[int, int] | None = None) -> Peak:
+def _vertex(result: PSFResult, middle: tuple[int, int] | None = None) -> Peak:
     """Return the maximum of the paraboloid through the sample `middle` (row, column) and its neighbours.
 
     middle: None: the brightest sample
     """
     import drjit as dr
 
-    types, (_, height, width) = precision("float64"), result.tensor.shape
-    image = result.psf[index].astype(np.float64)
+    types, width = precision("float64"), result.tensor.shape[2]
+    image = result.psf[0].astype(np.float64)
     row, column = middle or (int(n) for n in np.unravel_index(image.argmax(), image.shape))
-    values, start = types.Float(flat(result.tensor)), index * height * width
+    values = types.Float(flat(result.tensor))
 
     def value(i: int, j: int) -> Array:
-        return dr.gather(types.Float, values, types.Index(start + i * width + j))
+        return dr.gather(types.Float, values, types.Index(i * width + j))
 
     peak, at = value(row, column), (float(result.x[column]), float(result.y[row]))
     if not result.holds_cells:
@@ -218,14 +219,13 @@ def _vertex(result: PSFResult, index: int, middle: tuple[int, int] | None = None
             steps = (byy * gx - bxy * gy) / determinant, (bxx * gy - bxy * gx) / determinant
             at = at[0] + number(steps[0]) * result.dx, at[1] + number(steps[1]) * result.dx
     around = float(np.linalg.norm(image)) / float(image[row, column])
-    plan = result.plans[index if len(result.plans) > 1 else 0]
     # Error for a cosine at the cutoff frequency whose peak lies halfway between samples.
-    coarse = (2 * math.pi * result.dx * float(result.cutoff[index])) ** 4 / 170
-    error = plan.predicted_error * around + max(PARABOLOID_ERROR, 0.0 if result.holds_cells else coarse)
+    coarse = (2 * math.pi * result.dx * float(result.cutoff[0])) ** 4 / 170
+    error = result.plan.predicted_error * around + max(PARABOLOID_ERROR, 0.0 if result.holds_cells else coarse)
     return Peak(peak, error, at)
 
 
-def _measured_error(result: PSFResult, index: int, peak: Peak) -> float:
+def _measured_error(result: PSFResult, peak: Peak) -> float:
     """Return the relative error of a peak: its difference from the direct sum, if this is affordable.
 
     The direct sum is evaluated on 3 x 3 points around the peak, so close that the error of a paraboloid through them is
@@ -236,9 +236,11 @@ def _measured_error(result: PSFResult, index: int, peak: Peak) -> float:
     pitch = AT_A_PEAK / CLOSER / result.highest_cutoff
     near = Grid.square(3, pitch).moved(peak.at)
     x, y = (part.ravel() for part in np.meshgrid(near.x, near.y))
-    asked = result.requests if result.shares is not None else result.requests[index : index + 1]
     shares = np.ones(1) if result.shares is None else result.shares
-    sums = [exact_psf(each.beam, each.problem, x, y, number(peak.value), each.planned()[1].seconds) for each in asked]
+    sums = [
+        exact_psf(each.beam, each.problem, x, y, number(peak.value), each.planned()[1].seconds)
+        for each in result.requests
+    ]
     known = [one for one in sums if one is not None]
     if len(known) < len(sums):
         return peak.error
@@ -246,6 +248,6 @@ def _measured_error(result: PSFResult, index: int, peak: Peak) -> float:
     errors = sum(share * error for share, (_, error) in zip(shares, known, strict=True))
     there = replace(result, tensor=exact.reshape(1, 3, 3), dx=pitch, centre=peak.at, shares=None, requests=())
     # The points are so close that any of them may be the brightest, but only the middle one has all neighbours.
-    truth = number(_vertex(there, 0, (1, 1)).value)
+    truth = number(_vertex(there, (1, 1)).value)
     off = abs(number(peak.value) / truth - 1) + errors + PARABOLOID_ERROR / CLOSER**4
     return min(float(off), peak.error)

@@ -283,9 +283,8 @@ def _sample_note(planes: list[_Carried], tolerance: float) -> str:
     blur = max(plane.blur for plane in planes)
     if blur <= tolerance:
         return ""
-    return (
-        f"; light at u's Nyquist frequency adds an error of about {blur:.1g}: sample u more finely or soften its edges"
-    )
+    error = above(blur, tolerance)
+    return f"; light at u's Nyquist frequency adds an error of about {error}: sample u more finely or soften its edges"
 
 
 def _plan(how: TransformSampling, error: float, note: str, dtype: str) -> Plan:

@@ -55,6 +55,14 @@ class Receptors:
                 dark = int(np.argmin(seen))
                 raise ValueError(f"range_nm = {shown(self.range_nm)}: type {dark} has no sensitivity within it")
 
+    def __repr__(self) -> str:
+        """Return a short description with the peak of each type."""
+        peaks = ", ".join(
+            f"{kind.peak_nm if isinstance(kind, Spectrum) else kind.lambda_max_nm:g}" for kind in self.types
+        )
+        mosaic = "" if self.mosaic is None else f", mosaic of {len(self.mosaic)} x {len(self.mosaic[0])}"
+        return f"<Receptors with peaks at {peaks} nm{mosaic}>"
+
     @cached_property
     def limits_nm(self) -> tuple[float, float]:
         """Range of wavelengths [nm] that is divided into bands."""

@@ -62,6 +62,11 @@ class Spectrum:
         object.__setattr__(self, "wavelengths_nm", nm)
         object.__setattr__(self, "values", values)
 
+    def __repr__(self) -> str:
+        """Return a short description that omits the table."""
+        low, high = self.wavelengths_nm[0], self.wavelengths_nm[-1]
+        return f"<Spectrum of {len(self.values)} values from {low:g} to {high:g} nm, peak at {self.peak_nm:g} nm>"
+
     @property
     def peak_nm(self) -> float:
         """Wavelength of the largest value [nm]."""

@@ -14,6 +14,7 @@ senses                 observations of one agent
 eyes_of_kind           signals of one kind of an agent's eyes
 renderers              renderers of all eyes
 observation            memory of past frames
+ommatidia_space        space of the signals of a compound eye
 auxiliary              depth, geom ids and optic flow in observations
 held_state             checks of stored states
 calls                  checks of the calls of all environments: their order, seeds and actions
@@ -21,5 +22,6 @@ one_environment        methods of a stable-baselines3 VecEnv that are the same f
 world_pictures         images of worlds for human viewers
 follow_camera          a camera behind the agent
 field_of_view_overlay  fields of view of the agent's eyes, drawn into an image
+hexagon_images         signals of compound eyes as hexagons
 retina_images          signals of eyes as images
 """

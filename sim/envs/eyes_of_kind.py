@@ -6,6 +6,8 @@ import numpy as np
 from gymnasium import spaces
 
 from sim.envs.observation import ROUNDING, SIGMAS, Memory
+from sim.envs.ommatidia_space import OmmatidiaBox
+from sim.eyes.compound_eye import CompoundEye
 from sim.render.eye_renderer import EyeRenderer
 from sim.render.pending_frame import PendingFrame
 from sim.render.receptor_noise import NoiseModel, Normals
@@ -27,9 +29,9 @@ class EyesOfKind:
         self.renderer, self._simulation = renderer, simulation
         self._wavelengths = np.asarray(renderer.eye.spectral_bands.wavelengths)
         self.memory, self._noise = Memory(memory), NoiseModel.from_eye(renderer.eye)
-        frame = (len(renderer.mounts), renderer.eye.channels, *renderer.eye.resolution)
-        self._normals = Normals(keys, frame)
-        self.space = self._space((memory, *frame))
+        receptors = (len(renderer.mounts), renderer.eye.channels, *renderer.eye.resolution)
+        self._normals = Normals(keys, receptors)
+        self.space = self._space((memory, *self._as_frames(np.empty(receptors)).shape))
 
     def restart(self, keys: np.ndarray) -> None:
         """Restart the random generators of the noise with these keys."""
@@ -47,10 +49,15 @@ class EyesOfKind:
         else:
             seen = self.renderer.launch_some(poses, worlds, light)
         noise = self._noise
-        if noise is None:
-            return seen
-        normals = self._normals.launch(worlds)
-        return seen.then(lambda signals: noise(signals, normals.wait()))
+        if noise is not None:
+            normals, noiseless = self._normals.launch(worlds), seen
+            seen = noiseless.then(lambda signals: noise(signals, normals.wait()))
+        return seen.then(self._as_frames)
+
+    def _as_frames(self, signals: np.ndarray) -> np.ndarray:
+        """Return signals (..., eye, channel, h, w) in the form of an observation."""
+        eye = self.renderer.eye
+        return eye.as_frames(signals) if isinstance(eye, CompoundEye) else signals
 
     def get_state(self) -> dict[str, np.ndarray]:
         """Return all arrays on which future signals depend, apart from the state of the worlds."""
@@ -67,7 +74,10 @@ class EyesOfKind:
         margin = SIGMAS * spread + ROUNDING * brightest
         # The light from a point light has no upper bound, because it increases as the distance to the light decreases.
         high = 2 * brightest + margin if self.renderer.only_directional else np.inf
-        return spaces.Box(-margin if np.isfinite(high) else -np.inf, high, frames, np.float32)
+        low, eye = -margin if np.isfinite(high) else -np.inf, self.renderer.eye
+        if isinstance(eye, CompoundEye):
+            return OmmatidiaBox(low, high, frames, eye.directions_on(self.renderer.mounts))
+        return spaces.Box(low, high, frames, np.float32)
 
     def _brightest(self) -> float:
         """Return the signal of a white surface that faces all directional lights at once.

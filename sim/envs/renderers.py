@@ -68,7 +68,8 @@ def _of_agent(
         else:
             renderer = BatchedRenderer.from_scene(scenes[kind.name], simulation.n, fidelity)
         eyes[kind.name] = renderer
-    return AgentRenderers(eyes, tuple(renderer.labels for renderer in eyes.values()) if agent.auxiliary else ())
+    with named_in_errors(agent.name):
+        return AgentRenderers(eyes, tuple(renderer.labels for renderer in eyes.values()) if agent.auxiliary else ())
 
 
 def _scene_of_model(simulation: Simulation, kind: EyeKind, fidelity: Fidelity) -> PreparedScene:

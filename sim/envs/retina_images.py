@@ -45,12 +45,12 @@ def _palette(eye: Eye) -> np.ndarray:
     """Linear sRGB of each signal, (channel, h, w, 3)."""
     height, width = eye.resolution
     if eye.mosaic is not None:
-        return _hues(eye.receptors)[eye.mosaic][None]
-    shares = _shares(_hues(eye.receptors))
+        return hues_of(eye.receptors)[eye.mosaic][None]
+    shares = shares_of(hues_of(eye.receptors))
     return np.broadcast_to(shares[:, None, None], (len(shares), height, width, 3))
 
 
-def _hues(receptors: Receptors) -> np.ndarray:
+def hues_of(receptors: Receptors) -> np.ndarray:
     """Return the colour of each type (type, 3), from red through green to blue by decreasing peak wavelength."""
     types = receptors.types
     if len(types) == 1:
@@ -60,7 +60,7 @@ def _hues(receptors: Receptors) -> np.ndarray:
     return np.stack([np.clip(1 - 2 * at, 0, 1), 1 - np.abs(2 * at - 1), np.clip(2 * at - 1, 0, 1)], axis=-1)
 
 
-def _shares(hues: np.ndarray) -> np.ndarray:
+def shares_of(hues: np.ndarray) -> np.ndarray:
     """Return weights (type, 3) with which equal signals of all types give white.
 
     If no type's colour contains a primary, all types contribute equally to this primary.

@@ -9,8 +9,10 @@ import numpy as np
 
 from sim.envs.animals import Animals
 from sim.envs.follow_camera import FollowCamera
+from sim.envs.hexagon_images import hexagon_map
 from sim.envs.retina_images import one_above_another, side_by_side
 from sim.envs.senses import Senses
+from sim.eyes.compound_eye import CompoundEye, WorldEye
 from sim.eyes.eyes import Eyes
 from sim.physics.mujoco_worlds import MujocoWorlds
 from sim.pictures.eye_marks import with_eyes
@@ -106,10 +108,13 @@ class _ModelCameras:
 
 def _of_all_kinds(senses: Senses) -> list[np.ndarray]:
     """Return an image of each world, with a row for each kind of eyes."""
-    rows = [
-        [side_by_side(frame, sight.renderer.eye) for frame in sight.memory.newest] for sight in senses.sights.values()
-    ]
+    rows = [[_drawn(frame, sight.renderer.eye) for frame in sight.memory.newest] for sight in senses.sights.values()]
     return [one_above_another(pictures) for pictures in zip(*rows, strict=True)]
+
+
+def _drawn(frame: np.ndarray, eye: WorldEye) -> np.ndarray:
+    """Return an image of a frame of signals: hexagons of a compound eye, or squares."""
+    return hexagon_map(frame, eye) if isinstance(eye, CompoundEye) else side_by_side(frame, eye)
 
 
 def _overview(model: mujoco.MjModel) -> Viewpoint:

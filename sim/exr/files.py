@@ -3,9 +3,9 @@ for Spectral Images", JCGT 10(3).
 
 A file has up to two parts for each eye. For an eye named "left", these are `left.spectral` (spectral radiance, channels
 `S0.450,000000nm` ..., and reflectance, channels `T.450,000000nm` ...) and `left.receptors` (photoreceptor signals,
-channels `receptor_0` ...). Each part also contains a linear sRGB preview in the channels R, G and B, which plain
-viewers show. Readers that support only one part, such as colour-science, read the first part. Spectral parts precede
-receptor parts. Pixels are 32-bit floats with ZIP compression.
+channels `receptor_0` ..., and viewing directions, `direction_ahead` ...). Each part also contains a linear sRGB preview
+in the channels R, G and B, which plain viewers show. Readers that support only one part, such as colour-science, read
+the first part. Spectral parts precede receptor parts. Pixels are 32-bit floats with ZIP compression.
 
 A file is written completely or not at all. Each part stores a SHA-256 hash of its contents. Files of other programs
 need the spectral layout and have no hash.
@@ -37,7 +37,6 @@ from sim.exr.spectral_layout import (
 from sim.exr.view import View
 
 LAYOUT_VERSION = "1.0"
-UNITS = "W.m^-2.sr^-1"
 SCALE = "relative: a white Lambertian facing unit daylight has radiance D65, 1 at 560 nm"
 # Default limit on the unpacked size of a file's pixels [bytes]. Sixteen eyes of 128 x 128 receptors in 64 bands need a
 # fifteenth of it.
@@ -45,6 +44,7 @@ MOST_BYTES = 2**30
 LARGEST_HEADER = 2**24  # bytes of a file other than pixels
 _HELD = "rhabdom"  # name of the attribute that stores all values other than channels, as JSON
 _HASH = "sha256"
+DIRECTIONS = ("direction_ahead", "direction_left", "direction_up")  # channels of viewing directions
 
 
 class ExrError(ValueError):
@@ -150,10 +150,12 @@ def _part(view: View, kind: str) -> tuple[str, dict[str, np.ndarray], dict[str, 
         rgb = preview_of_spectra(view.radiance, view.reflectance, nm) if view.rgb is None else view.rgb
         attributes = {"spectralLayoutVersion": LAYOUT_VERSION}
         if view.radiance is not None:
-            attributes |= {"emissiveUnits": UNITS, "radianceScale": SCALE}
+            attributes["radianceScale"] = SCALE
     else:
         assert view.receptors is not None
         planes = {f"receptor_{c}": plane for c, plane in enumerate(view.receptors)}
+        if view.directions is not None:
+            planes |= dict(zip(DIRECTIONS, view.directions, strict=True))
         if view.peaks_nm is not None:
             held["peaks_nm"] = [float(nm) for nm in view.peaks_nm]
         rgb = preview_of_receptors(view.receptors, view.peaks_nm)
@@ -187,6 +189,7 @@ def _digest(name: str, channels: Mapping[str, np.ndarray], attributes: Mapping[s
     return digest.hexdigest()
 
 
+# Older files have the attribute emissiveUnits, too, which contradicts their scale.
 _OWN_ATTRIBUTES = ("spectralLayoutVersion", "emissiveUnits", "radianceScale", _HELD, "parts")
 
 
@@ -221,6 +224,8 @@ def _views(parts: list[tuple[str, dict[str, np.ndarray], dict[str, Any]]]) -> li
             count = sum(c.startswith("receptor_") for c in channels)
             view["receptors"] = np.stack([channels[f"receptor_{c}"] for c in range(count)])
             view["peaks_nm"] = held.get("peaks_nm")
+            if DIRECTIONS[0] in channels:
+                view["directions"] = np.stack([channels[name] for name in DIRECTIONS])
     return [View(**view) for view in fields.values()]
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from optics.numerics.arguments import shown
 from optics.numerics.number_types import full_precision
 from sim.exr.spectral_layout import channel, require_nanometres
+from sim.eyes.compound_eye import CompoundEye
 
 
 @dataclass(frozen=True)
@@ -27,6 +28,8 @@ class View:
     peaks_nm: peak wavelength of each receptor channel, (channel,); the preview shows the longest as red. None: channels
         are in descending order of their peaks.
     reflectance: reflectance or transmittance, (band, y, x) float32, or None
+    directions: viewing directions of the receptors, unit vectors (ahead, left, up) in the frame of the mount, (3, y, x)
+        float32, or None
     """
 
     name: str
@@ -37,6 +40,25 @@ class View:
     attributes: Mapping[str, Any] = field(default_factory=dict)
     peaks_nm: Sequence[float] | np.ndarray | None = None
     reflectance: np.ndarray | None = None
+    directions: np.ndarray | None = None
+
+    @classmethod
+    def from_ommatidia(cls, name: str, eye: CompoundEye, frame: np.ndarray, **others: Any) -> View:
+        """Return the view of a compound eye: signals and direction of each ommatidium, as a single row of pixels.
+
+        frame: signals of one mount, (ommatidium, channel), as in an observation
+        others: further fields of the view
+
+        Raises:
+            ValueError: the frame has another shape.
+        """
+        if _shape(frame) != (len(eye), eye.channels):
+            raise ValueError(
+                f"frame {_kind(frame)}: must be an array (ommatidium, channel), {(len(eye), eye.channels)}"
+            )
+        peaks = [kind.peak_nm for kind in eye.receptors.types] if eye.types is None else None
+        signals, ways = (np.asarray(values, np.float32).T[:, None] for values in (frame, eye.directions))
+        return cls(name, receptors=signals, peaks_nm=peaks, directions=ways, **others)
 
     def __post_init__(self) -> None:
         where = f"View {shown(self.name)}"
@@ -44,7 +66,7 @@ class View:
             raise ValueError(f"{where}: its name must be printable text, and not empty")
         if self.spectral is None and self.receptors is None:
             raise ValueError(f"{where}: has neither radiance nor receptors, and no reflectance")
-        for label in ("radiance", "reflectance", "receptors", "rgb"):
+        for label in ("radiance", "reflectance", "receptors", "directions", "rgb"):
             image = full_precision(f"{where}: {label}", getattr(self, label))
             object.__setattr__(self, label, image)
             if label != "rgb" and image is not None and (len(_shape(image)) != 3 or 0 in image.shape):
@@ -58,6 +80,12 @@ class View:
                 raise ValueError(f"{where}: rgb {_kind(self.rgb)}: must be an array (y, x, 3) like the radiance")
             if self.reflectance is not None and self.reflectance.shape != spectral.shape:
                 raise ValueError(f"{where}: reflectance {_kind(self.reflectance)}: must have that of the radiance")
+        if self.directions is not None:
+            seen = None if self.receptors is None else (3, *self.receptors.shape[1:])
+            if self.directions.shape != seen:
+                raise ValueError(
+                    f"{where}: directions {_kind(self.directions)}: must be an array {seen}, for receptors"
+                )
         if self.peaks_nm is not None:
             peaks = require_nanometres(f"{where}: peaks_nm", self.peaks_nm)
             if self.receptors is None or peaks.shape != (len(self.receptors),):

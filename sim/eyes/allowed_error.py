@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-import optics
+from sim.eyes.compound_eye import WorldEye
 
 # Independent errors add in quadrature. An error of half the noise increases the total to √(1 + 1/4) = 1.12 times the
 # noise.
@@ -14,7 +14,7 @@ SHARE_OF_NOISE = 0.5
 LEAST_TOLERANCE = 5e-3
 
 
-def allowed_error(eye: optics.Eye, tolerance: float | None) -> float:
+def allowed_error(eye: WorldEye, tolerance: float | None) -> float:
     """Return the allowed root mean square error of a signal.
 
     If the tolerance is None, the allowed error is half of the receptors' noise, but at least LEAST_TOLERANCE times the

@@ -14,8 +14,10 @@ import scipy.sparse
 
 import optics
 from sim.eyes.allowed_error import allowed_error
+from sim.eyes.compound_eye import CompoundEye, WorldEye
 from sim.eyes.depth_layers import ONE_PSF, DepthLayers
 from sim.eyes.field_areas import BEYOND, FieldAreas
+from sim.eyes.ommatidial_sampling import OmmatidialSampling
 from sim.eyes.receptive_fields import (
     Draw,
     NoRaysError,
@@ -237,8 +239,9 @@ def _bounce_samples(draw: Draw) -> np.ndarray:
     return bounce_samples(len(draw)).astype(np.float32)
 
 
-# Factory of the sensors of one eye, for any number of rays.
+# Factories of the sensors of one eye, for any number of rays: of eyes with a flat retina, and of all eyes.
 EyeSampling = BoxSampling | FieldSampling
+WorldSampling = EyeSampling | OmmatidialSampling
 
 
 def beyond_rim_of(resolution: tuple[int, int]) -> np.ndarray:
@@ -247,12 +250,16 @@ def beyond_rim_of(resolution: tuple[int, int]) -> np.ndarray:
     return np.pad(np.zeros(resolution, bool), 1, constant_values=True)
 
 
-def eye_sampling(eye: optics.Eye, depth: DepthLayers = ONE_PSF) -> EyeSampling:
-    """Return the sampling of an eye: `BoxSampling` for a perfect lens, otherwise `FieldSampling`.
+def eye_sampling(eye: WorldEye, depth: DepthLayers = ONE_PSF) -> WorldSampling:
+    """Return the sampling of an eye.
+
+    It is `OmmatidialSampling` for a compound eye, `BoxSampling` for a perfect lens, and otherwise `FieldSampling`.
 
     Raises:
         optics.AccuracyError: the pupil spreads light too far for the PSF to be computed.
     """
+    if isinstance(eye, CompoundEye):
+        return OmmatidialSampling(eye, depth)
     return BoxSampling(eye) if eye.pupil is None else FieldSampling(eye, receptive_fields_of(eye, depth), depth)
 
 

@@ -22,6 +22,18 @@ from sim.eyes.receptor_sums import ReceptorSums, RowProduct, of_bands, of_compon
 
 
 @dataclass(frozen=True)
+class Facets(ReadOnlyArrays):
+    """Values of rays that start at facets.
+
+    weights: weight of each ray's light in each band, (ray, band) float32
+    origins: starting points of the rays in the eye's frame [m], (ray, 3); None: all rays start at the pupil
+    """
+
+    weights: np.ndarray
+    origins: np.ndarray | None = None
+
+
+@dataclass(frozen=True)
 class BoxSensor(ReadOnlyArrays):
     """Sensor of an eye with a perfect lens: a receptor's signal is the mean of the light over the receptor's square.
 
@@ -40,6 +52,7 @@ class BoxSensor(ReadOnlyArrays):
     rays_per_receptor: int
     depth: DepthLayers = ONE_PSF
     extent: tuple[float, float] | None = None
+    facets = None
 
     def receptor_radiance(self, sums: np.ndarray) -> np.ndarray:
         """Return the mean radiance of each receptor, (band, view, receptor).
@@ -92,6 +105,7 @@ class ReceptiveFieldSensor(ReadOnlyArrays):
     depth: DepthLayers = ONE_PSF
     extent: tuple[float, float] | None = None
     rays_per_receptor: int = 1  # 1, because the renderer's kernel does not sum the rays
+    facets = None
 
     def receptor_radiance(self, radiance: np.ndarray) -> np.ndarray:
         """Return the receptors' radiance (band, view, receptor) from radiance along rays (layer * band, view, ray)."""
@@ -127,4 +141,44 @@ class ReceptiveFieldSensor(ReadOnlyArrays):
         return float(np.mean([w.nnz / np.prod(w.shape) for w in self.weights]))
 
 
-Sensor = BoxSensor | ReceptiveFieldSensor
+@dataclass(frozen=True)
+class OmmatidialSensor(ReadOnlyArrays):
+    """Sensor of a compound eye, whose ommatidia have their own rays.
+
+    The kernel multiplies the light along each ray by its weight, the integral of the acceptance function in each band
+    over the directions near the ray, and sums over an ommatidium's rays. The weights in band b sum to Ω_b, the integral
+    over all directions, relative to the mean of Ω over all bands. The signal of type t is Σ_b mixing[t, b] times the
+    sum in band b, divided by the same expression for white light.
+
+    directions, bounce_samples, rays_per_receptor: see `BoxSensor`
+    facets: weights and starting points of the rays
+    white: sum in each band for white light, (ommatidium, band)
+    depth: a single layer, because facets have a large depth of field
+    """
+
+    directions: np.ndarray
+    bounce_samples: np.ndarray
+    rays_per_receptor: int
+    facets: Facets
+    white: np.ndarray
+    depth: DepthLayers = ONE_PSF
+    extent: tuple[float, float] | None = None
+
+    def receptor_radiance(self, sums: np.ndarray) -> np.ndarray:
+        """Return the mean radiance in each ommatidium's field, (band, view, ommatidium).
+
+        sums: sums of weighted radiance over the ommatidium's rays, in an array of the same shape
+        """
+        weights = self.facets.weights.reshape(len(self.white), self.rays_per_receptor, -1).sum(axis=1)
+        return np.asarray(sums / weights.T[:, None].astype(np.float32))
+
+    def receptor_sums(self, mixing: np.ndarray, basis: np.ndarray) -> ReceptorSums:
+        """Return the map to signals from the sums of spectral components over each ommatidium's rays.
+
+        See `sim.eyes.receptor_sums`. Components must be bands.
+        """
+        signals, white = of_receptors(mixing @ basis.T), (mixing @ self.white.T).astype(np.float32)
+        return lambda light: signals(light) / white
+
+
+Sensor = BoxSensor | ReceptiveFieldSensor | OmmatidialSensor

@@ -14,7 +14,7 @@ import mitsuba as mi
 import numpy as np
 
 from optics.numerics.autodiff import Array
-from sim.eyes.sensor import Sensor
+from sim.eyes.sensor import Facets, Sensor
 from sim.render.eye_rays import Directions, EyeRays, Lane
 from sim.render.ray_kernel import Frame, KernelInputs, RayKernel
 from sim.scene.device_arrays import counted, floats, whole_numbers
@@ -70,7 +70,7 @@ class AreaKernel(RayKernel):
         self._areas, self._extent = areas, sensor.extent
         self._borders = Borders.from_middles(sensor.directions[:, 0], sensor.extent[0])
 
-    def inputs(self, ways: np.ndarray, bounces: np.ndarray | None = None) -> AreaInputs:
+    def inputs(self, ways: np.ndarray, bounces: np.ndarray | None = None, facets: Facets | None = None) -> AreaInputs:
         """See RayKernel; ways: directions to the middles of areas."""
         whole, places = super().inputs(ways), self._areas.places
         return AreaInputs(
@@ -78,6 +78,7 @@ class AreaKernel(RayKernel):
             whole.sizes,
             whole.along,
             self._areas.inputs,
+            None,
             None,
             floats(np.array(self._extent)),
             self._border_inputs() if self._borders.shared else None,

@@ -41,7 +41,9 @@ class Directions:
 
     ways: directions of all samples. For free eyes, they are in the eye's frame. For upright eyes, they are in the
         body's frame, and the fourth float is the cosine of the angle to the eye's axis
-    origins, axes: pupils and axes of upright eyes in the body's frame; None for free eyes
+    origins: pupils of upright eyes in the body's frame. For free eyes: starting points of all samples in the eye's
+        frame, or None if they start at the pupil
+    axes: axes of upright eyes in the body's frame; None for free eyes
     """
 
     ways: Array
@@ -58,8 +60,11 @@ class EyeRays(Protocol):
     def array(self) -> Array:
         """Return the array that the kernel reads."""
 
-    def directions(self, ways: np.ndarray) -> Directions:
-        """Return the directions of samples (ray, 3), given in an eye's frame."""
+    def directions(self, ways: np.ndarray, origins: np.ndarray | None = None) -> Directions:
+        """Return the directions of samples (ray, 3), given in an eye's frame.
+
+        origins: starting points in the eye's frame [m], (ray, 3), of free eyes; None: the pupil
+        """
 
     def ray(self, rows: Array, along: Directions, lane: Lane, samples: Array) -> EyeRay:
         """Return the ray of a lane, inside the kernel.
@@ -87,11 +92,11 @@ class UprightEyes:
         """See EyeRays."""
         return self._shared.array
 
-    def directions(self, ways: np.ndarray) -> Directions:
+    def directions(self, ways: np.ndarray, origins: np.ndarray | None = None) -> Directions:
         """See EyeRays."""
         in_body = np.einsum("eij,rj->eri", self._stand.rotations, ways)
-        origins, axes = (in_fours(vectors, 0.0) for vectors in (self._stand.origins, self._stand.rotations[:, :, 2]))
-        return Directions(floats(in_fours(in_body, ways[:, 2])), floats(origins), floats(axes))
+        pupils, axes = (in_fours(vectors, 0.0) for vectors in (self._stand.origins, self._stand.rotations[:, :, 2]))
+        return Directions(floats(in_fours(in_body, ways[:, 2])), floats(pupils), floats(axes))
 
     def ray(self, rows: Array, along: Directions, lane: Lane, samples: Array) -> EyeRay:
         """See EyeRays."""
@@ -127,13 +132,17 @@ class FreeEyes:
         """See EyeRays."""
         return self._shared.array
 
-    def directions(self, ways: np.ndarray) -> Directions:
+    def directions(self, ways: np.ndarray, origins: np.ndarray | None = None) -> Directions:
         """See EyeRays."""
-        return Directions(floats(in_fours(ways, 0.0)))
+        return Directions(floats(in_fours(ways, 0.0)), None if origins is None else floats(in_fours(origins, 0.0)))
 
     def ray(self, rows: Array, along: Directions, lane: Lane, samples: Array) -> EyeRay:
         """See EyeRays."""
         pupil, right, up, ahead = (three(rows, lane.row * EYE_ROWS + i) for i in range(EYE_ROWS))
         way = dr.gather(mi.Vector4f, along.ways, lane.sample)
-        ray = mi.Ray3f(mi.Point3f(pupil), right * way.x + up * way.y + ahead * way.z)
+        start = mi.Point3f(pupil)
+        if along.origins is not None:
+            x, y, z, _ = dr.gather(mi.Vector4f, along.origins, lane.sample)
+            start += right * x + up * y + ahead * z
+        ray = mi.Ray3f(start, right * way.x + up * way.y + ahead * way.z)
         return EyeRay(ray, ahead, way.z, mi.Point3f(pupil))

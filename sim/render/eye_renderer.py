@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from functools import cached_property
 from typing import Any, Self
 
@@ -18,7 +19,8 @@ from optics.numerics.arguments import whole
 from optics.numerics.renamed import renamed
 from optics.spectra.spectrum import Spectrum
 from sim.eyes.allowed_error import allowed_error
-from sim.eyes.sampling import BoxSampling
+from sim.eyes.ommatidial_sampling import OmmatidialSampling
+from sim.eyes.sampling import BoxSampling, FieldSampling
 from sim.eyes.sensor import Sensor
 from sim.render.area_kernel import AreaKernel
 from sim.render.edge_rays import FIRST, EdgeRays
@@ -62,6 +64,7 @@ class EyeRenderer:
         check_renderable(fidelity, scene.eye)
         self.scene, self.eye, self.model, self.mounts = scene, scene.eye, scene.model, scene.mounts
         self.fidelity, sampling = fidelity, scene.sampling(fidelity.depth, fidelity.tolerance)
+        self._sampling = sampling
         self.tracer: Tracer | AreaTracer
         self.tracer = (scene.areas if fidelity.samples == AREAS else scene.tracers.tracer_for)(fidelity.light)
         self._check_memory(n_envs, fidelity.rays_per_receptor)
@@ -69,10 +72,10 @@ class EyeRenderer:
         asked = fidelity.rays_per_receptor
         self.sensor: Sensor
         if fidelity.samples == AREAS:
+            assert not isinstance(sampling, OmmatidialSampling)
             self.sensor = scene.area_sensor(sampling, asked)
         else:
             self.sensor = sampling.sensor(FIRST if fidelity.samples == EDGES else asked)
-        self._sampling = sampling
         self._check_memory(n_envs, self._samples_per_receptor)
         self._mixing = self.eye.aperture_throughput * self.eye.spectral_bands.weights
         self._receptor_sums = self.sensor.receptor_sums(self._mixing, self.tracer.basis)
@@ -98,7 +101,8 @@ class EyeRenderer:
     def _check_memory(self, n_envs: int, samples_per_receptor: float) -> None:
         whole("n_envs", n_envs, 1, MOST_ENVS)
         layers = self.fidelity.depth.count
-        planes, weights = layers * len(self.tracer.basis), layers * self.eye.bands if self.eye.pupil else 0
+        planes = layers * len(self.tracer.basis)
+        weights = layers * self.eye.bands if isinstance(self._sampling, FieldSampling) else 0
         check_memory(Demand(samples_per_receptor, n_envs, len(self.mounts), self.eye.resolution, planes, int(weights)))
 
     def _set_width(self, n_envs: int) -> None:
@@ -111,10 +115,11 @@ class EyeRenderer:
                 kernel: RayKernel = AreaKernel(self.tracer, eyes, self.sensor, self.n_envs, n_eyes)
             else:
                 kernel = RayKernel(self.tracer, eyes, self.n_envs, n_eyes, self.sensor.depth)
-            self._inputs = kernel.inputs(self.sensor.directions, self.sensor.bounce_samples)
+            self._inputs = kernel.inputs(self.sensor.directions, self.sensor.bounce_samples, self.sensor.facets)
             lanes, reduced = self.n_envs * n_eyes * len(self.sensor.directions), self.sensor.rays_per_receptor
             self._rays = FrozenKernel(lambda scenes, frame, given: kernel.sums(scenes, frame, given, lanes, 1))
             self._sums = FrozenKernel(lambda scenes, frame, given: kernel.sums(scenes, frame, given, lanes, reduced))
+            self._unweighted = replace(self._inputs, weights=None)
             self._edges = self._at_edges(kernel) if self.fidelity.samples == EDGES else None
 
     def _at_edges(self, kernel: RayKernel) -> EdgeRays:
@@ -245,7 +250,7 @@ class EyeRenderer:
             self._moving.fill(placed)
             if frozen is None and self._edges is not None:
                 return self._edges.launch(start)
-            return start(self._sums if frozen is None else frozen, self._inputs)
+            return start(self._sums, self._inputs) if frozen is None else start(frozen, self._unweighted)
 
         return self._slot.launch(launch)
 
@@ -259,7 +264,7 @@ class EyeRenderer:
         signals = signals.reshape(self.n_envs, len(self.mounts), len(self._mixing), *self.eye.resolution)
         mosaic = self.eye.mosaic
         if mosaic is not None:
-            signals = np.take_along_axis(signals, mosaic[None, None, None], axis=2)
+            signals = np.take_along_axis(signals, mosaic.reshape(1, 1, -1, *self.eye.resolution), axis=2)
         if factors is not None and factors.is_level and self._has_components:
             return np.asarray(signals * factors.level)
         return signals

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from optics.numerics.autodiff import Array
+from sim.eyes.compound_eye import CompoundEye
 from sim.eyes.depth_layers import ONE_PSF
 from sim.eyes.tangent_plane import directions_of
 from sim.render.eye_rays import FreeEyes
@@ -25,10 +26,15 @@ class Labels:
     """Depth, geom id and optic flow of the point that each receptor's centre sees, in `n_envs` worlds.
 
     scene: the model and its eyes; Mitsuba traces all rays
+
+    Raises:
+        ValueError: a compound eye, which has no flat retina on which depth and flow are defined.
     """
 
     def __init__(self, scene: PreparedScene, n_envs: int) -> None:
         self.scene, self.eye, self.mounts, self.model = scene, scene.eye, scene.mounts, scene.model
+        if isinstance(scene.eye, CompoundEye):
+            raise ValueError("depth, ids and flow: are defined on a flat retina; the eye is a CompoundEye")
         self.n_envs, self._slot = n_envs, FrameSlot()
         with variant(scene.variant):
             tracer, eyes = ModelTracer(scene.scene), FreeEyes(scene.places, n_envs)

@@ -19,6 +19,7 @@ import numpy as np
 import optics
 from optics.spectra.spectrum import Spectrum
 from sim.eyes.allowed_error import allowed_error
+from sim.eyes.compound_eye import WorldEye
 from sim.eyes.depth_layers import ONE_PSF, DepthLayers
 from sim.eyes.mounts import Mount, mounts_of
 from sim.render.edge_rays import edges_pay
@@ -55,7 +56,7 @@ class Trials:
 
 def choose_model_fidelity(
     model: mujoco.MjModel | mujoco.MjSpec | str,
-    eye: optics.Eye,
+    eye: WorldEye,
     mounts: Sequence[Mount],
     poses: Placed,
     tolerance: float | None = None,
@@ -132,7 +133,7 @@ class ModelStages:
 
     def samples(self, depth: DepthLayers, light: Level, allowed: Allowed) -> Samples:
         """See `Stages`."""
-        ladder, most = PERFECT if self.eye.pupil is None else SHARED, allowed.error
+        ladder, most = SHARED if _shares_rays(self.eye) else PERFECT, allowed.error
         trials = tried(lambda rays: self._cached_signals(rays, light.level), ladder, _truth(self.eye), most)
         rays = next((n for n, error in trials.errors.items() if error <= most), max(trials.errors))
         enough = trials.errors[rays] <= most
@@ -158,13 +159,13 @@ def _light(asked: str, truth: Callable[[str], np.ndarray], allowed: float) -> Le
     return Level("light", lighting.BOUNCE, None, missing)
 
 
-def _with(rays: float, eye: optics.Eye, allowed: float, light: str) -> Fidelity:
+def _with(rays: float, eye: WorldEye, allowed: float, light: str) -> Fidelity:
     """Return the fidelity with this number of rays.
 
     In direct light through a perfect lens it uses adaptive edge sampling if that saves rays, except for the
     reference.
     """
-    at_edges = light == lighting.DIRECT and eye.pupil is None and rays < PERFECT_TRUTH
+    at_edges = light == lighting.DIRECT and _is_perfect(eye) and rays < PERFECT_TRUTH
     at_edges = at_edges and edges_pay(eye.resolution, rays)
     return Fidelity(rays, eye.bands, tolerance=allowed, light=light, samples=EDGES if at_edges else RAYS)
 
@@ -187,5 +188,15 @@ def tried(seen: Callable[[float], np.ndarray], ladder: Sequence[float], truth: f
     return Trials(errors, 0.0 if apart is None else float(apart.mean()))
 
 
-def _truth(eye: optics.Eye) -> float:
-    return PERFECT_TRUTH if eye.pupil is None else SHARED_TRUTH
+def _truth(eye: WorldEye) -> float:
+    return SHARED_TRUTH if _shares_rays(eye) else PERFECT_TRUTH
+
+
+def _is_perfect(eye: WorldEye) -> bool:
+    """Return whether the eye has a perfect lens."""
+    return isinstance(eye, optics.Eye) and eye.pupil is None
+
+
+def _shares_rays(eye: WorldEye) -> bool:
+    """Return whether the receptors share all rays: behind a pupil. Ommatidia and squares have their own rays."""
+    return isinstance(eye, optics.Eye) and eye.pupil is not None

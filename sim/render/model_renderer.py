@@ -7,9 +7,9 @@ from dataclasses import replace
 
 import mujoco
 
-import optics
 from optics.numerics.arguments import of_kind, whole
 from optics.spectra.spectrum import Spectrum
+from sim.eyes.compound_eye import CompoundEye, WorldEye, world_eye
 from sim.eyes.mounts import Mount, mounts_of
 from sim.render.eye_renderer import MOST_ENVS, EyeRenderer
 from sim.render.fidelity import AREAS, Fidelity
@@ -18,6 +18,7 @@ from sim.render.renderable import check_renderable
 from sim.scene import source
 from sim.scene.appearances import Varied
 from sim.scene.mirror import VISIBLE_GROUPS
+from sim.tracing.model_tracer import ModelTracer
 
 SIXTEEN = 16  # rays per receptor
 
@@ -26,7 +27,7 @@ class ModelRenderer(EyeRenderer):
     """A renderer of many worlds of one model, with eyes of one kind that are mounted anywhere on it.
 
     model: an MjModel, or a source that compiles to one (`sim.mirror`)
-    eye: optics and retina of all eyes; the fidelity's bands replace its bands
+    eye: optics and retina of all eyes (`optics.Eye`), or a `sim.CompoundEye`; the fidelity's bands replace its bands
     mounts: places of the eyes on the model
     n_envs: number of worlds
     fidelity: samples, bands and light. None: 16 rays per receptor, direct light of lamps, and the eye's own bands, 4 by
@@ -54,7 +55,7 @@ class ModelRenderer(EyeRenderer):
     def __init__(
         self,
         model: mujoco.MjModel | mujoco.MjSpec | str,
-        eye: optics.Eye,
+        eye: WorldEye,
         mounts: Sequence[Mount],
         n_envs: int = 1,
         fidelity: Fidelity | None = None,
@@ -65,7 +66,9 @@ class ModelRenderer(EyeRenderer):
         tracer: str = "mitsuba",
     ) -> None:
         whole("n_envs", n_envs, 1, MOST_ENVS)
-        of_kind("eye", eye, optics.Eye, "optics.Eye(resolution=(15, 15))")
+        world_eye("eye", eye)
+        if isinstance(eye, CompoundEye) and tracer != ModelTracer.name:
+            raise ValueError(f"tracer = {tracer!r}: must be {ModelTracer.name!r} for a compound eye")
         fidelity = Fidelity(SIXTEEN, eye.bands) if fidelity is None else fidelity
         of_kind("fidelity", fidelity, Fidelity, "Fidelity(16, bands=4)")
         if fidelity.samples == AREAS and tracer == "mitsuba":

@@ -11,10 +11,11 @@ import numpy as np
 
 import optics
 from optics.spectra.spectrum import Spectrum
+from sim.eyes.compound_eye import WorldEye
 from sim.eyes.depth_layers import DepthLayers
 from sim.eyes.inside import depth_inside
 from sim.eyes.mounts import Mount
-from sim.eyes.sampling import EyeSampling, FieldSampling, Trial, eye_sampling
+from sim.eyes.sampling import EyeSampling, FieldSampling, Trial, WorldSampling, eye_sampling
 from sim.eyes.sensor import Sensor
 from sim.render.eye_rays import EyeRays, FreeEyes, UprightEyes
 from sim.scene.appearances import Varied
@@ -50,7 +51,7 @@ class PreparedScene:
     def __init__(
         self,
         model: mujoco.MjModel,
-        eye: optics.Eye,
+        eye: WorldEye,
         mounts: Sequence[Mount],
         *,
         spectra: Mapping[str, Spectrum | str] | None = None,
@@ -64,7 +65,7 @@ class PreparedScene:
         if stand is None:
             self._refuse_eyes_inside()
         self.tracers = Tracers(self.scene, self.places, tracer, stand)
-        self._samplings: dict[DepthLayers, EyeSampling] = {}
+        self._samplings: dict[DepthLayers, WorldSampling] = {}
         self._has_warned = False
 
     @property
@@ -134,7 +135,7 @@ class PreparedScene:
         upright = self.tracers.upright
         return isinstance(upright, UprightScene) and len(upright.spheres) > 0
 
-    def sampling(self, depth: DepthLayers, tolerance: float | None = None) -> EyeSampling:
+    def sampling(self, depth: DepthLayers, tolerance: float | None = None) -> WorldSampling:
         """Return the sampling of the eye with these depth layers; its PSFs are computed once, on first use.
 
         tolerance: allowed error of a signal, see `sim.eyes.allowed_error`

@@ -15,6 +15,7 @@ import numpy as np
 
 from optics.numerics.autodiff import Array
 from sim.eyes.depth_layers import DepthLayers
+from sim.eyes.sensor import Facets
 from sim.render.eye_rays import Directions, EyeRays, Lane
 from sim.scene.device_arrays import counted, floats, whole_numbers
 from sim.scene.frozen_kernels import garbage_kept
@@ -36,6 +37,7 @@ class KernelInputs:
     along: directions of the samples
     tables: the tracer's inputs
     bounces: four numbers per sample, from which the directions of bounced light are computed; None: direct light only
+    weights: weight of each sample's components, in rows of four floats; None: all weights are 1
     """
 
     lanes: Array
@@ -43,6 +45,7 @@ class KernelInputs:
     along: Directions
     tables: Any
     bounces: Array | None = None
+    weights: Array | None = None
 
 
 @dataclass(frozen=True)
@@ -81,8 +84,10 @@ class RayKernel:
     def __init__(self, tracer: Tracer, eyes: EyeRays, n_envs: int, n_eyes: int, depth: DepthLayers) -> None:
         self.tracer, self.eyes, self.n_envs, self.n_eyes, self.depth = tracer, eyes, n_envs, n_eyes, depth
 
-    def inputs(self, ways: np.ndarray, bounces: np.ndarray | None = None) -> KernelInputs:
+    def inputs(self, ways: np.ndarray, bounces: np.ndarray | None = None, facets: Facets | None = None) -> KernelInputs:
         """Return the inputs for these samples (ray, 3) of every eye.
+
+        facets: weights and starting points of the samples; None: all weights are 1, and samples start at the pupil
 
         The samples are inputs and not constants, so that eyes of any resolution and field of view, in any number of
         worlds, share a kernel.
@@ -93,7 +98,11 @@ class RayKernel:
             second = np.random.default_rng(SECOND).random(bounces.shape)
             more = floats(np.concatenate([bounces, second], axis=1))
         sizes = whole_numbers([len(ways), self.n_eyes, lanes])
-        return KernelInputs(counted(lanes), sizes, self.eyes.directions(ways), self.tracer.inputs, more)
+        origins, weights = (None, None) if facets is None else (facets.origins, facets.weights)
+        if weights is not None:
+            weights = floats(np.pad(weights, ((0, 0), (0, -weights.shape[1] % 4))))
+        along = self.eyes.directions(ways, origins)
+        return KernelInputs(counted(lanes), sizes, along, self.tracer.inputs, more, weights)
 
     def sums(self, scenes: Any, frame: Frame, inputs: KernelInputs, lanes: int, reduced: int) -> Array:
         """Return sums over `reduced` neighbours among `lanes` lanes, flat (layer, component, world, eye, sum)."""
@@ -115,6 +124,10 @@ class RayKernel:
         bounces = inputs.bounces is not None
         samples = dr.gather(mi.Vector4f, inputs.bounces, lane.sample) if bounces else mi.Vector4f(0)
         components, distance = self.tracer.radiance(seen, there, samples)
+        if inputs.weights is not None:
+            fours = range(-(-len(components) // 4))
+            rows = [dr.gather(mi.Vector4f, inputs.weights, lane.sample * len(fours) + k) for k in fours]
+            components = [component * rows[k // 4][k % 4] for k, component in enumerate(components)]
         if self.depth.count == 1:
             return components
         shares = self.depth.shares(dr.rcp(distance * seen.cosine))

@@ -19,8 +19,8 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-import optics
 from optics.numerics.autodiff import Array
+from sim.eyes.compound_eye import CompoundEye, WorldEye
 from sim.render.pending_frame import FrameSlot, PendingFrame
 from sim.scene.device_arrays import SharedBuffer
 from sim.scene.frozen_kernels import garbage_kept
@@ -125,11 +125,13 @@ class NoiseModel:
     photons: np.ndarray | None = None
 
     @classmethod
-    def from_eye(cls, eye: optics.Eye) -> NoiseModel | None:
+    def from_eye(cls, eye: WorldEye) -> NoiseModel | None:
         """Return the noise of an eye; None if it has no noise."""
         photons = eye.photons
         if photons is None:
             return cls(eye.noise_sigma) if eye.noise_sigma > 0 else None
+        if isinstance(eye, CompoundEye):
+            return cls(eye.noise_sigma, photons[:, None].astype(np.float32))
         mosaic = eye.mosaic
         spread = photons[:, None, None] if mosaic is None else photons[mosaic][None]
         return cls(eye.noise_sigma, spread.astype(np.float32))

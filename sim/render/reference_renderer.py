@@ -70,7 +70,7 @@ class ReferenceRenderer:
         z: Any = np.array(depths) if depths else math.inf
         self.sight = self.eye.sight(self.samples_per_receptor, z, depth_layers, light_from="centres")
         self._data = mujoco.MjData(world.model)
-        spectra, off = lights_in_bands(world.model, world.spectra, self.eye)
+        spectra, off = lights_in_bands(world.model, world.spectra, self.eye.spectral_bands, self.eye.receptors)
         for words in off:
             warnings.warn(words, MirrorWarning, stacklevel=2)
         self._mirror = mirror(world.model, variant=variant, spectra=spectra)

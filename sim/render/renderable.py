@@ -2,22 +2,22 @@
 
 from __future__ import annotations
 
-import optics
 from optics.numerics.arguments import of_kind, shown
+from sim.eyes.compound_eye import CompoundEye, WorldEye, world_eye
 from sim.render.edge_rays import FIRST
-from sim.render.fidelity import EDGES, Fidelity
+from sim.render.fidelity import EDGES, RAYS, Fidelity
 from sim.tracing import lighting
 
 
-def check_renderable(fidelity: Fidelity, eye: optics.Eye) -> None:
+def check_renderable(fidelity: Fidelity, eye: WorldEye) -> None:
     """Refuse a fidelity that does not fit the eye.
 
     Raises:
-        ValueError: an eye with an eccentricity, another number of bands than the eye's, or adaptive edge sampling that
-            is not possible.
+        ValueError: an eye with an eccentricity, another number of bands than the eye's, adaptive edge sampling that is
+            not possible, or a compound eye with areas or depth layers.
     """
-    of_kind("eye", eye, optics.Eye, "optics.Eye(resolution=(15, 15))")
-    if any(eye.eccentricity_deg):
+    world_eye("eye", eye)
+    if not isinstance(eye, CompoundEye) and any(eye.eccentricity_deg):
         raise ValueError(
             f"eye: eccentricity_deg = {shown(eye.eccentricity_deg)}: must be (0, 0); eyes in a world look along their "
             "Mount, turn that instead"
@@ -25,6 +25,9 @@ def check_renderable(fidelity: Fidelity, eye: optics.Eye) -> None:
     of_kind("fidelity", fidelity, Fidelity, "Fidelity(16, bands=4)")
     if fidelity.bands != eye.bands:
         raise ValueError(f"fidelity.bands = {fidelity.bands}: must be the scene's {eye.bands}")
+    if isinstance(eye, CompoundEye):
+        _check_ommatidia(fidelity)
+        return
     if fidelity.samples != EDGES:
         return
     if fidelity.light == lighting.BOUNCE:
@@ -36,3 +39,16 @@ def check_renderable(fidelity: Fidelity, eye: optics.Eye) -> None:
         )
     if eye.pupil is not None:
         raise ValueError("fidelity: samples = 'edges': is for perfect lenses; behind a pupil receptors share all rays")
+
+
+def _check_ommatidia(fidelity: Fidelity) -> None:
+    if fidelity.samples != RAYS:
+        raise ValueError(
+            f"fidelity: samples = {fidelity.samples!r}: must be 'rays' for a compound eye, whose acceptance functions "
+            "draw them"
+        )
+    if fidelity.depth.count > 1:
+        raise ValueError(
+            f"fidelity: depth: {fidelity.depth.count} layers: must be one for a compound eye, whose facets have a "
+            "large depth of field"
+        )

@@ -4,8 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
+import optics
+from sim.eyes.depth_layers import DepthLayers
 from sim.eyes.eyes import BODY_RADIUS, EYE_HEIGHT, Eyes, eye_positions, eye_rotations
 from sim.eyes.mounts import ring
+from sim.eyes.ommatidial_sampling import OmmatidialSampling
+from sim.eyes.sampling import EyeSampling
 from sim.render.prepared_scene import Placed, PreparedScene
 from sim.scene.moved_bodies import MovedBodies, ReferencePose
 from sim.scene.poses import Poses
@@ -28,6 +32,8 @@ class WorldScene(PreparedScene):
         ValueError: a world or a tracer that `sim.BatchedRenderer` refuses.
     """
 
+    eye: optics.Eye
+
     def __init__(self, world: World, eyes: Eyes, tracer: str = "auto") -> None:
         self.world, self.eyes = world, eyes
         mounts = ring("agent", eyes.n_eyes, eyes.placement_range_deg, BODY_RADIUS * (1 + OUTSIDE))
@@ -38,6 +44,12 @@ class WorldScene(PreparedScene):
         bodies = [body, *(int(world.model.body(name).id) for name in world.objects)]
         self._reference = ReferencePose(world.model, bodies)
         self._turns = self._reference.poses.xmat[0, bodies]
+
+    def sampling(self, depth: DepthLayers, tolerance: float | None = None) -> EyeSampling:
+        """See PreparedScene. Built-in layouts have no compound eyes."""
+        found = super().sampling(depth, tolerance)
+        assert not isinstance(found, OmmatidialSampling)
+        return found
 
     def placed(self, poses: Placed | WorldState) -> Poses:
         """Return the poses as arrays; a state is also accepted."""

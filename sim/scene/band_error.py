@@ -8,7 +8,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from optics import Eye, SpectralBands, Spectrum, receptors_of
+from optics import Receptors, SpectralBands, Spectrum, receptors_of
 from optics.spectra.bands import daylight
 from sim.scene.spectra import Spectra
 
@@ -18,8 +18,10 @@ FINE_BANDS = 64
 LEAST_MISS = 1e-3  # relative to white in daylight: largest error of a quantum catch from a lamp without a warning
 
 
-def lights_in_bands(model: mujoco.MjModel, spectra: Spectra, eye: Eye) -> tuple[Spectra, list[str]]:
-    """Return measured spectra, with lights converted to this eye's bands, and messages about inaccurate lights.
+def lights_in_bands(
+    model: mujoco.MjModel, spectra: Spectra, bands: SpectralBands, receptors: Receptors
+) -> tuple[Spectra, list[str]]:
+    """Return measured spectra, with lights converted to an eye's bands, and messages about inaccurate lights.
 
     The values of lights at the bands' centres are chosen such that each receptor type has the correct quantum catch
     from white (`SpectralBands.band_values`). Sampling at the centres would include a spectral line only by chance.
@@ -30,16 +32,15 @@ def lights_in_bands(model: mujoco.MjModel, spectra: Spectra, eye: Eye) -> tuple[
     found, off = dict(spectra), []
     for name, light in spectra.items():
         if name not in materials:
-            found[name], words = _in_bands(name, light, eye)
+            found[name], words = _in_bands(name, light, bands, receptors)
             off += words
     return found, off
 
 
-def _in_bands(name: str, light: Spectrum, eye: Eye) -> tuple[Spectrum, list[str]]:
-    bands = eye.spectral_bands
-    found = bands.band_values(light, eye.receptors, nonnegative=True)
-    fine = SpectralBands.uniform(FINE_BANDS, eye.receptors)
-    caught, due = bands.weights @ found, fine.weights @ fine.band_values(light, eye.receptors)
+def _in_bands(name: str, light: Spectrum, bands: SpectralBands, receptors: Receptors) -> tuple[Spectrum, list[str]]:
+    found = bands.band_values(light, receptors, nonnegative=True)
+    fine = SpectralBands.uniform(FINE_BANDS, receptors)
+    caught, due = bands.weights @ found, fine.weights @ fine.band_values(light, receptors)
     worst = int(np.argmax(np.abs(caught - due)))
     words = (
         f"{name!r} in {len(found)} bands: receptor type {worst} catches {caught[worst]:.2g} of it, but should "

@@ -7,8 +7,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-import optics
-from optics.numerics.arguments import did_you_mean, items, of_kind
+from optics.numerics.arguments import did_you_mean, items
+from sim.eyes.compound_eye import WorldEye, world_eye
 from sim.eyes.mounts import Mount, mounts_of
 from sim.render.fidelity import Fidelity
 
@@ -25,13 +25,13 @@ class EyeKind:
     """Eyes of an animal that have the same optics and retina.
 
     name: name of their signals in an observation
-    eye: optics and retina
+    eye: optics and retina, or a compound eye
     mounts: places of the eyes
     fidelity: fidelity of the eyes, or "auto"
     """
 
     name: str
-    eye: optics.Eye
+    eye: WorldEye
     mounts: tuple[Mount, ...]
     fidelity: Fidelity | str
 
@@ -51,7 +51,7 @@ def kinds_of(task: TaskSettings) -> tuple[EyeKind, ...]:
     if not isinstance(eye, Mapping) and not isinstance(mounts, Mapping):
         if isinstance(fidelity, Mapping):
             raise ValueError(f"{where}: fidelity has kinds {_listed(fidelity)}: eye and mounts must have the same")
-        return (EyeKind(EYES, _an_eye(f"{where}: eye", eye), mounts_of(f"{where}: mounts", mounts), fidelity),)
+        return (EyeKind(EYES, world_eye(f"{where}: eye", eye), mounts_of(f"{where}: mounts", mounts), fidelity),)
     eyes, places = _by_name(f"{where}: eye", eye, ()), _by_name(f"{where}: mounts", mounts, ())
     if eyes.keys() != places.keys():
         raise ValueError(f"{where}: eye has kinds {_listed(eyes)}, mounts {_listed(places)}: must be the same")
@@ -71,7 +71,7 @@ def kinds_of(task: TaskSettings) -> tuple[EyeKind, ...]:
     return tuple(
         EyeKind(
             name,
-            _an_eye(f"{where}: eye[{name!r}]", eyes[name]),
+            world_eye(f"{where}: eye[{name!r}]", eyes[name]),
             mounts_of(f"{where}: mounts[{name!r}]", places[name]),
             fidelities[name],
         )
@@ -105,11 +105,6 @@ def auxiliary_of(names: Iterable[str], where: str) -> tuple[str, ...]:
             hint = did_you_mean(name, AUXILIARY) or f": must be of {', '.join(map(repr, AUXILIARY))}"
             raise ValueError(f"{where}: {name!r}{hint}")
     return tuple(name for name in AUXILIARY if name in asked)
-
-
-def _an_eye(where: str, said: Any) -> optics.Eye:
-    eye: optics.Eye = of_kind(where, said, optics.Eye, "optics.Eye(resolution=(15, 15))")
-    return eye
 
 
 def _by_name(where: str, said: Any, names: Mapping[str, Any] | Sequence[str]) -> Mapping[str, Any]:

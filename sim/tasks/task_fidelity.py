@@ -10,8 +10,8 @@ from dataclasses import replace
 
 import numpy as np
 
-import optics
 from sim.eyes.allowed_error import allowed_error
+from sim.eyes.compound_eye import WorldEye
 from sim.render.fidelity import Fidelity
 from sim.render.model_fidelity import choose_model_fidelity
 from sim.scene.poses import Poses
@@ -95,7 +95,7 @@ def resolve_other_fidelities(task: Task) -> Task:
     return among(task, settled)
 
 
-def _in_brightest(variation: Variation, eye: optics.Eye) -> float:
+def _in_brightest(variation: Variation, eye: WorldEye) -> float:
     """Return the allowed error of a signal, reduced by the largest factor of the lights.
 
     Errors are proportional to the light, and some episodes have more light than the model.

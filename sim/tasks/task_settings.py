@@ -12,6 +12,7 @@ import optics
 from optics.numerics.arguments import did_you_mean, finite, whole
 from optics.numerics.renamed import warn_renamed
 from optics.spectra.spectrum import Spectrum
+from sim.eyes.compound_eye import WorldEye
 from sim.eyes.mounts import Mount, fan
 from sim.physics.controls import actuator_names, controls_of
 from sim.render.fidelity import Fidelity
@@ -27,7 +28,7 @@ class TaskSettings:
     """Settings that a subclass defines as class attributes. It must define `model` and `mounts`.
 
     model: an MjModel, or a source from which `sim.mirror` can compile one
-    eye: optics and retina of every eye
+    eye: an `optics.Eye`, the optics and retina of every eye, or a `sim.CompoundEye`
     mounts: places of the eyes. If an animal has several kinds of eyes, `eye` and `mounts` are dictionaries, such as
         {"wide": ..., "sharp": ...}. An observation then has an array for each kind instead of "eyes".
     fidelity: rendering fidelity of the eyes, see `sim.ModelRenderer`; "auto": `sim.choose_model_fidelity` chooses it
@@ -62,7 +63,7 @@ class TaskSettings:
     """
 
     model: mujoco.MjModel | mujoco.MjSpec | str | Path
-    eye: optics.Eye | Mapping[str, optics.Eye] = optics.Eye()
+    eye: WorldEye | Mapping[str, WorldEye] = optics.Eye()
     mounts: Sequence[Mount] | Mapping[str, Sequence[Mount]] = ()
     fidelity: Fidelity | str | Mapping[str, Fidelity | str] = "auto"
     substeps: int = 5

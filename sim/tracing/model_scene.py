@@ -15,8 +15,8 @@ import mitsuba as mi
 import mujoco
 import numpy as np
 
-from optics import Eye
 from optics.spectra.spectrum import Spectrum
+from sim.eyes.compound_eye import WorldEye
 from sim.scene import bsdfs, inventory, lights, shapes, sky, surfaces
 from sim.scene.appearances import Appearance, Varied, appearances_of, in_white, varied_geoms
 from sim.scene.band_error import lights_in_bands
@@ -63,14 +63,14 @@ class ModelScene:
     def __init__(
         self,
         model: mujoco.MjModel,
-        eye: Eye,
+        eye: WorldEye,
         groups: Sequence[int] = VISIBLE_GROUPS,
         spectra: Mapping[str, Spectrum | str] | None = None,
         varied: Varied = (),
     ) -> None:
         self.model, self.eye, self.variant, self._groups = model, eye, default_variant(), groups
         self.spectra = resolve(model, spectra)
-        in_bands, self._off = lights_in_bands(model, self.spectra, eye)
+        in_bands, self._off = lights_in_bands(model, self.spectra, eye.spectral_bands, eye.receptors)
         self._visible = surfaces.visible(model, groups)
         self.geoms = [g for g in self._visible if shapes.has_shape(model, g)]
         surfaces.require_geoms(model, self.geoms)

@@ -11,10 +11,11 @@ import pytest
 import optics
 from optics import Eye, Pupil
 from tests.optics.walked_eyes import LENS, OF_EYES, OF_FACETS, SCENE
+from tests.optics.walked_lenses import OF_LENSES
 from tests.optics.walked_light import OF_MEASURES, OF_PARTS, OF_PSFS, OF_PUPILS, OF_SHAPES
 from tests.walked_arguments import Walk, missing
 
-TABLE = {**OF_SHAPES, **OF_PUPILS, **OF_PSFS, **OF_MEASURES, **OF_EYES, **OF_FACETS, **OF_PARTS}
+TABLE = {**OF_SHAPES, **OF_PUPILS, **OF_PSFS, **OF_MEASURES, **OF_EYES, **OF_FACETS, **OF_LENSES, **OF_PARTS}
 
 
 def test_the_table_names_every_optional_argument():
@@ -31,6 +32,8 @@ LONG = {
             "Eye",
             "WhitePSF",
             "read_exit",
+            "lens_mtf",
+            "LensMTF",
             "white_psf",
             "image_quality",
             "propagate_through",

@@ -80,6 +80,11 @@ SPECTRA = {
     "reflectance": {"name": "foliage"},
 }
 EYES = {
+    "acceptance_function": {
+        "ommatidium": optics.Ommatidium(optics.FacetLens(25e-6, 30e-6), optics.Waveguide(2e-6)),
+        "wavelengths": [500e-9, 550e-9],
+        "loss": 5e-3,
+    },
     "AppositionEye": {
         "ommatidium": optics.Ommatidium(optics.FacetLens(25e-6, 30e-6), optics.Waveguide(2e-6)),
         "rings": 1,
@@ -178,9 +183,21 @@ def test_masked_elements_are_refused(name):
 
 def test_nothing_of_the_face_is_forgotten():
     """Omitted names are results of optics itself, or take the same arguments as names that are tested here."""
-    made = {"AccuracyError", "BackendError", "MTF", "Mode", "PSFBatch", "PSFResult", "Plan", "PropagationResult"}
+    made = {
+        "AcceptanceFunction",
+        "AccuracyError",
+        "BackendError",
+        "MTF",
+        "Mode",
+        "PSFBatch",
+        "PSFResult",
+        "Plan",
+        "PropagationResult",
+    }
     made |= {
         "ExitPupil",
+        "ExitPupils",
+        "LensMTF",
         "SpectralBands",
         "StackResult",
         "VectorFocus",
@@ -197,7 +214,9 @@ def test_nothing_of_the_face_is_forgotten():
         "Grid",
         "Ommatidium",
         "white_psf",
+        "lens_mtf",
         "read_exit_pupil",
+        "read_exit_pupils",
         "require",
     }
     assert CALLS.keys() | made | like_others == set(optics.__all__)

@@ -36,6 +36,20 @@ def test_a_refusal_names_what_there_is():
         optics.psf(optics.Pupil(25e-6, np.random.default_rng(0).random((8, 8)) * 0.9e-3))
 
 
+def test_a_wrapped_height_map_before_a_vector_focus_needs_no_pixels():
+    """`optics.vector_focus` refuses pixels, so its message does not recommend them."""
+    x = (np.arange(128) + 0.5) / 64 - 1
+    wrapped = (-(60e-6**2) * (x**2 + x[:, None] ** 2) / 480e-6) % 1.1e-6
+    with pytest.raises(optics.AccuracyError, match=r"height jumps by .*: must be smooth, for each point to have one"):
+        optics.vector_focus(optics.Pupil(60e-6, wrapped, thin_lens_focal_length=480e-6), sensor_distance=480e-6)
+
+
+def test_pixels_are_square():
+    heights = np.random.default_rng(0).random((16, 48)) * 3e-7
+    with pytest.raises(optics.AccuracyError, match=r"PixelRelief\(height\) represents the steps of as many rows as"):
+        optics.psf(optics.Pupil(15e-6, heights), dtype="float64", tolerance=1e-7, method="rayleigh_sommerfeld")
+
+
 def test_a_wrapped_height_map_points_at_pixels():
     x = (np.arange(128) + 0.5) / 64 - 1
     for radius in (60e-6, 200e-6):  # too slow, and refused in any case

@@ -58,6 +58,7 @@ OF_EYES = {
             "receptors": "honeybee",
             "full_aperture": 2e-5,
             "eccentricity_deg": (5.0, 0.0),
+            "most_seconds": NoEffect("it only refuses: test_kept_kernels"),
             "waveguide": Waveguide(2e-6),
             "microvilli": optics.Microvilli(),
             "pupil_turned": With(True, {"pupil": Pupil(**LENS, wavefront=Zernike({(3, 1): 0.2}))}),
@@ -128,6 +129,9 @@ OF_FACETS = {
     "Ommatidium.mode_power": Walk(lambda **asked: EYELET.mode_power(np.zeros(1), np.zeros(1), **asked), IN_COLOUR),
     "Ommatidium.sensitivity": Walk(lambda **asked: EYELET.sensitivity(np.zeros(1), np.zeros(1), **asked), IN_COLOUR),
     "Ommatidium.acceptance_angle": Walk(EYELET.acceptance_angle, {**IN_COLOUR, "azimuth_deg": 15.0}),
+    "acceptance_function": Walk(
+        lambda **given: optics.acceptance_function(EYELET, [500e-9], **given).values, {"loss": 1e-2}
+    ),
     "AppositionEye.contrast": Walk(lambda **asked: COMPOUND.contrast(0.2, **asked), {**IN_COLOUR, "azimuth_deg": 15.0}),
     "AppositionEye.field": Walk(COMPOUND.field, IN_COLOUR),
     "AppositionEye.see": Walk(lambda **asked: COMPOUND.see(lambda x, y: x, **asked), IN_COLOUR),

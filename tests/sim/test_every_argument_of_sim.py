@@ -41,6 +41,14 @@ def rendered(mount=None, **given):
     return np.asarray(renderer.signals([DATA] * renderer.n_envs))
 
 
+def ommatidia(**given):
+    """Return the signals of a compound eye, and their noise."""
+    facet = optics.Ommatidium(optics.FacetLens(16e-6, 12e-6), optics.Waveguide(1.9e-6))
+    eye = sim.CompoundEye([[0.0, -20.0], [30.0, -10.0]], facet, **{"bands": 3, **given})
+    renderer = sim.ModelRenderer(MODEL, eye, [Mount("eye")], fidelity=Fidelity(4, bands=eye.bands))
+    return renderer.signals(DATA), eye.noise_sigma, eye.photons
+
+
 def looked(**given):
     """Return observations of an agent with these eyes."""
     return played(eyes=Eyes(**{**PERFECT, **given}), rays_per_receptor=2)
@@ -169,6 +177,20 @@ IN_WORLDS = {
 }
 DRAWING = "\n".join(["#" * 9, "#.......#", "#.S.....#", "#.......#", "#" * 9])
 ON_MODELS = {
+    "CompoundEye": Walk(
+        ommatidia,
+        {
+            "receptors": "lms",
+            "types": [[0], [2]],
+            "bands": 2,
+            "noise_sigma": 0.5,
+            "photon_budget": optics.PhotonBudget(1.0),
+            "radius": 0.6,
+        },
+    ),
+    "hexagonal_patch": Walk(
+        lambda **given: sim.hexagonal_patch(1, 5.0, **given), {"azimuth_deg": 9.0, "elevation_deg": 9.0}
+    ),
     "Mount": Walk(
         lambda **given: rendered(Mount(given.pop("on", "eye"), **given)),
         {
@@ -221,6 +243,7 @@ ON_MODELS = {
                 (500.0, 400.0), {"radiance": None, "wavelengths_nm": np.empty(0), "receptors": np.ones((2, 2, 2))}
             ),
             "reflectance": np.full((1, 2, 2), 0.2),
+            "directions": With(np.ones((3, 2, 2)), {"receptors": np.ones((2, 2, 2))}),
         },
     ),
     "write_exr": Walk(written, {"pixel_aspect": 2.0}),

@@ -5,6 +5,7 @@ name in optics.
 import numpy as np
 import pytest
 
+import optics
 import sim
 from tests.odd_arguments import complaints, masked_complaints
 
@@ -34,6 +35,18 @@ CALLS = {
         "offset": (0.0, 0.0, 0.0),
         "kind": None,
     },
+    "CompoundEye": {
+        "directions": [[0.0, 0.0], [20.0, 0.0]],
+        "ommatidium": optics.Ommatidium(optics.FacetLens(25e-6, 30e-6), optics.Waveguide(2e-6)),
+        "receptors": "rgb",
+        "types": None,
+        "bands": 4,
+        "noise_sigma": 0.01,
+        "photon_budget": None,
+        "radius": None,
+    },
+    "hexagonal_patch": {"rings": 1, "interommatidial_deg": 5.0, "azimuth_deg": 0.0, "elevation_deg": 0.0},
+    "whole_head": {"interommatidial_deg": 30.0},
     "View": VIEW | {"receptors": None, "rgb": None},
     "both_sides": {"mounts": [MOUNT]},
     "build_world": {"task": "navigation", "seed": 0, "mazes": 1, "course": "short", "eyes": None, "spectra": None},

@@ -6,6 +6,7 @@ steps_per_second       steps per CPU second of worlds and models (a proof with b
 sim_throughput         renderer and environment compared with MuJoCo's renderer
 learning_throughput    training with PPO compared with MuJoCo's renderer
 area_times             ray sampling and area sampling of eyes
+compound_eye_times     compound eyes compared with the same eyes made of mounts
 edge_times             adaptive edge sampling compared with uniform sampling
 kernel_times           kernels of evolving eyes
 many_zones             foci of many Fresnel zones

@@ -154,8 +154,12 @@ REFUSALS: tuple[tuple[str, Callable[[], Any], str], ...] = (
     ("pupil of NaN", lambda: Pupil(math.nan), r"aperture_radius = nan: must be greater than 0"),
     ("pupil of 1e-20 m", lambda: Pupil(1e-20), r"aperture_radius = 1e-20: .*at least 1e-15"),
     ("index below 1", lambda: Pupil(RADIUS, n=0.9), r"n = 0\.9: must lie in \[1, 10\]"),
-    ("DOE of no pixel", lambda: Pupil(RADIUS, np.zeros((0, 0))), r"height has shape \(0, 0\): must be square"),
-    ("DOE not square", lambda: Pupil(RADIUS, np.zeros((2, 3))), r"height has shape \(2, 3\): must be square"),
+    (
+        "DOE of no pixel",
+        lambda: Pupil(RADIUS, np.zeros((0, 0))),
+        r"height has shape \(0, 0\): must be \(rows",
+    ),
+    ("pixels not square", lambda: optics.PixelRelief(np.zeros((2, 3))), r"height has shape \(2, 3\): must be square"),
     ("DOE with NaN", lambda: Pupil(RADIUS, np.full((4, 4), math.nan)), "height holds NaN"),
     (
         "lens of f = 0",

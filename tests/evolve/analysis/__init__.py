@@ -1,6 +1,7 @@
 """Tests of evolve/analysis: which test covers which module.
 
 statistics: test_statistics.py, test_genealogy.py
+white_light: test_white_light.py
 fitness_parts: report/test_priced_report.py
 acuity: test_statistics.py, report/test_priced_report.py
 vision: test_vision.py

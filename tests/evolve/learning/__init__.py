@@ -11,6 +11,7 @@ policy: test_policy.py
 observed: test_policy.py, test_task_module.py
 eye_features: test_eye_features.py, test_policy.py, test_learning.py
 per_eye_layers: test_eye_features.py, test_policy.py, test_regridding.py
+hexagonal_layers: test_hexagonal_layers.py
 regridding: test_regridding.py
 schedule: test_schedule.py, test_ppo.py
 training_rewards: test_ppo.py

@@ -7,8 +7,9 @@ import pytest
 
 import optics
 from evolve.analysis.recorder import record
+from evolve.analysis.white_light import WhiteLight
 from evolve.report import eye_figures
-from evolve.report.eye_figures import WhiteLight, diffraction_limit, relief_heights
+from evolve.report.eye_figures import diffraction_limit, relief_heights
 from evolve.report.markup import html
 from evolve.report.views import through_optics
 from optics.spectra.bands import daylight

@@ -1,15 +1,18 @@
 """Tests that fail when a module of optics/elements is broken.
 
 beam: methods/test_textbook.py
+converging_wave: test_exit_pupil.py, test_exit_pupil_off_axis.py
 derivative_knots: point_spread/test_gradients.py
-exit_pupil_slopes: test_pupil.py
-zernike_modes: test_wavefront.py
-pupil: test_exit_pupil.py
+exit_pupil: test_exit_pupil.py, test_exit_pupil_off_axis.py
+exit_pupils: test_exit_pupils.py
 fine_detail: test_fine_detail.py, eye/test_scattered_light.py
 human_eye: test_human_eye.py
 phase_pupil: test_phase_pupil.py
 pixel_relief: test_pixel_relief.py
+pupil_slopes: test_pupil.py
+zernike_modes: test_wavefront.py
 pupil: test_pupil.py
+pupil_rim: test_exit_pupil.py, test_exit_pupil_off_axis.py
 ray_field: point_spread/test_vector_focus.py
 refractive_index: test_refractive_index.py, test_media.py
 relief: test_relief.py

@@ -151,3 +151,22 @@ def test_an_eye_of_its_retina_is_as_long_as_it_is():
     seen = optics.psf(human.pupil, [570e-9], human.focal_length, source_angle=(angle, 0.0), dx=1e-6, shape=(257, 257))
     brightest = float(seen.x[seen.psf[0].max(axis=0).argmax()])
     assert brightest / width == pytest.approx(math.tan(angle) / (2 * math.tan(math.radians(0.5))), abs=seen.dx / width)
+
+
+def test_centered_moves_the_centroid_of_the_image_to_the_axis():
+    """Over 3 mm, the coma of the standard observer is cropped, which shifts the image by (1.2', -0.7')."""
+    places = []
+    for centered in (False, True):
+        eye = HumanEye(1.5e-3, centered=centered)
+        seen = optics.psf(eye.pupil, [570e-9], eye.focal_length, dx=2e-6, shape=(129, 129), tolerance=1e-2)
+        image = seen.psf[0] / seen.psf[0].sum()
+        places.append(np.array([image.sum(axis=0) @ seen.x, image.sum(axis=1) @ seen.y]) / eye.sensor_width(1 / 60))
+    assert places[0] == pytest.approx([1.24, -0.67], abs=0.03)
+    assert places[1] == pytest.approx([0, 0], abs=0.03)
+
+
+def test_a_wavefront_over_the_pupil_itself_is_centered_too():
+    """The mean slope of c Z_3^1 = √8 c (3ρ³ - 2ρ) cos φ over its circle is √8 c / a."""
+    eye = HumanEye(1e-3, Zernike({(3, 1): 0.2, (4, 0): 0.1}), centered=True)
+    assert eye.pupil.wavefront.modes[1, 1] == pytest.approx(-math.sqrt(8) * 0.2 / 2)
+    assert eye.pupil.wavefront.modes[1, -1] == pytest.approx(0, abs=1e-12)

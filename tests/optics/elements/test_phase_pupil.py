@@ -94,7 +94,8 @@ def test_phases_carry_derivatives():
     [
         ({"n": 1.5}, "n: must be left out, because a phase has no refractive index"),
         ({"height": np.zeros((4, 4))}, "height: must be left out, because a pupil has a phase or a relief"),
-        ({"phase": np.zeros(4)}, "must be square"),
+        ({"phase": np.zeros(4)}, r"must be \(rows, columns\)"),
+        ({"phase": np.zeros((2, 3)), "pixels": True}, "must be square"),
         ({"phase": [[math.nan]]}, "NaN or infinity"),
         ({"phase": "x"}, "phase: must be real numbers"),
         ({"pixels": 2}, "pixels = 2: must be True or False"),

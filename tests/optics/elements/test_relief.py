@@ -80,7 +80,9 @@ def test_map_converges_in_fourth_order():
     assert 3.5 < np.log2(errors[0] / errors[1]) < 5
 
 
-@pytest.mark.parametrize("samples", [np.zeros((3, 4)), np.zeros((0, 0)), np.zeros(4), np.full((4, 4), np.nan)])
+@pytest.mark.parametrize(
+    "samples", [np.zeros((3, 4, 1)), np.zeros((0, 0)), np.zeros((0, 4)), np.zeros(4), np.full((4, 4), np.nan)]
+)
 def test_bad_maps(samples):
     with pytest.raises(ValueError, match="height"):
         HeightMap(samples)
@@ -90,3 +92,19 @@ def test_bad_maps(samples):
 def test_bad_control_points(points):
     with pytest.raises(ValueError, match="control_points"):
         BSplineRelief(points)
+
+
+@pytest.mark.parametrize("shape", [(4, 9), (12, 5), (1, 6), (7, 2)])
+def test_rows_and_columns_may_differ_in_number(shape):
+    """The spline is a tensor product: it is exact for a product of polynomials that each side can represent."""
+    y, x = ((2 * np.arange(n) + 1) / n - 1 for n in shape)
+    down, across = (min(n - 1, 3) for n in shape)
+    relief = HeightMap((1 + y**down)[:, None] * (2 - x**across))
+    at_x, at_y = random_places()
+    exact = (1 + at_y**down) * (2 - at_x**across)
+    np.testing.assert_allclose(heights(relief, at_x, at_y), exact, atol=1e-12)
+    np.testing.assert_allclose(relief.on_grid(at_x), relief.height(*np.meshgrid(at_x, at_x)), atol=1e-12)
+    mirrored = HeightMap(relief.samples.T)
+    assert mirrored.bandwidth(1e-3) == pytest.approx(relief.bandwidth(1e-3))
+    assert mirrored.detail(1e-3) == pytest.approx(relief.detail(1e-3))
+    assert (relief.knots, relief.rotationally_symmetric) == (max(shape), False)

@@ -215,7 +215,7 @@ def test_derivative_by_samples():
     ("make", "message"),
     [
         (lambda: GaussianMask(0), "waist = 0"),
-        (lambda: MaskMap(np.ones((3, 4))), r"samples has shape \(3, 4\)"),
+        (lambda: MaskMap(np.ones(4)), r"samples has shape \(4,\): must be \(rows, columns\)"),
         (lambda: MaskMap(2 * np.ones((4, 4))), "samples reach 2.0"),
         (lambda: MaskMap(np.repeat([[0.0], [1.0]], 8, axis=0) @ np.ones((1, 16))), "samples jump"),
         (lambda: MaskMap([[np.nan]]), "samples holds NaN"),

@@ -255,7 +255,7 @@ def test_vector_focus_takes_wavefronts():
         (lambda: Zernike("defocus"), "coefficients_um: must be real numbers"),
         (lambda: Zernike([math.inf]), "coefficients_um holds NaN or infinity"),
         (lambda: Zernike([0.1], radius=0), "radius = 0: must be greater than 0"),
-        (lambda: WavefrontMap(np.zeros((2, 3))), r"samples has shape \(2, 3\): must be square"),
+        (lambda: WavefrontMap(np.zeros(3)), r"samples has shape \(3,\): must be \(rows, columns\)"),
         (lambda: WavefrontMap(np.full((2, 2), np.nan)), "samples holds NaN or infinity: must be finite"),
         (lambda: eye(Zernike([0.1], radius=R / 2)), "wavefront is known over a radius of 3e-05 m: must be"),
         (lambda: eye({(2, 0): 0.1}), "wavefront = .*: must be a kind of Aberration, such as Zernike"),

@@ -2,7 +2,7 @@
 
 band_choice: spectra/test_bands.py, test_sight_tolerance.py
 cell_integrals: test_cell_integrals.py
-eye: test_eye.py, test_axes.py, test_eye_derivatives.py, test_eye_robustness.py
+eye: test_eye.py, test_kept_kernels.py, test_axes.py, test_eye_derivatives.py, test_eye_robustness.py
 eye_spec: test_eye.py, test_patches.py, test_axes.py, test_vertical_field.py
 geometry: test_patches.py, test_vertical_field.py
 kernel_bank: test_kernel_bank.py, test_layer_counts.py, test_sight_tolerance.py, test_eye_robustness.py
@@ -13,6 +13,8 @@ signals: test_eye.py, test_polarization.py
 receptive_field: test_receptive_field.py, test_scattered_light.py, test_axes.py, test_eye.py, test_eye_robustness.py
 guided_field: test_guided_field.py, test_axes.py
 receptor_kernel: test_guided_field.py, test_eye.py
+retina: test_kept_kernels.py, test_receptive_field.py
 retinal_image: test_retinal_image.py
+sensor_pixels: test_torch.py
 summary: test_summary.py
 """

@@ -13,7 +13,7 @@ from optics.elements.source import PointSource
 from optics.methods.rayleigh_sommerfeld import direct_sum
 from optics.numerics.precision import precision
 from optics.ommatidia import radiation
-from optics.ommatidia.ommatidium import _coupled
+from optics.ommatidia.ommatidium import coupled_modes
 
 WAVE, D, FOCAL = 500e-9, 25e-6, 50e-6  # a fly's facet at f/2
 LENS = Pupil(D / 2, thin_lens_focal_length=1.34 * FOCAL, medium_n=1.34, object_n=1.0)
@@ -173,7 +173,7 @@ def test_fields_of_thin_rhabdoms_reach_far(monkeypatch):
     power = {}
     for radii in (12.0, radiation.FARTHEST, 400.0):
         monkeypatch.setattr(radiation, "FARTHEST", radii)
-        _coupled.cache_clear()
+        coupled_modes.cache_clear()
         power[radii] = thin.mode_power(np.zeros(1), np.zeros(1))[0, 0]
     few, chosen, many = power.values()
     # the missing part is proportional to the field at the limit, or its square

@@ -2,10 +2,12 @@
 
 arriving: test_measure_bounds.py
 batch: test_batch.py
+lens_mtf: test_lens_mtf.py
 circle_sums: test_circle_sums.py
 concentration: test_measures.py, test_measure_errors.py, test_measure_bounds.py
 strehl: test_measures.py, test_measure_errors.py, test_measure_bounds.py
 window_loss: test_measure_bounds.py
+light_batch: test_torch.py
 microvilli: test_microvilli.py
 converging: test_vector_focus.py, test_microvilli.py
 disk_sum: test_microvilli.py

@@ -110,12 +110,31 @@ def test_the_higher_of_two_lobes_is_found_between_samples():
 
 
 def test_even_windows_are_split_about_their_own_cells():
-    """The middle of 20 samples is half a sample off: finer ones must fill the same cells."""
+    """The middle of 20 samples is half a sample off: an even or odd number of finer ones must fill the same cells."""
     off, whole = focus(3e-6, 20), focus(0.25e-6, 239, centre=(-1.5e-6, -1.5e-6))
-    assert off.with_pitch(0.3e-6, "it").x[[0, -1]] == pytest.approx(
-        [off.x[0] - 1.5e-6 + 3e-6 / 22, off.x[-1] + 1.5e-6 - 3e-6 / 22]
-    )
+    for pitch, parts in ((0.3e-6, 10), (0.29e-6, 11)):
+        rim = 1.5e-6 - 1.5e-6 / parts
+        assert off.with_pitch(pitch, "it").x[[0, -1]] == pytest.approx([off.x[0] - rim, off.x[-1] + rim])
     assert off.power[0] == pytest.approx(whole.power[0], abs=3e-4)
+
+
+def test_a_strehl_ratio_looks_again_at_one_wavelength_at_a_time(monkeypatch):
+    """Finer samples are computed once per wavelength, as if each PSF were known alone."""
+    waves = [0.45e-6, 0.55e-6, 0.65e-6]
+    result = optics.psf(LENS, waves, FOCUS, dx=3e-6, shape=(9, 9))
+    asked, own = [], optics.PSFResult.recompute_on
+
+    def counted(self, window, what):
+        asked.append(len(self.requests))
+        return own(self, window, what)
+
+    monkeypatch.setattr(optics.PSFResult, "recompute_on", counted)
+    together = optics.strehl_ratio(result)
+    assert set(asked) == {1}
+    alone = [optics.strehl_ratio(result.of_wavelength(index))[0] for index in range(3)]
+    assert together == pytest.approx(alone, rel=1e-12)
+    with pytest.raises(ValueError, match="index = 3"):
+        result.of_wavelength(3)
 
 
 @pytest.mark.slow

@@ -1,5 +1,7 @@
 """Contrasts between the grid's frequencies, over all orientations, against the sums themselves."""
 
+from dataclasses import replace
+
 import drjit as dr
 import numpy as np
 import pytest
@@ -31,9 +33,11 @@ def radial_means(shares, dx, frequencies, orientations):
 def test_contrasts_between_the_grids_frequencies_are_the_pictures_own():
     """Contrasts reverse within one step of the grid if light fills its window: straight lines have an error of 0.04
     there."""
-    result = optics.psf(LENS, [WAVELENGTH], FOCUS + 1.6e-4, dx=0.8e-6, shape=(91, 91), tolerance=1e-4)
+    result = optics.psf(LENS, [WAVELENGTH], FOCUS + 1.6e-4, dx=0.5e-6, shape=(145, 145), tolerance=1e-4)
     transfer = optics.mtf(result, tolerance=1)
-    grid = transfer.fx[46:49]  # the first few
+    assert transfer.fx.size == 145  # the samples are fine enough
+    middle = transfer.fx.size // 2
+    grid = transfer.fx[middle + 1 : middle + 4]  # the first few
     f = np.linspace(0.3, 1.7, 8) * grid[0]
     exact = radial_means(transfer.shares.numpy()[0], result.dx, f, 128)
     off = np.abs(transfer.profile(f)[0] - exact).max()
@@ -202,3 +206,27 @@ def test_a_mixture_is_refused_if_the_contrasts_of_any_of_its_sums_are_uncertain(
     for weights in ([bad], [good, bad], [bad, good]):
         with pytest.raises(optics.AccuracyError, match=r"tolerance = 0\.02: contrasts have errors of up to"):
             combined_mtf(seen, np.stack(weights), 0.02)
+
+
+@pytest.mark.parametrize("again", [False, pytest.param(True, marks=pytest.mark.slow)])
+def test_a_window_that_is_too_wide_names_a_tolerance_that_works(again):
+    pupil = optics.Pupil(1e-3, thin_lens_focal_length=5e-3, wavefront=optics.Zernike({(4, 0): 0.2}))
+    seen = optics.psf(pupil, [550e-9], dx=0.7e-6, shape=(65, 65))
+    seen = seen if again else replace(seen, requests=())
+    with pytest.raises(optics.AccuracyError, match=r"; tolerance=0\.0\d+ needs fewer samples$") as refused:
+        optics.mtf(seen, tolerance=1e-3)
+    works = float(str(refused.value).rpartition("tolerance=")[2].split()[0])
+    assert works <= (0.02 if again else 0.09)
+    assert optics.mtf(seen, tolerance=works).predicted_error.max() <= works
+
+
+def test_transfer_at_any_frequency_is_that_of_the_grid():
+    pupil = optics.Pupil(30e-6, thin_lens_focal_length=2e-4, wavefront=optics.Zernike({(3, 1): 0.1}))
+    view = {"dx": 0.5e-6, "shape": (33, 41), "centre": (2e-6, -1e-6)}
+    found = optics.mtf(optics.psf(pupil, [500e-9, 600e-9], **view), tolerance=0.1)
+    rows, columns = np.array([10, 20, 25]), np.array([12, 22, 20])
+    otf = found.otf(found.fx[columns], found.fy[rows])
+    assert np.abs(otf) == pytest.approx(found.mtf[:, rows, columns], abs=1e-6)
+    assert np.angle(otf / np.exp(1j * found.phase[:, rows, columns])) == pytest.approx(0, abs=1e-5)
+    with pytest.raises(ValueError, match="fx, fy: must be finite and at most"):
+        found.otf(1e9, 0.0)

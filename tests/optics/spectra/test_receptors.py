@@ -195,3 +195,10 @@ def test_types_that_see_nothing_of_the_range_are_named():
     violet = Spectrum((300, 350, 351), (0, 1, 0))
     with pytest.raises(ValueError, match=r"range_nm = .*: type 0 has no sensitivity within it"):
         Receptors((violet, Pigment(550.0)), range_nm=(500, 700))
+
+
+def test_descriptions_of_receptors_and_spectra_are_short():
+    mosaic = receptors_of([500, 600]).arranged(((0, 1), (1, 0)))
+    assert repr(mosaic) == "<Receptors with peaks at 500, 600 nm, mosaic of 2 x 2>"
+    assert repr(receptors_of("lms")) == "<Receptors with peaks at 565, 540, 440 nm>"
+    assert repr(Spectrum((400, 500, 600), (0, 2, 1))) == ("<Spectrum of 3 values from 400 to 600 nm, peak at 500 nm>")

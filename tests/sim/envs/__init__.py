@@ -14,6 +14,8 @@ observation: test_vec_env.py, test_task_state.py, test_tasks_page.py
 follow_camera: test_env.py
 field_of_view_overlay: test_field_of_view_overlay.py, test_env.py
 retina_images: test_env.py
+ommatidia_space: test_ommatidia_in_worlds.py
+hexagon_images: test_ommatidia_in_worlds.py
 prepared_task: test_features.py, evolve/learning/test_fitness.py
 batch_task_checker: test_batch_task.py
 animals: test_encounter.py, test_parallel_env.py, test_features.py

@@ -68,7 +68,8 @@ def test_parts_and_channels_have_the_names_of_the_layout(tmp_path):
     assert [p.name() for p in parts] == ["left.spectral", "right.spectral", "left.receptors", "signals.receptors"]
     header = parts[0].header
     assert header["spectralLayoutVersion"] == "1.0"
-    assert header["emissiveUnits"] == "W.m^-2.sr^-1"
+    assert header["radianceScale"].startswith("relative: a white Lambertian")
+    assert "emissiveUnits" not in header  # a relative radiance has no unit
     assert header["compression"] == OpenEXR.ZIP_COMPRESSION
     assert set(parts[0].channels) == {
         "S0.410,000000nm", "S0.450,125000nm", "S0.546,666667nm", "S0.690,000000nm", "R", "G", "B"

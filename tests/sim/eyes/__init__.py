@@ -10,5 +10,8 @@ receptor_sums: test_sensor.py
 depth_layers: test_depth_layers.py
 allowed_error: test_allowed_error.py
 mounts: test_mounts.py
+viewing_directions: test_viewing_directions.py
+compound_eye: test_compound_eye.py, render/test_ommatidia.py
+ommatidial_sampling: test_compound_eye.py, render/test_ommatidia.py
 inside: test_mounts.py
 """

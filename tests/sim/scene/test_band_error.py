@@ -94,7 +94,7 @@ class TestLampsWithLines:
         assert few.max() > 0.05
 
     def test_samples_at_the_centres_miss_lines(self, monkeypatch):
-        monkeypatch.setattr("sim.tracing.model_scene.lights_in_bands", lambda model, spectra, eye: (spectra, []))
+        monkeypatch.setattr("sim.tracing.model_scene.lights_in_bands", lambda model, spectra, *_: (spectra, []))
         few, many = (self.signals("batched", bands) for bands in (4, 64))
         assert (few > 1.9 * many)[many > 0.1].any()
 

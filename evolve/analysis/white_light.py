@@ -1,0 +1,99 @@
+"""Measures of an eye in white daylight. Bands are weighted by the mean sensitivity of the eye's channels."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+import optics
+from evolve.config.run_config import EyeConfig
+from evolve.genome.phenotype import Phenotype
+from optics.eye.summary import noise_of
+from optics.spectra.bands import daylight
+
+__all__ = ["WhiteLight", "eye_image_quality", "polychromatic", "white_strehl"]
+
+
+@dataclass(frozen=True)
+class WhiteLight:
+    """An eye with its PSF in each band (`psf`) and in white daylight (`white`), from which all measures are computed.
+
+    Measures raise an optics.AccuracyError if they cannot be computed accurately enough.
+    """
+
+    eye: optics.Eye
+    psf: optics.PSFResult
+    white: optics.PSFResult
+
+    @classmethod
+    def from_eye(cls, eye: optics.Eye) -> WhiteLight:
+        psf = eye.psf()
+        return cls(eye, psf, polychromatic(eye, psf))
+
+    @property
+    def per_degree(self) -> float:
+        """Distance on the retina per degree near the axis [m]."""
+        return self.eye.sensor_distance * np.pi / 180
+
+    @property
+    def nyquist(self) -> float:
+        """Nyquist frequency of the receptors [1/m]."""
+        return 1 / (2 * self.eye.receptor_pitch)
+
+    @cached_property
+    def mtf(self) -> optics.MTF:
+        return optics.mtf(self.white)
+
+    @cached_property
+    def image_quality(self) -> float:
+        """`optics.image_quality` up to the Nyquist frequency of the receptors, in [0, 1]."""
+        light = self.eye.white_signal
+        return float(optics.image_quality(self.mtf, self.nyquist, light, noise_of(self.eye, light))[0])
+
+    @cached_property
+    def contrast(self) -> float:
+        """MTF at half the Nyquist frequency of the receptors."""
+        return float(self.mtf.profile(np.array([self.nyquist / 2]))[0, 0])
+
+
+def polychromatic(eye: optics.Eye, psf: optics.PSFResult) -> optics.PSFResult:
+    """Return the PSF in white daylight, (1, y, x). Bands are weighted by the mean sensitivity of the channels."""
+    return psf.mean(_of_daylight(eye))
+
+
+def white_strehl(eye: optics.Eye, psf: optics.PSFResult) -> float:
+    """Return the Strehl ratio in white daylight; NaN if the PSF's window does not contain the maximum.
+
+    The reference is the PSF of the same aperture without aberrations at any wavelength, in the same light. Its maximum
+    is higher than that at the mean wavelength, because maxima are proportional to 1/λ².
+    """
+    try:
+        return float(optics.strehl_ratio(polychromatic(eye, psf))[0])
+    except optics.AccuracyError:
+        return math.nan
+
+
+def eye_image_quality(phenotype: Phenotype, config: EyeConfig) -> float:
+    """Return `optics.image_quality` of the phenotype's eye in white daylight, in [0, 1].
+
+    The quality is averaged over frequencies up to the Nyquist frequency of the receptors. A perfect lens has contrast 1
+    at all frequencies.
+
+    Raises:
+        optics.AccuracyError: the PSF cannot be computed.
+    """
+    eye = phenotype.eyes(config).eye()
+    if eye.pupil is None:
+        return max(1 - noise_of(eye, eye.white_signal), 0.0)
+    return WhiteLight.from_eye(eye).image_quality
+
+
+def _of_daylight(eye: optics.Eye) -> NDArray[np.float64]:
+    """Return the fraction of each band in the receptors' mean response to white daylight. Fractions sum to 1."""
+    weights = eye.spectral_bands.weights.mean(axis=0) * daylight(eye.spectral_bands.wavelengths)
+    share: NDArray[np.float64] = weights / weights.sum()
+    return share

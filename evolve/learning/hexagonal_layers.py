@@ -1,0 +1,114 @@
+"""Convolution over the ommatidia of a compound eye, in two layers whose weights all places of the eye share.
+
+A unit of the first layer receives the signals of seven ommatidia: a central one and its six neighbours. A unit of the
+second layer receives the outputs of seven units of the first layer in the same way. The centres are chosen so that
+every ommatidium is in at least one neighbourhood, which leaves about a fourth of the places in each layer. The
+directions may be any set; on a hexagonal lattice the neighbourhoods are hexagons.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import torch
+from scipy.spatial import KDTree
+from torch import Tensor, nn
+
+from evolve.learning.per_eye_layers import AdaptedLinear, PerEyeLinear
+from sim.eyes.viewing_directions import unit_directions
+
+__all__ = ["HexagonalLayers", "directions_from_record", "neighbourhoods"]
+
+NEIGHBOURS = 7  # a place and its six neighbours
+WIDTHS = 8, 16  # choice: numbers of units of the two layers at each place
+
+
+class SharedAdaptation(AdaptedLinear):
+    """AdaptedLinear with the same weights and the same spread at all places, so that noise in the dark stays small."""
+
+    @torch.no_grad()
+    def adapt(self, x: Tensor) -> None:
+        """Update means and spread with further signals, (place, inputs, sample)."""
+        super().adapt(x)
+        self.variance.copy_(self.variance.mean(dim=0, keepdim=True).expand_as(self.variance))
+
+
+class HexagonalLayers(nn.Module):
+    """Map of frames (..., ommatidium, channel) to features (sample, feature).
+
+    directions: viewing directions, (ommatidium, 3)
+    channels: signals of an ommatidium
+    units: class of the units
+    outputs: number of features
+    """
+
+    def __init__(self, directions: np.ndarray, channels: int, units: type[nn.Module]) -> None:
+        super().__init__()
+        first = neighbourhoods(directions)
+        second = neighbourhoods(np.asarray(directions)[first[:, 0]])
+        for name, places in (("first", first), ("second", second)):
+            self.register_buffer(name, torch.from_numpy(places), persistent=False)
+        self.outputs = len(second) * WIDTHS[1]
+        self.convolution = SharedAdaptation(len(first), first.shape[1] * channels, WIDTHS[0], shared=True)
+        self.combination = PerEyeLinear(len(second), second.shape[1] * WIDTHS[0], WIDTHS[1], shared=True)
+        self.units = units(inplace=True)
+
+    def forward(self, frames: Tensor) -> Tensor:
+        codes = self.units(self.convolution(self._gathered(frames)))
+        features = self.units(self.combination(codes[self.second].flatten(1, 2)))
+        return features.flatten(0, 1).T
+
+    def adapt(self, frames: Tensor) -> None:
+        """Update the running means and the spread with further frames (..., ommatidium, channel)."""
+        self.convolution.adapt(self._gathered(frames))
+
+    def _gathered(self, frames: Tensor) -> Tensor:
+        """Return the signals of each neighbourhood, (place, neighbour * channel, sample)."""
+        samples = frames.flatten(0, -3).permute(1, 2, 0)
+        return samples[self.first].flatten(1, 2)
+
+
+def neighbourhoods(directions: np.ndarray) -> np.ndarray:
+    """Return indices of directions that are near to each other, (place, neighbour), with the central one first.
+
+    The six neighbours are in the order of their azimuths around the centre, from right through up to left. Every
+    direction occurs.
+    """
+    directions = np.asarray(directions, float)
+    count = min(NEIGHBOURS, len(directions))
+    tree = KDTree(directions)
+    near = tree.query(directions, k=count)[1].reshape(len(directions), count)
+    centres, covered = [], np.zeros(len(directions), bool)
+    for place in np.argsort(((directions - directions[0]) ** 2).sum(axis=1), kind="stable"):
+        if not covered[place]:
+            centres.append(int(place))
+            covered[near[place]] = True
+    return np.stack([_in_order(directions, near[centre]) for centre in centres])
+
+
+def _in_order(directions: np.ndarray, near: np.ndarray) -> np.ndarray:
+    """Return the indices `near` with all but the first in the order of their azimuths around the first direction."""
+    ahead, left, _ = directions[near[0]]
+    level = np.hypot(ahead, left)
+    rightwards = np.array([left, -ahead, 0]) / level if level > 0 else np.array([0.0, -1.0, 0.0])
+    upwards = np.cross(rightwards, directions[near[0]])
+    offsets = directions[near[1:]] - directions[near[0]]
+    # Azimuths count from -30 degrees, so that a neighbour on the right is first, even after rounding.
+    azimuths = (np.arctan2(offsets @ upwards, offsets @ rightwards) + np.pi / 6) % (2 * np.pi)
+    return np.concatenate([near[:1], near[1:][np.argsort(azimuths, kind="stable")]])
+
+
+def directions_from_record(stored: Mapping[str, Any]) -> tuple[tuple[float, ...], ...]:
+    """Return the directions in the record of a policy, none for eyes without ommatidia.
+
+    Raises:
+        ValueError: they do not fit the shape of the eyes, or are not unit vectors.
+    """
+    found = tuple(tuple(float(part) for part in way) for way in stored.get("directions", ()))
+    if len(stored["eyes"]) != (3 if found else 5) or (found and len(found) != int(stored["eyes"][1])):
+        raise ValueError(f"{len(found)} directions do not fit eyes of the shape {stored['eyes']}")
+    if found:
+        unit_directions("directions", found)
+    return found

@@ -1,0 +1,89 @@
+"""Light through several pupils, for several distances of the source and the sensor."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from optics.elements.pupil import Pupil
+from optics.elements.source import PointSource
+from optics.numerics.arguments import is_sized, items, pair
+from optics.numerics.autodiff import Array, Scalar, number
+from optics.point_spread.psf import psf
+from optics.point_spread.request import sensor_place
+
+__all__ = ["LightBatch", "is_row"]
+
+
+@dataclass(frozen=True)
+class LightBatch:
+    """Light through several pupils, for several distances. All numbers may carry derivatives.
+
+    pupils: the pupils.
+    distances: pairs of the sensor's and the source's distance [m].
+    angle: direction (x, y) [rad] of the source.
+    """
+
+    pupils: tuple[Pupil, ...]
+    distances: tuple[tuple[Scalar | None, Scalar], ...]
+    angle: tuple[Scalar, Scalar]
+
+    @classmethod
+    def from_arguments(cls, pupil: Any, sensor_distance: Any, source_distance: Any, source_angle: Any) -> LightBatch:
+        """Return the light for a pupil or a sequence of pupils, and for distances that are numbers or rows of numbers.
+
+        Raises:
+            ValueError: something else is given, a sequence is empty, or two rows differ in length.
+        """
+        several = items("pupil", pupil, Pupil, "Pupil(25e-6)") if is_row(pupil) else (pupil,)
+        items("pupil", several, Pupil, "Pupil(25e-6)")
+        rows = {"sensor_distance": sensor_distance, "source_distance": source_distance}
+        counts = {name: len(row) for name, row in rows.items() if is_row(row)}
+        for name, count in {"pupil": len(several), **counts}.items():
+            if count == 0:
+                raise ValueError(f"{name} is empty: must hold at least one")
+        if len(set(counts.values())) > 1:
+            raise ValueError(
+                f"sensor_distance has {counts['sensor_distance']} entries and source_distance "
+                f"{counts['source_distance']}: must be as many, because they are used pairwise"
+            )
+        count = max(counts.values(), default=1)
+        sensors, sources = (tuple(row) if name in counts else (row,) * count for name, row in rows.items())
+        angle = pair("source_angle", source_angle, "angles (x, y) [rad]")
+        for source in sources:
+            PointSource(source, angle)
+        return cls(several, tuple(zip(sensors, sources, strict=True)), angle)
+
+    def images(self, wavelengths: np.ndarray, view: Mapping[str, Any]) -> Array:
+        """Return `optics.psf` as a Dr.Jit tensor (pupil, distance, wavelength, y, x) with derivatives.
+
+        view: arguments of `optics.psf` for the window, the tolerance and the method.
+        """
+        import drjit as dr
+
+        found = [
+            psf(pupil, wavelengths, sensor, source, self.angle, **view).tensor
+            for pupil in self.pupils
+            for sensor, source in self.distances
+        ]
+        flat: Array = dr.concat([tensor.array for tensor in found])
+        return type(found[0])(flat, (len(self.pupils), len(self.distances), *found[0].shape))
+
+    def cutoff(self, wavelengths: np.ndarray) -> float:
+        """Return the highest frequency [1/m] of all intensities; see `PSFResult.cutoff`."""
+        slopes = [
+            1 / math.hypot(1, number(sensor_place(pupil, sensor, source)) / pupil.radius)
+            for pupil in self.pupils
+            for sensor, source in self.distances
+        ]
+        waves = [pupil.index_behind(float(at)) / float(at) for pupil in self.pupils for at in wavelengths]
+        return 2 * max(slopes) * max(waves)
+
+
+def is_row(value: Any) -> bool:
+    """Return whether `value` is a sequence or an array with entries, as opposed to a number."""
+    return is_sized(value) and not isinstance(value, str)

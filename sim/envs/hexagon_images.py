@@ -1,0 +1,93 @@
+"""Signals of compound eyes as images for human viewers: a map of the visual field in which ommatidia are hexagons."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+from scipy.spatial import KDTree
+
+from sim.envs.retina_images import BETWEEN, GAP, SIZE, hues_of, shares_of
+from sim.eyes.compound_eye import CompoundEye
+from sim.scene.color import encode_srgb
+
+RIM = 0.93  # choice: radius of a drawn hexagon, relative to a hexagon that touches its neighbours
+OUTER = 0.95  # choice: largest radius of a hexagon without neighbours on all sides, relative to the corner's radius
+ALONE = 0.05  # choice: radius [rad] of the hexagon of a single ommatidium
+
+
+def hexagon_map(frame: np.ndarray, eye: CompoundEye) -> np.ndarray:
+    """Return an sRGB image (y, x, 3) uint8 of a frame of signals (ommatidium, channel), an image for each mount.
+
+    The map is Hammer's equal-area projection of the sphere: ahead is in the middle, left is on the left, and up is at
+    the top. It shows the part of the sphere that has ommatidia. A pixel has the colour of the ommatidium with the
+    nearest direction, which gives hexagons on a hexagonal lattice. Colours show receptor types as for other eyes
+    (`retina_images.side_by_side`), and white in full daylight is white.
+    """
+    linear = np.einsum("enc,nck->enk", frame.reshape(-1, len(eye), frame.shape[-1]), _palette(eye))
+    colours = np.rint(255 * encode_srgb(np.clip(linear, 0, 1))).astype(np.uint8)
+    background = np.full((len(colours), 1, 3), BETWEEN, np.uint8)
+    numbers = _numbers(eye)
+    images = np.concatenate([colours, background], axis=1)[:, numbers]
+    gap = np.full((len(numbers), GAP, 3), BETWEEN, np.uint8)
+    return np.concatenate([part for image in images for part in (gap, image)][1:], axis=1)
+
+
+def _palette(eye: CompoundEye) -> np.ndarray:
+    """Linear sRGB of each signal, (ommatidium, channel, 3)."""
+    hues = hues_of(eye.receptors)
+    types = np.arange(eye.channels)[None] if eye.types is None else eye.types
+    mine = hues[types]
+    shares = mine if eye.channels == 1 else np.stack([shares_of(one) for one in mine])
+    return np.broadcast_to(shares, (len(eye), eye.channels, 3))
+
+
+@lru_cache(maxsize=8)
+def _numbers(eye: CompoundEye) -> np.ndarray:
+    """Return the number of each pixel's ommatidium, (y, x); len(eye) between hexagons."""
+    tree = KDTree(eye.directions)
+    two = min(2, len(eye))
+    apart = tree.query(eye.directions, k=[two])[0][:, 0] if two == 2 else np.array([ALONE * np.sqrt(3)])
+    corner = apart / np.sqrt(3)  # a hexagon's circumscribed circle
+    places = _projected(eye.directions)
+    low, high = places.min(axis=0) - 2 * corner.max(), places.max(axis=0) + 2 * corner.max()
+    scale = min(SIZE[0] / (high[1] - low[1]), SIZE[1] / (high[0] - low[0]))
+    width, height = (max(1, round(side * scale)) for side in high - low)
+    x = low[0] + (np.arange(width) + 0.5) / scale
+    y = high[1] - (np.arange(height) + 0.5) / scale
+    ways, inside = _unprojected(*np.meshgrid(x, y))
+    distance, number = tree.query(ways)
+    margin = _margin(eye.directions, tree, ways, number)
+    seen = inside & (distance <= OUTER * corner[number]) & (margin >= 1 - RIM)
+    return np.where(seen, number, len(eye))
+
+
+def _margin(directions: np.ndarray, tree: KDTree, ways: np.ndarray, number: np.ndarray) -> np.ndarray:
+    """Return each pixel's distance from the border to the next ommatidium, relative to half their distance."""
+    if len(directions) == 1:
+        return np.ones(number.shape)
+    second = tree.query(ways, k=[2])[1][..., 0]
+    step = directions[second] - directions[number]
+    square = (step**2).sum(axis=-1)
+    found: np.ndarray = 1 - 2 * ((ways - directions[number]) * step).sum(axis=-1) / square
+    return found
+
+
+def _projected(directions: np.ndarray) -> np.ndarray:
+    """Return Hammer's projection (right, up) of directions (ahead, left, up)."""
+    longitude = np.arctan2(-directions[:, 1], directions[:, 0])
+    sine = np.clip(directions[:, 2], -1, 1)
+    cosine = np.sqrt(1 - sine**2)
+    root = np.sqrt(2 / (1 + cosine * np.cos(longitude / 2)))
+    return np.stack([2 * root * cosine * np.sin(longitude / 2), root * sine], axis=-1)
+
+
+def _unprojected(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the directions (..., 3) of points of Hammer's projection, and a mask of the points on the map."""
+    square = (x / 4) ** 2 + (y / 2) ** 2
+    inside = square <= 0.5
+    z = np.sqrt(np.maximum(1 - square, 0))
+    longitude = 2 * np.arctan2(z * x, 2 * (2 * z * z - 1))
+    sine = np.clip(z * y, -1, 1)
+    cosine = np.sqrt(1 - sine**2)
+    return np.stack([cosine * np.cos(longitude), -cosine * np.sin(longitude), sine], axis=-1), inside

@@ -1,0 +1,238 @@
+"""Compound eyes: ommatidia with any viewing directions, alike or varying over the eye."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any, TypeAlias
+
+import numpy as np
+
+import optics
+from optics.numerics.arguments import in_range, of_kind, positive, reals, shown
+from optics.numerics.read_only import read_only
+from optics.ommatidia.acceptance import AcceptanceFunction, acceptance_function
+from optics.spectra.receptors import receptors_of
+from optics.spectra.spectrum import daylight
+from sim.eyes.mounts import Mount
+from sim.eyes.viewing_directions import unit_directions
+
+EXAMPLE = "optics.Ommatidium(optics.FacetLens(25e-6, 14e-6), optics.Waveguide(2e-6))"
+TOUCHING = 1e-3  # facets may overlap by this fraction of their diameters, because measured directions are rounded
+SAME = 1e-6  # directions that differ by less than this angle [rad] are equal
+
+
+@dataclass(frozen=True, eq=False)
+class CompoundEye:
+    """A compound eye of ommatidia, each a facet lens in front of a rhabdom. It is used like `optics.Eye` in a task.
+
+    Every ommatidium collects light with its acceptance function, which wave optics computes for each band
+    (`optics.acceptance_function`). Signals are normalised: a white surface in full daylight that fills the field of an
+    ommatidium gives 1. Observations have the axes (memory, ommatidium, channel). If an eye has several mounts, the
+    ommatidia of the first mount come first.
+
+    directions: viewing directions in the frame of the mount: unit vectors (ahead, left, up), (n, 3), or (azimuth to the
+        left, elevation upwards) in degrees, (n, 2). See `sim.hexagonal_patch` and `sim.whole_head`. The field is always
+        converted to unit vectors.
+    ommatidium: an `optics.Ommatidium` for all directions, or a sequence with one for each direction. Ommatidia that are
+        the same object share an acceptance function, so zones with equal ommatidia are prepared faster.
+    receptors: receptor types, see `optics.Eye`, without a mosaic
+    types: type of the receptors in each ommatidium, indices into `receptors`, (n, channel). One column gives one
+        receptor for each ommatidium, a mosaic. Three columns can describe R1-6, R7 and R8 of a fly, whose R7 and R8
+        have different pigments in pale and yellow ommatidia. None: every ommatidium has receptors of all types.
+    bands: number of spectral bands, 1 to 64
+    noise_sigma: standard deviation of a receptor's Gaussian noise, in the unit of signals
+    photon_budget: an `optics.PhotonBudget`. Photons are counted in each ommatidium before its signal is normalised. A
+        wide facet therefore has less shot noise than a narrow one with the same field. None: no shot noise
+    radius: radius [m] of the eye's surface, a sphere around the mount on which the facets lie. Facets must not overlap.
+        None: all facets are at the mount, and their diameters are not compared with their distances
+
+    Raises:
+        ValueError: an invalid argument; no ommatidium or more than 1,000,000; two equal directions; or facets that
+            overlap.
+    """
+
+    directions: Any
+    ommatidium: optics.Ommatidium | Sequence[optics.Ommatidium]
+    receptors: Any = "rgb"
+    types: Any = None
+    bands: int = 4
+    noise_sigma: float = 0.01
+    photon_budget: optics.PhotonBudget | None = None
+    radius: float | None = None
+    spectral_bands: optics.SpectralBands = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        def put(name: str, value: Any) -> None:
+            object.__setattr__(self, name, value)
+
+        put("directions", read_only(unit_directions("CompoundEye: directions", self.directions)))
+        if not isinstance(self.ommatidium, optics.Ommatidium):
+            put("ommatidium", self._one_for_each(self.ommatidium))
+        put("receptors", receptors_of(self.receptors))
+        if self.receptors.mosaic is not None:
+            raise ValueError("CompoundEye: receptors have a mosaic: must have none, set types instead")
+        put("types", self._checked_types())
+        in_range("noise_sigma", self.noise_sigma, 0, 1e6)
+        if self.photon_budget is not None:
+            of_kind("photon_budget", self.photon_budget, optics.PhotonBudget, "PhotonBudget(), or None")
+        put("spectral_bands", optics.SpectralBands.uniform(self.bands, self.receptors))
+        put("bands", len(self.spectral_bands.wavelengths))
+        if self.radius is not None:
+            positive("radius", self.radius)
+        self._refuse_overlap()
+
+    def __len__(self) -> int:
+        return len(self.directions)
+
+    def with_mirror_image(self) -> CompoundEye:
+        """Return this eye together with its mirror image on the other side of the body.
+
+        The ommatidia of this eye come first, followed by their mirror images in the same order.
+        """
+        both = np.concatenate([self.directions, self.directions * [1, -1, 1]])
+        each = self.ommatidium if isinstance(self.ommatidium, optics.Ommatidium) else (*self.ommatidium,) * 2
+        types = None if self.types is None else np.concatenate([self.types, self.types])
+        return replace(self, directions=both, ommatidium=each, types=types)
+
+    def directions_on(self, mounts: Sequence[Mount]) -> np.ndarray:
+        """Return the viewing directions on these mounts, unit vectors (ommatidia of all mounts, 3).
+
+        They are relative to the forward, left and upward directions of the object that carries the mounts.
+        """
+        ahead, left, up = self.directions.T
+        in_eye = np.stack([-left, up, ahead], axis=-1)
+        return np.concatenate([in_eye @ mount.local("body")[1].T for mount in mounts])
+
+    @property
+    def resolution(self) -> tuple[int, int]:
+        """Receptors as one row: (1, number of ommatidia)."""
+        return 1, len(self)
+
+    @property
+    def channels(self) -> int:
+        """Number of signals of an ommatidium."""
+        return len(self.receptors.types) if self.types is None else int(self.types.shape[1])
+
+    @property
+    def mosaic(self) -> np.ndarray | None:
+        """Type of each signal, (channel, ommatidium); None if every ommatidium has all types in order."""
+        return None if self.types is None else self.types.T
+
+    @property
+    def fov_deg(self) -> float:
+        """Horizontal angle [degrees] around straight ahead that contains all viewing directions, at most 360."""
+        return float(2 * np.degrees(np.abs(np.arctan2(self.directions[:, 1], self.directions[:, 0])).max()))
+
+    @property
+    def throughput(self) -> float:
+        """Signal of a white surface, 1."""
+        return 1.0
+
+    aperture_throughput = white_signal = throughput
+
+    @cached_property
+    def kinds(self) -> tuple[tuple[optics.Ommatidium, ...], np.ndarray]:
+        """Different ommatidia, and the index of each direction's ommatidium among them, (n,)."""
+        if isinstance(self.ommatidium, optics.Ommatidium):
+            return (self.ommatidium,), np.zeros(len(self), int)
+        numbers: dict[optics.Ommatidium, int] = {}
+        index = [numbers.setdefault(one, len(numbers)) for one in self.ommatidium]
+        return tuple(numbers), np.array(index)
+
+    def acceptance(self, kind: int) -> AcceptanceFunction:
+        """Return the acceptance function of one of `kinds`, for the eye's bands."""
+        return acceptance_function(self.kinds[0][kind], self.spectral_bands.wavelengths)
+
+    @cached_property
+    def solid_angles(self) -> np.ndarray:
+        """Integral of each ommatidium's acceptance function [sr], (ommatidium, band)."""
+        kinds, index = self.kinds
+        found: np.ndarray = np.stack([self.acceptance(k).integrals for k in range(len(kinds))])[index]
+        return found
+
+    @property
+    def white(self) -> np.ndarray:
+        """Acceptance of white light by each type [sr], Σ_b weights[type, b] daylight_b Ω_b, (type, ommatidium)."""
+        bands = self.spectral_bands
+        found: np.ndarray = (bands.weights * daylight(bands.wavelengths)) @ self.solid_angles.T
+        return found
+
+    @property
+    def photons(self) -> np.ndarray | None:
+        """Absorbed photons for a signal of 1, (channel, ommatidium); None without a photon budget.
+
+        The étendue is the facet's area times the acceptance of white light.
+        """
+        if self.photon_budget is None:
+            return None
+        kinds, index = self.kinds
+        area = np.array([kind.pupil.area for kind in kinds])[index]
+        per_etendue = self.photon_budget.photons(self.spectral_bands, 1.0)
+        found: np.ndarray = per_etendue[:, None] * area * self.white
+        return found if self.types is None else np.take_along_axis(found, self.types.T, axis=0)
+
+    def as_frames(self, signals: np.ndarray) -> np.ndarray:
+        """Return a renderer's signals (..., eye, channel, 1, ommatidium) as (..., ommatidia of all eyes, channel)."""
+        frames = np.swapaxes(signals[..., 0, :], -1, -2)
+        return np.ascontiguousarray(frames.reshape(*frames.shape[:-3], -1, frames.shape[-1]))
+
+    def _one_for_each(self, given: Any) -> tuple[optics.Ommatidium, ...]:
+        where = "CompoundEye: ommatidium"
+        if not isinstance(given, Sequence) or len(given) != len(self):
+            raise ValueError(
+                f"{where} = {shown(given)}: must be an Ommatidium, or one for each of {len(self)} directions"
+            )
+        for number, one in enumerate(given):
+            of_kind(f"{where}[{number}]", one, optics.Ommatidium, EXAMPLE)
+        return tuple(given)
+
+    def _checked_types(self) -> np.ndarray | None:
+        if self.types is None:
+            return None
+        given, count = reals("CompoundEye: types", self.types), len(self.receptors.types)
+        fits = given.ndim == 2 and len(given) == len(self) and given.shape[1] >= 1
+        if not fits or not np.isin(given, np.arange(count)).all():
+            what = f"({len(self)}, channel) of indices from 0 to {count - 1}"
+            raise ValueError(f"CompoundEye: types has shape {given.shape}: must be an array {what}")
+        return read_only(given.astype(int))
+
+    def _refuse_overlap(self) -> None:
+        """Refuse equal directions and, on a surface with a radius, facets closer than the mean of their diameters."""
+        from scipy.spatial import KDTree
+
+        if len(self) == 1:
+            return
+        kinds, index = self.kinds
+        # Diameter across flats of a hexagon with the facet's area.
+        diameters = np.array([(2 * kind.pupil.area / 3**0.5) ** 0.5 for kind in kinds])
+        apart = SAME if self.radius is None else max(SAME, (1 - TOUCHING) * float(diameters.max()) / self.radius)
+        pairs = KDTree(self.directions).query_pairs(apart, output_type="ndarray")
+        if not len(pairs):
+            return
+        chords = np.linalg.norm(self.directions[pairs[:, 0]] - self.directions[pairs[:, 1]], axis=1)
+        needed = np.full(len(pairs), SAME)
+        if self.radius is not None:
+            needed = np.maximum(needed, (1 - TOUCHING) * diameters[index[pairs]].mean(axis=1) / self.radius)
+        for (one, other), chord, least in zip(pairs, chords, needed, strict=True):
+            if chord < least:
+                gap = "in the same direction"
+                if self.radius is not None:
+                    gap = f"{chord * self.radius:.3g} m apart, less than their diameter, for radius = {self.radius:g}"
+                raise ValueError(f"CompoundEye: facets {one} and {other} overlap: they are {gap}")
+
+
+WorldEye: TypeAlias = optics.Eye | CompoundEye  # eyes that worlds render
+
+
+def world_eye(name: str, value: Any) -> WorldEye:
+    """Return `value` if it is an eye that worlds render.
+
+    Raises:
+        ValueError: it is not.
+    """
+    if isinstance(value, CompoundEye):
+        return value
+    eye: optics.Eye = of_kind(name, value, optics.Eye, "optics.Eye(resolution=(15, 15)), or a sim.CompoundEye")
+    return eye

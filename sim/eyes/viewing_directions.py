@@ -1,0 +1,147 @@
+"""Viewing directions of ommatidia: hexagonal patches, whole heads, and measured directions.
+
+Directions are unit vectors (ahead, left, up) in the frame of a `sim.Mount`, with all its angles 0.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+import optics
+from optics.numerics.arguments import finite, in_range, is_sized, positive, reals, whole
+
+MOST_OMMATIDIA = 10**6  # chosen limit; the largest eyes of dragonflies have 30,000
+OFF_UNIT = 1e-3  # largest deviation of a vector's length from 1
+MOST_PARTS = 300
+
+
+def unit_directions(name: str, given: Any) -> np.ndarray:
+    """Return viewing directions as unit vectors (n, 3).
+
+    given: unit vectors (ahead, left, up), (n, 3), or angles [degrees] (azimuth to the left, elevation upwards), (n, 2)
+
+    Raises:
+        ValueError: no direction, more than MOST_OMMATIDIA, another shape, values that are not finite, an elevation
+            beyond 90 degrees, or vectors whose length differs from 1 by more than OFF_UNIT.
+    """
+    if is_sized(given) and len(given) > MOST_OMMATIDIA:
+        raise ValueError(f"{name}: {len(given)} ommatidia: must be at most {MOST_OMMATIDIA}")
+    found = reals(name, given)
+    if found.size == 0:
+        raise ValueError(f"{name}: no ommatidium: must contain at least one direction")
+    if found.ndim != 2 or found.shape[1] not in (2, 3):
+        raise ValueError(
+            f"{name} has shape {found.shape}: must be unit vectors (n, 3), or (azimuth, elevation) in degrees (n, 2)"
+        )
+    if not np.isfinite(found).all():
+        bad = int(np.flatnonzero(~np.isfinite(found).all(axis=1))[0])
+        raise ValueError(f"{name}[{bad}] = {found[bad].tolist()}: must be finite")
+    return _from_angles(name, found) if found.shape[1] == 2 else _normalized(name, found)
+
+
+def _from_angles(name: str, degrees: np.ndarray) -> np.ndarray:
+    steepest = int(np.abs(degrees[:, 1]).argmax())
+    if abs(degrees[steepest, 1]) > 90:
+        raise ValueError(f"{name}[{steepest}]: elevation = {degrees[steepest, 1]:g} degrees: must lie in [-90, 90]")
+    azimuth, elevation = np.radians(degrees).T
+    return np.stack([np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)], -1)
+
+
+def _normalized(name: str, vectors: np.ndarray) -> np.ndarray:
+    lengths = np.linalg.norm(vectors, axis=1)
+    worst = int(np.abs(lengths - 1).argmax())
+    if abs(lengths[worst] - 1) > OFF_UNIT:
+        raise ValueError(f"{name}[{worst}] has length {lengths[worst]:g}: must be a unit vector, within {OFF_UNIT:g}")
+    found: np.ndarray = vectors / lengths[:, None]
+    return found
+
+
+def facet_frames(directions: np.ndarray) -> np.ndarray:
+    """Return the frames of facets in the eye's frame (right, up, ahead), (n, 3, 3), with columns (right, up, axis).
+
+    A facet is turned like a `sim.Mount` with the same azimuth and elevation: its x axis is horizontal.
+    """
+    ahead, left, up = directions.T
+    level = np.hypot(ahead, left)
+    safe = np.where(level > 0, level, 1)
+    cos, sin = np.where(level > 0, ahead / safe, 1.0), np.where(level > 0, left / safe, 0.0)
+    top = np.stack([up * sin, level, -up * cos], axis=-1)
+    rightwards = np.stack([cos, np.zeros_like(cos), sin], axis=-1)
+    return np.stack([rightwards, top, np.stack([-left, up, ahead], axis=-1)], axis=-1)
+
+
+def hexagonal_patch(
+    rings: int, interommatidial_deg: float, azimuth_deg: float = 0.0, elevation_deg: float = 0.0
+) -> np.ndarray:
+    """Return viewing directions in hexagonal rings around a direction, unit vectors (n, 3).
+
+    15 rings have 721 ommatidia, as an eye of *Drosophila*. The hexagonal lattice is mapped to the sphere by Lambert's
+    equal-area projection, so every ommatidium has the same solid angle.
+
+    rings: number of rings around the central ommatidium, 0 to 60
+    interommatidial_deg: angle between neighbours at the centre [degrees]
+    azimuth_deg, elevation_deg: direction of the centre [degrees], to the left and upwards
+
+    Raises:
+        ValueError: an argument is out of range, or the lattice does not fit on a sphere.
+    """
+    right, up = optics.hexagonal_directions(rings, interommatidial_deg).T
+    radius = np.hypot(right, up)
+    if radius.max() >= 2:
+        raise ValueError(
+            f"interommatidial_deg = {interommatidial_deg:g}: must be smaller, {rings} rings do not fit on a sphere"
+        )
+    angle, turn = 2 * np.arcsin(radius / 2), np.arctan2(up, right)
+    local = np.stack([np.sin(angle) * np.cos(turn), np.sin(angle) * np.sin(turn), np.cos(angle)], axis=-1)
+    centre = _from_angles(
+        "centre", np.array([[finite("azimuth_deg", azimuth_deg), in_range("elevation_deg", elevation_deg, -90, 90)]])
+    )
+    found = local @ facet_frames(centre)[0].T
+    return np.stack([found[:, 2], -found[:, 0], found[:, 1]], axis=-1)
+
+
+def whole_head(interommatidial_deg: float) -> np.ndarray:
+    """Return viewing directions all around a head, unit vectors (n, 3).
+
+    They are the 10 f² + 2 nodes of an icosahedron whose edges are divided into f parts. All but twelve of them have six
+    neighbours. The number f is the smallest for which the mean angle between neighbours is at most the given one; 5.8
+    degrees give 1442 ommatidia.
+
+    interommatidial_deg: largest mean angle between neighbours [degrees]
+
+    Raises:
+        ValueError: an angle that is not positive, or below 0.22 degrees.
+    """
+    apart = math.radians(positive("interommatidial_deg", interommatidial_deg, "degrees"))
+    # Mean angle if the cells of all nodes, hexagons of area (√3/2) Δφ², cover the sphere.
+    nodes = 8 * math.pi / math.sqrt(3) / apart**2
+    parts = whole("parts of an edge", max(1, math.ceil(math.sqrt(max(nodes - 2, 0) / 10))), 1, MOST_PARTS)
+    corners, faces = _icosahedron()
+    i, j = (axis.ravel() for axis in np.meshgrid(np.arange(parts + 1), np.arange(parts + 1)))
+    i, j = i[i + j <= parts], j[i + j <= parts]
+    shares = np.stack([i, j, parts - i - j], axis=-1) / parts
+    points = np.concatenate([shares @ corners[face] for face in faces])
+    points /= np.linalg.norm(points, axis=1, keepdims=True)
+    _, first = np.unique(np.round(points, 9) + 0.0, axis=0, return_index=True)
+    found: np.ndarray = points[np.sort(first)]
+    return found
+
+
+def _icosahedron() -> tuple[np.ndarray, np.ndarray]:
+    """Return the corners (12, 3) of an icosahedron, unit vectors, and its faces (20, 3)."""
+    golden = (1 + math.sqrt(5)) / 2
+    corners = np.array(
+        [np.roll([0.0, y, z * golden], turn) for turn in range(3) for y in (-1, 1) for z in (-1, 1)]
+    ) / math.hypot(1, golden)
+    near = np.abs(corners @ corners.T - 1 / math.sqrt(5)) < 1e-9
+    faces = [
+        (a, b, c)
+        for a in range(12)
+        for b in range(a + 1, 12)
+        for c in range(b + 1, 12)
+        if near[a, b] and near[b, c] and near[a, c]
+    ]
+    return corners, np.array(faces)
