@@ -24,7 +24,7 @@ from optics.numerics.precision import precision
 
 __all__ = ["window_error"]
 
-CAUTION = 3.0  # choice: safety factor on the estimated error; see test_window_sampling.py
+CAUTION = 3.5  # choice: safety factor on the estimated error; see test_window_sampling.py
 ACROSS = 16  # choice: number of rows and of columns in which the check computes the PSF
 SHARES = (0.3, 0.3, 0.3, 0.1)  # choices: weights of the probabilities with which these are drawn, see `_drawn`
 INTERPOLATED = 2e-4  # choice: error of the interpolated kernel of the check

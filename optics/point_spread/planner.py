@@ -147,8 +147,7 @@ def choose(problem: Problem, method: str = "auto", most_seconds: float = MOST_SE
         raise ValueError(f"method = {method!r}: must be 'auto', 'exact' or one of {', '.join(METHODS)}")
     _check_dtype(problem)
     check_window(problem.window, problem.dtype)
-    allowed = _model_tolerance(problem) if method == "auto" else math.inf
-    outputs = math.prod(problem.window.shape)
+    allowed, outputs = _model_tolerance(problem) if method == "auto" else math.inf, math.prod(problem.window.shape)
     known = FOR_PIXELS if problem.divided else METHODS
     weighed: dict[str, Sampling] = {}
     best: Sampling | None = None
@@ -171,7 +170,7 @@ def choose(problem: Problem, method: str = "auto", most_seconds: float = MOST_SE
         in_memory = [_seconds(each, problem) for each in candidates if _bytes(each, problem) <= MOST_BYTES]
         raise AccuracyError(_refusal(problem, candidates, most_seconds, method), seconds=min(in_memory, default=None))
     in_order = {name: weighed[name] for name in asked if name in weighed}
-    return _plan(problem, best, in_order, most_seconds), best
+    return _plan(problem, best, in_order, most_seconds, len(asked) > 1), best
 
 
 def _check_dtype(problem: Problem) -> None:
@@ -207,7 +206,7 @@ def _within(option: Sampling, problem: Problem, most_seconds: float) -> bool:
     return _bytes(option, problem) <= MOST_BYTES and _seconds(option, problem) <= most_seconds
 
 
-def _plan(problem: Problem, best: Sampling, weighed: dict[str, Sampling], most_seconds: float) -> Plan:
+def _plan(problem: Problem, best: Sampling, weighed: dict[str, Sampling], most_seconds: float, auto: bool) -> Plan:
     options = [
         Option(
             name,
@@ -221,7 +220,7 @@ def _plan(problem: Problem, best: Sampling, weighed: dict[str, Sampling], most_s
     why = (
         f"Fresnel number {problem.fresnel_number:.3g}, sine of the steepest ray kept "
         f"{problem.band() * problem.wavelength:.2g}; "
-        + ("cheapest method that meets the tolerance" if len(weighed) > 1 else "requested")
+        + ("cheapest method that meets the tolerance" if auto else "requested")
         + _why_for_derivatives(problem, best)
     )
     error = _sampling_error(problem) + best.model_error
