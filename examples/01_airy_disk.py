@@ -7,7 +7,7 @@ import argparse
 
 import numpy as np
 
-import optics
+from rhabdom import optics
 
 WAVELENGTH, FOCAL_LENGTH, RADIUS = 550e-9, 240e-6, 30e-6
 

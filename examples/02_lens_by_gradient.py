@@ -15,7 +15,7 @@ import time
 import numpy as np
 from scipy.optimize import minimize
 
-import optics
+from rhabdom import optics
 
 WAVELENGTH, FOCAL_LENGTH, F_NUMBER, INDEX = 550e-9, 240e-6, 4, 1.5
 RADIUS = FOCAL_LENGTH / (2 * F_NUMBER)

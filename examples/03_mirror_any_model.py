@@ -9,10 +9,10 @@ import warnings
 import mujoco
 import numpy as np
 
-import sim
-from sim.scene.cameras import Viewpoint
-from sim.scene.color import preview
-from sim.scene.mirror import MirrorWarning
+from rhabdom import sim
+from rhabdom.sim.scene.cameras import Viewpoint
+from rhabdom.sim.scene.color import preview
+from rhabdom.sim.scene.mirror import MirrorWarning
 
 MODEL = """
 <mujoco>
@@ -72,7 +72,7 @@ for geom in np.unique(ids[ids >= 0]):
 if options.out:
     from matplotlib.image import imsave
 
-    from sim.scene.color import encode_srgb
+    from rhabdom.sim.scene.color import encode_srgb
 
     imsave(options.out, encode_srgb(np.clip(preview(radiance, wavelengths * 1e9), 0, 1)))
     print(f"drawn to         {options.out}")

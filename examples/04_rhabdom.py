@@ -7,7 +7,7 @@ import argparse
 
 import numpy as np
 
-import optics
+from rhabdom import optics
 
 WAVELENGTH = 400e-9
 facet = optics.FacetLens(diameter=25e-6, radius_front=22.5e-6, medium_n=1.34)

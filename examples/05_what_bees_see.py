@@ -7,9 +7,8 @@ import argparse
 
 import numpy as np
 
-import optics
-import sim
-from sim.worlds.foraging import ULTRAVIOLET, petal
+from rhabdom import optics, sim
+from rhabdom.sim.worlds.foraging import ULTRAVIOLET, petal
 
 SHOWN = {"rgb": "camera", "lms": "human", "goldfish": "goldfish", "honeybee": "bee"}
 

@@ -9,8 +9,7 @@ import argparse
 
 import numpy as np
 
-import optics
-import sim
+from rhabdom import optics, sim
 
 WORLD = """
 <mujoco>

@@ -16,7 +16,7 @@ import gymnasium
 import mujoco
 import numpy as np
 
-import sim
+from rhabdom import sim
 
 ANT = Path(gymnasium.__file__).parent / "envs/mujoco/assets/ant.xml"
 SIDES = np.array([1, 1, -1, -1])  # left or right, in the model's order of legs

@@ -8,7 +8,7 @@ arrangement. Run as a script, the file prints how often carts with random action
 
 import numpy as np
 
-import sim
+from rhabdom import sim
 
 
 class FindBall(sim.Task):

@@ -8,7 +8,7 @@ methods.
 
 import numpy as np
 
-import sim
+from rhabdom import sim
 
 
 class FindBalls(sim.BatchTask):

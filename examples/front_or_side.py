@@ -15,8 +15,7 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-import optics
-import sim
+from rhabdom import optics, sim
 
 PREY_SPEED, PREDATOR_SPEED, TURN = 0.6, 1.0, 2.0  # m/s, m/s, rad/s
 NEAR, AWAY, CAUGHT = 2.0, 30.0, 0.4  # [m] initial distance of the predator if it comes, if not; distance of capture
@@ -141,9 +140,9 @@ def seeing(task):
 
 def lived(world, placement_range_deg, seed):
     """Results, as in `always_ahead`, of prey trained as in a run, with this angle between its eyes."""
-    import evolve
-    from evolve.config.assemble import assemble
-    from evolve.learning.fitness import evaluate
+    from rhabdom import evolve
+    from rhabdom.evolve.config.assemble import assemble
+    from rhabdom.evolve.learning.fitness import evaluate
 
     here = Path(__file__)
     start = f"genome.placement_range_deg.start={placement_range_deg}"

@@ -12,6 +12,7 @@ point_spread  psf and plan: choice of the method and check of its result
 propagation   propagation of sampled fields between planes
 eye           Eye: signals of its receptors
 ommatidia     Ommatidium: facet lenses and rhabdoms as waveguides
+animals       eyes of honeybees, flies, fish, humans and other animals
 torch         psf as a function in a PyTorch graph
 """
 
@@ -25,6 +26,8 @@ _CONTENTS = {
     "AppositionEye": "ommatidia.mosaic",
     "BSplineRelief": "elements.relief",
     "BackendError": "numerics.backend",
+    "BallLens": "elements.ball_lens",
+    "BandMedium": "elements.turbid_medium",
     "Bitmap": "apertures.bitmap",
     "Circle": "apertures.circular",
     "Combined": "apertures.combined",
@@ -43,6 +46,7 @@ _CONTENTS = {
     "MTF": "point_spread.modulation_transfer",
     "MaskMap": "elements.transmittance",
     "Microvilli": "point_spread.microvilli",
+    "Misaligned": "propagation.misalignment",
     "Mode": "ommatidia.waveguide",
     "Oblong": "apertures.shapes",
     "Ommatidium": "ommatidia.ommatidium",
@@ -56,6 +60,7 @@ _CONTENTS = {
     "Polygon": "apertures.polygonal",
     "PropagationResult": "propagation.propagate",
     "Pupil": "elements.pupil",
+    "ReceptorDynamics": "spectra.receptor_dynamics",
     "Receptors": "spectra.receptors",
     "RefractiveIndex": "elements.refractive_index",
     "Relief": "elements.relief",
@@ -67,23 +72,32 @@ _CONTENTS = {
     "Spider": "apertures.shapes",
     "StackResult": "propagation.system",
     "ThroughFocus": "point_spread.through_focus",
+    "TurbidMedium": "elements.turbid_medium",
     "VectorFocus": "point_spread.converging",
     "WavefrontMap": "elements.wavefront",
     "Waveguide": "ommatidia.waveguide",
     "WhitePSF": "point_spread.white",
     "Zernike": "elements.wavefront",
     "acceptance_function": "ommatidia.acceptance",
+    "anatomical_acuity": "eye.acuity",
     "difference": "apertures.combined",
     "encircled_energy": "point_spread.concentration",
+    "eye_parameter": "eye.acuity",
+    "fog": "elements.turbid_medium",
     "hexagonal_directions": "ommatidia.mosaic",
     "hexagonal_segments": "apertures.combined",
+    "ideal_contrast_sensitivity": "eye.acuity",
     "illuminant": "spectra.spectrum",
     "image_quality": "point_spread.contrast",
+    "immersed": "eye.immersion",
     "intersection": "apertures.combined",
+    "least_eye_parameter": "eye.acuity",
     "lens_mtf": "point_spread.lens_mtf",
+    "light_level": "spectra.photon_budget",
     "mean_human_mtf": "elements.human_eye",
     "medium": "elements.refractive_index",
     "mtf": "point_spread.contrast",
+    "optical_sensitivity": "spectra.optical_sensitivity",
     "phase_pupil": "elements.phase_pupil",
     "plan": "point_spread.psf",
     "propagate": "propagation.propagate",
@@ -95,9 +109,13 @@ _CONTENTS = {
     "receptors_of": "spectra.receptors",
     "reflectance": "spectra.spectrum",
     "require": "numerics.backend",
+    "sampling_acuity": "eye.acuity",
+    "sea_water": "elements.turbid_medium",
     "snyder_acceptance": "ommatidia.ommatidium",
+    "srgb_basis": "spectra.spectrum",
     "strehl_ratio": "point_spread.strehl",
     "through_focus": "point_spread.through_focus",
+    "turbid_medium": "elements.turbid_medium",
     "union": "apertures.combined",
     "vector_focus": "point_spread.vector_focus",
     "white_psf": "point_spread.white",
@@ -107,6 +125,8 @@ __all__ = sorted(_CONTENTS)
 
 
 def __getattr__(name: str) -> Any:
+    if name == "animals":
+        return import_module("optics.animals")
     if name not in _CONTENTS:
         raise AttributeError(f"module 'optics' has no attribute {name!r}")
     value = getattr(import_module(f"optics.{_CONTENTS[name]}"), name)

@@ -21,8 +21,10 @@ Encounter, Frozen                   several animals in one world that see each o
 make_parallel_env                   PettingZoo environment of an Encounter
 make_vec_env, make_env              environments of many worlds in one batch, or of a single world
                                     (or gymnasium.make("rhabdom/Detection-v0"), "rhabdom/Maze-v0" ...)
+set_threads                         number of threads of Dr.Jit, torch, OpenMP and BLAS
 register_task                       registration of a user task under a Gymnasium id
 View, write_exr, read_exr           images of eyes in EXR files
+read_photograph, see_photograph     a photograph through an animal's eye, as a ReceptorMosaic
 """
 
 from __future__ import annotations
@@ -39,6 +41,7 @@ if TYPE_CHECKING:
     from sim.envs.batch_task_checker import check_batch_task
     from sim.envs.env import make_env
     from sim.envs.registration import register_task
+    from sim.envs.threads import set_threads
     from sim.exr.files import read_exr, write_exr
     from sim.exr.view import View
     from sim.eyes.compound_eye import CompoundEye
@@ -48,6 +51,8 @@ if TYPE_CHECKING:
     from sim.physics.array_worlds import ArrayWorlds
     from sim.physics.physics import Physics
     from sim.physics.sliding_agents import SlidingAgents
+    from sim.pictures.photograph import read_photograph, see_photograph
+    from sim.pictures.receptor_mosaic import ReceptorMosaic
     from sim.render.batched_renderer import BatchedRenderer
     from sim.render.fidelity import Fidelity
     from sim.render.fidelity_choice import FidelityWarning
@@ -103,9 +108,13 @@ _HOME = {
     "make_vec_env": "sim.envs.assembly",
     "make_parallel_env": "sim.envs.assembly",
     "register_task": "sim.envs.registration",
+    "set_threads": "sim.envs.threads",
     "View": "sim.exr.view",
     "read_exr": "sim.exr.files",
     "write_exr": "sim.exr.files",
+    "ReceptorMosaic": "sim.pictures.receptor_mosaic",
+    "read_photograph": "sim.pictures.photograph",
+    "see_photograph": "sim.pictures.photograph",
 }
 
 __all__ = [
@@ -128,6 +137,7 @@ __all__ = [
     "Outcome",
     "Physics",
     "Poses",
+    "ReceptorMosaic",
     "ReferenceRenderer",
     "RewardTerms",
     "SlidingAgents",
@@ -146,8 +156,11 @@ __all__ = [
     "make_vec_env",
     "mirror",
     "read_exr",
+    "read_photograph",
     "register_task",
     "ring",
+    "see_photograph",
+    "set_threads",
     "whole_head",
     "write_exr",
 ]

@@ -90,6 +90,14 @@ def sight(config, animal):
         worlds.close()
 
 
+def moving_sight(config, animal):
+    """Observations of the animal while it moves in its world, without noise."""
+    worlds = PreparedTask(animal_task(animal, config)).vec_env(1, 7, animal.memory_frames)
+    with closing(worlds):
+        worlds.reset()
+        return [worlds.step(np.float32([[1, turn]]))[0]["eyes"].tobytes() for turn in (0.5, -0.2, 0.0)]
+
+
 def own_sight(config, animal):
     """First observation of the animal in a user task."""
     worlds = PreparedTask(animal_task(animal, config)).vec_env(1, 7, animal.memory_frames)

@@ -137,6 +137,14 @@ def test_outputs_that_differ_are_noticed():
     assert not agrees("1 2", "1 2 3")
 
 
+def test_code_imports_the_packages_from_rhabdom():
+    """`import optics` imports another project's package if it comes first on Python's path."""
+    pages = {name(page): "".join(code for code, _ in CODE.findall(page.read_text())) for page in DOCUMENTS}
+    pages |= {name(path): path.read_text() for path in (ROOT / "examples").glob("*.py")}
+    direct = re.compile(r"^ *(?:import|from) (?:optics|sim|evolve)\b.*", re.MULTILINE)
+    assert {page: direct.findall(code) for page, code in pages.items() if direct.search(code)} == {}
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("example", sorted((ROOT / "examples").glob("*.py")), ids=lambda path: path.stem)
 def test_example_runs(example, tmp_path):

@@ -14,7 +14,7 @@ import pytest
 
 from evolve.config.assemble import assemble
 from evolve.config.run_config import SECTIONS, GeneConfig, RunConfig
-from evolve.genome.genes import ALL_GENES, LAMBDA_MAX, RHABDOM, SIDE, VERTICAL, gene_table
+from evolve.genome.genes import ALL_GENES, LAMBDA_MAX, RHABDOM, SIDE, TIME_CONSTANT, VERTICAL, gene_table
 from evolve.genome.genotype import GENES, Genotype
 from evolve.genome.phenotype import develop
 from optics.numerics import backend
@@ -25,6 +25,7 @@ from tests.parameter_outputs import (
     history,
     layouts,
     life,
+    moving_sight,
     own_sight,
     point_image,
     rides,
@@ -84,6 +85,9 @@ OF_FAMILY = (
     *("world.layouts=family", "world.training_layouts=1", "world.selection_layouts=1", "world.test_layouts=1"),
     *("world.layout_rows=9", "world.layout_columns=17", *PERFECT),
 )
+# Receptors that see one frame per action.
+INSTANT = ("eye.rays_per_receptor=1", "eye.noise_sigma=0", *PERFECT)
+IN_TIME = ("eye.temporal_order=1", "genome.time_constant_ms.start=200", "eye.frames=1", *INSTANT)
 NAVIGATING = ("genome.resolution_height.start=1", "eye.rays_per_receptor=1", *PERFECT)
 FIELDS = {
     "task": Case("task=tracking", rides),
@@ -111,6 +115,14 @@ FIELDS = {
     "eye.rhabdom_absorption": Case("eye.rhabdom_absorption=1e4", point_image, ("eye.rhabdom_length=1e-4", *GUIDED)),
     "eye.head_radius": Case("eye.head_radius=100e-6", sight),
     "eye.receptor_width": Case("eye.receptor_width=100e-6", sight),
+    "eye.temporal_order": Case("eye.temporal_order=1", moving_sight, INSTANT),
+    "eye.latency_ms": Case("eye.latency_ms=200", moving_sight, IN_TIME),
+    "eye.adaptation": Case("eye.adaptation=naka_rushton", moving_sight, IN_TIME),
+    "eye.adaptation_ms": Case("eye.adaptation_ms=100", moving_sight, ("eye.adaptation=logarithmic", *IN_TIME)),
+    "eye.event_threshold": Case("eye.event_threshold=0.1", moving_sight, IN_TIME),
+    "eye.motion_detectors": Case("eye.motion_detectors=barlow_levick", moving_sight, IN_TIME),
+    "eye.motion_ms": Case("eye.motion_ms=500", moving_sight, ("eye.motion_detectors=hassenstein_reichardt", *IN_TIME)),
+    "eye.frames": Case("eye.frames=2", moving_sight, IN_TIME),
     "world.mazes": Case("world.mazes=2", views, NAVIGATING, "maze"),
     "world.unseen": Case("world.unseen=true", views, NAVIGATING, "maze"),
     "world.course": Case("world.course=long", views, NAVIGATING, "navigation"),
@@ -127,6 +139,7 @@ FIELDS = {
     "world.selection_set": Case("world.selection_set=training", layouts, OF_FAMILY, "maze"),
     "world.wall_height": Case("world.wall_height=0.5", views),
     "world.least_light": Case("world.least_light=0.01", views),
+    "world.medium": Case("world.medium=fog", views),
     "world.encoded_textures": Case("world.encoded_textures=false", own_sight, task=TEXTURED),
     "search.optimizer": Case("search.optimizer=mutation", history),
     "search.steady_state": Case("search.steady_state=true", history),
@@ -182,6 +195,7 @@ GENE_OUTPUTS = {
     "dispersion": point_image,
     "aperture_shape": point_image,
     "rhabdom_diameter_um": sight,
+    "time_constant_ms": moving_sight,
     "memory_frames": life,
     "neurons": life,
     "layers": life,
@@ -222,7 +236,7 @@ def _names(cls, prefix=""):
 
 def test_tables_name_every_setting_and_every_gene():
     assert set(FIELDS) == set(_names(RunConfig))
-    assert set(GENE_OUTPUTS) == set(GENES) | set(gene_table(square=True, rhabdoms=True, heights=True))
+    assert set(GENE_OUTPUTS) == set(GENES) | set(gene_table(square=True, rhabdoms=True, heights=True, in_time=True))
     assert all(is_dataclass(section) for section in SECTIONS.values())
 
 
@@ -241,7 +255,7 @@ def test_every_gene_moves_its_output(name):
     output = GENE_OUTPUTS[name]
     spectral = ALL_GENES[name].cluster == "spectral"
     task = "foraging" if spectral else OWN if output is own_sight else "detection"  # only foraging has colours
-    special = {SIDE: SQUARE, RHABDOM: GUIDED, VERTICAL: HIGH}
+    special = {SIDE: SQUARE, RHABDOM: GUIDED, VERTICAL: HIGH, TIME_CONSTANT: IN_TIME}
     given = FOUR_TYPES if spectral else special.get(name, () if output is point_image else PERFECT)
     before = _settled(output, task, given)
     config = small(task, (*given, f"genome.{name}.open=true"))

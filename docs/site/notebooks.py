@@ -2,8 +2,9 @@
 
     python docs/site/notebooks.py
 
-Python blocks become code cells. The output or the image that follows a block is left out, because the cell produces it.
-Everything else stays text.
+The first cell of each notebook is `notebook_setup.py`, which installs rhabdom if it is missing. Python blocks become
+code cells. The output or the image that follows a block is left out, because the cell produces it. Everything else
+stays text.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from pathlib import Path
 import nbformat
 
 DOCS = Path(__file__).resolve().parents[1]
+SETUP = Path(__file__).with_name("notebook_setup.py").read_text(encoding="utf-8")
 TUTORIALS = ("optics", "rl", "evolution", "own_world", "python")
 # Name of each notebook and its page.
 SOURCES = {name: DOCS / "tutorial" / f"{name}.md" for name in TUTORIALS}
@@ -26,7 +28,8 @@ REFERENCE = re.compile(r"\[(`[^`]+`)\]\[\]")
 def notebook(page: Path) -> nbformat.NotebookNode:
     """A page as a notebook; the same page gives the same notebook."""
     pieces = CODE.split(page.read_text(encoding="utf-8"))
-    cells = [_cell(piece, at % 2 == 1, page.parent.name) for at, piece in enumerate(pieces) if piece.strip()]
+    cells = [nbformat.v4.new_code_cell(SETUP.rstrip())]
+    cells += [_cell(piece, at % 2 == 1, page.parent.name) for at, piece in enumerate(pieces) if piece.strip()]
     for number, cell in enumerate(cells):
         cell["id"] = f"cell-{number}"
     kernel = {"display_name": "Python 3", "language": "python", "name": "python3"}

@@ -49,7 +49,7 @@ class Episode:
     seconds: duration of one action [s]
     solved: True if the episode counts as solved
     failure: message of the failure that ended the episode; None without a failure
-    signals: receptor signals with noise, (t, eye, channel, height, width)
+    signals: receptor signals with noise, (t, eye, channel, height, width), without the outputs of motion detectors
     perfect_signals: signals of the same receptors behind a perfect lens, without noise, in the same shape
     wavelengths_nm: wavelengths of the radiance's bands, (band,)
     radiance_frames: time steps at which radiance was recorded, (frame,)

@@ -222,12 +222,13 @@ def _play(
     """Play one episode. Return the poses before each action, and the fields of `Episode` that this determines."""
     poses, rows, taken = list[Poses](), list[tuple[Any, ...]](), list[np.ndarray]()
     observation, infos, done, solved = begun.observation, [begun.info], False, None
+    channels = worlds.renderer.eye.channels
     every = max(1, -(-worlds.simulation.episode_steps // MOST_PICTURES))
     while not done:
         if pictures and len(rows) % every == 0:
             taken.append(worlds.get_images()[0])
         poses.append(worlds.simulation.poses())
-        seen = observation["eyes"][0, -1]
+        seen = observation["eyes"][0, -1][:, :channels]
         action = policy.predict(observation, deterministic=True)[0]
         observation, reward, dones, (info,) = worlds.step(action)
         done, solved = bool(dones[0]), worlds.batch_task.solved(solved, info)

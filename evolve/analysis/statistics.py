@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from evolve.genome.genes import LAMBDA_MAX, RHABDOM, TILT, VERTICAL
+from evolve.genome.genes import LAMBDA_MAX, RHABDOM, TILT, TIME_CONSTANT, VERTICAL
 from evolve.genome.phenotype import Phenotype
 from optics.numerics.number_types import full_precision
 
@@ -171,6 +171,8 @@ def gene_values(phenotype: Phenotype, eye: EyeConfig | None = None) -> dict[str,
         values |= {"dispersion": phenotype.dispersion, "aperture_shape": float(phenotype.aperture_shape)}
     if phenotype.rhabdom_diameter_um is not None:
         values[RHABDOM] = phenotype.rhabdom_diameter_um
+    if phenotype.time_constant_ms is not None:
+        values[TIME_CONSTANT] = phenotype.time_constant_ms
     brain = ("memory_frames", "neurons", "layers")
     values |= {name: float(getattr(phenotype, name)) for name in brain}
     if phenotype.lambda_max_nm is not None:

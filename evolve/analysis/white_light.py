@@ -77,16 +77,18 @@ def white_strehl(eye: optics.Eye, psf: optics.PSFResult) -> float:
         return math.nan
 
 
-def eye_image_quality(phenotype: Phenotype, config: EyeConfig) -> float:
+def eye_image_quality(phenotype: Phenotype, config: EyeConfig, medium: str = "air") -> float:
     """Return `optics.image_quality` of the phenotype's eye in white daylight, in [0, 1].
 
     The quality is averaged over frequencies up to the Nyquist frequency of the receptors. A perfect lens has contrast 1
     at all frequencies.
 
+    medium: medium of the run's worlds
+
     Raises:
         optics.AccuracyError: the PSF cannot be computed.
     """
-    eye = phenotype.eyes(config).eye()
+    eye = phenotype.eye(config, medium)
     if eye.pupil is None:
         return max(1 - noise_of(eye, eye.white_signal), 0.0)
     return WhiteLight.from_eye(eye).image_quality

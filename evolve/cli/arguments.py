@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, NoReturn, TypeAlias
 
 from evolve.cli.argument_values import every, searches, seed
+from evolve.cli.photograph_arguments import add_photograph
 from evolve.runs.output import say
 
 __all__ = ["SHELLS", "build_parser", "parse"]
@@ -41,6 +42,7 @@ EXAMPLES = {
     "replay": "  evolve replay runs/first --open\n  evolve replay runs/first --candidate 12 --seed 3\n",
     "report": "  evolve report runs/first --open\n",
     "export": "  evolve export runs/first --candidate 12 --out frames\n  evolve export runs/first --every 1\n",
+    "see": "  evolve see photo.jpg --animal honeybee --width-deg 60\n",
     "list": "  evolve list\n  evolve list /data/runs --json\n",
     "validate": "  evolve validate --list\n  evolve validate psf_error_prediction aliasing\n",
     "config": "  evolve config show detection --preset quick\n  evolve config schema > settings.schema.json\n",
@@ -230,14 +232,13 @@ def _add_products(commands: Commands) -> None:
             product.add_argument("--open", action="store_true", help="open the page in a browser")
         product.add_argument("--out", type=Path, metavar=out, help="output path (default: in the run directory)")
         _add_voice(product)
-    demo = _command(
-        commands, "demo", "demo.demo", "look at a finished run that ships with rhabdom: report, replay, EXR"
-    )
+    demo = _command(commands, "demo", "demo.demo", "look at a finished run: report, replay and EXR files")
     demo.add_argument(
         "--out", type=Path, metavar="DIR", default=Path("runs/demo"), help="output directory (default: runs/demo)"
     )
     demo.add_argument("--open", action="store_true", help="open the report in a browser")
     _add_voice(demo)
+    add_photograph(_command(commands, "see", "see.through_eye", "show a photograph through an animal's eye"))
 
 
 def _add_task(command: argparse.ArgumentParser) -> None:

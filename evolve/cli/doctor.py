@@ -1,8 +1,9 @@
-"""Check of the installation: versions, LLVM, Mitsuba variants and processor."""
+"""Check of the installation: versions, LLVM, Mitsuba variants, processor, memory and the cache of light tables."""
 
 from __future__ import annotations
 
 import json
+import math
 import os
 import platform
 import subprocess
@@ -13,6 +14,8 @@ from evolve.runs.output import say
 from optics.numerics import backend
 from optics.numerics.device import device
 from rhabdom.importing import namesakes
+from sim.render.memory_budget import GIB, available
+from sim.tracing.areas.light_store import cache_folder, write_error
 
 __all__ = ["examine", "print_findings", "unsupported"]
 
@@ -28,15 +31,18 @@ PACKAGES = (
     "stable-baselines3",
     "safetensors",
     "nevergrad",
+    "cma",
     "OpenEXR",
     "matplotlib",
     "pillow",
     "rich",
     "shtab",
-    "scikit-image",
+    "threadpoolctl",
     "tomli-w",
     "pandas",
 )
+# Advice from docs/measurements/rendering.md, "On a GPU".
+USE_OF_GPU = "renders a thousand worlds two to four times as fast; no gain for PSFs, physics, learning and evolution"
 # Program that renders an image with each variant of Mitsuba. It runs in a child process, because importing Mitsuba can
 # crash a process if the installation is broken.
 RENDER = """
@@ -67,8 +73,9 @@ def unsupported(platform_name: str = sys.platform) -> str | None:
 def examine() -> dict[str, object]:
     """Return the findings by name.
 
-    The names are python, machine, packages, llvm (all libraries that were tested), variants, gpu, device, notes, and
-    good (True if all works).
+    The names are python, machine, packages, llvm (all libraries that were tested), variants, gpu, device, free_memory
+    [bytes] (None if unknown), light_cache (the folder, and why it is not writable, or None), notes, and good (True if
+    all works).
     """
     chosen, tried = backend.find(cached=False)
     environment = {**os.environ, backend.VARIABLE: chosen.path} if chosen else dict(os.environ)
@@ -87,6 +94,8 @@ def examine() -> dict[str, object]:
         else f"{platform.system()} {platform.machine()}, {os.cpu_count()} cores",
         "gpu": gpu or "none",
         "device": _device(),
+        "free_memory": available() if math.isfinite(available()) else None,
+        "light_cache": {"folder": str(cache_folder()), "error": write_error()},
         "packages": packages,
         "llvm": [vars(llvm) for llvm in tried],
         "variants": variants,
@@ -143,7 +152,9 @@ def print_findings(as_json: bool = False) -> int:
 
 def _lines(findings: dict[str, object]) -> list[str]:
     packages, variants, tried = findings["packages"], findings["variants"], findings["llvm"]
-    notes = findings["notes"]
+    notes, free, cache = findings["notes"], findings["free_memory"], findings["light_cache"]
+    assert free is None or isinstance(free, float)
+    assert isinstance(cache, dict)
     assert isinstance(packages, dict)
     assert isinstance(notes, list)
     assert isinstance(variants, dict)
@@ -151,8 +162,11 @@ def _lines(findings: dict[str, object]) -> list[str]:
     lines = [
         f"{'python':<20}{findings['python']}",
         f"{'machine':<20}{findings['machine']}",
-        f"{'gpu':<20}{findings['gpu']}",
+        f"{'gpu':<20}{findings['gpu']} (a GPU {USE_OF_GPU})",
         f"{'device':<20}{findings['device']} for PSFs, eyes and rays; cpu for physics and learning",
+        f"{'free memory':<20}{'unknown' if free is None else f'{free / GIB:.3g} GiB'}",
+        f"{'light tables':<20}{cache['folder']}: "
+        + ("writable" if cache["error"] is None else f"{cache['error']}; every process computes the tables again"),
     ]
     lines += [f"{name:<20}{version}" for name, version in packages.items()]
     for llvm in tried:

@@ -7,6 +7,7 @@ sources        sources of settings: presets, tasks, files and options
 provenance     location of a setting: file and line, or command-line option
 costs          CostsConfig: prices of eyes and brains, and the costs of an animal
 checks         type and range checks of single settings
+eye_checks     checks of the settings of eyes
 layout_checks  checks of the settings of layouts
 lint           warnings about settings that are allowed but odd
 relief_starts  start values for the genes of a pupil's relief

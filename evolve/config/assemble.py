@@ -31,6 +31,7 @@ from evolve.genome.genes import (
     RHABDOM,
     SIDE,
     SIDES,
+    TIME_CONSTANT,
     VERTICAL,
     GeneConfig,
     group_members,
@@ -43,6 +44,7 @@ Tree = dict[str, Any]
 OF_SETTINGS = {
     RHABDOM: ("with rhabdoms", "eye.rhabdoms", "true"),
     VERTICAL: ("whose height evolves", "eye.vertical_fov", "gene"),
+    TIME_CONSTANT: ("whose receptors have memory", "eye.temporal_order", "1"),
 }
 GENE_FIELDS = tuple(f.name for f in fields(GeneConfig))
 TOP_LEVEL = ("task", "seed", "workers", "task_sha256")

@@ -6,6 +6,7 @@ import numpy as np
 
 from evolve.config.run_config import EyeConfig, RunConfig, SearchConfig
 from evolve.genome.genes import INHERITED, LAMBDA_MAX
+from optics.elements.turbid_medium import AIR, turbid_medium
 
 __all__ = ["coarse_bands", "idle_genes", "idle_settings", "idle_starts", "lint"]
 
@@ -23,17 +24,25 @@ def lint(config: RunConfig) -> list[str]:
 def coarse_bands(config: RunConfig) -> list[str]:
     """Return a warning if the error of the signals due to few spectral bands exceeds a receptor's noise.
 
-    The error is computed for the measured spectra of the task's world.
+    The error is computed for the measured spectra of the task's world, and for white and black in the run's medium.
     """
-    if config.card.grey is not False:  # reflectances are unknown, or the same at all wavelengths
+    if config.card.grey is not False and config.world.medium == AIR:  # reflectances are unknown, or grey
         return []
     from sim.scene.band_error import band_error, measured
     from sim.worlds.world import build_world
 
-    world = build_world(config.task)
-    spectra = measured(world.model, world.spectra)
+    medium, spectra = turbid_medium(config.world.medium), []
+    if config.card.grey is False:
+        world = build_world(config.task)
+        spectra = measured(world.model, world.spectra)
+
+    def error_with(bands: int) -> float:
+        found = [band_error(spectra, types, bands) for types in _types(config)]
+        found += [medium.band_error(bands, types) for types in _types(config)] if medium else []
+        return max(found)
+
     light, counts = _most_light(config), _doublings(config.eye.bands)
-    errors = {n: light * max(band_error(spectra, types, n) for types in _types(config)) for n in counts}
+    errors = {n: light * error_with(n) for n in counts}
     error, allowed = errors[config.eye.bands], max(config.eye.noise_sigma, LEAST_ERROR)
     if error <= allowed:
         return []

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 from evolve.config.checks import ConfigError, check_gene_use, check_values, quoted
+from evolve.config.eye_checks import check_eye
 from evolve.config.layout_checks import check_layouts
 from evolve.config.settings import (
     SECTIONS,
@@ -33,10 +33,9 @@ from evolve.config.task_card import (
 from evolve.config.task_choice import TaskChoice
 from evolve.config.task_code import TaskCode
 from evolve.genome import anatomy
-from evolve.genome.eye_config import VERTICAL_FOVS
 from evolve.genome.genes import CLUSTERS, GENES, INHERITED, Gene, GeneConfig
 from evolve.genome.interval import Interval
-from optics.spectra.receptors import RECEPTORS
+from optics.elements.turbid_medium import MEDIA_OF_WORLDS
 from sim.worlds.catalog import TASKS
 
 __all__ = [
@@ -53,14 +52,6 @@ __all__ = [
     "WiringConfig",
     "WorldConfig",
 ]
-
-RHABDOMS = ("rhabdom_index", "rhabdom_surround", "rhabdom_length", "rhabdom_absorption")
-# Limits of the numerical aperture of rhabdoms. A fly's rhabdom has 0.25. Below the lower limit a rhabdom guides almost
-# no light, and above the upper limit it has hundreds of modes.
-LEAST_STEP, MOST_STEP = 0.2, 0.5
-# [lx s] smallest allowed exposure. A receptor that sees a white surface through a pupil with relative aperture 1 then
-# absorbs some 30 photons. With fewer photons, the approximation of shot noise fails.
-LEAST_EXPOSURE = 2e-4
 
 
 @dataclass(frozen=True)
@@ -96,11 +87,10 @@ class RunConfig:
                 raise ConfigError(f"{section} = {quoted(getattr(self, section))}: must be a {kind.__name__}", section)
             check_values(getattr(self, section), prefix=f"{section}.")
         self._check_task()
-        for name, known in (("receptors", (*RECEPTORS, INHERITED)), ("vertical_fov", VERTICAL_FOVS)):
-            if (given := getattr(self.eye, name)) not in known:
-                raise ConfigError(f"eye.{name} = {given!r}: must be one of {', '.join(known)}", f"eye.{name}")
-        self._check_light()
-        self._check_rhabdoms()
+        if self.world.medium not in MEDIA_OF_WORLDS:
+            known = ", ".join(MEDIA_OF_WORLDS)
+            raise ConfigError(f"world.medium = {self.world.medium!r}: must be one of {known}", "world.medium")
+        check_eye(self.eye)
         self._check_world()
         for name, gene in self.genes.items():
             check_gene_use(gene, self.genome[name])
@@ -147,52 +137,6 @@ class RunConfig:
                 named = " and ".join(others) if len(others) < len(TASKS) else "built-in tasks"
                 whose = f"the task {others[0]}" if len(others) == 1 else named or "user tasks"
                 raise ConfigError(f"{key}: is for {whose}, not for {self.task}", key, "task")
-
-    def _check_light(self) -> None:
-        """Check that light is not too weak, and that the integration time is changed only if there is shot noise."""
-        light, default = self.eye.illuminance, EyeConfig.integration_time
-        if 0 < light * self.eye.integration_time < LEAST_EXPOSURE:
-            raise ConfigError(
-                f"eye.illuminance = {light:g}, eye.integration_time = {self.eye.integration_time:g}: too few photons; "
-                f"must be at least {LEAST_EXPOSURE:g} lx s together, or eye.illuminance 0, no shot noise",
-                *("eye.illuminance", "eye.integration_time"),
-            )
-        if light == 0 and self.eye.integration_time != default:
-            raise ConfigError(
-                f"eye.integration_time = {self.eye.integration_time:g}: has no effect without shot noise: set "
-                f"eye.illuminance, or leave it at {default:g}",
-                *("eye.integration_time", "eye.illuminance"),
-            )
-
-    def _check_rhabdoms(self) -> None:
-        """Check that eyes with rhabdoms have optics and a plausible numerical aperture.
-
-        Also check that settings of rhabdoms are changed only if receptors are rhabdoms.
-        """
-        eye, default = self.eye, EyeConfig()
-        for name in RHABDOMS if not eye.rhabdoms else ():
-            if getattr(eye, name) != getattr(default, name):
-                raise ConfigError(
-                    f"eye.{name}: is for rhabdoms: set eye.rhabdoms = true", f"eye.{name}", "eye.rhabdoms"
-                )
-        if eye.rhabdoms and not eye.optics:
-            raise ConfigError(
-                "eye.rhabdoms = true: needs the waves of a pupil; eye.optics = false gives none",
-                "eye.rhabdoms",
-                "eye.optics",
-            )
-        if eye.rhabdom_length == 0 and eye.rhabdom_absorption != default.rhabdom_absorption:
-            raise ConfigError(
-                f"eye.rhabdom_absorption = {eye.rhabdom_absorption:g}: needs a length: set eye.rhabdom_length",
-                *("eye.rhabdom_absorption", "eye.rhabdom_length"),
-            )
-        step = math.sqrt(max(eye.rhabdom_index**2 - eye.rhabdom_surround**2, 0.0))
-        if not LEAST_STEP <= step <= MOST_STEP:
-            raise ConfigError(
-                f"eye.rhabdom_index = {eye.rhabdom_index:g}, eye.rhabdom_surround = {eye.rhabdom_surround:g}: the root "
-                f"of the difference of their squares is {step:.3g}; must lie in [{LEAST_STEP:g}, {MOST_STEP:g}]",
-                *("eye.rhabdom_index", "eye.rhabdom_surround"),
-            )
 
     def _check_clusters(self) -> None:
         """Check that at least one gene is open, and that no gene is open that the run does not use."""

@@ -66,6 +66,12 @@ class WorldConfig:
         "lowest light level, relative to daylight; each episode draws its level between this and 1",
     )
 
+    medium: str = setting(
+        "air",
+        None,
+        "water or air between surfaces and eyes: air (clear; in a user task, its own medium), clear_ocean, "
+        "coastal_water or fog; under water, eyes are immersed",
+    )
     encoded_textures: bool = setting(
         True,
         None,
@@ -93,7 +99,7 @@ class WorldConfig:
         return {**self.evaluation, **self._walls("test")}
 
     def _walls(self, name: str) -> dict[str, Any]:
-        """Return the height of the walls, and the family's set of layouts of this name (None without a family)."""
+        """Return the height of the walls, the medium, and the family's set of layouts of this name, or None."""
         layouts = None
         if self.layouts == FAMILY:
             from sim.worlds.layout_family import LayoutFamily  # loads MuJoCo, which `evolve list` does not need
@@ -103,7 +109,7 @@ class WorldConfig:
             steps = self.layout_actions or None
             family = LayoutFamily(self.family_seed, **counts, n_test=self.test_layouts, **size, episode_steps=steps)
             layouts = getattr(family, name)
-        return {"layouts": layouts, "wall_height": self.wall_height}
+        return {"layouts": layouts, "wall_height": self.wall_height, "medium": self.medium}
 
     @property
     def vary(self) -> dict[str, tuple[float, float]] | None:

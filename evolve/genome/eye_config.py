@@ -36,7 +36,9 @@ class EyeConfig:
         0.02, Interval(1e-6, 1e3), "time over which a receptor sums photons [s]; used only if illuminance is above 0"
     )
     receptors: str = setting(
-        "rgb", None, "receptor types: rgb, lms, honeybee or goldfish; genes: from each animal's spectral genes"
+        "rgb",
+        None,
+        "receptor types: rgb, lms or an animal's, such as honeybee; genes: from each animal's spectral genes",
     )
     bands: int = setting(4, Interval(1, 64), "spectral bands")
     relief_height: float = setting(100e-6, Interval(0, 1e-2, open_low=True), "height of the relief at gene value 1 [m]")
@@ -92,8 +94,34 @@ class EyeConfig:
         1e-6, Interval(0, 1e-2, open_low=True), "smallest width of a receptor [m]; receptors do not overlap"
     )
 
+    temporal_order: int = setting(
+        0,
+        Interval(0, 2),
+        "low-pass filters in series in a receptor, with the time constant of the gene time_constant_ms; 0: receptors "
+        "without memory, which see only the last moment of an action",
+    )
+    latency_ms: float = setting(0.0, Interval(0, 10_000), "delay of the receptors' responses [ms]")
+    adaptation: str = setting(
+        "none", None, "gain control by the mean of the signal over adaptation_ms: none, naka_rushton or logarithmic"
+    )
+    adaptation_ms: float = setting(1000.0, Interval(1, 1e7), "time constant of the mean that controls the gain [ms]")
+    event_threshold: float = setting(
+        0.0, Interval(0, 100), "receptors count changes of the logarithm of their signal by this step; 0: no events"
+    )
+    motion_detectors: str = setting(
+        "none", None, "detectors between neighbours, as further channels: none, hassenstein_reichardt or barlow_levick"
+    )
+    motion_ms: float = setting(35.0, Interval(0.1, 10_000), "time constant of the motion detectors [ms]")
+    frames: int = setting(
+        0,
+        Interval(0, 1000),
+        "frames rendered per action for receptors with memory; 0: the minimum that the noise allows",
+    )
+
     @property
     def genes(self) -> Mapping[str, Gene]:
         """All genes of animals that have these eyes, by name."""
         heights = self.vertical_fov == "gene"
-        return gene_table(self.relief_points, self.relief_symmetric, self.square, self.rhabdoms, heights)
+        return gene_table(
+            self.relief_points, self.relief_symmetric, self.square, self.rhabdoms, heights, self.temporal_order > 0
+        )

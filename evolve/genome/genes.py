@@ -26,6 +26,7 @@ __all__ = [
     "SIDE",
     "SIDES",
     "TILT",
+    "TIME_CONSTANT",
     "VERTICAL",
     "Gene",
     "GeneConfig",
@@ -43,6 +44,7 @@ SIDE = "resolution"  # gene of square eyes, which replaces the two genes SIDES
 SIDES = ("resolution_height", "resolution_width")
 RHABDOM = "rhabdom_diameter_um"  # gene of eyes whose receptors are rhabdoms
 VERTICAL = "vertical_fov_deg"  # gene of eyes whose height evolves
+TIME_CONSTANT = "time_constant_ms"  # gene of eyes whose receptors integrate over time
 TILT = "elevation_deg"  # gene that exists only in user tasks; in built-in tasks eyes look along the floor
 REAL: Literal["real"] = "real"
 INTEGER: Literal["integer"] = "integer"
@@ -119,14 +121,16 @@ def gene_table(
     square: bool = False,
     rhabdoms: bool = False,
     heights: bool = False,
+    in_time: bool = False,
 ) -> Mapping[str, Gene]:
     """Return all genes by name, in the order of the genome.
 
     The relief has relief_points² genes. If it is symmetric, it has only the genes of an eighth of its area. Square eyes
     have one gene for both sides. Rhabdoms add a gene for their diameter, and `heights` one for the vertical field.
+    Receptors that integrate over time add a gene for their time constant.
     """
     relief = set(representatives(relief_points, relief_symmetric))
-    optional = {RHABDOM: rhabdoms, VERTICAL: heights}
+    optional = {RHABDOM: rhabdoms, VERTICAL: heights, TIME_CONSTANT: in_time}
     absent = (*(SIDES if square else (SIDE,)), *(name for name, present in optional.items() if not present))
     return {
         name: gene
@@ -179,6 +183,8 @@ def _optics(relief_points: int) -> list[Gene]:
 def _brain() -> list[Gene]:
     gene = partial(_gene, "neural")
     return [
+        # Photoreceptors of fast flies in bright light have 3 ms, and those of toads in the dark have seconds.
+        _held(gene(TIME_CONSTANT, REAL, (0.1, 10_000), (1, 500, 20), "ms", "time constant of the receptors' filter")),
         gene("memory_frames", INTEGER, (1, 32), (1, 10, 5), "frames", "past frames that the brain sees"),
         gene("neurons", INTEGER, (1, 512), (1, 512, 64), "", "neurons in each hidden layer"),
         _held(gene("layers", INTEGER, (1, 4), (1, 4, 2), "", "hidden layers of actor and critic")),

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from evolve.genome.anatomy import fitted, receptor_side, retina_width, sides, vertical_fov
 from evolve.genome.eye_config import EyeConfig
-from evolve.genome.genes import APERTURE_SHAPES, INHERITED, LAMBDA_MAX, RHABDOM, TILT, GeneConfig
+from evolve.genome.genes import APERTURE_SHAPES, INHERITED, LAMBDA_MAX, RHABDOM, TILT, TIME_CONSTANT, GeneConfig
 from evolve.genome.genotype import Genotype
 from evolve.genome.phenotype_on_record import checked_fields
 from evolve.genome.relief_genes import representatives
@@ -56,6 +56,7 @@ class Phenotype:
     `lambda_max_nm` are the wavelengths at which the pigments of the receptor types absorb most. If it is None, the
     setting `eye.receptors` of the run determines the receptors.
     `vertical_fov_deg` is the vertical field of view. If it is None, receptors are square.
+    `time_constant_ms` is the time constant of the receptors. If it is None, they have no memory, and records omit it.
     """
 
     n_eyes: int
@@ -75,6 +76,25 @@ class Phenotype:
     elevation_deg: float | None = None
     rhabdom_diameter_um: float | None = None
     vertical_fov_deg: float | None = None
+    time_constant_ms: float | None = None
+
+    def dynamics(self, eye: EyeConfig) -> optics.ReceptorDynamics | None:
+        """Return the temporal properties of the receptors; None for receptors without memory."""
+        import optics
+
+        if self.time_constant_ms is None:
+            return None
+        return optics.ReceptorDynamics(
+            time_constant_ms=self.time_constant_ms,
+            order=eye.temporal_order,
+            latency_ms=eye.latency_ms,
+            adaptation=eye.adaptation,
+            adaptation_ms=eye.adaptation_ms,
+            event_threshold=eye.event_threshold or None,
+            motion=eye.motion_detectors,
+            motion_ms=eye.motion_ms,
+            frames=eye.frames or None,
+        )
 
     def waveguide(self, eye: EyeConfig) -> optics.Waveguide | None:
         """Return the waveguide that each receptor forms, at most as wide as the receptor; None for square receptors."""
@@ -127,11 +147,20 @@ class Phenotype:
             waveguide=self.waveguide(eye),
             pupil_turned=eye.pupil_turned and pupil is not None,
             vertical_fov_deg=self.vertical_fov_deg,
+            dynamics=self.dynamics(eye),
         )
+
+    def eye(self, eye: EyeConfig, medium: str = "air") -> optics.Eye:
+        """Return the optics and retina of one eye in the medium of a run's worlds, one of `MEDIA_OF_WORLDS`."""
+        import optics
+
+        found: optics.Eye = optics.immersed(self.eyes(eye).eye(), optics.turbid_medium(medium))
+        return found
 
     def to_json(self) -> dict[str, Any]:
         """Return JSON values for a run file."""
-        return {name: list(value) if isinstance(value, tuple) else value for name, value in vars(self).items()}
+        found = {name: list(value) if isinstance(value, tuple) else value for name, value in vars(self).items()}
+        return {name: value for name, value in found.items() if value is not None or name != TIME_CONSTANT}
 
     @classmethod
     def from_json(cls, record: Mapping[str, Any]) -> Phenotype:
@@ -171,6 +200,7 @@ def develop(genome: NDArray[np.float64], config: Settings) -> Phenotype:
         elevation_deg=values.get(TILT),
         rhabdom_diameter_um=values.get(RHABDOM),
         vertical_fov_deg=vertical_fov(values, config.eye),
+        time_constant_ms=values.get(TIME_CONSTANT),
     )
 
 

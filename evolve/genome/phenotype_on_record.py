@@ -9,7 +9,7 @@ from collections.abc import Iterable, Mapping
 from math import isqrt
 from typing import Any
 
-from evolve.genome.genes import ALL_GENES, LAMBDA_MAX, RELIEF_POINTS, RHABDOM, TILT, VERTICAL
+from evolve.genome.genes import ALL_GENES, LAMBDA_MAX, RELIEF_POINTS, RHABDOM, TILT, TIME_CONSTANT, VERTICAL
 from evolve.genome.interval import Interval
 from evolve.genome.plain_values import listed, real, whole_number
 
@@ -38,7 +38,7 @@ def checked_fields(record: Any, names: Iterable[str]) -> dict[str, Any]:
 
 def _checked(name: str, value: Any) -> Any:
     key = f"phenotype.{name}"
-    if value is None and name in (*SEEN_THROUGH, "lambda_max_nm", TILT, RHABDOM, VERTICAL):
+    if value is None and name in (*SEEN_THROUGH, "lambda_max_nm", TILT, RHABDOM, VERTICAL, TIME_CONSTANT):
         return None
     if name == "resolution":
         sides = zip(SIDES, listed(value, key, 2, 2), strict=True)

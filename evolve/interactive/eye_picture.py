@@ -20,13 +20,15 @@ from evolve.report.eye_figures import DECADES, middle_of_psf, relief_heights
 __all__ = ["eye_picture"]
 
 
-def eye_picture(phenotype: Phenotype, config: EyeConfig) -> Figure:
+def eye_picture(phenotype: Phenotype, config: EyeConfig, medium: str = "air") -> Figure:
     """Draw the fields of view around the head, the relief of the pupil [µm], and the PSF in white daylight.
 
     The PSF is drawn on a logarithmic scale, with the outline of a receptor. For a perfect lens, only the fields of view
     are drawn.
+
+    medium: medium of the run's worlds
     """
-    eye = phenotype.eyes(config).eye()
+    eye = phenotype.eye(config, medium)
     figure, panels = pyplot.subplots(1, 1 if eye.pupil is None else 3, squeeze=False, layout="constrained")
     figure.set_size_inches(3.6 * panels.size, 3.4)
     _head(panels[0, 0], phenotype, config)

@@ -39,11 +39,16 @@ class OpenedCandidate(Candidate):
     """A candidate of an opened run, with the settings that all eyes of the run have in common."""
 
     eye: EyeConfig = field(default_factory=EyeConfig)
+    medium: str = "air"
 
     @classmethod
     def of_run(cls, candidate: Candidate, run: Run) -> OpenedCandidate:
-        """Return the candidate, with the eye settings of its run added."""
-        return cls(**{f.name: getattr(candidate, f.name) for f in fields(Candidate)}, eye=run.config.eye)
+        """Return the candidate, with the eye settings and the medium of its run added."""
+        return cls(
+            **{f.name: getattr(candidate, f.name) for f in fields(Candidate)},
+            eye=run.config.eye,
+            medium=run.config.world.medium,
+        )
 
     def to_line(self) -> str:
         """Return the line of the record that describes the candidate."""
@@ -53,7 +58,7 @@ class OpenedCandidate(Candidate):
         """Return a figure of the eyes' fields of view around the head, and of the relief and PSF of the pupil."""
         from evolve.interactive.eye_picture import eye_picture
 
-        return eye_picture(self.phenotype, self.eye)
+        return eye_picture(self.phenotype, self.eye, self.medium)
 
     def _repr_html_(self) -> str:
         return animal_as_html(self).markup

@@ -10,6 +10,7 @@ from evolve.config.checks import AUTO
 from evolve.config.run_config import RunConfig
 from evolve.genome.phenotype import Phenotype
 from evolve.learning.task_module import executed_task
+from optics.elements.turbid_medium import AIR
 from sim.eyes.eyes import Eyes
 from sim.render.fidelity import Fidelity, requested_fidelity
 from sim.tasks.batch_task import BatchTask
@@ -70,6 +71,8 @@ def with_phenotype(task: UserTask, phenotype: Phenotype, config: RunConfig, eyes
     """
     animal = with_evolved_eyes(task, eyes or phenotype.eyes(config.eye), phenotype.elevation_deg or 0.0)
     rays, bands = config.eye.rays_per_receptor, config.eye.bands
+    if config.world.medium != AIR:
+        animal.medium = config.world.medium
     if rays != AUTO:
         animal.fidelity = Fidelity(float(rays), bands)
     elif isinstance(task.fidelity, Fidelity):

@@ -29,9 +29,12 @@ DECADES = 4  # range of the PSF's logarithmic colour scale [powers of ten]
 SHOWN_POWER = 0.98  # fraction of the PSF's light that lies within the image
 
 
-def eye_figures(phenotype: Phenotype, config: EyeConfig) -> Html:
-    """Return the figures with their captions. For a perfect lens, return a sentence instead."""
-    eye = phenotype.eyes(config).eye()
+def eye_figures(phenotype: Phenotype, config: EyeConfig, medium: str = "air") -> Html:
+    """Return the figures with their captions. For a perfect lens, return a sentence instead.
+
+    medium: medium of the run's worlds
+    """
+    eye = phenotype.eye(config, medium)
     if eye.pupil is None:
         return html("<p>Optics are off in this run: every eye has a perfect lens, which neither blurs nor dims.</p>\n")
     pupil = _pupil(eye, phenotype)

@@ -188,7 +188,7 @@ def best_section(run: Run, best: Candidate, episode: Episode) -> Html:
         *(
             hint("fitness"),
             fitness_text(best.fitness, best.costs, partial(rounded, digits=4)),
-            eye_figures(best.phenotype, run.config.eye),
+            eye_figures(best.phenotype, run.config.eye, run.config.world.medium),
         ),
         *(what_it_sees(episode), tables.best_genes(run, best)),
     )

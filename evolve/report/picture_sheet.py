@@ -23,11 +23,12 @@ def figure_of_pictures(pictures: Pictures) -> Html:
     """Return the figure in which player.js shows the images."""
     height, width = _size(pictures)
     caption = html(
-        "<b>The animal at its task</b>, rendered by the task's camera. Dots mark its eyes, and lines the rims of their "
-        "fields of view, with a colour for each eye."
+        "<b>The animal at its task</b>, rendered by the task's camera, which follows the animal in built-in tasks. "
+        "Dots mark its eyes. Each eye has a colour, which marks the rim of its field of view, or the floor that it "
+        "sees."
     )
     return html(
-        '<figure><canvas class="world" role="img" aria-label="The animal at its task, with its eyes and '
+        '<figure><canvas class="pictures" role="img" aria-label="The animal at its task, with its eyes and '
         'the rims of their fields of view" {}></canvas><figcaption>{}</figcaption></figure>\n',
         *(style(f"aspect-ratio:{width}/{height}"), caption),
     )

@@ -1,4 +1,4 @@
-// A playable episode: the world from above, what each eye signals, and the reward so far.
+// A playable episode: images, the world from above, what each eye signals, and the reward so far.
 // The film (evolve/report/player.py) is stored as JSON inside the player's element.
 "use strict";
 (() => {
@@ -34,7 +34,7 @@
     return { scale, x: (x) => left + scale * (x - x0), y: (y) => top + scale * (y1 - y) };
   }
 
-  // A user task without a ground plan has rendered images instead of a drawing.
+  // Rendered images of the animal at its task.
   function drawPicture(canvas, film, frame, sheet) {
     if (!sheet.complete || !sheet.naturalWidth) return;
     const { context: c, width, height } = sharp(canvas);
@@ -251,8 +251,8 @@
     }
 
     function draw() {
-      if (film.pictures) drawPicture(find("canvas.world"), film, frame, sheets.pictures);
-      else drawWorld(find("canvas.world"), film, frame, colour);
+      if (film.pictures) drawPicture(find("canvas.pictures"), film, frame, sheets.pictures);
+      if (film.bounds) drawWorld(find("canvas.world"), film, frame, colour);
       drawRewards(find("canvas.rewards"), film, frame, colour);
       drawEyes();
       write();

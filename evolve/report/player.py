@@ -1,4 +1,4 @@
-"""Player of a recorded episode on a page, with the path from above, the signals of each eye, and the reward so far."""
+"""Player of a recorded episode on a page: the path from above, images, the signals of each eye, and the reward."""
 
 from __future__ import annotations
 
@@ -18,6 +18,7 @@ __all__ = ["episode_sentence", "player", "write_player"]
 
 # Maximum size of the pixels on a sheet [bytes]. It limits the size of the page, because noise hardly compresses.
 LARGEST_FILM = 1_500_000
+ROOM = 200  # length of the longer side of an eye's image, half of it with more than six eyes [CSS pixels]
 EVENTS = ("goal", "adversary")  # reward terms that player.js marks when they differ from 0
 TERM_COLOURS = ("accent", "green", "vermillion", "purple")  # player.js uses the same colours
 
@@ -45,7 +46,7 @@ def episode_sentence(episode: Episode) -> str:
 def player(episode: Episode) -> Html:
     """Return the player as an element; its page must include the script player.js."""
     film = json_script(_film(episode), "film")
-    left, right = _world(episode) + _controls(episode), _sights(episode) + _score(episode)
+    left, right = _controls(episode) + _world(episode) + _score(episode), _sights(episode)
     return html(
         '<div class="player" tabindex="0" role="group" aria-label="Replay"><div>{}</div><div>{}</div>{}</div>\n',
         left,
@@ -55,10 +56,9 @@ def player(episode: Episode) -> Html:
 
 
 def _world(episode: Episode) -> Html:
-    """Return the figure of the world: from above, if the task has a ground plan, otherwise rendered images."""
-    if episode.plan is not None:
-        return _from_above(episode.plan)
-    return Html() if episode.pictures is None else figure_of_pictures(episode.pictures)
+    """Return the figures of the world: rendered images, and the world from above if the task has a ground plan."""
+    pictures = Html() if episode.pictures is None else figure_of_pictures(episode.pictures)
+    return pictures if episode.plan is None else pictures + _from_above(episode.plan)
 
 
 def _from_above(plan: GroundPlan) -> Html:
@@ -86,7 +86,7 @@ def _sights(episode: Episode) -> Html:
     """Return a pair of canvases for each eye, which show its signals and the signals behind a perfect lens."""
     eyes, gain = episode.eyes, episode.gain
     height, width = eyes.resolution
-    room = 140 if eyes.n_eyes <= 2 else 88 if eyes.n_eyes <= 6 else 60
+    room = ROOM if eyes.n_eyes <= 6 else ROOM // 2
     aspect = eyes.field_aspect
     shape = style(f"width:{room * min(aspect, 1):.4g}px;aspect-ratio:{aspect:.4g}")
     size = html('width="{}" height="{}" {}', width, height, shape)
@@ -160,14 +160,15 @@ def _film(episode: Episode) -> dict[str, Any]:
 
 
 def _film_of_world(episode: Episode, kept: np.ndarray) -> dict[str, Any]:
-    """Return the part of the data that describes the world: positions [m], angles [rad] and commands.
+    """Return the part of the data that describes the world: commands, and rendered images if there are any.
 
-    Without a ground plan, it contains rendered images and commands.
+    With a ground plan, it also contains positions [m] and angles [rad].
     """
-    plan, commands = episode.plan, _commands(episode, kept)
+    plan = episode.plan
+    part = _commands(episode, kept) | ({} if episode.pictures is None else film_of_pictures(episode.pictures, kept))
     if plan is None:
-        return commands | ({} if episode.pictures is None else film_of_pictures(episode.pictures, kept))
-    return {
+        return part
+    return part | {
         "bounds": plan.bounds,
         "walls": _rounded(plan.walls),
         "goal_region": plan.goal_region,
@@ -176,7 +177,6 @@ def _film_of_world(episode: Episode, kept: np.ndarray) -> dict[str, Any]:
         "fov": float(np.radians(episode.eyes.fov_deg)),
         "position": _rounded(episode.position[kept]),
         "heading": _rounded(episode.heading[kept], 4),
-        **commands,
         "objects": _rounded(episode.objects[kept][..., :2]),
         "object_names": plan.object_names,
         "object_radius": plan.object_radius,

@@ -56,7 +56,7 @@ def write_replay(
         require_rerun()
     if "mp4" in also:
         require_ffmpeg()
-    episode = record(run, candidate_id, seed, EVERY if every is None else every, mode=mode)
+    episode = record(run, candidate_id, seed, EVERY if every is None else every, pictures=True, mode=mode)
     page = write_page(run, episode, out)
     return episode, [page, *(BESIDE[form](episode, page.with_suffix(f".{form}")) for form in BESIDE if form in also)]
 

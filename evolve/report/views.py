@@ -13,7 +13,7 @@ from evolve.report.picture import data_uri, display
 
 __all__ = ["through_optics", "what_it_sees"]
 
-WIDTH = 120  # length of the longer side of an image [CSS pixels]
+WIDTH = 200  # length of the longer side of an image [CSS pixels]
 MOST_EYES = 6  # maximum number of eyes that are shown
 
 

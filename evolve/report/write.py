@@ -37,7 +37,7 @@ def write(run: Run, episode: Episode | None = None, out: Path | None = None, doi
         require_file_name(out)
     if episode is None and run.best is not None:
         doing("the best agent plays an episode", 0.0)
-        episode = record(run)
+        episode = record(run, pictures=True)
     path = out or run.path / FILE
     if out is not None:  # a run directory that was deleted meanwhile must not reappear
         path.parent.mkdir(parents=True, exist_ok=True)

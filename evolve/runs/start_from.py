@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from evolve.analysis.statistics import gene_values
+from evolve.config.eye_checks import IN_TIME, RHABDOMS
 from evolve.config.provenance import Source
-from evolve.config.run_config import RHABDOMS
 from evolve.genome.genes import ALL_GENES, INHERITED, SIDE, VERTICAL
 from evolve.store.directory import Run
 
@@ -43,6 +43,8 @@ def starts_from(text: str) -> Source:
         tree["eye"] |= {name: getattr(run.config.eye, name) for name in AXES}
     if candidate.phenotype.rhabdom_diameter_um is not None:
         tree["eye"] |= {name: getattr(run.config.eye, name) for name in ("rhabdoms", *RHABDOMS)}
+    if candidate.phenotype.time_constant_ms is not None:
+        tree["eye"] |= {name: getattr(run.config.eye, name) for name in ("temporal_order", *IN_TIME)}
     if height != "receptors":
         tree["eye"]["vertical_fov"] = height
     if candidate.phenotype.lambda_max_nm is not None:

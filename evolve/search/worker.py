@@ -81,11 +81,10 @@ def prepare_device() -> None:
         BackendError: Dr.Jit cannot work here.
     """
     from optics.numerics import device
+    from sim.envs.threads import set_threads
 
     device.make_ready()
-    import drjit
-
-    drjit.set_thread_count(1)
+    set_threads(1)
     _keep_freed_memory()
 
 

@@ -16,6 +16,9 @@ exit_pupil        read_exit_pupil: lenses from other programs
 exit_pupils       read_exit_pupils: several fields and wavelengths
 converging_wave   rays and samples of other programs as a wave near its image
 pupil_rim         circle, ellipse or polygon around the samples of a pupil
+turbid_medium     TurbidMedium: water and fog between surfaces and eyes
+ball_lens         BallLens: gradient-index ball lenses
+spherical_index   rays through spheres with a radial index profile
 refractive_index  RefractiveIndex, Sellmeier, Cornu; media of eyes
 pupil_slopes      slopes of the wavefront behind a pupil
 wavefront_slopes  directions of a wavefront's rays

@@ -2,6 +2,7 @@
 
 eye                   Eye
 eye_spec              EyeSpec: parameters of an eye
+immersion             immersed: an eye under water
 geometry              lengths and directions, and checks of the pupil's width
 cell_integrals        integrals of sampled functions over cells
 retina                the retina as a plane of cells
@@ -17,4 +18,5 @@ polarization          microvilli over a retina and polarised scenes
 signals               signals of a scene
 photoreceptor         throughput, spectral weighting, noise
 summary               table of an eye's limits
+acuity                limits by the spacing of receptors, diffraction and photons
 """

@@ -53,7 +53,8 @@ class Eye(EyeSpec):
     noise_sigma: standard deviation of a receptor's Gaussian noise, in units of the signal.
     photon_budget: light level. Shot noise is added before the Gaussian noise (None: no shot noise).
     receptors: types of receptor: "rgb" (three channels: red, green, blue), "lms" (human cones), "honeybee", "goldfish",
-        peak wavelengths of pigments [nm], or `Receptors`, which can be a mosaic. This field then contains `Receptors`.
+        "mouse", "fruit_fly", "blowfly", "dragonfly", "jumping_spider", peak wavelengths of pigments [nm], or
+        `Receptors`, which can be a mosaic. This field then contains `Receptors`.
     waveguide: rhabdom of each receptor. It stands in the middle of the receptor's square, points at the pupil's centre,
         and accepts light in its guided modes (None: receptors absorb all light on their square).
     microvilli: directions and dichroic ratios of the receptors' microvilli: one `Microvilli` for all receptors, or rows

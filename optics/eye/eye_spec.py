@@ -26,6 +26,7 @@ from optics.numerics.autodiff import Scalar, number
 from optics.ommatidia.waveguide import Waveguide
 from optics.spectra.bands import SpectralBands
 from optics.spectra.photon_budget import PhotonBudget
+from optics.spectra.receptor_dynamics import ReceptorDynamics
 from optics.spectra.receptors import receptors_of
 
 __all__ = ["EyeSpec"]
@@ -59,6 +60,7 @@ class EyeSpec:
     pupil_turned: bool = False
     vertical_fov_deg: float | None = None
     most_seconds: float = 3.0
+    dynamics: ReceptorDynamics | None = None
     spectral_bands: SpectralBands = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -81,6 +83,8 @@ class EyeSpec:
             check_rays(self.pupil, number(self.retina_distance), self.tolerance)
         if self.photon_budget is not None:
             of_kind("photon_budget", self.photon_budget, PhotonBudget, "PhotonBudget(), or None")
+        if self.dynamics is not None:
+            of_kind("dynamics", self.dynamics, ReceptorDynamics, "ReceptorDynamics(time_constant_ms=20)")
         object.__setattr__(self, "receptors", receptors_of(self.receptors))
         auto = str(self.bands) == "auto"
         spectral = self.chosen_bands() if auto else SpectralBands.uniform(self.bands, self.receptors)

@@ -7,6 +7,10 @@ The values are for calls with compiled kernels on two cores. They are precise en
 from __future__ import annotations
 
 __all__ = [
+    "ARRAY_FFT_FLOPS",
+    "ARRAY_LINE_SAMPLE",
+    "ARRAY_MATMUL_FLOPS",
+    "ARRAY_MATRIX_ENTRY",
     "BESSEL_PAIR",
     "CALL",
     "CHECK_BYTES",
@@ -28,6 +32,7 @@ __all__ = [
     "OUTPUT_ARRAYS",
     "OUTPUT_SAMPLE",
     "PAIRS_PER_SECOND",
+    "PASSAGE_CALL",
     "PIXEL_NODE",
     "PIXEL_NODE_GEOMETRY",
     "PROFILE_ENTRY",
@@ -35,10 +40,13 @@ __all__ = [
     "PUPIL_SAMPLE",
     "RAY",
     "RAY_BYTES",
+    "SEPARABLE_ENTRY",
+    "SERIES_TERM",
     "SOFT_EDGE_SAMPLE",
     "SOFT_SIDE_SAMPLE",
     "SPECTRUM_SAMPLE",
     "SYMMETRIC_BYTES",
+    "TRANSFER_SAMPLE",
     "WINDOW_SAMPLE",
 ]
 
@@ -46,6 +54,10 @@ __all__ = [
 MATMUL_FLOPS = {"float32": 45e9, "float64": 22e9}  # additions and multiplications in matrix products
 FFT_FLOPS = 12e9  # counted as 5 n log2 n for a line of n samples
 PAIRS_PER_SECOND = {"float32": 2.5e8, "float64": 1.8e8}  # pairs of node and point in the direct sum
+
+# The same for complex NumPy arrays, in `optics.propagate` [1/s].
+ARRAY_MATMUL_FLOPS = {"float32": 95e9, "float64": 47e9}
+ARRAY_FFT_FLOPS = {"float32": 20e9, "float64": 10e9}
 
 # Seconds per call, independent of its size.
 CALL = {
@@ -59,10 +71,16 @@ CALL = {
     "rayleigh_sommerfeld": 1e-3,
 }
 DFT_CALL = 2e-4  # per Fourier sum
+PASSAGE_CALL = {"angular_spectrum": 4e-3, "separable_kernel": 1e-3}  # per call of `optics.propagate` at a new distance
 
 # Seconds per sample, entry, node or pair.
 FFT_LINE_SAMPLE = 5e-9  # copying a sample into the line of a transform
 FOLDED_SAMPLE = 5e-9  # sample of a sum that is computed from even and odd parts
+ARRAY_LINE_SAMPLE = {"float32": 4e-9, "float64": 8e-9}  # padding and copying a sample of a NumPy array
+ARRAY_MATRIX_ENTRY = 4e-8  # entry of a Fourier matrix, in NumPy
+SEPARABLE_ENTRY = 5e-8  # entry of a separable kernel, in NumPy
+SERIES_TERM = 4e-9  # term of a series at one point, in NumPy
+TRANSFER_SAMPLE = 3e-8  # transfer function in NumPy, including the product with the spectrum
 FFT_COPY = 8e-9  # copying a sample between Dr.Jit and SciPy
 PUPIL_SAMPLE = 1e-8  # optical path and phase, without the soft edge
 SOFT_EDGE_SAMPLE = 1e-8  # soft edge from a table along one edge

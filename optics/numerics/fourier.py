@@ -19,6 +19,7 @@ from typing import Any
 
 import numpy as np
 
+from optics.numerics.array_sum_cost import fft_wins
 from optics.numerics.autodiff import Array, Scalar, is_differentiable
 from optics.numerics.cost import DFT_CALL, FFT_COPY, FFT_FLOPS, FFT_LINE_SAMPLE
 from optics.numerics.field import Field
@@ -84,7 +85,8 @@ def dft2(
 
 def fourier_sum(u: np.ndarray, period: float, shape: tuple[int, int], sign: int) -> np.ndarray:
     """Return the sum of `dft2` for a complex NumPy array, computed without Dr.Jit and without derivatives."""
-    if _fft_wins(u.shape, period, shape):
+    shape_in = (u.shape[0], u.shape[1])
+    if fft_wins(shape_in, period, shape, u.real.dtype.name):
         for axis in (1, 0):
             u = _fft_axis(u, int(period), shape[axis], sign, axis)
         return u

@@ -8,7 +8,7 @@ then converge spectrally.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -20,21 +20,33 @@ from optics.methods.problem import SLOPE_MARGIN
 from optics.numerics.accuracy import MOST_SAMPLES, AccuracyError
 from optics.numerics.grid import Grid
 from optics.numerics.precision import precision
-from optics.propagation.propagate import WRAP_RIPPLE_PER_TOLERANCE, PropagationResult, propagate
-from optics.propagation.transfer_function import kept_band, kept_square
+from optics.propagation.misalignment import ALIGNED, Alignment, Misaligned, path_to_tilted_plane, seen_from, slowness
+from optics.propagation.propagate import WRAP_RIPPLE_PER_TOLERANCE, PropagationResult, propagated_field
+from optics.propagation.transfer_function import EVERYTHING, Passage, kept_band, kept_square, limited_band
 
 __all__ = ["PlaneField", "PupilSampling", "StepSettings", "Stop"]
 
+RIPPLE_OF_LIMITED = 0.03  # choice: WRAP_RIPPLE_PER_TOLERANCE of fields without part of their diffracted light
+FADE = 0.2  # choice: width of the fade that removes such light, relative to the frequency where it begins
 REACH_MARGIN = 1.02  # choice: factor on the planes' half widths, because `propagate` extends each plane by a sample
 
 
 @dataclass(frozen=True)
 class PlaneField:
-    """The field on the samples of a plane. band: highest frequency [1/m] in the field."""
+    """The field on the samples of a plane.
+
+    band: highest frequency [1/m] in the field.
+    rays: highest frequency [1/m] of geometrical rays in the field.
+    kept: frequency [1/m] beyond which the field is to be faded out until `band`; None for no fade.
+    alignment: position of the plane. Samples are counted from its centre.
+    """
 
     u: np.ndarray
     dx: float
     band: float
+    rays: float
+    kept: float | None = None
+    alignment: Alignment = ALIGNED
 
     @property
     def half_width(self) -> float:
@@ -49,13 +61,30 @@ class PlaneField:
 class Stop:
     """A pupil, or the output window, at a distance from the previous stop.
 
-    pupil: None for the output window.
     distance: distance [m] from the previous stop, negative for backward propagation.
+    pupil: None for the output window.
+    half_width: half width [m] of the pupil with its soft edge, or of the window.
+    window: None for a pupil.
+    alignment: position of the pupil.
     """
 
     distance: float
     pupil: Pupil | None
     half_width: float
+    window: Grid | None = None
+    alignment: Alignment = ALIGNED
+
+    @classmethod
+    def at(cls, element: Pupil | Misaligned, distance: float) -> Stop:
+        if isinstance(element, Misaligned):
+            pupil, alignment = element.pupil, Alignment.of(element)
+        else:
+            pupil, alignment = element, ALIGNED
+        return cls(distance, pupil, (1 + EDGE_REACH) * pupil.radius, None, alignment)
+
+    def apart(self, other: Alignment) -> float:
+        """Return the largest distance [m] of the centres along an axis."""
+        return max(map(abs, self.alignment.beside(other)))
 
 
 @dataclass(frozen=True)
@@ -64,6 +93,8 @@ class StepSettings:
 
     tolerance: tolerance of each step.
     wavelength: wavelength in vacuum [m].
+    margin: frequencies [cycles per radius of a pupil] of diffracted light beyond those of geometrical rays. Light of
+        higher frequencies is removed. Infinite: all light is propagated that can reach the next plane.
     """
 
     wavelength: float
@@ -71,10 +102,11 @@ class StepSettings:
     backward: bool
     tolerance: float
     dtype: str
+    margin: float = math.inf
 
     @property
     def ripple(self) -> float:
-        return WRAP_RIPPLE_PER_TOLERANCE * self.tolerance
+        return (WRAP_RIPPLE_PER_TOLERANCE if math.isinf(self.margin) else RIPPLE_OF_LIMITED) * self.tolerance
 
     @property
     def edge_ripple(self) -> float:
@@ -100,41 +132,70 @@ class StepSettings:
             return max(round_.end, square.diagonal(wavelength) if math.isfinite(square.kept) else 0)
         return math.hypot(1 / wavelength, math.log(1 / self.ripple) / (2 * math.pi * z))
 
-    def carried(self, field: PlaneField, distance: float, window: Grid) -> PropagationResult:
-        """Return the field after propagation through free space, on the samples of another plane."""
-        return propagate(
-            field.u,
-            dx=field.dx,
-            wavelength=self.wavelength,
-            distance=distance,
-            out_dx=window.dx,
-            out_shape=window.shape,
-            medium_n=self.medium_n,
-            tolerance=self.tolerance,
-            dtype=self.dtype,
-        )
+    def carried(self, field: PlaneField, stop: Stop, grid: Grid) -> PropagationResult:
+        """Return the field after propagation through free space, on the samples of the next stop."""
+        wavelength, limit = self.wavelength / self.medium_n, None
+        if field.kept is not None:
+            limit = limited_band(field.kept, field.band - field.kept, wavelength, abs(stop.distance), self.ripple)
+        window = grid.moved(stop.alignment.beside(field.alignment))
+        if not (field.alignment.steepness or stop.alignment.steepness):
+            passage = Passage(wavelength, stop.distance, False, EVERYTHING, self.ripple, window.centre, limit)
+            return propagated_field(field.u, field.dx, passage, window, self.tolerance, self.dtype)
+        sine = self.steep(field)
+        turns, source = slowness(sine) / wavelength, Grid(field.u.shape, field.dx)
+        leaving, error_out = field.alignment.nodes(field.half_width, sine, wavelength, self.tolerance / 4)
+        arriving, error_in = stop.alignment.nodes(stop.half_width, sine, wavelength, self.tolerance / 4)
+        found: list[PropagationResult] = []
+        into = stop.alignment.weights(arriving, grid, -turns)
+        for start, share in zip(leaving, field.alignment.weights(leaving, source, turns), strict=True):
+            for end, weight in zip(arriving, into, strict=True):
+                distance = stop.distance + float(end - start)
+                passage = Passage(wavelength, distance, False, EVERYTHING, self.ripple, window.centre, limit)
+                out = propagated_field(field.u * share, field.dx, passage, window, self.tolerance, self.dtype)
+                carrier = np.exp(2j * np.pi * (end - start) * (turns - 1 / wavelength))
+                found.append(replace(out, u=(out.u * (weight * carrier)).astype(out.u.dtype)))
+        worst = max(found, key=lambda result: result.plan.predicted_error)
+        plan = replace(worst.plan, predicted_error=worst.plan.predicted_error + error_out + error_in)
+        return replace(worst, plan=plan, u=np.sum([result.u for result in found], axis=0))
+
+    def steep(self, field: PlaneField) -> float:
+        """Return the largest sin θ to the axis that tilts must represent.
+
+        If diffracted light is removed, the remaining light beyond geometrical rays is too weak to matter here.
+        """
+        frequency = field.band if field.kept is None else field.rays
+        return min(frequency * self.wavelength / self.medium_n, 1.0)
 
 
 @dataclass(frozen=True)
 class PupilSampling:
-    """Samples of a pupil, its soft aperture, and the highest frequency [1/m] (`band`) that they transmit."""
+    """Samples of a pupil, its soft aperture, and the frequencies [1/m] that they transmit (see PlaneField).
+
+    source: source relative to the pupil's centre, which illuminates the pupil if no field arrives.
+    path: path [m] of the source's light to the pupil's centre, minus that to the axis.
+    """
 
     pupil: Pupil
     source: PointSource
     grid: Grid
     soft: SoftAperture
     band: float
+    rays: float
+    kept: float | None
+    alignment: Alignment
+    path: float
 
     @classmethod
     def for_stop(
-        cls, stop: Stop, following: Stop, settings: StepSettings, source: PointSource, arriving: float
+        cls, stop: Stop, following: Stop, settings: StepSettings, source: PointSource, field: PlaneField | None
     ) -> PupilSampling:
         """Return the sampling of the pupil at a stop.
 
         The band is the sum of the frequencies of the arriving light, of the pupil's phase and of the pupil's edge.
         Frequencies beyond the band may be aliased, but not into the band.
 
-        arriving: highest frequency [1/m] of the arriving light.
+        field: arriving field, before its propagation to the pupil. None: the source illuminates the pupil. Its
+            frequencies are then part of the pupil's phase.
 
         Raises:
             AccuracyError: more samples are necessary than the limit allows.
@@ -145,11 +206,25 @@ class PupilSampling:
             raise ValueError(
                 "elements: a PixelRelief has jumps, which the grids between planes cannot represent: use psf for it"
             )
-        slope = SLOPE_MARGIN * pupil.slopes(settings.wavelength, source).steepest / settings.wavelength
+        path = 0.0
+        if field is None:
+            source, path = seen_from(source, stop.alignment.centre)
+        slopes = pupil.slopes(settings.wavelength, source)
+        slope, inside = (SLOPE_MARGIN * s / settings.wavelength for s in (slopes.steepest, slopes.steepest_inside))
+        arriving = rays = 0.0
+        if field is not None:
+            widths = field.half_width + stop.half_width + stop.apart(field.alignment)
+            reaching = settings.reaching(widths, stop.distance)
+            arriving, rays = min(field.band, reaching), min(field.rays, reaching)
         turns = arriving + slope + pupil.bandwidth(settings.wavelength, settings.edge_ripple)
-        band = settings.reaching(stop.half_width + following.half_width, following.distance)
+        widths = stop.half_width + following.half_width + following.apart(stop.alignment)
+        band, kept = settings.reaching(widths, following.distance), None
         if math.isinf(band):
             band = turns  # coinciding planes: the edge is as soft as the finest detail
+        rays += inside + pupil.scatter(settings.wavelength, settings.ripple)
+        limit = rays + settings.margin / pupil.radius
+        if (1 + FADE) * limit < band:
+            band, kept = (1 + FADE) * limit, limit
         soft = pupil.aperture.soften((turns + band) * pupil.radius, settings.edge_ripple, EDGE_REACH)
         pitch = 1 / (turns + band + soft.stopband / pupil.radius)
         across = 2 * math.ceil((1 + soft.reach) * pupil.radius / pitch) + 1
@@ -158,15 +233,25 @@ class PupilSampling:
                 f"a pupil of radius {pupil.radius:.3g} m needs {across} samples across; the limit is {MOST_SAMPLES}: "
                 "widen the tolerance, flatten its relief, or move the adjacent planes further away"
             )
-        return cls(pupil, source, Grid.square(across, pitch), soft, band)
+        return cls(pupil, source, Grid.square(across, pitch), soft, band, rays, kept, stop.alignment, path)
 
-    def transmitted(self, u: np.ndarray | float, settings: StepSettings) -> PlaneField:
-        """Return the field u on the grid times the pupil's transmittance; backwards, times its conjugate."""
+    def transmitted(self, u: np.ndarray | None, settings: StepSettings) -> PlaneField:
+        """Return the field u on the grid times the pupil's transmittance; backwards, times its conjugate.
+
+        u: None for light from the source.
+        """
         import drjit as dr
 
+        types = precision(settings.dtype)
         beam = Beam(self.pupil, self.source, settings.wavelength, math.inf)
-        field = beam.behind(self.soft, self.grid, precision(settings.dtype))
-        if dr.grad_enabled(field.re, field.im):
+        x, y = self.alignment.on_element(*self.grid.coordinates(types), types)
+        found = beam.at(self.soft, x, y, self.grid, types)
+        if dr.grad_enabled(found.re, found.im):
             raise ValueError("elements: a system has no derivatives; use psf for a single pupil")
-        transmittance = field.numpy()
-        return PlaneField(u * (transmittance.conj() if settings.backward else transmittance), self.grid.dx, self.band)
+        transmittance = found.numpy()
+        if u is None:
+            path = self.path + path_to_tilted_plane(self.source, self.alignment, self.grid)
+            u = np.exp(2j * np.pi * settings.medium_n / settings.wavelength * path).astype(transmittance.dtype)
+        field = u * (transmittance.conj() if settings.backward else transmittance)
+        field = self.alignment.leaving(field, self.grid.dx, settings.wavelength / settings.medium_n)
+        return PlaneField(field, self.grid.dx, self.band, self.rays, self.kept, self.alignment)

@@ -13,22 +13,22 @@ that lands farther away. Neither is possible close to grazing incidence; the pre
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
-from functools import cached_property, lru_cache
-from typing import Any
+from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
 from optics.numerics.accuracy import FLOAT_NOISE, AccuracyError, Plan, above
 from optics.numerics.arguments import complexes, finite, in_range, shown, vacuum_wavelength, without_derivative
-from optics.numerics.fourier import fourier_sum, kept_indices, periodic_spectrum, periodic_sum, predicted_seconds
 from optics.numerics.grid import Grid, OnWindow
 from optics.numerics.precision import Precision, precision
 from optics.numerics.read_only import ReadOnlyArrays
-from optics.propagation.transfer_function import EVERYTHING, Passage, TransferFunction, evanescent
-from optics.propagation.transform_sampling import TransformSampling, blur_left, blurred_back, most_spare, sampling
+from optics.propagation.separable_kernel import SeparableSampling, separable
+from optics.propagation.spectrum_filter import PropagatedPlane, evanescent_share, filtered
+from optics.propagation.transfer_function import EVERYTHING, Passage
+from optics.propagation.transform_sampling import TransformSampling, blur_left, most_spare, sampling
 
-__all__ = ["PROPAGATION_METHODS", "WRAP_RIPPLE_PER_TOLERANCE", "PropagationResult", "propagate"]
+__all__ = ["PROPAGATION_METHODS", "WRAP_RIPPLE_PER_TOLERANCE", "PropagationResult", "propagate", "propagated_field"]
 
 PROPAGATION_METHODS = ("angular_spectrum", "fresnel")
 # Choice: fraction of the removed light that may still reach the window, relative to the tolerance. It is small, because
@@ -38,12 +38,8 @@ WRAP_RIPPLE_PER_TOLERANCE = 3e-3
 SPARE = 1.0
 # Choice: a field is propagated again if the blur, estimated to a factor of two or three, exceeds the limit this much.
 CLEARLY = 1.5
-# Choice: the evanescent part of the missing light is computed if the missing light exceeds the arriving light by this
-# factor. Smaller amounts hardly affect the predicted error.
-MUCH = 100.0
-
-HELD = (1e-20, 1e30)  # range of the power Σ|u|² for which float32 can represent the terms of the error estimate
-ONE = np.ones(1)  # stands for equal weights in a sum
+# Choice: fraction of the tolerance for the part of the kernel that is not separable.
+SEPARABLE_SHARE = 0.7
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +56,7 @@ class PropagationResult(ReadOnlyArrays, OnWindow):
     plan: Plan
     window: Grid
     _source: np.ndarray = field(repr=False)  # (plane, y, x)
-    _sampling: TransformSampling = field(repr=False)
+    _sampling: TransformSampling | SeparableSampling = field(repr=False)
 
     def __repr__(self) -> str:
         size = " x ".join(map(str, self.u.shape))
@@ -74,7 +70,8 @@ class PropagationResult(ReadOnlyArrays, OnWindow):
         In forward propagation, these waves decay. In backward propagation they are omitted, because undoing the decay
         would amplify noise without bound.
         """
-        return max(_evanescent_share(plane, self._sampling) for plane in self._source)
+        how = self._sampling
+        return max(evanescent_share(plane, how.period, how.source.dx, how.passage) for plane in self._source)
 
 
 def propagate(
@@ -100,7 +97,8 @@ def propagate(
         shape equal those of u, and the centre is on the axis.
     tolerance: relative L2 error of the intensity over the output, for exact samples u. If u contains light at its
         Nyquist frequency, that is, if it is sampled too coarsely, the plan states the additional error.
-    method: "auto" and "angular_spectrum" are exact. "fresnel" is the paraxial approximation.
+    method: "auto" and "angular_spectrum" are exact. "auto" replaces the transforms by matrix products if these are
+        faster, in distant or shifted windows. "fresnel" is the paraxial approximation.
 
     Raises:
         ValueError: an argument is invalid; the message names it with its value and valid range.
@@ -112,11 +110,6 @@ def propagate(
         without_derivative(name, value)
     given = _field(u)
     window = Grid(given.shape[-2:] if out_shape is None else out_shape, dx if out_dx is None else out_dx, out_centre)
-    lit = _lit(given)
-    source = Grid(lit.shape[-2:], dx)
-    sources = lit.reshape(-1, *source.shape)
-    if np.may_share_memory(sources, given):  # the result stores the sources, so later changes of u must not affect them
-        sources = sources.copy()
     in_range("tolerance", tolerance, 10 * FLOAT_NOISE[precision(dtype).dtype], 0.5)
     passage = Passage(
         vacuum_wavelength(wavelength) / in_range("medium_n", medium_n, 1.0, 10.0),
@@ -125,17 +118,27 @@ def propagate(
         EVERYTHING,
         WRAP_RIPPLE_PER_TOLERANCE * tolerance,
         window.centre,
+        by_transforms=method == "angular_spectrum",
     )
-    how, planes = _with_padding(sources, passage, (source, window), tolerance, precision(dtype))
+    return propagated_field(given, dx, passage, window, tolerance, dtype)
+
+
+def propagated_field(
+    given: np.ndarray, dx: float, passage: Passage, window: Grid, tolerance: float, dtype: str
+) -> PropagationResult:
+    """Return the field (…, y, x) after a passage. The arguments are those of `propagate`, and valid.
+
+    Raises:
+        AccuracyError: no sampling meets the tolerance.
+    """
+    lit = _lit(given)
+    source = Grid(lit.shape[-2:], dx)
+    sources = lit.reshape(-1, *source.shape)
+    if np.may_share_memory(sources, given):  # the result stores the sources, so later changes of u must not affect them
+        sources = sources.copy()
+    how, planes = _propagated(sources, passage, (source, window), tolerance, precision(dtype))
     out = np.stack([plane.u for plane in planes]).reshape(*given.shape[:-2], *window.shape)
-    error = max(plane.error for plane in planes)
-    if not error <= tolerance:
-        raise AccuracyError(
-            f"tolerance = {tolerance:g}: the error reaches {above(error, tolerance)}, because too much of the light is "
-            "near grazing incidence or too little of it hits the window; widen the tolerance or enlarge out_shape"
-        )
-    plan = _plan(how, error, _sample_note(planes, tolerance), dtype)
-    return PropagationResult(out, window.dx, plan, window, sources, how)
+    return PropagationResult(out, window.dx, _plan(how, planes, tolerance, dtype), window, sources, how)
 
 
 def _field(u: np.ndarray) -> np.ndarray:
@@ -161,23 +164,26 @@ def _lit(field: np.ndarray) -> np.ndarray:
     return field
 
 
-@dataclass(frozen=True)
-class _Carried:
-    """A propagated plane.
-
-    u: field (y, x).
-    error: predicted error of the intensity.
-    blur: additional error from light at the Nyquist frequency of the samples.
-    """
-
-    u: np.ndarray
-    error: float
-    blur: float
+def _propagated(
+    sources: np.ndarray, passage: Passage, grids: tuple[Grid, Grid], tolerance: float, types: Precision
+) -> tuple[TransformSampling | SeparableSampling, list[PropagatedPlane]]:
+    """Return the planes, propagated by the method with the shorter predicted time."""
+    direct = separable(passage, *grids, SEPARABLE_SHARE * tolerance)
+    if direct is None:
+        return _with_padding(sources, passage, grids, tolerance, types)
+    try:
+        how = sampling(passage, *grids, 0.0)
+    except AccuracyError:
+        how = None
+    count = len(sources)
+    if how is None or direct.seconds(types.dtype, count) < how.seconds(types.dtype, count):
+        return direct, [direct.propagated(plane, types) for plane in sources]
+    return how, [filtered(plane, how, types) for plane in sources]
 
 
 def _with_padding(
     sources: np.ndarray, passage: Passage, grids: tuple[Grid, Grid], tolerance: float, types: Precision
-) -> tuple[TransformSampling, list[_Carried]]:
+) -> tuple[TransformSampling, list[PropagatedPlane]]:
     """Return the planes, propagated with enough padding for the blur due to light at the Nyquist frequency.
 
     If even the largest useful padding is insufficient, none is added, because the samples themselves are then too
@@ -186,96 +192,17 @@ def _with_padding(
     most = most_spare(passage, grids[0])
     spare = min(SPARE * math.sqrt(passage.wavelength * abs(passage.z)), most)
     how = sampling(passage, *grids, spare)
-    planes = [_one(plane, how, types) for plane in sources]
+    planes = [filtered(plane, how, types) for plane in sources]
     blur = max(plane.blur for plane in planes)
     allowed = CLEARLY * (tolerance - max(plane.error for plane in planes))
     if spare < most and blur > allowed and blur * blur_left(how, sampling(passage, *grids, most)) < allowed:
         # The blur is proportional to 1 / spare. Choice: a fifth more padding than this implies.
         how = sampling(passage, *grids, min(1.2 * CLEARLY * blur / allowed * spare, most))
-        planes = [_one(plane, how, types) for plane in sources]
+        planes = [filtered(plane, how, types) for plane in sources]
     return how, planes
 
 
-def _one(plane: np.ndarray, how: TransformSampling, types: Precision) -> _Carried:
-    given, brightest = plane, 1.0
-    with np.errstate(over="ignore"):
-        plane = np.ascontiguousarray(given, dtype=types.complex_dtype)
-        total = _power(plane)
-    # Divide u by its brightest sample, so that float32 can represent the powers.
-    if not HELD[0] < total < HELD[1]:
-        brightest = float(np.abs(given).max(initial=0.0))
-        if brightest == 0:
-            return _Carried(np.zeros(how.window.shape, types.complex_dtype), 0.0, 0.0)
-        plane = np.ascontiguousarray(given / brightest, dtype=types.complex_dtype)
-        total = _power(plane)
-    space = _free_space(how, types.dtype)
-    if how.step:
-        spectrum = periodic_spectrum(plane, how.period, how.across)
-    else:
-        spectrum = fourier_sum(plane, how.period, (how.across, how.across), -1)
-    grazing = _power(spectrum, space.grazing) / how.period**2
-    blurred = blurred_back(spectrum, how)
-    spectrum *= space.transfer
-    # By Parseval's theorem, missing power was either faded out or is evanescent. If no power is missing, the difference
-    # is a rounding error of float32, which is small compared with the remainder of the fade.
-    faded = max(total - _power(spectrum) * how.period**2, 0.0) if how.passage.band.fade else 0.0
-    if how.step:
-        result = periodic_sum(spectrum, how.period, how.step, how.window.shape)
-    else:
-        result = fourier_sum(spectrum, how.period * how.source.dx / how.window.dx, how.window.shape, +1)
-    arrived = _power(result) * (how.window.dx / how.source.dx) ** 2
-    if not arrived:
-        return _Carried(result, math.inf, math.inf)
-    if faded > MUCH * arrived:
-        faded = max(faded - total * _evanescent_share(plane, how), 0.0)
-    rounding = FLOAT_NOISE[types.dtype] * (1 + math.sqrt(total / arrived))
-    # Light at the start of a fade is blurred but hardly weaker. It is assumed to be as bright as the light that
-    # arrives.
-    blurred_by_fade = 2 * how.passage.ripple * (1 + math.sqrt(faded / arrived)) if how.passage.band.fade else 0.0
-    error = 2 * math.sqrt(grazing / arrived) + rounding + blurred_by_fade
-    result = result if brightest == 1 else result * result.dtype.type(brightest)
-    return _Carried(result, error, 2 * math.sqrt(blurred / arrived))
-
-
-def _evanescent_share(plane: np.ndarray, how: TransformSampling) -> float:
-    """Return the evanescent fraction of a plane's power."""
-    total = _power(plane)
-    if total == 0 or how.passage.paraxial:
-        return 0.0
-    spectrum = periodic_spectrum(plane, how.period, how.period)
-    weights = evanescent(how.period, how.source.dx, how.passage.wavelength)
-    lost = float(np.sum(weights * (spectrum.real**2 + spectrum.imag**2), dtype=np.float64)) / how.period**2
-    return min(lost / total, 1.0)
-
-
-def _power(u: np.ndarray, weight: np.ndarray | None = ONE) -> float:
-    """Return Σ w |u|². The weights are for real and imaginary parts. The result is 0 if the weight is None."""
-    if weight is None:
-        return 0.0
-    if weight is ONE:
-        return float(np.vdot(u, u).real)
-    parts = u.view(weight.dtype)
-    return float(np.dot((parts * parts).ravel(), weight.ravel()))
-
-
-@lru_cache(maxsize=4)
-def _free_space(how: TransformSampling, dtype: str) -> TransferFunction:
-    """Return the transfer function over the spectrum, including the normalisation of the transforms.
-
-    It is cached, because it takes more time than the transforms, and the same distance is often used again.
-    """
-    step = 1 / (how.period * how.source.dx)
-    if how.step:  # the axes of the spectrum are (fx, fy)
-        fx, fy = (kept_indices(n) * step for n in (how.across, how.period))
-        space = replace(how.passage, centre=how.passage.centre[::-1]).over(fy, fx, precision(dtype))
-    else:
-        fx = fy = Grid.square(how.across, step).x
-        space = how.passage.over(fx, fy, precision(dtype))
-    space.transfer[:] *= 1 / how.period**2
-    return space
-
-
-def _sample_note(planes: list[_Carried], tolerance: float) -> str:
+def _sample_note(planes: list[PropagatedPlane], tolerance: float) -> str:
     """Return a note on the error of coarse input samples if it exceeds the tolerance, else an empty string.
 
     The predicted error does not include this error.
@@ -287,13 +214,25 @@ def _sample_note(planes: list[_Carried], tolerance: float) -> str:
     return f"; light at u's Nyquist frequency adds an error of about {error}: sample u more finely or soften its edges"
 
 
-def _plan(how: TransformSampling, error: float, note: str, dtype: str) -> Plan:
-    band = how.passage.band
-    kept = f"band {band.kept * how.passage.wavelength:.2g} n/λ" if band.fade else "the whole spectrum of u"
-    period = how.period * how.source.dx
-    why = f"period {period:.3g} m, {kept}" + ("; paraxial, as requested" if how.passage.paraxial else "") + note
-    spectrum = how.across, how.across
-    seconds = predicted_seconds(how.source.shape, how.period, spectrum)
-    seconds += predicted_seconds(spectrum, period / how.window.dx, how.window.shape)
-    any_samples: Any = (how.period, how.period)
-    return Plan(how.method, any_samples, dtype, error, why, seconds)
+def _plan(
+    how: TransformSampling | SeparableSampling, planes: list[PropagatedPlane], tolerance: float, dtype: str
+) -> Plan:
+    """Return the plan.
+
+    Raises:
+        AccuracyError: the predicted error exceeds the tolerance.
+    """
+    error = max(plane.error for plane in planes)
+    if not error <= tolerance:
+        raise AccuracyError(
+            f"tolerance = {tolerance:g}: the error reaches {above(error, tolerance)}, because too much of the light is "
+            "near grazing incidence or too little of it hits the window; widen the tolerance or enlarge out_shape"
+        )
+    return Plan(
+        how.method,
+        how.samples,
+        dtype,
+        error,
+        how.why + _sample_note(planes, tolerance),
+        how.seconds(dtype, len(planes)),
+    )

@@ -32,7 +32,16 @@ from optics.numerics.grid import Grid
 from optics.numerics.interpolation import Interpolant
 from optics.numerics.precision import Precision, opaque, padded_for_packets
 
-__all__ = ["PERIOD_MAX_SINE", "Band", "TransferFunction", "evanescent", "kept_band", "kept_square", "walk"]
+__all__ = [
+    "PERIOD_MAX_SINE",
+    "Band",
+    "TransferFunction",
+    "evanescent",
+    "kept_band",
+    "kept_square",
+    "limited_band",
+    "walk",
+]
 
 # Choice: the period is long enough for light up to this sin θ. z tan θ has no bound at grazing incidence.
 PERIOD_MAX_SINE = 0.995
@@ -101,6 +110,18 @@ def kept_square(half: float, wavelength: float, z: float, ripple: float, paraxia
     return _shortest(half, wavelength, z, ripple, paraxial, square=True)
 
 
+def limited_band(kept: float, fade: float, wavelength: float, z: float, ripple: float) -> Band:
+    """Return the band of given limits, whatever light could reach the window.
+
+    The result is `EVERYTHING` if its outermost light is too near grazing incidence.
+    """
+    if (kept + fade) * wavelength >= PERIOD_MAX_SINE:
+        return EVERYTHING
+    blur = kaiser_beta(ripple) / math.pi / fade
+    return Band(kept, fade, walk(kept + fade, wavelength, z) + OUTWARDS * blur)
+
+
+@lru_cache(maxsize=256)
 def _shortest(distance: float, wavelength: float, z: float, ripple: float, paraxial: bool, square: bool) -> Band:
     blur = kaiser_beta(ripple) / math.pi
     steepest = STEEPEST_SQUARE if square else PERIOD_MAX_SINE
@@ -181,6 +202,8 @@ class Passage:
 
     centre: position (x, y) [m] of the window.
     ripple: fraction of the light that remains beyond a fade.
+    limit: band beyond which light is removed although it could reach the window; None if there is no limit.
+    by_transforms: True if matrix products must not replace transforms.
 
     Evanescent waves decay in forward propagation and are omitted in backward propagation (z < 0).
     """
@@ -191,6 +214,8 @@ class Passage:
     band: Band
     ripple: float
     centre: tuple[float, float]
+    limit: Band | None = None
+    by_transforms: bool = False
 
     def over(self, fx: np.ndarray, fy: np.ndarray, types: Precision) -> TransferFunction:
         """Return the transfer function at frequencies fx (column), fy (row) [1/m]."""

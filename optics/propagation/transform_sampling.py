@@ -27,11 +27,21 @@ from functools import lru_cache
 import numpy as np
 
 from optics.numerics.accuracy import MOST_SAMPLES, AccuracyError
+from optics.numerics.array_sum_cost import lines_seconds, sum_seconds
+from optics.numerics.cost import PASSAGE_CALL, TRANSFER_SAMPLE
 from optics.numerics.fourier import fast_length
 from optics.numerics.grid import Grid
-from optics.propagation.transfer_function import EVERYTHING, PERIOD_MAX_SINE, Passage, kept_band, kept_square, walk
+from optics.propagation.transfer_function import (
+    EVERYTHING,
+    PERIOD_MAX_SINE,
+    Band,
+    Passage,
+    kept_band,
+    kept_square,
+    walk,
+)
 
-__all__ = ["TransformSampling", "blur_left", "blurred_back", "most_spare", "sampling"]
+__all__ = ["KeptLight", "TransformSampling", "blur_left", "blurred_back", "kept_light", "most_spare", "sampling"]
 
 # Pitches count as equal if positions differ by less than this fraction of a sample over the whole window (rounding).
 SAME_PITCH = 1e-9
@@ -62,6 +72,66 @@ class TransformSampling:
     def method(self) -> str:
         return "fresnel" if self.passage.paraxial else "angular_spectrum"
 
+    @property
+    def samples(self) -> tuple[int, int]:
+        return self.period, self.period
+
+    def seconds(self, real: str, planes: int = 1) -> float:
+        """Return the predicted time of the propagation of planes, including the transfer function.
+
+        real: type of real and imaginary parts, "float32" or "float64".
+        """
+        period, across = self.period, self.across
+        if self.step:
+            sums = lines_seconds(self.source.shape[0] + 2 * across + self.window.shape[0], period, real)
+        else:
+            back = period * self.source.dx / self.window.dx
+            sums = sum_seconds(self.source.shape, period, (across, across), real)
+            sums += sum_seconds((across, across), back, self.window.shape, real)
+        transfer = across * (period if self.step else across) * TRANSFER_SAMPLE
+        return PASSAGE_CALL["angular_spectrum"] + planes * sums + transfer
+
+    @property
+    def why(self) -> str:
+        """Reason for the sampling, for plans."""
+        band = self.passage.band
+        kept = f"band {band.kept * self.passage.wavelength:.2g} n/λ" if band.fade else "the whole spectrum of u"
+        paraxial = "; paraxial, as requested" if self.passage.paraxial else ""
+        return f"period {self.period * self.source.dx:.3g} m, {kept}{paraxial}"
+
+
+@dataclass(frozen=True)
+class KeptLight:
+    """The light that can reach a window: its band, and the distance [m] from the far edge of one plane to the far edge
+    of the other, along the longer axis."""
+
+    band: Band
+    reach: float
+
+
+def kept_light(passage: Passage, source: Grid, window: Grid) -> KeptLight:
+    """Return the band of the light that can reach the window.
+
+    The band contains all frequencies if no light can be faded, because light at the Nyquist frequency of the source
+    lands in the window or near it.
+    """
+    wavelength, z, ripple, paraxial = passage.wavelength, abs(passage.z), passage.ripple, passage.paraxial
+    # The source is extended by one sample, because the band-limited function extends beyond the outermost samples.
+    reach = max(
+        (n // 2 + 1) * source.dx + (m // 2) * window.dx + abs(middle)
+        for n, m, middle in zip(source.shape, window.shape, window.centre[::-1], strict=True)
+    )
+    band, nyquist = passage.limit, 0.5 / source.dx
+    if band is None:
+        corner = source.half_diagonal + source.dx + window.half_diagonal
+        bands = (
+            kept_square(reach, wavelength, z, ripple, paraxial),
+            kept_band(corner, wavelength, z, ripple, paraxial),
+        )
+        band = min(bands, key=lambda band: band.walk)
+    everything = band.end >= (nyquist if band.square else math.sqrt(2) * nyquist)
+    return KeptLight(EVERYTHING if everything else band, reach)
+
 
 @lru_cache(maxsize=64)
 def sampling(passage: Passage, source: Grid, window: Grid, spare: float) -> TransformSampling:
@@ -72,23 +142,10 @@ def sampling(passage: Passage, source: Grid, window: Grid, spare: float) -> Tran
     Raises:
         AccuracyError: the period needs more samples than the limit.
     """
-    wavelength, z, ripple, paraxial = passage.wavelength, abs(passage.z), passage.ripple, passage.paraxial
-    # Distance from the far edge of the source to the far edge of the window. The source is extended by one sample,
-    # because the band-limited function extends beyond the outermost samples.
-    reach = max(
-        (n // 2 + 1) * source.dx + (m // 2) * window.dx + abs(middle)
-        for n, m, middle in zip(source.shape, window.shape, window.centre[::-1], strict=True)
-    )
-    corner = source.half_diagonal + source.dx + window.half_diagonal
-    bands = (
-        kept_square(reach, wavelength, z, ripple, paraxial),
-        kept_band(corner, wavelength, z, ripple, paraxial),
-    )
-    band = min(bands, key=lambda band: band.walk)
-    far, nyquist = band.walk, 0.5 / source.dx
-    # If no light can be faded, all frequencies of the samples are included.
-    if band.end >= (nyquist if band.square else math.sqrt(2) * nyquist):
-        band, far = EVERYTHING, _farthest(nyquist, wavelength, z, paraxial) + spare
+    light = kept_light(passage, source, window)
+    band, reach = light.band, light.reach
+    far = band.walk if band.fade else _farthest(0.5 / source.dx, passage.wavelength, abs(passage.z), passage.paraxial)
+    far += 0.0 if band.fade else spare
     # Light that moves `far` from the source's far edge must not wrap around to the window's edge, and the source must
     # fit into the period.
     least = max(reach + far, 2 * (max(source.shape) // 2 + 1) * source.dx)

@@ -7,14 +7,25 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from optics.numerics.arguments import in_range, of_kind, positive
+from optics.numerics.arguments import in_range, of_kind, one_of, positive
 from optics.spectra.bands import SpectralBands
 from optics.spectra.spectrum import cie_1931, daylight
 
-__all__ = ["PhotonBudget"]
+__all__ = ["PhotonBudget", "light_level"]
 
 PLANCK, LIGHT_SPEED = 6.62607015e-34, 299792458.0  # [J s], [m/s], exact in the SI
 LUMENS_PER_WATT = 683.0  # K_m of CIE 018, accurate to 0.002 %
+# Illuminance [lx] of horizontal ground. Source: Schlyter, Radiometry and photometry in astronomy, 2017, by the table in
+# Wikipedia's "Orders of magnitude (illuminance)". The values vary with weather and season by factors of 2 and more.
+LIGHT_LEVELS = {
+    "starlight": 2e-3,
+    "quarter moon": 1e-2,
+    "full moon": 0.25,
+    "civil dusk": 3.4,
+    "sunset": 400.0,
+    "overcast": 1e4,
+    "sunlight": 1.1e5,
+}
 
 
 @dataclass(frozen=True)
@@ -52,9 +63,10 @@ class PhotonBudget:
 
             N_c = η Δt G ∫ E_λ/π · λ/(hc) · S_c(λ) dλ
 
-        etendue: G [m² sr], the pupil's area times the solid angle from which a receptor receives light. With G = (π/4)
-            D² (d/f)², N_c corresponds to Land's sensitivity (Warrant & Nilsson 1998, Vision Research 38:195, eq. 1),
-            with the spectrum of daylight instead of one wavelength, for square receptors of side d.
+        etendue: G [m² sr], the pupil's area times the solid angle from which a receptor receives light: Land's
+            sensitivity (`optical_sensitivity`; Warrant & Nilsson 1998, Vision Research 38:195, eq. 1), or (π/4) D²
+            (d/f)² for square receptors of side d. The spectrum of daylight replaces the single wavelength of Land's
+            formula.
 
         Raises:
             ValueError: an argument is outside its valid range, which the message states.
@@ -64,3 +76,17 @@ class PhotonBudget:
         radiance = self.spectral_irradiance / math.pi
         caught = self.quantum_efficiency * self.integration_time * etendue
         return caught * radiance / (PLANCK * LIGHT_SPEED) * bands.white_catch
+
+
+def light_level(name: str) -> float:
+    """Return a typical illuminance [lx] in the open, for `PhotonBudget`.
+
+    The light has the spectrum of daylight, as moonlight approximately does. Starlight is redder.
+
+    name: "starlight" (clear sky without moon, with airglow), "quarter moon", "full moon", "civil dusk" (the dark limit
+        of civil twilight), "sunset" (clear sky), "overcast" (midday) or "sunlight".
+
+    Raises:
+        ValueError: an unknown name.
+    """
+    return LIGHT_LEVELS[one_of("light level", name, LIGHT_LEVELS)]

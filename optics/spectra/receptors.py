@@ -165,6 +165,17 @@ RECEPTORS: Mapping[str, Callable[[], Receptors]] = {
     "honeybee": lambda: Receptors((544.0, 436.0, 344.0)),
     # Cones: Palacios et al. (1998), Vision Research 38:2135.
     "goldfish": lambda: Receptors(tuple(Pigment(peak, "A2") for peak in (623.0, 537.0, 447.0, 356.0))),
+    # R1-6, R7 and R8 in pale ommatidia, R7 and R8 in yellow ommatidia. The ultraviolet peak of R1-6 is omitted.
+    # Drosophila: Salcedo et al. (1999), J. Neurosci. 19:10716.
+    "fruit_fly": lambda: Receptors((478.0, 345.0, 437.0, 375.0, 508.0)),
+    # Musca: Hardie (1985), Progr. Sensory Physiol. 5:1.
+    "blowfly": lambda: Receptors((490.0, 335.0, 460.0, 430.0, 520.0)),
+    # Sympetrum, ventral eye: Meinertzhagen, Menzel & Kahle (1983), J. Comp. Physiol. A 151:295.
+    "dragonfly": lambda: Receptors((620.0, 515.0, 410.0, 340.0)),
+    # Principal eyes of Plexippus: Blest, Hardie, McIntyre & Williams (1981), J. Comp. Physiol. A 145:227.
+    "jumping_spider": lambda: Receptors((520.0, 360.0)),
+    # Cones: Abballe & Asari (2022), PLoS ONE 17:e0262763.
+    "mouse": lambda: Receptors((508.0, 360.0)),
 }
 
 

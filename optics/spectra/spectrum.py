@@ -1,7 +1,7 @@
 """Spectra as tables: illuminants, reflectances, cone fundamentals, and user data.
 
-The tables are copied from the package colour-science, and tests compare them with the package. The original sources are
-named with each table.
+The tables are copied from the package colour-science, and tests compare them with the package. Only the tables of water
+are copied from publications. The original sources are named with each table.
 """
 
 from __future__ import annotations
@@ -25,7 +25,10 @@ __all__ = [
     "cone_fundamentals",
     "daylight",
     "illuminant",
+    "phytoplankton_absorption",
     "reflectance",
+    "srgb_basis",
+    "water_absorption",
 ]
 
 LIMITS_NM = (300.0, 780.0)  # the table of CIE D65 starts at 300 nm; no receptors absorb beyond 780 nm
@@ -92,7 +95,7 @@ def _spectrum(nm: np.ndarray, values: np.ndarray) -> Spectrum:
     return Spectrum(tuple(nm.tolist()), tuple(values.tolist()))
 
 
-@lru_cache(maxsize=4)
+@lru_cache(maxsize=6)
 def _table(name: str) -> tuple[tuple[str, ...], np.ndarray]:
     """Return names and values (column, wavelength) of the columns of a CSV file. The first is wavelengths [nm]."""
     with resources.files("optics.spectra").joinpath("data", name).open() as file:
@@ -174,6 +177,19 @@ def reflectance(name: str) -> Spectrum:
     return _spectrum(_table("reflectances.csv")[1][0], _columns("reflectances.csv")[name])
 
 
+def srgb_basis() -> tuple[Spectrum, Spectrum, Spectrum]:
+    """Return the reflectances of red, green and blue surfaces whose mixtures have all colours of sRGB in daylight.
+
+    A surface with the linear sRGB values (r, g, b) has the reflectance r red + g green + b blue. The three add up to 1.
+    Infinitely many other spectra have the same colours. The tables cover 380-780 nm, and values are constant below.
+
+    Source: Mallett & Yuksel (2019), Spectral primary decomposition for rendering with sRGB reflectance, EGSR.
+    """
+    nm, columns = _table("srgb_basis.csv")[1][0], _columns("srgb_basis.csv")
+    red, green, blue = (_spectrum(nm, columns[name]) for name in ("red", "green", "blue"))
+    return red, green, blue
+
+
 def cone_fundamentals() -> tuple[Spectrum, Spectrum, Spectrum]:
     """Return the quantal sensitivities of human L, M and S cones at the cornea, with peaks of 1, for 2° fields.
 
@@ -184,3 +200,20 @@ def cone_fundamentals() -> tuple[Spectrum, Spectrum, Spectrum]:
     cones = (energy / nm for energy in _columns("cone_fundamentals.csv").values())
     long, middle, short = (Spectrum((nm[0] - 1, *nm), (0.0, *(quantal / quantal.max()))) for quantal in cones)
     return long, middle, short
+
+
+def water_absorption() -> Spectrum:
+    """Return the absorption coefficient of pure water [1/m], 300-780 nm.
+
+    Sources: Pope & Fry (1997), Applied Optics 36:8710, at 380-725 nm; Smith & Baker (1981), Applied Optics 20:177, at
+    other wavelengths. At 380 nm, the second table is higher by a factor of 2.
+    """
+    return _spectrum(*_table("water_absorption.csv")[1])
+
+
+def phytoplankton_absorption() -> Spectrum:
+    """Return the absorption of particles that contain chlorophyll, relative to that at 440 nm.
+
+    Source: Prieur & Sathyendranath (1981), Limnology and Oceanography 26:671, at 400-700 nm.
+    """
+    return _spectrum(*_table("phytoplankton.csv")[1])

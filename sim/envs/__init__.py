@@ -12,12 +12,14 @@ batch_task_checker     check_batch_task: test of a batch task against the protoc
 animals                all agents of all worlds, learning or frozen
 senses                 observations of one agent
 eyes_of_kind           signals of one kind of an agent's eyes
+frame_choice           number of frames per action for receptors with dynamics
 renderers              renderers of all eyes
 observation            memory of past frames
 ommatidia_space        space of the signals of a compound eye
 auxiliary              depth, geom ids and optic flow in observations
 held_state             checks of stored states
 calls                  checks of the calls of all environments: their order, seeds and actions
+threads                set_threads: number of threads of the libraries
 one_environment        methods of a stable-baselines3 VecEnv that are the same for all worlds
 world_pictures         images of worlds for human viewers
 follow_camera          a camera behind the agent

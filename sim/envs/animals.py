@@ -103,7 +103,7 @@ class Animals:
         for senses in self.seeing:
             senses.update_auxiliary(poses, worlds)
         everyone = len(worlds) == self.simulation.n
-        return [senses.launch(poses, None if everyone else worlds) for senses in self.seeing]
+        return [senses.launch(poses, None if everyone else worlds, fresh=True) for senses in self.seeing]
 
     def remember(self, seen: Sequence[Arrays], fresh: np.ndarray) -> list[Arrays]:
         """Add frames to the memories, and return the learners' observations.

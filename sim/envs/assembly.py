@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from optics import TurbidMedium
 from optics.numerics.arguments import shown, whole
 from optics.spectra.spectrum import Spectrum
 from sim.envs.calls import seed_of
@@ -41,7 +42,10 @@ OF_TASKS = {  # arguments for built-in tasks only, with the place where a user t
     "eyes": "a user task defines its eyes by its settings eye and mounts",
     "rays_per_receptor": "a user task defines it by its setting fidelity",
     **dict.fromkeys(("world_seed", "mazes", "course", "layouts", "wall_height"), LAYOUT),
-    **{name: f"a user task defines it by its setting {name}" for name in ("fidelity", "spectra", "vary", "auxiliary")},
+    **{
+        name: f"a user task defines it by its setting {name}"
+        for name in ("fidelity", "spectra", "medium", "vary", "auxiliary")
+    },
 }
 IN_RESET = "pass it to reset(seed=...)"
 MOST = 1_000_000  # chosen limit for n_envs and for memory, more than any memory can hold
@@ -65,6 +69,7 @@ def make_vec_env(
     least_return: float | None = None,
     episode_steps: int | None = None,
     spectra: Mapping[str, Spectrum | str] | None = None,
+    medium: TurbidMedium | str | None = None,
     vary: Mapping[str, tuple[Any, ...]] | None = None,
     auxiliary: Sequence[str] = (),
     render_mode: str | None = None,
@@ -91,6 +96,7 @@ def make_vec_env(
     least_return: in training, an episode is truncated once its rewards sum to this value or less; None: never
     episode_steps: number of actions after which an episode is truncated; None: the task's default
     spectra: spectra of materials and lights by name, used instead of their colours: see `sim.build_world`
+    medium: water or air between surfaces and eyes: see `sim.build_world`
     vary: ranges of quantities that are drawn for each episode, see docs/tasks.md. With {"light": (low, high)}, each
         episode has its own light level, whose logarithm is distributed uniformly; 1 is full daylight.
     auxiliary: any of "depth", "ids" and "flow": quantities that an observation contains for each receptor in addition
@@ -122,8 +128,8 @@ def make_vec_env(
     check_least_return(least_return, mode)
     if asked is not None:
         eyes = in_bands(eyes, asked.bands)
-    where: dict[str, Any] = {"seed": world_seed, "mazes": mazes, "course": course}
-    world = build_world(task, **where, layouts=layouts, wall_height=wall_height, spectra=spectra)
+    where: dict[str, Any] = {"seed": world_seed, "mazes": mazes, "course": course, "wall_height": wall_height}
+    world = build_world(task, **where, layouts=layouts, spectra=spectra, medium=medium)
     built_in = task_of(world, mode, eyes=eyes, fidelity=asked or AUTO)
     built_in.vary, built_in.auxiliary = vary or None, auxiliary_of(auxiliary, "auxiliary")
     return PreparedTask(built_in).vec_env(n_envs, seed, memory, **how)

@@ -22,7 +22,7 @@ class EyesEnv(gymnasium.Env[dict[str, np.ndarray], np.ndarray]):
     """One agent with eyes in one world. Spaces, rewards, endings and `info` are documented in docs/tasks.md.
 
     task, eyes, memory, mode, rays_per_receptor, fidelity, world_seed, mazes, course, layouts, wall_height,
-        least_return, episode_steps, spectra, render_mode: see `sim.make_vec_env`
+        least_return, episode_steps, spectra, medium, render_mode: see `sim.make_vec_env`
 
     Raises:
         ValueError: a bad argument.

@@ -1,18 +1,22 @@
-"""Signals of one kind of an agent's eyes in all worlds, including noise."""
+"""Signals of one kind of an agent's eyes in all worlds, including noise and the dynamics of receptors."""
 
 from __future__ import annotations
 
 import numpy as np
 from gymnasium import spaces
 
+from sim.envs.frame_choice import dynamics_of, require_frames
 from sim.envs.observation import ROUNDING, SIGMAS, Memory
 from sim.envs.ommatidia_space import OmmatidiaBox
 from sim.eyes.compound_eye import CompoundEye
 from sim.render.eye_renderer import EyeRenderer
 from sim.render.pending_frame import PendingFrame
 from sim.render.receptor_noise import NoiseModel, Normals
+from sim.render.receptors_in_time import ReceptorsInTime
 from sim.scene.poses import Poses
 from sim.tasks.simulation import Simulation
+
+UNCHANGED = ("none", None, "none")  # adaptation, events and motion of receptors whose responses have bounds
 
 
 class EyesOfKind:
@@ -30,18 +34,34 @@ class EyesOfKind:
         self._wavelengths = np.asarray(renderer.eye.spectral_bands.wavelengths)
         self.memory, self._noise = Memory(memory), NoiseModel.from_eye(renderer.eye)
         receptors = (len(renderer.mounts), renderer.eye.channels, *renderer.eye.resolution)
-        self._normals = Normals(keys, receptors)
-        self.space = self._space((memory, *self._as_frames(np.empty(receptors)).shape))
+        self._normals: Normals = Normals(keys, receptors)
+        self._in_time: ReceptorsInTime | None = None
+        self._shot: NoiseModel | None = None
+        frame = self._as_frames(np.empty(receptors)).shape
+        if (dynamics := dynamics_of(renderer.eye)) is not None:
+            frames = renderer.fidelity.frames or 1
+            require_frames(simulation, frames)
+            seconds = simulation.physics.seconds / frames
+            self._in_time = ReceptorsInTime(dynamics, simulation.n, receptors, seconds)
+            budget = renderer.eye.photon_budget
+            share = 1.0 if budget is None else seconds / budget.integration_time
+            self._shot, self._noise = (None, None) if self._noise is None else self._noise.in_frames(share)
+            frame = (frame[0], frame[1] * self._in_time.channels, *frame[2:])
+        self.space = self._space((memory, *frame))
 
     def restart(self, keys: np.ndarray) -> None:
         """Restart the random generators of the noise with these keys."""
         self._normals.restart(keys)
 
-    def launch(self, poses: Poses, worlds: np.ndarray | None = None) -> PendingFrame:
-        """Launch the rendering of these worlds (None: all), including noise.
+    def launch(self, poses: Poses, worlds: np.ndarray | None = None, fresh: bool = False) -> PendingFrame:
+        """Launch the rendering of these worlds (None: all), including noise and the dynamics of receptors.
 
         The random generators of the other worlds do not advance.
+
+        fresh: True if these worlds begin an episode
         """
+        if self._in_time is not None:
+            return self._launch_in_time(self._in_time, poses, worlds, fresh)
         light = self._simulation.light(self._wavelengths)
         if worlds is None:
             seen = self.renderer.launch(poses, light)
@@ -59,18 +79,59 @@ class EyesOfKind:
         eye = self.renderer.eye
         return eye.as_frames(signals) if isinstance(eye, CompoundEye) else signals
 
+    def _launch_in_time(
+        self, receptors: ReceptorsInTime, poses: Poses, worlds: np.ndarray | None, fresh: bool
+    ) -> PendingFrame:
+        """Launch the last frame of an action, after the receptors have seen its earlier frames.
+
+        If only some worlds are rendered, and they do not begin an episode, their last frame replaces the one before.
+        """
+        everyone, light = np.arange(self._simulation.n), self._simulation.light(self._wavelengths)
+        first, chosen = fresh or worlds is not None, everyone if worlds is None else worlds
+        passed = [] if first else getattr(self._simulation.physics, "passed", [])
+        for earlier in passed:
+            receptors.step(self._with_shot_noise(self.renderer.signals(earlier, light), chosen), chosen)
+        if not first:
+            receptors.store(chosen)
+        seen = self.renderer.launch(poses, light) if worlds is None else self.renderer.launch_some(poses, worlds, light)
+
+        def finish(signals: np.ndarray) -> np.ndarray:
+            if fresh:
+                receptors.start(signals, chosen)
+            elif worlds is not None:
+                receptors.undo(chosen)
+            found = receptors.step(self._with_shot_noise(signals, chosen), chosen)
+            receptors.observed(chosen)
+            return found if self._noise is None else self._noise(found, self._normals_of(chosen, found.shape))
+
+        return seen.then(finish)
+
+    def _with_shot_noise(self, signals: np.ndarray, worlds: np.ndarray) -> np.ndarray:
+        return signals if self._shot is None else self._shot(signals, self._normals.launch(worlds).wait())
+
+    def _normals_of(self, worlds: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
+        """Return normal numbers of this shape; motion detectors do not add noise of their own."""
+        drawn = self._normals.launch(worlds).wait()
+        return np.concatenate([drawn, np.zeros_like(drawn)], axis=2) if drawn.shape != shape else drawn
+
     def get_state(self) -> dict[str, np.ndarray]:
         """Return all arrays on which future signals depend, apart from the state of the worlds."""
-        return {"remembered": self.memory.frames_held, "noise": self._normals.place}
+        found = {"remembered": self.memory.frames_held, "noise": self._normals.place}
+        return found if self._in_time is None else {**found, "receptors": self._in_time.state.copy()}
 
-    def set_state(self, remembered: np.ndarray, noise: np.ndarray) -> None:
+    def set_state(self, remembered: np.ndarray, noise: np.ndarray, receptors: np.ndarray | None = None) -> None:
         """Restore a state from `get_state`."""
         self.memory.restore(remembered)
         self._normals.go_on_from(noise)
+        if self._in_time is not None and receptors is not None:
+            self._in_time.state[:] = receptors
 
     def _space(self, frames: tuple[int, ...]) -> spaces.Box:
+        dynamics = dynamics_of(self.renderer.eye)
+        if dynamics is not None and (dynamics.adaptation, dynamics.event_threshold, dynamics.motion) != UNCHANGED:
+            return spaces.Box(-np.inf, np.inf, frames, np.float32)
         brightest = self._brightest()
-        spread = 0.0 if self._noise is None else self._noise.largest(brightest)
+        spread = sum(noise.largest(brightest) for noise in (self._noise, self._shot) if noise is not None)
         margin = SIGMAS * spread + ROUNDING * brightest
         # The light from a point light has no upper bound, because it increases as the distance to the light decreases.
         high = 2 * brightest + margin if self.renderer.only_directional else np.inf

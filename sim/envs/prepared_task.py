@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import drjit as dr
 
+from sim.envs.frame_choice import with_frames
 from sim.envs.renderers import renderers_for, scenes_for
 from sim.envs.vec_env import EyesVecEnv
 from sim.render.edge_rays import FIRST
@@ -44,6 +45,7 @@ class PreparedTask:
             self._fidelities(number, agent, fidelity) if agent.learns or agent.policy is not None else None
             for number, agent in enumerate(agents)
         ]
+        self.fidelities = with_frames(task, self.fidelities, self._scenes)
 
     def _fidelities(self, number: int, agent: Agent, fidelity: Fidelity | None) -> Fidelities:
         if agent.learns and fidelity is not None:

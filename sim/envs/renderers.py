@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
+from optics.elements.turbid_medium import medium_of
 from sim.render.batched_renderer import BatchedRenderer
 from sim.render.eye_renderer import EyeRenderer
 from sim.render.fidelity import AREAS, Fidelity
@@ -81,5 +82,6 @@ def _scene_of_model(simulation: Simulation, kind: EyeKind, fidelity: Fidelity) -
         kind.mounts,
         spectra=task.spectra,
         varied=physics.varied,
+        medium=medium_of("medium", task.medium),
         tracer="auto" if fidelity.samples == AREAS else "mitsuba",
     )

@@ -58,9 +58,12 @@ class Senses:
         for sight, keys in zip(self.sights.values(), self._simulation.streams.noise_keys[self._number], strict=True):
             sight.restart(keys)
 
-    def launch(self, poses: Poses, worlds: np.ndarray | None = None) -> dict[str, PendingFrame]:
-        """Launch the rendering of these worlds (None: all) with all kinds of eyes."""
-        return {name: sight.launch(poses, worlds) for name, sight in self.sights.items()}
+    def launch(self, poses: Poses, worlds: np.ndarray | None = None, fresh: bool = False) -> dict[str, PendingFrame]:
+        """Launch the rendering of these worlds (None: all) with all kinds of eyes.
+
+        fresh: True if these worlds begin an episode
+        """
+        return {name: sight.launch(poses, worlds, fresh) for name, sight in self.sights.items()}
 
     def update_auxiliary(self, poses: Poses, fresh: np.ndarray) -> None:
         """Update the auxiliary entries of the observation.
@@ -128,7 +131,7 @@ class Senses:
     def set_state(self, state: Arrays) -> None:
         """Restore a state from `get_state`."""
         for k, (name, sight) in enumerate(self.sights.items()):
-            sight.set_state(*(state[_part(k, name, what)] for what in ("remembered", "noise")))
+            sight.set_state(**{what: state[_part(k, name, what)] for what in sight.get_state()})
         self.action = state["action"]
         self._last_auxiliary = {name: state[name] for name in self._last_auxiliary}
         for auxiliary in self._auxiliary:

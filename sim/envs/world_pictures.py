@@ -114,7 +114,7 @@ def _of_all_kinds(senses: Senses) -> list[np.ndarray]:
 
 def _drawn(frame: np.ndarray, eye: WorldEye) -> np.ndarray:
     """Return an image of a frame of signals: hexagons of a compound eye, or squares."""
-    return hexagon_map(frame, eye) if isinstance(eye, CompoundEye) else side_by_side(frame, eye)
+    return hexagon_map(frame, eye) if isinstance(eye, CompoundEye) else side_by_side(frame[:, : eye.channels], eye)
 
 
 def _overview(model: mujoco.MjModel) -> Viewpoint:

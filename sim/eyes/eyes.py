@@ -17,6 +17,7 @@ from optics.numerics.arguments import shown
 from optics.numerics.renamed import warn_renamed
 from optics.spectra.bands import FINEST
 from optics.spectra.photon_budget import PhotonBudget
+from optics.spectra.receptor_dynamics import ReceptorDynamics
 from optics.spectra.receptors import receptors_of
 
 if TYPE_CHECKING:
@@ -41,9 +42,10 @@ class Eyes:
     noise_sigma: standard deviation of a receptor's noise, in the unit of signals: white in full daylight behind a
         perfect lens gives 1
     bands: number of spectral bands, 1 to 64
-    receptors: receptor types: "rgb" (three channels), "lms" (human cones), "honeybee", "goldfish", peak wavelengths of
-        visual pigments [nm] such as (350, 440, 530), or an `optics.Receptors`, which can also describe a mosaic. The
-        attribute is always converted to optics.Receptors.
+    receptors: receptor types: "rgb" (three channels), "lms" (human cones), "honeybee", "goldfish", "mouse",
+        "fruit_fly", "blowfly", "dragonfly", "jumping_spider", peak wavelengths of visual pigments [nm] such as (350,
+        440, 530), or an `optics.Receptors`, which can also describe a mosaic. The attribute is always converted to
+        optics.Receptors.
     photon_budget: an optics.PhotonBudget, which defines the amount of light and the integration time of the receptors.
         The resulting shot noise is added to the noise of `noise_sigma`. None: unlimited light, without shot noise.
     waveguide: an optics.Waveguide: receptors are rhabdoms, which receive light in waveguide modes; this requires
@@ -51,6 +53,8 @@ class Eyes:
     pupil_turned: True if the pupils are rotated by 180° about their axes
     vertical_fov_deg: vertical field of view of one eye [deg], in [0.001, 170], which determines the height of the
         receptors. None: receptors are square.
+    dynamics: an optics.ReceptorDynamics: receptors that integrate, adapt or detect motion over time. None: receptors
+        without memory
 
     Raises:
         ValueError: a value is outside its range, or the receptors are unknown; the message suggests the nearest name.
@@ -69,6 +73,7 @@ class Eyes:
     waveguide: Waveguide | None = None
     pupil_turned: bool = False
     vertical_fov_deg: float | None = None
+    dynamics: ReceptorDynamics | None = None
 
     def __post_init__(self) -> None:
         def check(name: str, valid: Callable[[Any], bool], range_: str) -> None:
@@ -104,6 +109,8 @@ class Eyes:
             raise ValueError(
                 f"Eyes: photon_budget = {shown(self.photon_budget)}: must be an optics.PhotonBudget or None"
             )
+        if not isinstance(self.dynamics, ReceptorDynamics | None):
+            raise ValueError(f"Eyes: dynamics = {shown(self.dynamics)}: must be an optics.ReceptorDynamics or None")
         check("pupil_turned", lambda turned: isinstance(turned, bool | np.bool_), "True or False")
         if self.pupil_turned and self.optics is None:
             raise ValueError(
@@ -128,6 +135,7 @@ class Eyes:
             waveguide=self.waveguide,
             pupil_turned=self.pupil_turned,
             vertical_fov_deg=self.vertical_fov_deg,
+            dynamics=self.dynamics,
         )
 
     def _check_waveguide(self) -> None:
@@ -155,7 +163,11 @@ class Eyes:
         return np.linspace(half, -half, self.n_eyes)
 
     def names(self) -> tuple[str, ...]:
-        """Return the labels of the eyes' views from left to right: ("left", "right") for two eyes."""
+        """Return the names of the eyes from left to right.
+
+        One eye is "center", two are "left" and "right", and three are "left", "center" and "right". More eyes are
+        numbered: "eye_0", "eye_1" and so on. Files, reports, cameras and recordings use these names.
+        """
         special = {1: ("center",), 2: ("left", "right"), 3: ("left", "center", "right")}
         return special.get(self.n_eyes, tuple(f"eye_{i}" for i in range(self.n_eyes)))
 

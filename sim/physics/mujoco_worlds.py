@@ -46,6 +46,7 @@ class MujocoWorlds:
         self.varied: Mapping[str, tuple[str, ...]] = self.bodies.varied
         self.datas = [mujoco.MjData(model) for model in self.bodies.models]
         self._pool = ThreadPoolExecutor(threads) if threads > 1 else None
+        self.frames, self.passed = 1, list[Poses]()
         self._watched = b""
         self.chance: Any = None
 
@@ -84,9 +85,25 @@ class MujocoWorlds:
 
     def step(self, skipped: Collection[int]) -> dict[int, str]:
         moving = [world for world in range(self.n) if world not in skipped]
-        for _ in (self._pool.map if self._pool else map)(self._move, moving):
+        self.passed, advance = [], self._pool.map if self._pool else map
+        for _ in range(self.frames - 1):
+            for _ in advance(self._pass_frame, moving):
+                pass
+            self.passed.append(self.poses())
+        for _ in advance(self._move, moving):
             pass
-        return {world: words for world in moving if (words := _broken(self.datas[world])) is not None}
+        broken = {world: words for world in moving if (words := _broken(self.datas[world])) is not None}
+        if broken and self.passed:
+            self._replace_passed(list(broken))
+        return broken
+
+    def _replace_passed(self, broken: list[int]) -> None:
+        """Replace the earlier poses of worlds whose physics broke down by their poses after the action."""
+        for world in broken:
+            self.require_places(world)
+        fine = [world for world in range(self.n) if world not in broken]
+        order, final = np.argsort([*fine, *broken]), self.poses().take(np.array(broken))
+        self.passed = [Poses.joined(earlier.take(np.array(fine, int)), final).take(order) for earlier in self.passed]
 
     def require_places(self, world: int) -> None:
         """Reset a world if its poses are not finite, because rendering would then fail for all worlds."""
@@ -124,8 +141,16 @@ class MujocoWorlds:
 
     def _move(self, world: int) -> None:
         data = self.datas[world]
-        mujoco.mj_step(data.model, data, self.substeps)
+        mujoco.mj_step(data.model, data, self.substeps // self.frames)
         mujoco.mj_forward(data.model, data)
+
+    def _pass_frame(self, world: int) -> None:
+        """Advance a world to the next frame, and compute poses only, so that the physics is as without frames."""
+        data = self.datas[world]
+        mujoco.mj_step(data.model, data, self.substeps // self.frames)
+        mujoco.mj_kinematics(data.model, data)
+        mujoco.mj_comPos(data.model, data)
+        mujoco.mj_camlight(data.model, data)
 
 
 def _broken(data: mujoco.MjData) -> str | None:

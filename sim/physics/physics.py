@@ -20,6 +20,9 @@ class Physics(Protocol):
     model: model for which renderers are built
     n: number of worlds
     seconds: duration of one action [s]
+    frames: number of moments of an action at which receptors with dynamics see the worlds, 1 or a divisor of `substeps`
+    passed: poses at the moments of the last action before its end, `frames` - 1 of them
+    substeps: number of physics steps per action
     chance: random streams of the worlds, set whenever the worlds are seeded
     varied: names of geoms whose size, colour or material differs between worlds, with the materials that they may have
     """
@@ -27,6 +30,9 @@ class Physics(Protocol):
     model: mujoco.MjModel
     n: int
     seconds: float
+    substeps: int
+    frames: int
+    passed: list[Poses]
     varied: Mapping[str, tuple[str, ...]]
     chance: Any
 

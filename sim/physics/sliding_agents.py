@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from sim.physics.agent_motion import AgentPhysics, Agents, Motion
+from sim.physics.agent_motion import SUBSTEPS, AgentPhysics, Agents, Motion
 from sim.physics.varied_appearances import varied_appearances
 from sim.scene.moved_bodies import MovedBodies, ReferencePose
 from sim.scene.poses import Poses
@@ -34,7 +34,7 @@ class SlidingAgents:
     def __init__(self, world: World, n: int, threads: int = 1, variation: Variation | None = None) -> None:
         self.world, self.n, self.model = world, n, world.model
         self.agents = AgentPhysics(world, threads)
-        self.seconds = self.agents.seconds
+        self.seconds, self.substeps, self.frames, self.passed = self.agents.seconds, SUBSTEPS, 1, list[Poses]()
         self._appearances = None if variation is None else varied_appearances(world.model, n, variation)
         self.varied: Mapping[str, tuple[str, ...]] = {} if self._appearances is None else self._appearances.varied
         self._heights = np.array([world.model.body(name).pos[2] for name in world.objects])
@@ -148,10 +148,25 @@ class SlidingAgents:
             worlds = np.flatnonzero(motion.unstable | ~after.finite)
             after, broken = after.repaired(), dict.fromkeys(worlds.tolist(), UNSTABLE)
         self._state = after
+        shares = [k / self.frames for k in range(1, self.frames)]
+        self.passed = [self._between(before, after, share, list(broken)) for share in shares]
         return broken
 
+    def _between(self, before: WorldState, after: WorldState, share: float, broken: list[int]) -> Poses:
+        """Return the poses when this share of the action has passed. The heading changes when an action begins.
+
+        broken: worlds whose physics broke down; their poses are already those after the action
+        """
+        assert self.motion is not None
+        position = self.motion.path[:, round(share * SUBSTEPS) - 1].copy()
+        objects = before.objects + share * (after.objects - before.objects)
+        position[broken], objects[broken] = after.position[broken], after.objects[broken]
+        return self._poses(replace(after, position=position, objects=objects))
+
     def poses(self) -> Poses:
-        state = self.state
+        return self._poses(self.state)
+
+    def _poses(self, state: WorldState) -> Poses:
         positions = np.empty((state.n, 1 + state.objects.shape[1], 3))
         positions[:, 0, :2], positions[:, 0, 2], positions[:, 1:] = state.position, self._height, state.objects
         rotations, (cos, sin) = self._turns.copy(), (np.cos(state.heading), np.sin(state.heading))

@@ -25,6 +25,7 @@ populations         views and receptors for which the errors of trials are compu
 random_views        random views for the trials
 model_fidelity      choose_model_fidelity: fidelity of any other model, from trials at given poses
 memory_budget       check of the memory that rendering needs
+receptors_in_time    ReceptorsInTime: filters, adaptation, events and motion detectors
 receptor_noise      noise for all worlds at once
 pending_frame       frames that are launched early and read late
 """

@@ -51,7 +51,7 @@ class EyeRenderer:
     eye, mounts, model: the scene's eye, mounts and model
     sensor: the sampled directions
     tracer: the method of tracing rays, with its name, why, light and basis
-    brightest: signal of a white surface that faces all directional lights at once
+    brightest: signal of a white surface that faces all directional lights at once, or of veiling light if it is larger
 
     One warning (`sim.MirrorWarning`) lists features of the model that are not rendered. Further warnings name lamps
     with spectral lines for which the eye has too few bands.
@@ -81,6 +81,8 @@ class EyeRenderer:
         self._receptor_sums = self.sensor.receptor_sums(self._mixing, self.tracer.basis)
         suns = [light.level for light in scene.scene.lights.found if light.kind == "directional"]
         self._white = sum(suns, np.zeros(len(self.eye.spectral_bands.wavelengths))) / np.pi
+        if scene.scene.medium is not None:
+            self._white = np.maximum(self._white, scene.scene.medium.veil)
         self.brightest = self.brightest_in(np.ones(len(self._white)))
         self._set_width(n_envs)
 

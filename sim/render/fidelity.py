@@ -18,6 +18,7 @@ from sim.tracing.lighting import ALL, DIRECT, LEVELS
 RAYS, AREAS, EDGES = SAMPLES = ("rays", "areas", "edges")
 MOST_RAYS = 1e7  # per receptor; a larger number is a mistake, and calculations with it would overflow
 MOST_BANDS = 4096
+MOST_FRAMES = 10**6
 
 
 @dataclass(frozen=True)
@@ -51,6 +52,8 @@ class Fidelity:
         rectangles around the receptors, and receptors share larger rectangles if rays_per_receptor is below 1. Areas
         need an upright world. "edges" is adaptive edge sampling: four rays per receptor, and rays_per_receptor rays if
         these differ. It needs a perfect lens and direct light, and is chosen automatically only for user models.
+    frames: number of rendered frames per action, for receptors with `dynamics`: a divisor of the number of physics
+        steps per action. None: environments choose the fewest whose error is allowed
     tolerance: allowed error of a receptor's signal (root mean square); None if nothing was chosen. In adaptive edge
         sampling, rays whose signals differ by at most the tolerance count as equal.
     levels: chosen level of each stage, with its reason
@@ -67,6 +70,7 @@ class Fidelity:
     levels: tuple[Level, ...] = ()
     light: str = DIRECT
     samples: str = RAYS
+    frames: int | None = None
 
     def __post_init__(self) -> None:
         rays = self.rays_per_receptor
@@ -76,6 +80,8 @@ class Fidelity:
         whole("bands", self.bands, 1, MOST_BANDS)
         if self.tolerance is not None and not (isinstance(self.tolerance, Real) and 0 < self.tolerance < math.inf):
             raise ValueError(f"tolerance = {shown(self.tolerance)}: must be positive, or None")
+        if self.frames is not None:
+            whole("frames", self.frames, 1, MOST_FRAMES)
         one_of("light", self.light, LEVELS)
         one_of("samples", self.samples, SAMPLES)
         if self.light == ALL and self.samples != AREAS:
@@ -98,6 +104,7 @@ class Fidelity:
             Level("depth", f"{self.depth}", None, "as requested"),
             Level("light", self.light, None, "as requested"),
             Level(self.samples, f"{self.rays_per_receptor:g} per receptor", None, "as requested"),
+            *([Level("frames", f"{self.frames} per action", None, "as requested")] if self.frames else []),
         )
         rows = [("stage", "level", "error", "why")]
         for level in levels:

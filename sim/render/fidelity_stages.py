@@ -11,6 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 import optics
+from optics.spectra.bands import FINEST
 from sim.eyes.depth_layers import ONE_PSF, DepthLayers
 from sim.eyes.sampling import EyeSampling
 from sim.render.fidelity import Level
@@ -26,22 +27,37 @@ LAYERS = (1, 3, 5, 9)  # numbers of layers to try; each set of layers is a subse
 NEAREST = 0.005  # chosen: quantile of the visible distances that counts as the nearest distance
 
 
-def bands(eye: optics.Eye, allowed: float) -> tuple[int, Level]:
-    """Return the smallest number of bands that `optics.Eye` needs for scenes of any colour."""
+def bands(eye: optics.Eye, allowed: float, medium: optics.TurbidMedium | None = None) -> tuple[int, Level]:
+    """Return the smallest number of bands that `optics.Eye` needs for scenes of any colour, and for the medium."""
     within = min(max(allowed / eye.throughput, 1e-6), 0.5)  # the tolerances that an Eye accepts
     try:
         bands = int(replace(eye, bands="auto", tolerance=within).bands)
     except optics.AccuracyError as error:
         return eye.bands, Level("bands", f"{eye.bands}", None, f"the eyes' own: {error}")
-    return bands, Level("bands", f"{bands}", allowed, f"fewest for {allowed:.1e} with any colours up to white")
+    if medium is None:
+        return bands, Level("bands", f"{bands}", allowed, f"fewest for {allowed:.1e} with any colours up to white")
+    errors = ((n, eye.throughput * medium.band_error(n, eye.receptors)) for n in range(bands, FINEST + 1))
+    bands, worst = next(((n, float(found)) for n, found in errors if found <= allowed), (FINEST, math.inf))
+    why = f"fewest for {allowed:.1e} with any colours up to white, and for white and black in the medium"
+    return bands, Level("bands", f"{bands}", max(allowed, worst), why)
 
 
 def own_bands(world: World, eye: optics.Eye) -> Level:
-    """Return the eye's own bands, with their error for measured reflectances. For RGB colours, the error is unknown."""
-    if not (spectra := measured(world.model, world.spectra)):
+    """Return the eye's own bands, with their error for measured reflectances and for black and white in the medium.
+
+    For RGB colours in clear air, the error is unknown.
+    """
+    spectra = measured(world.model, world.spectra)
+    errors, cases = [], []
+    if spectra:
+        errors, cases = [band_error(spectra, eye.receptors, eye.bands)], ["measured reflectances in daylight"]
+    if world.medium is not None:
+        errors.append(world.medium.band_error(eye.bands, eye.receptors))
+        cases.append("white and black in the medium")
+    if not errors:
         return Level("bands", f"{eye.bands}", None, "the eyes' own")
-    error = float(eye.throughput) * band_error(spectra, eye.receptors, eye.bands)
-    return Level("bands", f"{eye.bands}", error, "the eyes' own; error for measured reflectances in daylight")
+    error = float(eye.throughput) * max(errors)
+    return Level("bands", f"{eye.bands}", error, f"the eyes' own; error for {' and '.join(cases)}")
 
 
 def depth(trials: FidelityTrials, eye: optics.Eye, allowed: float) -> tuple[DepthLayers, Level]:

@@ -17,6 +17,7 @@ import mujoco
 import numpy as np
 
 import optics
+from optics.elements.turbid_medium import medium_of
 from optics.spectra.spectrum import Spectrum
 from sim.eyes.allowed_error import allowed_error
 from sim.eyes.compound_eye import WorldEye
@@ -65,6 +66,7 @@ def choose_model_fidelity(
     spectra: Mapping[str, Spectrum | str] | None = None,
     varied: Varied = (),
     light: str = lighting.DIRECT,
+    medium: optics.TurbidMedium | str | None = None,
 ) -> Fidelity:
     """Return the fidelity with the fewest rays for `ModelRenderer` whose error at these poses is within the tolerance.
 
@@ -75,7 +77,7 @@ def choose_model_fidelity(
     tolerance: allowed error of a signal (root mean square), over receptors without a uniform field; None: half of the
         receptors' noise, but at least `sim.eyes.allowed_error.LEAST_TOLERANCE` times the signal of a white surface
         behind the eye's pupil
-    groups, spectra, varied: see `ModelRenderer`
+    groups, spectra, varied, medium: see `ModelRenderer`
     light: "direct" or "bounce", see `Fidelity`; "auto": "bounce" if direct light alone has an error above the tolerance
         at these moments, over receptors that bounced light reaches
 
@@ -94,6 +96,7 @@ def choose_model_fidelity(
         spectra=spectra,
         varied=varied,
         tracer=ModelTracer.name,
+        medium=medium_of("medium", medium),
     )
     return cheapest(ModelStages(scene, placed, allowed, light))
 
@@ -121,7 +124,10 @@ class ModelStages:
 
     def bands(self) -> Level:
         """See `Stages`."""
-        return Level("bands", f"{self.eye.bands}", None, "the eye's own")
+        if (medium := self._scene.medium) is None:
+            return Level("bands", f"{self.eye.bands}", None, "the eye's own")
+        error = float(self.eye.throughput) * medium.band_error(self.eye.bands, self.eye.receptors)
+        return Level("bands", f"{self.eye.bands}", error, "the eye's own; error for white and black in the medium")
 
     def depth(self, allowed: float) -> tuple[DepthLayers, Level | None]:
         """See `Stages`."""

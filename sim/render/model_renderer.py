@@ -7,6 +7,8 @@ from dataclasses import replace
 
 import mujoco
 
+import optics
+from optics.elements.turbid_medium import medium_of
 from optics.numerics.arguments import of_kind, whole
 from optics.spectra.spectrum import Spectrum
 from sim.eyes.compound_eye import CompoundEye, WorldEye, world_eye
@@ -40,6 +42,7 @@ class ModelRenderer(EyeRenderer):
         colour of such a geom depends only on its material
     tracer: "mitsuba" (any shapes), "closed_form" (upright walls, a floor and spheres), or "auto": the closed form if
         the model has one. The tracer in use is in `.tracer.name`
+    medium: water or air between surfaces and eyes, see `sim.build_world`
     brightest: signal of a white surface that faces all directional lights at once
 
     One warning (`sim.MirrorWarning`) lists features of the model that are not rendered. Others name lamps with spectral
@@ -64,6 +67,7 @@ class ModelRenderer(EyeRenderer):
         spectra: Mapping[str, Spectrum | str] | None = None,
         varied: Varied = (),
         tracer: str = "mitsuba",
+        medium: optics.TurbidMedium | str | None = None,
     ) -> None:
         whole("n_envs", n_envs, 1, MOST_ENVS)
         world_eye("eye", eye)
@@ -83,5 +87,6 @@ class ModelRenderer(EyeRenderer):
             groups=groups,
             varied=varied,
             tracer=tracer,
+            medium=medium_of("medium", medium),
         )
         super().__init__(scene, n_envs, fidelity)

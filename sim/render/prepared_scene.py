@@ -10,8 +10,9 @@ import mujoco
 import numpy as np
 
 import optics
+from optics.numerics.arguments import of_kind
 from optics.spectra.spectrum import Spectrum
-from sim.eyes.compound_eye import WorldEye
+from sim.eyes.compound_eye import CompoundEye, WorldEye
 from sim.eyes.depth_layers import DepthLayers
 from sim.eyes.inside import depth_inside
 from sim.eyes.mounts import Mount
@@ -42,6 +43,8 @@ class PreparedScene:
     varied: see `sim.ModelRenderer`
     tracer: method of tracing rays, see `sim.BatchedRenderer`
     stand: the body that the eyes are fixed to, if they stand upright on one; None: derived from the mounts
+    medium: water or air that fills the world; under water, an `optics.Eye` is immersed, and the
+        facets of a compound eye keep the index in front of them. None: clear air
 
     Raises:
         ValueError: a mount on a part that the model lacks, an eye inside a geom in the model's reference pose, or a
@@ -59,9 +62,14 @@ class PreparedScene:
         varied: Varied = (),
         tracer: str = "auto",
         stand: LevelStand | None = None,
+        medium: optics.TurbidMedium | None = None,
     ) -> None:
-        self.model, self.eye, self.places = model, eye, EyePlaces(model, mounts)
-        self.scene = ModelScene(model, eye, groups, spectra, varied)
+        if medium is not None:
+            of_kind("medium", medium, optics.TurbidMedium, "optics.sea_water(1), or None for clear air")
+        self.eye = eye if isinstance(eye, CompoundEye) else optics.immersed(eye, medium)
+        self.model, self.places = model, EyePlaces(model, mounts)
+        self.medium = medium
+        self.scene = ModelScene(model, self.eye, groups, spectra, varied, medium)
         if stand is None:
             self._refuse_eyes_inside()
         self.tracers = Tracers(self.scene, self.places, tracer, stand)

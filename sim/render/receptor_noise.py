@@ -136,6 +136,14 @@ class NoiseModel:
         spread = photons[:, None, None] if mosaic is None else photons[mosaic][None]
         return cls(eye.noise_sigma, spread.astype(np.float32))
 
+    def in_frames(self, share: float) -> tuple[NoiseModel | None, NoiseModel | None]:
+        """Return the shot noise of a frame that lasts this share of the integration time, and the remaining noise.
+
+        Receptors with dynamics sum the photons of their frames. Only the shot noise passes their filters.
+        """
+        shot = None if self.photons is None else NoiseModel(0.0, (self.photons * share).astype(np.float32))
+        return shot, NoiseModel(self.sigma) if self.sigma > 0 else None
+
     def largest(self, brightest: float) -> float:
         """Return the standard deviation of a signal that is twice the brightest."""
         shot = 0.0 if self.photons is None else 2 * brightest / float(self.photons.min())

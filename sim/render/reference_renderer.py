@@ -42,7 +42,8 @@ class ReferenceRenderer:
     seed: seed of the samples; the attribute may be changed between images
 
     Raises:
-        ValueError: an invalid argument, or receptors whose sides are not in the ratio of small whole numbers.
+        ValueError: an invalid argument, a world with a medium, or receptors whose sides are not in the ratio of small
+            whole numbers.
         optics.AccuracyError: a pupil whose light spreads too far.
     """
 
@@ -60,6 +61,8 @@ class ReferenceRenderer:
         variant: str | None = None,
         seed: int = 0,
     ) -> None:
+        if world.medium is not None:
+            raise ValueError("world: its medium must be None, the reference renders clear air only")
         self.world, self.eyes, self.eye = world, eyes, eyes.eye()
         self.bands: optics.SpectralBands = self.eye.spectral_bands
         fewest = cells_for(self.eye) if self.eye.waveguide is not None else 4

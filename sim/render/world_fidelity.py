@@ -43,7 +43,7 @@ def choose_fidelity(
     allowed = allowed_error(eyes.eye(), tolerance)
     if bands == "own":
         return chosen_fidelity(WorldScene(world, eyes, tracer), allowed)
-    n_bands, level = stages.bands(eyes.eye(), SHARES.bands * allowed)
+    n_bands, level = stages.bands(eyes.eye(), SHARES.bands * allowed, world.medium)
     fidelity = chosen_fidelity(WorldScene(world, replace(eyes, bands=n_bands), tracer), allowed)
     return replace(fidelity, levels=(level, *fidelity.levels[1:]))
 

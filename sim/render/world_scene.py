@@ -39,7 +39,9 @@ class WorldScene(PreparedScene):
         mounts = ring("agent", eyes.n_eyes, eyes.placement_range_deg, BODY_RADIUS * (1 + OUTSIDE))
         azimuths, body = eyes.azimuths(), int(world.model.body("agent").id)
         stand = LevelStand(body, EYE_HEIGHT, eye_positions(azimuths), eye_rotations(azimuths))
-        super().__init__(world.model, eyes.eye(), mounts, spectra=world.spectra, tracer=tracer, stand=stand)
+        super().__init__(
+            world.model, eyes.eye(), mounts, spectra=world.spectra, tracer=tracer, stand=stand, medium=world.medium
+        )
         self.warn_once(lighting.DIRECT)
         bodies = [body, *(int(world.model.body(name).id) for name in world.objects)]
         self._reference = ReferencePose(world.model, bodies)

@@ -98,7 +98,7 @@ class AgentTask(BatchTask):
     ) -> None:
         self.world, self.model, self.mode, self.name, self.eyes = world, world.model, mode, world.task, eyes
         self.spectra, self.episode_steps = world.spectra, world.episode_steps or EPISODE_STEPS
-        self.fidelity = fidelity
+        self.fidelity, self.medium = fidelity, world.medium
         if isinstance(eyes, Eyes):
             self.eye, self.mounts = eyes.eye(), mounts_of_agent(eyes)
         elif eyes is not None:

@@ -20,7 +20,7 @@ from sim.tasks.task import Task
 # Number of axes of the eyes' signals: memory, eye, channel, height and width. No other entry of an observation has
 # five axes.
 FRAMES_AXES = 5
-SAID_BY_ANY = ("spectra", "vary")  # settings of the world that the task of one animal may set for all
+SAID_BY_ANY = ("spectra", "medium", "vary")  # settings of the world that the task of one animal may set for all
 SHARED = ("substeps", "episode_steps")  # settings of the world that must be equal in the tasks of all animals
 
 

@@ -66,7 +66,7 @@ class PerWorld(BatchTask):
         require_own_actuators(self.animals, self.model)
         first = self.animals[0]
         self.substeps, self.episode_steps, self.mode = first.substeps, first.episode_steps, first.mode
-        for name in ("spectra", "vary", "camera"):
+        for name in ("spectra", "medium", "vary", "camera"):
             setattr(self, name, of_world(self.animals, name))
 
     def in_mode(self, mode: str) -> Self:

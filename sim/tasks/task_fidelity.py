@@ -57,7 +57,14 @@ def fidelities_of(task: BatchTask | Task) -> dict[str, Fidelity]:
                 tolerance = None if variation is None else _in_brightest(variation, kind.eye)
                 with named_in_errors(animal.name):
                     found[kind.name] = choose_model_fidelity(
-                        model, kind.eye, kind.mounts, poses, tolerance, spectra=batch.spectra, varied=varied
+                        model,
+                        kind.eye,
+                        kind.mounts,
+                        poses,
+                        tolerance,
+                        spectra=batch.spectra,
+                        varied=varied,
+                        medium=batch.medium,
                     )
     return found
 

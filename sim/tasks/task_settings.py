@@ -9,6 +9,8 @@ from typing import Any
 import mujoco
 
 import optics
+from optics import TurbidMedium
+from optics.elements.turbid_medium import medium_of
 from optics.numerics.arguments import did_you_mean, finite, whole
 from optics.numerics.renamed import warn_renamed
 from optics.spectra.spectrum import Spectrum
@@ -36,6 +38,7 @@ class TaskSettings:
     substeps: physics steps per action
     episode_steps: number of actions after which an episode is truncated
     spectra: spectra of materials and lights, by name, which replace their colours
+    medium: water or air between surfaces and eyes, see `sim.build_world`
     vary: ranges (low, high) of quantities, by name. Values are drawn for each episode and world before `reset`:
         "light": factor of all lights, with a uniformly distributed logarithm.
         "color_temperature": colour temperature of white [K], with a uniformly distributed reciprocal.
@@ -69,6 +72,7 @@ class TaskSettings:
     substeps: int = 5
     episode_steps: int = 256
     spectra: Mapping[str, Spectrum | str] | None = None
+    medium: TurbidMedium | str | None = None
     vary: Mapping[str, tuple[Any, ...]] | None = None
     auxiliary: Sequence[str] = ()
     camera: str | None = None
@@ -115,6 +119,7 @@ def compiled(task: TaskSettings, model: mujoco.MjModel | None = None) -> mujoco.
     if type(task).mode != TaskSettings.mode:
         raise ValueError(f"{name}: mode = {type(task).mode!r}: must be left out, the environment sets it")
     kinds_of(task)
+    medium_of(f"{name}: medium", task.medium)
     finite(f"{name}: failure_reward", task.failure_reward)
     whole(f"{name}: substeps", task.substeps, 1, MOST_STEPS)
     whole(f"{name}: episode_steps", task.episode_steps, 1, MOST_STEPS)

@@ -11,6 +11,8 @@ wall_intersection    intersections of rays with upright walls
 reflectance_atlas    reflectances of all materials in one table
 areas                means over rectangles of the visual field, without rays
 lighting             directional light, after one or two reflections
+light_components     components of light in closed forms
+medium_on_rays       absorption and veiling light of water and air along rays
 model_tracer         ModelTracer: rays through models with any shapes
 model_scene          static and moving geoms of any model
 model_lights         lights of any model

@@ -20,56 +20,19 @@ from optics.numerics.autodiff import Array
 from sim.scene.device_arrays import floats
 from sim.tracing import lighting, spheres
 from sim.tracing.eye_ray import EyeRay
+from sim.tracing.light_components import components_in_bands, components_of, reflected_components_of
+from sim.tracing.medium_on_rays import MediumOnRays
 from sim.tracing.reflectance_atlas import Atlas, bake
 from sim.tracing.spheres import SphereRows
 from sim.tracing.upright_scene import UprightScene
 from sim.tracing.wall_intersection import CellTables, Footprints, footprints_of
 from sim.tracing.walls import ALIGNED, NoClosedForm
 
-RANK_TOLERANCE = 1e-6  # smaller singular values, relative to the largest, are rounding errors of float32 (1.2e-7)
-# Chosen: largest deviation of a grey reflectance from its mean over the bands. Mitsuba's greys are not quite flat.
-GREY = 1e-4
 # Distance at which shadow rays and bounce rays start, relative to Mitsuba's. Mitsuba's distance, 3 mm in a maze, would
 # shift the shadow of a body next to a wall by this amount. Closed forms have smaller rounding errors than meshes.
 CLEARANCE = 1 / 16
 Irradiance = Callable[[Array, Array], list[Array]]  # function (point, normal) of a surface: irradiance per component
 ROW = 12  # floats per face: affine functions of (x, y, z) for the texel's column and row, then the texture's place
-
-
-@dataclass(frozen=True)
-class Components:
-    """Factors of radiance_b = sum_k basis[k, b] reflectance_k sum_l levels[l, k] cos θ_l.
-
-    reflectance: (texel, component) · levels: of the lights (light, component) · basis: (component, band)
-    """
-
-    reflectance: np.ndarray
-    levels: np.ndarray
-    basis: np.ndarray
-
-
-def components_of(texels: np.ndarray, irradiance: np.ndarray) -> Components:
-    """Return the smallest set of components that describes texels (texel, band) under lights (light, band)."""
-    n_bands = texels.shape[1]
-    brightest = irradiance[np.argmax(irradiance.sum(axis=1))]
-    level = irradiance @ brightest / (brightest @ brightest)
-    if np.allclose(irradiance, level[:, None] * brightest, rtol=0, atol=RANK_TOLERANCE * irradiance.max()):
-        u, s, vt = np.linalg.svd(texels, full_matrices=False)
-        rank = max(int((s > RANK_TOLERANCE * s[0]).sum()), 1)
-        if rank < n_bands:
-            return Components(u[:, :rank] * s[:rank], np.tile(level[:, None], rank), vt[:rank] * brightest / np.pi)
-    return Components(texels, irradiance, np.eye(n_bands) / np.pi)
-
-
-def reflected_components_of(texels: np.ndarray, irradiance: np.ndarray) -> Components:
-    """Return components in which reflection multiplies light by a texel, component by component."""
-    grey = texels.mean(axis=1, keepdims=True)
-    if np.abs(texels - grey).max() <= GREY:
-        few = components_of(np.tile(grey, texels.shape[1]), irradiance)
-        if len(few.basis) == 1:
-            scale = few.reflectance[:, 0] @ grey[:, 0] / (grey[:, 0] @ grey[:, 0])
-            return Components(few.reflectance / scale, few.levels, few.basis * scale)
-    return Components(texels, irradiance, np.eye(texels.shape[1]) / np.pi)
 
 
 @dataclass(frozen=True)
@@ -111,6 +74,7 @@ class ClosedForm:
     light: level of light, one of `lighting.LEVELS`
     basis: (component, band): contribution of each component to each band
     world, walls, footprints, lights, components: the parts of the scene
+    medium: water or air between surfaces and eyes; None: clear air
     faces: textures of walls and floor, see `face_rows` · sphere_textures: maps to the texels, and the texels' places
 
     Raises:
@@ -134,8 +98,10 @@ class ClosedForm:
         atlas = bake(scene.model, [*geoms, *visible.geoms], bsdfs, wavelengths)
         irradiance = np.array([source.irradiance for source in self.lights]).reshape(-1, len(wavelengths))
         fewest = components_of if light == lighting.DIRECT else reflected_components_of
-        self.components = fewest(atlas.texels, irradiance)
+        medium = scene.medium
+        self.components = (fewest if medium is None else components_in_bands)(atlas.texels, irradiance)
         self.basis = self.components.basis
+        self.medium = None if medium is None else MediumOnRays.from_bands(medium, self.basis)
         self.faces = face_rows(self.walls.uv, atlas, place)
         self._n_faces = len(self.walls.geoms)
         self.one_dimensional = atlas.one_dimensional
@@ -172,7 +138,8 @@ class ClosedForm:
             second_hit = self._hit(bounce_ray, bodies, tables)
             second = zip(second_hit.reflectance, self._irradiance(second_hit, bodies, tables), strict=True)
             light = [dr.select(hit.is_lit, dr.fma(r, e, first), 0) for first, (r, e) in zip(light, second, strict=True)]
-        return [r * e for r, e in zip(hit.reflectance, light, strict=True)], hit.t
+        sent = [r * e for r, e in zip(hit.reflectance, light, strict=True)]
+        return sent if self.medium is None else self.medium.through(sent, hit.t), hit.t
 
     def returned(self, ray: Array, shade: Array, radius: float, more: Irradiance | None = None) -> list[Array]:
         """Return the light that walls and floor reflect towards the origin of each ray, per component. They receive

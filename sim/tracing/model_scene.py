@@ -15,6 +15,7 @@ import mitsuba as mi
 import mujoco
 import numpy as np
 
+from optics import TurbidMedium
 from optics.spectra.spectrum import Spectrum
 from sim.eyes.compound_eye import WorldEye
 from sim.scene import bsdfs, inventory, lights, shapes, sky, surfaces
@@ -42,6 +43,7 @@ class ModelScene:
 
     model: the MuJoCo model
     eye: determines the spectral bands
+    medium: water or air in the eye's bands; None: clear air
     variant: Mitsuba's variant
     geoms: ids of all visible geoms
     looks: appearances of these geoms
@@ -67,7 +69,9 @@ class ModelScene:
         groups: Sequence[int] = VISIBLE_GROUPS,
         spectra: Mapping[str, Spectrum | str] | None = None,
         varied: Varied = (),
+        medium: TurbidMedium | None = None,
     ) -> None:
+        self.medium = None if medium is None else medium.in_bands(eye.spectral_bands, eye.receptors)
         self.model, self.eye, self.variant, self._groups = model, eye, default_variant(), groups
         self.spectra = resolve(model, spectra)
         in_bands, self._off = lights_in_bands(model, self.spectra, eye.spectral_bands, eye.receptors)

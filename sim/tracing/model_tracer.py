@@ -21,6 +21,7 @@ from sim.scene.variant import MitsubaObject, computed
 from sim.scene.variant import variant as in_variant
 from sim.tracing import lighting
 from sim.tracing.eye_ray import EyeRay
+from sim.tracing.medium_on_rays import MediumOnRays
 from sim.tracing.model_lights import ROWS as LIGHT_ROWS
 from sim.tracing.model_scene import ModelScene
 from sim.tracing.movers import MoverRows
@@ -133,7 +134,7 @@ class ModelTracer:
             raise ValueError("light = 'all': rays follow at most two reflections, see samples = 'areas'")
         self._scene, self._bands, self.light = scene, lighting.spectra(scene.wavelengths), light
         self.why, self.basis = why, np.eye(len(scene.wavelengths))
-        self._glows = len(scene.glows) > 0
+        self._medium = None if scene.medium is None else MediumOnRays.from_bands(scene.medium, self.basis)
         self.scene = Scenes(scene.still, scene.movers.atlas.scene)
         shapes = scene.still.shapes()
         self._any_still = len(shapes) > 0
@@ -144,7 +145,7 @@ class ModelTracer:
 
     def _of_glows(self) -> tuple[Array | None, Array | None]:
         scene = self._scene
-        if not self._glows:
+        if not scene.glows:
             return None, None
         number = {look: k for k, look in enumerate(scene.glows)}
         of_movers = [number.get(look, len(number)) for look in scene.movers.looks]
@@ -177,7 +178,8 @@ class ModelTracer:
             reflected = self._returned(met, seen.axis, there, samples)
             arrives = [e + dr.pi * more for e, more in zip(arrives, reflected, strict=True)]
         spectra = self._sent(met, arrives, there)
-        return [spectra[b // lighting.LANES][b % lighting.LANES] for b in range(len(self.basis))], met.t
+        sent = [spectra[b // lighting.LANES][b % lighting.LANES] for b in range(len(self.basis))]
+        return sent if self._medium is None else self._medium.through(sent, met.t), met.t
 
     def _returned(self, met: _SurfaceHit, axis: Array, there: Surroundings, samples: Array) -> list[Array]:
         """Return the light that reaches each visible surface from a random direction (Lambert's cosine). It comes from
@@ -185,7 +187,7 @@ class ModelTracer:
         bounce_ray = lighting.spawn_bounce_ray(met.point, met.normal, mi.Point2f(samples.x, samples.y))
         second = self._first_hits(bounce_ray, there, met.seen)
         arrives = self._irradiance(second, axis, there)
-        if self._scene.has_sky or self._glows:
+        if self._scene.has_sky or self._scene.glows:
             further = lighting.spawn_bounce_ray(second.point, second.normal, mi.Point2f(samples.z, samples.w))
             last = self._first_hits(further, there, second.seen)
             emitted = self._emitted(last, there)
@@ -201,15 +203,13 @@ class ModelTracer:
         si = there.still.ray_intersect(ray, active) if self._any_still else _nothing()
         if movers.apart:
             computed(si)  # evaluated here, because otherwise every kernel that reads `si` would trace the rays again
-        far = dr.select(active, si.t, 0)
-        hit = movers.nearest(ray, far, there.movers)
+        hit = movers.nearest(ray, dr.select(active, si.t, 0), there.movers)
         on_mover = active & (hit.which < len(movers))
         seen = active & (si.is_valid() | on_mover)
         point = ray(dr.select(seen, hit.t, 0))
         normal = dr.select(on_mover, hit.normal, mi.Vector3f(si.sh_frame.n))
         normal = dr.select(dr.dot(normal, ray.d) > 0, -normal, normal)
-        si.p, si.n, si.uv = point, mi.Normal3f(normal), dr.select(on_mover, hit.uv, si.uv)
-        si.t = hit.t
+        si.p, si.n, si.uv, si.t = point, mi.Normal3f(normal), dr.select(on_mover, hit.uv, si.uv), hit.t
         si.sh_frame = mi.Frame3f(si.n)
         si.wi = si.to_local(-ray.d)
         bsdfs = there.tables.bsdfs

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
+from optics import BandMedium
 from sim.scene import bsdfs, shapes, surfaces
 from sim.scene.appearances import Appearance
 from sim.scene.variant import MitsubaObject
@@ -41,6 +42,7 @@ class UprightScene:
     model: the MuJoCo model
     variant: Mitsuba's variant
     bsdfs: BSDF of each geom, by id; geoms of equal appearance share one object
+    medium: water or air in the eye's bands; None: clear air
     """
 
     model: mujoco.MjModel
@@ -53,6 +55,7 @@ class UprightScene:
     heights: np.ndarray
     settled: np.ndarray
     bsdfs: dict[int, MitsubaObject]
+    medium: BandMedium | None
 
     @property
     def has_own(self) -> bool:
@@ -101,6 +104,7 @@ def upright_scene(scene: ModelScene, stand: LevelStand) -> UprightScene:
         data.geom_xpos[bodies, 2],
         np.array([_keeps_height(model, data, geom) for geom in bodies], bool),
         same,
+        scene.medium,
     )
 
 

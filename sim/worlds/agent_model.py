@@ -41,9 +41,11 @@ def _alone(spec: mujoco.MjSpec) -> mujoco.MjModel:
             spec.delete(body)
     for element in [*spec.worldbody.geoms, *spec.worldbody.sites, *spec.lights, *spec.cameras]:
         spec.delete(element)
+    seen = [*spec.materials, *spec.textures]
+    plain = spec.add_material(name="plain").name  # in MuJoCo 3.14, an empty name does not remove a material
     for element in [*spec.geoms, *spec.sites]:
-        element.material = ""
-    for element in [*spec.materials, *spec.textures]:
+        element.material = plain
+    for element in seen:
         spec.delete(element)
     for _ in range(ROOM):
         spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, size=[1, 1, 1], contype=0, conaffinity=0)

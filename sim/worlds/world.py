@@ -13,6 +13,8 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from optics import TurbidMedium
+from optics.elements.turbid_medium import medium_of
 from optics.numerics.arguments import did_you_mean, in_range, of_kind, shown, whole
 from optics.numerics.read_only import ReadOnlyArrays
 from optics.spectra.spectrum import Spectrum
@@ -50,7 +52,7 @@ class World(ReadOnlyArrays):
     model: MuJoCo model. It contains static geoms and mocap bodies for the objects. The body "agent" has the slide
         joints agent_x and agent_y, the hinge agent_heading, the actuators agent_x and agent_y (commanded velocity [m/s]
         along the world's axes) and the sensor agent_touch (above 0 in contact with a wall). If the world was built with
-        eyes, the agent has cameras eye_0 ...
+        eyes, the agent has a camera for each, with the name that `Eyes.names()` states
     objects: names of the objects' bodies: ("goal", "adversary_0", "adversary_1"), or () in navigation and mazes
     starts: starting positions of the agent, at the centres of cells
     object_spawn: possible positions of objects, at the centres of cells, (m, 2) [m]
@@ -61,6 +63,7 @@ class World(ReadOnlyArrays):
     training_starts: starting positions of the agent in training; None: `starts`
     episode_steps: number of actions after which an episode is truncated; None: the task's default
     mazes: number of mazes, or of courses, which are arranged from south to north; 1 in other tasks
+    medium: water or air that fills the world; None: clear air
     """
 
     task: str
@@ -74,6 +77,7 @@ class World(ReadOnlyArrays):
     training_starts: Starts | None = None
     episode_steps: int | None = None
     mazes: int = 1
+    medium: TurbidMedium | None = None
 
     @property
     def agent_spawn(self) -> np.ndarray:
@@ -93,6 +97,7 @@ def build_world(
     wall_height: float = WALL_HEIGHT,
     eyes: Eyes | None = None,
     spectra: Mapping[str, Spectrum | str] | None = None,
+    medium: TurbidMedium | str | None = None,
 ) -> World:
     """Build the world of a task.
 
@@ -104,10 +109,13 @@ def build_world(
     layouts: one set of a `sim.LayoutFamily` for navigation or mazes, instead of `seed`, `mazes` and `course`; an
         episode starts in any of its layouts
     wall_height: height of all walls [m], in [0.4, 100]; 0.5 in the published code
-    eyes: eyes for which the agent gets cameras eye_0 ..., from left to right; None: no cameras
+    eyes: eyes for which the agent gets cameras, with the names of `Eyes.names()`; None: no cameras
     spectra: spectra of materials and lights, by name ("wall", "floor", "light_0" ...). They add to the spectra that the
         task defines, or replace them. Each is an `optics.Spectrum`, or a name that `optics.reflectance` or
         `optics.illuminant` accepts.
+    medium: water or air between surfaces and eyes: an `optics.TurbidMedium`, or one of its names ("clear_ocean",
+        "coastal_water", "fog"; see `optics.turbid_medium`). Under water, eyes are immersed (`optics.immersed`). None:
+        clear air
 
     Raises:
         ValueError: the task or the course is unknown, the seed is negative, `mazes`, `course` or `layouts` is given for
@@ -150,6 +158,7 @@ def build_world(
         training_starts=layout.training_starts,
         episode_steps=layout.episode_steps,
         mazes=mazes,
+        medium=medium_of("build_world: medium", medium),
     )
 
 
@@ -253,7 +262,8 @@ def _add_velocity_servo(spec: mujoco.MjSpec, joint: str) -> None:
 
 def _add_eye_cameras(body: mujoco.MjsBody, eyes: Eyes) -> None:
     azimuths = eyes.azimuths()
-    for i, (position, rotation) in enumerate(zip(eye_positions(azimuths), camera_rotations(azimuths), strict=True)):
+    places = zip(eyes.names(), eye_positions(azimuths), camera_rotations(azimuths), strict=True)
+    for name, position, rotation in places:
         quat = np.empty(4)
         mujoco.mju_mat2Quat(quat, rotation.ravel())
-        body.add_camera(name=f"eye_{i}", pos=position.tolist(), quat=quat.tolist(), fovy=eyes.fovy_deg)
+        body.add_camera(name=name, pos=position.tolist(), quat=quat.tolist(), fovy=eyes.fovy_deg)

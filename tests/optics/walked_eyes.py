@@ -4,6 +4,7 @@ import numpy as np
 
 import optics
 from optics import Eye, Pupil, Waveguide, Zernike
+from sim.render.receptors_in_time import ReceptorsInTime
 from tests.walked_arguments import NoEffect, Walk, With
 
 LENS = {"aperture_radius": 10e-6, "thin_lens_focal_length": 80e-6}
@@ -12,6 +13,7 @@ SCENE = np.linspace(0, 1, 64).reshape(1, 8, 8)
 FACET = optics.FacetLens(12e-6, 14e-6)
 EYELET = optics.Ommatidium(FACET, Waveguide(2e-6))
 COMPOUND = optics.AppositionEye(EYELET, 1, 2.0)
+TINT = optics.Spectrum((500,), (0.1,))
 IN_COLOUR = {"wavelength": 400e-9}
 
 
@@ -22,6 +24,13 @@ def looked(**given):
     scene = np.linspace(0, 1, layers * 64).reshape(layers, 8, 8)
     noisy = eye.see(scene, 2, rng=np.random.default_rng(0), polarization=(0.5, 20.0) if eye.microvilli else None)
     return eye.kernel(2), noisy, eye.tolerance
+
+
+def in_time(**given):
+    """Return responses to two frames."""
+    receptors = ReceptorsInTime(optics.ReceptorDynamics(**given), 1, (1, 1, 1, 2), 0.02)
+    receptors.start(np.full((1, 1, 1, 1, 2), 0.5, np.float32), np.arange(1))
+    return [receptors.step(np.array([0.2, 0.9], np.float32).reshape(1, 1, 1, 1, 2), np.arange(1)) for _ in range(2)]
 
 
 def guided(**given):
@@ -63,7 +72,27 @@ OF_EYES = {
             "microvilli": optics.Microvilli(),
             "pupil_turned": With(True, {"pupil": Pupil(**LENS, wavefront=Zernike({(3, 1): 0.2}))}),
             "vertical_fov_deg": 30.0,
+            "dynamics": NoEffect("it needs time, which environments have: tests/sim/envs/test_receptors_in_time.py"),
         },
+    ),
+    "ReceptorDynamics": Walk(
+        in_time,
+        {
+            "time_constant_ms": 30.0,
+            "order": 2,
+            "latency_ms": 20.0,
+            "adaptation": "naka_rushton",
+            "adaptation_ms": With(100.0, {"adaptation": "logarithmic"}),
+            "dark_light": With(0.1, {"adaptation": "logarithmic"}),
+            "event_threshold": 0.3,
+            "motion": "barlow_levick",
+            "motion_ms": With(5.0, {"motion": "hassenstein_reichardt"}),
+            "frames": NoEffect("environments render them: tests/sim/envs/test_receptors_in_time.py"),
+        },
+    ),
+    "TurbidMedium": Walk(
+        lambda **given: repr(optics.immersed(EYE, optics.TurbidMedium(TINT, TINT, **given)).pupil),
+        {"refractive_index": optics.medium("water")},
     ),
     "Eye.describe": Walk(lambda **asked: str(EYE.describe(**asked)), {"z": 1e-3}),
     "Eye.kernel": Walk(lambda **asked: EYE.kernel(2, **asked), {"z": 1e-3, "direction_deg": (10.0, 0.0)}),
@@ -87,6 +116,16 @@ OF_EYES = {
             "light_from": "centres",
         },
     ),
+    "anatomical_acuity": Walk(lambda **asked: optics.anatomical_acuity(1e11, 0.017, **asked), {"lattice": "square"}),
+    "ideal_contrast_sensitivity": Walk(
+        lambda **asked: optics.ideal_contrast_sensitivity(1.0, 0.5, 1e6, 1.0, **asked), {"d_prime": 2.0}
+    ),
+    "least_eye_parameter": Walk(lambda **asked: optics.least_eye_parameter(5e-7, **asked), {"lattice": "square"}),
+    "optical_sensitivity": Walk(
+        lambda **asked: optics.optical_sensitivity(2e-5, 5e-5, 2e-6, **asked),
+        {"length": 1e-4, "absorption": With(1e4, {"length": 1e-4}), "light": With("peak", {"length": 1e-4})},
+    ),
+    "sampling_acuity": Walk(lambda **asked: optics.sampling_acuity(1.0, **asked), {"lattice": "square"}),
     "PhotonBudget": Walk(
         lambda **given: looked(photon_budget=optics.PhotonBudget(**given)),
         {"illuminance": 100.0, "integration_time": 0.1, "quantum_efficiency": 0.1},

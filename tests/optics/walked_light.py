@@ -14,6 +14,7 @@ LENS = {"aperture_radius": 10e-6, "thin_lens_focal_length": 80e-6}
 SMALL = {"dx": 1e-6, "shape": (9, 9), "tolerance": 1e-2}
 U = np.exp(-np.add.outer(np.linspace(-2, 2, 16) ** 2, np.linspace(-2, 2, 16) ** 2))
 STEPS = {"dx": 1e-6, "wavelength": 5e-7, "distance": 1e-4}
+BLUE = {"wavelength": 400e-9}
 INTERNAL = NoEffect("planners call it; its effect is the accuracy of PSFs")
 SAME = NoEffect("a part of a result that other code computes")
 
@@ -61,6 +62,11 @@ def through(**asked):
     elements = asked.pop("elements", [Pupil(10e-6), FreeSpace(1e-4), Pupil(20e-6)])
     found = optics.propagate_through(elements, **{"wavelength": 5e-7, "out_dx": 2e-6, "out_shape": (8, 8), **asked})
     return found.u, found.x, found.predicted_error
+
+
+def ball(**given):
+    water = optics.medium("water")
+    return optics.BallLens(1e-3, optics.RefractiveIndex(1.5, 4e-15), water, water, **given)
 
 
 def exit_pupil(**asked):
@@ -128,6 +134,17 @@ OF_PUPILS = {
         },
         {"aperture_radius": 10e-6},
     ),
+    "BallLens": Walk(lambda **given: ball(**given).focal_length(), {"shape": lambda u: 1 - u**4}),
+    "BallLens.luneburg": Walk(
+        lambda **given: optics.BallLens.luneburg(1e-3, 1.336, **given).focal_length(), {"focal_ratio": 2.5}
+    ),
+    "BallLens.maxwell": Walk(lambda **given: optics.BallLens.maxwell(1e-3, **given).index(0.0), {"medium_n": 1.336}),
+    **{
+        f"BallLens.{name}": Walk(lambda name=name, **asked: getattr(ball(), name)(2e-4, **asked), BLUE)
+        for name in ("deviation", "focus", "index", "turning")
+    },
+    "BallLens.pupil": Walk(lambda **asked: ball().pupil(2e-4, **asked).thin_lens_focal_length, BLUE),
+    "BallLens.focal_length": Walk(lambda **asked: ball().focal_length(**asked), BLUE),
     "HumanEye": Walk(
         lambda **given: human(**given),
         {"aperture_radius": 1e-3, "wavefront": None, "centered": True},
@@ -243,6 +260,10 @@ OF_PSFS = {
     "FreeSpace": Walk(
         lambda **given: through(u=U, dx=1e-6, elements=[FreeSpace(1e-4, **given)]),
         {"medium_n": 1.3},
+    ),
+    "Misaligned": Walk(
+        lambda **given: through(elements=[optics.Misaligned(Pupil(**LENS), **given), FreeSpace(8e-5)], tolerance=0.05),
+        {"decentre": (1e-6, 0.0), "tilt": (0.05, 0.0)},
     ),
     "Grid": Walk(lambda **given: Grid((3, 3), 1.0, **given).x, {"centre": (1.0, 0.0)}),
 }

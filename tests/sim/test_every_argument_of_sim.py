@@ -33,6 +33,8 @@ PERFECT = {"resolution": (4, 4), "n_eyes": 1, "bands": 3, "fov_deg": 70.0}
 RAYS = Fidelity(2, bands=3)
 PUPIL = optics.Pupil(10e-6, thin_lens_focal_length=240e-6)
 EYE = optics.Eye(None, (4, 4), 70.0, bands=3)
+PHOTO = np.full((12, 16, 3), 0.5)
+MOSAIC = sim.ReceptorMosaic("mouse", np.linspace(0, 1, 24).reshape(2, 3, 4), (508.0, 360.0), 20.0, False)
 
 
 def rendered(mount=None, **given):
@@ -75,6 +77,7 @@ def world(**given):
         sorted(found.spectra),
         found.mazes,
         found.episode_steps,
+        None if found.medium is None else found.medium.veil.values,
     )
 
 
@@ -89,6 +92,12 @@ def written(tmp="view.exr", **given):
     view = sim.View("left", **{"wavelengths_nm": np.array([500.0]), "radiance": np.full((1, 2, 2), 0.5), **given})
     sim.write_exr(tmp, [view], **({} if aspect is None else {"pixel_aspect": aspect}))
     with open(tmp, "rb") as file:
+        return file.read().hex()
+
+
+def image_file(**given):
+    MOSAIC.write_png("mosaic.png", **given)
+    with open("mosaic.png", "rb") as file:
         return file.read().hex()
 
 
@@ -122,6 +131,7 @@ IN_WORLDS = {
             "least_return": With(-0.01, {"steps": 30}),
             "episode_steps": With(2, {"steps": 4}),
             "spectra": {"light_0": "A"},
+            "medium": "fog",
             "vary": {"light": (0.1, 0.5)},
             "auxiliary": ("depth",),
             "render_mode": "eyes",
@@ -146,6 +156,7 @@ IN_WORLDS = {
                 {"optics": optics.Pupil(20e-6, wavefront=optics.Zernike({(1, 1): 4.0}), thin_lens_focal_length=240e-6)},
             ),
             "vertical_fov_deg": 30.0,
+            "dynamics": optics.ReceptorDynamics(200.0),
         },
     ),
     "build_world": Walk(
@@ -158,6 +169,7 @@ IN_WORLDS = {
             "wall_height": 0.5,
             "eyes": Eyes(),
             "spectra": {"wall": "foliage"},
+            "medium": "fog",
         },
     ),
     "make_env": Walk(
@@ -213,6 +225,7 @@ ON_MODELS = {
             "spectra": {"lamp": "A"},
             "varied": NoEffect("it allows `Poses` with varied values: tests/sim/scene change them"),
             "tracer": NoEffect("all tracers give the same signals: tests/sim/tracing compare them"),
+            "medium": "fog",
         },
     ),
     "ModelRenderer.signals": Walk(
@@ -229,6 +242,7 @@ ON_MODELS = {
             "spectra": NoEffect("as in ModelRenderer"),
             "varied": NoEffect("as in ModelRenderer"),
             "light": "bounce",
+            "medium": "fog",
         },
     ),
     "View": Walk(
@@ -246,6 +260,12 @@ ON_MODELS = {
             "directions": With(np.ones((3, 2, 2)), {"receptors": np.ones((2, 2, 2))}),
         },
     ),
+    "see_photograph": Walk(
+        lambda progress=None, **given: sim.see_photograph(PHOTO, "mouse", 20.0, progress=progress, **given).signals,
+        {"uv": 0.0, "progress": NoEffect("sim/pictures/test_photograph.py: the calls of this function")},
+    ),
+    "ReceptorMosaic.image": Walk(MOSAIC.image, {"photograph": PHOTO, "height": 40}),
+    "ReceptorMosaic.write_png": Walk(image_file, {"photograph": PHOTO, "height": 40}),
     "write_exr": Walk(written, {"pixel_aspect": 2.0}),
     "read_exr": Walk(lambda **given: outcome(lambda: sim.read_exr("view.exr", **given)), {"most_bytes": 10}, {}),
 }
@@ -259,7 +279,11 @@ ELSEWHERE = {
         ("BatchedRenderer.signals", ("light",), "as ModelRenderer.signals"),
         ("ModelRenderer.launch", ("light",), "as ModelRenderer.signals"),
         ("ModelRenderer.launch_some", ("light",), "as ModelRenderer.signals"),
-        ("Fidelity", ("depth", "levels", "light", "samples", "tolerance"), "tests/sim/render: they describe a choice"),
+        (
+            "Fidelity",
+            ("depth", "frames", "levels", "light", "samples", "tolerance"),
+            "tests/sim/render: they describe a choice",
+        ),
         ("Frozen", ("policy",), "tests/sim/envs"),
         ("Mirror.render", ("integrator", "sampler", "seed", "spp", "wavelengths"), "tests/sim/scene"),
         ("mirror", ("bodies", "data", "groups", "spectra", "variant"), "tests/sim/scene"),
@@ -275,7 +299,7 @@ ELSEWHERE = {
             "tests/sim/render: it is the reference of other renderers",
         ),
         ("SlidingAgents", ("threads", "variation"), "tests/sim/physics; threads changes only the speed"),
-        ("World", ("alone", "episode_steps", "mazes", "spectra", "training_starts"), "build_world sets them"),
+        ("World", ("alone", "episode_steps", "mazes", "medium", "spectra", "training_starts"), "build_world sets them"),
         ("check_batch_task", ("n_envs", "steps"), "tests/sim/envs: it returns nothing"),
         ("choose_fidelity", ("bands", "tolerance", "tracer"), "tests/sim/render"),
     )
@@ -303,7 +327,17 @@ def test_the_table_names_every_optional_argument():
     assert missing(sim, TABLE) == []
 
 
-QUICK = ("View", "write_exr", "read_exr", "fan", "Course", "build_world")
+QUICK = (
+    "View",
+    "see_photograph",
+    "ReceptorMosaic.image",
+    "ReceptorMosaic.write_png",
+    "write_exr",
+    "read_exr",
+    "fan",
+    "Course",
+    "build_world",
+)
 
 
 @pytest.mark.parametrize(

@@ -24,8 +24,9 @@ from optics.elements.source import PointSource
 from optics.methods.hankel import _transform
 from optics.methods.rayleigh_sommerfeld import cached_nodes, direct_sum
 from optics.numerics import cost
+from optics.numerics.array_sum_cost import lines_seconds
 from optics.numerics.field import Field
-from optics.numerics.fourier import _fft
+from optics.numerics.fourier import _fft, fourier_sum
 from optics.numerics.fourier_matrices import by_whole_matrices
 from optics.numerics.grid import Grid
 from optics.numerics.interpolation import TAPS
@@ -67,6 +68,20 @@ def operations(types: Precision) -> Iterator[Operation]:
         lambda n: int(2 * complex_flops(n**3)),
         lambda n: _dft(n, types),
     )
+    yield Operation(
+        f"flop of a product of NumPy arrays, {types.dtype}",
+        1 / cost.ARRAY_MATMUL_FLOPS[types.dtype],
+        (256, 512, 1024),
+        lambda n: 16 * n**3,
+        lambda n: _array_sum(n, n + 0.5, types),
+    )
+    yield Operation(
+        f"sample in an FFT of NumPy arrays, {types.dtype}",
+        lines_seconds(2, 1024, types.dtype) / 1024,
+        (256, 512, 1024),
+        lambda n: n * n,
+        lambda n: _array_sum(n, float(n), types),
+    )
     if types.dtype == "float64":
         return
     yield Operation(
@@ -99,6 +114,10 @@ def _random(n: int, types: Precision) -> Field:
 def _dft(n: int, types: Precision) -> None:
     """Two complex products of n x n matrices."""
     dr.eval(by_whole_matrices(_random(n, types), n + 0.5, (n, n), -1))
+
+
+def _array_sum(n: int, period: float, types: Precision) -> None:
+    fourier_sum(_random(n, types).numpy(), period, (n, n), -1)
 
 
 def _fourier(n: int, types: Precision) -> None:

@@ -196,8 +196,8 @@ def _mitsuba_rate(world: sim.World, eyes: sim.Eyes, state: Any, budget: float) -
     def draw() -> None:
         pose(data, world, state, next(worlds) % state.n)
         mirror.sync(data)
-        for i in range(eyes.n_eyes):
-            mirror.render(f"eye_{i}", width=width, height=height, integrator="direct", spp=SAMPLES)
+        for name in eyes.names():
+            mirror.render(name, width=width, height=height, integrator="direct", spp=SAMPLES)
 
     return 1 / seconds(draw, budget)
 
@@ -215,8 +215,8 @@ def _mujoco_rate(world: sim.World, eyes: sim.Eyes, state: Any, budget: float, sh
 
     def draw() -> None:
         pose(data, world, state, next(worlds) % state.n)
-        for i in range(eyes.n_eyes):
-            renderer.update_scene(data, camera=f"eye_{i}")
+        for name in eyes.names():
+            renderer.update_scene(data, camera=name)
             renderer.scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = shadows
             renderer.render()
 

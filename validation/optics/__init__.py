@@ -9,6 +9,7 @@ float32_precision     loss of digits of phases in float32
 backward_propagation  backward propagation and evanescent waves
 thin_element          phase mask compared with refraction at a relief
 limiting_cases        edges of the domain: a known value, or a one-line error
+real_eyes             published values of animals' eyes and computed ones
 cell_samples          number of samples for integrals over cells
 freeze_spectra        stored spectra compared with colour-science
 

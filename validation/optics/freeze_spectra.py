@@ -1,4 +1,4 @@
-"""The four tables of optics/spectra/data, exported from colour-science
+"""The five tables of optics/spectra/data, exported from colour-science
 
     python -m validation.optics.freeze_spectra [--write]
 
@@ -55,11 +55,20 @@ def cone_fundamentals() -> dict[str, np.ndarray]:
     return {"wavelength_nm": FROM_390, **dict(zip("LMS", _at(cones, FROM_390).T, strict=True))}
 
 
+def srgb_basis() -> dict[str, np.ndarray]:
+    """Reflectances of the primaries of sRGB after Mallett & Yuksel."""
+    import colour
+
+    basis = colour.recovery.MSDS_BASIS_FUNCTIONS_sRGB_MALLETT2019
+    return {"wavelength_nm": FROM_380, **dict(zip(("red", "green", "blue"), _at(basis, FROM_380).T, strict=True))}
+
+
 TABLES: dict[str, Callable[[], dict[str, np.ndarray]]] = {
     "colour_tables.csv": colour_tables,
     "cone_fundamentals.csv": cone_fundamentals,
     "illuminants.csv": illuminants,
     "reflectances.csv": reflectances,
+    "srgb_basis.csv": srgb_basis,
 }
 
 

@@ -60,7 +60,7 @@ def finished_products(run: Run, shown: bool, replay: bool = False) -> Products:
         from evolve.report.replay import write_page
         from evolve.report.write import write
 
-        best, played = recorder.record(run), None
+        best, played = recorder.record(run, pictures=True), None
         # The former report is deleted only now, so that it is kept if no episode can be played.
         (run.path / REPORT).unlink(missing_ok=True)
         if replay:

@@ -7,6 +7,7 @@ patch               Area, and the Patch of a surface that is visible in an area
 illuminated_bodies  table of the light on moving bodies
 body_light          light on the visible part of a body
 half_planes         fractions of an area that straight lines cut off
+distances           path lengths from an eye to surfaces in an area
 borders             borders between columns of areas
 columns             walls, floor and sky behind an area
 sphere_areas        spheres in an area

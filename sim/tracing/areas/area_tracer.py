@@ -8,7 +8,6 @@ worlds.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import partial
 
 import drjit as dr
@@ -20,9 +19,10 @@ from sim.eyes.depth_layers import ONE_PSF, DepthLayers
 from sim.scene.device_arrays import floats
 from sim.tracing import lighting
 from sim.tracing.areas import sphere_areas
-from sim.tracing.areas.body_light import BodyLight
+from sim.tracing.areas.body_light import BodyLight, LitSphere
 from sim.tracing.areas.branches import only_where
 from sim.tracing.areas.columns import RIM, Columns, Piece
+from sim.tracing.areas.distances import LEAST_DIP, distances_to_floor, distances_to_wall
 from sim.tracing.areas.illumination import AreaTables, FrameState, Illumination
 from sim.tracing.areas.light_table import LightTable
 from sim.tracing.areas.patch import Area, Patch
@@ -32,27 +32,10 @@ from sim.tracing.closed_form_tracer import ClosedForm
 from sim.tracing.spheres import SphereRows, centres_in
 from sim.tracing.walls import ALIGNED, NoClosedForm
 
-LEAST_DIP = 1e-4  # smallest downward slope of directions that hit the floor
 BANDS = 2  # horizontal bands into which the floor in an area is divided
 # Number of equally wide parts of an area in which a wall's texture is averaged separately. It is more than 1, because
 # the near part of a wall fills more of the area than a distant part of the same length.
 STRETCHES = 2
-
-
-@dataclass(frozen=True)
-class _LitSphere:
-    """A sphere in an area.
-
-    number: number of the sphere among the bodies · view: visible part of the sphere · light: light on the sphere
-    now: inputs of the current frame
-    depth: layers among which its light is divided
-    """
-
-    number: int
-    view: SphereView
-    light: BodyLight
-    now: FrameState
-    depth: DepthLayers
 
 
 class AreaTracer:
@@ -79,7 +62,7 @@ class AreaTracer:
             raise NoClosedForm("walls of several heights")
         if not rays.one_dimensional:
             raise NoClosedForm("a texture that changes along two axes")
-        self.why, self.light, self.basis = rays.why, rays.light, rays.basis
+        self.why, self.light, self.basis, self._medium = rays.why, rays.light, rays.basis, rays.medium
         self._walls = walls
         self._columns = Columns(walls, rays.footprints)
         self._illumination = Illumination(rays, bodies.radii)
@@ -133,7 +116,11 @@ class AreaTracer:
         for part, light, *hidden in zip(parts, seen, *(sphere[:3] for sphere in spheres), strict=True):
             left = dr.clip(1 - sum(hidden, mi.Float(0)) / dr.maximum(part, LEAST_DIP), 0, 1)
             total = [dr.fma(left, own, sum_) for own, sum_ in zip(light, total, strict=True)]
-        return [sum(own, rest) for rest, *own in zip(total, *(sphere[3:] for sphere in spheres), strict=True)]
+        found = [sum(own, rest) for rest, *own in zip(total, *(sphere[3:] for sphere in spheres), strict=True)]
+        if self._medium is None:
+            return found
+        # Surfaces sent their contrast with the veiling light, which is added to the first depth layer.
+        return [own + veil for own, veil in zip(found, self._medium.veil, strict=False)] + found[len(self.basis) :]
 
     def first_faces(self, origin: Array, level: Array, inputs: AreaTables) -> Array:
         """Return the number of the wall's face that a ray in a horizontal direction (Vector2f) hits."""
@@ -181,6 +168,8 @@ class AreaTracer:
             arriving = self._reflected.on_wall(patch, now.inputs.reflected)
             light = _sum(light, self._illumination.past_bodies(patch, arriving, now))
         sent_on = [piece.wall_share * r * e for r, e in zip(reflectance, light, strict=True)]
+        if self._medium is not None:
+            sent_on = self._medium.contrasts(sent_on, distances_to_wall(area, piece, patch), piece.wall_share)
         return _in_layers(depth, piece.inverse_distance_at(piece.middle), sent_on)
 
     def _floor(self, area: Area, pieces: tuple[Piece, Piece], now: FrameState, depth: DepthLayers) -> list[Array]:
@@ -197,8 +186,11 @@ class AreaTracer:
             if self._reflected and now.inputs.reflected:
                 arriving = self._reflected.on_floor(patch, now.inputs.reflected)
                 light = _sum(light, self._illumination.past_bodies(patch, arriving, now))
-            reflectance = self._floor_reflectance(patch, now)
-            layers = _in_layers(depth, dip / (area.origin.z - self._walls.floor), light)
+            reflectance, above = self._floor_reflectance(patch, now), area.origin.z - self._walls.floor
+            if self._medium is not None:
+                distances = distances_to_floor(area, a, dip, area.height * share / BANDS, above)
+                light, reflectance = self._medium.reflected_contrasts(reflectance, light, distances)
+            layers = _in_layers(depth, dip / above, light)
             sent_on = zip(reflectance * depth.count, layers, strict=True)
             return index + 1, [dr.fma(r, e, sum_) for (r, e), sum_ in zip(sent_on, total, strict=True)]
 
@@ -228,7 +220,7 @@ class AreaTracer:
         sphere that nearer spheres hide are omitted."""
         view = SphereView(area, now.bodies[k], self._radii[k])
         light = BodyLight.on_patch(self._illumination, k, view.whole().patch, now)
-        sphere = _LitSphere(k, view, light, now, depth)
+        sphere = LitSphere(k, view, light, now, depth)
 
         def add(number: Array, hidden: list[Array], total: list[Array]) -> tuple[Array, ...]:
             strip = view.strip(number)
@@ -242,7 +234,7 @@ class AreaTracer:
         _, hidden, total = dr.while_loop(start, lambda number, *_: number < view.sides, add, label="strips")
         return [*hidden, *total]
 
-    def _strip(self, area: Area, sphere: _LitSphere, strip: Strip) -> list[Array]:
+    def _strip(self, area: Area, sphere: LitSphere, strip: Strip) -> list[Array]:
         """Return the fraction of a strip that no other sphere hides. It is followed by the strip's light times the
         fraction of the area that it fills, per component."""
         k, view, now, depth = sphere.number, sphere.view, sphere.now, sphere.depth
@@ -253,7 +245,12 @@ class AreaTracer:
             bare = self._not_hidden(area, k, slice_, now)
             column, sides = sphere_areas.columns_of(texture, slice_.patch, self._radii[k])
             reflectance = self._stripes.mean_over(texture.texture, column, sides, now.inputs.stripes)
-            layers = _in_layers(depth, slice_.inverse_distance(area), sphere.light.on(slice_.patch.normal))
+            light = sphere.light.on(slice_.patch.normal)
+            if self._medium is not None:
+                light, reflectance = self._medium.reflected_contrasts(
+                    reflectance, light, [dr.norm(slice_.patch.point - area.origin)]
+                )
+            layers = _in_layers(depth, slice_.inverse_distance(area), light)
             sent_on = [bare / mi.Float(view.sides)]
             sent_on += [slice_.share * bare * r * e for r, e in zip(reflectance * depth.count, layers, strict=True)]
             return number + 1, _sum(sent_on, total)

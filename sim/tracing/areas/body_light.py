@@ -11,9 +11,11 @@ from dataclasses import dataclass
 import mitsuba as mi
 
 from optics.numerics.autodiff import Array
+from sim.eyes.depth_layers import DepthLayers
 from sim.tracing.areas.illumination import FrameState, Illumination
 from sim.tracing.areas.light_table import sum_of
 from sim.tracing.areas.patch import Patch
+from sim.tracing.areas.sphere_areas import SphereView
 
 
 @dataclass(frozen=True)
@@ -50,3 +52,19 @@ class BodyLight:
             return light
         parts = zip(light, self.around, self.change, strict=True)
         return [straight + sum_of(fours, normal) + change for straight, fours, change in parts]
+
+
+@dataclass(frozen=True)
+class LitSphere:
+    """A sphere in an area.
+
+    number: number of the sphere among the bodies · view: visible part of the sphere · light: light on the sphere
+    now: inputs of the current frame
+    depth: layers among which its light is divided
+    """
+
+    number: int
+    view: SphereView
+    light: BodyLight
+    now: FrameState
+    depth: DepthLayers

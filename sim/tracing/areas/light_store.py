@@ -13,10 +13,12 @@ import os
 import tempfile
 import zipfile
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sim.tracing.areas.light_baking import Baking
+if TYPE_CHECKING:
+    from sim.tracing.areas.light_baking import Baking
 
 VERSION = 3  # version of the tables; to be increased with every change of the method or of the file format
 KEPT = 200  # largest number of files; the oldest are deleted first
@@ -27,6 +29,17 @@ ENTRY = 1024  # largest number of bytes that an archive adds to each table
 def cache_folder() -> Path:
     """Return the folder of the cache."""
     return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "rhabdom" / "light"
+
+
+def write_error() -> str | None:
+    """Return the system's message if a temporary file cannot be written to the folder of the cache, else None."""
+    try:
+        cache_folder().mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=cache_folder()) as file:
+            file.write(b"0")
+    except OSError as error:
+        return error.strerror or str(error)
+    return None
 
 
 def stored(baking: Baking) -> dict[str, np.ndarray]:

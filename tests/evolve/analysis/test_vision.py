@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from skimage.metrics import structural_similarity
 
 from evolve.analysis.vision import ssim, vision
 from evolve.config.assemble import assemble
@@ -32,6 +33,18 @@ def test_ssim_by_its_equation():
     expected /= (mu**2 + nu**2 + c1) * (cov[0, 0] + cov[1, 1] + c2)
     assert ssim(a, b) == pytest.approx(expected)
     assert ssim(a, a) == pytest.approx(1.0)
+
+
+def test_ssim_as_scikit_image_computes_it():
+    rng = np.random.default_rng(1)
+    for shape in ((2, 3, 7, 9), (4, 5, 6), (12, 15)):
+        a, b = rng.random((2, *shape)).astype(np.float32)
+        window = 5 if 5 in shape else 7
+        pairs = zip(a.reshape(-1, *shape[-2:]), b.reshape(-1, *shape[-2:]), strict=True)
+        expected = [
+            structural_similarity(x.astype(float), y.astype(float), win_size=window, data_range=1) for x, y in pairs
+        ]
+        assert ssim(a, b) == pytest.approx(np.mean(expected), rel=1e-12)
 
 
 def test_ssim_of_a_line_of_receptors_is_no_number():

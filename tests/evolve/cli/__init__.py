@@ -2,6 +2,7 @@
 
 main: test_main.py
 arguments: test_options.py, test_main.py
+photograph_arguments: test_see.py, test_options.py
 argument_values: store/test_sizes.py, report/test_gene_drift.py, interactive/test_run_products.py
 waiting: test_products.py
 notes: test_notes.py
@@ -18,5 +19,6 @@ commands.demo: test_demo.py
 commands.completion: test_main.py
 commands.validate: test_validate.py
 commands.compare: test_status_and_compare.py, test_generations.py
+commands.see: test_see.py
 commands.drift: report/test_gene_drift.py, test_generations.py
 """

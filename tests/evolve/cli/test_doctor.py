@@ -22,6 +22,9 @@ def test_a_working_installation_is_good(findings, monkeypatch, capsys):
     assert doctor.print_findings() == 0
     printed = capsys.readouterr().out
     assert f"drjit               {findings['packages']['drjit']}" in printed
+    assert f"light tables        {findings['light_cache']['folder']}: writable\n" in printed
+    assert f"free memory         {findings['free_memory'] / 2**30:.3g} GiB\n" in printed
+    assert f"gpu                 {findings['gpu']} (a GPU {doctor.USE_OF_GPU})\n" in printed
     assert printed.endswith("all good\n")
 
 
@@ -29,6 +32,18 @@ def test_json_is_the_same_findings(findings, monkeypatch, capsys):
     monkeypatch.setattr(doctor, "examine", lambda: findings)
     doctor.print_findings(as_json=True)
     assert json.loads(capsys.readouterr().out) == findings
+
+
+def test_light_tables_that_cannot_be_stored_are_named(monkeypatch, tmp_path):
+    (tmp_path / "file").touch()
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
+    monkeypatch.setattr(doctor, "_render", lambda variants, environment: dict.fromkeys(variants, "works"))
+    findings = doctor.examine()
+    lines = doctor._lines(findings)
+    folder = tmp_path / "file" / "rhabdom" / "light"
+    assert f"light tables        {folder}: Not a directory; every process computes the tables again" in lines
+    assert findings["good"], "runs work without the cache"
+    assert not (tmp_path / "file").is_dir()
 
 
 def test_bad_llvm_is_named_with_the_remedy(monkeypatch, capsys, tmp_path):

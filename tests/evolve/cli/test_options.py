@@ -12,6 +12,7 @@ import shutil
 from types import SimpleNamespace
 
 import pytest
+from PIL import Image
 
 import evolve.cli.commands.demo
 import evolve.cli.commands.products
@@ -101,6 +102,13 @@ TABLE = {
     "report": {**OF_PRODUCTS, **DAMAGE, **OPEN},
     "export": {**OF_PRODUCTS, **DAMAGE, **OF_ONE, "every": (["--every", "4"], CHANGES)},
     "demo": {"out": (["--out", "there"], CHANGES), **OPEN, **JSON, "quiet": (["--quiet"], CHANGES)},
+    "see": {
+        "photograph": (["other.png"], CHANGES),
+        "animal": (["--animal", "eagle"], CHANGES),
+        "width_deg": (["--width-deg", "30"], CHANGES),
+        "uv": (["--uv", "0"], CHANGES),
+        "out": (["--out", "there"], CHANGES),
+    },
     "validate": {"proofs": (["aliasing"], CHANGES), "list": (["--list"], CHANGES)},
     "doctor": JSON,
     "tasks": JSON,
@@ -120,11 +128,12 @@ BASE = {
     "report": ["report", "done"],
     "export": ["export", "done"],
     "demo": ["demo"],
+    "see": ["see", "photo.png", "--animal", "mouse", "--width-deg", "60"],
     "config": ["config", "show", "detection"],
     "completion": ["completion", "bash"],
 }
 # Positional arguments replace those of the base command.
-POSITIONAL = {"directory": 1, "what": 1, "shell": 1}
+POSITIONAL = {"directory": 1, "what": 1, "shell": 1, "photograph": 1}
 NO_PLAN = {name: (given, PLAN) for name, (given, _) in OF_RUNS.items() if name in ("quiet", "open", "tensorboard")}
 MORE = [  # an argument next to others, which it contradicts
     *((DRY, given, words) for given, words in NO_PLAN.values()),
@@ -174,6 +183,8 @@ def runs(tmp_path_factory):
     damaged = shutil.copytree(folder / "done", folder / "damaged") / "candidates.jsonl"
     damaged.write_text(damaged.read_text() + "damage\n")
     (folder / "empty").mkdir()
+    for name, colour in (("photo", (200, 120, 40)), ("other", (40, 120, 200))):
+        Image.new("RGB", (16, 12), colour).save(folder / f"{name}.png")
     (folder / "settings.toml").write_text("seed = 9\n")
     return folder
 

@@ -129,7 +129,7 @@ def test_who_is_stopped_among_the_exr_files_has_no_report_yet(finished, monkeypa
     def stopped(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("evolve.analysis.recorder.record", lambda run: None)
+    monkeypatch.setattr("evolve.analysis.recorder.record", lambda run, pictures: None)
     monkeypatch.setattr("evolve.report.exr_export.export_episode", stopped)
     (finished / "report.html").write_text("of an hour ago")
     with pytest.raises(KeyboardInterrupt):

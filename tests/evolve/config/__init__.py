@@ -1,6 +1,7 @@
 """Tests of evolve/config: which test covers which module.
 
 run_config: test_run_config.py
+eye_checks: test_run_config.py
 layout_checks: learning/test_final_figures.py
 settings: test_assemble.py, test_run_config.py, test_parameters.py
 costs: test_costs.py

@@ -45,6 +45,7 @@ def test_only_the_maze_has_mazes_and_only_navigation_a_course():
         "course": "short",
         "layouts": None,
         "wall_height": 1.0,
+        "medium": "air",
     }
     for change in ("world.mazes=2", "world.unseen=true"):
         with pytest.raises(ConfigError, match="is for the task maze, not for navigation"):

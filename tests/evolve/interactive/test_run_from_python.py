@@ -1,8 +1,10 @@
 """`evolve.run` and the command produce the same record; notebooks are generated from pages, and can be run."""
 
+import importlib.util
 import inspect
 import os
 import runpy
+import shutil
 import subprocess
 import sys
 from contextlib import contextmanager
@@ -19,6 +21,7 @@ from evolve.config.assemble import assemble
 from evolve.runs import carry_on
 from evolve.search.local_executor import LocalExecutor
 from evolve.store.directory import Run
+from optics.numerics import backend
 from tests.evolve.closed_form import TINY, bowl
 from tests.evolve.store.handwriting import records_of
 from tests.test_docs import CODE, agrees
@@ -159,10 +162,24 @@ def test_notebooks_are_their_pages(name):
     assert stored == MAKER.notebook(page)
     nbformat.validate(stored)
     code = "".join(f"{cell.source}\n" for cell in stored.cells if cell.cell_type == "code")
-    assert code == "".join(MAKER.CODE.findall(page.read_text()))
+    assert code == MAKER.SETUP + "".join(MAKER.CODE.findall(page.read_text()))
     prose = "\n".join(cell.source for cell in stored.cells if cell.cell_type == "markdown")
     for target in MAKER.LINK.findall(prose):
         assert (NOTEBOOKS / target.partition("#")[0]).exists(), target
+
+
+@pytest.mark.parametrize("missing", [[], ["rhabdom"], ["LLVM"], ["rhabdom", "LLVM"]])
+def test_setup_of_a_notebook_installs_what_is_missing(missing, monkeypatch):
+    commands = []
+    monkeypatch.setattr(subprocess, "run", lambda command, check: commands.append(command[1:]))
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None if name in missing else object())
+    monkeypatch.setattr(backend, "find", lambda: (None if "LLVM" in missing else object(), []))
+    monkeypatch.setattr(backend, "require", lambda: commands.append("require"))
+    monkeypatch.setattr(shutil, "which", lambda name: f"/usr/bin/{name}")
+    exec(MAKER.SETUP, {})
+    pip = ["-m", "pip", "install", "--quiet", "git+https://github.com/rhabdom/rhabdom"]
+    apt = [["update", "-qq"], ["install", "-y", "-qq", "libllvm19", "libatomic1"]]
+    assert commands == [pip] * ("rhabdom" in missing) + apt * ("LLVM" in missing) + ["require"]
 
 
 @pytest.mark.slow
@@ -173,7 +190,7 @@ def test_a_notebook_runs_as_jupyter_runs_it(tmp_path, monkeypatch):
     NotebookClient(book, timeout=300, resources={"metadata": {"path": tmp_path}}).execute()
     shown = {kind for cell in book.cells for output in cell.get("outputs", ()) for kind in output.get("data", ())}
     assert "image/png" in shown
-    printed = [cell.outputs for cell in book.cells if cell.cell_type == "code"]
+    printed = [cell.outputs for cell in book.cells[1:] if cell.cell_type == "code"]  # without the setup
     page = (ROOT / "docs" / "tutorial" / "python.md").read_text()
     for (_, expected), outputs in zip(CODE.findall(page), printed, strict=True):
         texts = [output.text for output in outputs if output.output_type == "stream" and output.name == "stdout"]

@@ -3,6 +3,7 @@
 import json
 import shutil
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -27,12 +28,13 @@ def recorded(episode, monkeypatch):
     """Replace the recording of an episode by the one with seed 3; return the list of requests."""
     requests = []
 
-    def record(run, candidate_id, seed, every, mode="evaluation"):
+    def record(pictured, run, candidate_id, seed, every, pictures=False, mode="evaluation"):
+        assert pictures is pictured, "only pages show the images"
         requests.append((run.path, candidate_id, seed, every))
         return episode
 
-    for module in (exr_export, replay):
-        monkeypatch.setattr(module, "record", record)
+    for module, pictured in ((exr_export, False), (replay, True)):
+        monkeypatch.setattr(module, "record", partial(record, pictured))
     return requests
 
 

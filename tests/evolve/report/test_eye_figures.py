@@ -104,9 +104,9 @@ def test_a_figure_that_cannot_be_known_is_one_line(monkeypatch):
     class Animal:
         refractive_index = 1.5
 
-        def eyes(self, _):
+        def eye(self, *_):
             pupil = optics.Pupil(20e-6, thin_lens_focal_length=optics.Eye().sensor_distance)
-            return type("Eyes", (), {"eye": lambda _: optics.Eye(pupil, (5, 5))})()
+            return optics.Eye(pupil, (5, 5))
 
     monkeypatch.setattr(optics, "mtf", refused)
     page = str(eye_figures.eye_figures(Animal(), None))

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import sim
+from evolve.analysis.episode import Pictures
 from evolve.analysis.recorder import Recorder
 from evolve.learning.fitness import evaluate
 from evolve.learning.policy import load_policy
@@ -48,6 +49,26 @@ def test_film_shows_what_each_eye_signalled(episode, content):
             x = (column * 2 + eye) * width
             cell = pixels[row * height : (row + 1) * height, x : x + width]
             np.testing.assert_array_equal(cell, display(signals[time, eye], gain))
+
+
+def test_images_follow_the_agent_next_to_the_plan(run, episode, tmp_path):
+    pixels = np.zeros((3, 36, 48, 3), np.uint8)
+    pixels[1], pixels[2] = 100, 200
+    pictured = replace(episode, pictures=Pictures(np.array([0, 100, 200]), pixels))
+    text = write_player(pictured, tmp_path / "replay.html").read_text()
+    film = film_of(text)
+    assert {"bounds", "walls", "position"} <= film.keys(), "the plan is still there"
+    assert [film["pictures"]["shown"][frame] for frame in (0, 99, 100, 199, 200, 255)] == [0, 0, 1, 1, 2, 2]
+    classes = [value for tag, name, value in Page(text).attributes if (tag, name) == ("canvas", "class")]
+    assert classes == ["pictures", "world", "rewards"]
+
+
+def test_eyes_are_shown_large_and_by_their_names(episode, tmp_path):
+    text = write_player(episode, tmp_path / "replay.html").read_text()
+    looks = re.findall(r'data-eye="\d+"[^>]*? data-look="(\w+)"', text)
+    assert len(looks) == 2 * 2
+    assert all(float(re.search(rf'data-look="{look}"\]{{width:([\d.]+)px', text)[1]) >= 200 for look in looks)
+    assert re.findall(r'<span class="name">(\w+)</span>', text) == ["left", "right"] == list(episode.eyes.names())
 
 
 def test_events_are_marked_when_they_happen(episode, content):

@@ -1,5 +1,6 @@
 """Tests that fail when a module of optics/elements is broken.
 
+ball_lens: test_ball_lens.py
 beam: methods/test_textbook.py
 converging_wave: test_exit_pupil.py, test_exit_pupil_off_axis.py
 derivative_knots: point_spread/test_gradients.py
@@ -17,8 +18,10 @@ ray_field: point_spread/test_vector_focus.py
 refractive_index: test_refractive_index.py, test_media.py
 relief: test_relief.py
 source: test_source.py
+spherical_index: test_ball_lens.py
 square_samples: test_relief.py, methods/test_even_pupils.py
 torch_numbers: test_derivatives_refused.py, test_torch.py
+turbid_medium: test_turbid_medium.py
 transmittance: test_transmittance.py
 wavefront: test_wavefront.py
 wavefront_slopes: test_pupil.py

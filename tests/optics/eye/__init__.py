@@ -1,10 +1,12 @@
 """Tests that fail when a module of optics/eye is broken.
 
+acuity: test_acuity.py
 band_choice: spectra/test_bands.py, test_sight_tolerance.py
 cell_integrals: test_cell_integrals.py
 eye: test_eye.py, test_kept_kernels.py, test_axes.py, test_eye_derivatives.py, test_eye_robustness.py
 eye_spec: test_eye.py, test_patches.py, test_axes.py, test_vertical_field.py
 geometry: test_patches.py, test_vertical_field.py
+immersion: elements/test_turbid_medium.py
 kernel_bank: test_kernel_bank.py, test_layer_counts.py, test_sight_tolerance.py, test_eye_robustness.py
 kernel_interpolation: test_kernel_interpolation.py, test_kernel_bank.py, test_sight_tolerance.py
 photoreceptor: test_photoreceptor.py

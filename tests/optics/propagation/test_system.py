@@ -212,3 +212,37 @@ def test_nothing_is_carried_back_from_nowhere():
     with pytest.raises(ValueError, match="u = None: must be given, behind the last element"):
         propagate_through([FreeSpace(3e-5), Pupil(1e-5)], None, wavelength=WAVELENGTH, backward=True, out_dx=DX,
                           out_shape=(9, 9))  # fmt: skip
+
+
+LENS_TRAIN = [
+    part
+    for f, z in ((50e-3, 8e-3), (-40e-3, 8e-3), (20e-3, 12e-3))
+    for part in (Pupil(0.35e-3, thin_lens_focal_length=f), FreeSpace(z))
+]
+
+
+def test_loose_tolerances_take_fewer_samples_and_keep_their_predictions():
+    """The light that few diffracted frequencies carry is that of a tight tolerance, to within the predicted error."""
+    where = {"wavelength": 550e-9, "out_dx": 1e-6, "out_shape": (96, 96)}
+    tight, loose, looser = (
+        propagate_through(LENS_TRAIN, **where, tolerance=tolerance) for tolerance in (1e-3, 1e-2, 0.05)
+    )
+    error = relative_l2(np.abs(loose.u) ** 2, np.abs(tight.u) ** 2)
+    assert 1e-5 < error < loose.predicted_error < 1e-2  # not needlessly exact
+    assert relative_l2(np.abs(looser.u) ** 2, np.abs(tight.u) ** 2) < looser.predicted_error < 0.05
+    work = [sum(step.plan.samples[0] ** 2 for step in out.steps) for out in (tight, loose, looser)]
+    assert work[0] > 4 * work[1] >= 4 * work[2]
+
+
+@pytest.mark.slow
+def test_light_outside_both_margins_is_in_the_prediction():
+    """Without the allowance, opposite rims of these lenses would exceed the prediction by 7 %."""
+    aberrations = optics.Zernike({(2, 2): -0.0547, (3, 1): -0.1252, (4, 0): 0.0333})
+    system = [
+        Pupil(0.1684e-3, thin_lens_focal_length=3.805e-3, wavefront=aberrations), FreeSpace(1.424e-3),
+        Pupil(0.2172e-3, thin_lens_focal_length=3.114e-3), FreeSpace(3.594e-3),
+    ]  # fmt: skip
+    where = {"wavelength": 550e-9, "out_dx": 4.8e-6, "out_shape": (85, 85)}
+    tight, loose = (propagate_through(system, **where, tolerance=tolerance) for tolerance in (2e-3, 1e-2))
+    error = relative_l2(np.abs(loose.u) ** 2, np.abs(tight.u) ** 2)
+    assert 1e-4 < error < loose.predicted_error / 2

@@ -20,8 +20,10 @@ prepared_task: test_features.py, evolve/learning/test_fitness.py
 batch_task_checker: test_batch_task.py
 animals: test_encounter.py, test_parallel_env.py, test_features.py
 senses: test_task_vec_env.py, test_task_state.py, test_encounter.py
-eyes_of_kind: test_eyes_of_kind.py, test_eye_kinds.py, test_features.py
+eyes_of_kind: test_receptors_in_time.py, test_eyes_of_kind.py, test_eye_kinds.py, test_features.py
+frame_choice: test_receptors_in_time.py
 renderers: test_features.py, test_light_levels.py, test_receptor_shapes.py
 held_state: test_task_state.py
+threads: test_threads.py
 world_pictures: test_task_vec_env.py, test_pictures.py, test_parallel_env.py
 """

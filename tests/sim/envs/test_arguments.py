@@ -43,6 +43,7 @@ ARGUMENTS = {
     "least_return": (-1e-3, CHANGES, CHANGES),
     "episode_steps": (1, CHANGES, CHANGES),
     "spectra": ({"wall": "foliage"}, CHANGES, f"{SET} spectra"),
+    "medium": ("fog", CHANGES, f"{SET} medium"),
     "vary": ({"light": (0.1, 0.2)}, CHANGES, f"{SET} vary"),
     "auxiliary": (("depth",), CHANGES, f"{SET} auxiliary"),
     "render_mode": ("eyes", CHANGES, CHANGES),

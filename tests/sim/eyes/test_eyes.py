@@ -30,15 +30,17 @@ def test_eyes_look_outwards_with_the_left_on_the_left():
     np.testing.assert_allclose(np.linalg.det(camera_rotations(azimuths)), 1.0)
 
 
-def test_cameras_of_a_world_are_the_eyes():
-    eyes = sim.Eyes(n_eyes=4, placement_range_deg=200, resolution=(3, 5), fov_deg=60)
+@pytest.mark.parametrize(("n_eyes", "first"), [(1, "center"), (2, "left"), (3, "left"), (4, "eye_0")])
+def test_cameras_of_a_world_are_the_eyes(n_eyes, first):
+    eyes = sim.Eyes(n_eyes=n_eyes, placement_range_deg=200, resolution=(3, 5), fov_deg=60)
     model = sim.build_world("detection", eyes=eyes).model
     data = mujoco.MjData(model)
     heading = 0.7
     data.qpos[2] = heading
     mujoco.mj_forward(model, data)
-    for i, azimuth in enumerate(eyes.azimuths()):
-        camera = model.camera(f"eye_{i}").id
+    assert (eyes.names()[0], model.ncam) == (first, n_eyes)
+    for name, azimuth in zip(eyes.names(), eyes.azimuths(), strict=True):
+        camera = model.camera(name).id
         outwards = [math.cos(azimuth + heading), math.sin(azimuth + heading), 0]
         np.testing.assert_allclose(-data.cam_xmat[camera].reshape(3, 3)[:, 2], outwards, atol=1e-12)
         np.testing.assert_allclose(

@@ -20,6 +20,7 @@ populations: test_sample_choice.py, test_fidelity.py
 fidelity_trials: test_fidelity_trials.py, test_fidelity.py, eyes/test_depth_layers.py
 prepared_scene: test_batched_renderer.py, test_fidelity.py
 memory_budget: test_memory_budget.py, test_sample_choice.py
+receptors_in_time: test_receptors_in_time.py
 receptor_noise: test_receptor_noise.py
 pending_frame: test_pending_frame.py, envs/test_eyes_of_kind.py
 model_renderer: test_model_renderer.py, test_pupil_axes.py

@@ -65,10 +65,10 @@ class References(dict):
         images = np.empty((BATCHES, state.n, EYES.n_eyes, len(wavelengths), *EYES.resolution))
         for env in range(state.n):
             mirror.sync(placed(world, state, env))
-            for eye in range(EYES.n_eyes):
+            for eye, name in enumerate(EYES.names()):
                 for batch in range(BATCHES):
                     images[batch, env, eye] = mirror.render(
-                        f"eye_{eye}", EYES.resolution[1], EYES.resolution[0], "direct", SPP, wavelengths, seed=batch
+                        name, EYES.resolution[1], EYES.resolution[0], "direct", SPP, wavelengths, seed=batch
                     )
         self[task] = world, state, images
         return self[task]

@@ -67,8 +67,8 @@ def test_task_worlds_agree_from_the_eyes(task):
             data.mocap_pos[i, :2] = world.object_spawn[rng.integers(len(world.object_spawn))]
         mujoco.mj_forward(model, data)
         mirror.sync(data)
-        for i in range(3):
-            kinds |= set(np.unique(assert_agrees(mirror, model, data, f"eye_{i}", 80, 60, model.body("agent").id)))
+        for name in ("left", "center", "right"):
+            kinds |= set(np.unique(assert_agrees(mirror, model, data, name, 80, 60, model.body("agent").id)))
     assert model.geom("floor").id in kinds
 
 

@@ -1,6 +1,8 @@
 """Tests of ray tracing: which test covers which module.
 
 tracer: test_closed_form_tracer.py
+medium_on_rays: test_medium_on_rays.py
+light_components: test_closed_form_tracer.py
 closed_form_tracer: test_closed_form_tracer.py, worlds/test_foraging.py
 eye_places: test_upright_scene.py, render/test_model_renderer.py
 eye_ray: render/test_batched_renderer.py
@@ -16,6 +18,7 @@ areas.light_baking: test_light_table.py, test_light_store.py
 areas.light_store: test_light_store.py, test_light_table.py
 areas.cell_grid: test_light_table.py
 areas.branches: test_areas.py
+areas.distances: test_medium_on_rays.py
 areas.columns: test_areas.py
 areas.half_planes: test_area_integrals.py, test_areas.py
 areas.illumination: test_illumination.py, test_areas.py

@@ -19,7 +19,7 @@ from sim.scene.variant import variant
 from sim.tasks.registry import task_of
 from sim.tasks.simulation import Simulation
 from sim.tracing import closed_form_tracer, spheres
-from sim.tracing.closed_form_tracer import components_of, reflected_components_of
+from sim.tracing.light_components import components_of, reflected_components_of
 from sim.tracing.reflectance_atlas import bake
 from sim.tracing.wall_intersection import Cells
 from sim.worlds.layout import Starts

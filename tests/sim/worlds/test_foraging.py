@@ -155,7 +155,7 @@ def test_the_mirror_shows_what_the_renderer_shows(world):
         .mean(axis=(2, 3))
     )
     theirs = np.stack(
-        [mirror.render(f"eye_{i}", 13, 9, "direct", 1024, wavelengths).mean(axis=(1, 2)) for i in range(2)], axis=1
+        [mirror.render(name, 13, 9, "direct", 1024, wavelengths).mean(axis=(1, 2)) for name in BEES.names()], axis=1
     )
     # 120,000 samples of one of three lights each give a standard error of 0.3 % of the mean.
     np.testing.assert_allclose(ours, theirs, rtol=0.012)

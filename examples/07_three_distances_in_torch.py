@@ -4,15 +4,15 @@ A lens is in focus at one distance of the sensor. A plate in front of it, a map 
 the share of the light on the middle 3 x 3 pixels becomes as equal and as large as possible at three distances. Each
 call of `optics.torch.psf` returns all nine PSFs, integrated over the pixels.
 
-    python examples/06_three_distances_in_torch.py
+    python examples/07_three_distances_in_torch.py
 """
 
 from __future__ import annotations
 
 import torch
 
-import optics
-import optics.torch
+from rhabdom import optics
+from rhabdom.optics.torch import psf
 
 RADIUS, FOCAL_LENGTH, PIXEL = 30e-6, 240e-6, 2e-6
 WAVELENGTHS = [480e-9, 550e-9, 620e-9]
@@ -24,8 +24,8 @@ def shares(heights_um: torch.Tensor) -> torch.Tensor:
     """Share of the light on the middle 3 x 3 pixels, (distance, wavelength)."""
     plate = optics.Pupil(RADIUS, optics.HeightMap(heights_um * 1e-6), thin_lens_focal_length=FOCAL_LENGTH)
     view = {"dx": PIXEL, "shape": (9, 9), "tolerance": 1e-2, "pixel_means": True}
-    psf = optics.torch.psf(plate, WAVELENGTHS, DISTANCES, **view)
-    return psf[..., 3:6, 3:6].sum((-2, -1)) * PIXEL**2
+    images = psf(plate, WAVELENGTHS, DISTANCES, **view)
+    return images[..., 3:6, 3:6].sum((-2, -1)) * PIXEL**2
 
 
 def main() -> None:

@@ -1,0 +1,19 @@
+"""Arguments of `evolve see`."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser
+from pathlib import Path
+
+__all__ = ["add_photograph"]
+
+
+def add_photograph(command: ArgumentParser) -> None:
+    """Add the file of the photograph, and the options of its view."""
+    command.add_argument("photograph", type=Path, metavar="FILE", help="opaque colour image, such as a JPEG file")
+    command.add_argument("--animal", required=True, metavar="NAME", help="animal, such as honeybee, goldfish or eagle")
+    angle = "angle that the width of the photograph covers in the visual field [degrees]"
+    command.add_argument("--width-deg", type=float, required=True, metavar="DEG", help=angle)
+    ultraviolet = "ultraviolet reflectance of white surfaces, which no photograph contains, 0 to 1 (default: 1)"
+    command.add_argument("--uv", type=float, default=1.0, metavar="SHARE", help=ultraviolet)
+    command.add_argument("--out", type=Path, default=Path(), metavar="DIR", help="output directory (default: this one)")

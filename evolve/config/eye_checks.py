@@ -1,0 +1,102 @@
+"""Checks of the settings of eyes that depend on each other."""
+
+from __future__ import annotations
+
+import math
+
+from evolve.config.checks import ConfigError
+from evolve.genome.eye_config import VERTICAL_FOVS, EyeConfig
+from evolve.genome.genes import INHERITED
+from optics.spectra.receptor_dynamics import ADAPTATIONS, MOTION
+from optics.spectra.receptors import RECEPTORS
+
+# Settings of receptors with memory, and settings that have an effect only with another one.
+IN_TIME = ("latency_ms", "adaptation", "adaptation_ms", "event_threshold", "motion_detectors", "motion_ms", "frames")
+NEEDED = {"adaptation_ms": "adaptation", "motion_ms": "motion_detectors"}
+RHABDOMS = ("rhabdom_index", "rhabdom_surround", "rhabdom_length", "rhabdom_absorption")
+# Limits of the numerical aperture of rhabdoms. A fly's rhabdom has 0.25. Below the lower limit a rhabdom guides almost
+# no light, and above the upper limit it has hundreds of modes.
+LEAST_STEP, MOST_STEP = 0.2, 0.5
+# [lx s] smallest allowed exposure. A receptor that sees a white surface through a pupil with relative aperture 1 then
+# absorbs some 30 photons. With fewer photons, the approximation of shot noise fails.
+LEAST_EXPOSURE = 2e-4
+
+
+def check_eye(eye: EyeConfig) -> None:
+    """Check the names, the light, the rhabdoms and the temporal settings of eyes.
+
+    Raises:
+        ConfigError: an unknown name, or settings that contradict each other.
+    """
+    names = {"receptors": (*RECEPTORS, INHERITED), "vertical_fov": VERTICAL_FOVS}
+    for name, known in {**names, "adaptation": ADAPTATIONS, "motion_detectors": MOTION}.items():
+        if (given := getattr(eye, name)) not in known:
+            raise ConfigError(f"eye.{name} = {given!r}: must be one of {', '.join(known)}", f"eye.{name}")
+    _check_light(eye)
+    _check_rhabdoms(eye)
+    _check_time(eye)
+
+
+def _check_light(eye: EyeConfig) -> None:
+    """Check that light is not too weak, and that the integration time is changed only if there is shot noise."""
+    light, default = eye.illuminance, EyeConfig.integration_time
+    if 0 < light * eye.integration_time < LEAST_EXPOSURE:
+        raise ConfigError(
+            f"eye.illuminance = {light:g}, eye.integration_time = {eye.integration_time:g}: too few photons; "
+            f"must be at least {LEAST_EXPOSURE:g} lx s together, or eye.illuminance 0, no shot noise",
+            *("eye.illuminance", "eye.integration_time"),
+        )
+    if light == 0 and eye.integration_time != default:
+        raise ConfigError(
+            f"eye.integration_time = {eye.integration_time:g}: has no effect without shot noise: set "
+            f"eye.illuminance, or leave it at {default:g}",
+            *("eye.integration_time", "eye.illuminance"),
+        )
+
+
+def _check_rhabdoms(eye: EyeConfig) -> None:
+    """Check that eyes with rhabdoms have optics and a plausible numerical aperture.
+
+    Also check that settings of rhabdoms are changed only if receptors are rhabdoms.
+    """
+    default = EyeConfig()
+    for name in RHABDOMS if not eye.rhabdoms else ():
+        if getattr(eye, name) != getattr(default, name):
+            raise ConfigError(f"eye.{name}: is for rhabdoms: set eye.rhabdoms = true", f"eye.{name}", "eye.rhabdoms")
+    if eye.rhabdoms and not eye.optics:
+        raise ConfigError(
+            "eye.rhabdoms = true: needs the waves of a pupil; eye.optics = false gives none",
+            "eye.rhabdoms",
+            "eye.optics",
+        )
+    if eye.rhabdom_length == 0 and eye.rhabdom_absorption != default.rhabdom_absorption:
+        raise ConfigError(
+            f"eye.rhabdom_absorption = {eye.rhabdom_absorption:g}: needs a length: set eye.rhabdom_length",
+            *("eye.rhabdom_absorption", "eye.rhabdom_length"),
+        )
+    step = math.sqrt(max(eye.rhabdom_index**2 - eye.rhabdom_surround**2, 0.0))
+    if not LEAST_STEP <= step <= MOST_STEP:
+        raise ConfigError(
+            f"eye.rhabdom_index = {eye.rhabdom_index:g}, eye.rhabdom_surround = {eye.rhabdom_surround:g}: the root "
+            f"of the difference of their squares is {step:.3g}; must lie in [{LEAST_STEP:g}, {MOST_STEP:g}]",
+            *("eye.rhabdom_index", "eye.rhabdom_surround"),
+        )
+
+
+def _check_time(eye: EyeConfig) -> None:
+    """Check that settings of receptors with memory are changed only if receptors have one, and where they matter."""
+    default = EyeConfig()
+    changed = [name for name in IN_TIME if getattr(eye, name) != getattr(default, name)]
+    if changed and eye.temporal_order == 0:
+        raise ConfigError(
+            f"eye.{changed[0]}: is for receptors with memory: set eye.temporal_order = 1 or 2",
+            *(f"eye.{changed[0]}", "eye.temporal_order"),
+        )
+    for name in changed:
+        if (other := NEEDED.get(name)) is not None and getattr(eye, other) == "none":
+            raise ConfigError(f"eye.{name}: has no effect with eye.{other} = none", f"eye.{name}", f"eye.{other}")
+    if eye.event_threshold > 0 and eye.adaptation != "none":
+        raise ConfigError(
+            f"eye.event_threshold = {eye.event_threshold:g}: must be 0 with eye.adaptation = {eye.adaptation}",
+            *("eye.event_threshold", "eye.adaptation"),
+        )

@@ -1,0 +1,24 @@
+"""Eyes of animals, from published measurements. Each function returns an eye of `optics` and states its sources.
+
+compound_eyes  honeybee, fruit_fly, blowfly, dragonfly, megalopta: an AppositionEye; cirolana: an Eye with one receptor
+camera_eyes    human, mouse, eagle, goldfish, jumping_spider: an Eye, a patch of the retina
+"""
+
+from optics.animals.camera_eyes import eagle, goldfish, goldfish_lens, human, jumping_spider, mouse
+from optics.animals.compound_eyes import COMPOUND, blowfly, cirolana, dragonfly, fruit_fly, honeybee, megalopta
+
+__all__ = [
+    "COMPOUND",
+    "blowfly",
+    "cirolana",
+    "dragonfly",
+    "eagle",
+    "fruit_fly",
+    "goldfish",
+    "goldfish_lens",
+    "honeybee",
+    "human",
+    "jumping_spider",
+    "megalopta",
+    "mouse",
+]

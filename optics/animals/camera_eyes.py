@@ -1,0 +1,146 @@
+"""Eyes with one lens, of vertebrates and a spider. Each function returns the patch of the retina with best acuity.
+
+The receptors of an `optics.Eye` form a square lattice. Its pitch gives the acuity of the animal's hexagonal lattice.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Any
+
+from optics.elements.ball_lens import BallLens
+from optics.elements.human_eye import HumanEye
+from optics.elements.pupil import Pupil
+from optics.elements.refractive_index import RefractiveIndex, medium
+from optics.eye.acuity import anatomical_acuity
+from optics.eye.eye import Eye
+from optics.numerics.arguments import one_of, whole
+
+__all__ = ["eagle", "goldfish", "goldfish_lens", "human", "jumping_spider", "mouse"]
+
+HUMAN_CONES = 199e9  # Curcio et al. 1990: mean peak density [1/m²]
+NODAL_DISTANCE = 16.67e-3  # Gullstrand's reduced eye [m]
+VITREOUS = 1.336
+MOST = 1000  # receptors along a side of a patch
+MATTHIESSEN = 2.5  # focal length of a fish lens in radii
+# Perlmann & Longsworth 1948: refractive increment of serum albumin, proportional to 0.940 + 2e4 nm²/λ². [1], [m²]
+ALBUMIN = 0.940, 2e-14
+
+
+def _patch(pupil: Pupil, acuity: float, nodal_distance: float, side: int, receptors: Any) -> Eye:
+    """Return side · side receptors whose square lattice resolves `acuity` cycles per degree."""
+    whole("receptors_across", side, 1, MOST)
+    width = side * nodal_distance * math.radians(1 / (2 * acuity))
+    fov = 2 * math.degrees(math.atan(width / (2 * nodal_distance)))
+    return Eye(pupil, (side, side), fov, width, receptors=receptors, full_aperture=2 * pupil.radius)
+
+
+def _lens(diameter: float, nodal_distance: float, index: float = VITREOUS) -> Pupil:
+    """Return an ideal lens between air and the eye's medium."""
+    return Pupil(diameter / 2, thin_lens_focal_length=nodal_distance * index, medium_n=index, object_n=1.0)
+
+
+def human(receptors_across: int = 60, pupil_diameter: float = 3e-3) -> Eye:
+    """Return the human foveola behind `HumanEye`, the standard observer.
+
+    Source of the density of cones, 199,000 per mm²: Curcio, Sloan, Kalina & Hendrickson, J. Comp. Neurol. 292, 497,
+    1990. Individuals have 100,000 to 324,000 per mm².
+
+    receptors_across: receptors along each side of the patch, 1 to 1000.
+    pupil_diameter: diameter [m] of the pupil, at most 6 mm.
+
+    Raises:
+        ValueError: an argument outside its range.
+    """
+    eye = HumanEye(pupil_diameter / 2)
+    nodal = eye.focal_length / float(medium("chromatic_eye").at(570e-9))
+    return _patch(eye.pupil, anatomical_acuity(HUMAN_CONES, NODAL_DISTANCE), nodal, receptors_across, "lms")
+
+
+def mouse(receptors_across: int = 40, pupil_diameter: float = 1e-3) -> Eye:
+    """Return a patch of a mouse's retina whose acuity is that of behaviour, 0.5 cycles/degree.
+
+    Source of the receptors, 360 and 508 nm: Abballe & Asari, PLoS ONE 17, e0262763, 2022. The acuity (Prusky et al.
+    2000) and 31 µm of retina per degree (Remtulla & Hallett 1985) are quoted; their articles have not been read. Mice
+    pool many receptors, so the patch has one receptor for each pool.
+
+    receptors_across: pools along each side of the patch, 1 to 1000.
+    pupil_diameter: diameter [m] of the pupil.
+
+    Raises:
+        ValueError: an argument outside its range.
+    """
+    nodal = 31e-6 * 180 / math.pi
+    return _patch(_lens(pupil_diameter, nodal), 0.5, nodal, receptors_across, "mouse")
+
+
+def eagle(receptors_across: int = 60) -> Eye:
+    """Return the deep fovea of a wedge-tailed eagle, *Aquila audax*.
+
+    Source: Reymond, Vision Research 25, 1477, 1985 (abstract): the retina resolves 140 cycles/degree, and the smallest
+    pupil 157. At 550 nm, that pupil is 4.9 mm wide. The nodal distance of 22 mm has no read source; it changes no
+    angle. The pigment at 567 nm is that of long-wavelength cones of birds, because no pigment of an eagle was found.
+
+    receptors_across: receptors along each side of the patch, 1 to 1000.
+
+    Raises:
+        ValueError: receptors_across outside its range.
+    """
+    diameter = 157 * math.degrees(1) * 550e-9
+    return _patch(_lens(diameter, 22e-3), 140.0, 22e-3, receptors_across, (567.0,))
+
+
+def goldfish_lens(radius: float = 1.4e-3) -> BallLens:
+    """Return a ball lens of a fish in water, with Matthiessen's ratio f = 2.5 R at 550 nm.
+
+    The profile is the generalised Luneburg lens. The surface has the index of water. At the core, the lens' proteins
+    add (n_core - n_water)(0.940 + 20,000 nm²/λ²) to the index, the dispersion of serum albumin (Perlmann & Longsworth,
+    J. Am. Chem. Soc. 70, 2719, 1948), scaled to 550 nm. The radius of 1.4 mm is a typical value.
+    """
+    at, water = 550e-9, medium("water")
+    around = float(water.at(at))
+    plain = BallLens.luneburg(radius, around, MATTHIESSEN)
+    middle = float(plain.index(0.0))
+    # Cauchy's equation with one term reproduces the index of water to 3e-4 between 400 and 700 nm.
+    of_water = (float(water.at(450e-9)) - float(water.at(650e-9))) / (450e-9**-2 - 650e-9**-2)
+    bend = of_water + (middle - around) * ALBUMIN[1] / (ALBUMIN[0] + ALBUMIN[1] / at**2)
+    return replace(plain, core_n=RefractiveIndex(middle - bend / at**2, bend), surface_n=water, medium_n=water)
+
+
+def goldfish(receptors_across: int = 40, radius: float = 1.4e-3) -> Eye:
+    """Return a patch of a goldfish's retina behind a ball lens, with an acuity of 60/26 cycles/degree.
+
+    Source: Northmore & Dvorak, Vision Research 19, 255, 1979: 13 minutes of arc per half period, in agreement with the
+    separation of cones. The retina is concentric with the lens, so the patch represents any direction. The pupil is
+    0.9 of the lens' width. See `goldfish_lens`.
+
+    receptors_across: receptors along each side of the patch, 1 to 1000.
+    radius: radius [m] of the lens.
+
+    Raises:
+        ValueError: an argument outside its range.
+    """
+    lens = goldfish_lens(radius)
+    return _patch(lens.pupil(0.9 * radius), 60 / 26, lens.focal_length(), receptors_across, "goldfish")
+
+
+# Angle between receptors [minutes of arc], diameter of the lens [m], and focal length [m].
+SPIDER_EYES = {"principal": (2.4, 780e-6, 1980e-6), "secondary": (42.0, 380e-6, 254e-6)}
+
+
+def jumping_spider(receptors_across: int = 30, eye: str = "principal") -> Eye:
+    """Return an eye of the jumping spider *Portia*: receptors "jumping_spider".
+
+    Source of the 2.4 minutes of arc between receptors of the principal eyes: Land, in Neurobiology of Arachnids, p. 53,
+    1985, after Williams & McIntyre, Nature 288, 578, 1980. No source has been read for the widths and focal lengths of
+    the lenses, nor for the 0.7° between receptors of the secondary (anterior lateral) eyes.
+
+    receptors_across: receptors along each side of the patch, 1 to 1000.
+    eye: "principal" or "secondary".
+
+    Raises:
+        ValueError: an unknown eye, or receptors_across outside its range.
+    """
+    minutes, diameter, focal = SPIDER_EYES[one_of("eye", eye, SPIDER_EYES)]
+    return _patch(_lens(diameter, focal), 30 / minutes, focal, receptors_across, "jumping_spider")

@@ -1,0 +1,149 @@
+"""Compound eyes of insects and of a crustacean.
+
+The refractive indices of all rhabdoms and rhabdomeres are 1.363 in 1.340, those of flies (Stavenga, J. Comp. Physiol. A
+190, 115, 2004). They have not been measured in the other animals.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from optics.elements.pupil import Pupil
+from optics.eye.eye import Eye
+from optics.numerics.arguments import one_of
+from optics.ommatidia.facet import FacetLens
+from optics.ommatidia.mosaic import AppositionEye
+from optics.ommatidia.ommatidium import Ommatidium
+from optics.ommatidia.waveguide import Waveguide
+from optics.spectra.optical_sensitivity import INVERTEBRATE_ABSORPTION
+
+__all__ = ["COMPOUND", "HONEYBEES", "Facet", "blowfly", "cirolana", "dragonfly", "fruit_fly", "honeybee", "megalopta"]
+
+# Names of compound eyes with many ommatidia, and their receptors for `optics.receptors_of`.
+COMPOUND = {
+    "honeybee": "honeybee",
+    "fruit_fly": "fruit_fly",
+    "blowfly": "blowfly",
+    "dragonfly": "dragonfly",
+    "megalopta": "honeybee",
+}
+LENS_N = 1.45  # Stavenga 2003: index of the facet lens of a fly
+CRUSTACEAN_N = 1.34  # index of the crystalline cone
+
+
+@dataclass(frozen=True)
+class Facet:
+    """Measurements of an ommatidium.
+
+    diameter: diameter D [m] of the facet.
+    focal_length: focal length f [m] in front of the lens.
+    rhabdom: diameter d [m] of the rhabdom's tip.
+    length: length l [m] of the rhabdom.
+    """
+
+    diameter: float
+    focal_length: float
+    rhabdom: float
+    length: float
+
+    def ommatidium(self) -> Ommatidium:
+        """Return a plano-convex facet lens of this focal length, and the rhabdom in its focus."""
+        lens = FacetLens(self.diameter, self.focal_length * (LENS_N - 1), n=LENS_N)
+        return Ommatidium(lens, _guide(self.rhabdom, self.length))
+
+
+def _guide(diameter: float, length: float) -> Waveguide:
+    return Waveguide(diameter, length=length, absorption=INVERTEBRATE_ABSORPTION)
+
+
+def _by_angle(diameter: float, focal_length: float, angle_deg: float, length: float) -> Facet:
+    """Return a facet whose rhabdom has the width f · angle."""
+    return Facet(diameter, focal_length, focal_length * math.radians(angle_deg), length)
+
+
+# Somanathan, Warrant, Borges, Wallén & Kelber, J. Exp. Biol. 212, 2448, 2009, table 1: D, f, Δρ = d/f, l.
+HONEYBEES = {
+    "mellifera": _by_angle(20e-6, 66e-6, 1.75, 320e-6),
+    "cerana": _by_angle(24.5e-6, 84e-6, 1.2, 270e-6),
+    "florea": _by_angle(19.5e-6, 79e-6, 1.1, 190e-6),
+    "dorsata": _by_angle(29.5e-6, 104e-6, 1.8, 260e-6),
+}
+
+
+def honeybee(species: str = "mellifera", rings: int = 10) -> AppositionEye:
+    """Return an eye of a worker honeybee: receptors "honeybee".
+
+    Source: Somanathan et al. 2009 (see HONEYBEES). The diameters of rhabdoms follow from their Δρ = d/f. The mean
+    interommatidial angle of 2.1° is an estimate for all four species: the 5432 facets of *Apis mellifera* share a
+    hemisphere.
+
+    species: "mellifera", "cerana", "florea" or "dorsata".
+    rings: rings of ommatidia around the central one.
+
+    Raises:
+        ValueError: an unknown species, or rings outside 0 to 60.
+    """
+    return AppositionEye(HONEYBEES[one_of("species", species, HONEYBEES)].ommatidium(), rings, 2.1)
+
+
+def fruit_fly(rings: int = 15) -> AppositionEye:
+    """Return an eye of *Drosophila melanogaster* with the rhabdomeres R1-6: receptors "fruit_fly".
+
+    Source of the lens: Stavenga, J. Comp. Physiol. A 189, 1, 2003, appendix 1. The facet's diameter of 16 µm, the
+    rhabdomere's of 1.9 µm, its length of 80 µm and the interommatidial angle of 5° are typical values, for which no
+    source has been read.
+
+    rings: rings of ommatidia around the central one. 15 rings have 721 ommatidia.
+    """
+    return AppositionEye(Ommatidium(FacetLens(16e-6, 11e-6, -11e-6, 8e-6), _guide(1.9e-6, 80e-6)), rings, 5.0)
+
+
+def blowfly(rings: int = 20, rhabdomere: float = 2e-6) -> AppositionEye:
+    """Return the frontal eye of a blowfly, *Calliphora*, with the rhabdomeres R1-6: receptors "blowfly".
+
+    Source: Stavenga, J. Exp. Biol. 207, 1703, 2004, fig. 4: D = 25 µm, F = 2.2, tips of 1.4 to 2 µm, length 250 µm. The
+    rhabdomeres of flies taper to 1 µm at their ends. Here they are straight. The interommatidial angle of 1.3° is a
+    typical value, for which no source has been read.
+
+    rings: rings of ommatidia around the central one.
+    rhabdomere: diameter [m] of the rhabdomere's tip.
+    """
+    return AppositionEye(Facet(25e-6, 2.2 * 25e-6, rhabdomere, 250e-6).ommatidium(), rings, 1.3)
+
+
+def dragonfly(rings: int = 20) -> AppositionEye:
+    """Return the acute zone of a dragonfly: receptors "dragonfly".
+
+    Source of the interommatidial angle of 0.24°: Land, Annu. Rev. Entomol. 42, 147, 1997. The facet's diameter of 62 µm
+    is quoted from Sherk 1978. No source has been read for it, for the focal length of three diameters, or for the
+    rhabdom of 2 µm by 500 µm.
+
+    rings: rings of ommatidia around the central one.
+    """
+    return AppositionEye(Facet(62e-6, 3 * 62e-6, 2e-6, 500e-6).ommatidium(), rings, 0.24)
+
+
+def megalopta(rings: int = 10) -> AppositionEye:
+    """Return an eye of the nocturnal bee *Megalopta genalis*: receptors "honeybee".
+
+    Source: Greiner, Ribi & Warrant, Cell Tissue Res. 316, 377, 2004. D = 36 µm, f = 97 µm, d = 8 µm, l = 350 µm and the
+    interommatidial angle of 1.4° are quoted from later articles. Only the abstract has been read: the facets are nearly
+    twice as wide and the rhabdoms four to five times as wide as those of bees that are active by day.
+
+    rings: rings of ommatidia around the central one.
+    """
+    return AppositionEye(Facet(36e-6, 97e-6, 8e-6, 350e-6).ommatidium(), rings, 1.4)
+
+
+def cirolana() -> Eye:
+    """Return one ommatidium of the marine isopod *Cirolana borealis*: a receptor that accepts light from 45°.
+
+    Source: Nilsson & Nilsson, J. Comp. Physiol. A 143, 503, 1981: D = 150 µm, Δρ = 45°. Its rhabdom has too many modes
+    for a waveguide, and the focus lies below its tip. The eye is therefore a lens in front of a single square receptor
+    of 45°. The focal length of 100 µm has no read source; the angle does not depend on it.
+    """
+    focal = 100e-6
+    pupil = Pupil(75e-6, thin_lens_focal_length=focal, medium_n=CRUSTACEAN_N)
+    width = 2 * focal * math.tan(math.radians(45 / 2))
+    return Eye(pupil, (1, 1), 45.0, width, bands=1, receptors=(500.0,), full_aperture=150e-6)

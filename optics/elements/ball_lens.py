@@ -1,0 +1,186 @@
+"""Gradient-index ball lenses, such as those of fish: their focus, and the pupil with their wavefront."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from optics.elements.pupil import MIDDLE, Pupil
+from optics.elements.refractive_index import Dispersion, index_of
+from optics.elements.spherical_index import SphericalIndex, generalized_luneburg
+from optics.elements.wavefront import UM, Zernike, mode
+from optics.numerics.arguments import in_range, positive, reals, shown
+from optics.numerics.quadrature import gauss_legendre
+
+__all__ = ["BallLens"]
+
+RINGS = 24  # choice: rays for the fit of the wavefront
+ORDER = 12  # choice: highest radial order of the wavefront
+STEEPEST = 0.95  # largest sine of a ray behind the lens
+
+
+Shape: TypeAlias = Callable[[np.ndarray], np.ndarray]
+
+
+def parabola(u: np.ndarray) -> np.ndarray:
+    """Return 1 - u², Matthiessen's profile."""
+    return 1 - u * u
+
+
+@dataclass(frozen=True, eq=False)
+class BallLens:
+    """A sphere with the index n(r, λ) = n_surface(λ) + (n_core(λ) - n_surface(λ)) shape(r/R), in one medium.
+
+    All directions are equivalent. On a retina that is concentric with the lens, every receptor therefore has the same
+    PSF, apart from the aperture's foreshortening.
+
+    radius: radius R [m] of the lens.
+    core_n, surface_n: refractive indices at the centre and just inside the surface, constant or dispersive.
+    medium_n: refractive index of the surrounding medium, on both sides.
+    shape: function of r/R in [0, 1], an array, that falls from 1 to 0. It must be smooth in (r/R)². Default: the
+        parabola 1 - (r/R)².
+
+    Raises:
+        ValueError: an argument is outside its valid range, which the message states, or the profile keeps light in
+            circles (n r must grow from the centre to the surface).
+    """
+
+    radius: float
+    core_n: float | Dispersion
+    surface_n: float | Dispersion
+    medium_n: float | Dispersion
+    shape: Shape = parabola
+
+    def __post_init__(self) -> None:
+        positive("radius", self.radius)
+        for name in ("core_n", "surface_n", "medium_n"):
+            index_of(name, getattr(self, name))
+        if not callable(self.shape):
+            raise ValueError(f"shape = {shown(self.shape)}: must be a function of r/R, such as lambda u: 1 - u**2")
+        ends = reals("shape", self.shape(np.array([0.0, 1.0])))
+        if ends.shape != (2,) or not np.allclose(ends, (1, 0), atol=1e-6):
+            raise ValueError(f"shape is {shown(ends.tolist())} at r/R = 0 and 1: must be 1 and 0")
+        _profile(self, MIDDLE)
+
+    @classmethod
+    def luneburg(cls, radius: float, medium_n: float, focal_ratio: float = 1.0) -> BallLens:
+        """Return a lens that focuses parallel light perfectly at the distance focal_ratio · R behind its centre.
+
+        With focal_ratio = 1 it is Luneburg's lens, n = n_medium √(2 - (r/R)²). A ratio of about 2.5 describes the
+        lenses of fish (Matthiessen, Pflügers Archiv 27, 510, 1882).
+
+        Raises:
+            ValueError: focal_ratio outside [1, 20].
+        """
+        relative = generalized_luneburg(focal_ratio)
+        core, medium = float(relative(np.zeros(1))[0]), float(index_of("medium_n", medium_n).at(MIDDLE))
+        return cls(radius, core * medium, medium, medium, lambda u: (relative(u) - 1) / (core - 1))
+
+    @classmethod
+    def maxwell(cls, radius: float, medium_n: float = 1.0) -> BallLens:
+        """Return Maxwell's fish-eye, n = 2 n_medium/(1 + (r/R)²): it images each point of its surface on the opposite
+        point."""
+        medium = float(index_of("medium_n", medium_n).at(MIDDLE))
+        return cls(radius, 2 * medium, medium, medium, lambda u: (1 - u * u) / (1 + u * u))
+
+    def index(self, r: Any, wavelength: float = MIDDLE) -> np.ndarray:
+        """Return the refractive index at distances r [m] from the centre, an array of any shape."""
+        u = reals("r", r) / self.radius
+        in_range("r", float(u.max(initial=0.0)) * self.radius, 0.0, self.radius)
+        core, surface, _ = self._indices(wavelength)
+        return np.asarray(surface + (core - surface) * np.asarray(self.shape(np.abs(u))))
+
+    def turning(self, height: Any, wavelength: float = MIDDLE) -> np.ndarray:
+        """Return the angle ψ [rad] about the centre between a ray's entry and its exit.
+
+        height: distance [m] at which the ray would pass the centre without the lens, below R and above 0.
+
+        Raises:
+            ValueError: a height outside the lens.
+        """
+        return _profile(self, wavelength).turning(self._relative(height))
+
+    def deviation(self, height: Any, wavelength: float = MIDDLE) -> np.ndarray:
+        """Return the angle [rad] by which the lens bends rays towards the axis, ψ + 2 arcsin(h/R) - π.
+
+        height: distance [m] of parallel rays from the axis.
+        """
+        h = self._relative(height)
+        return _profile(self, wavelength).turning(h) + 2 * np.arcsin(h) - math.pi
+
+    def focus(self, height: Any, wavelength: float = MIDDLE) -> np.ndarray:
+        """Return the distance [m] behind the centre at which rays parallel to the axis cross it.
+
+        height: distance [m] of the rays from the axis. See `deviation`.
+        """
+        return np.asarray(reals("height", height) / np.sin(self.deviation(height, wavelength)))
+
+    def focal_length(self, wavelength: float = MIDDLE) -> float:
+        """Return the paraxial focal length [m], from the centre of the lens, in closed form up to one integral.
+
+        Raises:
+            ValueError: the lens does not focus.
+        """
+        power = _profile(self, wavelength).power()
+        if not power > 0:
+            raise ValueError(f"core_n = {self.core_n}: must make a lens that focuses parallel light")
+        return self.radius / power
+
+    def pupil(self, aperture_radius: float, wavelength: float = MIDDLE) -> Pupil:
+        """Return the pupil through the centre of the lens, with the wavefront of parallel light behind the lens.
+
+        The wavefront refers to a sphere about the paraxial focus, which is the default distance of a sensor. The
+        pupil's amplitude is uniform over its plane, although rays are denser or sparser towards the rim of a thick
+        lens.
+
+        aperture_radius: largest distance [m] of parallel rays from the axis, below R.
+        wavelength: vacuum wavelength [m]. The focal length of the pupil is that for this wavelength.
+
+        Raises:
+            ValueError: an aperture as large as the lens, or rays steeper than a sine of 0.95 behind it.
+        """
+        focal, widest = self.focal_length(wavelength), float(self._relative(aperture_radius))
+        at, weights = gauss_legendre(RINGS)
+        x, ahead = self._wavefront(np.append(at, 1.0) * widest, focal / self.radius, wavelength)
+        edge = float(x[-1])
+        orders, rho = range(0, ORDER + 1, 2), x[:-1] / edge
+        share = np.sqrt(weights * rho)  # samples count by the area of their rings
+        basis = np.stack([mode(n, 0, rho, np.zeros_like(rho)) for n in orders], axis=1)
+        found = np.linalg.lstsq(basis * share[:, None], ahead[:-1] * share, rcond=None)[0]
+        modes = {(n, 0): float(value) / UM for n, value in zip(orders, found, strict=True) if n}
+        medium = float(index_of("medium_n", self.medium_n).at(wavelength))
+        return Pupil(edge, medium_n=medium, thin_lens_focal_length=focal, wavefront=Zernike(modes, edge))
+
+    def _wavefront(self, h: np.ndarray, focal: float, wavelength: float) -> tuple[np.ndarray, np.ndarray]:
+        """Return the places [m] of rays on the pupil's plane, and the wavefront [m] there, for relative heights."""
+        profile = _profile(self, wavelength)
+        bent = profile.turning(h) + 2 * np.arcsin(h) - math.pi
+        in_range("sine of the steepest ray", float(np.abs(np.sin(bent)).max()), 0.0, STEEPEST)
+        along = focal * np.cos(bent) - np.sqrt(focal**2 - (h - focal * np.sin(bent)) ** 2)
+        outside = along - 2 * np.sqrt(1 - h * h)
+        ahead = profile.path(np.zeros(1)) - 2 - (profile.path(h) + outside)
+        x, z = h * np.cos(bent) - along * np.sin(bent), h * np.sin(bent) + along * np.cos(bent)
+        medium = self._indices(wavelength)[2]
+        return focal * x / (focal - z) * self.radius, medium * ahead * self.radius
+
+    def _relative(self, height: Any) -> np.ndarray:
+        h = reals("height", height) / self.radius
+        if not ((h > 0) & (h < 1)).all():
+            raise ValueError(f"height = {shown(height)}: must be above 0 and below the radius, {self.radius:g} m")
+        return h
+
+    def _indices(self, wavelength: float) -> tuple[float, float, float]:
+        names = ("core_n", "surface_n", "medium_n")
+        core, surface, medium = (float(index_of(name, getattr(self, name)).at(wavelength)) for name in names)
+        return core, surface, medium
+
+
+@lru_cache(maxsize=64)
+def _profile(lens: BallLens, wavelength: float) -> SphericalIndex:
+    core, surface, medium = lens._indices(wavelength)
+    return SphericalIndex.from_function(lambda u: (surface + (core - surface) * np.asarray(lens.shape(u))) / medium)

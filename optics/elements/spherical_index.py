@@ -1,0 +1,131 @@
+"""Rays through a sphere whose refractive index depends on the distance from the centre.
+
+Lengths are relative to the sphere's radius, and indices n relative to the medium. A ray that would pass the centre at a
+distance h keeps n r sin i = h, where i is its angle to the radius (Bouguer's theorem). Between entry and exit, it turns
+about the centre by
+
+    ψ(h) = 2 ∫ h dr / (r √(n² r² - h²)),
+
+integrated from the turning point, n r = h, to the surface. Its optical path is 2 ∫ n² r dr / √(n² r² - h²). Both
+integrals become smooth with r² = a² + y², where a is the turning point.
+
+Source: Luneburg, Mathematical Theory of Optics, 1964, §27.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.polynomial.chebyshev import Chebyshev
+
+from optics.numerics.arguments import in_range
+from optics.numerics.quadrature import gauss_legendre
+
+__all__ = ["SphericalIndex", "generalized_luneburg"]
+
+NODES = 64  # choice: quadrature nodes of an integral along a ray; errors below 1e-9 for the lenses in this folder
+TERMS = 96  # choice: Chebyshev terms of a profile in (r/R)²
+HALVINGS = 52  # bisection down to rounding
+ROUNDING = 1e-9  # margin for n r in the check of a profile
+
+
+@dataclass(frozen=True, eq=False)
+class SphericalIndex:
+    """The index of a sphere, relative to its medium, as a polynomial in t = (r/R)²."""
+
+    index: Chebyshev
+
+    @classmethod
+    def from_function(cls, relative: Callable[[np.ndarray], np.ndarray]) -> SphericalIndex:
+        """Interpolate a relative index, given as a function of r/R, at Chebyshev points in (r/R)².
+
+        Raises:
+            ValueError: n r falls where it is below its values outside, so that light could stay in the sphere.
+        """
+        found = cls(Chebyshev.interpolate(lambda t: relative(np.sqrt(np.clip(t, 0, 1))), TERMS - 1, (0.0, 1.0)))
+        t = np.linspace(0, 1, 20 * TERMS)
+        moment = np.sqrt(t) * found.index(t)
+        if (np.diff(np.minimum(moment, min(1.0, moment[-1]))) < -ROUNDING).any():
+            raise ValueError("shape: n r must grow from the centre to the surface, or light stays inside the lens")
+        return found
+
+    def turning(self, h: np.ndarray) -> np.ndarray:
+        """Return the angle ψ [rad] for relative heights h, an array.
+
+        Raises:
+            ValueError: a ray is totally reflected at the surface.
+        """
+        y, end, n, least, radial = self._along(h)
+        # The integral of a straight line is known. The difference from it has no peak at small heights.
+        bend = (n * n - least * least) / (least * radial * (least * y + radial))
+        return np.asarray(2 * np.arcsin(end) - 2 * h * end * (bend @ gauss_legendre(NODES)[1]))
+
+    def path(self, h: np.ndarray) -> np.ndarray:
+        """Return the optical path inside the sphere, relative to R and to the medium's index, for relative heights."""
+        y, end, n, _, radial = self._along(h)
+        return np.asarray(2 * end * ((n * n * y / radial) @ gauss_legendre(NODES)[1]))
+
+    def power(self) -> float:
+        """Return R/f of rays near the axis: 2 (1 - 1/n(R)) - 4 ∫ (dn/dt)/n² d(r/R), the limit of deviation/h."""
+        u, weights = gauss_legendre(NODES)
+        bend = self.index.deriv()(u * u) / self.index(u * u) ** 2
+        return float(2 - 2 / self.index(1.0) - 4 * bend @ weights)
+
+    def _turning_point(self, h: np.ndarray) -> np.ndarray:
+        """Return (r/R)² at which n r = h."""
+        edge = float(self.index(1.0))
+        if not (h < edge).all():
+            raise ValueError(f"surface_n is {edge:.4g} of medium_n: must be larger, or rays at the rim are reflected")
+        return _solved(lambda t: np.sqrt(t) * self.index(t), h)
+
+    def _along(self, h: np.ndarray) -> tuple[np.ndarray, ...]:
+        """Return y, its upper end, n, n at the turning point, and √(n² r² - h²), at quadrature nodes (*h.shape, node).
+
+        The upper end has the shape of h.
+        """
+        turn = self._turning_point(h)
+        end, least = np.sqrt(1 - turn), self.index(turn)[..., None]
+        y = end[..., None] * gauss_legendre(NODES)[0]
+        t = turn[..., None] + y * y
+        n = self.index(t)
+        return y, end, n, least, np.sqrt((least * y) ** 2 + t * (n * n - least * least))
+
+
+def _solved(rising: Callable[[np.ndarray], np.ndarray], value: np.ndarray) -> np.ndarray:
+    """Return the arguments in [0, 1] at which a function reaches given values, by bisection."""
+    low, high = np.zeros_like(value), np.ones_like(value)
+    for _ in range(HALVINGS):
+        middle = (low + high) / 2
+        below = rising(middle) < value
+        low, high = np.where(below, middle, low), np.where(below, high, middle)
+    return high
+
+
+@lru_cache(maxsize=16)
+def generalized_luneburg(focal_ratio: float) -> Callable[[np.ndarray], np.ndarray]:
+    """Return the relative index, as a function of r/R, that focuses parallel light at the distance focal_ratio · R.
+
+        n(ρ) = exp ω(ρ),   ω(ρ) = 1/π ∫ arcsin(x/s) / √(x² - ρ²) dx  from ρ to 1,   r/R = ρ exp(-ω),   s = focal_ratio
+
+    Sources: Luneburg, Mathematical Theory of Optics, 1964, §29; Morgan, J. Appl. Phys. 29, 1358, 1958.
+
+    Raises:
+        ValueError: focal_ratio outside [1, 20].
+    """
+    s = in_range("focal_ratio", focal_ratio, 1.0, 20.0)
+    v, weights = gauss_legendre(NODES)
+
+    def omega(rho: np.ndarray) -> np.ndarray:
+        end = np.sqrt(1 - rho * rho)
+        x = np.hypot(rho[..., None], end[..., None] * (1 - v * v))
+        return np.asarray(2 * end / math.pi * ((np.arcsin(np.minimum(x / s, 1.0)) / x) @ (v * weights)))
+
+    def index(t: np.ndarray) -> np.ndarray:
+        return np.exp(omega(_solved(lambda rho: rho * np.exp(-omega(rho)), np.sqrt(t))))
+
+    profile = Chebyshev.interpolate(index, TERMS - 1, (0.0, 1.0))
+    return lambda u: np.asarray(profile(np.square(u)))

@@ -1,0 +1,120 @@
+"""Acuity of eyes: limits by the spacing of receptors, by diffraction, and by the number of photons."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from optics.numerics.arguments import in_range, one_of, positive, reals, vacuum_wavelength
+
+__all__ = [
+    "anatomical_acuity",
+    "eye_parameter",
+    "ideal_contrast_sensitivity",
+    "least_eye_parameter",
+    "sampling_acuity",
+]
+
+# Wavelengths of the finest grating that a lattice resolves, in units of the distance between neighbours: √3 for a
+# hexagonal lattice, 2 for a square one.
+PERIODS = {"hexagon": math.sqrt(3), "square": 2.0}
+DETECTED = 0.954  # d' for 75 % correct choices between two intervals
+
+
+def eye_parameter(diameter: float, interommatidial_deg: float) -> float:
+    """Return the eye parameter p = D Δφ [m] of a compound eye (Snyder, J. Comp. Physiol. 116, 161, 1977).
+
+    Values near `least_eye_parameter` belong to eyes that diffraction limits, in bright light. Eyes that photon noise
+    limits have larger values.
+
+    diameter: diameter D [m] of a facet.
+    interommatidial_deg: interommatidial angle Δφ.
+
+    Raises:
+        ValueError: an argument that is not positive, or an angle above 180°.
+    """
+    angle = positive("interommatidial_deg", interommatidial_deg, "degrees")
+    return positive("diameter", diameter) * math.radians(in_range("interommatidial_deg", angle, 0.0, 180.0))
+
+
+def least_eye_parameter(wavelength: float, lattice: str = "hexagon") -> float:
+    """Return the smallest useful eye parameter [m]: λ/√3 for a hexagonal lattice, λ/2 for a square one.
+
+    With this value, the finest grating that the lattice resolves has the period λ/D. Facets transmit no finer grating.
+
+    wavelength: vacuum wavelength λ [m], for an eye in air. Under water, divide it by the index of water.
+
+    Raises:
+        ValueError: an invalid wavelength or an unknown lattice.
+    """
+    one_of("lattice", lattice, PERIODS)
+    return vacuum_wavelength(wavelength) / PERIODS[lattice]
+
+
+def sampling_acuity(spacing_deg: float, lattice: str = "hexagon") -> float:
+    """Return the finest grating [cycles/degree] that a lattice of receptors resolves: 1/(√3 Δφ), or 1/(2 Δφ).
+
+    spacing_deg: angle Δφ between neighbouring receptors or ommatidia.
+    lattice: "hexagon" or "square".
+
+    Raises:
+        ValueError: an angle that is not positive, or an unknown lattice.
+    """
+    one_of("lattice", lattice, PERIODS)
+    return 1 / (PERIODS[lattice] * positive("spacing_deg", spacing_deg, "degrees"))
+
+
+def anatomical_acuity(density: float, nodal_distance: float, lattice: str = "hexagon") -> float:
+    """Return the finest grating [cycles/degree] that a retina resolves, from its density of receptors.
+
+    Use the density of ganglion cells instead where several receptors share one.
+
+    density: receptors per area [1/m²]. 1 per mm² is 1e6 per m².
+    nodal_distance: posterior nodal distance [m]: the retina's distance x is the angle x/nodal_distance.
+    lattice: "hexagon" or "square".
+
+    Raises:
+        ValueError: an argument that is not positive, or an unknown lattice.
+    """
+    cell = 1 / positive("density", density, "1/m²")
+    one_of("lattice", lattice, PERIODS)
+    spacing = math.sqrt(cell * 2 / math.sqrt(3)) if lattice == "hexagon" else math.sqrt(cell)
+    return sampling_acuity(math.degrees(spacing / positive("nodal_distance", nodal_distance)), lattice)
+
+
+def ideal_contrast_sensitivity(
+    cycles_per_degree: Any, contrast: Any, photons: float, area: Any, d_prime: float = DETECTED
+) -> np.ndarray:
+    """Return the contrast sensitivity of an ideal observer for sine gratings, limited by photon noise alone.
+
+    The observer knows the grating and weights the photons of all receptors by it. The threshold contrast c follows from
+
+        d' = c T √(N A / 2),
+
+    with the transferred contrast T, N photons per area, and the area A of many periods. The sensitivity is 1/c. Source:
+    Geisler (J. Opt. Soc. Am. A 1, 775, 1984), used by Banks, Geisler & Bennett (Vision Research 27, 1915, 1987).
+
+    cycles_per_degree: frequencies of the gratings.
+    contrast: contrast T that optics and receptors transfer at these frequencies, in [0, 1], of the same shape. For
+        example `mean_human_mtf(cycles_per_degree, 2e-3)`.
+    photons: number N of photons that the receptors absorb from one square degree in the presentation, such as
+        `PhotonBudget.photons` with the etendue pupil area · (π/180)² times the fraction of the retina that receptors
+        cover.
+    area: area A of the grating [square degrees], a number or one for each frequency. For n · n cycles it is (n/u)². A
+        grating with a smooth window has the integral of the squared window.
+    d_prime: detectability d' at the threshold. 0.954 belongs to 75 % correct choices between two intervals.
+
+    Raises:
+        ValueError: numbers outside their ranges, or arrays of different shapes.
+    """
+    u, transferred = reals("cycles_per_degree", cycles_per_degree), reals("contrast", contrast)
+    sizes = reals("area", area)
+    if u.shape != transferred.shape or sizes.shape not in ((), u.shape):
+        raise ValueError(f"contrast has shape {transferred.shape} and area {sizes.shape}: must be those of frequencies")
+    for name, values, least in (("cycles_per_degree", u, 0.0), ("contrast", transferred, 0.0), ("area", sizes, 0.0)):
+        in_range(name, float(values.min(initial=1.0)), least, math.inf)
+    in_range("contrast", float(transferred.max(initial=0.0)), 0.0, 1.0)
+    positive("photons", photons, "1")
+    return np.asarray(transferred * np.sqrt(photons * sizes / 2) / positive("d_prime", d_prime, "1"))

@@ -1,0 +1,189 @@
+"""Pupils of a system that are decentred and tilted.
+
+Each plane has its own lateral coordinates about the centre of its pupil, so a decentred pupil only moves the window of
+the propagation to its plane. The plane of a tilted pupil has the depth ζ(x) = x·tan α. Light arrives there as the field
+at the depth ζ, and it leaves from there. If its angles to the axis are at most θ, the field is a carrier exp(ikcζ) with
+c = (1 + cos θ)/2 times a function that varies slowly with the depth. This function is interpolated between a few planes
+at Chebyshev nodes z_j. For light that arrives at the tilted plane, and for light that leaves it,
+
+    U(x, ζ) = exp(ikcζ) Σ_j L_j(ζ) exp(-ikcz_j) U(x, z_j),   w → Σ_j exp(ikcz_j) P(-z_j) [L_j(ζ) exp(-ikcζ) w],
+
+where P is the propagation to the next plane. The second formula is the adjoint of the first one. It becomes the inverse
+if light at the angle θ is multiplied by 1 - tan α tan θ. Fields on tilted planes are stored without exp(ikζ).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from optics.elements.pupil import Pupil
+from optics.elements.source import PointSource
+from optics.numerics.accuracy import AccuracyError
+from optics.numerics.arguments import in_range, of_kind, point_2d
+from optics.numerics.autodiff import Array, number
+from optics.numerics.grid import Grid
+from optics.numerics.precision import Precision, opaque
+
+__all__ = ["ALIGNED", "Alignment", "Misaligned", "path_to_tilted_plane", "seen_from", "slowness"]
+
+STEEPEST_TILT = 0.2  # choice [rad]: largest tilt; a thin element at a larger tilt is no longer thin along the axis
+MOST_NODES = 8  # choice: largest number of depths between which fields are interpolated
+
+# Choice: error of the interpolation over the pupil, relative to that of the steepest light at the deepest point.
+MEAN_OVER_PUPIL = 1 / 3
+
+Point = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Misaligned:
+    """A pupil of a system that is decentred, and tilted about its centre.
+
+    decentre: position (x, y) [m] of the pupil's centre beside the axis.
+    tilt: angles (x, y) [rad]. A positive angle moves the pupil's +x (or +y) side in the direction of the light.
+
+    Raises:
+        ValueError: an argument is outside its valid range, which the message states.
+    """
+
+    pupil: Pupil
+    decentre: Point = (0.0, 0.0)
+    tilt: Point = (0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        of_kind("pupil", self.pupil, Pupil, "Pupil(25e-6)")
+        object.__setattr__(self, "decentre", point_2d("decentre", self.decentre, "lengths (x, y) [m]"))
+        x, y = point_2d("tilt", self.tilt, "angles (x, y) [rad]")
+        tilt = tuple(in_range("tilt", angle, -STEEPEST_TILT, STEEPEST_TILT) for angle in (x, y))
+        object.__setattr__(self, "tilt", tilt)
+
+
+@dataclass(frozen=True)
+class Alignment:
+    """Position of a plane: its centre (x, y) [m], and the tangents of its tilt along x and y."""
+
+    centre: Point = (0.0, 0.0)
+    slope: Point = (0.0, 0.0)
+
+    @classmethod
+    def of(cls, element: Misaligned) -> Alignment:
+        x, y = element.tilt
+        return cls(element.decentre, (math.tan(x), math.tan(y)))
+
+    @property
+    def steepness(self) -> float:
+        return math.hypot(*self.slope)
+
+    def beside(self, other: Alignment) -> Point:
+        """Return the centre (x, y) [m] relative to that of another plane."""
+        return self.centre[0] - other.centre[0], self.centre[1] - other.centre[1]
+
+    def nodes(self, radius: float, sine: float, wavelength: float, allowed: float) -> tuple[np.ndarray, float]:
+        """Return the depths [m] between which fields are interpolated, or 0 alone, and the error of the intensity.
+
+        Along a ray, the phase without the carrier changes by up to φ = kζ (1 - cos θ)/2. Interpolation between n
+        Chebyshev nodes has an error of at most φⁿ / (2ⁿ⁻¹ n!).
+
+        radius: largest distance [m] from the centre.
+        sine: largest sin θ of the light.
+        wavelength: wavelength [m] in the medium.
+        allowed: largest error of the intensity.
+
+        Raises:
+            AccuracyError: the tilt is too large for this interpolation.
+        """
+        deepest = self.steepness * radius
+        phase = 2 * math.pi / wavelength * deepest * slowness(sine)
+        for count in range(1, MOST_NODES + 1):
+            error = 2 * MEAN_OVER_PUPIL * phase**count / (2 ** (count - 1) * math.factorial(count))
+            if error <= allowed:
+                return deepest * np.cos(np.pi * (np.arange(count) + 0.5) / count) * (count > 1), error
+        raise AccuracyError(
+            f"tilt: {math.atan(self.steepness):.2g} rad over a radius of {radius:.3g} m is too large for light at "
+            f"{math.degrees(math.asin(min(sine, 1))):.2g}° to the axis: widen the tolerance"
+        )
+
+    def weights(self, nodes: np.ndarray, grid: Grid, turns: float) -> list[np.ndarray]:
+        """Return L_j(ζ) exp(2πi ζ turns) at the samples of a grid about the centre, (y, x) each.
+
+        turns: waves per depth [1/m].
+        """
+        depth, found = self.depth(grid), []
+        for j, at in enumerate(nodes):
+            others = np.delete(nodes, j)
+            found.append(np.prod([(depth - other) / (at - other) for other in others], axis=0))
+        return [weight * np.exp(2j * np.pi * turns * depth) for weight in found]
+
+    def depth(self, grid: Grid) -> np.ndarray:
+        """Return ζ [m] at the samples of a grid about the centre, (y, x)."""
+        rows, columns = (np.arange(n) - n // 2 for n in grid.shape)
+        found: np.ndarray = grid.dx * np.add.outer(self.slope[1] * rows, self.slope[0] * columns)
+        return found
+
+    def leaving(self, u: np.ndarray, dx: float, wavelength: float) -> np.ndarray:
+        """Return a field u (y, x) on the tilted plane times the obliquity factor, with sin θ instead of tan θ.
+
+        wavelength: wavelength [m] in the medium.
+        """
+        if not self.steepness:
+            return u
+        from scipy import fft
+
+        sines = (fft.fftfreq(n, dx).astype(u.real.dtype) * wavelength for n in u.shape)
+        along_y, along_x = (sine * slope for sine, slope in zip(sines, self.slope[::-1], strict=True))
+        factor = 1 - np.add.outer(along_y, along_x)
+        found: np.ndarray = fft.ifft2(fft.fft2(u) * factor, overwrite_x=True)
+        return found
+
+    def error(self, sine: float) -> float:
+        """Return the relative error of the intensity of light up to the angle θ, due to approximations of the tilt."""
+        return self.steepness * sine**2 * (self.steepness + sine)
+
+    def on_element(self, x: Array, y: Array, types: Precision) -> tuple[Array, Array]:
+        """Return the coordinates along the tilted plane of points (x, y) [m] perpendicular to the axis."""
+        if not self.steepness:
+            return x, y
+        (sx, sy), stretch = self.slope, math.hypot(1, self.steepness) - 1
+        along = (x * sx + y * sy) * opaque(types, stretch / self.steepness**2)
+        return x + along * sx, y + along * sy
+
+
+ALIGNED = Alignment()
+
+
+def slowness(sine: float) -> float:
+    """Return 1 - c = (1 - cos θ)/2."""
+    return sine**2 / (2 * (1 + math.sqrt(max(1 - sine**2, 0))))
+
+
+def path_to_tilted_plane(source: PointSource, alignment: Alignment, grid: Grid) -> np.ndarray:
+    """Return the path [m] of a source's light from the plane of a pupil's centre to its tilted plane, minus ζ.
+
+    The result is for the samples of a grid about the centre, (y, x).
+    """
+    tangents = [math.tan(angle) for angle in source.angle]
+    distance = number(source.distance)
+    per = 0.0 if math.isinf(distance) else 1 / distance
+    x, y = tangents[0] + grid.x * per, tangents[1] + grid.y * per
+    squared = np.add.outer(np.square(y), np.square(x))
+    # cos θ - 1 = -tan²θ / (1 + tan²θ + √(1 + tan²θ))
+    found: np.ndarray = -alignment.depth(grid) * squared / (1 + squared + np.sqrt(1 + squared))
+    return found
+
+
+def seen_from(source: PointSource, centre: Point) -> tuple[PointSource, float]:
+    """Return a source relative to another centre (x, y) [m], and the path [m] of its light from the old to the new one.
+
+    The path is measured in vacuum.
+    """
+    distance, tangents = number(source.distance), [math.tan(angle) for angle in source.angle]
+    along = (centre[0] * tangents[0] + centre[1] * tangents[1]) / math.hypot(*tangents, 1)
+    if math.isinf(distance):
+        return source, along
+    moved = [tangent + at / distance for tangent, at in zip(tangents, centre, strict=True)]
+    before, after = (distance * math.hypot(*t, 1) for t in (tangents, moved))
+    excess = centre[0] ** 2 + centre[1] ** 2 + 2 * before * along
+    return PointSource(source.distance, (math.atan(moved[0]), math.atan(moved[1]))), excess / (before + after)

@@ -1,0 +1,232 @@
+"""Propagation to distant or shifted windows by matrix products, with a kernel that is a sum of functions of x times y.
+
+The field is the sum over samples of Rayleigh and Sommerfeld's kernel (Goodman, §3.5),
+
+    U(x) = Σ_j u[j] A(ρ) exp(ikD(ρ)) dx²,   D(ρ) = √(z² + ρ²),   A(ρ) = |z| / (2πD²) (1/D - ik),   ρ = x - ξ_j.
+
+Let c be the centre of the window. D is the sum of a function of ρx, a function of ρy, and a coupling e, which vanishes
+if ρx = cx or ρy = cy:
+
+    D(ρ) = D(ρx, cy) + D(cx, ρy) - D(c) + e(ρ).
+
+In a distant window, A exp(ike) varies so slowly that a few terms a_k(ρx) b_k(ρy) approximate it. They follow from the
+singular value decomposition of its values at Chebyshev nodes. Each term is then one matrix product along x and one
+along y. Fresnel's kernel exp(ikρ²/2z) needs a single term, without an approximation.
+
+A sum over samples contains the light of all replicas of the spectrum. None of it reaches the window if light at the
+Nyquist frequency passes beside it.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from functools import lru_cache
+
+import numpy as np
+from numpy.polynomial import chebyshev
+
+from optics.numerics.accuracy import FLOAT_NOISE, MOST_SAMPLES
+from optics.numerics.array_sum_cost import products_seconds
+from optics.numerics.cost import PASSAGE_CALL, SEPARABLE_ENTRY, SERIES_TERM
+from optics.numerics.grid import Grid
+from optics.numerics.precision import Precision
+from optics.propagation.spectrum_filter import PropagatedPlane, ScaledPlane
+from optics.propagation.transfer_function import Passage
+from optics.propagation.transform_sampling import kept_light
+
+__all__ = ["SeparableSampling", "separable"]
+
+TERM_MARGIN = 2.0  # choice: predicted error divided by that of the kernel's largest error; faint light may exceed it
+MOST_TERMS = 8  # choice: nearer windows need more terms, and a transform is then faster
+NODES = (8, 16, 32)  # choice: numbers of Chebyshev nodes to try
+CHECKED = 37  # choice: points along each axis at which the approximation is compared with the kernel
+
+Range = tuple[float, float]
+
+
+@dataclass(frozen=True, eq=False)
+class Terms:
+    """Slow part A exp(ike) of a kernel as a sum of products of polynomials.
+
+    along_x, along_y: Chebyshev coefficients (degree, term) over the ranges of ρx and ρy [m].
+    error: largest error relative to the slow part.
+    """
+
+    along_x: np.ndarray
+    along_y: np.ndarray
+    range_x: Range
+    range_y: Range
+    error: float
+
+    @property
+    def count(self) -> int:
+        return int(self.along_x.shape[1])
+
+
+@dataclass(frozen=True)
+class SeparableSampling:
+    """Sampling of a separable kernel between two planes."""
+
+    passage: Passage
+    source: Grid
+    window: Grid
+    terms: Terms = field(repr=False)
+
+    @property
+    def method(self) -> str:
+        return "fresnel" if self.passage.paraxial else "separable_kernel"
+
+    @property
+    def samples(self) -> tuple[int, int]:
+        return self.source.shape
+
+    @property
+    def period(self) -> int:
+        return max(self.source.shape)
+
+    def seconds(self, real: str, planes: int = 1) -> float:
+        """Return the predicted time of the propagation of planes, including the matrices.
+
+        real: type of real and imaginary parts, "float32" or "float64".
+        """
+        (ny, nx), (my, mx), (degree, terms) = self.source.shape, self.window.shape, self.terms.along_x.shape
+        products = products_seconds((nx, ny), (mx, my), real, terms)
+        entries = (my * ny + mx * nx) * (SEPARABLE_ENTRY + terms * degree * SERIES_TERM)
+        return PASSAGE_CALL["separable_kernel"] + planes * products + entries
+
+    @property
+    def why(self) -> str:
+        """Reason for the sampling, for plans."""
+        paraxial = "; paraxial, as requested" if self.passage.paraxial else ""
+        return f"distant window: the kernel is a sum of {self.terms.count} products of functions of x and y{paraxial}"
+
+    def propagated(self, plane: np.ndarray, types: Precision) -> PropagatedPlane:
+        """Return a plane (y, x) after propagation."""
+        scaled = ScaledPlane.of(plane, types)
+        along_x, along_y = _matrices(self, types)
+        (ny, nx), (my, mx) = self.source.shape, self.window.shape
+        over_x = (along_x.reshape(-1, nx) @ scaled.u.T).reshape(-1, mx, ny)  # (term, x, η)
+        result = along_y.reshape(my, -1) @ over_x.transpose(0, 2, 1).reshape(-1, mx)
+        arrived = float(np.vdot(result, result).real)
+        if not arrived:
+            return PropagatedPlane(result, 0.0 if not scaled.power else math.inf, 0.0)
+        # Rounding errors of the summands are independent, so they spread evenly over the window.
+        nearest = abs(_amplitude(self.passage, 0.0, 0.0)) * self.source.dx**2
+        noise = float(nearest) * math.sqrt(scaled.power * result.size / arrived)
+        error = 2 * TERM_MARGIN * self.terms.error + FLOAT_NOISE[types.dtype] * (1 + noise)
+        return PropagatedPlane(scaled.restored(result), error, 0.0)
+
+
+@lru_cache(maxsize=64)
+def separable(passage: Passage, source: Grid, window: Grid, allowed: float) -> SeparableSampling | None:
+    """Return a sampling of the separable kernel whose predicted error of the intensity is at most `allowed`.
+
+    The result is None if the samples of the source represent too few of the frequencies that reach the window, if light
+    is to be removed that could reach the window, if transforms are requested, or if more than MOST_TERMS terms are
+    necessary.
+    """
+    largest = max(*source.shape, *window.shape)
+    if passage.z == 0 or passage.by_transforms or passage.limit is not None or largest > MOST_SAMPLES:
+        return None
+    if not kept_light(passage, source, window).band.fade:
+        return None
+    range_x, range_y = (
+        (float(w[0] - s[-1]), float(w[-1] - s[0])) for w, s in ((window.x, source.x), (window.y, source.y))
+    )
+    if passage.paraxial:
+        one = np.ones((1, 1))
+        only = Terms(one * _amplitude(passage, 0.0, 0.0), one, range_x, range_y, 0.0)
+        return SeparableSampling(passage, source, window, only)
+    terms = _terms(passage, range_x, range_y, allowed / (2 * TERM_MARGIN))
+    return None if terms is None else SeparableSampling(passage, source, window, terms)
+
+
+def _terms(passage: Passage, range_x: Range, range_y: Range, allowed: float) -> Terms | None:
+    """Return the fewest terms whose error is at most `allowed`; None if there are more than MOST_TERMS."""
+    x, y = (np.linspace(*span, CHECKED) for span in (range_x, range_y))
+    exact = _slow_part(passage, x[None, :], y[:, None])
+    for nodes in NODES:
+        at = np.cos(np.pi * (np.arange(nodes) + 0.5) / nodes)
+        node_x, node_y = ((span[1] + span[0] + at * (span[1] - span[0])) / 2 for span in (range_x, range_y))
+        series = np.linalg.inv(chebyshev.chebvander(at, nodes - 1))
+        values = series @ _slow_part(passage, node_x[None, :], node_y[:, None]) @ series.T
+        left, sizes, right = np.linalg.svd(values)
+        for count in range(1, min(MOST_TERMS, nodes) + 1):
+            along_x, along_y = right[:count].T, left[:, :count] * sizes[:count]
+            found = np.einsum("ky,kx->yx", _series(along_y, range_y, y), _series(along_x, range_x, x))
+            error = float((np.abs(found - exact) / np.abs(exact)).max())
+            if error <= allowed:
+                return Terms(along_x, along_y, range_x, range_y, error)
+    return None
+
+
+def _series(coefficients: np.ndarray, span: Range, at: np.ndarray) -> np.ndarray:
+    """Return the polynomials at positions [m] as an array (term, ...)."""
+    width = span[1] - span[0]
+    scaled = (2 * at - span[1] - span[0]) / width if width else 0 * at
+    found: np.ndarray = chebyshev.chebval(scaled, coefficients)
+    return found
+
+
+@lru_cache(maxsize=2)
+def _matrices(how: SeparableSampling, types: Precision) -> tuple[np.ndarray, np.ndarray]:
+    """Return the factors of the kernel along x and along y: (term, x, ξ) and (y, term, η), with dx² and the carrier."""
+    passage, (cx, cy), terms = how.passage, how.passage.centre, how.terms
+    x, y = np.subtract.outer(how.window.x, how.source.x), np.subtract.outer(how.window.y, how.source.y)
+    carrier = _phasor(passage, math.fmod(abs(passage.z), passage.wavelength) + _sag(passage, cx, cy))
+    fast_x = _phasor(passage, _longer(passage, x, cx, cy)) * (carrier * how.source.dx**2)
+    along_x = fast_x * _series(terms.along_x, terms.range_x, x)
+    along_y = _phasor(passage, _longer(passage, y, cy, cx)) * _series(terms.along_y, terms.range_y, y)
+    dtype = types.complex_dtype
+    return along_x.astype(dtype), np.ascontiguousarray(along_y.transpose(1, 0, 2), dtype)
+
+
+def _distance(passage: Passage, x: np.ndarray | float, y: np.ndarray | float) -> np.ndarray:
+    found: np.ndarray = np.sqrt(passage.z**2 + np.square(x) + np.square(y))
+    return found
+
+
+def _sag(passage: Passage, x: np.ndarray | float, y: np.ndarray | float) -> np.ndarray:
+    """Return D(x, y) - |z| without a difference of nearly equal numbers; paraxially, (x² + y²) / 2|z|."""
+    z = abs(passage.z)
+    square = np.square(x) + np.square(y)
+    found: np.ndarray = square / (2 * z if passage.paraxial else _distance(passage, x, y) + z)
+    return found
+
+
+def _longer(passage: Passage, along: np.ndarray, middle: float, other: float) -> np.ndarray:
+    """Return D(along, other) - D(middle, other)."""
+    more, z = np.square(along) - middle**2, abs(passage.z)
+    if passage.paraxial:
+        return more / (2 * z)
+    found: np.ndarray = more / (_distance(passage, along, other) + _distance(passage, middle, other))
+    return found
+
+
+def _phasor(passage: Passage, path: np.ndarray | float) -> np.ndarray:
+    """Return exp(ik path), for backward propagation its conjugate."""
+    waves = np.asarray(path) / passage.wavelength
+    angle = 2 * np.pi * (waves - np.round(waves))
+    found: np.ndarray = np.cos(angle) + 1j * math.copysign(1, passage.z) * np.sin(angle)
+    return found
+
+
+def _amplitude(passage: Passage, x: np.ndarray | float, y: np.ndarray | float) -> np.ndarray:
+    """Return A. Paraxially it is 1/(iλz)."""
+    k, z = 2 * np.pi / passage.wavelength, abs(passage.z)
+    if passage.paraxial:
+        return np.asarray(-1j * k / (2 * np.pi * passage.z))
+    distance = _distance(passage, x, y)
+    found: np.ndarray = z / (2 * np.pi * distance**2) * (1 / distance - 1j * math.copysign(1, passage.z) * k)
+    return found
+
+
+def _slow_part(passage: Passage, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """Return A(x, y) exp(ik e(x, y))."""
+    cx, cy = passage.centre
+    # e = [D(x, y) - D(x, cy)] - [D(cx, y) - D(c)]; both differences have the numerator y² - cy².
+    far = _distance(passage, x, y) + _distance(passage, x, cy)
+    near = _distance(passage, cx, y) + _distance(passage, cx, cy)
+    coupling = (np.square(y) - cy**2) * (near - far) / (near * far)
+    return _amplitude(passage, x, y) * _phasor(passage, coupling)

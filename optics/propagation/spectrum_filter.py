@@ -1,0 +1,138 @@
+"""Propagation of one plane by a filter: transform, multiply by the transfer function, transform back."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import numpy as np
+
+from optics.numerics.accuracy import FLOAT_NOISE
+from optics.numerics.fourier import fourier_sum, kept_indices, periodic_spectrum, periodic_sum
+from optics.numerics.grid import Grid
+from optics.numerics.precision import Precision, precision
+from optics.propagation.transfer_function import Passage, TransferFunction, evanescent
+from optics.propagation.transform_sampling import TransformSampling, blurred_back
+
+__all__ = ["PropagatedPlane", "ScaledPlane", "evanescent_share", "filtered"]
+
+# Choice: the evanescent part of the missing light is computed if the missing light exceeds the arriving light by this
+# factor. Smaller amounts hardly affect the predicted error.
+MUCH = 100.0
+
+HELD = (1e-20, 1e30)  # range of the power Σ|u|² for which float32 can represent the terms of the error estimate
+ONE = np.ones(1)  # stands for equal weights in a sum
+
+
+@dataclass(frozen=True)
+class PropagatedPlane:
+    """A propagated plane.
+
+    u: field (y, x).
+    error: predicted error of the intensity.
+    blur: additional error from light at the Nyquist frequency of the samples.
+    """
+
+    u: np.ndarray
+    error: float
+    blur: float
+
+
+@dataclass(frozen=True)
+class ScaledPlane:
+    """A plane u (y, x), divided by `brightest` so that float32 can represent its power Σ|u|²."""
+
+    u: np.ndarray
+    power: float
+    brightest: float
+
+    @classmethod
+    def of(cls, given: np.ndarray, types: Precision) -> ScaledPlane:
+        with np.errstate(over="ignore"):
+            plane = np.ascontiguousarray(given, dtype=types.complex_dtype)
+            total = _power(plane)
+        if HELD[0] < total < HELD[1]:
+            return cls(plane, total, 1.0)
+        brightest = float(np.abs(given).max(initial=0.0))
+        if brightest == 0:
+            return cls(plane, 0.0, 1.0)
+        plane = np.ascontiguousarray(given / brightest, dtype=types.complex_dtype)
+        return cls(plane, _power(plane), brightest)
+
+    def restored(self, result: np.ndarray) -> np.ndarray:
+        """Return the propagated field, multiplied by `brightest`."""
+        return result if self.brightest == 1 else result * result.dtype.type(self.brightest)
+
+
+def filtered(given: np.ndarray, how: TransformSampling, types: Precision) -> PropagatedPlane:
+    """Return a plane (y, x) after propagation."""
+    scaled = ScaledPlane.of(given, types)
+    plane, total = scaled.u, scaled.power
+    if total == 0:
+        return PropagatedPlane(np.zeros(how.window.shape, types.complex_dtype), 0.0, 0.0)
+    space = _free_space(how, types.dtype)
+    if how.step:
+        spectrum = periodic_spectrum(plane, how.period, how.across)
+    else:
+        spectrum = fourier_sum(plane, how.period, (how.across, how.across), -1)
+    grazing = _power(spectrum, space.grazing) / how.period**2
+    blurred = blurred_back(spectrum, how)
+    spectrum *= space.transfer
+    # By Parseval's theorem, missing power was either faded out or is evanescent. If no power is missing, the difference
+    # is a rounding error of float32, which is small compared with the remainder of the fade.
+    faded = max(total - _power(spectrum) * how.period**2, 0.0) if how.passage.band.fade else 0.0
+    if how.step:
+        result = periodic_sum(spectrum, how.period, how.step, how.window.shape)
+    else:
+        result = fourier_sum(spectrum, how.period * how.source.dx / how.window.dx, how.window.shape, +1)
+    arrived = _power(result) * (how.window.dx / how.source.dx) ** 2
+    if not arrived:
+        return PropagatedPlane(result, math.inf, math.inf)
+    if faded > MUCH * arrived:
+        faded = max(faded - total * evanescent_share(plane, how.period, how.source.dx, how.passage), 0.0)
+    rounding = FLOAT_NOISE[types.dtype] * (1 + math.sqrt(total / arrived))
+    # Light at the start of a fade is blurred but hardly weaker. It is assumed to be as bright as the light that
+    # arrives.
+    blurred_by_fade = 2 * how.passage.ripple * (1 + math.sqrt(faded / arrived)) if how.passage.band.fade else 0.0
+    error = 2 * math.sqrt(grazing / arrived) + rounding + blurred_by_fade
+    return PropagatedPlane(scaled.restored(result), error, 2 * math.sqrt(blurred / arrived))
+
+
+def evanescent_share(plane: np.ndarray, period: int, dx: float, passage: Passage) -> float:
+    """Return the evanescent fraction of a plane's power."""
+    total = _power(plane)
+    highest = math.sqrt(0.5) / dx * passage.wavelength  # sine, at the corner of the spectrum
+    if total == 0 or passage.paraxial or highest * (1 + 2 / period) < 1:
+        return 0.0
+    spectrum = periodic_spectrum(plane, period, period)
+    weights = evanescent(period, dx, passage.wavelength)
+    lost = float(np.sum(weights * (spectrum.real**2 + spectrum.imag**2), dtype=np.float64)) / period**2
+    return min(lost / total, 1.0)
+
+
+def _power(u: np.ndarray, weight: np.ndarray | None = ONE) -> float:
+    """Return Σ w |u|². The weights are for real and imaginary parts. The result is 0 if the weight is None."""
+    if weight is None:
+        return 0.0
+    if weight is ONE:
+        return float(np.vdot(u, u).real)
+    parts = u.view(weight.dtype)
+    return float(np.dot((parts * parts).ravel(), weight.ravel()))
+
+
+@lru_cache(maxsize=4)
+def _free_space(how: TransformSampling, dtype: str) -> TransferFunction:
+    """Return the transfer function over the spectrum, including the normalisation of the transforms.
+
+    It is cached, because it takes more time than the transforms, and the same distance is often used again.
+    """
+    step = 1 / (how.period * how.source.dx)
+    if how.step:  # the axes of the spectrum are (fx, fy)
+        fx, fy = (kept_indices(n) * step for n in (how.across, how.period))
+        space = replace(how.passage, centre=how.passage.centre[::-1]).over(fy, fx, precision(dtype))
+    else:
+        fx = fy = Grid.square(how.across, step).x
+        space = how.passage.over(fx, fy, precision(dtype))
+    space.transfer[:] *= 1 / how.period**2
+    return space

@@ -1,0 +1,76 @@
+"""The responses of photoreceptors over time: integration, latency, adaptation and events."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from optics.numerics.arguments import in_range, one_of, whole
+
+__all__ = ["ADAPTATIONS", "MOTION", "ReceptorDynamics"]
+
+ADAPTATIONS = ("none", "naka_rushton", "logarithmic")
+MOTION = ("none", "hassenstein_reichardt", "barlow_levick")
+
+
+@dataclass(frozen=True)
+class ReceptorDynamics:
+    """Temporal properties of all receptors of an eye, in the order in which a signal s(t) passes them.
+
+    time_constant_ms: time constant τ of the low-pass filter [ms]
+    order: order n of the filter, 1 or 2: h(t) = tⁿ⁻¹ exp(-t/τ) / τⁿ
+    latency_ms: additional delay [ms], rounded to whole frames
+    adaptation: gain control by the mean b of the signal over `adaptation_ms`, an exponentially weighted mean. "none";
+        "naka_rushton": s / (s + b), which is 1/2 in constant light (Naka & Rushton 1966, J. Physiol. 185:536);
+        "logarithmic": ln(s / b), which is 0 in constant light. `dark_light` is added to s and b of the logarithm, and
+        to b of the quotient
+    adaptation_ms: time constant of b [ms]
+    dark_light: signal that is equivalent to the receptor's spontaneous activity; white in daylight gives 1
+    event_threshold: θ. If above 0, the output is the number of events since the last observation, with a sign. An event
+        occurs whenever ln(s + dark_light) has changed by θ since the last event (Lichtsteiner et al. 2008, IEEE J.
+        Solid-State Circuits 43:566). None: no events
+    motion: elementary motion detectors between neighbours in a row. Their outputs are channels that follow those of the
+        receptors. "hassenstein_reichardt" (1956): D(a) b - a D(b). "barlow_levick" (1965): max(a - D(b), 0) - max(b -
+        D(a), 0): the neighbour at which an object in the null direction arrives first inhibits. "none": no detectors.
+        a is the left receptor, b the right one, and D is a low-pass filter. Motion to the right gives positive output
+    motion_ms: time constant of D [ms]
+    frames: number of frames per action that environments render, a divisor of the number of physics steps per action.
+        None: the smallest number whose error is allowed
+
+    Raises:
+        ValueError: an argument is outside its range; or events together with adaptation.
+    """
+
+    time_constant_ms: float = 10.0
+    order: int = 1
+    latency_ms: float = 0.0
+    adaptation: str = "none"
+    adaptation_ms: float = 1000.0
+    dark_light: float = 1e-3
+    event_threshold: float | None = None
+    motion: str = "none"
+    motion_ms: float = 35.0
+    frames: int | None = None
+
+    def __post_init__(self) -> None:
+        for name, low, high in (
+            ("time_constant_ms", 1e-3, 1e5),
+            ("latency_ms", 0.0, 1e4),
+            ("adaptation_ms", 1e-3, 1e7),
+            ("dark_light", 1e-9, 1.0),
+            ("motion_ms", 1e-3, 1e5),
+        ):
+            in_range(f"ReceptorDynamics: {name}", getattr(self, name), low, high)
+        whole("ReceptorDynamics: order", self.order, 1, 2)
+        one_of("ReceptorDynamics: adaptation", self.adaptation, ADAPTATIONS)
+        one_of("ReceptorDynamics: motion", self.motion, MOTION)
+        if self.frames is not None:
+            whole("ReceptorDynamics: frames", self.frames, 1, 10**6)
+        if self.event_threshold is not None:
+            in_range("ReceptorDynamics: event_threshold", self.event_threshold, 1e-3, 1e2)
+            if self.adaptation != "none":
+                raise ValueError("ReceptorDynamics: event_threshold: must be None with adaptation; events adapt")
+
+    @property
+    def integration_ms(self) -> float:
+        """Duration of a rectangular window with the same shot noise, 1 / ∫h² dt: 2 τ or 4 τ [ms]."""
+        return self.time_constant_ms * (2 if self.order == 1 else 4)

@@ -1,0 +1,156 @@
+"""Choice of the number of frames per action that receptors with dynamics need, so that fast motion blurs.
+
+The choice plays a few random actions. It compares the responses at the end of each action with the responses to the
+finest frames, one per physics step.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from contextlib import closing
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from optics import ReceptorDynamics
+from sim.envs.renderers import renderers_for
+from sim.eyes.allowed_error import allowed_error
+from sim.render.eye_renderer import EyeRenderer
+from sim.render.fidelity import Fidelity, Level
+from sim.render.receptors_in_time import ReceptorsInTime
+from sim.render.world_scene import WorldScene
+from sim.tasks.batch_task import BatchTask
+from sim.tasks.simulation import Simulation
+
+__all__ = ["dynamics_of", "require_frames", "with_frames"]
+
+Fidelities = Mapping[str, Fidelity]
+WORLDS, ACTIONS, FINEST = 4, 6, 20  # chosen: size of a trial, and largest number of frames per action
+
+
+def dynamics_of(eye: Any) -> Any:
+    """Return the dynamics of an eye's receptors; None without dynamics, as for all compound eyes."""
+    return getattr(eye, "dynamics", None)
+
+
+def with_frames(
+    task: BatchTask, fidelities: Sequence[Fidelities | None], scenes: Mapping[str, WorldScene] | None
+) -> list[Fidelities | None]:
+    """Return the fidelities with a number of frames for all eyes whose receptors have dynamics.
+
+    It is the same for all eyes of a world: the number that a fidelity or `ReceptorDynamics.frames` states, or else the
+    smallest number with which the errors of all signals are allowed.
+
+    fidelities: for each agent, the fidelity of each kind of its eyes, or None if its eyes are not used
+    scenes: see `renderers_for`
+    """
+    kinds = [kind for agent, of in zip(task.agents(), fidelities, strict=True) if of for kind in agent.kinds]
+    given = [of[name] for of in fidelities if of for name in of]
+    in_time = [(kind.eye, of) for kind, of in zip(kinds, given, strict=True) if dynamics_of(kind.eye) is not None]
+    if not in_time or all(of.frames is not None for _, of in in_time):
+        return list(fidelities)
+    stated = [of.frames or dynamics_of(eye).frames for eye, of in in_time]
+    known = max((n for n in stated if n is not None), default=None)
+    level = _chosen(task, fidelities, scenes) if known is None else (known, Level("frames", _named(known), None, ASKED))
+    frames, reason = level
+    return [
+        None if of is None else {name: _with(fidelity, frames, reason) for name, fidelity in of.items()}
+        for of in fidelities
+    ]
+
+
+ASKED = "as requested"
+
+
+def require_frames(simulation: Simulation, frames: int) -> None:
+    """Set the number of frames per action of the simulation's physics.
+
+    Raises:
+        ValueError: it is not a divisor of the number of physics steps, differs from that of other eyes, or exceeds 1
+            for a physics without frames.
+    """
+    physics = simulation.physics
+    if not hasattr(physics, "passed"):
+        if frames > 1:
+            name = type(physics).__name__
+            raise ValueError(f"frames = {frames}: must be 1, the physics {name} has no poses within an action")
+        return
+    if physics.substeps % frames:
+        raise ValueError(f"frames = {frames}: must be a divisor of the {physics.substeps} physics steps of an action")
+    if physics.frames not in (1, frames):
+        raise ValueError(f"frames = {frames} and {physics.frames}: must be the same for all eyes of a world")
+    physics.frames = frames
+
+
+def _with(fidelity: Fidelity, frames: int, level: Level) -> Fidelity:
+    levels = (*fidelity.levels, level) if fidelity.levels else ()
+    return replace(fidelity, frames=frames, levels=levels)
+
+
+def _named(frames: int) -> str:
+    return f"{frames} per action"
+
+
+def _chosen(
+    task: BatchTask, fidelities: Sequence[Fidelities | None], scenes: Mapping[str, WorldScene] | None
+) -> tuple[int, Level]:
+    with closing(Simulation(task, WORLDS, 0)) as worlds:
+        steps = worlds.physics.substeps if hasattr(worlds.physics, "passed") else 1
+        numbers = [n for n in range(1, min(steps, FINEST) + 1) if steps % n == 0]
+        renderers = [
+            renderer
+            for of in renderers_for(worlds, worlds.agents, fidelities, scenes)
+            for renderer in ({} if of is None else of.eyes).values()
+            if dynamics_of(renderer.eye) is not None
+        ]
+        if len(numbers) == 1:
+            return 1, Level("frames", _named(1), None, "an action is one physics step")
+        require_frames(worlds, numbers[-1])
+        seen = _played(worlds, renderers)
+        seconds = worlds.physics.seconds
+    chosen, worst = 1, 0.0
+    for renderer, signals in zip(renderers, seen, strict=True):
+        allowed = allowed_error(renderer.eye, renderer.fidelity.tolerance)
+        truth = _responses(dynamics_of(renderer.eye), signals, numbers[-1], seconds)
+        for frames in numbers:
+            off = _responses(dynamics_of(renderer.eye), signals, frames, seconds) - truth
+            error = float(np.sqrt(np.mean(np.square(off, dtype=np.float64))))
+            if error <= allowed:
+                break
+        chosen, worst = max(chosen, frames), max(worst, error)
+    why = f"fewest of {', '.join(map(str, numbers))} for the allowed error in {len(seen[0])} random actions"
+    return chosen, Level("frames", _named(chosen), worst, why)
+
+
+def _played(worlds: Simulation, renderers: Sequence[EyeRenderer]) -> list[np.ndarray]:
+    """Return noise-free signals during random actions, (action, frame, world, ...) for each renderer."""
+    random = np.random.default_rng(0)
+    worlds.reset()
+    found: list[list[list[np.ndarray]]] = [[] for _ in renderers]
+    for _ in range(ACTIONS):
+        commanded = [random.uniform(-1, 1, (worlds.n, agent.n_actions)) for agent in worlds.agents]
+        worlds.move(np.concatenate(commanded, axis=1))
+        moments = [*worlds.physics.passed, worlds.poses()]
+        for renderer, mine in zip(renderers, found, strict=True):
+            mine.append([renderer.signals(poses) for poses in moments])
+        if worlds.judge({}).done.any():
+            break
+    return [np.array(mine) for mine in found]
+
+
+def _responses(dynamics: ReceptorDynamics, signals: np.ndarray, frames: int, seconds: float) -> np.ndarray:
+    """Return the responses at the end of each action if only this number of the frames is rendered."""
+    if not len(signals):
+        return np.zeros(1)
+    finest, n = signals.shape[1:3]
+    stride, everyone = finest // frames, np.arange(n)
+    receptors = ReceptorsInTime(dynamics, n, signals.shape[3:], seconds / frames)
+    receptors.start(signals[0, 0], everyone)
+    found = []
+    for action in signals:
+        for frame in action[stride - 1 :: stride]:
+            last = receptors.step(frame, everyone)
+        receptors.observed(everyone)
+        found.append(last)
+    return np.array(found)

@@ -1,0 +1,191 @@
+"""A photograph seen through an animal's eye: from sRGB to a spectral scene, and to the signals of receptors."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import optics
+from optics import animals
+from optics.numerics.arguments import in_range, one_of, reals, shown
+from optics.spectra.bands import SpectralBands
+from optics.spectra.receptors import receptors_of
+from optics.spectra.spectrum import daylight, srgb_basis
+from sim.pictures.receptor_mosaic import ReceptorMosaic
+from sim.scene.color import decode_srgb
+
+__all__ = ["ANIMALS", "read_photograph", "see_photograph"]
+
+CAMERA = ("eagle", "goldfish", "human", "jumping_spider", "mouse")
+ANIMALS = (*sorted(animals.COMPOUND), *CAMERA)
+BANDS = 5  # choice: spectral bands
+TOGETHER = 1_000_000  # choice, limited by memory: rays of ommatidia that are computed at once
+MOST_RECEPTORS = 40_000  # choice, limited by time
+ULTRAVIOLET_NM = 400.0
+CELLS = 2  # choice: cells of the scene per receptor, along each axis
+MARGIN = 16  # choice: cells that continue the photograph beyond its edges
+SMALLEST = 8  # pixels along the shorter side
+Progress = Callable[[float], None]
+
+
+def read_photograph(path: str | Path) -> np.ndarray:
+    """Read an image file as sRGB values (y, x, 3) in [0, 1].
+
+    Raises:
+        ValueError: the file is no image, has one channel, or has transparent pixels.
+        OSError: the file cannot be read.
+    """
+    from PIL import Image, UnidentifiedImageError
+
+    try:
+        with Image.open(path) as image:
+            mode, pixels = image.mode, np.asarray(image.convert("RGB") if image.mode == "P" else image)
+    except UnidentifiedImageError:
+        raise ValueError(f"{path}: must be an image, such as a PNG or JPEG file") from None
+    if mode in ("RGBA", "LA", "PA"):
+        raise ValueError(f"{path}: has transparency (mode {mode}): must be opaque; save it without an alpha channel")
+    if mode not in ("RGB", "P"):
+        raise ValueError(f"{path}: has the mode {mode}: must have three channels, red, green and blue, of 8 bits")
+    return pixels / 255.0
+
+
+def see_photograph(
+    photograph: Any, animal: str, width_deg: float, uv: float = 1.0, progress: Progress | None = None
+) -> ReceptorMosaic:
+    """Return the signals of an animal's receptors for a photograph, which covers a part of its visual field.
+
+    Each colour becomes one of the many reflectances with this colour (`optics.spectra.spectrum.srgb_basis`), in
+    daylight. The light passes the optics of the animal's eye (`optics.animals`) and excites its receptors. A white
+    surface gives a signal of 1. Receptors that are finer than the photograph are replaced by one for each pixel, at
+    most 40,000 in all.
+
+    photograph: sRGB values in [0, 1], (y, x, 3), of a camera that maps straight lines to straight lines.
+    animal: one of "blowfly", "dragonfly", "fruit_fly", "honeybee", "megalopta", "eagle", "goldfish", "human",
+        "jumping_spider" and "mouse".
+    width_deg: angular width of the photograph, in [0.1, 120].
+    uv: a photograph contains no ultraviolet. Below 400 nm, reflectances are this fraction, in [0, 1], of the value by
+        which the table of `srgb_basis` continues: a white surface reflects the fraction uv.
+    progress: function that is called with the completed fraction. None: no calls.
+
+    Raises:
+        ValueError: an argument outside its range, an image with another shape, or a field with more than 40,000
+            ommatidia.
+    """
+    one_of("animal", animal, ANIMALS)
+    width = in_range("width_deg", width_deg, 0.1, 120.0)
+    linear = decode_srgb(_checked(photograph))
+    in_range("uv", uv, 0.0, 1.0)
+    report = progress or (lambda share: None)
+    if animal in animals.COMPOUND:
+        return _compound(linear, animal, width, uv, report)
+    return _camera(linear, animal, width, uv, report)
+
+
+def _checked(photograph: Any) -> np.ndarray:
+    pixels = reals("photograph", photograph)
+    if pixels.ndim != 3 or pixels.shape[2] != 3 or min(pixels.shape[:2]) < SMALLEST:
+        what = f"(y, x, 3), with at least {SMALLEST} pixels along each side"
+        raise ValueError(f"photograph has shape {pixels.shape}: must be sRGB values {what}")
+    if not (np.isfinite(pixels).all() and pixels.min() >= 0 and pixels.max() <= 1):
+        raise ValueError(f"photograph holds {shown(float(pixels.max()))}: must lie in [0, 1], so divide bytes by 255")
+    return pixels
+
+
+def _inks(bands: SpectralBands, receptors: Any, uv: float) -> np.ndarray:
+    """Return the radiance in each band of red, green and blue surfaces in daylight, (band, 3)."""
+
+    def radiance(ink: optics.Spectrum) -> Callable[[np.ndarray], np.ndarray]:
+        return lambda at: ink.at(at) * np.where(at * 1e9 < ULTRAVIOLET_NM, uv, 1.0) * daylight(at)
+
+    return np.stack([bands.band_values(radiance(ink), receptors) for ink in srgb_basis()], axis=-1)
+
+
+def _height_deg(linear: np.ndarray, width_deg: float) -> float:
+    ratio = linear.shape[0] / linear.shape[1]
+    return 2 * math.degrees(math.atan(ratio * math.tan(math.radians(width_deg) / 2)))
+
+
+def _compound(linear: np.ndarray, animal: str, width_deg: float, uv: float, report: Progress) -> ReceptorMosaic:
+    receptors = receptors_of(animals.COMPOUND[animal])
+    bands = SpectralBands.uniform(BANDS, receptors)
+    apart = math.radians(getattr(animals, animal)(rings=0).interommatidial_deg)
+    tall = math.radians(_height_deg(linear, width_deg))
+    columns = max(2, int(math.radians(width_deg) / apart))
+    rows = max(2, int(tall / (apart * math.sqrt(3) / 2)))
+    if rows * columns > MOST_RECEPTORS:
+        raise ValueError(
+            f"width_deg = {width_deg:g}: {rows * columns} ommatidia of a {animal}, must be at most {MOST_RECEPTORS}, "
+            "so choose a smaller part of the field"
+        )
+    shifts = np.where(np.arange(rows) % 2 == 1, 0.25, -0.25)[:, None]
+    x = apart * (np.arange(columns) - (columns - 1) / 2 + shifts)
+    y = -apart * math.sqrt(3) / 2 * (np.arange(rows) - (rows - 1) / 2)[:, None] + np.zeros_like(x)
+    directions, inks = np.column_stack([x.ravel(), y.ravel()]), _inks(bands, receptors, uv)
+    found = np.empty((len(inks), len(directions)))
+    for band, wavelength in enumerate(bands.wavelengths):
+        around_x, around_y, weights = _field(animal, float(wavelength))
+        scene = _by_angle(linear @ inks[band], math.radians(width_deg))
+        step = max(1, TOGETHER // len(weights))
+        for start in range(0, len(directions), step):
+            part = directions[start : start + step]
+            found[band, start : start + step] = scene(part[:, :1] + around_x, part[:, 1:] + around_y) @ weights
+            report((band + min(1.0, (start + step) / len(directions))) / len(inks))
+    signals = (bands.weights @ found).reshape(-1, rows, columns)
+    return ReceptorMosaic(animal, signals, _peaks(receptors), width_deg, hexagons=True)
+
+
+@lru_cache(maxsize=64)
+def _field(animal: str, wavelength: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    eye: optics.AppositionEye = getattr(animals, animal)(rings=0)
+    return eye.field(wavelength)
+
+
+def _by_angle(plane: np.ndarray, width: float) -> Callable[[np.ndarray, np.ndarray], np.ndarray]:
+    """Return the radiance (y, x) as a function of angles [rad] to the right and up. The edges continue outside."""
+    from scipy.ndimage import map_coordinates
+
+    per_tangent = plane.shape[1] / (2 * math.tan(width / 2))
+    middle_y, middle_x = ((side - 1) / 2 for side in plane.shape)
+
+    def radiance(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        limit = math.radians(89)
+        tx, ty = (np.tan(np.clip(angle, -limit, limit)) for angle in (x, y))
+        at = np.stack([middle_y - per_tangent * ty, middle_x + per_tangent * tx])
+        return np.asarray(map_coordinates(plane, at, order=1, mode="nearest"))
+
+    return radiance
+
+
+def _camera(linear: np.ndarray, animal: str, width_deg: float, uv: float, report: Progress) -> ReceptorMosaic:
+    patch: optics.Eye = getattr(animals, animal)()
+    nodal = float(patch.sensor_distance)
+    sensor_width = 2 * nodal * math.tan(math.radians(width_deg) / 2)
+    most = math.sqrt(MOST_RECEPTORS * linear.shape[1] / linear.shape[0])
+    columns = max(2, int(min(sensor_width / patch.receptor_pitch, linear.shape[1], most)))
+    rows = max(2, round(columns * linear.shape[0] / linear.shape[1]))
+    eye = replace(patch, resolution=(rows, columns), fov_deg=width_deg, sensor_width=sensor_width, bands=BANDS)
+    cells = _resized(linear, (rows * CELLS, columns * CELLS))
+    scene = np.einsum("yxc,bc->byx", cells, _inks(eye.spectral_bands, eye.receptors, uv))
+    report(0.1)
+    padded = np.pad(scene, ((0, 0), (MARGIN, MARGIN), (MARGIN, MARGIN)), mode="edge")
+    signals = np.asarray(eye.see(padded, CELLS)) / float(eye.white_signal)
+    report(1.0)
+    return ReceptorMosaic(animal, signals, _peaks(eye.receptors), width_deg, hexagons=False)
+
+
+def _resized(linear: np.ndarray, size: tuple[int, int]) -> np.ndarray:
+    """Return the means of the photograph over cells, (y, x, 3)."""
+    from PIL import Image
+
+    planes = [Image.fromarray(plane.astype(np.float32)) for plane in np.moveaxis(linear, -1, 0)]
+    return np.stack([np.asarray(plane.resize(size[::-1], Image.Resampling.BOX)) for plane in planes], axis=-1)
+
+
+def _peaks(receptors: optics.Receptors) -> tuple[float, ...]:
+    return tuple(float(kind.peak_nm) for kind in receptors.types)

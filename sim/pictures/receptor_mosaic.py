@@ -1,0 +1,113 @@
+"""Signals of the receptors that see a photograph, drawn as hexagons or squares and written as EXR."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from optics.numerics.arguments import whole
+from optics.numerics.read_only import read_only
+from sim.exr.files import write_exr
+from sim.exr.previews import preview_of_receptors
+from sim.exr.view import View
+from sim.scene.color import encode_srgb
+
+__all__ = ["ReceptorMosaic"]
+
+GAP = 12  # choice: pixels between the photograph and the receptors
+
+
+@dataclass(frozen=True, eq=False)
+class ReceptorMosaic:
+    """Signals of an animal's receptors for a photograph.
+
+    animal: name of the animal.
+    signals: signals (channel, row, column), from the top left of the visual field. A white surface gives 1.
+    peaks_nm: peak wavelength of each channel, (channel,).
+    width_deg: angular width of the photograph.
+    hexagons: True for ommatidia. Rows with odd numbers are then half an ommatidium further to the right.
+    """
+
+    animal: str
+    signals: np.ndarray
+    peaks_nm: tuple[float, ...]
+    width_deg: float
+    hexagons: bool
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "signals", read_only(np.asarray(self.signals)))
+
+    def image(self, photograph: np.ndarray | None = None, height: int = 600) -> np.ndarray:
+        """Return an sRGB image (height, x, 3) uint8 of the receptors, to the right of the photograph if it is given.
+
+        Red, green and blue show the receptors with the longest, the middle and the shortest peaks. A single type is
+        shown as grey.
+
+        photograph: sRGB values in [0, 1], (y, x, 3).
+        height: height of the image in pixels, 16 to 8192.
+
+        Raises:
+            ValueError: a height outside its range.
+        """
+        from PIL import Image
+
+        tall = whole("height", height, 16, 8192)
+        channels = self.signals[self._shown()]
+        linear = preview_of_receptors(channels, [self.peaks_nm[channel] for channel in self._shown()])
+        colors = np.rint(255 * encode_srgb(np.clip(linear, 0, 1))).astype(np.uint8)
+        drawn = self._hexagons(colors, tall) if self.hexagons else self._squares(colors, tall)
+        if photograph is None:
+            return drawn
+        left = Image.fromarray(np.rint(255 * np.asarray(photograph)).astype(np.uint8))
+        left = left.resize((max(1, round(tall * left.width / left.height)), tall), Image.Resampling.LANCZOS)
+        between = np.full((tall, GAP, 3), 255, np.uint8)
+        return np.concatenate([np.asarray(left), between, drawn], axis=1)
+
+    def write_png(self, path: str | Path, photograph: np.ndarray | None = None, height: int = 600) -> None:
+        """Write `image` to a PNG file.
+
+        Raises:
+            ValueError: a height outside its range.
+            OSError: the file cannot be written.
+        """
+        from PIL import Image
+
+        Image.fromarray(self.image(photograph, height)).save(path, format="PNG")
+
+    def write_exr(self, path: str | Path) -> None:
+        """Write the signals to an OpenEXR file, with one pixel for each receptor (see `sim.read_exr`).
+
+        Raises:
+            OSError: the file cannot be written.
+        """
+        notes = {"animal": self.animal, "width_deg": self.width_deg, "odd_rows_shifted": self.hexagons}
+        signals = self.signals.astype(np.float32)
+        write_exr(path, [View(self.animal, receptors=signals, peaks_nm=self.peaks_nm, attributes=notes)])
+
+    def _shown(self) -> list[int]:
+        """Return the channels with the longest, the middle and the shortest peaks; all channels if there are fewer."""
+        order = np.argsort(-np.asarray(self.peaks_nm), kind="stable").tolist()
+        return order if len(order) < 3 else [order[0], order[len(order) // 2], order[-1]]
+
+    def _squares(self, colors: np.ndarray, height: int) -> np.ndarray:
+        width = max(1, round(height * colors.shape[1] / colors.shape[0]))
+        row, column = (np.arange(n) * m // n for n, m in zip((height, width), colors.shape[:2], strict=True))
+        return colors[np.ix_(row, column)]
+
+    def _hexagons(self, colors: np.ndarray, height: int) -> np.ndarray:
+        from PIL import Image, ImageDraw
+
+        rows, columns = colors.shape[:2]
+        side = height / (1.5 * rows + 0.5)  # corner to centre; rows are 1.5 sides apart
+        apart = math.sqrt(3) * side
+        image = Image.new("RGB", (max(1, round((columns + 0.5) * apart)), height))
+        draw, turns = ImageDraw.Draw(image), np.radians(30 + 60 * np.arange(6))
+        corners = side * np.column_stack([np.cos(turns), np.sin(turns)])
+        for row in range(rows):
+            for column in range(columns):
+                centre = (column + (1.0 if row % 2 else 0.5)) * apart, (1.5 * row + 1) * side
+                draw.polygon([tuple(corner + centre) for corner in corners], fill=tuple(colors[row, column].tolist()))
+        return np.asarray(image)

@@ -1,0 +1,52 @@
+"""Components into which the light of closed forms is divided, usually fewer than bands."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+RANK_TOLERANCE = 1e-6  # smaller singular values, relative to the largest, are rounding errors of float32 (1.2e-7)
+# Chosen: largest deviation of a grey reflectance from its mean over the bands. Mitsuba's greys are not quite flat.
+GREY = 1e-4
+
+
+@dataclass(frozen=True)
+class Components:
+    """Factors of radiance_b = sum_k basis[k, b] reflectance_k sum_l levels[l, k] cos θ_l.
+
+    reflectance: (texel, component) · levels: of the lights (light, component) · basis: (component, band)
+    """
+
+    reflectance: np.ndarray
+    levels: np.ndarray
+    basis: np.ndarray
+
+
+def components_of(texels: np.ndarray, irradiance: np.ndarray) -> Components:
+    """Return the smallest set of components that describes texels (texel, band) under lights (light, band)."""
+    n_bands = texels.shape[1]
+    brightest = irradiance[np.argmax(irradiance.sum(axis=1))]
+    level = irradiance @ brightest / (brightest @ brightest)
+    if np.allclose(irradiance, level[:, None] * brightest, rtol=0, atol=RANK_TOLERANCE * irradiance.max()):
+        u, s, vt = np.linalg.svd(texels, full_matrices=False)
+        rank = max(int((s > RANK_TOLERANCE * s[0]).sum()), 1)
+        if rank < n_bands:
+            return Components(u[:, :rank] * s[:rank], np.tile(level[:, None], rank), vt[:rank] * brightest / np.pi)
+    return components_in_bands(texels, irradiance)
+
+
+def reflected_components_of(texels: np.ndarray, irradiance: np.ndarray) -> Components:
+    """Return components in which reflection multiplies light by a texel, component by component."""
+    grey = texels.mean(axis=1, keepdims=True)
+    if np.abs(texels - grey).max() <= GREY:
+        few = components_of(np.tile(grey, texels.shape[1]), irradiance)
+        if len(few.basis) == 1:
+            scale = few.reflectance[:, 0] @ grey[:, 0] / (grey[:, 0] @ grey[:, 0])
+            return Components(few.reflectance / scale, few.levels, few.basis * scale)
+    return components_in_bands(texels, irradiance)
+
+
+def components_in_bands(texels: np.ndarray, irradiance: np.ndarray) -> Components:
+    """Return components that are the bands, for light that passes a medium or several reflections."""
+    return Components(texels, irradiance, np.eye(texels.shape[1]) / np.pi)

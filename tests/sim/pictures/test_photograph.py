@@ -1,0 +1,151 @@
+"""Photographs through the eyes of animals: white, colours, positions, ultraviolet, and files."""
+
+import math
+
+import numpy as np
+import pytest
+from PIL import Image
+
+import optics
+from optics.spectra.spectrum import daylight, srgb_basis
+from sim import read_exr
+from sim.pictures import photograph
+from sim.pictures.photograph import ANIMALS, read_photograph, see_photograph
+from sim.pictures.receptor_mosaic import ReceptorMosaic
+
+WHITE = np.ones((12, 16, 3))
+
+
+@pytest.fixture
+def one_band(monkeypatch):
+    """Compute ommatidia in one band only, because their acceptance functions take most of the time."""
+    monkeypatch.setattr(photograph, "BANDS", 1)
+
+
+def test_the_primaries_add_up_to_white_and_have_the_colours_of_srgb():
+    """White is D65. Each primary's XYZ in daylight is the column of the matrix of IEC 61966-2-1."""
+    nm = np.arange(380, 781, 5)
+    inks = np.stack([ink.at(nm * 1e-9) for ink in srgb_basis()])
+    np.testing.assert_allclose(inks.sum(axis=0), 1, atol=2e-3)
+    matching = optics.spectra.spectrum.cie_1931(nm * 1e-9) * daylight(nm * 1e-9)[:, None]
+    found = (inks @ matching / matching[:, 1].sum()).T
+    expected = [[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]]
+    np.testing.assert_allclose(found, expected, atol=2e-3)
+
+
+@pytest.mark.parametrize("animal", ["honeybee", "goldfish", "mouse"])
+def test_a_white_photograph_gives_signals_of_one(animal, one_band):
+    seen = see_photograph(WHITE, animal, 20.0)
+    np.testing.assert_allclose(seen.signals, 1, atol=0.02)
+
+
+def test_ommatidia_look_at_their_places(one_band):
+    """A white square in the right upper corner excites ommatidia there, and rows are √3/2 Δφ apart."""
+    corner = np.zeros((48, 64, 3))
+    corner[:24, 32:] = 1
+    seen = see_photograph(corner, "honeybee", 40.0)
+    rows, columns = seen.signals.shape[1:]
+    assert columns == int(40 / 2.1)
+    assert rows == int(math.degrees(2 * math.atan(0.75 * math.tan(math.radians(20)))) / (2.1 * math.sqrt(3) / 2))
+    assert seen.hexagons
+    green = seen.signals[0]
+    assert green[: rows // 2 - 3, columns // 2 + 3 :].min() > 0.9
+    assert green[rows // 2 + 3 :].max() < 0.1
+    assert green[:, : columns // 2 - 3].max() < 0.1
+
+
+def test_a_camera_eye_keeps_the_orientation_of_the_photograph():
+    corner = np.zeros((12, 16, 3))
+    corner[:6, 8:] = 1
+    seen = see_photograph(corner, "mouse", 30.0).signals[0]
+    rows, columns = seen.shape
+    assert seen[: rows // 2 - 1, columns // 2 + 1 :].min() > 0.8
+    assert seen[rows // 2 + 1 :].max() < 0.2
+    assert seen[:, : columns // 2 - 1].max() < 0.2
+
+
+def test_without_ultraviolet_light_the_receptor_for_it_is_dark():
+    bright, dark = (see_photograph(WHITE, "mouse", 20.0, uv) for uv in (1.0, 0.0))
+    assert dark.signals[1].max() < 0.5 * bright.signals[1].min()
+    np.testing.assert_allclose(dark.signals[0], bright.signals[0], atol=0.1)
+
+
+def test_red_excites_the_long_receptors_of_a_human():
+    red = np.zeros_like(WHITE)
+    red[..., 0] = 1
+    long, middle, short = see_photograph(red, "human", 5.0).signals.mean(axis=(1, 2))
+    assert long > 1.5 * middle > 3 * short > 0
+
+
+def test_files_contain_the_photograph_and_the_signals(tmp_path):
+    signals = np.arange(24.0).reshape(2, 3, 4) / 24
+    mosaic = ReceptorMosaic("bee", signals, (540.0, 344.0), 60.0, True)
+    mosaic.write_exr(tmp_path / "bee.exr")
+    (view,) = read_exr(tmp_path / "bee.exr")
+    np.testing.assert_allclose(view.receptors, signals, atol=1e-7)
+    assert view.attributes == {"animal": "bee", "width_deg": 60.0, "odd_rows_shifted": True}
+    mosaic.write_png(tmp_path / "bee.png", WHITE, 90)
+    with Image.open(tmp_path / "bee.png") as image:
+        pixels = np.asarray(image)
+    assert pixels.shape[0] == 90
+    assert (pixels[:, :120] == 255).all()
+    assert pixels[45, 140:].std() > 10
+
+
+def test_hexagons_and_squares_have_the_colours_of_their_signals():
+    """The last of 2 x 2 receptors is bright in its long channel only."""
+    signals = np.zeros((3, 2, 2))
+    signals[0, 1, 1] = 1
+    for hexagons in (True, False):
+        image = ReceptorMosaic("bee", signals, (600.0, 500.0, 400.0), 60.0, hexagons).image(height=80)
+        red = np.argwhere(image[..., 0] > 200)
+        assert image[..., 1:].max() == 0
+        assert red.mean(axis=0)[0] > 40
+        assert red.mean(axis=0)[1] > image.shape[1] / 2
+
+
+def test_progress_reaches_one(one_band):
+    shares = []
+    see_photograph(WHITE, "honeybee", 10.0, progress=shares.append)
+    assert shares == sorted(shares)
+    assert shares[-1] == 1.0
+
+
+@pytest.mark.parametrize(
+    ("mode", "words"), [("L", "three channels"), ("RGBA", "transparency"), ("CMYK", "three channels")]
+)
+def test_images_of_other_kinds_are_refused(tmp_path, mode, words):
+    Image.new(mode, (16, 12)).save(tmp_path / "photo.tiff")
+    with pytest.raises(ValueError, match=words):
+        read_photograph(tmp_path / "photo.tiff")
+
+
+def test_a_palette_is_read_and_a_text_is_refused(tmp_path):
+    Image.new("RGB", (16, 12), (255, 0, 0)).quantize(4).save(tmp_path / "photo.png")
+    np.testing.assert_allclose(read_photograph(tmp_path / "photo.png")[0, 0], (1, 0, 0), atol=0.02)
+    (tmp_path / "text.png").write_text("no image")
+    with pytest.raises(ValueError, match="must be an image"):
+        read_photograph(tmp_path / "text.png")
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"photograph": np.ones((12, 16))}, "photograph has shape"),
+        ({"photograph": np.ones((12, 16, 4))}, "photograph has shape"),
+        ({"photograph": np.full((12, 16, 3), 255.0)}, "divide bytes by 255"),
+        ({"animal": "honeybe"}, "honeybee"),
+        ({"width_deg": 0.0}, "width_deg"),
+        ({"width_deg": 170.0}, "width_deg"),
+        ({"uv": 2.0}, "uv"),
+        ({"animal": "dragonfly", "width_deg": 120.0}, "smaller part of the field"),
+    ],
+)
+def test_invalid_arguments_raise_one_line(change, words):
+    with pytest.raises(ValueError, match=words) as error:
+        see_photograph(**{"photograph": WHITE, "animal": "honeybee", "width_deg": 60.0, **change})
+    assert "\n" not in str(error.value)
+
+
+def test_all_animals_are_those_of_optics():
+    assert set(ANIMALS) | {"cirolana", "goldfish_lens", "COMPOUND"} == set(optics.animals.__all__)
