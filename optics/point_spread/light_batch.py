@@ -34,7 +34,7 @@ class LightBatch:
 
     @classmethod
     def from_arguments(cls, pupil: Any, sensor_distance: Any, source_distance: Any, source_angle: Any) -> LightBatch:
-        """Return the light for a pupil or a sequence of pupils, and for distances that are numbers or rows of numbers.
+        """Return the light for a pupil or a sequence of pupils, and for distances that are numbers or sequences.
 
         Raises:
             ValueError: something else is given, a sequence is empty, or two rows differ in length.

@@ -13,8 +13,8 @@ In a distant window, A exp(ike) varies so slowly that a few terms a_k(ρx) b_k(�
 singular value decomposition of its values at Chebyshev nodes. Each term is then one matrix product along x and one
 along y. Fresnel's kernel exp(ikρ²/2z) needs a single term, without an approximation.
 
-A sum over samples contains the light of all replicas of the spectrum. None of it reaches the window if light at the
-Nyquist frequency passes beside it.
+A sum over samples contains the light of all replicas of the spectrum. If light at the Nyquist frequency misses the
+window, none of the replicas' light reaches it.
 """
 
 from __future__ import annotations

@@ -54,7 +54,7 @@ uses another MTF. Duration, window and criterion are quoted.
 - The owlfly's Δρ of 1.8°. Its eye is a superposition eye.
 - Values for tapered rhabdomeres.
 - The acuity of the wedge-tailed eagle, 140 cycles/degree, the 13 minutes of arc of the goldfish and the 0.24° of
-  dragonflies. They were read in abstracts, and they are inputs of `optics.animals`, so a comparison would prove nothing.
+  dragonflies. They were read in abstracts, and are inputs of `optics.animals`, so a comparison would prove nothing.
 
 The command computes the table:
 
