@@ -90,7 +90,7 @@ def psf(
     light = LightBatch.from_arguments(pupil, sensor_distance, source_distance, source_angle)
     lambdas, numbers = np.atleast_1d(vacuum_wavelengths(wavelengths)), torch_numbers(light)
     if flag("requires_grad", requires_grad) and not numbers:
-        raise ValueError("no number of the pupil requires a gradient: must hold a tensor with requires_grad=True")
+        raise ValueError("no tensor requires a gradient: at least one must have requires_grad=True")
     place = torch.device(device) if device is not None else _common_device(numbers)
     if not torch.is_grad_enabled():
         light, numbers = with_numbers(light, {name: plain(tensor)[()] for name, tensor in numbers.items()}), {}
