@@ -23,7 +23,7 @@ from optics.elements.pupil import Pupil
 from optics.elements.relief import BSplineRelief, HeightMap, Relief
 from optics.elements.torch_numbers import torch_numbers, with_numbers
 from optics.eye.sensor_pixels import SensorPixels
-from optics.numerics.arguments import flag, in_range, of_kind, shown, vacuum_wavelengths
+from optics.numerics.arguments import flag, in_range, of_kind, shown, vacuum_wavelengths, wavelength_row
 from optics.numerics.autodiff import Array, plain
 from optics.numerics.backend import BackendError
 from optics.numerics.device import VARIABLE, make_ready
@@ -88,7 +88,7 @@ def psf(
     if view.get("field"):
         raise ValueError("field: only `optics.psf` returns it; this function returns the intensity")
     light = LightBatch.from_arguments(pupil, sensor_distance, source_distance, source_angle)
-    lambdas, numbers = np.atleast_1d(vacuum_wavelengths(wavelengths)), torch_numbers(light)
+    lambdas, numbers = wavelength_row(wavelengths), torch_numbers(light)
     if flag("requires_grad", requires_grad) and not numbers:
         raise ValueError("no tensor requires a gradient: at least one must have requires_grad=True")
     place = torch.device(device) if device is not None else _common_device(numbers)

@@ -13,7 +13,8 @@ import numpy as np
 
 from optics.apertures.pixelated import PixelatedAperture
 from optics.elements.beam import Beam
-from optics.methods.problem import Problem, PupilEdge
+from optics.methods.problem import Problem
+from optics.methods.pupil_edge import PupilEdge
 from optics.methods.rayleigh_sommerfeld import node_rule
 from optics.numerics.autodiff import Array
 from optics.numerics.cost import PIXEL_NODE_GEOMETRY

@@ -69,7 +69,7 @@ class ReceptorDynamics:
         if self.event_threshold is not None:
             in_range("ReceptorDynamics: event_threshold", self.event_threshold, 1e-3, 1e2)
             if self.adaptation != "none":
-                raise ValueError("ReceptorDynamics: event_threshold: must be None with adaptation, because events adapt, too")
+                raise ValueError("ReceptorDynamics: event_threshold: must be None with adaptation; events adapt, too")
 
     @property
     def integration_ms(self) -> float:
