@@ -5,8 +5,8 @@ width of the window, plus the distance from the middle within which nearly all l
 diffracted at the edge of the pupil spreads further. A soft edge keeps it out of the window, and the softer edge changes
 only light that is far from the geometrical rays of the edge, where there is little of it.
 
-All these are estimates, so that every PSF is compared with a sum over finer samples in a few rows and columns
-(`window_check`).
+All of these values are estimates. Every PSF is therefore compared with a sum over finer samples in a few rows and
+columns (`window_check`).
 """
 
 from __future__ import annotations
