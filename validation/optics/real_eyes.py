@@ -39,13 +39,13 @@ from a later article, or was proposed for this page. Rows with "closed form" are
   serum albumin, between 486 and 656 nm (the lines F and C). The two values therefore agree only roughly.
 - Luneburg's and Maxwell's lenses: closed forms.
 
-**Ideal observer.** The second table lists the contrast sensitivity of an ideal observer under the conditions of Banks,
-Geisler & Bennett (Vision Research 27, 1915, 1987): a pupil of 2 mm, 100 ms, 7.5 cycles in a cosine window, and 70.7 %
-correct choices. Only the abstract was read. It states that the ideal observer is about 20 times better than humans, and
-that both curves have the same shape from 5 to 40 cycles/degree. The human data are in a figure that was not accessible.
-The column "over 20" is the sensitivity divided by 20, which is a prediction of human sensitivity, not a comparison. The
-sensitivity at 5 cycles/degree must lie between 1,000 and 10,000. The optics are `optics.mean_human_mtf`; the article
-uses another MTF. Duration, window and criterion are quoted.
+**Ideal observer.** The second table lists the contrast sensitivity of an ideal observer. The conditions are those of
+Banks, Geisler & Bennett (Vision Research 27, 1915, 1987): a pupil of 2 mm, 100 ms, 7.5 cycles in a cosine window, and
+70.7 % correct choices. Only the abstract was read. It states that the ideal observer is about 20 times better than
+humans, and that both curves have the same shape from 5 to 40 cycles/degree. The human data are in a figure that was not
+accessible. The column "over 20" is the sensitivity divided by 20, which is a prediction of human sensitivity, not a
+comparison. The sensitivity at 5 cycles/degree must lie between 1,000 and 10,000. The optics are
+`optics.mean_human_mtf`; the article uses another MTF. Duration, window and criterion are quoted.
 
 **Not computed.** The table omits these published values:
 
