@@ -90,9 +90,9 @@ def honeybee(species: str = "mellifera", rings: int = 10) -> AppositionEye:
 def fruit_fly(rings: int = 15) -> AppositionEye:
     """Return an eye of *Drosophila melanogaster* with the rhabdomeres R1-6, for the receptors "fruit_fly".
 
-    Source of the lens: Stavenga, J. Comp. Physiol. A 189, 1, 2003, appendix 1. The facet's diameter of 16 µm, the
-    rhabdomere's of 1.9 µm, its length of 80 µm and the interommatidial angle of 5° are typical values, for which no
-    source has been read.
+    Source of the lens: Stavenga, J. Comp. Physiol. A 189, 1, 2003, appendix 1. Typical values, for which no source has
+    been read, are the facet's diameter of 16 µm, the rhabdomere's diameter of 1.9 µm and length of 80 µm, and the
+    interommatidial angle of 5°.
 
     rings: rings of ommatidia around the central one. 15 rings have 721 ommatidia.
     """

@@ -75,9 +75,9 @@ class Rim:
 def rim_around(lit: np.ndarray, dark: np.ndarray | None = None) -> Rim:
     """Return the rim of a convex pupil from the positions (2, n) of its illuminated samples.
 
-    Circle and oval are least-squares fits to all corners of the convex hull, because a single sample can lie on the rim
-    if the grid has an even number of samples. If neither fits, the rim is the hull. If there are dark samples, the hull
-    is extended half way to them, and otherwise up to the circle or oval around all samples.
+    Circle and oval are least-squares fits to all corners of the convex hull. On a grid with an even number of samples,
+    a single sample can lie on the rim, so it must not determine the fit. If neither fits, the rim is the hull. If there
+    are dark samples, the hull is extended half way to them, and otherwise up to the circle or oval around all samples.
 
     dark: positions (2, m) of samples without light.
 

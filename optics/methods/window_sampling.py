@@ -2,8 +2,8 @@
 
 Samples at the pitch Δs, in sines, repeat the light of the window with the period λ/Δs. The period must be half the
 width of the window, plus the distance from the middle within which nearly all light arrives. The light that is
-diffracted at the edge of the pupil spreads further. A soft edge keeps it out of the window, and the softer edge changes
-only light that is far from the geometrical rays of the edge, where there is little of it.
+diffracted at the edge of the pupil spreads further. A soft edge keeps it out of the window. The softer edge only
+changes light far from the geometrical rays of the edge, where there is little light.
 
 All of these values are estimates. Every PSF is therefore compared with a sum over finer samples in a few rows and
 columns (`window_check`).
