@@ -3,7 +3,7 @@
 Do the models reproduce what biologists measured and calculated for real eyes? The table compares published with
 computed values. Each row states the range in which the ratio computed/published must lie, and the command fails if a
 row leaves its range. Some ranges are wide, because the values differ for the reasons given below. These ranges only
-detect a change of the computed value; they do not claim agreement. The inputs are those of `optics.animals`.
+detect a change of the computed value; they do not claim agreement. The inputs come from `optics.animals`.
 
 **Method.** Land's sensitivity S is `optics.optical_sensitivity` in white light with k = 0.0067 per µm. Acceptance
 angles Δρ are full widths at half maximum of `optics.Ommatidium.sensitivity`, which is computed by wave optics with
@@ -24,7 +24,7 @@ from a later article, or was proposed for this page. Rows with "closed form" are
 - *Drosophila*: Stavenga, J. Comp. Physiol. A 189, 1, 2003, appendix 1.
 - Blowfly: Stavenga, J. Exp. Biol. 207, 1703, 2004, caption of fig. 4. Dark-adapted angles approach d/f, and
   light-adapted angles approach the half width of the facet's diffraction pattern. The values of the curves could not be
-  read. They apply to tapered rhabdomeres, whereas those of the model are straight.
+  read. They apply to tapered rhabdomeres, whereas the model has straight ones.
 - *Megalopta*: Greiner, Ribi & Warrant, Cell Tissue Res. 316, 377, 2004, abstract. The inputs are quoted.
 - *Cirolana*: Nilsson & Nilsson, J. Comp. Physiol. A 143, 503, 1981, abstract. The receptor accepts 45° by geometrical
   optics. The row shows by how much the PSF of the lens widens this angle.
@@ -39,18 +39,18 @@ from a later article, or was proposed for this page. Rows with "closed form" are
   serum albumin, between 486 and 656 nm (the lines F and C). The two values therefore agree only roughly.
 - Luneburg's and Maxwell's lenses: closed forms.
 
-**Ideal observer.** The second table lists the contrast sensitivity of an ideal observer. The conditions are those of
-Banks, Geisler & Bennett (Vision Research 27, 1915, 1987): a pupil of 2 mm, 100 ms, 7.5 cycles in a cosine window, and
-70.7 % correct choices. Only the abstract was read. It states that the ideal observer is about 20 times better than
-humans, and that both curves have the same shape from 5 to 40 cycles/degree. The human data are in a figure that was not
-accessible. The column "over 20" is the sensitivity divided by 20, which is a prediction of human sensitivity, not a
-comparison. The sensitivity at 5 cycles/degree must lie between 1,000 and 10,000. The optics are
-`optics.mean_human_mtf`; the article uses another MTF. Duration, window and criterion are quoted.
+**Ideal observer.** The second table lists the contrast sensitivity of an ideal observer. The conditions follow Banks,
+Geisler & Bennett (Vision Research 27, 1915, 1987): a pupil of 2 mm, 100 ms, 7.5 cycles in a cosine window, and 70.7 %
+correct choices. Only the abstract was read. It states that the ideal observer is about 20 times better than humans, and
+that both curves have the same shape from 5 to 40 cycles/degree. The human data are in a figure that was not accessible.
+The column "over 20" is the sensitivity divided by 20, which is a prediction of human sensitivity, not a comparison. The
+sensitivity at 5 cycles/degree must lie between 1,000 and 10,000. The optics are `optics.mean_human_mtf`; the article
+uses another MTF. Duration, window and criterion are quoted.
 
 **Not computed.** The table omits these published values:
 
-- The sensitivity and the angle of *Cyrba algerina*, 0.39 µm² and 12.4 minutes of arc. Lens and receptors are described
-  in the article, of which only the abstract was accessible.
+- The sensitivity and the angle of *Cyrba algerina*, 0.39 µm² and 12.4 minutes of arc. The article describes lens and
+  receptors, but only its abstract was accessible.
 - The owlfly's Δρ of 1.8°. Its eye is a superposition eye.
 - Values for tapered rhabdomeres.
 - The acuity of the wedge-tailed eagle, 140 cycles/degree, the 13 minutes of arc of the goldfish and the 0.24° of
