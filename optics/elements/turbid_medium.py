@@ -15,6 +15,7 @@ import numpy as np
 
 from optics.elements.refractive_index import Dispersion, medium
 from optics.numerics.arguments import in_range, of_kind, one_of
+from optics.numerics.read_only import ReadOnlyArrays
 from optics.spectra.bands import SpectralBands
 from optics.spectra.receptors import receptors_of
 from optics.spectra.spectrum import (
@@ -38,8 +39,8 @@ STEP_NM = 5.0
 SHORTEST, LONGEST = 1e-2, 1e2
 
 
-@dataclass(frozen=True)
-class BandMedium:
+@dataclass(frozen=True, eq=False)
+class BandMedium(ReadOnlyArrays):
     """A medium in the spectral bands of an eye.
 
     attenuation: coefficient c [1/m], (band,)
