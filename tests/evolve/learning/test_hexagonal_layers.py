@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import safetensors.torch
 import torch
 from gymnasium import spaces
 
@@ -10,6 +11,7 @@ from evolve.learning.eye_features import EyeFeatures
 from evolve.learning.hexagonal_layers import HexagonalLayers, neighbourhoods
 from evolve.learning.policy import Brain, PolicyConfig, build_policy, load_policy, save_policy
 from evolve.learning.ppo import AdaptingPPO
+from evolve.learning.tensor_file import read_tensors
 from sim import hexagonal_patch, make_vec_env, whole_head
 from sim.envs.ommatidia_space import OmmatidiaBox
 from tests.sim.envs.test_ommatidia_in_worlds import Turning
@@ -102,6 +104,17 @@ def test_a_policy_is_restored_from_its_file(tmp_path):
     seen = {"eyes": torch.rand(3, 2, len(PATCH), 3), "previous_action": torch.zeros(3, 2)}
     with torch.no_grad():
         assert torch.equal(found.predict_values(seen), policy.predict_values(seen))
+
+
+def test_neighbours_in_a_file_do_not_replace_those_of_the_directions(tmp_path):
+    policy = build_policy(PolicyConfig.from_space(space_of(PATCH), Brain(8)))
+    save_policy(policy, tmp_path / "policy.safetensors")
+    metadata, tensors = read_tensors(tmp_path / "policy.safetensors")
+    assert all(tensor.is_floating_point() for tensor in tensors.values())
+    tensors["features_extractor.grid.first"] = policy.features_extractor.grid.first + len(PATCH)
+    (tmp_path / "policy.safetensors").write_bytes(safetensors.torch.save(tensors, metadata))
+    with pytest.raises(ValueError, match=r"tensors missing or unknown: \['features_extractor.grid.first'\]"):
+        load_policy(tmp_path / "policy.safetensors")
 
 
 @pytest.mark.parametrize(
