@@ -7,6 +7,7 @@ import torch
 from gymnasium import spaces
 
 from evolve.config.run_config import LearningConfig
+from evolve.config.settings import WiringConfig
 from evolve.learning.eye_features import EyeFeatures
 from evolve.learning.hexagonal_layers import HexagonalLayers, neighbourhoods
 from evolve.learning.policy import Brain, PolicyConfig, build_policy, load_policy, save_policy
@@ -92,6 +93,12 @@ def test_features_of_stacks_equal_those_of_frames_stored_once():
     found = features({"frames": frames, "age": torch.full((4, 3), 9), "previous_action": last})
     torch.testing.assert_close(found, features({"eyes": stacks, "previous_action": last}), rtol=0, atol=1e-5)
     assert found.shape == (12, 5 + 2)
+
+
+@pytest.mark.parametrize("wiring", [{"pool_side": 4}, {"repeat_side": 15}])
+def test_grids_of_signals_are_refused(wiring):
+    with pytest.raises(ValueError, match="must be 0, ommatidia have no rows and columns"):
+        EyeFeatures(space_of(PATCH), 5, WiringConfig(**wiring))
 
 
 def test_a_policy_is_restored_from_its_file(tmp_path):
