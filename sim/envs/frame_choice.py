@@ -155,6 +155,6 @@ def _responses(dynamics: ReceptorDynamics, signals: np.ndarray, frames: int, sec
     for action in signals:
         for frame in action[stride - 1 :: stride]:
             last = receptors.step(frame, everyone)
-        receptors.observed(everyone)
+        receptors.reset_counts(everyone)
         found.append(last)
     return np.array(found)
