@@ -2,6 +2,7 @@
 
 import pickle
 import re
+import sys
 from dataclasses import replace
 
 import drjit as dr
@@ -54,6 +55,28 @@ def test_other_kernels_are_computed(computed, other):
     assert len(computed) > count
     fresh = an_eye().see(SCENE, **asked) if asked["samples_per_receptor"] == 2 else an_eye().see(SCENE[:, :4, :4], 1)
     assert np.array_equal(seen, fresh)
+
+
+def test_a_call_of_another_thread_does_not_change_the_kernels():
+    """Before every line of the function that keeps kernels, the eye sees another distance, as another thread could."""
+    eye, before = an_eye(), sys.gettrace()
+    expected = an_eye().see(SCENE, 2, z=0.02)
+
+    def meanwhile(frame, event, _):
+        if frame.f_code is not optics.Eye._last_sight.__code__:
+            return None
+        if event == "line":
+            sys.settrace(before)
+            eye.see(SCENE, 2, z=0.001)
+            sys.settrace(meanwhile)
+        return meanwhile
+
+    sys.settrace(meanwhile)
+    try:
+        seen = eye.see(SCENE, 2, z=0.02)
+    finally:
+        sys.settrace(before)
+    assert np.array_equal(seen, expected)
 
 
 def test_derivatives_are_computed_again(computed):
