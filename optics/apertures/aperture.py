@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -149,6 +150,10 @@ class Aperture(ABC):
         positive("widest_reach", widest_reach, "pupil radii")
         return self._softened(SoftEdge.cheapest(passband, ripple, widest_reach, self.half_widths))
 
+    def with_edge(self, passband: float, stopband: float, ripple: float) -> SoftAperture:
+        """Return the aperture after a low-pass filter that ends at `stopband` [cycles per R]; see `soften`."""
+        return _with_edge(self, SoftEdge(passband, stopband, ripple))
+
     @abstractmethod
     def _nodes(self, cycles: float, digits: float) -> Nodes:
         """Return quadrature nodes that are fitted to the edge."""
@@ -156,3 +161,8 @@ class Aperture(ABC):
     @abstractmethod
     def _softened(self, edge: SoftEdge) -> SoftAperture:
         """Return the aperture convolved with the edge's kernel."""
+
+
+@lru_cache(maxsize=64)
+def _with_edge(aperture: Aperture, edge: SoftEdge) -> SoftAperture:
+    return aperture._softened(edge)

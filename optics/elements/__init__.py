@@ -8,6 +8,7 @@ pixel_relief      PixelRelief: stepped reliefs
 fine_detail       spatial frequencies that samples contain
 square_samples    checks of the samples of reliefs, masks and wavefronts
 wavefront         Zernike, WavefrontMap
+zernike_modes     Zernike polynomials, and sums of many of them
 zernike_order     numberings of Zernike polynomials: OSA, Noll, Fringe
 transmittance     GaussianMask, MaskMap
 human_eye         HumanEye, mean_human_mtf: published models
@@ -19,9 +20,10 @@ turbid_medium     TurbidMedium: water and fog between surfaces and eyes
 ball_lens         BallLens: gradient-index ball lenses
 spherical_index   rays through spheres with a radial index profile
 refractive_index  RefractiveIndex, Sellmeier, Cornu; media of eyes
+pupil_slopes      slopes of the wavefront behind a pupil
 wavefront_slopes  directions of a wavefront's rays
 beam              light of one wavelength between source and sensor plane
-derivative_knots  cells in which derivatives by the samples of maps are polynomials
+derivative_knots  cells in which derivatives with respect to samples of maps are polynomials
 torch_numbers     tensors of PyTorch in a pupil
 ray_field         polarised light along rays
 """

@@ -4,24 +4,24 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
-from functools import cached_property, lru_cache
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from optics.apertures.aperture import EDGE_REACH, Aperture
+from optics.apertures.aperture import Aperture
 from optics.apertures.circular import Circle
 from optics.elements.pixel_relief import PixelRelief
+from optics.elements.pupil_slopes import all_slopes, sampled_slopes
 from optics.elements.refractive_index import Dispersion, index_of, material
 from optics.elements.relief import HeightMap, Relief
 from optics.elements.source import PointSource
 from optics.elements.transmittance import Mask
 from optics.elements.wavefront import Aberration
-from optics.elements.wavefront_slopes import Slopes, _derivative
+from optics.elements.wavefront_slopes import Slopes
 from optics.numerics.arguments import finite, of_kind, positive, reals
 from optics.numerics.array_library import library, like
 from optics.numerics.autodiff import Array, Scalar, is_differentiable, number
-from optics.numerics.grid import Grid
 from optics.numerics.precision import precision
 
 __all__ = ["MIDDLE", "Pupil"]
@@ -144,7 +144,7 @@ class Pupil:
         return dr.sum(types.Float64(nodes.weight) * dr.square(amplitude)) / self.aperture.area
 
     def amplitude(self, x: Array, y: Array) -> Array:
-        """Return the amplitude that the mask transmits at points in units of R. Arrays: see `Relief.height`."""
+        """Return the amplitude that the mask transmits at points in units of R, arrays as in `Relief.height`."""
         if self.mask is None:
             return like(x, 1.0)
         radius = like(x, self.aperture_radius)
@@ -224,7 +224,7 @@ class Pupil:
         return self.aperture.mirror_symmetric and relief_is and wavefront_is and mask_is
 
     def path(self, x: Array, y: Array, wavelength: float, source: PointSource) -> Array:
-        """Return the optical path [m] from the source through the pupil at points (x, y) [m]; see `Relief.height`."""
+        """Return the optical path [m] from the source through points (x, y) [m], arrays as in `Relief.height`."""
         total = source.path(x, y) * like(x, self.index_before(wavelength))
         if self.thin_lens_focal_length is not None:
             f, own = like(x, self.thin_lens_focal_length), library(x)
@@ -245,7 +245,18 @@ class Pupil:
         # The path depends on the wavelength only through these indices. Equal indices therefore give equal slopes.
         indices = number(self.index_step(wavelength)), self.index_before(wavelength), self.index_behind(wavelength)
         same = self._first_with.setdefault(indices, wavelength)
-        return _slopes(self._level if self.pixels else self, same, number(source.distance), source.plain.angle)
+        level = self._level if self.pixels else self
+        return all_slopes(level, same, number(source.distance), source.plain.angle, self._pieces(same))
+
+    def sampled_slopes(self, wavelength: float, source: PointSource) -> Slopes:
+        """Return `slopes` at a limited number of points. Each slope is exact, but the steepest point may be missed."""
+        return sampled_slopes(self._level if self.pixels else self, wavelength, source, self._pieces(wavelength))
+
+    def _pieces(self, wavelength: float) -> int:
+        """Return the number of polynomial pieces across the pupil."""
+        pieces = [self.height.knots if self.bends(wavelength) else 0]
+        pieces += [0 if self.wavefront is None else self.wavefront.knots]
+        return max(pieces)
 
     @cached_property
     def _first_with(self) -> dict[tuple[float, float, float], float]:
@@ -285,16 +296,3 @@ class Pupil:
         if self.wavefront is not None:
             found = max(found, self.wavefront.bandwidth(level) / self.radius)
         return found if self.mask is None else found + self.mask.bandwidth(min(tolerance, 0.1), self.radius)
-
-
-@lru_cache(maxsize=64)
-def _slopes(pupil: Pupil, wavelength: float, distance: float, angle: tuple[float, float]) -> Slopes:
-    types = precision("float64")
-    pieces = max(
-        pupil.height.knots if pupil.bends(wavelength) else 0, 0 if pupil.wavefront is None else pupil.wavefront.knots
-    )
-    n = int(min(1025, max(65 if pieces else 33, 4 * pieces + 1)))
-    grid = Grid.square(n, 2 * (1 + EDGE_REACH) * pupil.radius / (n - 1))
-    x, y = grid.coordinates(types)
-    path = pupil.path(x, y, wavelength, PointSource(distance, angle)).numpy().reshape(grid.shape)
-    return Slopes(grid, _derivative(path.T, grid.dx).T, _derivative(path, grid.dx), pupil.radius)

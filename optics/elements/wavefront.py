@@ -17,6 +17,7 @@ import numpy as np
 
 from optics.elements.relief import HeightMap
 from optics.elements.square_samples import map_samples
+from optics.elements.zernike_modes import mode, norm, weighted_modes
 from optics.elements.zernike_order import HIGHEST, fringe_mode, noll_mode, numbered, osa_mode
 from optics.numerics.arguments import finite, plain_reals, positive, reals, shown
 from optics.numerics.array_library import gather, like
@@ -40,7 +41,7 @@ class Aberration(ABC):
 
     @abstractmethod
     def ahead(self, x: Array, y: Array) -> Array:
-        """Return the length [m] by which the wavefront is ahead at (x, y) [radii]. Arrays: see `Relief.height`."""
+        """Return the length [m] by which the wavefront is ahead at (x, y) [radii], arrays as in `Relief.height`."""
 
     @abstractmethod
     def bandwidth(self, level: float) -> float:
@@ -135,13 +136,16 @@ class Zernike(Aberration):
             ValueError: a number outside 1 to 36, or see `Zernike`.
         """
         named = numbered(coefficients_um, fringe_mode)
-        return cls({key: value / _norm(*key) for key, value in named.items()}, radius)
+        return cls({key: value / norm(*key) for key, value in named.items()}, radius)
 
     def ahead(self, x: Array, y: Array) -> Array:
+        named = [key for key, value in self.modes.items() if value != 0 or self.asks]
+        if named and isinstance(x, np.ndarray) and isinstance(y, np.ndarray):
+            coefficients = UM * np.array([self.modes[key] for key in named])
+            return weighted_modes(coefficients, tuple(named), x, y)
         total = like(x, 0.0)
-        for (n, m), value in self.modes.items():
-            if value != 0 or self.asks:
-                total = total + self._coefficient(n, m, x) * mode(n, m, x, y)
+        for n, m in named:
+            total = total + self._coefficient(n, m, x) * mode(n, m, x, y)
         return total
 
     def at(self, x: Any, y: Any) -> np.ndarray:
@@ -170,7 +174,7 @@ class Zernike(Aberration):
 
     @property
     def span(self) -> float:
-        return 2 * UM * sum(abs(value) * _norm(*key) for key, value in self.modes.items() if key != (0, 0))
+        return 2 * UM * sum(abs(value) * norm(*key) for key, value in self.modes.items() if key != (0, 0))
 
     @property
     def rotationally_symmetric(self) -> bool:
@@ -203,7 +207,7 @@ class WavefrontMap(Aberration):
         negative of an optical path difference. They must be unwrapped, and finite and smooth outside the pupil, too.
     radius: half side [m] of the square, at least the pupil's radius. None: the pupil's radius.
 
-    A tensor of Dr.Jit or PyTorch carries derivatives.
+    A Dr.Jit or PyTorch tensor may carry derivatives.
 
     Raises:
         ValueError: not of two dimensions, empty, or not finite.
@@ -240,30 +244,6 @@ class WavefrontMap(Aberration):
     @property
     def rotationally_symmetric(self) -> bool:
         return self._map.rotationally_symmetric
-
-
-def mode(n: int, m: int, x: Any, y: Any) -> Any:
-    """Return Z_n^m at (x, y), NumPy or Dr.Jit: ρ^|m| P_k^(0, |m|)(2ρ² - 1) {cos, sin} with k = (n - |m|)/2.
-
-    The recurrence of Jacobi's polynomials loses no digits at high orders (Abramowitz & Stegun 22.7.1).
-    """
-    sine, cosine = x * 0, x * 0 + 1.0
-    for _ in range(abs(m)):
-        cosine, sine = cosine * x - sine * y, cosine * y + sine * x
-    t, order = 2 * (x * x + y * y) - 1, abs(m)
-    before, now = x * 0, x * 0 + 1.0
-    for k in range(1, (n - order) // 2 + 1):
-        c = 2 * k + order
-        if k == 1:
-            before, now = now, 1 + (order + 2) / 2 * (t - 1)
-            continue
-        raised = (c - 1) * (c * (c - 2) * t - order**2) * now - 2 * (k - 1) * (k + order - 1) * c * before
-        before, now = now, raised / (2 * k * (k + order) * (c - 2))
-    return _norm(n, m) * now * (cosine if m >= 0 else sine)
-
-
-def _norm(n: int, m: int) -> float:
-    return math.sqrt((2 - (m == 0)) * (n + 1))
 
 
 def _check_mode(key: Any) -> None:

@@ -15,7 +15,7 @@ from optics.apertures.aperture import EDGE_REACH
 from optics.numerics.grid import Grid
 from optics.numerics.read_only import ReadOnlyArrays, read_only
 
-__all__ = ["Slopes"]
+__all__ = ["Slopes", "derivative"]
 
 
 GROUPS = 400  # choice: number of groups of slopes in `spread`
@@ -26,7 +26,7 @@ AT_END = np.array([-25, 48, -36, 16, -3]) / 12
 BESIDE_END = np.array([-3, -10, 18, -6, 1]) / 12
 
 
-def _derivative(values: np.ndarray, step: float) -> np.ndarray:
+def derivative(values: np.ndarray, step: float) -> np.ndarray:
     """Return the derivative along axis 0 by differences of fourth order, also at both ends."""
     slope = np.empty_like(values)
     for place, weights in ((0, AT_END), (1, BESIDE_END)):
@@ -130,6 +130,42 @@ class Slopes(ReadOnlyArrays):
             rest = points[:, to_centre + most >= steepest]
             found.append(max(steepest, _total(rest, around, bend).max(initial=0)))
         return float(found[0]), float(found[1])
+
+    def to_window(self, distance: float, centre: tuple[float, float], medium_n: float) -> tuple[np.ndarray, np.ndarray]:
+        """Return slopes |∇L + n (ξ - c) / D| of paths to the centre of a window, and distances of the points.
+
+        The slopes are those along x or y, whichever is larger, at points of the disk, flat. The distances of these
+        points from the axis are in units of the radius. D is the distance of the centre c from the point.
+        """
+        inside = self._inside
+        along_x, along_y = self._bent(distance, centre, medium_n)
+        return np.maximum(np.abs(along_x), np.abs(along_y))[inside], self.distance_from_axis[inside] / self.radius
+
+    def end_points(
+        self, distance: float, centre: tuple[float, float], medium_n: float, count: int
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Return points (x, y) [m] of the disk, and where their rays hit the window, relative to its centre c [m].
+
+        About `count` rays are returned. To first order, the ray hits the window at D/n times the slope that `to_window`
+        describes.
+        """
+        some = np.flatnonzero(self._inside)
+        some = some[:: max(1, len(some) // count)]
+        x, y = (part.ravel()[some] for part in np.meshgrid(self.grid.x, self.grid.y))
+        length = np.sqrt((x - centre[0]) ** 2 + (y - centre[1]) ** 2 + distance**2) / medium_n
+        u, v = (part.ravel()[some] * length for part in self._bent(distance, centre, medium_n))
+        return x, y, u, v
+
+    @property
+    def _inside(self) -> np.ndarray:
+        found: np.ndarray = self.distance_from_axis <= self.radius
+        return found
+
+    def _bent(self, distance: float, centre: tuple[float, float], medium_n: float) -> tuple[np.ndarray, np.ndarray]:
+        """Return ∇L + n (ξ - c) / D along x and along y."""
+        x, y = self.grid.x[None, :] - centre[0], self.grid.y[:, None] - centre[1]
+        scale = medium_n / np.sqrt(x * x + y * y + distance * distance)
+        return self.along_x + x * scale, self.along_y + y * scale
 
     def rays(self, distance: float, medium_n: float) -> tuple[np.ndarray, np.ndarray]:
         """Return the points at which rays from the disk hit a plane at `distance` [m]; infinite for evanescent rays."""

@@ -6,15 +6,20 @@ computes the PSF on request. `optics.point_spread.planner` chooses between them.
 textbook             the angular spectrum in plain NumPy: start here
 carrier              the phase of a spherical wave, which methods remove from fields and restore
 problem              Problem: the parameters of a computation
+pupil_edge           the soft edge of a pupil
 method_sampling      Sampling: the interface of all methods
 rayleigh_sommerfeld  the direct sum: the reference
 angular_spectrum     transforms on grids, whole or with the paraxial part split off
 spectrum_sampling    planes of the angular spectrum, and the sums between them
 row_blocks           blocks of rows of a large pupil, whose spectra are summed
-derivative_cells     nodes between the knots of maps, for derivatives by their samples
+derivative_cells     nodes between the knots of maps, for derivatives with respect to their samples
 pixelated_spectrum   the angular spectrum of pupils made of pixels
 hankel               the angular spectrum of rotationally symmetric pupils, along one radius
 low_rank             one matrix product, with a Fourier kernel times a slow factor
+slow_factor          this factor, and the points of the window that interpolate it
+window_sampling      the same method at coarse tolerances: few samples, from the light in the window
+window_check         their error, by a sum over other samples in a few rows and columns
+window_sums          their sums, and the adjoint of these sums
 far_field            one Fourier transform onto directions for each of a few nodes of the window
 far_field_nodes      the choice of these nodes, and their weights in every direction
 fresnel              approximate: Fresnel and Fraunhofer, with their predicted errors

@@ -12,7 +12,8 @@ from functools import cached_property
 
 from optics.elements.beam import Beam
 from optics.methods.fresnel import paraxial_integral
-from optics.methods.problem import Problem, PupilEdge
+from optics.methods.problem import Problem
+from optics.methods.pupil_edge import PupilEdge
 from optics.methods.row_blocks import block_size, row_blocks
 from optics.methods.spectral_taper import Taper, tapers
 from optics.methods.spectrum_sampling import SpectrumSampling

@@ -10,7 +10,8 @@ import numpy as np
 
 from optics.elements.beam import Beam
 from optics.methods.far_field_nodes import WindowNodes, all_nodes, few_nodes
-from optics.methods.problem import Problem, PupilEdge
+from optics.methods.problem import Problem
+from optics.methods.pupil_edge import PupilEdge
 from optics.numerics.autodiff import Array
 from optics.numerics.cost import (
     CALL,

@@ -11,7 +11,8 @@ import numpy as np
 
 from optics.apertures.aperture import EDGE_REACH
 from optics.elements.beam import Beam
-from optics.methods.problem import Problem, PupilEdge
+from optics.methods.problem import Problem
+from optics.methods.pupil_edge import PupilEdge
 from optics.methods.rays import MARGIN, Rays, brightness, disk_area, mismatch
 from optics.numerics.autodiff import Array, Scalar, is_differentiable, number
 from optics.numerics.cost import CALL, ITEM_BYTES, PUPIL_SAMPLE

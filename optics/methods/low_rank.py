@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 
@@ -12,23 +12,20 @@ from optics.elements.beam import Beam
 from optics.methods.carrier import on_window
 from optics.methods.problem import Problem
 from optics.methods.pupil_sampling import PupilSamples, samples_of
-from optics.methods.sine_samples import SineSamples, sine_samples
+from optics.methods.sine_samples import sine_samples
+from optics.methods.slow_factor import fourier_kernel, uniform_rank
+from optics.methods.window_sampling import WindowSampling, window_sampling
 from optics.numerics.autodiff import Array
 from optics.numerics.cost import CALL, FOURIER_ENTRY, ITEM_BYTES, KERNEL_ENTRY, MATMUL_FLOPS
 from optics.numerics.field import Field
 from optics.numerics.grid import Grid, sample_positions
-from optics.numerics.interpolation import chebyshev_points, lagrange_basis
+from optics.numerics.interpolation import chebyshev_points
 from optics.numerics.matrices import complex_flops, complex_matmul
 from optics.numerics.precision import Precision, opaque, padded_for_packets, precision
 
 __all__ = ["LowRankSampling", "low_rank"]
 
-# Choice: ranks to try, in ascending order.
-RANKS = (1, 2, 3, 4, 5, 6, 7, 8, 10, 12, 14, 16, 20, 24)
-# Choice: allowed error of the slow factor at the pupil's rim, relative to the tolerance; see test_low_rank.py.
-RANK_RIPPLE = 0.4
 STEEPEST = 8.0  # choice, radius over distance: at larger ratios, a test on the rim is not sufficient
-TRIED = 41  # choice: number of test positions along a line through the window
 MOST_BYTES = 288_000_000  # choice, limited by memory: largest matrix between pupil and window, of which two exist
 
 
@@ -75,12 +72,16 @@ class LowRankSampling:
         return len(self.pupil.at), len(self.pupil.at)
 
 
-def low_rank(problem: Problem) -> list[LowRankSampling]:
+def low_rank(problem: Problem) -> Sequence[LowRankSampling | WindowSampling]:
     """Return a sampling with the fewest samples of the pupil and the necessary rank.
 
     The samples resolve the combined phase of pupil and path. They are evenly spaced in sines, or in positions if even
-    spacing in sines needs too many samples. A pupil of pixels has nodes within the pixels.
+    spacing in sines needs too many samples. A pupil of pixels has nodes within the pixels. At coarse tolerances, the
+    samples follow from the light in the window instead (`window_sampling`).
     """
+    coarse = window_sampling(problem)
+    if coarse is not None:
+        return [coarse]
     if problem.radius > STEEPEST * problem.distance:
         return []
     half = max(problem.window.own_half_width, problem.window.dx)
@@ -98,7 +99,7 @@ def low_rank(problem: Problem) -> list[LowRankSampling]:
 
 def _sampling(problem: Problem, pupil: PupilSamples, half: float, scale: float) -> LowRankSampling | None:
     entries = MOST_BYTES // np.dtype(precision(problem.dtype).complex_dtype).itemsize
-    rank = _rank(problem, pupil, half, scale, math.isqrt(entries) // len(pupil.at))
+    rank = uniform_rank(problem, pupil, half, scale, math.isqrt(entries) // len(pupil.at))
     if rank is None:
         return None
     inner = rank * len(pupil.at)
@@ -119,66 +120,6 @@ def _sampling(problem: Problem, pupil: PupilSamples, half: float, scale: float) 
     return LowRankSampling(pupil, rank, half, scale, seconds, needed)
 
 
-def _rank(problem: Problem, pupil: PupilSamples, half: float, scale: float, most: int) -> int | None:
-    """Return the number of Chebyshev points per axis that interpolate the slow factor; None if `most` are too few.
-
-    Interpolation is tested for points on the rim of the soft aperture.
-    """
-    angle = np.linspace(0, 2 * np.pi, 8, endpoint=False)[:, None]
-    rim = pupil.outermost * np.cos(angle), pupil.outermost * np.sin(angle)
-    directions = pupil.directions(*rim) if isinstance(pupil, SineSamples) else (rim[0] / scale, rim[1] / scale)
-    test = half * np.linspace(-1, 1, TRIED)
-    # If the window lies on the axis, x and y are equivalent, and so are both sides of the window.
-    on_axis = problem.window.centre == (0.0, 0.0)
-    lines = [(0, 0.0), (0, half)] if on_axis else [(k, side) for k in (0, 1) for side in (-half, 0, half)]
-
-    def rest(at: np.ndarray) -> np.ndarray:
-        """Return the slow factor, (line, point of the rim, position on the line)."""
-        u, v = np.stack([_line(axis, at, across) for axis, across in lines], axis=1)[:, :, None, :]
-        return _rest(problem, rim, directions, (u, v))
-
-    exact = rest(test)
-    for rank in RANKS:
-        if rank > most:
-            return None
-        known = rest(half * chebyshev_points(rank))
-        if np.abs(exact - known @ _between(rank)).max() < RANK_RIPPLE * problem.tolerance:
-            return rank
-    return None
-
-
-@lru_cache(maxsize=len(RANKS))
-def _between(rank: int) -> np.ndarray:
-    """Return interpolation weights of `rank` Chebyshev points at the test positions, (point, position)."""
-    return lagrange_basis(np.linspace(-1, 1, TRIED), chebyshev_points(rank))
-
-
-def _line(along: int, at: np.ndarray, across: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return points (x, y) of a line along x (0) or y (1), relative to the window's centre."""
-    beside = np.full_like(at, across)
-    return (at, beside) if along == 0 else (beside, at)
-
-
-def _rest(
-    problem: Problem,
-    pupil: tuple[np.ndarray, np.ndarray],
-    directions: tuple[np.ndarray, np.ndarray],
-    window: tuple[np.ndarray, np.ndarray],
-) -> np.ndarray:
-    """Return the slow factor (z/D)² e^{ik(D - ρ + u·s)} between points ξ of the pupil and points u of the window.
-
-    s is the direction of ξ in the Fourier kernel e^{-ik s·u}.
-    """
-    (xi, eta), (u, v), (s, t) = pupil, window, directions
-    x, y = u + problem.window.centre[0], v + problem.window.centre[1]
-    z = problem.distance
-    rho2 = x * x + y * y + z * z
-    excess = xi**2 + eta**2 - 2 * (x * xi + y * eta)
-    distance = np.sqrt(rho2 + excess)
-    waves = (excess / (distance + np.sqrt(rho2)) + u * s + v * t) / problem.wavelength
-    return z * z / distance**2 * np.exp(2j * np.pi * waves)
-
-
 def _low_rank(beam: Beam, problem: Problem, how: LowRankSampling, types: Precision) -> Field:
     """Return U(x) = Σ_ab L_a(u) L_b(v) Σ_ξ P(ξ) G(ξ; x_a, y_b) e^{-ik s·u}.
 
@@ -191,8 +132,12 @@ def _low_rank(beam: Beam, problem: Problem, how: LowRankSampling, types: Precisi
     halves the cost of the first product.
     """
     window = problem.window
-    across_y = _fourier(sample_positions(window.shape[0], window.dx), problem, how)
-    across_x = _halves(_fourier(np.arange(window.shape[1] // 2 + 1) * window.dx, problem, how))
+    nodes = how.half_width * chebyshev_points(how.rank)
+    across_y, along_x = (
+        fourier_kernel(at, how.directions, nodes, problem.wavelength, problem.dtype)
+        for at in (sample_positions(window.shape[0], window.dx), np.arange(window.shape[1] // 2 + 1) * window.dx)
+    )
+    across_x = _halves(along_x)
     summed = [
         complex_matmul(_tensors(across_y, types), complex_matmul(inner, _tensors(across, types), transposed=True))
         for inner, across in zip(_kernel(beam, problem, how, types), across_x, strict=True)
@@ -280,15 +225,6 @@ def _split(index: Array, n: int, types: Precision) -> tuple[Array, Array]:
     by = dr.opaque(types.Float64, n)
     quotient = dr.floor((index + 0.5) / by)
     return quotient, dr.fma(-quotient, by, index)
-
-
-def _fourier(at: np.ndarray, problem: Problem, how: LowRankSampling) -> np.ndarray:
-    """Return A[x, (a, ξ)] = L_a(u) e^{-ik s u} for positions u [m] along an axis, relative to the window's centre."""
-    waves = np.outer(at, how.directions) / -problem.wavelength
-    angle = (2 * np.pi * (waves - np.rint(waves))).astype(problem.dtype)
-    weight = lagrange_basis(at, how.half_width * chebyshev_points(how.rank)).T.astype(problem.dtype)
-    found: np.ndarray = weight[:, :, None] * (np.cos(angle) + 1j * np.sin(angle))[:, None, :]
-    return found.reshape(len(at), -1)
 
 
 def _tensors(matrix: np.ndarray, types: Precision) -> tuple[Array, Array]:

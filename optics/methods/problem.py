@@ -9,13 +9,14 @@ from itertools import pairwise
 
 import numpy as np
 
-from optics.apertures.aperture import EDGE_REACH, Aperture, SoftAperture
+from optics.apertures.aperture import EDGE_REACH, Aperture
 from optics.apertures.pixelated import PixelatedAperture
 from optics.elements.beam import Beam
 from optics.elements.derivative_knots import DerivativeKnots, carries_derivatives, derivative_knots
 from optics.elements.torch_numbers import refuse_torch
 from optics.elements.wavefront_slopes import Slopes
 from optics.methods.derivative_cells import derivative_cells
+from optics.methods.pupil_edge import PupilEdge
 from optics.methods.rays import Rays
 from optics.methods.scalar_theory import ROUND, light_spread, scalar_theory_error, steepest_sine
 from optics.numerics.arguments import in_range, positive
@@ -24,7 +25,7 @@ from optics.numerics.grid import Grid
 from optics.numerics.precision import precision
 from optics.numerics.quadrature import stepped_up
 
-__all__ = ["SLOPE_MARGIN", "Problem", "PupilEdge"]
+__all__ = ["SLOPE_MARGIN", "Problem"]
 
 # Choice: factor on the steepest slope of a wavefront, because the grid of slopes may miss the steepest point.
 SLOPE_MARGIN = 1.02
@@ -33,8 +34,8 @@ SLOPE_MARGIN = 1.02
 # is twice as large: half the tolerance in a window that contains no other light.
 EDGE_RIPPLE_PER_TOLERANCE = 0.1
 DETAIL_PART = 0.1  # choice: phase [rad] of neglected detail, relative to the tolerance
-# Choice: factor by which detail is finer if derivatives by single numbers are requested. Such a derivative can be a
-# small difference, as that by the focal length of a lens in focus, to which the detail contributes most.
+# Choice: factor by which detail is finer if derivatives with respect to single numbers are requested. Such a derivative
+# can be a small difference to which the detail contributes most, as for the focal length of a lens in focus.
 FINER_DETAIL = 10.0
 BRIGHT_EDGE_RIPPLE_PER_TOLERANCE = 0.3
 
@@ -43,38 +44,33 @@ BRIGHT_EDGE_RIPPLE_PER_TOLERANCE = 0.3
 class Problem:
     """One monochromatic propagation from a pupil to a window, described by numbers.
 
+    light: the light, without derivatives with respect to the distances.
     aperture: shape of the pupil.
     radius, distance: radius of the pupil and distance of the window's plane [m].
     wavelength: wavelength [m] in the medium.
     window: grid of the output.
-    phase_band: highest spatial frequency [1/m] in the pupil's phase, over the disk and its soft edge.
-    phase_band_inside: the same over the disk alone, because a relief may be steep in the soft edge.
-    detail: bandwidth [1/m] of the phase that the slopes of the wavefront do not include.
     symmetric: True if the light behind the pupil is rotationally symmetric.
     even: True if it is even in x and in y.
     widest_band: frequency [1/m] beyond which light may be omitted (infinite: all light that reaches the window counts).
     reach: distance [m] from the axis within which all light lies, except for a fraction of the tolerance. Samples
         beyond it may be wrong, and edge-diffracted light may be less accurate (None: the whole window must be
         accurate).
-    slopes: slopes of the wavefront.
     medium_n: refractive index behind the pupil.
     masked: True if a mask scatters light to places that rays do not predict, so that approximations cannot predict
         their error.
     spread: spread of the light over the pupil, see `light_spread`.
     differentiated: whether the PSF carries derivatives.
-    knots: cells that derivatives by the samples of maps require; None if no such derivatives are requested.
-    other_detail: `detail` without that of these maps.
+    knots: cells that derivatives with respect to samples of maps require; None if no such derivatives are requested.
+    mask_detail: bandwidth [1/m] of the amplitude of the mask.
+    detail_part: phase [rad] of neglected detail, relative to the tolerance.
     """
 
+    light: Beam
     aperture: Aperture
     radius: float
     wavelength: float
     distance: float
     window: Grid
-    phase_band: float
-    phase_band_inside: float
-    detail: float
-    slopes: Slopes
     symmetric: bool
     tolerance: float
     dtype: str = "float32"
@@ -86,7 +82,8 @@ class Problem:
     even: bool = False
     differentiated: bool = False
     knots: DerivativeKnots | None = None
-    other_detail: float = 0.0
+    mask_detail: float = 0.0
+    detail_part: float = DETAIL_PART
 
     @classmethod
     def from_beam(
@@ -110,6 +107,38 @@ class Problem:
         found = _differentiated(plain, window, tolerance, dtype, derivative_knots(beam.pupil, beam.wavelength))
         # A small change of the angle breaks the symmetry of light along the axis.
         return replace(found, symmetric=False, even=False) if any(map(carries_derivative, beam.source.angle)) else found
+
+    @cached_property
+    def slopes(self) -> Slopes:
+        """Slopes of the wavefront, on a grid that resolves all maps."""
+        return self.light.pupil.slopes(self.light.wavelength, self.light.source)
+
+    @cached_property
+    def sampled_slopes(self) -> Slopes:
+        """Slopes of the wavefront at a limited number of points, which may miss the steepest point."""
+        return self.light.pupil.sampled_slopes(self.light.wavelength, self.light.source)
+
+    @cached_property
+    def detail(self) -> float:
+        """Bandwidth [1/m] of the phase that the slopes of the wavefront do not include."""
+        return self.light.pupil.bandwidth(self.light.wavelength, self.detail_part * self.tolerance)
+
+    @cached_property
+    def other_detail(self) -> float:
+        """The same without the maps whose derivatives are requested."""
+        assert self.knots is not None
+        others = self.knots.without_maps(self.light.pupil)
+        return others.bandwidth(self.light.wavelength, DETAIL_PART * self.tolerance)
+
+    @property
+    def phase_band(self) -> float:
+        """Highest spatial frequency [1/m] in the pupil's phase, over the disk and its soft edge."""
+        return SLOPE_MARGIN * self.slopes.steepest / self.light.wavelength + self.detail
+
+    @property
+    def phase_band_inside(self) -> float:
+        """The same over the disk alone, because a relief may be steep in the soft edge."""
+        return SLOPE_MARGIN * self.slopes.steepest_inside / self.light.wavelength + self.detail
 
     @cached_property
     def turning(self) -> float:
@@ -208,6 +237,9 @@ class Problem:
     @property
     def steepest_sine(self) -> float:
         """Largest sine of the rays that meet in a point of the window; see `scalar_theory.steepest_sine`."""
+        straight, per_slope = self.radius / math.hypot(self.radius, self.distance), SLOPE_MARGIN / self.medium_n
+        if per_slope * self.sampled_slopes.steepest_inside >= straight:
+            return straight  # all slopes and finer detail can only increase the sine of light that leaves the pupil
         leaving = self.phase_band_inside * self.wavelength + self.wavelength / self.radius
         return steepest_sine(self.radius, self.distance, leaving)
 
@@ -226,60 +258,31 @@ class Problem:
         return min(self.widest_band, reach / math.hypot(reach, self.distance) / self.wavelength)
 
 
-@dataclass(frozen=True)
-class PupilEdge:
-    """A soft aperture, scaled to a pupil of the given radius [m]."""
-
-    aperture: SoftAperture
-    radius: float
-
-    @property
-    def outermost(self) -> float:
-        """Distance from the axis [m] beyond which the aperture is closed."""
-        return (1 + self.aperture.reach) * self.radius
-
-    @property
-    def stopband(self) -> float:
-        """Frequency [1/m] beyond which the spectrum is below the ripple."""
-        return self.aperture.stopband / self.radius
-
-    @property
-    def seconds_per_point(self) -> float:
-        return self.aperture.seconds_per_point
-
-
 @lru_cache(maxsize=256)
 def _differentiated(beam: Beam, window: Grid, tolerance: float, dtype: str, knots: DerivativeKnots | None) -> Problem:
     part = DETAIL_PART / (1 if knots else FINER_DETAIL)
-    found = replace(_problem(beam, window, tolerance, dtype, part), differentiated=True, knots=knots)
-    if knots is None:
-        return found
-    others = knots.without_maps(beam.pupil)
-    return replace(found, other_detail=others.bandwidth(beam.wavelength, DETAIL_PART * tolerance))
+    return replace(_problem(beam, window, tolerance, dtype, part), differentiated=True, knots=knots)
 
 
 @lru_cache(maxsize=256)
 def _problem(beam: Beam, window: Grid, tolerance: float, dtype: str, part: float = DETAIL_PART) -> Problem:
-    pupil, wavelength, distance = beam.pupil, beam.wavelength, beam.distance
-    slopes = pupil.slopes(wavelength, beam.source)
+    pupil, wavelength = beam.pupil, beam.wavelength
     pixels = pupil.pixels if pupil.bends(wavelength) else 0
     on_axis = beam.source.angle == (0.0, 0.0)
-    detail = pupil.bandwidth(wavelength, part * tolerance)
     return Problem(
+        light=beam,
         aperture=PixelatedAperture(pupil.aperture, pixels) if pixels else pupil.aperture,
         radius=pupil.radius,
         wavelength=wavelength / beam.index,
-        distance=distance,
+        distance=beam.distance,
         window=window,
-        phase_band=SLOPE_MARGIN * slopes.steepest / wavelength + detail,
-        phase_band_inside=SLOPE_MARGIN * slopes.steepest_inside / wavelength + detail,
-        detail=detail,
-        slopes=slopes,
         symmetric=pupil.rotationally_symmetric(wavelength) and on_axis,
         tolerance=tolerance,
         dtype=dtype,
         masked=pupil.mask is not None,
+        mask_detail=0.0 if pupil.mask is None else pupil.mask.bandwidth(min(tolerance, 0.1), pupil.radius),
         medium_n=beam.index,
         spread=light_spread(pupil),
         even=on_axis and window.centre == (0.0, 0.0) and pupil.mirror_symmetric(wavelength),
+        detail_part=part,
     )

@@ -13,7 +13,8 @@ import numpy as np
 
 from optics.apertures.pixelated import PixelatedAperture
 from optics.elements.beam import Beam
-from optics.methods.problem import Problem, PupilEdge
+from optics.methods.problem import Problem
+from optics.methods.pupil_edge import PupilEdge
 from optics.methods.rayleigh_sommerfeld import node_rule
 from optics.numerics.autodiff import Array
 from optics.numerics.cost import PIXEL_NODE_GEOMETRY
@@ -138,7 +139,7 @@ def pixel_samples(aperture: PixelatedAperture, cycles: float, digits: float, rad
 
 
 def cell_samples(problem: Problem, band: float | None = None) -> PixelSamples | None:
-    """Return the nodes that derivatives by the samples of maps require; None if there would be too many cells.
+    """Return the nodes that derivatives with respect to samples of maps require; None if there would be too many cells.
 
     band: see `Problem.cells`.
     """

@@ -13,23 +13,26 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
+from typing import Any
 
 import numpy as np
 
 from optics.elements.beam import Beam
-from optics.methods.problem import Problem, PupilEdge
+from optics.methods.problem import Problem
+from optics.methods.pupil_edge import PupilEdge
 from optics.methods.pupil_sampling import MOST_ACROSS
 from optics.numerics.autodiff import Array
 from optics.numerics.cost import PUPIL_SAMPLE
 from optics.numerics.field import Field
 from optics.numerics.grid import Grid
-from optics.numerics.precision import Precision, opaque, padded_for_packets
+from optics.numerics.precision import Precision, opaque, padded_for_packets, precision
 
-__all__ = ["SineSamples", "sine_samples"]
+__all__ = ["SineSamples", "evenly_in_sines", "sine_samples"]
 
 # Choice: largest ratio between the distances of samples in the pupil; above it, too many samples are necessary.
 MOST_STRETCH = 3.0
+MOST_SQUARE = 0.95  # choice: largest square of a sine outside the pupil, where there is no light
 RIM = 64  # number of points on the rim from which the range of the sines is determined
 
 
@@ -73,6 +76,33 @@ class SineSamples:
         sx, sy = _sines(x, y, self.centre, self.distance)
         return sx - self._middle[0], sy - self._middle[1]
 
+    @property
+    def points(self) -> tuple[np.ndarray, np.ndarray]:
+        """Points ξ (x, y) [m] of all samples, (y, x)."""
+        x, y, _ = _layout(self)
+        return x, y
+
+    def light(self, beam: Beam, dtype: Any) -> np.ndarray:
+        """Return the result of `field` as a complex NumPy array (y, x), without derivatives.
+
+        dtype: type of the real and imaginary parts, in which the phase is rounded.
+        """
+        x, y, weight = _layout(self)
+        if beam.pupil.mask is not None:
+            weight = weight * beam.pupil.amplitude(x / self.edge.radius, y / self.edge.radius)
+        waves = beam.waves(x, y)
+        waves = ((waves - np.rint(waves)) * (2 * np.pi)).astype(dtype)
+        found = np.empty(waves.shape, np.result_type(dtype, np.complex64))
+        np.multiply(np.cos(waves), weight, out=found.real)
+        np.multiply(np.sin(waves), weight, out=found.imag)
+        return found
+
+    def points_at(self, s: np.ndarray, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the points ξ (x, y) [m] of the pupil in the directions s - s₀."""
+        sx, sy = s + self._middle[0], t + self._middle[1]
+        slant = self.distance / np.sqrt(1 - np.minimum(sx * sx + sy * sy, max(self.steepest**2, MOST_SQUARE)))
+        return sx * slant + self.centre[0], sy * slant + self.centre[1]
+
     def places(self, i: Array, j: Array, beam: Beam, types: Precision) -> tuple[Array, Array]:
         """Return ξ = c + z s/√(1 - s²) [m] of sample i along x and j along y, which are float64 indices."""
         import drjit as dr
@@ -108,6 +138,18 @@ class SineSamples:
         return Field(behind.re * types.Float(area), behind.im * types.Float(area), self.grid, types)
 
 
+@lru_cache(maxsize=64)
+def _layout(samples: SineSamples) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return x and y [m] of the samples, and their areas [m²] times the transmittance of the aperture, (y, x)."""
+    types, radius = precision("float64"), samples.edge.radius
+    sx, sy = np.meshgrid(samples.at + samples._middle[0], samples.at + samples._middle[1])
+    x, y = samples.points_at(sx - samples._middle[0], sy - samples._middle[1])
+    at = (types.Float64(padded_for_packets(part / radius)) for part in (x, y))
+    soft = samples.edge.aperture.transmittance(*at, types).numpy().reshape(x.shape)
+    cosine2 = 1 - np.minimum(sx * sx + sy * sy, max(samples.steepest**2, MOST_SQUARE))
+    return x, y, soft * (samples.distance * samples.grid.dx / cosine2) ** 2
+
+
 def _sines(x: np.ndarray, y: np.ndarray, centre: tuple[float, float], distance: float) -> tuple[np.ndarray, np.ndarray]:
     """Return the sines of the rays from the centre of the window to points (x, y) of the pupil."""
     x, y = x - centre[0], y - centre[1]
@@ -122,26 +164,36 @@ def _middle(centre: tuple[float, float], distance: float) -> tuple[float, float]
 
 
 def sine_samples(problem: Problem) -> SineSamples | None:
-    """Return the fewest samples that resolve the combined phase of pupil and path.
+    """Return the fewest samples that resolve the combined phase of pupil and path; see `evenly_in_sines`."""
+    edge = problem.soft_edge(problem.turning)
+    return evenly_in_sines(problem, edge, problem.turning + edge.stopband)
+
+
+def evenly_in_sines(problem: Problem, edge: PupilEdge, cycles: float, shift: float = 0.0) -> SineSamples | None:
+    """Return samples that resolve a number of cycles per metre of the pupil.
 
     The result is None if samples that are evenly spaced in sines are too uneven in the pupil, or if the grid would be
     too large.
 
     The distance of two points in the pupil is at most z/cos³θ times the distance of their sines. The number of cycles
     per unit of sine is therefore the number of cycles per metre times this factor.
+
+    shift: distance by which the grid is shifted along both axes, in units of its pitch, at most 1.
     """
-    edge = problem.soft_edge(problem.turning)
     angle = np.linspace(0, 2 * np.pi, RIM, endpoint=False)
     centre = problem.window.centre
     rim = _sines(edge.outermost * np.cos(angle), edge.outermost * np.sin(angle), centre, problem.distance)
     middle = _middle(centre, problem.distance)
     steepest = float(np.hypot(*rim).max())
+    if steepest >= 1:  # rounding, in pupils millions of times wider than their distance
+        return None
     stretch = (1 - steepest**2) ** -1.5
     if stretch > MOST_STRETCH * (1 - math.hypot(*middle) ** 2) ** -1.5:
         return None
-    pitch = 1 / (stretch * problem.distance * (problem.turning + edge.stopband))
+    pitch = 1 / (stretch * problem.distance * cycles)
     half = max(float(np.abs(at - middle_at).max()) for at, middle_at in zip(rim, middle, strict=True))
     if half / pitch > MOST_ACROSS:
         return None
-    grid = Grid.square(2 * math.ceil(half / pitch) + 1, pitch)
+    count = 2 * math.ceil(half / pitch + shift) + 1
+    grid = Grid((count, count), pitch, (shift * pitch, shift * pitch))
     return SineSamples(edge, grid, centre, problem.distance, steepest)

@@ -149,8 +149,9 @@ def lagrange_basis(x: np.ndarray, nodes: np.ndarray) -> np.ndarray:
     """Return the values at x of the Lagrange polynomials of arbitrary nodes, (node, *x.shape)."""
     basis = np.ones((len(nodes), *np.shape(x)))
     for i, node in enumerate(nodes):
-        for other in np.delete(nodes, i):
-            basis[i] *= (x - other) / (node - other)
+        for j, other in enumerate(nodes):
+            if j != i:
+                basis[i] *= (x - other) / (node - other)
     return basis
 
 

@@ -10,13 +10,15 @@ from typing import NamedTuple, cast
 
 import numpy as np
 
+from optics.elements.beam import Beam
 from optics.methods.geometric import NoDerivativesError
 from optics.methods.method_sampling import Sampling, WithField
 from optics.methods.problem import Problem
+from optics.methods.window_sampling import WindowSampling
 from optics.numerics.accuracy import FLOAT_NOISE, AccuracyError, Plan, above
 from optics.numerics.autodiff import Array
 from optics.numerics.field import Field
-from optics.numerics.precision import opaque, precision
+from optics.numerics.precision import opaque, padded_for_packets, precision
 from optics.point_spread.request import Request
 from optics.point_spread.spot_check import spot_check
 from optics.point_spread.window_cost import check_window
@@ -49,7 +51,7 @@ class _Attempt:
     """A PSF, and the parameters from which it was computed.
 
     request: the request, whose tolerance may be smaller than that of the user's request.
-    image: the PSF as a flat array.
+    image: the PSF as a flat array, of Dr.Jit or, without derivatives, of NumPy.
     """
 
     request: Request
@@ -68,18 +70,18 @@ class _Attempt:
 
         plan, sampling = planned
         problem, beam = request.problem, request.beam
-        types = precision(problem.dtype)
-        radius = opaque(types, beam.radius)
-        area = types.Float(beam.pupil.aperture.area * radius * radius)
         if not request.keeps_field:
             try:
-                return cls(request, plan, sampling, sampling.intensity(beam, problem) / area)
+                if isinstance(sampling, WindowSampling) and not problem.differentiated:
+                    return cls(request, plan, sampling, sampling.plain_intensity(beam, problem) / beam.pupil.area)
+                return cls(request, plan, sampling, sampling.intensity(beam, problem) / _area(beam, problem))
             except NoDerivativesError:
                 if request.method != "auto":
                     raise
             request = replace(request, method="exact")
             return cls.at(request, request.planned())
         whole = cast(WithField, sampling).field(beam, problem)
+        types, area = precision(problem.dtype), _area(beam, problem)
         waves = opaque(types, beam.distance) * opaque(types, 1 / problem.wavelength)
         # dr.rsqrt has an error of 1e-6 on a GPU, also in float64.
         field = whole * Field.from_waves(1 / dr.sqrt(area), waves, whole.grid, types)
@@ -92,8 +94,10 @@ class _Attempt:
 
     def stated(self, error: float) -> PSFPicture:
         """Return the PSF, and its plan with this error as the predicted error."""
-        plan = replace(self.plan, predicted_error=error)
-        return PSFPicture(self.image, plan, self.field, self.sampling, self.request.problem)
+        plan, types = replace(self.plan, predicted_error=error), precision(self.request.problem.dtype)
+        plain = isinstance(self.image, np.ndarray)
+        image = types.Float(padded_for_packets(self.image)) if plain else self.image
+        return PSFPicture(image, plan, self.field, self.sampling, self.request.problem)
 
     def repeated(self, error: float, tolerance: float, last: bool) -> _Attempt | None:
         """Return the next attempt, after the spot check has found an error above the tolerance.
@@ -118,6 +122,13 @@ class _Attempt:
         return _Attempt.at(request, request.planned())
 
 
+def _area(beam: Beam, problem: Problem) -> Array:
+    """Return the area of the open pupil [m²] with the derivative of its radius."""
+    types = precision(problem.dtype)
+    radius = opaque(types, beam.radius)
+    return types.Float(beam.pupil.aperture.area * radius * radius)
+
+
 def pictures(requests: Sequence[Request], alike: bool = False) -> list[PSFPicture]:
     """Return PSFs as flat arrays, with their plans.
 
@@ -140,9 +151,9 @@ def pictures(requests: Sequence[Request], alike: bool = False) -> list[PSFPictur
         planned.append((told, told.planned()))
     started = [_Attempt.at(*each) for each in planned]
     for attempt in started:
-        dr.eval(
-            attempt.image, attempt.field and (attempt.field.re, attempt.field.im)
-        )  # each PSF has its own kernel launch, since a joint kernel would be compiled again for every number of PSFs
+        if not isinstance(attempt.image, np.ndarray):
+            # Each PSF has its own kernel launch, since a joint kernel would be compiled again for every number of PSFs.
+            dr.eval(attempt.image, attempt.field and (attempt.field.re, attempt.field.im))
     return [_checked(attempt, attempt.request, TRIES) for attempt in started]
 
 
@@ -156,8 +167,11 @@ def _checked(attempt: _Attempt, asked: Request, tries: int) -> PSFPicture:
         AccuracyError: the error of the last attempt also exceeds the tolerance.
     """
     problem, tolerance = attempt.request.problem, asked.problem.tolerance
-    image = attempt.image.numpy()
-    error = spot_check(attempt.request.beam, problem, image, attempt.sampling.seconds)
+    image = attempt.image if isinstance(attempt.image, np.ndarray) else attempt.image.numpy()
+    if isinstance(attempt.sampling, WindowSampling):
+        error = attempt.sampling.error(attempt.request.beam, problem, image)
+    else:
+        error = spot_check(attempt.request.beam, problem, image, attempt.sampling.seconds)
     if error is None:
         return attempt.stated(_predicted_error(image, attempt.sampling, problem))
     named = attempt.approximates and asked.method == attempt.plan.method

@@ -45,6 +45,7 @@ from optics.methods.method_sampling import Sampling
 from optics.methods.pixelated_spectrum import split_pixel_spectrum, whole_pixel_spectrum
 from optics.methods.problem import Problem
 from optics.methods.rayleigh_sommerfeld import nodes
+from optics.methods.window_sampling import DERIVATIVE_ERROR, WindowSampling, window_sampling
 from optics.numerics.accuracy import (
     FLOAT_NOISE,
     MOST_BYTES,
@@ -124,13 +125,12 @@ WEIGHING = {
     "angular_spectrum": Weighing(CALL["angular_spectrum"] + 2 * DFT_CALL, 0.0, 6e-4),
     "split_angular_spectrum": Weighing(CALL["angular_spectrum"] + 3 * DFT_CALL, 0.0, 6e-4),
 }
+OTHERS = 4e-3  # choice: time [s] of planning any other method if "low_rank" is planned first, at coarse tolerances
 
 
 @lru_cache(maxsize=256)
 def choose(problem: Problem, method: str = "auto", most_seconds: float = MOST_SECONDS) -> tuple[Plan, Sampling]:
-    """Return the plan and the fastest sampling that meets the problem's tolerance.
-
-    Planning takes as long as a small PSF, so plans are cached.
+    """Return the plan and the fastest sampling that meets the problem's tolerance. Plans are cached.
 
     method: "auto" compares all methods that may save time, "exact" only exact methods, and "field" only exact methods
         with a complex field. A method's name selects that method. Its sampling must then meet the tolerance, but the
@@ -147,17 +147,19 @@ def choose(problem: Problem, method: str = "auto", most_seconds: float = MOST_SE
         raise ValueError(f"method = {method!r}: must be 'auto', 'exact' or one of {', '.join(METHODS)}")
     _check_dtype(problem)
     check_window(problem.window, problem.dtype)
-    allowed = _model_tolerance(problem) if method == "auto" else math.inf
-    outputs = math.prod(problem.window.shape)
+    allowed, outputs = _model_tolerance(problem) if method == "auto" else math.inf, math.prod(problem.window.shape)
     known = FOR_PIXELS if problem.divided else METHODS
     weighed: dict[str, Sampling] = {}
     best: Sampling | None = None
-    for name in sorted(set(asked) & set(known), key=list(WEIGHING).index):
-        if best is not None and not WEIGHING[name].pays(best.seconds, outputs):
+    coarse = window_sampling(problem) if {"low_rank"} <= {*asked} & {*known} else None
+    first = "" if coarse is None else "low_rank"
+    names = sorted({*asked} & {*known}, key=lambda name: (name != first, list(WEIGHING).index(name)))
+    for name in names:
+        if best is not None and not WEIGHING[name].pays(best.seconds - (OTHERS if first else 0.0), outputs):
             continue
         if name == "fraunhofer" and "fresnel" in weighed and weighed["fresnel"].model_error > allowed:
             continue  # Fraunhofer's integral is less accurate than Fresnel's
-        samplings = known[name](problem)
+        samplings = [coarse] if coarse is not None and name == "low_rank" else known[name](problem)
         if not samplings:
             continue
         weighed[name] = option = min(samplings, key=lambda each: _cost(each, problem))
@@ -168,7 +170,7 @@ def choose(problem: Problem, method: str = "auto", most_seconds: float = MOST_SE
         in_memory = [_seconds(each, problem) for each in candidates if _bytes(each, problem) <= MOST_BYTES]
         raise AccuracyError(_refusal(problem, candidates, most_seconds, method), seconds=min(in_memory, default=None))
     in_order = {name: weighed[name] for name in asked if name in weighed}
-    return _plan(problem, best, in_order, most_seconds), best
+    return _plan(problem, best, in_order, most_seconds, len(asked) > 1), best
 
 
 def _check_dtype(problem: Problem) -> None:
@@ -204,7 +206,7 @@ def _within(option: Sampling, problem: Problem, most_seconds: float) -> bool:
     return _bytes(option, problem) <= MOST_BYTES and _seconds(option, problem) <= most_seconds
 
 
-def _plan(problem: Problem, best: Sampling, weighed: dict[str, Sampling], most_seconds: float) -> Plan:
+def _plan(problem: Problem, best: Sampling, weighed: dict[str, Sampling], most_seconds: float, auto: bool) -> Plan:
     options = [
         Option(
             name,
@@ -218,12 +220,13 @@ def _plan(problem: Problem, best: Sampling, weighed: dict[str, Sampling], most_s
     why = (
         f"Fresnel number {problem.fresnel_number:.3g}, sine of the steepest ray kept "
         f"{problem.band() * problem.wavelength:.2g}; "
-        + ("cheapest method that meets the tolerance" if len(weighed) > 1 else "requested")
+        + ("cheapest method that meets the tolerance" if auto else "requested")
         + _why_for_derivatives(problem, best)
     )
     error = _sampling_error(problem) + best.model_error
     sampled = best.method, best.samples, problem.dtype, error, why, _seconds(best, problem)
-    derivatives = problem.tolerance if problem.differentiated and not best.model_error else None
+    factor = DERIVATIVE_ERROR if isinstance(best, WindowSampling) else 1.0
+    derivatives = factor * problem.tolerance if problem.differentiated and not best.model_error else None
     return Plan(*sampled, tuple(options), best.padding, problem.scalar_error, derivatives)
 
 
@@ -235,7 +238,9 @@ def _why_for_derivatives(problem: Problem, best: Sampling) -> str:
         return "; an approximation predicts no error of derivatives"
     if problem.knots is None:
         return "; derivatives exclude approximations"
-    return f"; derivatives by the samples of maps need nodes in each cell between knots ({problem.knots.maps})"
+    if isinstance(best, WindowSampling):
+        return f"; derivatives with respect to samples of maps need more samples ({problem.knots.maps})"
+    return f"; derivatives with respect to samples of maps need nodes in each cell between knots ({problem.knots.maps})"
 
 
 def _verdict(option: Sampling, best: Sampling, problem: Problem, most_seconds: float) -> str:
@@ -263,13 +268,13 @@ def _refusal(problem: Problem, found: list[Sampling], most_seconds: float, metho
     width = 2 * problem.window.half_width
     if not found and problem.knots is not None and method in {*METHODS} - {*FOR_PIXELS}:
         return (
-            f"method = {method!r}: cannot compute derivatives by the samples of maps ({problem.knots.maps}); use "
-            f"method='auto' or one of {', '.join(FOR_PIXELS)}"
+            f"method = {method!r}: cannot compute derivatives with respect to samples of maps ({problem.knots.maps}); "
+            f"use method='auto' or one of {', '.join(FOR_PIXELS)}"
         )
     if not found and problem.knots is not None:
         return (
-            f"tolerance = {problem.tolerance:g}: derivatives by the samples of maps ({problem.knots.maps}) need too "
-            f"many nodes: widen the tolerance, or shrink the window ({width:.3g} m) or the pupil (radius "
+            f"tolerance = {problem.tolerance:g}: derivatives with respect to samples of maps ({problem.knots.maps}) "
+            f"need too many nodes: widen the tolerance, or shrink the window ({width:.3g} m) or the pupil (radius "
             f"{problem.radius:.3g} m)"
         )
     if not found and problem.pixelated is not None:
@@ -286,9 +291,9 @@ def _refusal(problem: Problem, found: list[Sampling], most_seconds: float, metho
             "use method='rayleigh_sommerfeld'"
         )
     least = min(found, key=lambda option: option.seconds)
-    purpose = "" if problem.knots is None else f" for derivatives by the samples of maps ({problem.knots.maps})"
+    maps = "" if problem.knots is None else f" for derivatives with respect to samples of maps ({problem.knots.maps})"
     return (
-        f"tolerance = {problem.tolerance:g}{purpose} needs {_count(least)}, {size_of(_bytes(least, problem))} and "
+        f"tolerance = {problem.tolerance:g}{maps} needs {_count(least)}, {size_of(_bytes(least, problem))} and "
         f"about {_seconds(least, problem):.2g} s by {least.method}; the limits are {size_of(MOST_BYTES)} and "
         f"{most_seconds:g} s: widen the tolerance, shrink the window ({width:.3g} m) or the pupil (radius "
         f"{problem.radius:.3g} m, Fresnel number {problem.fresnel_number:.3g})"

@@ -41,7 +41,7 @@ SAMPLING = 0.2  # choice: error due to the soft edge, relative to the tolerance
 # Choice: smallest transmitted light, relative to a mask's brightest light near the aperture's edge, for which SAMPLING
 # is valid; see test_population_members.py. The error of the soft edge is relative to the light near the edge.
 LEAST_LIGHT = 1e-2
-SPREAD = 1.1  # choice: error of the intensity divided by the spread of the phase; see test_population.py
+SPREAD = 1.4  # choice: error of the intensity divided by the spread of the phase; see test_population.py
 TURNS = 1.3  # choice: ratio of successive numbers of samples; similar pupils then share a plan
 STACK = 2_000_000  # choice, limited by memory: samples of pupils in a stack
 RINGS = 12  # choice: number of rings of the window for which the error is predicted

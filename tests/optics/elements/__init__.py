@@ -10,6 +10,8 @@ fine_detail: test_fine_detail.py, eye/test_scattered_light.py
 human_eye: test_human_eye.py
 phase_pupil: test_phase_pupil.py
 pixel_relief: test_pixel_relief.py
+pupil_slopes: test_pupil.py
+zernike_modes: test_wavefront.py
 pupil: test_pupil.py
 pupil_rim: test_exit_pupil.py, test_exit_pupil_off_axis.py
 ray_field: point_spread/test_vector_focus.py

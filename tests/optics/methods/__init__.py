@@ -8,6 +8,11 @@ far_field_nodes: test_far_field.py
 fresnel: test_fresnel.py
 geometric: test_geometric.py
 hankel: test_textbook.py, test_oracles_circular.py
+pupil_edge: test_sine_samples.py
+slow_factor: test_low_rank.py
+window_check: test_window_sampling.py
+window_sampling: test_window_sampling.py
+window_sums: test_window_sampling.py
 low_rank: test_low_rank.py, test_textbook.py
 pixelated_spectrum: elements/test_pixel_relief.py
 problem: point_spread/test_planner.py

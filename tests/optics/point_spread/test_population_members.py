@@ -101,6 +101,19 @@ def test_light_from_one_side_of_a_near_pupil(side):
     assert error < (0.03 if side < 0 else 0.08)
 
 
+def test_the_prediction_holds_behind_a_graded_mask_and_a_prism():
+    """The error is 0.115. A smaller factor between the spread of the phase and the error would predict 0.097."""
+    mask = optics.MaskMap(np.broadcast_to(0.45 + 0.422 * np.linspace(-1, 1, 5), (5, 5)))
+    prism = optics.Zernike({(1, 1): 0.376})
+    pupil = optics.Pupil(3e-6, thin_lens_focal_length=20e-6, mask=mask, wavefront=prism)
+    window = Grid.square(33, 0.247e-6)
+    [(_, image, plan)] = population_pictures([Member(pupil, LAMBDA, 20e-6, math.inf)], window, 0.2)
+    ask = {"dx": window.dx, "shape": window.shape, "tolerance": 1e-5, "dtype": "float64"}
+    error = relative_l2(image, optics.psf(pupil, [LAMBDA], 20e-6, **ask).psf[0])
+    assert 0.11 < error <= plan.predicted_error < 0.2
+    assert not list(population_pictures([Member(pupil, LAMBDA, 20e-6, math.inf)], window, 0.1))
+
+
 def test_what_it_leaves_to_others():
     plain = optics.Pupil(10e-6, wavefront=optics.Zernike({(2, 0): 0.1}), mask=optics.GaussianMask(10e-6), object_n=1.2)
     assert Member(plain, LAMBDA, Z, math.inf).plain

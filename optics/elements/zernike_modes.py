@@ -1,0 +1,56 @@
+"""Zernike polynomials, and sums of many of them at the same points."""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+__all__ = ["mode", "norm", "weighted_modes"]
+
+MOST_CACHED = 4_000_000  # choice, limited by memory: largest number of values of polynomials that are cached together
+
+
+def mode(n: int, m: int, x: Any, y: Any) -> Any:
+    """Return Z_n^m at (x, y), NumPy or Dr.Jit: ρ^|m| P_k^(0, |m|)(2ρ² - 1) {cos, sin} with k = (n - |m|)/2.
+
+    The recurrence of Jacobi's polynomials loses no digits at high orders (Abramowitz & Stegun 22.7.1).
+    """
+    sine, cosine = x * 0, x * 0 + 1.0
+    for _ in range(abs(m)):
+        cosine, sine = cosine * x - sine * y, cosine * y + sine * x
+    t, order = 2 * (x * x + y * y) - 1, abs(m)
+    before, now = x * 0, x * 0 + 1.0
+    for k in range(1, (n - order) // 2 + 1):
+        c = 2 * k + order
+        if k == 1:
+            before, now = now, 1 + (order + 2) / 2 * (t - 1)
+            continue
+        raised = (c - 1) * (c * (c - 2) * t - order**2) * now - 2 * (k - 1) * (k + order - 1) * c * before
+        before, now = now, raised / (2 * k * (k + order) * (c - 2))
+    return norm(n, m) * now * (cosine if m >= 0 else sine)
+
+
+def weighted_modes(weights: np.ndarray, named: tuple[tuple[int, int], ...], x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """Return Σ w Z_n^m at (x, y). Many wavefronts have the same samples, so the polynomials are cached for them."""
+    size = np.broadcast_shapes(x.shape, y.shape)
+    if len(named) * math.prod(size) > MOST_CACHED:
+        return np.asarray(sum((w * mode(n, m, x, y) for w, (n, m) in zip(weights, named, strict=True)), np.zeros(size)))
+    known = _modes(named, x.tobytes(), x.shape, y.tobytes(), y.shape)
+    return np.asarray((weights @ known).reshape(size))
+
+
+@lru_cache(maxsize=8)
+def _modes(
+    named: tuple[tuple[int, int], ...], x: bytes, columns: tuple[int, ...], y: bytes, rows: tuple[int, ...]
+) -> np.ndarray:
+    """Return the polynomials at (x, y), (mode, point). Positions are float64."""
+    at = np.frombuffer(x).reshape(columns), np.frombuffer(y).reshape(rows)
+    size = np.broadcast_shapes(columns, rows)
+    return np.stack([np.broadcast_to(mode(n, m, *at), size).ravel() for n, m in named])
+
+
+def norm(n: int, m: int) -> float:
+    return math.sqrt((2 - (m == 0)) * (n + 1))

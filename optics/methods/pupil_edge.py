@@ -1,0 +1,31 @@
+"""The soft edge of an aperture, scaled to the radius of a pupil."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from optics.apertures.aperture import SoftAperture
+
+__all__ = ["PupilEdge"]
+
+
+@dataclass(frozen=True)
+class PupilEdge:
+    """A soft aperture, scaled to a pupil of the given radius [m]."""
+
+    aperture: SoftAperture
+    radius: float
+
+    @property
+    def outermost(self) -> float:
+        """Distance from the axis [m] beyond which the aperture is closed."""
+        return (1 + self.aperture.reach) * self.radius
+
+    @property
+    def stopband(self) -> float:
+        """Frequency [1/m] beyond which the spectrum is below the ripple."""
+        return self.aperture.stopband / self.radius
+
+    @property
+    def seconds_per_point(self) -> float:
+        return self.aperture.seconds_per_point

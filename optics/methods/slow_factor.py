@@ -1,0 +1,114 @@
+"""The factor by which the diffraction kernel differs from a Fourier kernel. It varies slowly over the window.
+
+A few Chebyshev points per axis of the window are enough to interpolate it. Their number is the rank of the factor.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from optics.methods.problem import Problem
+from optics.methods.pupil_sampling import PupilSamples
+from optics.methods.sine_samples import SineSamples
+from optics.numerics.grid import Grid
+from optics.numerics.interpolation import chebyshev_points, lagrange_basis
+
+__all__ = ["RANKS", "Path", "fourier_kernel", "slow_factor", "uniform_rank"]
+
+# Choice: ranks to try, in ascending order.
+RANKS = (1, 2, 3, 4, 5, 6, 7, 8, 10, 12, 14, 16, 20, 24)
+# Choice: allowed error of the slow factor at the pupil's rim, relative to the tolerance; see test_low_rank.py.
+RANK_RIPPLE = 0.4
+TRIED = 41  # choice: number of test positions along a line through the window
+
+
+@dataclass(frozen=True)
+class Path:
+    """The geometry of a problem: the wavelength [m] in the medium, and the distance [m] and samples of the window."""
+
+    wavelength: float
+    distance: float
+    window: Grid
+
+    @classmethod
+    def from_problem(cls, problem: Problem) -> Path:
+        return cls(problem.wavelength, problem.distance, problem.window)
+
+
+def uniform_rank(problem: Problem, pupil: PupilSamples, half: float, scale: float, most: int) -> int | None:
+    """Return the number of Chebyshev points per axis that interpolate the slow factor; None if `most` are too few.
+
+    Interpolation is tested for points on the rim of the soft aperture.
+    """
+    angle = np.linspace(0, 2 * np.pi, 8, endpoint=False)[:, None]
+    rim = pupil.outermost * np.cos(angle), pupil.outermost * np.sin(angle)
+    directions = pupil.directions(*rim) if isinstance(pupil, SineSamples) else (rim[0] / scale, rim[1] / scale)
+    test, path = half * np.linspace(-1, 1, TRIED), Path.from_problem(problem)
+    # If the window lies on the axis, x and y are equivalent, and so are both sides of the window.
+    on_axis = problem.window.centre == (0.0, 0.0)
+    lines = [(0, 0.0), (0, half)] if on_axis else [(k, side) for k in (0, 1) for side in (-half, 0, half)]
+
+    def rest(at: np.ndarray) -> np.ndarray:
+        """Return the slow factor, (line, point of the rim, position on the line)."""
+        u, v = np.stack([_line(axis, at, across) for axis, across in lines], axis=1)[:, :, None, :]
+        return slow_factor(path, rim, directions, (u, v))
+
+    exact = rest(test)
+    for rank in RANKS:
+        if rank > most:
+            return None
+        known = rest(half * chebyshev_points(rank))
+        if np.abs(exact - known @ _between(rank)).max() < RANK_RIPPLE * problem.tolerance:
+            return rank
+    return None
+
+
+@lru_cache(maxsize=len(RANKS))
+def _between(rank: int) -> np.ndarray:
+    """Return interpolation weights of `rank` Chebyshev points at the test positions, (point, position)."""
+    return lagrange_basis(np.linspace(-1, 1, TRIED), chebyshev_points(rank))
+
+
+def _line(along: int, at: np.ndarray, across: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return points (x, y) of a line along x (0) or y (1), relative to the window's centre."""
+    beside = np.full_like(at, across)
+    return (at, beside) if along == 0 else (beside, at)
+
+
+def slow_factor(
+    path: Path,
+    pupil: tuple[np.ndarray, np.ndarray],
+    directions: tuple[np.ndarray, np.ndarray],
+    window: tuple[np.ndarray, np.ndarray],
+) -> np.ndarray:
+    """Return the slow factor (z/D)² e^{ik(D - ρ + u·s)} between points ξ of the pupil and points u of the window.
+
+    s is the direction of ξ in the Fourier kernel e^{-ik s·u}.
+    """
+    (xi, eta), (u, v), (s, t) = pupil, window, directions
+    x, y = u + path.window.centre[0], v + path.window.centre[1]
+    z = path.distance
+    rho2 = x * x + y * y + z * z
+    excess = xi**2 + eta**2 - 2 * (x * xi + y * eta)
+    distance = np.sqrt(rho2 + excess)
+    waves = (excess / (distance + np.sqrt(rho2)) + u * s + v * t) / path.wavelength
+    return z * z / distance**2 * np.exp(2j * np.pi * waves)
+
+
+def fourier_kernel(
+    at: np.ndarray, directions: np.ndarray, nodes: np.ndarray, wavelength: float, dtype: str
+) -> np.ndarray:
+    """Return A[x, (a, ξ)] = L_a(u) e^{-ik s u} for positions u [m] along an axis, relative to the window's centre.
+
+    directions: s of each sample.
+    nodes: interpolation points a [m].
+    dtype: "float32" or "float64".
+    """
+    waves = np.outer(at, directions) / -wavelength
+    angle = (2 * np.pi * (waves - np.rint(waves))).astype(dtype)
+    weight = lagrange_basis(at, nodes).T.astype(dtype)
+    found: np.ndarray = weight[:, :, None] * (np.cos(angle) + 1j * np.sin(angle))[:, None, :]
+    return found.reshape(len(at), -1)

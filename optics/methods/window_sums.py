@@ -1,0 +1,139 @@
+"""Sums over the pupil for all samples of a window, as stacked matrix products, and their adjoint.
+
+    U[y, x] = Σ_ba Σ_ηξ down[y, bη] P[η, ξ] kernel[b, a, η, ξ] across[x, aξ]
+
+P is the light behind the pupil, times the areas of its samples. `down` and `across` are Fourier kernels times the
+interpolation weights of the points (b, a) of the window, and `kernel` is the slow factor at these points. At rank 1,
+there is one such point, and the sum is the matrix Fourier transform of P times one factor. These three arrays describe
+the geometry alone, so all light that passes the same samples shares them.
+
+`window_field` and `pupil_gradient` accept arrays of any library with the operators of NumPy, such as PyTorch, and any
+number of leading axes (pupil, depth, wavelength), which are broadcast.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from optics.numerics.autodiff import Array, Scalar, carries_derivative
+from optics.numerics.field import Field
+from optics.numerics.grid import Grid
+from optics.numerics.precision import Precision, padded_for_packets
+
+__all__ = ["WindowSums", "intensity_of", "pupil_gradient", "recorded_field", "window_field"]
+
+
+def window_field(pupil: Any, kernel: Any, down: Any, across: Any) -> Any:
+    """Return the field U over the window, (..., y, x), complex.
+
+    pupil: light behind the pupil times the areas of the samples, (..., η, ξ), complex.
+    kernel: slow factor, (..., b, a, η, ξ), complex.
+    down, across: Fourier kernels along y and x, (..., y, b·η) and (..., x, a·ξ), complex.
+    """
+    return down @ _weighted(pupil, kernel) @ across.swapaxes(-1, -2)
+
+
+def pupil_gradient(cotangent: Any, kernel: Any, down: Any, across: Any) -> Any:
+    """Return the gradient of a loss L with respect to the pupil, ∂L/∂Re P + i ∂L/∂Im P, (..., η, ξ).
+
+    It is the adjoint of `window_field` and takes about as long.
+
+    cotangent: ∂L/∂Re U + i ∂L/∂Im U, (..., y, x). For a loss on the intensity |U|², it is 2U ∂L/∂|U|².
+    """
+    inner = down.conj().swapaxes(-1, -2) @ cotangent @ across.conj()
+    rows, columns, height, width = kernel.shape[-4:]
+    split = inner.reshape((*inner.shape[:-2], rows, height, columns, width)).swapaxes(-3, -2)
+    return (split * kernel.conj()).sum((-4, -3))
+
+
+def _weighted(pupil: Any, kernel: Any) -> Any:
+    """Return P[η, ξ] kernel[b, a, η, ξ] as matrices (..., b·η, a·ξ)."""
+    rows, columns, height, width = kernel.shape[-4:]
+    if rows == columns == 1:
+        return pupil * kernel[..., 0, 0, :, :]
+    product = (pupil[..., None, None, :, :] * kernel).swapaxes(-3, -2)
+    return product.reshape((*product.shape[:-4], rows * height, columns * width))
+
+
+def intensity_of(field: np.ndarray) -> np.ndarray:
+    """Return |U|²."""
+    found: np.ndarray = np.square(field.real) + np.square(field.imag)
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class WindowSums:
+    """The arrays of `window_field` for one pupil and one window, without leading axes.
+
+    by_distance: function that returns the derivative of `kernel` with respect to the distance of the window [1/m].
+    """
+
+    kernel: np.ndarray
+    down: np.ndarray
+    across: np.ndarray
+    by_distance: Callable[[], np.ndarray]
+
+    def field(self, pupil: np.ndarray) -> np.ndarray:
+        found: np.ndarray = window_field(pupil, self.kernel, self.down, self.across)
+        return found
+
+    def gradient(self, cotangent: np.ndarray) -> np.ndarray:
+        found: np.ndarray = pupil_gradient(cotangent, self.kernel, self.down, self.across)
+        return found
+
+    def moved(self, pupil: np.ndarray) -> np.ndarray:
+        """Return the derivative of the field with respect to the distance of the window."""
+        found: np.ndarray = window_field(pupil, self.by_distance(), self.down, self.across)
+        return found
+
+
+def recorded_field(pupil: Field, distance: Scalar, sums: WindowSums, window: Grid) -> Field:
+    """Return the field over the window, with derivatives with respect to the pupil's light and the distance."""
+    import drjit as dr
+
+    types, shape = pupil.types, pupil.grid.shape
+    moves = carries_derivative(distance)
+
+    class WindowField(dr.CustomOp):
+        """The sums as one operation. For derivatives with respect to the distance, it stores the pupil's light."""
+
+        def eval(self, re: Array, im: Array, distance: Array) -> tuple[Array, Array]:
+            self.pupil = _complex(re, im, shape)
+            return _parts(sums.field(self.pupil), types)
+
+        def forward(self) -> None:
+            changed = sums.field(_complex(self.grad_in("re"), self.grad_in("im"), shape))
+            if moves:
+                changed = changed + sums.moved(self.pupil) * self.grad_in("distance").numpy()[0]
+            self.set_grad_out(_parts(changed, types))
+
+        def backward(self) -> None:
+            cotangent = _complex(*self.grad_out(), window.shape)
+            re, im = _parts(sums.gradient(cotangent), types)
+            self.set_grad_in("re", re)
+            self.set_grad_in("im", im)
+            if moves:
+                self.set_grad_in("distance", types.Float64(float(np.vdot(cotangent, sums.moved(self.pupil)).real)))
+
+    place = types.Float64(dr.ravel(distance)) if moves else types.Float64(0)
+    return Field(*dr.custom(WindowField, pupil.re, pupil.im, place), window, types)
+
+
+def _parts(values: np.ndarray, types: Precision) -> tuple[Array, Array]:
+    """Return real and imaginary part as flat Dr.Jit arrays."""
+    return types.Float(padded_for_packets(values.real)), types.Float(padded_for_packets(values.imag))
+
+
+def _complex(re: Array, im: Array, shape: tuple[int, int]) -> np.ndarray:
+    """Return two flat Dr.Jit arrays as one complex NumPy array."""
+    import drjit as dr
+
+    dr.eval(re, im)  # one kernel for both, since separate kernels would compute their common terms twice
+    parts = re.numpy(), im.numpy()
+    found = np.empty(shape, np.result_type(parts[0], np.complex64))
+    found.real, found.imag = (part.reshape(shape) for part in parts)
+    return found
