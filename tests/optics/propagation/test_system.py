@@ -210,7 +210,7 @@ def test_derivatives_are_refused_not_dropped():
 
 @pytest.mark.parametrize("distance", [np.inf, 0.1])
 def test_numbers_of_drjit_are_plain_numbers_of_a_source(distance):
-    """With a derivative they are refused, also if the source is at a finite distance from a decentred pupil."""
+    """Derivatives are refused, also of a source at a finite distance from a decentred pupil."""
     import drjit as dr
 
     from optics.numerics.precision import precision
