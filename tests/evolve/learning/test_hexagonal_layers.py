@@ -125,7 +125,13 @@ def test_neighbours_in_a_file_do_not_replace_those_of_the_directions(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "change", [{"directions": [[1.0, 0, 0]]}, {"directions": []}, {"directions": [[2.0, 0, 0]] * len(PATCH)}]
+    "change",
+    [
+        {"directions": [[1.0, 0, 0]]},
+        {"directions": []},
+        {"directions": [[2.0, 0, 0]] * len(PATCH)},
+        {"directions": [[10.0, 0.0]] * len(PATCH)},
+    ],
 )
 def test_directions_that_do_not_fit_are_refused(change):
     record = PolicyConfig.from_space(space_of(PATCH), Brain(8)).record()
