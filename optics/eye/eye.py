@@ -247,9 +247,10 @@ class Eye(EyeSpec):
         if holds_arrays(z) or holds_arrays(self):
             return self.sight(samples_per_receptor, z)
         key = samples_per_receptor, distances_of(z)
-        if vars(self).get(LAST, (None,))[0] != key:
-            vars(self)[LAST] = key, self.sight(samples_per_receptor, z)
-        bank: KernelBank = vars(self)[LAST][1]
+        known, bank = vars(self).get(LAST, (None, None))
+        if known != key:
+            bank = self.sight(samples_per_receptor, z)
+            vars(self)[LAST] = key, bank
         return bank
 
     def __getstate__(self) -> dict[str, Any]:
