@@ -183,7 +183,7 @@ def _matrices(how: SeparableSampling, types: Precision) -> tuple[np.ndarray, np.
 
 
 def _distance(passage: Passage, x: np.ndarray | float, y: np.ndarray | float) -> np.ndarray:
-    found: np.ndarray = np.sqrt(passage.z**2 + np.square(x) + np.square(y))
+    found: np.ndarray = np.hypot(passage.z, np.hypot(x, y))
     return found
 
 
