@@ -20,6 +20,7 @@ layered_image         image of a scene with many distances
 polarization          microvilli over a retina and polarised scenes
 signals               signals of a scene
 photoreceptor         throughput, spectral weighting, noise
+camera                image of a scene on the sensor of a camera
 summary               table of an eye's limits
 acuity                limits by the spacing of receptors, diffraction and photons
 """

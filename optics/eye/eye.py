@@ -253,9 +253,9 @@ class Eye(EyeSpec):
 
         Kernels that depend on Dr.Jit arrays are computed again, because these may carry derivatives.
         """
-        if holds_arrays(z) or holds_arrays(self):
-            return self.sight(samples_per_receptor, z)
         layers, distances = layers_for(z)
+        if holds_arrays(z) or holds_arrays(self):
+            return self._sight_for(samples_per_receptor, z, layers)
         key = samples_per_receptor, distances
         if vars(self).get(LAST, (None,))[0] != key:
             vars(self)[LAST] = key, self._sight_for(samples_per_receptor, z, layers)

@@ -21,5 +21,6 @@ receptor_kernel: test_guided_field.py, test_eye.py
 retina: test_kept_kernels.py, test_receptive_field.py
 retinal_image: test_retinal_image.py
 sensor_pixels: test_torch.py
+camera: test_camera.py
 summary: test_summary.py
 """
