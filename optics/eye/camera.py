@@ -20,7 +20,7 @@ from optics.spectra.photon_budget import PhotonBudget
 from optics.spectra.receptors import receptors_of
 from optics.spectra.srgb import decode_srgb, ink_radiance
 
-__all__ = ["Sensor", "camera_eye", "image"]
+__all__ = ["Sensor", "camera_eye", "camera_image"]
 
 BAYER = ((0, 1), (1, 2))  # rows of types: red, green; green, blue
 
@@ -68,7 +68,7 @@ class Sensor:
         whole("bands", self.bands, 1, 64)
 
 
-def image(
+def camera_image(
     scene: Any,
     lens: Pupil | Eye,
     sensor: Sensor | None = None,
@@ -100,7 +100,7 @@ def image(
 
     Returns digital numbers as uint16 or, if `sensor.bits` is None, electrons. There is one channel with a mosaic, and
     otherwise one for each type. If the pupil carries derivatives, the result is a Dr.Jit tensor of electrons. For
-    PyTorch, see `optics.torch.image`.
+    PyTorch, see `optics.torch.camera_image`.
 
     Raises:
         ValueError: an argument is invalid; the message names it with its value and valid range.
@@ -123,7 +123,7 @@ def camera_eye(
 ) -> Eye:
     """Return the eye that a pupil and a sensor form: its receptors are the pixels, and it has no receptor noise.
 
-    Its kernels, PSFs and spectral bands are those of the camera. Arguments as in `image`.
+    Its kernels, PSFs and spectral bands are those of the camera. Arguments as in `camera_image`.
     """
     of_kind("lens", lens, Pupil, "Pupil(1e-3, thin_lens_focal_length=5e-3), or an Eye")
     of_kind("sensor", sensor, Sensor, "Sensor((480, 640), 3e-6)")

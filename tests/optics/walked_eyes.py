@@ -32,7 +32,7 @@ def photographed(**given):
     """Return the image of a camera, and the spectral bands of its eye."""
     sensor = optics.Sensor((2, 4), 4e-6, **given)
     scene = np.linspace(0, 1, 8 * 10 * 3).reshape(8, 10, 3)[:, :8]
-    found = optics.image(scene, CAMERA_LENS, sensor, rng=np.random.default_rng(0))
+    found = optics.camera_image(scene, CAMERA_LENS, sensor, rng=np.random.default_rng(0))
     return found, optics.camera_eye(CAMERA_LENS, sensor).spectral_bands.wavelengths
 
 
@@ -100,8 +100,8 @@ OF_EYES = {
         lambda **asked: optics.camera_eye(CAMERA_LENS, optics.Sensor((2, 4), 4e-6), **asked).kernel(1),
         {"sensor_distance": 2.1e-3, "tolerance": 0.1},
     ),
-    "image": Walk(
-        lambda **asked: optics.image(COLOURS, **{"lens": CAMERA_LENS, **asked}),
+    "camera_image": Walk(
+        lambda **asked: optics.camera_image(COLOURS, **{"lens": CAMERA_LENS, **asked}),
         {
             "sensor": With(optics.Sensor((2, 4), 5e-6), {"sensor": optics.Sensor((2, 4), 4e-6)}),
             "depth": With(0.02, {"sensor": optics.Sensor((2, 4), 4e-6)}),

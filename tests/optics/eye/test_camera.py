@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import optics
-from optics import Eye, PhotonBudget, Pupil, Sensor, camera_eye, image
+from optics import Eye, PhotonBudget, Pupil, Sensor, camera_eye, camera_image
 
 PUPIL = Pupil(0.25e-3, thin_lens_focal_length=5e-3)
 SENSOR = Sensor((6, 8), 4e-6, bits=None, bands=4)
@@ -21,7 +21,7 @@ def middle(picture):
 
 def test_electrons_of_white_are_those_of_its_irradiance():
     """Lambertian white in daylight has the spectral irradiance π/4 (D/f)² of its radiance, on the area of a pixel."""
-    electrons = middle(image(WHITE, PUPIL, SENSOR))
+    electrons = middle(camera_image(WHITE, PUPIL, SENSOR))
     etendue = math.pi / 4 * SENSOR.pitch**2 * (0.5e-3 / 5e-3) ** 2
     bands = camera_eye(PUPIL, SENSOR).spectral_bands
     red, green, blue = PhotonBudget(1e4, 1e-3).photons(bands, etendue)
@@ -30,27 +30,27 @@ def test_electrons_of_white_are_those_of_its_irradiance():
 
 def test_noise_is_that_of_photons_and_reading():
     sensor, rng = replace(SENSOR, read_noise=15.0), np.random.default_rng(0)
-    many = np.stack([middle(image(WHITE, PUPIL, sensor, rng=rng)) for _ in range(150)])
-    mean = middle(image(WHITE, PUPIL, sensor))
+    many = np.stack([middle(camera_image(WHITE, PUPIL, sensor, rng=rng)) for _ in range(150)])
+    mean = middle(camera_image(WHITE, PUPIL, sensor))
     np.testing.assert_allclose(many.mean(axis=0), mean, atol=5 * np.sqrt((mean + 225).max() / 150))
     assert (many.var(axis=0) / (mean + 225)).mean() == pytest.approx(1, abs=0.15)
 
 
 def test_digital_numbers_are_rounded_and_saturate():
-    electrons = np.asarray(image(WHITE, PUPIL, SENSOR))
+    electrons = np.asarray(camera_image(WHITE, PUPIL, SENSOR))
     full = float(electrons.max()) / 1.5
-    numbers = image(WHITE, PUPIL, replace(SENSOR, bits=8, full_well=full))
+    numbers = camera_image(WHITE, PUPIL, replace(SENSOR, bits=8, full_well=full))
     assert numbers.dtype == np.uint16
     np.testing.assert_array_equal(numbers, np.minimum(np.rint(electrons / full * 255), 255))
     assert numbers.max() == 255 > numbers.min()
-    assert image(0 * WHITE, PUPIL, replace(SENSOR, bits=8), rng=np.random.default_rng(0)).min() == 0
+    assert camera_image(0 * WHITE, PUPIL, replace(SENSOR, bits=8), rng=np.random.default_rng(0)).min() == 0
 
 
 def test_colours_reach_their_pixels():
-    white, red = middle(image(WHITE, PUPIL, SENSOR)), middle(image(WHITE * [1.0, 0, 0], PUPIL, SENSOR))
+    white, red = middle(camera_image(WHITE, PUPIL, SENSOR)), middle(camera_image(WHITE * [1.0, 0, 0], PUPIL, SENSOR))
     (red_pixel, green_pixel), (_, blue_pixel) = (red / white)[:, ::-1]
     assert red_pixel > 2 * green_pixel > 2 * blue_pixel
-    every = image(WHITE, PUPIL, replace(SENSOR, filters="rgb"))
+    every = camera_image(WHITE, PUPIL, replace(SENSOR, filters="rgb"))
     assert every.shape == (3, 6, 8)
     np.testing.assert_allclose(every[0, 2, 4], white[0, 1], rtol=1e-5)
 
@@ -63,7 +63,7 @@ def test_an_srgb_scene_is_a_spectral_scene():
     spectrum = colours[0] + 0.21404 * colours[1]
     radiance = np.broadcast_to(spectrum[:, None, None], (4, *WIDE[:2]))
     np.testing.assert_allclose(
-        image(WHITE * [1, 0.5, 0], PUPIL, SENSOR), image(radiance, PUPIL, SENSOR), rtol=1e-4, atol=1e-3
+        camera_image(WHITE * [1, 0.5, 0], PUPIL, SENSOR), camera_image(radiance, PUPIL, SENSOR), rtol=1e-4, atol=1e-3
     )
 
 
@@ -71,8 +71,8 @@ def test_a_near_surface_hides_the_one_behind():
     """A dark plate, out of focus, before a bright wall: beside the edge the plate only takes light away."""
     scene, depth = np.ones(WIDE), np.full(WIDE[:2], 2.0)
     scene[:, :16], depth[:, :16] = 0.0, 0.04
-    seen = np.asarray(image(scene, PUPIL, replace(SENSOR, filters=(530,)), depth=depth))[0]
-    white = np.asarray(image(WHITE, PUPIL, replace(SENSOR, filters=(530,)), depth=2.0))[0]
+    seen = np.asarray(camera_image(scene, PUPIL, replace(SENSOR, filters=(530,)), depth=depth))[0]
+    white = np.asarray(camera_image(WHITE, PUPIL, replace(SENSOR, filters=(530,)), depth=2.0))[0]
     passing = (seen / white).mean(axis=0)
     assert (np.diff(passing) > 0).all()
     radius = 0.25e-3 * 5e-3 * (1 / 0.04 - 1 / 2) / 4e-6  # blur of the plate in pixels
@@ -85,7 +85,7 @@ def test_an_eye_is_a_camera():
     eye = Eye(Pupil(20e-6, thin_lens_focal_length=150e-6), (4, 4), 60.0, bands=4)
     radiance = np.random.default_rng(0).random((4, 8, 8))
     np.testing.assert_array_equal(
-        image(radiance, eye, samples_per_pixel=2, depth=0.01, rng=np.random.default_rng(1)),
+        camera_image(radiance, eye, samples_per_pixel=2, depth=0.01, rng=np.random.default_rng(1)),
         eye.see(radiance, 2, np.random.default_rng(1), z=0.01),
     )
 
@@ -104,7 +104,7 @@ def test_gradients_pass_from_electrons_to_the_pupil(noisy):
         lens = Pupil(0.2e-3, optics.BSplineRelief(heights), thin_lens_focal_length=focal)
         view = {"depth": depth, "samples_per_pixel": 2, "sensor_distance": 5.05e-3, "tolerance": 3e-3}
         noise = np.random.default_rng(5) if noisy else None
-        return (optics.torch.image(scene, lens, sensor, rng=noise, **view) * weights).sum()
+        return (optics.torch.camera_image(scene, lens, sensor, rng=noise, **view) * weights).sum()
 
     heights = torch.tensor(rng.normal(size=(4, 4)) * 3e-8, requires_grad=True)
     focal = torch.tensor(5e-3, dtype=torch.float64, requires_grad=True)
@@ -139,7 +139,7 @@ def test_gradients_pass_from_electrons_to_the_pupil(noisy):
 )
 def test_bad_images(given, message):
     with pytest.raises(ValueError, match=message) as refused:
-        image(**{"scene": WHITE, "lens": PUPIL, "sensor": SENSOR, **given})
+        camera_image(**{"scene": WHITE, "lens": PUPIL, "sensor": SENSOR, **given})
     assert "\n" not in str(refused.value)
 
 
@@ -168,11 +168,11 @@ def test_derivatives_need_electrons():
     radius = Float64(0.25e-3)
     dr.enable_grad(radius)
     with pytest.raises(ValueError, match="bits = 12 and the pupil carries derivatives: must be None"):
-        image(WHITE, Pupil(radius, thin_lens_focal_length=5e-3), replace(SENSOR, bits=12))
+        camera_image(WHITE, Pupil(radius, thin_lens_focal_length=5e-3), replace(SENSOR, bits=12))
 
 
 def test_kernels_of_a_camera_are_computed_once():
-    first = image(WHITE, PUPIL, SENSOR)
+    first = camera_image(WHITE, PUPIL, SENSOR)
     assert camera_eye(PUPIL, SENSOR) is camera_eye(PUPIL, replace(SENSOR))
     assert camera_eye(PUPIL, SENSOR) is not camera_eye(PUPIL, SENSOR, tolerance=2e-2)
-    np.testing.assert_array_equal(image(WHITE, PUPIL, SENSOR), first)
+    np.testing.assert_array_equal(camera_image(WHITE, PUPIL, SENSOR), first)
