@@ -1,8 +1,8 @@
-"""A robot with the compound eyes of a fly, and the image that they see.
+"""A robot with the compound eyes of a fly, and an image of their signals.
 
 python examples/06_compound_eye.py [--out compound_eyes.png]
 
-Each eye has 721 ommatidia, as an eye of Drosophila. Lenses are wider in an acute zone that looks ahead.
+Each eye has 721 ommatidia, like an eye of Drosophila. Lenses are wider in an acute zone that looks ahead.
 """
 
 import argparse

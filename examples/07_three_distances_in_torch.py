@@ -1,8 +1,8 @@
-"""A phase plate by gradient descent in PyTorch: one image quality at three distances and three wavelengths.
+"""A phase plate by gradient descent in PyTorch: the same image quality at three distances and three wavelengths.
 
-A lens is in focus at one distance of the sensor. A plate in front of it, a map of 12 x 12 heights, is learnt such that
-the share of the light on the middle 3 x 3 pixels becomes as equal and as large as possible at three distances. Each
-call of `optics.torch.psf` returns all nine PSFs, integrated over the pixels.
+A lens is in focus at one distance of the sensor. The script optimises a plate in front of the lens, a map of 12 x 12
+heights. The share of the light on the middle 3 x 3 pixels becomes as equal and as large as possible at three distances.
+Each call of `optics.torch.psf` returns all nine PSFs, integrated over the pixels.
 
     python examples/07_three_distances_in_torch.py
 """

@@ -31,8 +31,10 @@ def fittest(returns: Returns, prices: CostsConfig) -> Design:
 def probability_of_finer(
     fine: Returns, coarse: Returns, prices: CostsConfig, rng: np.random.Generator
 ) -> tuple[float, float]:
-    """Return two bootstrap probabilities: that the fittest animal of the first task has more receptors across each eye
-    per eye than that of the second task, and that it has fewer.
+    """Return two bootstrap probabilities that compare the fittest animals of two tasks.
+
+    The animals are compared by the ratio of receptors across each eye to the number of eyes. The probabilities are
+    those that the ratio is higher in the first task, and that it is lower.
 
     The training runs of each animal are resampled with replacement.
     """

@@ -90,7 +90,7 @@ def _side(spot: float) -> int:
 
 
 def gradient(genome: Floats, spot: float | None) -> tuple[float, Floats]:
-    """Return the loss and its derivatives by all genes."""
+    """Return the loss and its derivatives with respect to all genes."""
     import drjit as dr
     from drjit.llvm.ad import Float64
 

@@ -25,7 +25,7 @@ from optics.elements.relief import BSplineRelief, HeightMap, Relief
 from optics.elements.torch_numbers import torch_numbers, with_numbers
 from optics.eye import camera
 from optics.eye.sensor_pixels import SensorPixels
-from optics.numerics.arguments import flag, in_range, of_kind, shown, vacuum_wavelengths
+from optics.numerics.arguments import flag, in_range, of_kind, shown, vacuum_wavelengths, wavelength_row
 from optics.numerics.autodiff import Array, plain
 from optics.numerics.backend import BackendError
 from optics.numerics.device import VARIABLE, make_ready
@@ -55,7 +55,7 @@ def psf(
     device: torch.device | str | None = None,
     **view: Any,
 ) -> torch.Tensor:
-    """Return `optics.psf` as a tensor with gradients to every tensor in the pupil, the distances and the angle.
+    """Return `optics.psf` as a tensor, differentiable with respect to tensors in the pupil, distances and angle.
 
     pupil: a pupil, or a sequence of pupils. Its numbers may be tensors that require gradients: the samples of a
         `HeightMap`, `PixelRelief`, `WavefrontMap` or `MaskMap`, the control points of a `BSplineRelief`, the
@@ -63,17 +63,17 @@ def psf(
         length. Tensors that require no gradients are treated as numbers.
     wavelengths: one or several wavelengths [m] in vacuum.
     sensor_distance, source_distance: distances [m] behind and in front of the pupil. Each is a number, or a row of
-        numbers: a sequence, or a tensor of one axis. Two rows have the same length and are used pairwise.
+        numbers: a sequence, or a tensor with one axis. Two rows must have the same length and are used pairwise.
     source_angle: direction (x, y) [rad] of the source: two numbers, or a tensor of two elements.
     pixel_means: True for the mean of the PSF over each square pixel of side dx, as a sensor measures it. False for the
         PSF at the middle of each pixel.
-    requires_grad: True to refuse light without any tensor that requires a gradient.
+    requires_grad: True to raise an error if no tensor requires a gradient.
     device: device of the result. None: the device of the tensors that require gradients, or the processor.
     view: dx, shape, tolerance, method, dtype and centre, see `optics.psf`.
 
     Returns a tensor (pupil, distance, wavelength, y, x) [1/m²], float32 unless dtype="float64". It has an axis of
     pupils only if a sequence of pupils is passed, and an axis of distances only if a distance is a row. Each gradient
-    has the device and the precision of its tensor. There are first derivatives only.
+    has the device and the precision of its tensor. Only first derivatives are available.
 
     A call psf(heights, radius=..., n=..., pupil={...}) with a square tensor of heights [m] still works.
 
@@ -90,9 +90,9 @@ def psf(
     if view.get("field"):
         raise ValueError("field: only `optics.psf` returns it; this function returns the intensity")
     light = LightBatch.from_arguments(pupil, sensor_distance, source_distance, source_angle)
-    lambdas, numbers = np.atleast_1d(vacuum_wavelengths(wavelengths)), torch_numbers(light)
+    lambdas, numbers = wavelength_row(wavelengths), torch_numbers(light)
     if flag("requires_grad", requires_grad) and not numbers:
-        raise ValueError("no number of the pupil requires a gradient: must hold a tensor with requires_grad=True")
+        raise ValueError("no tensor requires a gradient: at least one must have requires_grad=True")
     place = torch.device(device) if device is not None else _common_device(numbers)
     if not torch.is_grad_enabled():
         light, numbers = with_numbers(light, {name: plain(tensor)[()] for name, tensor in numbers.items()}), {}
@@ -233,7 +233,7 @@ def _former_pupil(heights: Any, given: Mapping[str, Any]) -> Any:
 
 
 def _guessed(heights: torch.Tensor, stacklevel: int) -> Relief:
-    """Return the relief that a tensor of heights meant before reliefs were passed: 4 x 4 heights are control points.
+    """Return the relief for a tensor of heights in a former call: 4 x 4 heights are control points.
 
     stacklevel: number of calls from `warnings.warn` to the user's code.
     """
@@ -255,7 +255,7 @@ class PointSpread(torch.nn.Module):
     radius: radius [m] of the pupil.
     wavelengths, sensor_distance, dx, shape, ...: arguments of `psf`.
     heights: initial relief, a `BSplineRelief`, `HeightMap` or `PixelRelief`. None: a flat `BSplineRelief`. A tensor of
-        heights [m] is guessed to hold control points if it is 4 x 4, and else samples of a `HeightMap`.
+        heights [m] is interpreted as control points if it is 4 x 4, and otherwise as samples of a `HeightMap`.
     n: refractive index of the relief.
     unit: length [m] of one unit of the learnt parameter. Choose it such that the parameter is near 1, as optimisers
         expect.

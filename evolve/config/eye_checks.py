@@ -84,7 +84,7 @@ def _check_rhabdoms(eye: EyeConfig) -> None:
 
 
 def _check_time(eye: EyeConfig) -> None:
-    """Check that settings of receptors with memory are changed only if receptors have one, and where they matter."""
+    """Check that settings of receptors with memory are changed only if they have an effect."""
     default = EyeConfig()
     changed = [name for name in IN_TIME if getattr(eye, name) != getattr(default, name)]
     if changed and eye.temporal_order == 0:

@@ -99,7 +99,7 @@ class WorldConfig:
         return {**self.evaluation, **self._walls("test")}
 
     def _walls(self, name: str) -> dict[str, Any]:
-        """Return the height of the walls, the medium, and the family's set of layouts of this name, or None."""
+        """Return the height of the walls, the medium, and this set of layouts (None without a family)."""
         layouts = None
         if self.layouts == FAMILY:
             from sim.worlds.layout_family import LayoutFamily  # loads MuJoCo, which `evolve list` does not need

@@ -1,9 +1,9 @@
-"""Convolution over the ommatidia of a compound eye, in two layers whose weights all places of the eye share.
+"""Convolution over the ommatidia of a compound eye, in two layers with the same weights everywhere in the eye.
 
 A unit of the first layer receives the signals of seven ommatidia: a central one and its six neighbours. A unit of the
 second layer receives the outputs of seven units of the first layer in the same way. The centres are chosen so that
-every ommatidium is in at least one neighbourhood, which leaves about a fourth of the places in each layer. The
-directions may be any set; on a hexagonal lattice the neighbourhoods are hexagons.
+every ommatidium is in at least one neighbourhood, which reduces the number of places to about a quarter in each layer.
+The directions may be any set; on a hexagonal lattice the neighbourhoods are hexagons.
 """
 
 from __future__ import annotations
@@ -71,7 +71,7 @@ class HexagonalLayers(nn.Module):
 
 
 def neighbourhoods(directions: np.ndarray) -> np.ndarray:
-    """Return indices of directions that are near to each other, (place, neighbour), with the central one first.
+    """Return indices of neighbouring directions, (place, neighbour), with the central one first.
 
     The six neighbours are in the order of their azimuths around the centre, from right through up to left. Every
     direction occurs.
@@ -101,7 +101,7 @@ def _in_order(directions: np.ndarray, near: np.ndarray) -> np.ndarray:
 
 
 def directions_from_record(stored: Mapping[str, Any]) -> tuple[tuple[float, ...], ...]:
-    """Return the directions in the record of a policy, none for eyes without ommatidia.
+    """Return the directions in the record of a policy; empty for eyes without ommatidia.
 
     Raises:
         ValueError: they do not fit the shape of the eyes, or are not unit vectors.

@@ -1,4 +1,4 @@
-"""Eyes with one lens, of vertebrates and a spider. Each function returns the patch of the retina with best acuity.
+"""Eyes with one lens, of vertebrates and a spider. Each function returns the patch of the retina with the best acuity.
 
 The receptors of an `optics.Eye` form a square lattice. Its pitch gives the acuity of the animal's hexagonal lattice.
 """
@@ -59,7 +59,7 @@ def human(receptors_across: int = 60, pupil_diameter: float = 3e-3) -> Eye:
 
 
 def mouse(receptors_across: int = 40, pupil_diameter: float = 1e-3) -> Eye:
-    """Return a patch of a mouse's retina whose acuity is that of behaviour, 0.5 cycles/degree.
+    """Return a patch of a mouse's retina with the acuity that behaviour shows, 0.5 cycles/degree.
 
     Source of the receptors, 360 and 508 nm: Abballe & Asari, PLoS ONE 17, e0262763, 2022. The acuity (Prusky et al.
     2000) and 31 µm of retina per degree (Remtulla & Hallett 1985) are quoted; their articles have not been read. Mice
@@ -79,8 +79,9 @@ def eagle(receptors_across: int = 60) -> Eye:
     """Return the deep fovea of a wedge-tailed eagle, *Aquila audax*.
 
     Source: Reymond, Vision Research 25, 1477, 1985 (abstract): the retina resolves 140 cycles/degree, and the smallest
-    pupil 157. At 550 nm, that pupil is 4.9 mm wide. The nodal distance of 22 mm has no read source; it changes no
-    angle. The pigment at 567 nm is that of long-wavelength cones of birds, because no pigment of an eagle was found.
+    pupil 157. At 550 nm, that pupil is 4.9 mm wide. No source has been read for the nodal distance of 22 mm, which does
+    not affect any angle. The pigment at 567 nm is that of long-wavelength cones of birds, because no pigment of an
+    eagle was found.
 
     receptors_across: receptors along each side of the patch, 1 to 1000.
 
@@ -109,7 +110,7 @@ def goldfish_lens(radius: float = 1.4e-3) -> BallLens:
 
 
 def goldfish(receptors_across: int = 40, radius: float = 1.4e-3) -> Eye:
-    """Return a patch of a goldfish's retina behind a ball lens, with an acuity of 60/26 cycles/degree.
+    """Return a patch of a goldfish's retina behind a ball lens, with an acuity of 60/26 = 2.3 cycles/degree.
 
     Source: Northmore & Dvorak, Vision Research 19, 255, 1979: 13 minutes of arc per half period, in agreement with the
     separation of cones. The retina is concentric with the lens, so the patch represents any direction. The pupil is
@@ -130,9 +131,9 @@ SPIDER_EYES = {"principal": (2.4, 780e-6, 1980e-6), "secondary": (42.0, 380e-6, 
 
 
 def jumping_spider(receptors_across: int = 30, eye: str = "principal") -> Eye:
-    """Return an eye of the jumping spider *Portia*: receptors "jumping_spider".
+    """Return an eye of the jumping spider *Portia*, with the receptors "jumping_spider".
 
-    Source of the 2.4 minutes of arc between receptors of the principal eyes: Land, in Neurobiology of Arachnids, p. 53,
+    Source for the principal eyes, with 2.4 minutes of arc between receptors: Land, in Neurobiology of Arachnids, p. 53,
     1985, after Williams & McIntyre, Nature 288, 578, 1980. No source has been read for the widths and focal lengths of
     the lenses, nor for the 0.7° between receptors of the secondary (anterior lateral) eyes.
 

@@ -1,7 +1,7 @@
 """Compound eyes of insects and of a crustacean.
 
-The refractive indices of all rhabdoms and rhabdomeres are 1.363 in 1.340, those of flies (Stavenga, J. Comp. Physiol. A
-190, 115, 2004). They have not been measured in the other animals.
+All rhabdoms and rhabdomeres have the refractive index 1.363 in a medium of 1.340, as in flies (Stavenga, J. Comp.
+Physiol. A 190, 115, 2004). The indices have not been measured in the other animals.
 """
 
 from __future__ import annotations
@@ -72,11 +72,11 @@ HONEYBEES = {
 
 
 def honeybee(species: str = "mellifera", rings: int = 10) -> AppositionEye:
-    """Return an eye of a worker honeybee: receptors "honeybee".
+    """Return an eye of a worker honeybee, for the receptors "honeybee".
 
-    Source: Somanathan et al. 2009 (see HONEYBEES). The diameters of rhabdoms follow from their Δρ = d/f. The mean
-    interommatidial angle of 2.1° is an estimate for all four species: the 5432 facets of *Apis mellifera* share a
-    hemisphere.
+    Source: Somanathan et al. 2009 (see HONEYBEES). The diameters of rhabdoms follow from the article's Δρ = d/f. The
+    mean interommatidial angle of 2.1° is an estimate for all four species. It assumes that the 5432 facets of *Apis
+    mellifera* cover a hemisphere.
 
     species: "mellifera", "cerana", "florea" or "dorsata".
     rings: rings of ommatidia around the central one.
@@ -88,11 +88,11 @@ def honeybee(species: str = "mellifera", rings: int = 10) -> AppositionEye:
 
 
 def fruit_fly(rings: int = 15) -> AppositionEye:
-    """Return an eye of *Drosophila melanogaster* with the rhabdomeres R1-6: receptors "fruit_fly".
+    """Return an eye of *Drosophila melanogaster* with the rhabdomeres R1-6, for the receptors "fruit_fly".
 
-    Source of the lens: Stavenga, J. Comp. Physiol. A 189, 1, 2003, appendix 1. The facet's diameter of 16 µm, the
-    rhabdomere's of 1.9 µm, its length of 80 µm and the interommatidial angle of 5° are typical values, for which no
-    source has been read.
+    Source of the lens: Stavenga, J. Comp. Physiol. A 189, 1, 2003, appendix 1. Typical values, for which no source has
+    been read, are the facet's diameter of 16 µm, the rhabdomere's diameter of 1.9 µm and length of 80 µm, and the
+    interommatidial angle of 5°.
 
     rings: rings of ommatidia around the central one. 15 rings have 721 ommatidia.
     """
@@ -100,7 +100,7 @@ def fruit_fly(rings: int = 15) -> AppositionEye:
 
 
 def blowfly(rings: int = 20, rhabdomere: float = 2e-6) -> AppositionEye:
-    """Return the frontal eye of a blowfly, *Calliphora*, with the rhabdomeres R1-6: receptors "blowfly".
+    """Return the frontal eye of a blowfly, *Calliphora*, with the rhabdomeres R1-6, for the receptors "blowfly".
 
     Source: Stavenga, J. Exp. Biol. 207, 1703, 2004, fig. 4: D = 25 µm, F = 2.2, tips of 1.4 to 2 µm, length 250 µm. The
     rhabdomeres of flies taper to 1 µm at their ends. Here they are straight. The interommatidial angle of 1.3° is a
@@ -113,11 +113,11 @@ def blowfly(rings: int = 20, rhabdomere: float = 2e-6) -> AppositionEye:
 
 
 def dragonfly(rings: int = 20) -> AppositionEye:
-    """Return the acute zone of a dragonfly: receptors "dragonfly".
+    """Return the acute zone of a dragonfly, for the receptors "dragonfly".
 
     Source of the interommatidial angle of 0.24°: Land, Annu. Rev. Entomol. 42, 147, 1997. The facet's diameter of 62 µm
-    is quoted from Sherk 1978. No source has been read for it, for the focal length of three diameters, or for the
-    rhabdom of 2 µm by 500 µm.
+    is quoted from Sherk 1978, which has not been read. No source has been read for the focal length of three diameters,
+    or for the rhabdom of 2 µm by 500 µm.
 
     rings: rings of ommatidia around the central one.
     """
@@ -125,7 +125,7 @@ def dragonfly(rings: int = 20) -> AppositionEye:
 
 
 def megalopta(rings: int = 10) -> AppositionEye:
-    """Return an eye of the nocturnal bee *Megalopta genalis*: receptors "honeybee".
+    """Return an eye of the nocturnal bee *Megalopta genalis*, for the receptors "honeybee".
 
     Source: Greiner, Ribi & Warrant, Cell Tissue Res. 316, 377, 2004. D = 36 µm, f = 97 µm, d = 8 µm, l = 350 µm and the
     interommatidial angle of 1.4° are quoted from later articles. Only the abstract has been read: the facets are nearly
@@ -140,8 +140,8 @@ def cirolana() -> Eye:
     """Return one ommatidium of the marine isopod *Cirolana borealis*: a receptor that accepts light from 45°.
 
     Source: Nilsson & Nilsson, J. Comp. Physiol. A 143, 503, 1981: D = 150 µm, Δρ = 45°. Its rhabdom has too many modes
-    for a waveguide, and the focus lies below its tip. The eye is therefore a lens in front of a single square receptor
-    of 45°. The focal length of 100 µm has no read source; the angle does not depend on it.
+    to be modelled as a waveguide, and the focus lies below its tip. The eye is therefore a lens in front of a single
+    square receptor of 45°. No source has been read for the focal length of 100 µm, on which the angle does not depend.
     """
     focal = 100e-6
     pupil = Pupil(75e-6, thin_lens_focal_length=focal, medium_n=CRUSTACEAN_N)

@@ -23,7 +23,7 @@ refractive_index  RefractiveIndex, Sellmeier, Cornu; media of eyes
 pupil_slopes      slopes of the wavefront behind a pupil
 wavefront_slopes  directions of a wavefront's rays
 beam              light of one wavelength between source and sensor plane
-derivative_knots  cells in which derivatives by the samples of maps are polynomials
+derivative_knots  cells in which derivatives with respect to samples of maps are polynomials
 torch_numbers     tensors of PyTorch in a pupil
 ray_field         polarised light along rays
 """

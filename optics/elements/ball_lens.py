@@ -46,8 +46,8 @@ class BallLens:
         parabola 1 - (r/R)².
 
     Raises:
-        ValueError: an argument is outside its valid range, which the message states, or the profile keeps light in
-            circles (n r must grow from the centre to the surface).
+        ValueError: an argument is outside its valid range, which the message states, or the profile traps light inside
+            the lens (n r must grow from the centre to the surface).
     """
 
     radius: float
@@ -114,14 +114,16 @@ class BallLens:
         return _profile(self, wavelength).turning(h) + 2 * np.arcsin(h) - math.pi
 
     def focus(self, height: Any, wavelength: float = MIDDLE) -> np.ndarray:
-        """Return the distance [m] behind the centre at which rays parallel to the axis cross it.
+        """Return the distance [m] behind the centre at which rays that arrive parallel to the axis cross the axis.
 
         height: distance [m] of the rays from the axis. See `deviation`.
         """
         return np.asarray(reals("height", height) / np.sin(self.deviation(height, wavelength)))
 
     def focal_length(self, wavelength: float = MIDDLE) -> float:
-        """Return the paraxial focal length [m], from the centre of the lens, in closed form up to one integral.
+        """Return the paraxial focal length [m], measured from the centre of the lens.
+
+        It is known in closed form up to one integral.
 
         Raises:
             ValueError: the lens does not focus.
@@ -142,7 +144,7 @@ class BallLens:
         wavelength: vacuum wavelength [m]. The focal length of the pupil is that for this wavelength.
 
         Raises:
-            ValueError: an aperture as large as the lens, or rays steeper than a sine of 0.95 behind it.
+            ValueError: the aperture is as large as the lens, or the sine of a ray's angle behind the lens exceeds 0.95.
         """
         focal, widest = self.focal_length(wavelength), float(self._relative(aperture_radius))
         at, weights = gauss_legendre(RINGS)

@@ -126,7 +126,7 @@ def of_rays(system: Any, wavelength: float, image_normal: Any) -> ConvergingWave
     dark = sines[:, known & ~lit]
     rim = rim_around(sines[:, lit], dark)
     if rim.contains(dark[0], dark[1], INSIDE).any():
-        raise ValueError("the pupil is obscured or not convex: only open, convex pupils can be read")
+        raise ValueError("the pupil is obscured or not convex: only unobscured, convex pupils can be read")
     return ConvergingWave(sines[:, lit], ahead[lit], rim, rim.onto_plane(radius), radius, wavelength, position, height)
 
 
@@ -152,7 +152,7 @@ def of_samples(system: Any, wavelength: float, distance: float) -> ConvergingWav
     within = amplitude[rim.contains(x[None, :], y[:, None], INSIDE)]
     middle = np.median(within) if within.size else 0.0
     if within.size and np.abs(within - middle).max() > EVEN * middle:
-        raise ValueError("data: the pupil is obscured, not convex, or unevenly lit: only open pupils can be read")
+        raise ValueError("data: the pupil is obscured, not convex, or unevenly lit: only unobscured pupils can be read")
     at = np.stack([x[columns], y[rows]]) - rim.middle[:, None]
     ahead = -_unwrapped(data, illuminated)[lit] * wavelength / (2 * np.pi)
     sines, on_plane = at / np.hypot(distance, np.hypot(*at)), replace(rim, middle=np.zeros(2))

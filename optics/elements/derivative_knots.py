@@ -1,9 +1,9 @@
 """Inputs of a PSF that carry derivatives, and the cells in which these derivatives are polynomials.
 
 A small change of one sample of a map multiplies the light behind the pupil by a cardinal spline. This spline is a
-different cubic polynomial in every cell between two knots, whatever the values of the map are: the derivative by the
-samples of a flat map has the same detail as that of a rough map. Samples of the pupil that resolve only the light
-therefore give wrong derivatives, and quadrature nodes are placed in each cell instead.
+different cubic polynomial in every cell between two knots, whatever the values of the map are: the derivative with
+respect to the samples of a flat map has the same detail as that of a rough map. Samples of the pupil that resolve only
+the light therefore give wrong derivatives, and quadrature nodes are placed in each cell instead.
 """
 
 from __future__ import annotations
@@ -51,9 +51,10 @@ class DerivativeKnots:
 
 
 def derivative_knots(pupil: Pupil, wavelength: float) -> DerivativeKnots | None:
-    """Return the cells that derivatives by the samples of maps require; None if no map is concerned.
+    """Return the cells that derivatives with respect to samples of maps require; None if no map is concerned.
 
-    A derivative by the refractive index is proportional to the height, so it requires the cells of the relief, too.
+    A derivative with respect to the refractive index is proportional to the height, so it requires the cells of the
+    relief, too.
     """
     maps = dict(_maps(pupil, wavelength))
     if not maps:
@@ -62,7 +63,8 @@ def derivative_knots(pupil: Pupil, wavelength: float) -> DerivativeKnots | None:
     inner = np.unique(inner[np.abs(inner) < 1 - APART])
     kept = inner[np.diff(inner, prepend=-1.0) > APART]
     paths = len(maps.keys() - {"mask"})
-    # A derivative by a sample of the relief or wavefront is a spline, times the mask, which may be a spline as well.
+    # A derivative with respect to a sample of the relief or wavefront is a spline, times the mask, which may be a
+    # spline as well.
     splines = 2 if paths and "mask" in maps else 1
     sizes = ", ".join(f"{name}: {rows} x {columns}" for name, ((rows, columns), _) in maps.items())
     return DerivativeKnots((-1.0, *kept.tolist(), 1.0), splines, sizes, tuple(maps))

@@ -161,7 +161,7 @@ def _fitted(wave: ConvergingWave, medium_n: float | Dispersion, order: int) -> E
         raise ValueError(f"{wave.ahead.size} samples of the wavefront: must be {RAYS_PER_MODE * len(modes)} or more")
     x, y = wave.pupil_points
     if np.mean(np.hypot(x, y) < CENTRE) < FILLED * CENTRE**2:
-        raise ValueError("the pupil is obscured: only open pupils can be read")
+        raise ValueError("the pupil is obscured: only unobscured pupils can be read")
     basis = np.stack([mode(n, m, x, y) for n, m in modes], axis=1)
     ahead = wave.ahead - wave.ahead.mean()
     bounds = BOUNDED * np.sqrt(len(x)) * np.eye(len(modes))

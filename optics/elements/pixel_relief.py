@@ -25,7 +25,7 @@ class PixelRelief(Relief):
     samples: heights [m], (n, n), (y, x). To wrap a smooth height h to one wave and quantise it to N levels, in glass of
         index n, use `np.round(h / step) % N * step` with step = wavelength / (n - 1) / N.
 
-    A tensor of Dr.Jit or PyTorch carries derivatives. For smooth surfaces use `HeightMap`, which interpolates.
+    A Dr.Jit or PyTorch tensor may carry derivatives. For smooth surfaces use `HeightMap`, which interpolates.
 
     Raises:
         ValueError: not square, empty, or not finite.

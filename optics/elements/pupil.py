@@ -144,7 +144,7 @@ class Pupil:
         return dr.sum(types.Float64(nodes.weight) * dr.square(amplitude)) / self.aperture.area
 
     def amplitude(self, x: Array, y: Array) -> Array:
-        """Return the amplitude that the mask transmits at points in units of R. Arrays: see `Relief.height`."""
+        """Return the amplitude that the mask transmits at points in units of R, arrays as in `Relief.height`."""
         if self.mask is None:
             return like(x, 1.0)
         radius = like(x, self.aperture_radius)
@@ -224,7 +224,7 @@ class Pupil:
         return self.aperture.mirror_symmetric and relief_is and wavefront_is and mask_is
 
     def path(self, x: Array, y: Array, wavelength: float, source: PointSource) -> Array:
-        """Return the optical path [m] from the source through the pupil at points (x, y) [m]; see `Relief.height`."""
+        """Return the optical path [m] from the source through points (x, y) [m], arrays as in `Relief.height`."""
         total = source.path(x, y) * like(x, self.index_before(wavelength))
         if self.thin_lens_focal_length is not None:
             f, own = like(x, self.thin_lens_focal_length), library(x)

@@ -1,4 +1,4 @@
-"""Rim of a pupil that is known by samples: a circle, an ellipse, or a convex polygon."""
+"""Rim of a pupil that is known from samples: a circle, an ellipse, or a convex polygon."""
 
 from __future__ import annotations
 
@@ -55,11 +55,11 @@ class Rim:
         return self.aperture.contains((x - self.middle[0]) * scale, (y - self.middle[1]) * scale)
 
     def onto_plane(self, distance: float) -> Rim:
-        """Return the rim on a plane at a distance [m] from the image, if the unit is the sine of a direction."""
+        """Return a rim in sines of directions, projected onto a plane at a distance [m] from the image."""
         return self._scaled(lambda r: distance * r / math.sqrt(1 - r * r))
 
     def in_sines(self, distance: float) -> Rim:
-        """Return the rim in sines of directions, if it lies on a plane at a distance [m] from the image."""
+        """Return a rim on a plane at a distance [m] from the image, converted to sines of directions."""
         return self._scaled(lambda r: r / math.hypot(r, distance))
 
     def _scaled(self, of_radius: Callable[[float], float]) -> Rim:
@@ -75,9 +75,9 @@ class Rim:
 def rim_around(lit: np.ndarray, dark: np.ndarray | None = None) -> Rim:
     """Return the rim of a convex pupil from the positions (2, n) of its illuminated samples.
 
-    Circle and oval are least-squares fits to all corners of the convex hull, because a single sample can lie on the rim
-    if the grid has an even number of samples. If neither fits, the rim is the hull. If there are dark samples, the hull
-    is extended half way to them, and otherwise up to the circle or oval around all samples.
+    Circle and oval are least-squares fits to all corners of the convex hull. On a grid with an even number of samples,
+    a single sample can lie on the rim, so it must not determine the fit. If neither fits, the rim is the hull. If there
+    are dark samples, the hull is extended half way to them, and otherwise up to the circle or oval around all samples.
 
     dark: positions (2, m) of samples without light.
 
@@ -164,7 +164,7 @@ def _oval(corners: np.ndarray) -> tuple[np.ndarray, float]:
     """Return a polygon around the corners with the area of an oval, and the oval's relative residual.
 
     The oval is an ellipse whose radius is multiplied by a Fourier series of the angle: the image of a round stop is an
-    ellipse only to first order. The residual is infinite if the best conic is no ellipse.
+    ellipse only to first order. The residual is infinite if the best conic is not an ellipse.
     """
     origin = corners.mean(axis=0)
     x, y = (corners - origin).T

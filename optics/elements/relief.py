@@ -84,7 +84,7 @@ class BSplineRelief(Relief):
     polynomial, so paraboloids are exact (`paraboloid`). Outside the square the polynomial continues. Source: Piegl &
     Tiller, The NURBS Book, ch. 2.
 
-    A tensor of Dr.Jit or PyTorch carries derivatives.
+    A Dr.Jit or PyTorch tensor may carry derivatives.
 
     Raises:
         ValueError: not 4 x 4 finite numbers.
@@ -164,7 +164,7 @@ class HeightMap(Relief):
 
     samples: (rows, columns), (y, x). Beyond the outermost centres the spline continues for one cell, then linearly.
 
-    A tensor of Dr.Jit or PyTorch carries derivatives.
+    A Dr.Jit or PyTorch tensor may carry derivatives.
 
     Raises:
         ValueError: not of two dimensions, empty, or not finite.

@@ -44,7 +44,8 @@ class SphericalIndex:
         """Interpolate a relative index, given as a function of r/R, at Chebyshev points in (r/R)².
 
         Raises:
-            ValueError: n r falls where it is below its values outside, so that light could stay in the sphere.
+            ValueError: n r decreases with r where it is below its value outside, so that light could stay in the
+                sphere.
         """
         found = cls(Chebyshev.interpolate(lambda t: relative(np.sqrt(np.clip(t, 0, 1))), TERMS - 1, (0.0, 1.0)))
         t = np.linspace(0, 1, 20 * TERMS)

@@ -13,7 +13,7 @@ __all__ = ["refuse_torch", "torch_numbers", "with_numbers"]
 
 
 def torch_numbers(element: Any) -> dict[str, Any]:
-    """Return the tensors that require a gradient, by their place, such as {"height.samples": tensor}.
+    """Return the tensors that require a gradient, with their places as keys, such as {"height.samples": tensor}.
 
     element: a pupil, or another dataclass, dictionary or tuple, which is searched with all its entries.
     """
@@ -26,7 +26,7 @@ def with_numbers(element: Any, numbers: Mapping[str, Any]) -> Any:
 
 
 def refuse_torch(beam: Beam) -> None:
-    """Raise a ValueError if a tensor of PyTorch requires a gradient, since Dr.Jit carries none for PyTorch."""
+    """Raise a ValueError if a tensor of PyTorch requires a gradient, which Dr.Jit cannot compute."""
     own = {"sensor_distance": beam.distance, "source_distance": beam.source.distance}
     own |= {"source_angle": next(filter(of_torch, beam.source.angle), None)}
     for name in [*torch_numbers(beam.pupil), *(name for name, value in own.items() if of_torch(value))]:

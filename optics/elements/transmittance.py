@@ -107,10 +107,10 @@ class MaskMap(Mask):
     samples: (rows, columns), (y, x).
     reach: half side [m] of the square, at least the pupil's radius. None: equal to the pupil's radius.
 
-    A tensor of Dr.Jit or PyTorch carries derivatives.
+    A Dr.Jit or PyTorch tensor may carry derivatives.
 
     Raises:
-        ValueError: samples that have not two dimensions, or are empty or not finite; or an amplitude beyond [-1, 1].
+        ValueError: samples that are not two-dimensional, are empty or are not finite; or an amplitude outside [-1, 1].
             The spline can exceed this range at jumps of the samples.
     """
 

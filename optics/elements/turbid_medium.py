@@ -15,6 +15,7 @@ import numpy as np
 
 from optics.elements.refractive_index import Dispersion, medium
 from optics.numerics.arguments import in_range, of_kind, one_of
+from optics.numerics.read_only import ReadOnlyArrays
 from optics.spectra.bands import SpectralBands
 from optics.spectra.receptors import receptors_of
 from optics.spectra.spectrum import (
@@ -38,8 +39,8 @@ STEP_NM = 5.0
 SHORTEST, LONGEST = 1e-2, 1e2
 
 
-@dataclass(frozen=True)
-class BandMedium:
+@dataclass(frozen=True, eq=False)
+class BandMedium(ReadOnlyArrays):
     """A medium in the spectral bands of an eye.
 
     attenuation: coefficient c [1/m], (band,)
@@ -50,7 +51,11 @@ class BandMedium:
     veil: np.ndarray
 
     def through(self, radiance: np.ndarray, distance: np.ndarray) -> np.ndarray:
-        """Return the radiance (..., band) of a surface (..., band) behind this path [m] through the medium, (...)."""
+        """Return the radiance (..., band) of a surface that is seen through the medium.
+
+        radiance: radiance of the surface, (..., band)
+        distance: length of the path [m], (...)
+        """
         passed = np.exp(-self.attenuation * np.asarray(distance)[..., None])
         return np.asarray(self.veil + passed * (radiance - self.veil))
 
@@ -81,8 +86,8 @@ class TurbidMedium:
     def in_bands(self, bands: SpectralBands, receptors: Any) -> BandMedium:
         """Return the medium in spectral bands.
 
-        The coefficient of a band is a mean, weighted with the receptors' catch of daylight. At short distances, the
-        change of every receptor's signal per metre is then exact for a white surface. At longer distances, the
+        The coefficient of a band is a mean, weighted by the receptors' quantum catch in daylight. At short distances,
+        the change of every receptor's signal per metre is then exact for a white surface. At longer distances, the true
         transmission of a band is not an exponential function, and `band_error` returns the error.
 
         bands, receptors: as in `SpectralBands.band_values`
@@ -94,7 +99,7 @@ class TurbidMedium:
     def band_error(self, bands: int, receptors: Any) -> float:
         """Return the largest error of a signal due to this number of bands, relative to white in daylight.
 
-        It is the largest over receptor types, black and white surfaces, and distances up to 100 attenuation lengths.
+        The maximum is taken over receptor types, black and white surfaces, and distances up to 100 attenuation lengths.
         The reference is the integral over the spectrum in steps of 1 nm.
         """
         kinds = receptors_of(receptors)
@@ -116,7 +121,7 @@ class TurbidMedium:
 
 
 def sea_water(chlorophyll: float) -> TurbidMedium:
-    """Return sea water that contains this mass of chlorophyll [mg/m³], in [0, 30].
+    """Return sea water with this concentration of chlorophyll [mg/m³], in [0, 30].
 
     Absorption and scattering follow the classic model of case 1 waters: a = a_w + a_p + 0.2 a_p(440) exp(-0.014 (λ -
     440)), with a_p = 0.06 A(λ) C^0.65, and b = b_w + 0.30 C^0.62 (550/λ), λ in nm. Pure sea water scatters b_w = 16.06
@@ -124,9 +129,9 @@ def sea_water(chlorophyll: float) -> TurbidMedium:
     all directions of the upper hemisphere.
 
     Sources: Gordon & Morel (1983), Remote Assessment of Ocean Color; Morel (1974); Mobley (1994), Light and Water,
-    equations 3.27 and 3.40. For absorption: `water_absorption`, `phytoplankton_absorption`. Below 400 nm, A is
-    constant, which is uncertain. With 0.15 and 1 mg/m³, c at 514 nm is 0.15 and 0.40 per metre, as Petzold (1972)
-    measured in a clear and in a coastal ocean.
+    equations 3.27 and 3.40. For absorption: `water_absorption`, `phytoplankton_absorption`. Below 400 nm, A is assumed
+    to be constant, which is uncertain. With 0.15 and 1 mg/m³, c at 514 nm is 0.15 and 0.40 per metre, as Petzold (1972)
+    measured in clear ocean water and in coastal water.
 
     Raises:
         ValueError: a concentration outside the range.
@@ -173,7 +178,7 @@ def turbid_medium(name: str) -> TurbidMedium | None:
 
 
 def medium_of(name: str, value: Any) -> TurbidMedium | None:
-    """Return a medium that is given as such, by its name, or as None for clear air.
+    """Return the medium for an argument: a medium, the name of one, or None for clear air.
 
     name: name of the argument, for the error message
 

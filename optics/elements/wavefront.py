@@ -41,7 +41,7 @@ class Aberration(ABC):
 
     @abstractmethod
     def ahead(self, x: Array, y: Array) -> Array:
-        """Return the length [m] by which the wavefront is ahead at (x, y) [radii]. Arrays: see `Relief.height`."""
+        """Return the length [m] by which the wavefront is ahead at (x, y) [radii], arrays as in `Relief.height`."""
 
     @abstractmethod
     def bandwidth(self, level: float) -> float:
@@ -207,7 +207,7 @@ class WavefrontMap(Aberration):
         negative of an optical path difference. They must be unwrapped, and finite and smooth outside the pupil, too.
     radius: half side [m] of the square, at least the pupil's radius. None: the pupil's radius.
 
-    A tensor of Dr.Jit or PyTorch carries derivatives.
+    A Dr.Jit or PyTorch tensor may carry derivatives.
 
     Raises:
         ValueError: not of two dimensions, empty, or not finite.

@@ -26,8 +26,8 @@ DETECTED = 0.954  # d' for 75 % correct choices between two intervals
 def eye_parameter(diameter: float, interommatidial_deg: float) -> float:
     """Return the eye parameter p = D Δφ [m] of a compound eye (Snyder, J. Comp. Physiol. 116, 161, 1977).
 
-    Values near `least_eye_parameter` belong to eyes that diffraction limits, in bright light. Eyes that photon noise
-    limits have larger values.
+    Eyes that work in bright light are limited by diffraction and have values near `least_eye_parameter`. Eyes that are
+    limited by photon noise have larger values.
 
     diameter: diameter D [m] of a facet.
     interommatidial_deg: interommatidial angle Δφ.
@@ -42,7 +42,8 @@ def eye_parameter(diameter: float, interommatidial_deg: float) -> float:
 def least_eye_parameter(wavelength: float, lattice: str = "hexagon") -> float:
     """Return the smallest useful eye parameter [m]: λ/√3 for a hexagonal lattice, λ/2 for a square one.
 
-    With this value, the finest grating that the lattice resolves has the period λ/D. Facets transmit no finer grating.
+    With this value, the finest grating that the lattice resolves has the period λ/D. Facets do not transmit finer
+    gratings.
 
     wavelength: vacuum wavelength λ [m], for an eye in air. Under water, divide it by the index of water.
 
@@ -72,7 +73,7 @@ def anatomical_acuity(density: float, nodal_distance: float, lattice: str = "hex
     Use the density of ganglion cells instead where several receptors share one.
 
     density: receptors per area [1/m²]. 1 per mm² is 1e6 per m².
-    nodal_distance: posterior nodal distance [m]: the retina's distance x is the angle x/nodal_distance.
+    nodal_distance: posterior nodal distance [m]. A length x on the retina corresponds to the angle x/nodal_distance.
     lattice: "hexagon" or "square".
 
     Raises:
@@ -99,12 +100,12 @@ def ideal_contrast_sensitivity(
     cycles_per_degree: frequencies of the gratings.
     contrast: contrast T that optics and receptors transfer at these frequencies, in [0, 1], of the same shape. For
         example `mean_human_mtf(cycles_per_degree, 2e-3)`.
-    photons: number N of photons that the receptors absorb from one square degree in the presentation, such as
+    photons: number N of photons that the receptors absorb from one square degree during the presentation, such as
         `PhotonBudget.photons` with the etendue pupil area · (π/180)² times the fraction of the retina that receptors
         cover.
-    area: area A of the grating [square degrees], a number or one for each frequency. For n · n cycles it is (n/u)². A
-        grating with a smooth window has the integral of the squared window.
-    d_prime: detectability d' at the threshold. 0.954 belongs to 75 % correct choices between two intervals.
+    area: area A of the grating [square degrees], a number or one for each frequency. For n · n cycles at the frequency
+        u, it is (n/u)². For a smooth window, it is the integral of the squared window.
+    d_prime: detectability d' at the threshold. 0.954 corresponds to 75 % correct choices between two intervals.
 
     Raises:
         ValueError: numbers outside their ranges, or arrays of different shapes.

@@ -15,12 +15,12 @@ __all__ = ["immersed"]
 
 
 def immersed(eye: Any, medium: TurbidMedium | None) -> Any:
-    """Return an eye as it is in this medium.
+    """Return an eye that is immersed in a medium.
 
     The medium is in front of the pupil (`Pupil.object_n`). A refracting surface between air and the eye, such as a
     cornea, therefore loses power. The retina does not move, so the field of view changes by the ratio of the
     indices at 550 nm. A pupil without `object_n` has the same medium on both sides; the medium then also fills the eye,
-    and the field of view does not change. A perfect lens is perfect in every medium, and air (and fog) changes nothing.
+    and the field of view does not change. A perfect lens is perfect in every medium. Air and fog have no effect.
 
     eye: an `optics.Eye`
     medium: None: air

@@ -45,7 +45,7 @@ class Retina:
 
 @contextmanager
 def more_time() -> Iterator[None]:
-    """Name the argument of an eye that allows a computation, if it is refused because of its predicted time only."""
+    """Add advice to errors about a predicted time: the value of `most_seconds` that allows it."""
     try:
         yield
     except AccuracyError as refused:

@@ -12,7 +12,7 @@ rayleigh_sommerfeld  the direct sum: the reference
 angular_spectrum     transforms on grids, whole or with the paraxial part split off
 spectrum_sampling    planes of the angular spectrum, and the sums between them
 row_blocks           blocks of rows of a large pupil, whose spectra are summed
-derivative_cells     nodes between the knots of maps, for derivatives by their samples
+derivative_cells     nodes between the knots of maps, for derivatives with respect to their samples
 pixelated_spectrum   the angular spectrum of pupils made of pixels
 hankel               the angular spectrum of rotationally symmetric pupils, along one radius
 low_rank             one matrix product, with a Fourier kernel times a slow factor

@@ -1,4 +1,4 @@
-"""Quadrature nodes in the cells between the knots of maps, for derivatives by the samples of the maps.
+"""Quadrature nodes in the cells between the knots of maps, for derivatives with respect to the samples of the maps.
 
 In a cell, the integrand of a derivative is a cubic polynomial times a wave, the light behind the pupil. With t in
 [-1, 1] across the cell, the wave is e^{izt} or slower, with the Chebyshev coefficients 2 J_k(z). n Gauss-Legendre nodes
@@ -40,8 +40,8 @@ def derivative_cells(
 ) -> PixelatedAperture | None:
     """Return the opening with the fewest nodes that keep the error of derivatives below a part of the tolerance.
 
-    The error is the relative L2 error of the derivatives by all samples, for a random functional of the PSF. Cells are
-    divided if they would need many nodes. The result is None if there would be too many cells.
+    The error is the relative L2 error of the derivatives with respect to all samples, for a random functional of the
+    PSF. Cells are divided if they would need many nodes. The result is None if there would be too many cells.
 
     cycles: local frequencies [cycles per R] of the integrand at points that are evenly spread over the opening.
     """

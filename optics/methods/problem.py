@@ -34,8 +34,8 @@ SLOPE_MARGIN = 1.02
 # is twice as large: half the tolerance in a window that contains no other light.
 EDGE_RIPPLE_PER_TOLERANCE = 0.1
 DETAIL_PART = 0.1  # choice: phase [rad] of neglected detail, relative to the tolerance
-# Choice: factor by which detail is finer if derivatives by single numbers are requested. Such a derivative can be a
-# small difference, as that by the focal length of a lens in focus, to which the detail contributes most.
+# Choice: factor by which detail is finer if derivatives with respect to single numbers are requested. Such a derivative
+# can be a small difference to which the detail contributes most, as for the focal length of a lens in focus.
 FINER_DETAIL = 10.0
 BRIGHT_EDGE_RIPPLE_PER_TOLERANCE = 0.3
 
@@ -44,7 +44,7 @@ BRIGHT_EDGE_RIPPLE_PER_TOLERANCE = 0.3
 class Problem:
     """One monochromatic propagation from a pupil to a window, described by numbers.
 
-    light: the light, without derivatives by the distances.
+    light: the light, without derivatives with respect to the distances.
     aperture: shape of the pupil.
     radius, distance: radius of the pupil and distance of the window's plane [m].
     wavelength: wavelength [m] in the medium.
@@ -60,7 +60,7 @@ class Problem:
         their error.
     spread: spread of the light over the pupil, see `light_spread`.
     differentiated: whether the PSF carries derivatives.
-    knots: cells that derivatives by the samples of maps require; None if no such derivatives are requested.
+    knots: cells that derivatives with respect to samples of maps require; None if no such derivatives are requested.
     mask_detail: bandwidth [1/m] of the amplitude of the mask.
     detail_part: phase [rad] of neglected detail, relative to the tolerance.
     """

@@ -139,7 +139,7 @@ def pixel_samples(aperture: PixelatedAperture, cycles: float, digits: float, rad
 
 
 def cell_samples(problem: Problem, band: float | None = None) -> PixelSamples | None:
-    """Return the nodes that derivatives by the samples of maps require; None if there would be too many cells.
+    """Return the nodes that derivatives with respect to samples of maps require; None if there would be too many cells.
 
     band: see `Problem.cells`.
     """

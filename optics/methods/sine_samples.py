@@ -185,6 +185,8 @@ def evenly_in_sines(problem: Problem, edge: PupilEdge, cycles: float, shift: flo
     rim = _sines(edge.outermost * np.cos(angle), edge.outermost * np.sin(angle), centre, problem.distance)
     middle = _middle(centre, problem.distance)
     steepest = float(np.hypot(*rim).max())
+    if steepest >= 1:  # rounding, in pupils millions of times wider than their distance
+        return None
     stretch = (1 - steepest**2) ** -1.5
     if stretch > MOST_STRETCH * (1 - math.hypot(*middle) ** 2) ** -1.5:
         return None

@@ -1,6 +1,6 @@
 """The factor by which the diffraction kernel differs from a Fourier kernel. It varies slowly over the window.
 
-Few Chebyshev points per axis of the window interpolate it. Their number is the rank of the factor.
+A few Chebyshev points per axis of the window are enough to interpolate it. Their number is the rank of the factor.
 """
 
 from __future__ import annotations

@@ -2,11 +2,11 @@
 
 Samples at the pitch Δs, in sines, repeat the light of the window with the period λ/Δs. The period must be half the
 width of the window, plus the distance from the middle within which nearly all light arrives. The light that is
-diffracted at the edge of the pupil spreads further. A soft edge keeps it out of the window, and the softer edge changes
-only light that is far from the geometrical rays of the edge, where there is little of it.
+diffracted at the edge of the pupil spreads further. A soft edge keeps it out of the window. The softer edge only
+changes light far from the geometrical rays of the edge, where there is little light.
 
-All these are estimates, so that every PSF is compared with a sum over finer samples in a few rows and columns
-(`window_check`).
+All of these values are estimates. Every PSF is therefore compared with a sum over finer samples in a few rows and
+columns (`window_check`).
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ RIPPLES, PASSBAND = (0.03, 0.0075), 0.35
 # light; cycles for the edge; the same, relative to the cycles of the rays at the edge; exponent of the tolerance.
 NEGLECTED, EDGE_CYCLES, RIM_CYCLES, EXPONENT = 3e-4, 4.0, 3.0, -0.4
 RIM = 0.85  # choice, radii: rays farther out count as rays of the edge
-CELL_CYCLES = 0.5  # choice: cycles per cell between knots, for derivatives by the samples of maps
+CELL_CYCLES = 0.5  # choice: cycles per cell between knots, for derivatives with respect to samples of maps
 DERIVATIVE_PART = 0.1  # choice: tolerance of the edge if the PSF carries derivatives, relative to that of the PSF
 DERIVATIVE_ERROR = 3.0  # choice: bound on the error of derivatives, relative to the tolerance; see test_gradients.py
 # Choices: sampling densities and sharpnesses of the edge per octave; equal ones share arrays and tables.

@@ -30,6 +30,7 @@ __all__ = [
     "shown",
     "vacuum_wavelength",
     "vacuum_wavelengths",
+    "wavelength_row",
     "whole",
     "without_derivative",
 ]
@@ -129,6 +130,16 @@ def vacuum_wavelengths(values: Any) -> np.ndarray:
     for end in (wavelengths.min(), wavelengths.max()) if wavelengths.size else ():
         vacuum_wavelength(end)
     return wavelengths
+
+
+def wavelength_row(values: Any) -> np.ndarray:
+    """Return one or several vacuum wavelengths [m] as a float64 array (wavelength,)."""
+    row = np.atleast_1d(vacuum_wavelengths(values))
+    if row.size == 0:
+        raise ValueError("wavelengths is empty: must hold at least one wavelength [m]")
+    if row.ndim > 1:
+        raise ValueError(f"wavelengths has shape {row.shape}: must be one wavelength [m], or a row of them")
+    return row
 
 
 def in_range(name: str, value: float, low: float, high: float, *, carried: bool = False) -> float:

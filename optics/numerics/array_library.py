@@ -1,8 +1,8 @@
 """Operations on arrays of NumPy, PyTorch or Dr.Jit whose names or forms differ between these libraries.
 
-Optical elements compute with the operators of the arrays that they receive, so they evaluate on all three. NumPy serves
-plans, PyTorch its own graphs of derivatives, and Dr.Jit compiled kernels. No function imports PyTorch: whoever passes a
-tensor has imported it.
+Optical elements compute with the operators of the arrays that they receive, so they evaluate on all three. Plans use
+NumPy, graphs of PyTorch use its tensors, and compiled kernels use Dr.Jit. No function imports PyTorch: a caller who
+passes a tensor has imported it.
 """
 
 from __future__ import annotations
@@ -30,9 +30,9 @@ def library(x: Array) -> Any:
 def like(x: Array, value: Any) -> Array:
     """Return `value` as an array of the type, precision and device of `x`.
 
-    value: number or array. NumPy keeps no derivatives. PyTorch and Dr.Jit each keep their own.
+    value: number or array. NumPy arrays carry no derivatives. PyTorch and Dr.Jit each keep their own.
 
-    A Dr.Jit array is flat, and Dr.Jit treats it as data, so that other values need no other kernel.
+    A Dr.Jit array is flat. Dr.Jit treats it as data, so the same kernel serves other values.
 
     Raises:
         ValueError: `value` carries a derivative of Dr.Jit and `x` is a tensor of PyTorch, or the reverse.

@@ -21,7 +21,7 @@ def readable(name: str, value: Any) -> Any:
     masked elements (numpy.ma) as data. Entries of lists and tuples are treated in the same way.
 
     Raises:
-        ValueError: masked elements, or a tensor on the device "meta", which has no numbers.
+        ValueError: masked elements, or a tensor on the device "meta", which contains no numbers.
     """
     if isinstance(value, (list, tuple)):
         entries = [readable(name, entry) for entry in value]

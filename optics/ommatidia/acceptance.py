@@ -12,7 +12,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from optics.numerics.arguments import in_range, of_kind, vacuum_wavelengths
+from optics.numerics.arguments import in_range, of_kind, wavelength_row
 from optics.numerics.grid import Grid
 from optics.numerics.read_only import ReadOnlyArrays
 from optics.ommatidia.coupling import ModesAtPupil
@@ -65,7 +65,7 @@ def acceptance_function(ommatidium: Ommatidium, wavelengths: np.ndarray, loss: f
         ValueError: an argument is outside its valid range, or the rhabdom guides no mode.
     """
     of_kind("ommatidium", ommatidium, Ommatidium, "Ommatidium(FacetLens(25e-6, 14e-6), Waveguide(2e-6))")
-    at = tuple(float(one) for one in vacuum_wavelengths(wavelengths))
+    at = tuple(float(one) for one in wavelength_row(wavelengths))
     return _tabulated(ommatidium, at, in_range("loss", loss, 1e-5, 0.1))
 
 

@@ -52,11 +52,11 @@ class LensMTF(ReadOnlyArrays):
     def plot(self, axes: Any, frequency: float | None = None) -> None:
         """Draw the contrasts on Matplotlib axes, with solid tangential and dashed sagittal lines.
 
-        With several shifts, the lines show contrast over shift at one frequency. With one shift, they show contrast
-        over frequency.
+        With several shifts, the lines show contrast against shift at one frequency. With one shift, they show contrast
+        against frequency.
 
-        frequency: frequency [1/m] of the lines over shift; the nearest one of `frequencies` is drawn. None: the middle
-            one.
+        frequency: frequency [1/m] of the lines if there are several shifts; the nearest one of `frequencies` is drawn.
+            None: the middle one.
         """
         through = len(self.shifts) > 1
         middle = self.frequencies[len(self.frequencies) // 2]

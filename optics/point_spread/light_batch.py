@@ -34,7 +34,7 @@ class LightBatch:
 
     @classmethod
     def from_arguments(cls, pupil: Any, sensor_distance: Any, source_distance: Any, source_angle: Any) -> LightBatch:
-        """Return the light for a pupil or a sequence of pupils, and for distances that are numbers or rows of numbers.
+        """Return the light for a pupil or a sequence of pupils, and for distances that are numbers or sequences.
 
         Raises:
             ValueError: something else is given, a sequence is empty, or two rows differ in length.
@@ -49,7 +49,7 @@ class LightBatch:
         if len(set(counts.values())) > 1:
             raise ValueError(
                 f"sensor_distance has {counts['sensor_distance']} entries and source_distance "
-                f"{counts['source_distance']}: must be as many, because they are used pairwise"
+                f"{counts['source_distance']}: must be of equal length, because they are used pairwise"
             )
         count = max(counts.values(), default=1)
         sensors, sources = (tuple(row) if name in counts else (row,) * count for name, row in rows.items())

@@ -239,8 +239,8 @@ def _why_for_derivatives(problem: Problem, best: Sampling) -> str:
     if problem.knots is None:
         return "; derivatives exclude approximations"
     if isinstance(best, WindowSampling):
-        return f"; derivatives by the samples of maps need more samples ({problem.knots.maps})"
-    return f"; derivatives by the samples of maps need nodes in each cell between knots ({problem.knots.maps})"
+        return f"; derivatives with respect to samples of maps need more samples ({problem.knots.maps})"
+    return f"; derivatives with respect to samples of maps need nodes in each cell between knots ({problem.knots.maps})"
 
 
 def _verdict(option: Sampling, best: Sampling, problem: Problem, most_seconds: float) -> str:
@@ -268,13 +268,13 @@ def _refusal(problem: Problem, found: list[Sampling], most_seconds: float, metho
     width = 2 * problem.window.half_width
     if not found and problem.knots is not None and method in {*METHODS} - {*FOR_PIXELS}:
         return (
-            f"method = {method!r}: cannot compute derivatives by the samples of maps ({problem.knots.maps}); use "
-            f"method='auto' or one of {', '.join(FOR_PIXELS)}"
+            f"method = {method!r}: cannot compute derivatives with respect to samples of maps ({problem.knots.maps}); "
+            f"use method='auto' or one of {', '.join(FOR_PIXELS)}"
         )
     if not found and problem.knots is not None:
         return (
-            f"tolerance = {problem.tolerance:g}: derivatives by the samples of maps ({problem.knots.maps}) need too "
-            f"many nodes: widen the tolerance, or shrink the window ({width:.3g} m) or the pupil (radius "
+            f"tolerance = {problem.tolerance:g}: derivatives with respect to samples of maps ({problem.knots.maps}) "
+            f"need too many nodes: widen the tolerance, or shrink the window ({width:.3g} m) or the pupil (radius "
             f"{problem.radius:.3g} m)"
         )
     if not found and problem.pixelated is not None:
@@ -291,9 +291,9 @@ def _refusal(problem: Problem, found: list[Sampling], most_seconds: float, metho
             "use method='rayleigh_sommerfeld'"
         )
     least = min(found, key=lambda option: option.seconds)
-    purpose = "" if problem.knots is None else f" for derivatives by the samples of maps ({problem.knots.maps})"
+    maps = "" if problem.knots is None else f" for derivatives with respect to samples of maps ({problem.knots.maps})"
     return (
-        f"tolerance = {problem.tolerance:g}{purpose} needs {_count(least)}, {size_of(_bytes(least, problem))} and "
+        f"tolerance = {problem.tolerance:g}{maps} needs {_count(least)}, {size_of(_bytes(least, problem))} and "
         f"about {_seconds(least, problem):.2g} s by {least.method}; the limits are {size_of(MOST_BYTES)} and "
         f"{most_seconds:g} s: widen the tolerance, shrink the window ({width:.3g} m) or the pupil (radius "
         f"{problem.radius:.3g} m, Fresnel number {problem.fresnel_number:.3g})"

@@ -11,7 +11,7 @@ import numpy as np
 from optics.elements.pupil import Pupil
 from optics.elements.source import PointSource
 from optics.numerics.accuracy import Plan
-from optics.numerics.arguments import flag, of_kind, vacuum_wavelength, vacuum_wavelengths
+from optics.numerics.arguments import flag, of_kind, vacuum_wavelength, wavelength_row
 from optics.numerics.autodiff import Scalar
 from optics.numerics.grid import Grid
 from optics.point_spread.planner import FIELDS
@@ -60,11 +60,7 @@ def psf(
     source = PointSource(source_distance, source_angle)
     at = sensor_place(of_kind("pupil", pupil, Pupil, "Pupil(25e-6)"), sensor_distance, source.distance)
     setup = Setup(at, source, Grid(shape, dx, centre), tolerance, method, dtype)
-    lambdas = np.atleast_1d(vacuum_wavelengths(wavelengths))
-    if lambdas.size == 0:
-        raise ValueError("wavelengths is empty: must hold at least one wavelength [m]")
-    if lambdas.ndim > 1:
-        raise ValueError(f"wavelengths has shape {lambdas.shape}: must be one wavelength [m], or a row of them")
+    lambdas = wavelength_row(wavelengths)
     if flag("field", field) and method not in ("auto", "exact", *FIELDS):
         raise ValueError(
             f"method = {method!r} has no phase: with field=True must be 'auto' or one of {', '.join(FIELDS)}"

@@ -13,8 +13,8 @@ In a distant window, A exp(ike) varies so slowly that a few terms a_k(ρx) b_k(�
 singular value decomposition of its values at Chebyshev nodes. Each term is then one matrix product along x and one
 along y. Fresnel's kernel exp(ikρ²/2z) needs a single term, without an approximation.
 
-A sum over samples contains the light of all replicas of the spectrum. None of it reaches the window if light at the
-Nyquist frequency passes beside it.
+A sum over samples contains the light of all replicas of the spectrum. If light at the Nyquist frequency misses the
+window, none of the replicas' light reaches it.
 """
 
 from __future__ import annotations
@@ -122,9 +122,9 @@ class SeparableSampling:
 def separable(passage: Passage, source: Grid, window: Grid, allowed: float) -> SeparableSampling | None:
     """Return a sampling of the separable kernel whose predicted error of the intensity is at most `allowed`.
 
-    The result is None if the samples of the source represent too few of the frequencies that reach the window, if light
-    is to be removed that could reach the window, if transforms are requested, or if more than MOST_TERMS terms are
-    necessary.
+    The result is None if transforms are requested or more than MOST_TERMS terms are necessary. It is also None if the
+    samples of the source represent too few of the frequencies that reach the window, or if light is to be removed that
+    could reach the window.
     """
     largest = max(*source.shape, *window.shape)
     if passage.z == 0 or passage.by_transforms or passage.limit is not None or largest > MOST_SAMPLES:

@@ -28,8 +28,9 @@ def optical_sensitivity(
         P = k l / (2.3 + k l)   for white light (Warrant & Nilsson, Vision Research 38, 195, 1998, eq. 4),
         P = 1 - exp(-k l)       for light at the pigment's peak (Land, Handbook of Sensory Physiology VII/6B, 1981).
 
-    Pass S to `PhotonBudget.photons` as the etendue. That function applies the pigment's spectrum and the quantum
-    efficiency, so omit the length there unless the efficiency describes only the losses in front of the receptor.
+    Pass S to `PhotonBudget.photons` as the etendue. That method applies the pigment's spectrum and the quantum
+    efficiency. For this purpose, omit the length unless the efficiency describes only the losses in front of the
+    receptor.
 
     diameter: diameter D [m] of the pupil or facet.
     focal_length: focal length f [m] in front of the lens (the posterior nodal distance).

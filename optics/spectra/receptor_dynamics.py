@@ -21,8 +21,8 @@ class ReceptorDynamics:
     latency_ms: additional delay [ms], rounded to whole frames
     adaptation: gain control by the mean b of the signal over `adaptation_ms`, an exponentially weighted mean. "none";
         "naka_rushton": s / (s + b), which is 1/2 in constant light (Naka & Rushton 1966, J. Physiol. 185:536);
-        "logarithmic": ln(s / b), which is 0 in constant light. `dark_light` is added to s and b of the logarithm, and
-        to b of the quotient
+        "logarithmic": ln(s / b), which is 0 in constant light. `dark_light` is added to s and b in the logarithm, and
+        to b in the quotient
     adaptation_ms: time constant of b [ms]
     dark_light: signal that is equivalent to the receptor's spontaneous activity; white in daylight gives 1
     event_threshold: θ. If above 0, the output is the number of events since the last observation, with a sign. An event
@@ -30,11 +30,12 @@ class ReceptorDynamics:
         Solid-State Circuits 43:566). None: no events
     motion: elementary motion detectors between neighbours in a row. Their outputs are channels that follow those of the
         receptors. "hassenstein_reichardt" (1956): D(a) b - a D(b). "barlow_levick" (1965): max(a - D(b), 0) - max(b -
-        D(a), 0): the neighbour at which an object in the null direction arrives first inhibits. "none": no detectors.
-        a is the left receptor, b the right one, and D is a low-pass filter. Motion to the right gives positive output
+        D(a), 0): an object that moves in the null direction reaches the inhibiting neighbour first. "none": no
+        detectors. a is the left receptor, b the right one, and D is a low-pass filter. Motion to the right gives
+        positive output
     motion_ms: time constant of D [ms]
     frames: number of frames per action that environments render, a divisor of the number of physics steps per action.
-        None: the smallest number whose error is allowed
+        None: the smallest number whose error is acceptable
 
     Raises:
         ValueError: an argument is outside its range; or events together with adaptation.
@@ -68,7 +69,7 @@ class ReceptorDynamics:
         if self.event_threshold is not None:
             in_range("ReceptorDynamics: event_threshold", self.event_threshold, 1e-3, 1e2)
             if self.adaptation != "none":
-                raise ValueError("ReceptorDynamics: event_threshold: must be None with adaptation; events adapt")
+                raise ValueError("ReceptorDynamics: event_threshold: must be None with adaptation; events adapt, too")
 
     @property
     def integration_ms(self) -> float:

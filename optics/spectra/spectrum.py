@@ -178,10 +178,11 @@ def reflectance(name: str) -> Spectrum:
 
 
 def srgb_basis() -> tuple[Spectrum, Spectrum, Spectrum]:
-    """Return the reflectances of red, green and blue surfaces whose mixtures have all colours of sRGB in daylight.
+    """Return the reflectances of red, green and blue surfaces. In daylight, their mixtures have all colours of sRGB.
 
-    A surface with the linear sRGB values (r, g, b) has the reflectance r red + g green + b blue. The three add up to 1.
-    Infinitely many other spectra have the same colours. The tables cover 380-780 nm, and values are constant below.
+    A surface with the linear sRGB values (r, g, b) has the reflectance r red + g green + b blue. The three reflectances
+    add up to 1. Infinitely many other spectra have the same colours. The tables cover 380-780 nm, and values are
+    constant below.
 
     Source: Mallett & Yuksel (2019), Spectral primary decomposition for rendering with sRGB reflectance, EGSR.
     """

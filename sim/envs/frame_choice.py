@@ -39,8 +39,8 @@ def with_frames(
 ) -> list[Fidelities | None]:
     """Return the fidelities with a number of frames for all eyes whose receptors have dynamics.
 
-    It is the same for all eyes of a world: the number that a fidelity or `ReceptorDynamics.frames` states, or else the
-    smallest number with which the errors of all signals are allowed.
+    The number is the same for all eyes of a world. A fidelity or `ReceptorDynamics.frames` may specify it. Otherwise it
+    is the smallest number for which the errors of all signals are acceptable.
 
     fidelities: for each agent, the fidelity of each kind of its eyes, or None if its eyes are not used
     scenes: see `renderers_for`

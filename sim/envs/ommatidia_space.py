@@ -1,4 +1,4 @@
-"""Space of the signals of a compound eye, which knows the viewing directions of the ommatidia."""
+"""Space of the signals of a compound eye, which stores the viewing directions of the ommatidia."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Number of threads of the libraries that a training uses: Dr.Jit, torch, OpenMP and BLAS."""
+"""Number of threads of the libraries that a training run uses: Dr.Jit, torch, OpenMP and BLAS."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ def set_threads(count: int = 1) -> None:
     torch and BLAS use one thread per core. The networks of small eyes are too small for that: most of the time, the
     threads wait for each other, and waiting takes CPU time. `evolve` uses one thread per process.
 
-    Rendering and physics use the threads of Dr.Jit. If a machine runs a single training,
-    ``drjit.set_thread_count(n)`` after this call gives them more threads than torch.
+    Rendering and physics use the threads of Dr.Jit. If a machine executes a single training run, call
+    ``drjit.set_thread_count(n)`` afterwards to give them more threads than torch.
 
     count: number of threads, from 1 to 1024
 

@@ -25,7 +25,7 @@ SAME = 1e-6  # directions that differ by less than this angle [rad] are equal
 
 @dataclass(frozen=True, eq=False)
 class CompoundEye:
-    """A compound eye of ommatidia, each a facet lens in front of a rhabdom. It is used like `optics.Eye` in a task.
+    """A compound eye, used like `optics.Eye` in a task. Each ommatidium is a facet lens in front of a rhabdom.
 
     Every ommatidium collects light with its acceptance function, which wave optics computes for each band
     (`optics.acceptance_function`). Signals are normalised: a white surface in full daylight that fills the field of an
@@ -37,7 +37,7 @@ class CompoundEye:
         converted to unit vectors.
     ommatidium: an `optics.Ommatidium` for all directions, or a sequence with one for each direction. Ommatidia that are
         the same object share an acceptance function, so zones with equal ommatidia are prepared faster.
-    receptors: receptor types, see `optics.Eye`, without a mosaic
+    receptors: receptor types, see `optics.Eye`. Mosaics are not supported here; use `types`
     types: type of the receptors in each ommatidium, indices into `receptors`, (n, channel). One column gives one
         receptor for each ommatidium, a mosaic. Three columns can describe R1-6, R7 and R8 of a fly, whose R7 and R8
         have different pigments in pale and yellow ommatidia. None: every ommatidium has receptors of all types.

@@ -110,7 +110,7 @@ def _tests(places: np.ndarray, spread: float) -> np.ndarray:
 
 
 def _corrected(weights: np.ndarray, at_rays: np.ndarray, everywhere: np.ndarray, powers: np.ndarray) -> np.ndarray:
-    """Return weights with which every band sees the test scenes exactly.
+    """Return weights with which the signals of the test scenes are exact in every band.
 
     All bands share the centroids of cells. Without the correction, a band with a wide acceptance function would see too
     narrow a field.

@@ -1,6 +1,6 @@
 """Viewing directions of ommatidia: hexagonal patches, whole heads, and measured directions.
 
-Directions are unit vectors (ahead, left, up) in the frame of a `sim.Mount`, with all its angles 0.
+Directions are unit vectors (ahead, left, up) in the frame of a `sim.Mount` whose angles are all 0.
 """
 
 from __future__ import annotations
@@ -78,7 +78,7 @@ def hexagonal_patch(
 ) -> np.ndarray:
     """Return viewing directions in hexagonal rings around a direction, unit vectors (n, 3).
 
-    15 rings have 721 ommatidia, as an eye of *Drosophila*. The hexagonal lattice is mapped to the sphere by Lambert's
+    15 rings have 721 ommatidia, like an eye of *Drosophila*. The hexagonal lattice is mapped to the sphere by Lambert's
     equal-area projection, so every ommatidium has the same solid angle.
 
     rings: number of rings around the central ommatidium, 0 to 60

@@ -98,7 +98,7 @@ class MujocoWorlds:
         return broken
 
     def _replace_passed(self, broken: list[int]) -> None:
-        """Replace the earlier poses of worlds whose physics broke down by their poses after the action."""
+        """Replace the earlier poses of worlds whose physics broke down with their poses after the action."""
         for world in broken:
             self.require_places(world)
         fine = [world for world in range(self.n) if world not in broken]

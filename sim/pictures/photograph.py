@@ -67,8 +67,8 @@ def see_photograph(
     animal: one of "blowfly", "dragonfly", "fruit_fly", "honeybee", "megalopta", "eagle", "goldfish", "human",
         "jumping_spider" and "mouse".
     width_deg: angular width of the photograph, in [0.1, 120].
-    uv: a photograph contains no ultraviolet. Below 400 nm, reflectances are this fraction, in [0, 1], of the value by
-        which the table of `srgb_basis` continues: a white surface reflects the fraction uv.
+    uv: fraction of ultraviolet light, in [0, 1], that a white surface reflects. A photograph does not contain it. Below
+        400 nm, the reflectances of `srgb_basis` are multiplied by it.
     progress: function that is called with the completed fraction. None: no calls.
 
     Raises:

@@ -28,7 +28,7 @@ class ReceptorMosaic:
     signals: signals (channel, row, column), from the top left of the visual field. A white surface gives 1.
     peaks_nm: peak wavelength of each channel, (channel,).
     width_deg: angular width of the photograph.
-    hexagons: True for ommatidia. Rows with odd numbers are then half an ommatidium further to the right.
+    hexagons: True for ommatidia. Rows with odd numbers are then shifted to the right by half an ommatidium.
     """
 
     animal: str

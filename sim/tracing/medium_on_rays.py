@@ -41,7 +41,7 @@ class MediumOnRays:
         return [v + more for v, more in zip(self.veil, self.contrasts(radiance, [distance]), strict=True)]
 
     def contrasts(self, radiance: Sequence[Array], distances: Sequence[Array], share: Array | float = 1) -> list[Array]:
-        """Return the contrasts (L - V) exp(-c d) of surfaces with the veiling light, per component.
+        """Return the contrasts (L - V) exp(-c d) between surfaces and the veiling light, per component.
 
         radiance: share · L
         distances: exp(-c d) is averaged over them [m]

@@ -253,7 +253,7 @@ NAN = np.full((5, 5), np.nan)
         (lambda: optics.torch.psf(lens(), sensor_distance=[]), "sensor_distance is empty: must hold at least one"),
         (
             lambda: optics.torch.psf(lens(), 5e-7, [1e-4, 2e-4], [1.0, 2.0, 3.0]),
-            "sensor_distance has 2 entries and source_distance 3: must be as many, because they are used pairwise",
+            "sensor_distance has 2 entries and source_distance 3: must be of equal length, because they are used",
         ),
         (lambda: optics.torch.psf(lens(), source_angle=0.1, **VIEW), r"source_angle = 0\.1: must be two angles"),
         (lambda: optics.torch.psf(lens(), field=True, **VIEW), r"field: only `optics\.psf` returns it"),
@@ -271,7 +271,7 @@ NAN = np.full((5, 5), np.nan)
         (lambda: optics.torch.psf(lens(), pixel_means=2, **VIEW), "pixel_means = 2: must be True or False"),
         (
             lambda: optics.torch.psf(lens(height=torch.zeros(5, 5)), requires_grad=True, **VIEW),
-            "no number of the pupil requires a gradient: must hold a tensor with requires_grad=True",
+            "no tensor requires a gradient: at least one must have requires_grad=True",
         ),
         (
             lambda: lens(height=asking(6 * SQUARE)),

@@ -52,10 +52,10 @@ def test_pixels_are_square():
 
 def test_a_wrapped_height_map_points_at_pixels():
     x = (np.arange(128) + 0.5) / 64 - 1
-    for radius in (60e-6, 200e-6):  # too slow, and refused in any case
+    for radius in (60e-6, 200e-6):  # too slow at this tolerance
         wrapped = (-(radius**2) * (x**2 + x[:, None] ** 2) / (8 * radius)) % 1.1e-6
         with pytest.raises(optics.AccuracyError, match=r"height jumps by .* optics\.PixelRelief\(height\)"):
-            optics.psf(optics.Pupil(radius, height=wrapped), sensor_distance=8 * radius)
+            optics.psf(optics.Pupil(radius, height=wrapped), sensor_distance=8 * radius, tolerance=1e-4)
     smooth = optics.HeightMap(-(60e-6**2) * (x**2 + x[:, None] ** 2) / (480e-6))
     assert smooth.jump == 0
     assert optics.HeightMap(wrapped).jump == pytest.approx(1.1e-6, rel=0.05)

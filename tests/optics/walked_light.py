@@ -181,7 +181,7 @@ OF_PSFS = {
             "dx": 2e-6,
             "shape": (7, 9),
             "tolerance": 1e-4,
-            "method": "low_rank",
+            "method": "rayleigh_sommerfeld",
             "dtype": "float64",
             "centre": (1e-6, 0.0),
             "field": True,

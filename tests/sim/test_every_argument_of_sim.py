@@ -273,6 +273,7 @@ ON_MODELS = {
 ELSEWHERE = {
     name: Walk(dict, dict.fromkeys(names, NoEffect(where)))
     for name, names, where in (
+        ("set_threads", ("count",), "tests/sim/envs/test_threads.py"),
         ("BatchedRenderer", ("fidelity", "tracer"), "tests/sim/render"),
         ("BatchedRenderer.launch", ("light",), "as ModelRenderer.signals"),
         ("BatchedRenderer.launch_some", ("light",), "as ModelRenderer.signals"),

@@ -2,9 +2,9 @@
 
 The ant of `examples/ant_seeks.py`, whose body consists of primitives, has two eyes of 721 ommatidia in 64 worlds. The
 same eyes are built from 1,442 mounts of an `optics.Eye` with one receptor. For both, the table shows the fewest rays
-whose root mean square error is at most half of the receptors' noise (σ = 0.01, relative to white), the error, and the
-median CPU times of the signals of a single world and of all worlds. The last lines are the ratios of these times, and
-whole steps per CPU second. The first calls, which compile kernels, are not counted.
+whose root mean square error is at most half of the receptors' noise (σ = 0.01, relative to white), and this error. It
+also shows the median CPU times of the signals of a single world and of all worlds. The last lines are the ratios of
+these times, and whole steps per CPU second. The first calls, which compile kernels, are not counted.
 """
 
 from __future__ import annotations

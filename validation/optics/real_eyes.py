@@ -2,26 +2,29 @@
 
 Do the models reproduce what biologists measured and calculated for real eyes? The table compares published with
 computed values. Each row states the range in which the ratio computed/published must lie, and the command fails if a
-row leaves its range. Wide ranges belong to values that differ for the reasons given below. They guard the computed
-value and do not claim agreement. The inputs are those of `optics.animals`.
+row leaves its range. Some ranges are wide, because the values differ for the reasons given below. These ranges only
+detect a change of the computed value; they do not claim agreement. The inputs come from `optics.animals`.
 
 **Method.** Land's sensitivity S is `optics.optical_sensitivity` in white light with k = 0.0067 per µm. Acceptance
-angles Δρ are full widths at half maximum of `optics.Ommatidium.sensitivity`, which is wave optics with waveguide modes.
-All rhabdoms have the indices 1.363 in 1.340, which were measured in flies. Acuity is that of a hexagonal lattice.
+angles Δρ are full widths at half maximum of `optics.Ommatidium.sensitivity`, which is computed by wave optics with
+waveguide modes. All rhabdoms have the refractive index 1.363 in a medium of 1.340. Both indices were measured in flies.
+Acuity is that of a hexagonal lattice.
 
-**Sources.** The last column states what was read: "table", "appendix", "figure" (its caption), "abstract" or "quoted".
-A quoted value comes from a later article or from the proposal for this page, and its source was not accessible.
+**Sources.** The last column states which part of the source was read: the article, a table, an appendix, the caption of
+a figure, the abstract, or a press release ("press"). The source of a "quoted" value was not accessible: the value comes
+from a later article, or was proposed for this page. Rows with "closed form" are compared with a formula.
 
 - Honeybees: Somanathan et al., J. Exp. Biol. 212, 2448, 2009, table 1. Its Δρ is d/f. This ratio ignores diffraction,
   so computed angles are larger, by 20 to 65 %. Electrophysiology supports them: 2.6° on average in dark-adapted eyes,
   and less than 1.9° in the acute zone of light-adapted eyes (Rigosi, Wiederman & O'Carroll, Sci. Rep. 7, 45972, 2017).
   A closed pupil removes the higher modes (Stavenga 2004), so the light-adapted angle is computed from the first mode.
   *Apis cerana* has V = 2.55 at 540 nm, just above the cut-off of the second mode at 2.405. Its angle is therefore
-  sensitive to the refractive indices. The S of *Apis dorsata* follows from the table's own D, f, Δρ and l only to 9 %.
+  sensitive to the refractive indices. For *Apis dorsata*, S and the other columns of the table (D, f, Δρ and l) agree
+  only to within 9 %.
 - *Drosophila*: Stavenga, J. Comp. Physiol. A 189, 1, 2003, appendix 1.
 - Blowfly: Stavenga, J. Exp. Biol. 207, 1703, 2004, caption of fig. 4. Dark-adapted angles approach d/f, and
-  light-adapted angles approach the half width of the facet's diffraction pattern. The curves could not be read. They
-  are for tapered rhabdomeres, and the model's are straight.
+  light-adapted angles approach the half width of the facet's diffraction pattern. The values of the curves could not be
+  read. They apply to tapered rhabdomeres, whereas the model has straight ones.
 - *Megalopta*: Greiner, Ribi & Warrant, Cell Tissue Res. 316, 377, 2004, abstract. The inputs are quoted.
 - *Cirolana*: Nilsson & Nilsson, J. Comp. Physiol. A 143, 503, 1981, abstract. The receptor accepts 45° by geometrical
   optics. The row shows by how much the PSF of the lens widens this angle.
@@ -33,20 +36,25 @@ A quoted value comes from a later article or from the proposal for this page, an
   cd/m² at 555 nm.
 - Fish: Fernald & Wright, Vision Research 25, 155, 1985, abstract: 1.9 % of the focal length in *Haplochromis burtoni*.
   The abstract does not state the wavelengths. The computed value is for a lens with f = 2.5 R and the dispersion of
-  serum albumin, between 486 and 656 nm (the lines F and C). The two values therefore agree in their size only.
+  serum albumin, between 486 and 656 nm (the lines F and C). The two values therefore agree only roughly.
 - Luneburg's and Maxwell's lenses: closed forms.
 
-**Ideal observer.** The second table has the contrast sensitivity of an ideal observer under the conditions of Banks,
+**Ideal observer.** The second table lists the contrast sensitivity of an ideal observer. The conditions follow Banks,
 Geisler & Bennett (Vision Research 27, 1915, 1987): a pupil of 2 mm, 100 ms, 7.5 cycles in a cosine window, and 70.7 %
-correct choices. The abstract was read: the ideal observer is about 20 times better than humans, and both curves have
-the same shape from 5 to 40 cycles/degree. The human data are in a figure that was not accessible. The column "over 20"
-is therefore a prediction, not a comparison. The sensitivity at 5 cycles/degree must lie between 1,000 and 10,000. The
-optics are `optics.mean_human_mtf`; the article uses another MTF. Duration, window and criterion are quoted.
+correct choices. Only the abstract was read. It states that the ideal observer is about 20 times better than humans, and
+that both curves have the same shape from 5 to 40 cycles/degree. The human data are in a figure that was not accessible.
+The column "over 20" is the sensitivity divided by 20, which is a prediction of human sensitivity, not a comparison. The
+sensitivity at 5 cycles/degree must lie between 1,000 and 10,000. The optics are `optics.mean_human_mtf`; the article
+uses another MTF. Duration, window and criterion are quoted.
 
-**Not computed.** Sensitivities and angles of *Cyrba algerina* (0.39 µm² and 12.4 minutes of arc: lens and receptors are
-in the article, of which only the abstract was accessible). The owlfly's Δρ of 1.8° (a superposition eye). Tapered
-rhabdomeres. The acuity of 140 cycles/degree of the wedge-tailed eagle, the 13 minutes of arc of the goldfish and the
-0.24° of dragonflies were read in abstracts; they are inputs of `optics.animals` and therefore prove nothing.
+**Not computed.** The table omits these published values:
+
+- The sensitivity and the angle of *Cyrba algerina*, 0.39 µm² and 12.4 minutes of arc. The article describes lens and
+  receptors, but only its abstract was accessible.
+- The owlfly's Δρ of 1.8°. Its eye is a superposition eye.
+- Values for tapered rhabdomeres.
+- The acuity of the wedge-tailed eagle, 140 cycles/degree, the 13 minutes of arc of the goldfish and the 0.24° of
+  dragonflies. They were read in abstracts, and are inputs of `optics.animals`, so a comparison would prove nothing.
 
 The command computes the table:
 

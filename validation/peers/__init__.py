@@ -5,7 +5,7 @@ functions and propagators that a code can prepare once are prepared before timin
 
 work_precision    proof: error against time of these codes and ours
 population_speed  proof: PSFs per CPU second of whole populations
-design_speed      its table of single PSFs and gradients, for pupils that somebody designs
+design_speed      its table of single PSFs and gradients, for the design of pupils
 peer_claims       proof: claims of other codes' tests and of textbooks
 claims            those claims
 problem           cases for all codes

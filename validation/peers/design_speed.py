@@ -1,4 +1,4 @@
-"""Times and errors of single PSFs and of their gradients, for pupils that somebody designs.
+"""Times and errors of single PSFs and of their gradients, for the design of pupils.
 
 Each pupil is new: its PSF is planned, computed and checked in the measured time. The yardstick is a matrix Fourier
 transform in NumPy, from direction sines to the window, with a grey edge. It plans nothing and predicts no error. The

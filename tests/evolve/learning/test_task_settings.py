@@ -97,6 +97,7 @@ SETTINGS = {
     "camera": ('"above"', EFFECT, EFFECT),
     "actuators": ('("slide", "roll")', EFFECT, EFFECT),
     "name": ('"Ben"', EFFECT, EFFECT),
+    "medium": ('"coastal_water"', EFFECT, EFFECT),
     "failure_reward": ("-3.0", EFFECT, EFFECT),
     "mode": ('"evaluation"', "mode = 'evaluation': must be left out", "mode = 'evaluation': must be left out"),
     "others": ("(sim.Frozen(Ball(), lambda seen: np.ones((1, 1))),)", EFFECT, EFFECT),

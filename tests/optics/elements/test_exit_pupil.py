@@ -224,7 +224,7 @@ def test_obscured_and_uneven_pupils_are_refused():
     for amplitude in (r > 0.5, np.exp(-(r**2)), r > 0.1):
         system = wavefront()
         system.data = system.data * amplitude
-        with pytest.raises(ValueError, match="obscured, not convex, or unevenly lit: only open pupils"):
+        with pytest.raises(ValueError, match="obscured, not convex, or unevenly lit: only unobscured pupils"):
             read_exit_pupil(system, WAVE, focal_length=0.1, order=2)
     system = traced()
     off = np.hypot(system.pupil_x, system.pupil_y)

@@ -121,7 +121,7 @@ def test_square_samples_are_a_square_pupil():
 def test_rays_that_are_cut_off_inside_are_refused():
     wave = triplet(20, WAVE, grid_rays(121))
     wave.intensity[np.hypot(wave.pupil_x, wave.pupil_y - 1.0) < 1.0] = 0.0
-    with pytest.raises(ValueError, match="obscured or not convex: only open, convex pupils"):
+    with pytest.raises(ValueError, match="obscured or not convex: only unobscured, convex pupils"):
         optics.read_exit_pupil(wave, WAVE)
 
 

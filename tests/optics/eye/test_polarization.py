@@ -175,7 +175,7 @@ def test_modes_of_rhabdoms_take_polarised_light_as_squares_do():
 
 
 def test_derivatives_are_those_of_unpolarised_light_times_the_same():
-    """Derivatives by the pupil's radius and a mask's waist, for a scene with the same polarisation everywhere."""
+    """Derivatives with respect to the pupil's radius and a mask's waist; the polarisation is the same everywhere."""
     slopes = {}
     for polarization in (None, (0.7, 30.0)):
         radius, waist = Float64(12e-6), Float64(10e-6)

@@ -92,7 +92,7 @@ def test_methods_that_are_none_are_named(method):
 
 
 def test_the_phase_carries_derivatives():
-    """The derivative by the distance includes the carrier: d arg U / dz is about k."""
+    """The derivative with respect to the distance includes the carrier: d arg U / dz is about k."""
 
     def real_part(z):
         asked = {**ASKED, "sensor_distance": z, "method": "rayleigh_sommerfeld", "tolerance": 1e-8}

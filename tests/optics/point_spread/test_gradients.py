@@ -1,4 +1,4 @@
-"""Derivatives by all inputs, whatever their values are, against exact adjoints in NumPy (`exact_gradients`).
+"""Derivatives with respect to all inputs, against exact adjoints in NumPy (`exact_gradients`).
 
 The error of a gradient is its relative L2 error for a random functional of the PSF. It must be below five times the
 tolerance; at most the tolerance is stated.
@@ -112,7 +112,7 @@ def test_a_flat_map_of_every_user_s_first_step():
     """119 nodes for 1,024 unknowns would give a gradient of the wrong sign; the plan states the reason for more."""
     found, plan = gradient(np.zeros((32, 32)), pupil_with("height"), 1e-2)
     assert np.corrcoef(found.ravel(), exact_gradient("height", "zeros", 32).ravel())[0, 1] > 0.9995
-    assert "derivatives by the samples of maps need more samples (height: 32 x 32)" in plan.why
+    assert "derivatives with respect to samples of maps need more samples (height: 32 x 32)" in plan.why
     assert "derivatives      error up to 3.0e-02" in str(plan)
 
 
@@ -241,15 +241,15 @@ def test_approximations_are_not_chosen_for_derivatives():
 
 @pytest.mark.parametrize("method", ["geometric", "fresnel", "far_field", "hankel"])
 def test_methods_without_nodes_between_knots_are_refused(method):
-    with pytest.raises(AccuracyError, match=rf"method = '{method}': cannot compute derivatives by the samples of maps"):
+    with pytest.raises(AccuracyError, match=rf"'{method}': cannot compute derivatives with respect to samples of maps"):
         gradient(np.zeros((8, 8)), pupil_with("height"), 1e-2, method=method)
 
 
 @pytest.mark.parametrize(
     ("radius", "message"),
     [
-        (5e-3, r"derivatives by the samples of maps \(height: 8 x 8\) need too many nodes: widen the tolerance"),
-        (4e-4, r"for derivatives by the samples of maps \(height: 8 x 8\) needs \d+ samples across"),
+        (5e-3, r"derivatives with respect to samples of maps \(height: 8 x 8\) need too many nodes: widen"),
+        (4e-4, r"for derivatives with respect to samples of maps \(height: 8 x 8\) needs \d+ samples across"),
     ],
 )
 def test_nodes_beyond_the_limits_are_refused(radius, message):

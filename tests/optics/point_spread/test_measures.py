@@ -166,8 +166,8 @@ def test_the_cutoff_is_the_mediums():
 
 
 def test_contrasts_know_how_much_light_a_mask_leaves_at_the_rim():
-    """The derivative by the mask's width agrees with differences: the evanescent part is proportional to the light at
-    the rim."""
+    """The derivative with respect to the mask's width agrees with differences: the evanescent part is proportional to
+    the light at the rim."""
     import drjit as dr
 
     from tests.optics.device_types import Float64
