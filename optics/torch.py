@@ -118,7 +118,7 @@ def camera_image(scene: Any, pupil: Pupil, sensor: camera.Sensor, *, device: Any
     pupil: see `psf`.
     sensor: a sensor with bits=None, because rounded numbers have no derivatives.
     device: device of the result, see `psf`.
-    view: depth, samples_per_pixel, rng, sensor_distance and tolerance, see `optics.camera_image`.
+    view: depth, samples_per_pixel, field_zones, rng, sensor_distance and tolerance, see `optics.camera_image`.
 
     Raises:
         ValueError: an argument is invalid; the message names it with its value and valid range.

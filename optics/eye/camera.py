@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from optics.elements.pupil import Pupil
+from optics.eye.depth_range import layers_for
 from optics.eye.eye import Eye
 from optics.eye.geometry import behind_pupil
 from optics.eye.photoreceptor import photon_noise
@@ -75,6 +76,7 @@ def camera_image(
     *,
     depth: Any = math.inf,
     samples_per_pixel: int = 1,
+    field_zones: int | str = 1,
     rng: np.random.Generator | None = None,
     sensor_distance: Scalar | None = None,
     tolerance: float = 1e-2,
@@ -93,6 +95,7 @@ def camera_image(
     sensor: the sensor behind a pupil; None for an eye.
     depth: distance [m] of the scene along the axis: a number, or a map with one distance per cell (Y, X).
     samples_per_pixel: cells of the scene per pixel along each axis. A defocused edge needs a few.
+    field_zones: number of PSFs across the width of the field, or "auto", see `Eye.sight`. 1 uses the PSF on the axis.
     rng: random generator of the noise. None: no noise; electrons are their mean numbers.
     sensor_distance: distance [m] of the sensor behind the pupil. None: the distance at which the pupil's ideal lens
         focuses an infinitely distant point.
@@ -113,9 +116,11 @@ def camera_image(
         raise ValueError("lens is an Eye, and sensor or sensor_distance is given: must be None, an Eye has its own")
     radiance = _radiance(scene, eye, samples_per_pixel)
     z = _distances(depth, radiance.shape[1:])
+    on_axis = isinstance(field_zones, int) and field_zones == 1
+    sight = None if on_axis else eye.sight(samples_per_pixel, z, layers_for(z)[0], field_zones)
     if sensor is None:
-        return eye.see(radiance, samples_per_pixel, rng, z=z)
-    return _read(eye.see(radiance, samples_per_pixel, z=z), sensor, eye, rng)
+        return eye.see(radiance, samples_per_pixel, rng, z, sight)
+    return _read(eye.see(radiance, samples_per_pixel, None, z, sight), sensor, eye, rng)
 
 
 def camera_eye(

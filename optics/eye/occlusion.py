@@ -51,14 +51,19 @@ def visible_layers(inverse_distance: np.ndarray, parallax: float) -> Iterator[La
     """
     from scipy.ndimage import distance_transform_edt
 
-    level = _levels(inverse_distance, parallax)
-    source = np.arange(level.size).reshape(level.shape)
+    least = _least_jump(inverse_distance, parallax)
+    level = ((inverse_distance - inverse_distance.min()) / least).astype(int)  # 0 is the farthest layer
+    itself = np.arange(level.size).reshape(level.shape)
+    source = itself
     remaining = np.ones(level.shape, bool)
     for number in np.unique(level)[::-1]:
         near = inverse_distance.ravel()[source]
         cells = remaining & (level.ravel()[source] == number)
         behind = remaining & ~cells
-        edge = behind & (_highest_neighbour(near, cells) - near >= _least_jump(inverse_distance, parallax))
+        # Cells that continue a surface behind another one have an edge only where the visible surface has one.
+        visible = source == itself
+        edge = behind & visible & (_highest_neighbour(near, cells & visible) - near >= least)
+        edge = edge.ravel()[source] & behind & (_highest_neighbour(near, cells) - near >= least)
         if not edge.any():
             yield Layer(source, cells, np.zeros_like(cells))
             remaining = behind
@@ -76,12 +81,6 @@ def _least_jump(inverse_distance: np.ndarray, parallax: float) -> float:
     if parallax == 0:
         return math.inf
     return max(LEAST_SHIFT / parallax, float(np.ptp(inverse_distance)) / MOST_LAYERS)
-
-
-def _levels(inverse_distance: np.ndarray, parallax: float) -> np.ndarray:
-    """Return the number of each cell's layer, from 0 for the farthest."""
-    above = inverse_distance - inverse_distance.min()
-    return (above / _least_jump(inverse_distance, parallax)).astype(int)
 
 
 def _highest_neighbour(values: np.ndarray, cells: np.ndarray) -> np.ndarray:
