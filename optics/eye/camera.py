@@ -14,7 +14,7 @@ from optics.eye.depth_range import layers_for
 from optics.eye.eye import Eye
 from optics.eye.geometry import behind_pupil
 from optics.eye.photoreceptor import photon_noise
-from optics.numerics.arguments import in_range, of_kind, positive, reals, shape_2d, whole, without_derivative
+from optics.numerics.arguments import in_range, of_kind, positive, reals, shape_2d, whole
 from optics.numerics.autodiff import Array, Scalar, holds_arrays, is_differentiable, number, plain
 from optics.point_spread.request import sensor_place
 from optics.spectra.photon_budget import PhotonBudget
@@ -132,9 +132,11 @@ def camera_eye(
     """
     of_kind("lens", lens, Pupil, "Pupil(1e-3, thin_lens_focal_length=5e-3), or an Eye")
     of_kind("sensor", sensor, Sensor, "Sensor((480, 640), 3e-6)")
-    distance = number(sensor_place(lens, without_derivative("sensor_distance", sensor_distance), math.inf))
+    if sensor_distance is not None:
+        positive("sensor_distance", sensor_distance)
+    distance = number(sensor_place(lens, sensor_distance, math.inf))
     make = _camera_eye.__wrapped__ if holds_arrays(lens) else _camera_eye
-    return make(lens, sensor, distance, tolerance)
+    return make(lens, sensor, distance, in_range("tolerance", tolerance, 1e-6, 0.5))
 
 
 @lru_cache(maxsize=4)
@@ -184,10 +186,9 @@ def _radiance(scene: Any, eye: Eye, samples_per_pixel: int) -> np.ndarray:
 
 def _distances(depth: Any, shape: tuple[int, ...]) -> Any:
     """Return a checked distance, or a map of distances."""
-    if is_differentiable(depth) or np.ndim(depth) == 0:
+    if is_differentiable(depth) or np.ndim(found := reals("depth", depth)) == 0:
         positive("depth", depth, infinite=True, carried=True)
         return depth
-    found = reals("depth", depth)
     if found.shape != shape:
         raise ValueError(f"depth has shape {found.shape}: must be one distance, or one per cell of the scene, {shape}")
     if np.isnan(found).any():
