@@ -7,7 +7,7 @@ import math
 from evolve.config.checks import ConfigError
 from evolve.genome.eye_config import VERTICAL_FOVS, EyeConfig
 from evolve.genome.genes import INHERITED
-from optics.spectra.receptor_dynamics import ADAPTATIONS, MOTION
+from optics.spectra.receptor_dynamics import ADAPTATIONS, LEAST_EVENT, MOTION
 from optics.spectra.receptors import RECEPTORS
 
 # Settings of receptors with memory, and settings that have an effect only with another one.
@@ -95,6 +95,11 @@ def _check_time(eye: EyeConfig) -> None:
     for name in changed:
         if (other := NEEDED.get(name)) is not None and getattr(eye, other) == "none":
             raise ConfigError(f"eye.{name}: has no effect with eye.{other} = none", f"eye.{name}", f"eye.{other}")
+    if 0 < eye.event_threshold < LEAST_EVENT:
+        raise ConfigError(
+            f"eye.event_threshold = {eye.event_threshold:g}: must be 0, or at least {LEAST_EVENT:g}",
+            "eye.event_threshold",
+        )
     if eye.event_threshold > 0 and eye.adaptation != "none":
         raise ConfigError(
             f"eye.event_threshold = {eye.event_threshold:g}: must be 0 with eye.adaptation = {eye.adaptation}",

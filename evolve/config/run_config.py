@@ -36,7 +36,7 @@ from evolve.genome import anatomy
 from evolve.genome.genes import CLUSTERS, GENES, INHERITED, Gene, GeneConfig
 from evolve.genome.interval import Interval
 from optics.elements.turbid_medium import MEDIA_OF_WORLDS
-from sim.worlds.catalog import TASKS
+from sim.worlds.catalog import SUBSTEPS, TASKS
 
 __all__ = [
     "SECTIONS",
@@ -121,6 +121,11 @@ class RunConfig:
                     *(f"genome.{name}", "task"),
                 )
         self._check_settings((*OF_SLIDING_AGENTS, *OF_USER_TASKS))
+        if not self.card.has_file and self.eye.frames and SUBSTEPS % self.eye.frames:
+            raise ConfigError(
+                f"eye.frames = {self.eye.frames}: must be 0, or a divisor of the {SUBSTEPS} physics steps of an action",
+                "eye.frames",
+            )
 
     def _check_world(self) -> None:
         """Check the settings of layouts, and that they are changed only for tasks that have them."""

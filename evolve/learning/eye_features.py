@@ -77,6 +77,8 @@ class EyeFeatures(BaseFeaturesExtractor):
         eyes, first = observation_space["eyes"], AdaptedLinear
         grid: HexagonalLayers | Regridding
         if isinstance(eyes, OmmatidiaBox):
+            if wiring.pool_side or wiring.repeat_side:
+                raise ValueError("wiring: pool_side and repeat_side must be 0, ommatidia have no rows and columns")
             self.memory, self.n_eyes, first = eyes.shape[0], 1, PerEyeLinear
             grid = HexagonalLayers(eyes.directions, eyes.shape[2], UNITS)
             inputs = grid.outputs

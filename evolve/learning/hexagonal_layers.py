@@ -109,6 +109,8 @@ def directions_from_record(stored: Mapping[str, Any]) -> tuple[tuple[float, ...]
     found = tuple(tuple(float(part) for part in way) for way in stored.get("directions", ()))
     if len(stored["eyes"]) != (3 if found else 5) or (found and len(found) != int(stored["eyes"][1])):
         raise ValueError(f"{len(found)} directions do not fit eyes of the shape {stored['eyes']}")
+    if any(len(way) != 3 for way in found):
+        raise ValueError("directions: must be unit vectors (ahead, left, up)")
     if found:
         unit_directions("directions", found)
     return found

@@ -246,8 +246,12 @@ def load_policy(path: Path | str) -> EyePolicy:
 
 
 def learnt(policy: EyePolicy) -> dict[str, Tensor]:
-    """Return all tensors that learning changes, by name: weights, and running means and spreads of inputs."""
-    return {**dict(policy.named_parameters()), **dict(policy.named_buffers())}
+    """Return all tensors that learning changes, by name: weights, and running means and spreads of inputs.
+
+    Tables that follow from the policy's shape, such as the neighbours of ommatidia, are not among them.
+    """
+    found, changing = {**dict(policy.named_parameters()), **dict(policy.named_buffers())}, policy.state_dict().keys()
+    return {name: tensor for name, tensor in found.items() if name in changing}
 
 
 @torch.no_grad()

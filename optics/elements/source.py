@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from optics.numerics.arguments import in_range, pair, positive
+from optics.numerics.arguments import in_range, pair, positive, without_derivative
 from optics.numerics.array_library import library, like
 from optics.numerics.autodiff import Array, Scalar, is_differentiable, number
 
@@ -41,6 +41,15 @@ class PointSource:
         """The same source without derivatives."""
         x, y = map(number, self.angle)
         return PointSource(number(self.distance), (x, y))
+
+    def require_plain(self) -> PointSource:
+        """Return the same source without Dr.Jit arrays.
+
+        Raises:
+            ValueError: a number carries a derivative.
+        """
+        without_derivative("source", (self.distance, *self.angle))
+        return self.plain
 
     def path(self, x: Array, y: Array) -> Array:
         """Return the optical path [m] in vacuum at points (x, y) [m] of the pupil, relative to the centre.

@@ -257,9 +257,10 @@ class Eye(EyeSpec):
         if holds_arrays(z) or holds_arrays(self):
             return self._sight_for(samples_per_receptor, z, layers)
         key = samples_per_receptor, distances
-        if vars(self).get(LAST, (None,))[0] != key:
-            vars(self)[LAST] = key, self._sight_for(samples_per_receptor, z, layers)
-        bank: KernelBank = vars(self)[LAST][1]
+        known, bank = vars(self).get(LAST, (None, None))
+        if known != key:
+            bank = self._sight_for(samples_per_receptor, z, layers)
+            vars(self)[LAST] = key, bank
         return bank
 
     def _sight_for(self, samples_per_receptor: int, z: Any, layers: str) -> KernelBank:

@@ -133,10 +133,24 @@ class Description:
 
 def noise_of(eye: EyeSpec, white_signal: Scalar) -> float:
     """Return the standard deviation of a receptor's signal for white in daylight: receptor noise and photon noise."""
-    if eye.photons is None:
+    photons = _photons_of(eye)
+    if photons is None:
         return float(eye.noise_sigma)
     light = number(white_signal)
-    return math.hypot(eye.noise_sigma, light / math.sqrt(float(eye.photons.mean()) * light))
+    return math.hypot(eye.noise_sigma, light / math.sqrt(photons * light))
+
+
+def _photons_of(eye: EyeSpec) -> float | None:
+    """Return the photons that a receptor absorbs for a signal of 1, averaged over types; None without a photon budget.
+
+    Receptors with dynamics integrate over the time that their filter defines, instead of that of the photon budget.
+    """
+    if eye.photons is None or eye.photon_budget is None:
+        return None
+    found = float(eye.photons.mean())
+    if eye.dynamics is None:
+        return found
+    return found * 1e-3 * eye.dynamics.integration_ms / eye.photon_budget.integration_time
 
 
 def describe(eye: EyeSpec, light: float, result: PSFResult, kernel: Kernels) -> Description:
@@ -151,7 +165,7 @@ def describe(eye: EyeSpec, light: float, result: PSFResult, kernel: Kernels) -> 
     distance = number(eye.sensor_distance)
     white, wavelength = _white(eye, result)
     unknown: list[str] = []
-    photons, noise = None if eye.photons is None else float(eye.photons.mean()) * light, noise_of(eye, light)
+    photons, noise = _photons_of(eye), noise_of(eye, light)
     if eye.pupil is None:
         diffraction, strehl, quality = math.inf, 1.0, max(1 - noise, 0.0)
         noise_limit = math.inf if noise < 1 else 0.0
@@ -177,7 +191,7 @@ def describe(eye: EyeSpec, light: float, result: PSFResult, kernel: Kernels) -> 
         strehl_ratio=strehl,
         image_quality=quality,
         noise=noise,
-        photons=photons,
+        photons=None if photons is None else photons * light,
         acceptance_angle_deg=_acceptance(eye, white, kernel) / per_degree,
         interommatidial_angle_deg=eye.receptor_pitch / per_degree,
         interommatidial_vertical_deg=eye.receptor_size[0] / per_degree,

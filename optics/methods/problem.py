@@ -63,6 +63,7 @@ class Problem:
     knots: cells that derivatives with respect to samples of maps require; None if no such derivatives are requested.
     mask_detail: bandwidth [1/m] of the amplitude of the mask.
     detail_part: phase [rad] of neglected detail, relative to the tolerance.
+    all_light: True if the samples must resolve all light behind the pupil, even where the window needs fewer.
     """
 
     light: Beam
@@ -84,6 +85,7 @@ class Problem:
     knots: DerivativeKnots | None = None
     mask_detail: float = 0.0
     detail_part: float = DETAIL_PART
+    all_light: bool = False
 
     @classmethod
     def from_beam(

@@ -34,7 +34,7 @@ from optics.numerics.grid import sample_positions
 from optics.numerics.interpolation import chebyshev_points, lagrange_basis
 from optics.numerics.precision import padded_for_packets, precision
 
-__all__ = ["DERIVATIVE_ERROR", "WindowSampling", "window_sampling"]
+__all__ = ["DERIVATIVE_ERROR", "TIGHTEST", "WindowSampling", "window_sampling"]
 
 TIGHTEST = 3e-4  # choice: smallest tolerance at which this way of sampling saves time
 # Choices for the soft edge: ripple of its spectrum, of the samples and of the finer samples of the check, and width of
@@ -122,7 +122,7 @@ class WindowSampling:
 def window_sampling(problem: Problem) -> WindowSampling | None:
     """Return the samples for a coarse tolerance. The result is None if the method is not suitable."""
     fine = problem.tolerance < TIGHTEST or problem.reach is not None or math.isfinite(problem.widest_band)
-    if fine or problem.pixelated is not None:
+    if fine or problem.all_light or problem.pixelated is not None:
         return None
     half = max(problem.window.own_half_width, problem.window.dx)
     density = 2.0 ** (math.ceil(STEPS * math.log2(_density(problem, half)) - 1e-9) / STEPS)

@@ -236,11 +236,8 @@ def radiance_cube(value: Any, bands: int, least: tuple[int, int]) -> np.ndarray:
         ValueError: the array does not have `bands` bands, is smaller than the shape `least`, or is not finite.
     """
     radiance = reals("radiance", value).astype(np.float32)
-    if (
-        radiance.ndim != 3
-        or radiance.shape[0] != bands
-        or any(n < m for n, m in zip(radiance.shape[1:], least, strict=True))
-    ):
+    fits = radiance.ndim == 3 and radiance.shape[0] == bands
+    if not fits or any(n < m for n, m in zip(radiance.shape[1:], least, strict=True)):
         raise ValueError(
             f"radiance has shape {radiance.shape}: must be (band, Y, X) with {bands} bands "
             f"and at least {least[0]} x {least[1]} cells"

@@ -119,15 +119,15 @@ def _otf(
     pupils: tuple[ExitPupil, ...], wavelengths: np.ndarray, parts: np.ndarray, f: np.ndarray, tolerance: float
 ) -> tuple[np.ndarray, float]:
     """Return Σ parts OTF at frequencies f (2, n) [1/m], and its predicted error."""
-    total, error = np.zeros(f.shape[1], complex), 0.0
+    total, error, highest = np.zeros(f.shape[1], complex), 0.0, float(np.hypot(*f).max())
     for pupil, wavelength, part in zip(pupils, wavelengths, parts, strict=True):
         if part == 0:
             continue
         sine = pupil.pupil.radius / np.hypot(pupil.pupil.radius, pupil.distance)
         cutoff = 2 * sine * pupil.pupil.index_behind(float(wavelength)) / wavelength
-        if np.abs(f).max() > cutoff:
+        if highest > cutoff:
             raise ValueError(
-                f"frequencies: {np.abs(f).max():.4g} per metre is beyond the cutoff of the lens at {wavelength:g} m, "
+                f"frequencies: {highest:.4g} per metre is beyond the cutoff of the lens at {wavelength:g} m, "
                 f"{cutoff:.4g} per metre"
             )
         side = SAMPLES + 2 * math.ceil(AROUND * pupil.spot_radius * cutoff / PITCH)

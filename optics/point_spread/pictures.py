@@ -14,7 +14,7 @@ from optics.elements.beam import Beam
 from optics.methods.geometric import NoDerivativesError
 from optics.methods.method_sampling import Sampling, WithField
 from optics.methods.problem import Problem
-from optics.methods.window_sampling import WindowSampling
+from optics.methods.window_sampling import TIGHTEST, WindowSampling
 from optics.numerics.accuracy import FLOAT_NOISE, AccuracyError, Plan, above
 from optics.numerics.autodiff import Array
 from optics.numerics.field import Field
@@ -99,11 +99,18 @@ class _Attempt:
         image = types.Float(padded_for_packets(self.image)) if plain else self.image
         return PSFPicture(image, plan, self.field, self.sampling, self.request.problem)
 
+    @property
+    def for_window(self) -> bool:
+        """True if the samples are made for the light of the window alone."""
+        return isinstance(self.sampling, WindowSampling)
+
     def repeated(self, error: float, tolerance: float, last: bool) -> _Attempt | None:
         """Return the next attempt, after the spot check has found an error above the tolerance.
 
         If the method was an approximation, the next attempt uses an exact method. Otherwise it has a smaller tolerance,
         because a dark window needs more digits than a bright one. The result is None if the dtype cannot provide them.
+        If the samples of the window's light would need a tolerance for which they are not made, the next attempt
+        resolves all light instead, at the original tolerance.
 
         last: True for the last attempt. Its tolerance is reduced further, because quadrature rules change in steps and
             a slightly smaller tolerance may give the same nodes.
@@ -116,8 +123,11 @@ class _Attempt:
             smaller = max(share * problem.tolerance * tolerance / error, 10 * FLOAT_NOISE[problem.dtype])
             if smaller >= problem.tolerance:
                 return None
+            whole = problem.all_light or (self.for_window and smaller < TIGHTEST)
+            wanted = tolerance if whole and self.for_window else smaller
             # The problem is derived again, because a smaller tolerance includes finer detail of the relief.
-            problem = Problem.from_beam(request.beam, problem.window, smaller, problem.dtype)
+            problem = Problem.from_beam(request.beam, problem.window, wanted, problem.dtype)
+            problem = replace(problem, all_light=whole)
             request = replace(request, problem=problem)
         return _Attempt.at(request, request.planned())
 
@@ -181,15 +191,16 @@ def _checked(attempt: _Attempt, asked: Request, tries: int) -> PSFPicture:
         f"tolerance = {tolerance:g}: a check against the direct sum finds an error of {above(error, tolerance)} by "
         f"{attempt.plan.method} in {problem.dtype}"
     )
+    left = tries - (not attempt.for_window)  # attempts with samples of the window's light are quick
     try:
-        better = attempt.repeated(error, tolerance, tries == 2) if tries > 1 else None
+        better = attempt.repeated(error, tolerance, left == 1) if left > 0 else None
     except AccuracyError as refused:
         needs = str(refused).partition(": ")[0].partition(" needs ")[2]
         more = f", and a smaller error needs {needs}" if needs else ""
         raise AccuracyError(f"{found}{more}; widen the tolerance or shrink the window") from None
     if better is None:
         raise AccuracyError(f"{found}; widen the tolerance or use another method or dtype")
-    return _checked(better, asked, tries - 1)
+    return _checked(better, asked, left)
 
 
 def _predicted_error(image: np.ndarray, sampling: Sampling, problem: Problem) -> float:

@@ -213,10 +213,12 @@ class PSFResult(ReadOnlyArrays, OnWindow):
             field_parts=None if self.field_parts is None else tuple(part[one] for part in self.field_parts),
         )
 
-    def recompute_on(self, window: Grid, what: str) -> PSFResult:
+    def recompute_on(self, window: Grid, what: str, all_light: bool = False) -> PSFResult:
         """Return the PSF of the same light over another window, to the same tolerance.
 
         what: name of the measure, for the error message.
+        all_light: True if the samples of the pupil must resolve all light, even where the window needs fewer. Errors
+            are then usually far below the tolerance, and vary less from window to window.
 
         Raises:
             AccuracyError: the requests of the PSF are not known, or the window is too large.
@@ -228,8 +230,8 @@ class PSFResult(ReadOnlyArrays, OnWindow):
             raise AccuracyError(needs, f"set dx={window.dx:.3g}, shape=({height}, {width})")
         try:
             if self.shares is not None:
-                return spread([_through(request, window) for request in self.requests]).mean(self.shares)
-            return spread([_through(request, window) for request in self.requests])
+                return spread([_through(request, window, all_light) for request in self.requests]).mean(self.shares)
+            return spread([_through(request, window, all_light) for request in self.requests])
         except AccuracyError as error:
             raise AccuracyError(f"{needs}, which fails: {error}") from None
 
@@ -257,9 +259,9 @@ class PSFResult(ReadOnlyArrays, OnWindow):
         return self.with_pitch(0.5 / self.highest_cutoff, "power")
 
 
-def _through(request: Request, window: Grid) -> Request:
+def _through(request: Request, window: Grid, all_light: bool) -> Request:
     asked = request.problem
-    problem = Problem.from_beam(request.beam, window, asked.tolerance, asked.dtype)
+    problem = replace(Problem.from_beam(request.beam, window, asked.tolerance, asked.dtype), all_light=all_light)
     method = request.method if request.method in APPROXIMATE else "auto"
     return replace(request, problem=problem, method=method, most_seconds=MOST_SECONDS, keeps_field=False)
 

@@ -64,7 +64,7 @@ def vector_focus(
     """
     of_kind("pupil", pupil, Pupil, "Pupil(25e-6)")
     lambda_ = vacuum_wavelength(wavelength)
-    source = PointSource(math.inf, without_derivative("source_angle", source_angle))
+    source = PointSource(math.inf, without_derivative("source_angle", source_angle)).plain
     one_of("apodization", apodization, ("flat", "aplanatic"))
     z = pupil.image_distance(math.inf) if sensor_distance is None else positive("sensor_distance", sensor_distance)
     _check_plain(pupil, lambda_)

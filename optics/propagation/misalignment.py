@@ -69,7 +69,7 @@ class Alignment:
     slope: Point = (0.0, 0.0)
 
     @classmethod
-    def of(cls, element: Misaligned) -> Alignment:
+    def from_element(cls, element: Misaligned) -> Alignment:
         x, y = element.tilt
         return cls(element.decentre, (math.tan(x), math.tan(y)))
 

@@ -77,7 +77,7 @@ class Stop:
     @classmethod
     def at(cls, element: Pupil | Misaligned, distance: float) -> Stop:
         if isinstance(element, Misaligned):
-            pupil, alignment = element.pupil, Alignment.of(element)
+            pupil, alignment = element.pupil, Alignment.from_element(element)
         else:
             pupil, alignment = element, ALIGNED
         return cls(distance, pupil, (1 + EDGE_REACH) * pupil.radius, None, alignment)

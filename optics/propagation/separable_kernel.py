@@ -103,7 +103,7 @@ class SeparableSampling:
 
     def propagated(self, plane: np.ndarray, types: Precision) -> PropagatedPlane:
         """Return a plane (y, x) after propagation."""
-        scaled = ScaledPlane.of(plane, types)
+        scaled = ScaledPlane.from_plane(plane, types)
         along_x, along_y = _matrices(self, types)
         (ny, nx), (my, mx) = self.source.shape, self.window.shape
         over_x = (along_x.reshape(-1, nx) @ scaled.u.T).reshape(-1, mx, ny)  # (term, x, η)

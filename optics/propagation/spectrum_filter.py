@@ -48,7 +48,7 @@ class ScaledPlane:
     brightest: float
 
     @classmethod
-    def of(cls, given: np.ndarray, types: Precision) -> ScaledPlane:
+    def from_plane(cls, given: np.ndarray, types: Precision) -> ScaledPlane:
         with np.errstate(over="ignore"):
             plane = np.ascontiguousarray(given, dtype=types.complex_dtype)
             total = _power(plane)
@@ -67,7 +67,7 @@ class ScaledPlane:
 
 def filtered(given: np.ndarray, how: TransformSampling, types: Precision) -> PropagatedPlane:
     """Return a plane (y, x) after propagation."""
-    scaled = ScaledPlane.of(given, types)
+    scaled = ScaledPlane.from_plane(given, types)
     plane, total = scaled.u, scaled.power
     if total == 0:
         return PropagatedPlane(np.zeros(how.window.shape, types.complex_dtype), 0.0, 0.0)

@@ -119,7 +119,7 @@ def propagate_through(
     if isinstance(elements, str) or not isinstance(elements, Sequence):
         raise ValueError(f"elements = {shown(elements)}: must be a list of Pupil, Misaligned and FreeSpace")
     if source is not None:
-        of_kind("source", source, PointSource, "PointSource(), a plane wave")
+        source = of_kind("source", source, PointSource, "PointSource(), a plane wave").require_plain()
     field, window, brightest = _start(u, dx, out_dx, out_shape)
     if backward and field is None:
         raise ValueError("u = None: must be given, behind the last element, for backward propagation")

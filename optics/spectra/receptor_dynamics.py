@@ -6,10 +6,11 @@ from dataclasses import dataclass
 
 from optics.numerics.arguments import in_range, one_of, whole
 
-__all__ = ["ADAPTATIONS", "MOTION", "ReceptorDynamics"]
+__all__ = ["ADAPTATIONS", "LEAST_EVENT", "MOTION", "ReceptorDynamics"]
 
 ADAPTATIONS = ("none", "naka_rushton", "logarithmic")
 MOTION = ("none", "hassenstein_reichardt", "barlow_levick")
+LEAST_EVENT = 1e-3  # smallest step of the logarithm that counts as an event
 
 
 @dataclass(frozen=True)
@@ -67,7 +68,7 @@ class ReceptorDynamics:
         if self.frames is not None:
             whole("ReceptorDynamics: frames", self.frames, 1, 10**6)
         if self.event_threshold is not None:
-            in_range("ReceptorDynamics: event_threshold", self.event_threshold, 1e-3, 1e2)
+            in_range("ReceptorDynamics: event_threshold", self.event_threshold, LEAST_EVENT, 1e2)
             if self.adaptation != "none":
                 raise ValueError("ReceptorDynamics: event_threshold: must be None with adaptation; events adapt, too")
 

@@ -101,7 +101,7 @@ class EyesOfKind:
             elif worlds is not None:
                 receptors.undo(chosen)
             found = receptors.step(self._with_shot_noise(signals, chosen), chosen)
-            receptors.observed(chosen)
+            receptors.reset_counts(chosen)
             return found if self._noise is None else self._noise(found, self._normals_of(chosen, found.shape))
 
         return seen.then(finish)

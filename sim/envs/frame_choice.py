@@ -44,14 +44,18 @@ def with_frames(
 
     fidelities: for each agent, the fidelity of each kind of its eyes, or None if its eyes are not used
     scenes: see `renderers_for`
+
+    Raises:
+        ValueError: two different numbers are stated.
     """
-    kinds = [kind for agent, of in zip(task.agents(), fidelities, strict=True) if of for kind in agent.kinds]
-    given = [of[name] for of in fidelities if of for name in of]
-    in_time = [(kind.eye, of) for kind, of in zip(kinds, given, strict=True) if dynamics_of(kind.eye) is not None]
+    kinds = [(kind, of) for agent, of in zip(task.agents(), fidelities, strict=True) if of for kind in agent.kinds]
+    in_time = [(kind.eye, of[kind.name]) for kind, of in kinds if dynamics_of(kind.eye) is not None]
+    stated = sorted({n for eye, of in in_time if (n := of.frames or dynamics_of(eye).frames) is not None})
+    if len(stated) > 1:
+        raise ValueError(f"frames = {' and '.join(map(str, stated))}: must be the same for all eyes of a world")
     if not in_time or all(of.frames is not None for _, of in in_time):
         return list(fidelities)
-    stated = [of.frames or dynamics_of(eye).frames for eye, of in in_time]
-    known = max((n for n in stated if n is not None), default=None)
+    known = stated[0] if stated else None
     level = _chosen(task, fidelities, scenes) if known is None else (known, Level("frames", _named(known), None, ASKED))
     frames, reason = level
     return [
@@ -151,6 +155,6 @@ def _responses(dynamics: ReceptorDynamics, signals: np.ndarray, frames: int, sec
     for action in signals:
         for frame in action[stride - 1 :: stride]:
             last = receptors.step(frame, everyone)
-        receptors.observed(everyone)
+        receptors.reset_counts(everyone)
         found.append(last)
     return np.array(found)

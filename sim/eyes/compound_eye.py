@@ -204,23 +204,29 @@ class CompoundEye:
 
         if len(self) == 1:
             return
-        kinds, index = self.kinds
-        # Diameter across flats of a hexagon with the facet's area.
-        diameters = np.array([(2 * kind.pupil.area / 3**0.5) ** 0.5 for kind in kinds])
-        apart = SAME if self.radius is None else max(SAME, (1 - TOUCHING) * float(diameters.max()) / self.radius)
-        pairs = KDTree(self.directions).query_pairs(apart, output_type="ndarray")
-        if not len(pairs):
-            return
-        chords = np.linalg.norm(self.directions[pairs[:, 0]] - self.directions[pairs[:, 1]], axis=1)
-        needed = np.full(len(pairs), SAME)
+        sizes = np.full(len(self), SAME)
         if self.radius is not None:
-            needed = np.maximum(needed, (1 - TOUCHING) * diameters[index[pairs]].mean(axis=1) / self.radius)
-        for (one, other), chord, least in zip(pairs, chords, needed, strict=True):
-            if chord < least:
-                gap = "in the same direction"
-                if self.radius is not None:
-                    gap = f"{chord * self.radius:.3g} m apart, less than their diameter, for radius = {self.radius:g}"
-                raise ValueError(f"CompoundEye: facets {one} and {other} overlap: they are {gap}")
+            # Diameter across flats of a hexagon with the facet's area, as an angle.
+            kinds, index = self.kinds
+            diameters = np.array([(2 * kind.pupil.area / 3**0.5) ** 0.5 for kind in kinds])[index]
+            sizes = np.maximum(sizes, (1 - TOUCHING) * diameters / self.radius)
+        tree = KDTree(self.directions)
+        # If the radius is far too small, most pairs are close, and more than fit into memory. Neighbours overlap first.
+        neighbours = tree.query(self.directions, k=[2])[1][:, 0]
+        self._refuse_pairs(np.stack([np.arange(len(self)), neighbours], axis=-1), sizes)
+        self._refuse_pairs(tree.query_pairs(float(sizes.max()), output_type="ndarray"), sizes)
+
+    def _refuse_pairs(self, pairs: np.ndarray, sizes: np.ndarray) -> None:
+        """Refuse pairs (n, 2) of facets that are closer than the mean of their sizes [rad], (ommatidium,)."""
+        pairs = pairs[pairs[:, 0] != pairs[:, 1]]
+        chords = np.linalg.norm(self.directions[pairs[:, 0]] - self.directions[pairs[:, 1]], axis=1)
+        close = np.flatnonzero(chords < sizes[pairs].mean(axis=1))
+        if not close.size:
+            return
+        (one, other), chord, gap = np.sort(pairs[close[0]]), chords[close[0]], "in the same direction"
+        if self.radius is not None:
+            gap = f"{chord * self.radius:.3g} m apart, less than their diameter, for radius = {self.radius:g}"
+        raise ValueError(f"CompoundEye: facets {one} and {other} overlap: they are {gap}")
 
 
 WorldEye: TypeAlias = optics.Eye | CompoundEye  # eyes that worlds render

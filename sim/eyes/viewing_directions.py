@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 
 import optics
-from optics.numerics.arguments import finite, in_range, is_sized, positive, reals, whole
+from optics.numerics.arguments import finite, in_range, is_sized, reals
 
 MOST_OMMATIDIA = 10**6  # chosen limit; the largest eyes of dragonflies have 30,000
 OFF_UNIT = 1e-3  # largest deviation of a vector's length from 1
-MOST_PARTS = 300
+FINEST_DEG = 0.2302  # chosen: smallest angle between neighbours of a whole head; it gives 900,000 ommatidia
 
 
 def unit_directions(name: str, given: Any) -> np.ndarray:
@@ -113,12 +113,12 @@ def whole_head(interommatidial_deg: float) -> np.ndarray:
     interommatidial_deg: largest mean angle between neighbours [degrees]
 
     Raises:
-        ValueError: an angle that is not positive, or below 0.22 degrees.
+        ValueError: an angle below 0.2302 or above 180 degrees.
     """
-    apart = math.radians(positive("interommatidial_deg", interommatidial_deg, "degrees"))
+    apart = math.radians(in_range("interommatidial_deg", interommatidial_deg, FINEST_DEG, 180.0))
     # Mean angle if the cells of all nodes, hexagons of area (√3/2) Δφ², cover the sphere.
     nodes = 8 * math.pi / math.sqrt(3) / apart**2
-    parts = whole("parts of an edge", max(1, math.ceil(math.sqrt(max(nodes - 2, 0) / 10))), 1, MOST_PARTS)
+    parts = max(1, math.ceil(math.sqrt(max(nodes - 2, 0) / 10)))
     corners, faces = _icosahedron()
     i, j = (axis.ravel() for axis in np.meshgrid(np.arange(parts + 1), np.arange(parts + 1)))
     i, j = i[i + j <= parts], j[i + j <= parts]

@@ -17,10 +17,10 @@ import numpy as np
 from sim.physics.free_motion import free_motion_of
 from sim.physics.local_contacts import local_contacts_of
 from sim.physics.mujoco_batch import BatchedStep
+from sim.worlds.catalog import SUBSTEPS
 from sim.worlds.state import WorldState
 from sim.worlds.world import MAX_SPEED, World
 
-SUBSTEPS = 10  # number of the model's timesteps per action, as in the published environments
 UNSTABLE_SPEED = 10 * MAX_SPEED  # [m/s], a speed that no actuator can cause
 FEW_GEOMS = 200  # largest number of geoms for which a test of each is faster than MuJoCo's tree of bounding volumes
 

@@ -8,11 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from sim.physics.agent_motion import SUBSTEPS, AgentPhysics, Agents, Motion
+from sim.physics.agent_motion import AgentPhysics, Agents, Motion
 from sim.physics.varied_appearances import varied_appearances
 from sim.scene.moved_bodies import MovedBodies, ReferencePose
 from sim.scene.poses import Poses
 from sim.scene.variation import Drawn, Variation
+from sim.worlds.catalog import SUBSTEPS
 from sim.worlds.state import WorldState, wrap_angle
 from sim.worlds.world import MAX_SPEED, World
 

@@ -33,20 +33,28 @@ Progress = Callable[[float], None]
 
 
 def read_photograph(path: str | Path) -> np.ndarray:
-    """Read an image file as sRGB values (y, x, 3) in [0, 1].
+    """Read an image file as sRGB values (y, x, 3) in [0, 1], upright as its EXIF orientation says.
 
     Raises:
-        ValueError: the file is no image, has one channel, or has transparent pixels.
+        ValueError: the file is no image, is damaged or too large, has one channel, or has transparent pixels.
         OSError: the file cannot be read.
     """
-    from PIL import Image, UnidentifiedImageError
+    from PIL import Image, ImageOps, UnidentifiedImageError
 
     try:
         with Image.open(path) as image:
-            mode, pixels = image.mode, np.asarray(image.convert("RGB") if image.mode == "P" else image)
+            mode, clear = image.mode, "transparency" in image.info
+            upright = ImageOps.exif_transpose(image)
+            pixels = np.asarray(upright.convert("RGB") if mode == "P" else upright)
     except UnidentifiedImageError:
         raise ValueError(f"{path}: must be an image, such as a PNG or JPEG file") from None
-    if mode in ("RGBA", "LA", "PA"):
+    except Image.DecompressionBombError:
+        raise ValueError(f"{path}: has more than {2 * (Image.MAX_IMAGE_PIXELS or 0)} pixels: must have fewer") from None
+    except (OSError, SyntaxError) as error:  # Pillow raises a SyntaxError for some damaged PNG files
+        if isinstance(error, OSError) and error.filename is not None:
+            raise
+        raise ValueError(f"{path}: {error}: must be an undamaged image") from None
+    if clear or mode in ("RGBA", "LA", "PA"):
         raise ValueError(f"{path}: has transparency (mode {mode}): must be opaque; save it without an alpha channel")
     if mode not in ("RGB", "P"):
         raise ValueError(f"{path}: has the mode {mode}: must have three channels, red, green and blue, of 8 bits")

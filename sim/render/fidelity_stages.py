@@ -36,9 +36,13 @@ def bands(eye: optics.Eye, allowed: float, medium: optics.TurbidMedium | None = 
         return eye.bands, Level("bands", f"{eye.bands}", None, f"the eyes' own: {error}")
     if medium is None:
         return bands, Level("bands", f"{bands}", allowed, f"fewest for {allowed:.1e} with any colours up to white")
-    errors = ((n, eye.throughput * medium.band_error(n, eye.receptors)) for n in range(bands, FINEST + 1))
-    bands, worst = next(((n, float(found)) for n, found in errors if found <= allowed), (FINEST, math.inf))
-    why = f"fewest for {allowed:.1e} with any colours up to white, and for white and black in the medium"
+    worst = math.inf
+    for n in range(bands, FINEST + 1):
+        bands, worst = n, float(eye.throughput) * medium.band_error(n, eye.receptors)
+        if worst <= allowed:
+            break
+    number = "fewest" if worst <= allowed else "most, not enough"
+    why = f"{number} for {allowed:.1e} with any colours up to white, and for white and black in the medium"
     return bands, Level("bands", f"{bands}", max(allowed, worst), why)
 
 

@@ -19,7 +19,13 @@ from sim.worlds.world import World
 
 
 def see(world: World, eyes: Eyes, state: WorldState, index: int = 0) -> np.ndarray:
-    """Return the noise-free signals of one world of a state, (eye, channel, height, width)."""
+    """Return the noise-free signals of one world of a state, (eye, channel, height, width).
+
+    Raises:
+        ValueError: a world with a medium.
+    """
+    if world.medium is not None:
+        raise ValueError("world: its medium must be None, a single ray renders clear air only")
     bands, data = eyes.eye().spectral_bands, mujoco.MjData(world.model)
     pose(data, world, state, index)  # moves all bodies to their places in the state
     scene = mirror(world.model, data, variant="scalar_spectral", spectra=world.spectra).scene

@@ -81,7 +81,7 @@ class ReceptorsInTime:
         self.state[worlds] = rows
         return found
 
-    def observed(self, worlds: np.ndarray) -> None:
+    def reset_counts(self, worlds: np.ndarray) -> None:
         """Set the counts of events to 0 after an observation."""
         if self.dynamics.event_threshold:
             self.state[worlds, self._others + 1] = 0

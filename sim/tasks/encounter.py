@@ -18,7 +18,7 @@ from sim.tasks.batch_task import BatchTask
 from sim.tasks.task import Task
 
 # Number of axes of the eyes' signals: memory, eye, channel, height and width. No other entry of an observation has
-# five axes.
+# five axes. The signals of compound eyes have three, and their space has viewing directions (`OmmatidiaBox`).
 FRAMES_AXES = 5
 SAID_BY_ANY = ("spectra", "medium", "vary")  # settings of the world that the task of one animal may set for all
 SHARED = ("substeps", "episode_steps")  # settings of the world that must be equal in the tasks of all animals
@@ -52,8 +52,8 @@ class Frozen:
     def memory(self) -> int:
         """Number of frames in the observations that the policy expects."""
         known = getattr(getattr(self.policy, "observation_space", None), "spaces", {})
-        shapes = [space.shape for space in known.values()]
-        return max((shape[0] for shape in shapes if len(shape) == FRAMES_AXES), default=1)
+        eyes = [one for one in known.values() if len(one.shape) == FRAMES_AXES or hasattr(one, "directions")]
+        return max((one.shape[0] for one in eyes), default=1)
 
     def actions(self, observation: Mapping[str, np.ndarray], shape: tuple[int, int]) -> np.ndarray:
         """Return the animal's actions in every world.

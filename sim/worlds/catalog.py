@@ -19,5 +19,6 @@ TASKS: Mapping[str, str] = MappingProxyType(
     }
 )
 
+SUBSTEPS = 10  # number of the model's timesteps per action, as published
 EPISODE_STEPS = 256  # number of actions after which an episode is truncated; as published
 COURSES = ("short", "long")  # names of navigation's drawings in `sim.worlds.navigation`

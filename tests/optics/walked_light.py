@@ -267,6 +267,14 @@ OF_PSFS = {
     ),
     "Grid": Walk(lambda **given: Grid((3, 3), 1.0, **given).x, {"centre": (1.0, 0.0)}),
 }
+
+
+def seen_again(**asked):
+    """Return a PSF over the same window, computed again."""
+    found = optics.psf(Pupil(**LENS, height=optics.BSplineRelief(RAMP)), **SMALL)
+    return found.recompute_on(found.window, "a test", **asked).psf
+
+
 ERROR = {"with_error": True}
 OF_MEASURES = {
     "mtf": Walk(
@@ -290,6 +298,7 @@ OF_MEASURES = {
     "Microvilli.polarization_sensitivity": Walk(
         lambda **asked: MICRO.polarization_sensitivity(FOCUS, 3e-6, **asked), {"centre": (5e-6, 1e-6)}
     ),
+    "PSFResult.recompute_on": Walk(seen_again, {"all_light": True}),
     "PSFBatch.result": Walk(
         lambda **asked: optics.psf_batch([Pupil(**LENS)], source_distances=(1.0, 1e-3), **SMALL).result(0, **asked).psf,
         {"depth": 1},

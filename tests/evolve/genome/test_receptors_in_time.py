@@ -72,6 +72,8 @@ def test_the_gene_is_optional_and_comes_back_from_records():
             (*SLOW, "eye.event_threshold=0.1", "eye.adaptation=naka_rushton"),
             r"eye\.event_threshold = 0\.1: must be 0 with eye\.adaptation = naka_rushton",
         ),
+        ((*SLOW, "eye.event_threshold=1e-4"), r"eye\.event_threshold = 0\.0001: must be 0, or at least 0\.001"),
+        ((*SLOW, "eye.frames=3"), r"eye\.frames = 3: must be 0, or a divisor of the 10 physics steps of an action"),
         (("eye.temporal_order=3",), r"eye\.temporal_order = 3: must be in \[0, 2\]"),
         (("world.medium=milk",), r"world\.medium = 'milk': must be one of air, clear_ocean, coastal_water, fog"),
     ],

@@ -2,14 +2,17 @@
 
 import numpy as np
 import pytest
+import safetensors.torch
 import torch
 from gymnasium import spaces
 
 from evolve.config.run_config import LearningConfig
+from evolve.config.settings import WiringConfig
 from evolve.learning.eye_features import EyeFeatures
 from evolve.learning.hexagonal_layers import HexagonalLayers, neighbourhoods
 from evolve.learning.policy import Brain, PolicyConfig, build_policy, load_policy, save_policy
 from evolve.learning.ppo import AdaptingPPO
+from evolve.learning.tensor_file import read_tensors
 from sim import hexagonal_patch, make_vec_env, whole_head
 from sim.envs.ommatidia_space import OmmatidiaBox
 from tests.sim.envs.test_ommatidia_in_worlds import Turning
@@ -92,6 +95,12 @@ def test_features_of_stacks_equal_those_of_frames_stored_once():
     assert found.shape == (12, 5 + 2)
 
 
+@pytest.mark.parametrize("wiring", [{"pool_side": 4}, {"repeat_side": 15}])
+def test_grids_of_signals_are_refused(wiring):
+    with pytest.raises(ValueError, match="must be 0, ommatidia have no rows and columns"):
+        EyeFeatures(space_of(PATCH), 5, WiringConfig(**wiring))
+
+
 def test_a_policy_is_restored_from_its_file(tmp_path):
     torch.manual_seed(0)
     config = PolicyConfig.from_space(space_of(PATCH), Brain(8, encoder=6))
@@ -104,8 +113,25 @@ def test_a_policy_is_restored_from_its_file(tmp_path):
         assert torch.equal(found.predict_values(seen), policy.predict_values(seen))
 
 
+def test_neighbours_in_a_file_do_not_replace_those_of_the_directions(tmp_path):
+    policy = build_policy(PolicyConfig.from_space(space_of(PATCH), Brain(8)))
+    save_policy(policy, tmp_path / "policy.safetensors")
+    metadata, tensors = read_tensors(tmp_path / "policy.safetensors")
+    assert all(tensor.is_floating_point() for tensor in tensors.values())
+    tensors["features_extractor.grid.first"] = policy.features_extractor.grid.first + len(PATCH)
+    (tmp_path / "policy.safetensors").write_bytes(safetensors.torch.save(tensors, metadata))
+    with pytest.raises(ValueError, match=r"tensors missing or unknown: \['features_extractor.grid.first'\]"):
+        load_policy(tmp_path / "policy.safetensors")
+
+
 @pytest.mark.parametrize(
-    "change", [{"directions": [[1.0, 0, 0]]}, {"directions": []}, {"directions": [[2.0, 0, 0]] * len(PATCH)}]
+    "change",
+    [
+        {"directions": [[1.0, 0, 0]]},
+        {"directions": []},
+        {"directions": [[2.0, 0, 0]] * len(PATCH)},
+        {"directions": [[10.0, 0.0]] * len(PATCH)},
+    ],
 )
 def test_directions_that_do_not_fit_are_refused(change):
     record = PolicyConfig.from_space(space_of(PATCH), Brain(8)).record()

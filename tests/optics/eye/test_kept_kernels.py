@@ -2,6 +2,7 @@
 
 import pickle
 import re
+import sys
 from dataclasses import replace
 
 import drjit as dr
@@ -56,6 +57,28 @@ def test_other_kernels_are_computed(computed, other):
     assert np.array_equal(seen, fresh)
 
 
+def test_a_call_of_another_thread_does_not_change_the_kernels():
+    """Before every line of the function that keeps kernels, the eye sees another distance, as another thread could."""
+    eye, before = an_eye(), sys.gettrace()
+    expected = an_eye().see(SCENE, 2, z=0.02)
+
+    def meanwhile(frame, event, _):
+        if frame.f_code is not optics.Eye._last_sight.__code__:
+            return None
+        if event == "line":
+            sys.settrace(before)
+            eye.see(SCENE, 2, z=0.001)
+            sys.settrace(meanwhile)
+        return meanwhile
+
+    sys.settrace(meanwhile)
+    try:
+        seen = eye.see(SCENE, 2, z=0.02)
+    finally:
+        sys.settrace(before)
+    assert np.array_equal(seen, expected)
+
+
 def test_derivatives_are_computed_again(computed):
     """A graph allows one backward pass, so kernels with derivatives are not kept."""
     from drjit.auto.ad import Float
@@ -68,7 +91,8 @@ def test_derivatives_are_computed_again(computed):
         found.append(float(radius.grad[0]))
         radius.grad = 0
     assert len(computed) >= 2
-    assert found[0] == pytest.approx(found[1], rel=1e-6) != 0
+    assert found[0] == pytest.approx(found[1], rel=1e-5)  # threads add float32 gradients in any order
+    assert found[1] != 0
 
 
 def test_an_eye_that_has_seen_can_be_pickled_and_changed():

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from optics import AccuracyError, Eye, PhotonBudget, Pupil
+from optics import AccuracyError, Eye, PhotonBudget, Pupil, ReceptorDynamics
 from optics.eye import summary
 
 F = Eye().sensor_distance
@@ -40,6 +40,16 @@ def test_f_number_between_media_says_how_bright_the_image_is(before, behind):
     eye = Eye(pupil, bands=1)
     sine = math.sin(math.atan(10e-6 / eye.retina_distance))
     assert eye.describe().f_number == pytest.approx(before / (2 * behind * sine), rel=2e-3)
+
+
+@pytest.mark.parametrize(("order", "windows"), [(1, 2), (2, 4)])
+def test_receptors_with_dynamics_count_photons_over_the_window_of_their_filter(order, windows):
+    """White noise behind exp(-t/τ)/τ or t exp(-t/τ)/τ² is that of a window of 2 τ or 4 τ."""
+    dynamics = ReceptorDynamics(30.0, order)
+    slow = Eye(photon_budget=PhotonBudget(1.0, 0.02), dynamics=dynamics).describe()
+    window = Eye(photon_budget=PhotonBudget(1.0, windows * 0.03)).describe()
+    assert slow.photons == pytest.approx(window.photons)
+    assert slow.noise == pytest.approx(window.noise)
 
 
 def test_diffraction_limit_is_the_apertures_width_in_wavelengths():

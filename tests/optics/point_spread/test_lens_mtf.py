@@ -51,6 +51,15 @@ def displaced(x, y, angle=0):
     return wave
 
 
+def test_frequencies_beyond_the_cutoff_are_refused_in_all_directions():
+    """The image lies on the diagonal of the plane, so either component of a frequency is smaller by √2."""
+    diagonal = optics.read_exit_pupils({(0, 0.55): displaced(1.0, 1.0)})
+    pupil = diagonal.pupils[0][0].pupil
+    cutoff = 2 * pupil.radius / np.hypot(pupil.radius, diagonal.pupils[0][0].distance) / 0.55e-6
+    with pytest.raises(ValueError, match="is beyond the cutoff of the lens"):
+        optics.lens_mtf(diagonal, 1.2 * cutoff)
+
+
 def test_lateral_colour_cancels_a_pattern_of_twice_its_width():
     """Two equal images 10 µm apart along x multiply contrasts by |cos(πfx 10 µm)|, which is 0 at 50 cycles per mm.
 

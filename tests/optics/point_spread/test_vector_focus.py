@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import optics
+from optics.numerics.precision import precision
 from optics.point_spread import converging
 from validation.reference.richards_wolf import Light, focal_integrals
 
@@ -204,6 +205,13 @@ def test_flat_rays_aslant_keep_their_polarisation():
     assert ex == pytest.approx(math.cos(0.3) ** 2, abs=3e-3)
     assert ez == pytest.approx(math.sin(0.3) ** 2, abs=3e-3)
     assert ey < 1e-3
+
+
+def test_an_angle_may_be_a_number_of_drjit():
+    narrow = optics.Pupil(0.1e-3, thin_lens_focal_length=F)
+    angles = (0.3, 0.0), (precision("float64").Float64(0.3), 0.0)
+    one, other = (optics.vector_focus(narrow, WAVE, source_angle=at, dx=1e-6, shape=(3, 3)) for at in angles)
+    assert np.array_equal(one.psf, other.psf)
 
 
 def test_hexagons_with_coma_are_scalar_theorys_where_rays_are_flat():

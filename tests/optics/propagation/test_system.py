@@ -208,6 +208,24 @@ def test_derivatives_are_refused_not_dropped():
         propagate_through([FreeSpace(3e-5), Pupil(radius), FreeSpace(3e-5)], OBJECT, dx=DX, wavelength=WAVELENGTH)
 
 
+@pytest.mark.parametrize("distance", [np.inf, 0.1])
+def test_numbers_of_drjit_are_plain_numbers_of_a_source(distance):
+    """Derivatives are refused, also of a source at a finite distance from a decentred pupil."""
+    import drjit as dr
+
+    from optics.numerics.precision import precision
+
+    angle = precision("float64").Float64(0.01)
+    system = [optics.Misaligned(Pupil(1e-5), (2e-6, 0.0)), FreeSpace(3e-5)]
+    asked = {"wavelength": WAVELENGTH, "out_dx": DX, "out_shape": (9, 9)}
+    found = propagate_through(system, source=optics.PointSource(distance, (angle, 0.0)), **asked)
+    plain = propagate_through(system, source=optics.PointSource(distance, (0.01, 0.0)), **asked)
+    assert np.array_equal(found.u, plain.u)
+    dr.enable_grad(angle)
+    with pytest.raises(ValueError, match="source requires a derivative, but none is propagated"):
+        propagate_through(system, source=optics.PointSource(distance, (angle, 0.0)), **asked)
+
+
 def test_nothing_is_carried_back_from_nowhere():
     with pytest.raises(ValueError, match="u = None: must be given, behind the last element"):
         propagate_through([FreeSpace(3e-5), Pupil(1e-5)], None, wavelength=WAVELENGTH, backward=True, out_dx=DX,

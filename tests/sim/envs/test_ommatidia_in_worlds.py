@@ -4,6 +4,7 @@ import pickle
 
 import numpy as np
 import pytest
+from gymnasium import spaces
 
 import optics
 import sim
@@ -60,6 +61,16 @@ def test_the_space_survives_storage_and_differs_with_the_directions():
     other = OmmatidiaBox(space.low.min(), space.high.max(), space.shape, -space.directions)
     assert other != space
     env.close()
+
+
+def test_a_frozen_policy_gets_as_many_frames_of_ommatidia_as_its_space_has():
+    class Policy:
+        observation_space = spaces.Dict({"eyes": OmmatidiaBox(0.0, 1.0, (3, 38, 3), np.eye(3)[[0] * 38])})
+
+        def predict(self, observation, deterministic):
+            return np.zeros((len(observation["eyes"]), 1)), None
+
+    assert sim.Frozen(Turning(), Policy()).memory == 3
 
 
 def test_two_mounts_follow_each_other_in_an_observation():

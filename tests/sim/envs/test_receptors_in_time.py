@@ -192,6 +192,14 @@ def test_frames_that_do_not_fit_are_refused_in_one_line():
     assert "\n" not in str(raised.value)
 
 
+@pytest.mark.parametrize(("one", "other"), [(1, 2), (2, 1), (5, 10)])
+def test_different_frames_of_two_kinds_of_eyes_are_refused(one, other):
+    both = {"one": eyes(optics.ReceptorDynamics(frames=one)), "other": eyes(optics.ReceptorDynamics(frames=other))}
+    less, more = sorted((one, other))
+    with pytest.raises(ValueError, match=f"^frames = {less} and {more}: must be the same for all eyes of a world$"):
+        sim.make_vec_env("detection", both, 1, rays_per_receptor=1)
+
+
 def test_several_kinds_of_eyes_share_their_frames():
     both = {"slow": eyes(SLOW), "fast": eyes(optics.ReceptorDynamics(1.0, motion="barlow_levick")), "plain": eyes(None)}
     with closing(sim.make_vec_env("detection", both, 2, rays_per_receptor=1, render_mode="eyes")) as venv:

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.spatial import KDTree
 
 import optics
 import sim
@@ -115,6 +116,13 @@ def test_facets_may_touch_but_not_overlap():
     mixed = [SMALL] * 6 + [LARGE]
     with pytest.raises(ValueError, match="overlap"):
         sim.CompoundEye(sim.hexagonal_patch(1, apart * 1.01), mixed, radius=400e-6)
+
+
+def test_a_radius_that_is_far_too_small_is_refused_without_a_list_of_all_pairs(monkeypatch):
+    """For 30,000 ommatidia, the list would take 7 GB."""
+    monkeypatch.setattr(KDTree, "query_pairs", lambda *_, **__: pytest.fail("all pairs are listed"))
+    with pytest.raises(ValueError, match=r"overlap: they are .* m apart, less than their diameter, for radius = 1e-06"):
+        sim.CompoundEye(sim.whole_head(30.0), SMALL, radius=1e-6)
 
 
 @pytest.mark.parametrize(

@@ -85,7 +85,7 @@ def test_bad_directions_name_themselves(given, message):
     [
         (lambda: hexagonal_patch(60, 5.0), "interommatidial_deg = 5: must be smaller, 60 rings do not fit"),
         (lambda: hexagonal_patch(2, 5.0, 0.0, 95.0), "elevation_deg"),
-        (lambda: whole_head(0.1), "parts of an edge"),
+        (lambda: whole_head(0.1), r"interommatidial_deg = 0\.1: must lie in \[0\.2302, 180\]"),
         (lambda: whole_head(-1.0), "interommatidial_deg"),
     ],
 )

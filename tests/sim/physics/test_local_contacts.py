@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 
 from sim.physics import mujoco_batch
-from sim.physics.agent_motion import SUBSTEPS, AgentPhysics
+from sim.physics.agent_motion import AgentPhysics
 from sim.physics.local_contacts import LocalContacts
 from sim.physics.mujoco_batch import POOLED
 from sim.tasks.registry import task_of
 from sim.tasks.simulation import Simulation
 from sim.worlds.agent_model import AgentModel
+from sim.worlds.catalog import SUBSTEPS
 from sim.worlds.world import _add_agent, _empty_world, build_world
 
 

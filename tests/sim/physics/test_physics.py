@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from sim.physics import agent_motion
-from sim.physics.agent_motion import SUBSTEPS, AgentPhysics
+from sim.physics.agent_motion import AgentPhysics
 from sim.tasks.registry import task_of
 from sim.tasks.simulation import Simulation
+from sim.worlds.catalog import SUBSTEPS
 from sim.worlds.world import SPEED_GAIN, TIME_CONSTANT, build_world
 
 

@@ -120,6 +120,46 @@ def test_images_of_other_kinds_are_refused(tmp_path, mode, words):
         read_photograph(tmp_path / "photo.tiff")
 
 
+@pytest.mark.parametrize("mode", ["RGB", "P"])
+def test_a_transparent_colour_is_refused(tmp_path, mode):
+    Image.new(mode, (16, 12)).save(tmp_path / "photo.png", transparency=0 if mode == "P" else (0, 0, 0))
+    with pytest.raises(ValueError, match="has transparency"):
+        read_photograph(tmp_path / "photo.png")
+
+
+def test_a_photograph_is_turned_upright(tmp_path):
+    """Cameras store the orientation beside the pixels. 6: the stored left edge is the top edge."""
+    stored = np.zeros((12, 16, 3), np.uint8)
+    stored[:, :8] = 255
+    orientation = Image.Exif()
+    orientation[0x0112] = 6
+    Image.fromarray(stored).save(tmp_path / "photo.png", exif=orientation)
+    upright = read_photograph(tmp_path / "photo.png")
+    assert upright.shape == (16, 12, 3)
+    assert upright[:8].min() == 1
+    assert upright[8:].max() == 0
+
+
+@pytest.mark.parametrize("damage", ["half", "name of a chunk"])
+def test_damaged_files_are_refused_by_name(tmp_path, damage):
+    noise = np.random.default_rng(0).integers(256, size=(200, 300, 3), dtype=np.uint8)
+    Image.fromarray(noise).save(tmp_path / "photo.png")
+    content = (tmp_path / "photo.png").read_bytes()
+    at = content.index(b"IDAT", content.index(b"IDAT") + 4)
+    cut = content[: len(content) // 2] if damage == "half" else content[:at] + b"\xff" + content[at + 1 :]
+    (tmp_path / "photo.png").write_bytes(cut)
+    with pytest.raises(ValueError, match=r"photo.png: .*: must be an undamaged image") as raised:
+        read_photograph(tmp_path / "photo.png")
+    assert "\n" not in str(raised.value)
+
+
+def test_too_many_pixels_are_refused(tmp_path, monkeypatch):
+    Image.new("RGB", (16, 13)).save(tmp_path / "photo.png")
+    monkeypatch.setattr(Image, "MAX_IMAGE_PIXELS", 100)
+    with pytest.raises(ValueError, match=r"photo.png: has more than 200 pixels: must have fewer"):
+        read_photograph(tmp_path / "photo.png")
+
+
 def test_a_palette_is_read_and_a_text_is_refused(tmp_path):
     Image.new("RGB", (16, 12), (255, 0, 0)).quantize(4).save(tmp_path / "photo.png")
     np.testing.assert_allclose(read_photograph(tmp_path / "photo.png")[0, 0], (1, 0, 0), atol=0.02)

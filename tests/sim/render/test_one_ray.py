@@ -90,3 +90,8 @@ def without_cosine(monkeypatch, world, state):
 def test_a_wrong_one_is_noticed(wrong, monkeypatch):
     world, state = wrong(monkeypatch, *scene("detection"))
     assert differing("detection", one_ray.see(world, EYES, state)) > 20
+
+
+def test_a_world_with_a_medium_is_refused():
+    with pytest.raises(ValueError, match="medium must be None, a single ray renders clear air only"):
+        one_ray.see(sim.build_world("detection", seed=3, medium="fog"), EYES, scene("detection")[1])

@@ -102,7 +102,7 @@ def test_events_count_changes_of_the_logarithm():
     for factor in (1.2, 1.5):
         out = receptors.step(np.full((1, 1), factor, np.float32), ONE)
     assert out[0, 0] == 4  # ln 1.5 = 0.405, in two frames
-    receptors.observed(ONE)
+    receptors.reset_counts(ONE)
     assert receptors.step(np.full((1, 1), 1.0, np.float32), ONE)[0, 0] == -4
     assert receptors.step(np.full((1, 1), 1.0, np.float32), ONE)[0, 0] == -4  # not observed yet
 

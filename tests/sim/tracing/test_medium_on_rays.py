@@ -162,6 +162,14 @@ def test_the_choice_of_bands_includes_the_medium():
     assert dyed.band_error(more, "rgb") <= level.predicted_error == 0.03 < dyed.band_error(more - 1, "rgb")
 
 
+def test_the_error_of_the_largest_number_of_bands_is_reported():
+    line = optics.TurbidMedium(Spectrum((549, 550, 551), (0.0, 100.0, 0.0)), Spectrum((500,), (0.0,)))
+    bands, level = fidelity_stages.bands(EYES.eye(), 0.01, line)
+    assert (bands, level.level) == (64, "64")
+    assert level.predicted_error == pytest.approx(line.band_error(64, "rgb"))
+    assert level.why.startswith("most, not enough for 1.0e-02")
+
+
 def test_fog_is_brighter_and_flatter_and_the_space_of_observations_contains_it():
     venv = sim.make_vec_env("detection", EYES, 4, medium=optics.fog(2.0), rays_per_receptor=4)
     observation = venv.reset()["eyes"]
