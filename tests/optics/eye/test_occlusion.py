@@ -7,7 +7,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from optics import AccuracyError, Eye, Pupil
+from optics import AccuracyError, Eye, MaskMap, Pupil
 from optics.eye.occlusion import visible_layers
 
 S, RADIUS, FOCAL, CELL, N = 2, 300e-6, 2e-3, 4e-6, 12
@@ -105,6 +105,14 @@ def test_a_scene_of_uniform_radiance_shows_no_edges(focus):
     _, z, _, plate = edge()
     assert np.abs(see(eye(focus), np.ones_like(plate), z) - 1).max() < 0.01
     assert np.abs(see(eye(focus), np.ones_like(plate), z, 0.0) - 1).max() > 0.2
+
+
+def test_a_mask_dims_the_scene_but_hides_as_much():
+    """A mask that transmits a quarter of the light leaves a quarter of every signal."""
+    scene, z, _, _ = edge()
+    dim = replace(eye(FAR).pupil, mask=MaskMap(np.full((4, 4), 0.5)))
+    masked, whole = (one.see(scene[None], S, z=z) for one in (replace(eye(FAR), pupil=dim), eye(FAR)))
+    np.testing.assert_allclose(4 * masked, whole, rtol=0.01)
 
 
 @pytest.mark.slow
