@@ -144,8 +144,8 @@ def _layout(samples: SineSamples) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     types, radius = precision("float64"), samples.edge.radius
     sx, sy = np.meshgrid(samples.at + samples._middle[0], samples.at + samples._middle[1])
     x, y = samples.points_at(sx - samples._middle[0], sy - samples._middle[1])
-    at = (types.Float64(padded_for_packets(part / radius)) for part in (x, y))
-    soft = samples.edge.aperture.transmittance(*at, types).numpy().reshape(x.shape)
+    across, down = (types.Float64(padded_for_packets(part / radius)) for part in (x, y))
+    soft = samples.edge.aperture.transmittance(across, down, types).numpy().reshape(x.shape)
     cosine2 = 1 - np.minimum(sx * sx + sy * sy, max(samples.steepest**2, MOST_SQUARE))
     return x, y, soft * (samples.distance * samples.grid.dx / cosine2) ** 2
 

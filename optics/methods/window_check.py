@@ -97,23 +97,24 @@ def _ratios(samples: SineSamples, path: Path, u: np.ndarray, v: np.ndarray) -> t
     number of points that is usually sufficient for the phase there.
     """
 
-    def ratio(s: np.ndarray, t: np.ndarray, u: np.ndarray, v: np.ndarray) -> np.ndarray:
-        points, place = samples.points_at(s, t), (u[None, :, None, None], v[:, None, None, None])
-        found: np.ndarray = slow_factor(path, points, (s, t), place) / slow_factor(path, points, (s, t), (0.0, 0.0))
+    def ratio(directions: tuple[np.ndarray, np.ndarray], u: np.ndarray, v: np.ndarray) -> np.ndarray:
+        points, place = samples.points_at(*directions), (u[None, :, None, None], v[:, None, None, None])
+        middle = slow_factor(path, points, directions, (np.zeros(1), np.zeros(1)))
+        found: np.ndarray = slow_factor(path, points, directions, place) / middle
         return found
 
     angle = 2 * np.pi * np.arange(12) / 12
     rim = samples.directions(samples.outermost * np.cos(angle), samples.outermost * np.sin(angle))
     ends = u[[0, -1]], v[[0, -1]]
-    exact = ratio(*rim, *ends)[:, :, 0]
+    exact = ratio(rim, *ends)[:, :, 0]
     phase = float(np.abs(np.angle(exact)).max())
     for order in ORDERS[bisect(PHASES, phase) :]:
         nodes = (at := samples.at[[0, -1]]).mean() + (at[1] - at[0]) / 2 * chebyshev_points(order)
-        at_nodes = np.meshgrid(nodes, nodes)
+        across, down = np.meshgrid(nodes, nodes)
         weight = lagrange_basis(rim[1], nodes)[:, None] * lagrange_basis(rim[0], nodes)
-        if np.abs(np.tensordot(ratio(*at_nodes, *ends), weight, 2) - exact).max() < INTERPOLATED:
+        if np.abs(np.tensordot(ratio((across, down), *ends), weight, 2) - exact).max() < INTERPOLATED:
             break
-    return nodes, ratio(*at_nodes, u, v)
+    return nodes, ratio((across, down), u, v)
 
 
 def _drawn(image: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

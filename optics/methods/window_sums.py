@@ -108,11 +108,13 @@ def recorded_field(pupil: Field, distance: Scalar, sums: WindowSums, window: Gri
         def forward(self) -> None:
             changed = sums.field(_complex(self.grad_in("re"), self.grad_in("im"), shape))
             if moves:
-                changed = changed + sums.moved(self.pupil) * self.grad_in("distance").numpy()[0]
+                step: Array = self.grad_in("distance")
+                changed = changed + sums.moved(self.pupil) * step.numpy()[0]
             self.set_grad_out(_parts(changed, types))
 
         def backward(self) -> None:
-            cotangent = _complex(*self.grad_out(), window.shape)
+            parts: Array = self.grad_out()
+            cotangent = _complex(parts[0], parts[1], window.shape)
             re, im = _parts(sums.gradient(cotangent), types)
             self.set_grad_in("re", re)
             self.set_grad_in("im", im)
