@@ -1,6 +1,7 @@
-"""PSFs inside a PyTorch graph. Gradients flow from a loss on the PSF back to every tensor in the pupil.
+"""PSFs and images inside a PyTorch graph. Gradients flow from a loss back to every tensor in the pupil.
 
 psf(pupil, wavelengths, sensor_distance, ...)     PSFs of one or several pupils, as a tensor
+camera_image(scene, pupil, sensor, ...)           electrons in the pixels of a camera
 PointSpread(radius, wavelengths, ...)             module with a learnable relief
 
 heights = torch.zeros(32, 32, dtype=torch.float64, requires_grad=True)    # [m]
@@ -22,6 +23,7 @@ import torch
 from optics.elements.pupil import Pupil
 from optics.elements.relief import BSplineRelief, HeightMap, Relief
 from optics.elements.torch_numbers import torch_numbers, with_numbers
+from optics.eye import camera
 from optics.eye.sensor_pixels import SensorPixels
 from optics.numerics.arguments import flag, in_range, of_kind, shown, vacuum_wavelengths, wavelength_row
 from optics.numerics.autodiff import Array, plain
@@ -35,7 +37,7 @@ from optics.point_spread.light_batch import LightBatch, is_row
 from optics.point_spread.psf import psf as drjit_psf
 from optics.point_spread.psf_result import OF_CELLS
 
-__all__ = ["PointSpread", "psf"]
+__all__ = ["PointSpread", "camera_image", "psf"]
 
 FORMER = "heights", "radius", "n", "pupil"  # arguments that `psf` had before it accepted pupils
 
@@ -107,6 +109,31 @@ def psf(
         found = rows @ found @ columns.T
     found = found if is_row(sensor_distance) or is_row(source_distance) else found[:, 0]
     return found[0] if isinstance(pupil, Pupil) else found
+
+
+def camera_image(scene: Any, pupil: Pupil, sensor: camera.Sensor, *, device: Any = None, **view: Any) -> torch.Tensor:
+    """Return the electrons of `optics.camera_image` as a tensor (channel, y, x) with gradients to the pupil's tensors.
+
+    scene: see `optics.camera_image`. It carries no gradients.
+    pupil: see `psf`.
+    sensor: a sensor with bits=None, because rounded numbers have no derivatives.
+    device: device of the result, see `psf`.
+    view: depth, samples_per_pixel, field_zones, rng, sensor_distance and tolerance, see `optics.camera_image`.
+
+    Raises:
+        ValueError: an argument is invalid; the message names it with its value and valid range.
+        AccuracyError: see `optics.psf`.
+    """
+    numbers = torch_numbers(of_kind("pupil", pupil, Pupil, "optics.Pupil(1e-3)"))
+    place = torch.device(device) if device is not None else _common_device(numbers)
+    if not numbers or not torch.is_grad_enabled():
+        fixed = with_numbers(pupil, {name: plain(tensor)[()] for name, tensor in numbers.items()})
+        return torch.from_numpy(np.asarray(camera.camera_image(scene, fixed, sensor, **view))).to(place)
+
+    def electrons(own: Sequence[Array]) -> Array:
+        return camera.camera_image(scene, with_numbers(pupil, dict(zip(numbers, own, strict=True))), sensor, **view)
+
+    return _Evaluation.apply(electrons, *numbers.values()).to(place)
 
 
 def _pixels(light: LightBatch, wavelengths: np.ndarray, view: Mapping[str, Any]) -> SensorPixels:

@@ -11,12 +11,16 @@ receptive_field       kernels: receptive fields of receptors
 guided_field          kernels of receptors that are waveguides
 receptor_kernel       kernel of any receptor
 kernel_interpolation  number of kernels for a range of distances and directions
+depth_range           distances in a scene and their layers
 kernel_bank           kernels of an eye for a scene
 band_choice           choice of the number of spectral bands
 retinal_image         convolution of a scene with a kernel
+occlusion             layers of a depth map, and what near surfaces hide
+layered_image         image of a scene with many distances
 polarization          microvilli over a retina and polarised scenes
 signals               signals of a scene
 photoreceptor         throughput, spectral weighting, noise
+camera                image of a scene on the sensor of a camera
 summary               table of an eye's limits
 acuity                limits by the spacing of receptors, diffraction and photons
 """

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
 
+from optics.eye.depth_range import MOST_DISTINCT, layers_for
 from optics.eye.eye_spec import EyeSpec
 from optics.eye.geometry import direction, tangents
-from optics.eye.kernel_bank import KernelBank, distances_of, prepare
+from optics.eye.kernel_bank import KernelBank, prepare
+from optics.eye.kernel_interpolation import NodeError
 from optics.eye.polarization import taken_by
 from optics.eye.receptive_field import perfect_psf, retinal_psf
 from optics.eye.receptor_kernel import CELLS_FOR_BANDS, bands_for, receptor_kernel, white_share
@@ -19,6 +21,7 @@ from optics.eye.retina import Retina
 from optics.eye.retinal_image import centred, with_centre
 from optics.eye.signals import signals, with_noise
 from optics.eye.summary import Description, describe
+from optics.numerics.accuracy import AccuracyError
 from optics.numerics.arguments import in_range, of_kind, one_of, positive, radiance_cube, whole
 from optics.numerics.autodiff import Array, Scalar, holds_arrays, number, plain, to_user
 from optics.point_spread.psf_result import PSFResult
@@ -164,9 +167,10 @@ class Eye(EyeSpec):
 
         Printed, the result shows the chosen numbers of kernels with reasons.
 
-        z: distances [m] in the scene, a number or an array. Only the nearest and the farthest distance matter.
+        z: distances [m] in the scene, a number or an array. Only the nearest and the farthest distance matter, except
+            for "distinct" layers.
         depth_layers: number of kernels between the nearest and the farthest distance, evenly spaced in 1/z; or "auto",
-            the fewest within the tolerance.
+            the fewest within the tolerance; or "distinct", one kernel for each different distance in z, at most 64.
         field_zones: number of kernels across the width of the field; or "auto". With 1, the kernel on the axis is used
             for the whole retina.
         tolerance: largest error of a receptor's signal, relative to the signal of a white surface, for any scene at
@@ -194,7 +198,8 @@ class Eye(EyeSpec):
         def white() -> float:
             return number(self.white_signal) / number(self.aperture_throughput)
 
-        return prepare(kernel_at, self.resolution, s, z, counts, within, averaged=self.waveguide is None, white=white)
+        bank = prepare(kernel_at, self.resolution, s, z, counts, within, averaged=self.waveguide is None, white=white)
+        return replace(bank, parallax=self._parallax * s)
 
     def see(
         self,
@@ -214,18 +219,22 @@ class Eye(EyeSpec):
             `Eye.sight`). The scene is centred on the axis and dark outside. It has at least h s x w s cells. A larger
             scene must exceed this height and this width by even numbers.
         rng: random generator of the noise; None for signals without noise. Noise carries no derivative.
-        z: distance [m] of the scene along the axis, a number or one per cell (Y, X).
+        z: distance [m] of the scene along the axis, a number or a map with one per cell (Y, X). In a map, near surfaces
+            hide far ones at jumps of depth (see `optics.eye.occlusion`). Behind them, far surfaces continue with their
+            nearest visible cell. Up to 17 different distances have a kernel each, more share kernels within the
+            tolerance.
         sight: kernels from `Eye.sight` with the same samples_per_receptor; None computes them. Objects outside its
             range of distances are rendered with the kernel of the nearest or the farthest distance. The kernels of the
-            last call are kept.
+            last call are kept. With `dataclasses.replace(sight, parallax=0)` no surface hides another one.
         polarization: (degree, angle_deg) of the light, for an eye with microvilli: the degree of linear polarisation in
             [0, 1], and the angle of the electric field, from right towards up. Each is a number or an array (band,),
             (Y, X) or (band, Y, X). None: unpolarised or circularly polarised light, which microvilli do not
             distinguish.
 
         Raises:
-            ValueError: radiance has another shape or is not finite; or the light is polarised and receptors have no
-                microvilli.
+            ValueError: radiance has another shape or is not finite; z has another shape, is not positive or holds NaN;
+                or the light is polarised and receptors have no microvilli.
+            AccuracyError: see `optics.psf`, or z has so wide a range that the tolerance requires too many kernels.
         """
         s = whole("samples_per_receptor", samples_per_receptor, 1, 64)
         if rng is not None:
@@ -244,14 +253,32 @@ class Eye(EyeSpec):
 
         Kernels that depend on Dr.Jit arrays are computed again, because these may carry derivatives.
         """
+        layers, distances = layers_for(z)
         if holds_arrays(z) or holds_arrays(self):
-            return self.sight(samples_per_receptor, z)
-        key = samples_per_receptor, distances_of(z)
+            return self._sight_for(samples_per_receptor, z, layers)
+        key = samples_per_receptor, distances
         known, bank = vars(self).get(LAST, (None, None))
         if known != key:
-            bank = self.sight(samples_per_receptor, z)
+            bank = self._sight_for(samples_per_receptor, z, layers)
             vars(self)[LAST] = key, bank
         return bank
+
+    def _sight_for(self, samples_per_receptor: int, z: Any, layers: str) -> KernelBank:
+        try:
+            return self.sight(samples_per_receptor, z, layers)
+        except NodeError:
+            raise AccuracyError(
+                f"z from {np.min(z):.3g} to {np.max(z):.3g} m needs more kernels than the limit at the eye's tolerance "
+                f"of {self.tolerance:g}: must span less, or hold at most {MOST_DISTINCT} different distances, or pass "
+                "sight=eye.sight(..., depth_layers=64)"
+            ) from None
+
+    @property
+    def _parallax(self) -> float:
+        """Shift [receptors m] of the image across the pupil's diameter, per difference of inverse distance."""
+        if self.pupil is None:
+            return 0.0
+        return 2 * number(self.pupil.aperture_radius) * number(self.sensor_distance) / min(self.receptor_size)
 
     def __getstate__(self) -> dict[str, Any]:
         return {name: value for name, value in vars(self).items() if name != LAST}

@@ -1,10 +1,12 @@
 """Kernels of an eye for a scene with a range of distances and directions: the fewest within the tolerance.
 
 A kernel depends on the position of the light source. Kernels are computed at nodes, and interpolated linearly between
-them (see `kernel_interpolation`). The nodes are evenly spaced over the tangent plane and in inverse distance 1/z,
-because defocus is linear in 1/z:
+them (see `kernel_interpolation`). The nodes are evenly spaced over the tangent plane. Along depth they are evenly
+spaced in inverse distance 1/z, because defocus is linear in 1/z, or they are the distances of the scene itself:
 
     signal = Σ_l kernel_l ⊗ (share_l · radiance),   Σ_l share_l = 1 at every cell of the scene.
+
+`occlusion` adds that near surfaces hide far ones.
 """
 
 from __future__ import annotations
@@ -17,61 +19,52 @@ from typing import Any
 
 import numpy as np
 
+from optics.eye.depth_range import DISTINCT, MOST_NODES, DepthRange
 from optics.eye.kernel_interpolation import Choice, NodeChoice, nodes
 from optics.numerics.accuracy import AccuracyError
-from optics.numerics.arguments import positive, shown, whole, without_derivative
-from optics.numerics.autodiff import Array, Scalar, is_differentiable, number, plain
+from optics.numerics.arguments import whole
+from optics.numerics.autodiff import Array, Scalar, number
 from optics.numerics.interpolation import linear_weights
-from optics.numerics.number_types import full_precision
 
-__all__ = ["KernelBank", "distances_of", "prepare"]
+__all__ = ["KernelBank", "prepare"]
 
-MOST_NODES = 64  # choice: largest number of layers or zones that can be requested
 # Choice: numbers of nodes to try. The nodes of each number include the nodes of all smaller numbers.
-DEPTH_COUNTS, FIELD_COUNTS = (1, 3, 5, 9, 17), (1, 3, 5, 9)
+DEPTH_COUNTS, FIELD_COUNTS = (1, 3, 5, 9, 17, 33), (1, 3, 5, 9)
 
 
 @dataclass(frozen=True)
 class KernelBank:
     """The kernels of an eye at all nodes, and the weights with which a cell of the scene uses them.
 
-    inverse_distance: 1/z [1/m] of the (nearest, farthest) distance.
+    inverse_distances: 1/z [1/m] of the nodes along depth, ascending.
     field: (half height, half width) of the retina in cells.
     kernels: a Dr.Jit tensor (band, ky, kx) for each node (layer, row, column).
     choices: the chosen numbers of nodes, for depth and for the field.
     averaged: True if a receptor's signal is the mean over its cells. It is False with waveguides.
+    parallax: shift [cells m] that the pupil's diameter causes in the image, per difference of inverse distance. Near
+        surfaces hide far ones within this shift. 0: no surface hides another, as in renderers whose rays all pass the
+        middle of the pupil.
     """
 
-    inverse_distance: tuple[float, float]
+    inverse_distances: tuple[float, ...]
     field: tuple[float, float]
     kernels: dict[tuple[int, int, int], Array]
     choices: tuple[Choice, ...]
     averaged: bool = True
+    parallax: float = 0.0
 
-    def shares(self, shape: tuple[int, int], z: Any) -> list[Any]:
+    def shares(self, inverse_distance: np.ndarray) -> list[Any]:
         """Return the interpolation weight (Y, X) of each node in every cell of a scene, one array per node.
 
-        z: distances [m], a number or (Y, X).
-
-        Raises:
-            ValueError: z of another shape, or invalid distances.
+        inverse_distance: 1/z [1/m] of the cells, (Y, X).
         """
-        if is_differentiable(z):
-            positive("z", z, infinite=True, carried=True)
-        else:
-            found = _distances(z)
-            if np.ndim(z) and found.shape != shape:
-                raise ValueError(f"z has shape {np.shape(z)}: must be one distance or one per cell, {shape}")
-            z = found
         if len(self.kernels) == 1:
             return [1]
-        layers, rows, columns = (1 + max(node[axis] for node in self.kernels) for axis in range(3))
-        near, far = self.inverse_distance
-        depth = (2 / np.broadcast_to(plain(z), shape) - near - far) / ((near - far) or 1.0)
-        down, across = ((np.arange(n) - (n - 1) / 2) / half for n, half in zip(shape, self.field, strict=True))
-        by_depth, by_row, by_column = (
-            linear_weights(at, nodes(n)) for at, n in ((depth, layers), (down, rows), (across, columns))
-        )
+        rows, columns = (1 + max(node[axis] for node in self.kernels) for axis in (1, 2))
+        sides = inverse_distance.shape
+        down, across = ((np.arange(n) - (n - 1) / 2) / half for n, half in zip(sides, self.field, strict=True))
+        by_depth = linear_weights(inverse_distance, np.array(self.inverse_distances))
+        by_row, by_column = (linear_weights(at, nodes(n)) for at, n in ((down, rows), (across, columns)))
         return [by_depth[i] * by_row[j][:, None] * by_column[k] for i, j, k in self.kernels]
 
     def check(self, shape: tuple[int, int], bands: int, *, averaged: bool) -> None:
@@ -90,36 +83,6 @@ class KernelBank:
         return "\n".join(map(str, self.choices))
 
 
-@dataclass(frozen=True)
-class _Range:
-    """Inverse distances of the nearest and the farthest object. A single Dr.Jit distance is used unchanged."""
-
-    inverse_distance: tuple[float, float]
-    only: Scalar
-
-    @classmethod
-    def from_distances(cls, z: Any) -> _Range:
-        if is_differentiable(z):
-            positive("z", z, infinite=True, carried=True)
-            return cls((1 / number(z), 1 / number(z)), z)
-        distances = _distances(z)
-        near, far = float(distances.min()), float(distances.max())
-        return cls((1 / near, 1 / far), near if near == far else None)
-
-    def distance(self, place: float) -> Scalar:
-        """Return the distance [m] at a place between -1 (farthest) and 1 (nearest)."""
-        if self.only is not None:
-            return self.only
-        near, far = self.inverse_distance
-        at = (near + far + place * (near - far)) / 2
-        return 1 / at if at > 0 else math.inf
-
-
-def distances_of(z: Any) -> tuple[float, float]:
-    """Return 1/z [1/m] of the (nearest, farthest) distance, on which alone a bank depends."""
-    return _Range.from_distances(z).inverse_distance
-
-
 def prepare(
     kernel_at: Callable[[Scalar, float, float], Array],
     resolution: tuple[int, int],
@@ -135,14 +98,16 @@ def prepare(
 
     kernel_at: function of (z, right, down) that returns a kernel. Positions in the field run from -1 to 1, the edges of
         the retina.
-    counts: number of depth layers, and of zones across the longer side of the retina; or "auto".
+    counts: number of depth layers, and of zones across the longer side of the retina; or "auto", or "distinct" for one
+        layer at each distance.
     averaged: True if a receptor's signal is the mean over its cells.
     white: function that returns the fraction of the signal of a white surface that the kernels transmit.
     """
-    s, depths = samples_per_receptor, _Range.from_distances(z)
+    s, depths = samples_per_receptor, DepthRange.from_distances(z)
+    exactly = isinstance(counts[0], str) and counts[0] == DISTINCT
     layers, zones = (
-        None if isinstance(count, str) and count == "auto" else whole(name, count, 1, MOST_NODES)
-        for name, count in zip(("depth_layers", "field_zones"), counts, strict=True)
+        None if isinstance(count, str) and count in ("auto", *known) else whole(name, count, 1, MOST_NODES)
+        for name, count, known in zip(("depth_layers", "field_zones"), counts, ((DISTINCT,), ()), strict=True)
     )
     mean = s if averaged else 1
     by_depth = [(n,) for n in DEPTH_COUNTS]
@@ -151,16 +116,19 @@ def prepare(
     across = NodeChoice("field", lambda at: kernel_at(depths.distance(0), at[1], at[0]), by_place, mean, white)
     if depths.only is not None:
         depth: Choice | None = Choice("depth", (1,), 0.0, "a single distance")
+    elif exactly:
+        depth = Choice("depth", (len(depths.each()),), 0.0, "one for each distance")
     else:
         depth = None if layers is None else Choice("depth", (layers,), None, "as requested")
     wide = None if zones is None else Choice("field", _grid(zones, resolution), None, "as requested")
     choices = _choices((along, across), (depth, wide), tolerance)
-    deep, down, right = (nodes(n) for choice in choices for n in choice.counts)
-    places = itertools.product(range(len(deep)), range(len(down)), range(len(right)))
-    kernels = {(i, j, k): kernel_at(depths.distance(deep[i]), right[k], down[j]) for i, j, k in places}
-    return KernelBank(
-        depths.inverse_distance, (resolution[0] * s / 2, resolution[1] * s / 2), kernels, choices, averaged
-    )
+    (deep,), (down, right) = choices[0].counts, (nodes(n) for n in choices[1].counts)
+    distances = depths.each() if exactly and depths.only is None else depths.layers(deep)
+    places = itertools.product(range(deep), range(len(down)), range(len(right)))
+    kernels = {(i, j, k): kernel_at(distances[i], right[k], down[j]) for i, j, k in places}
+    half_sides = resolution[0] * s / 2, resolution[1] * s / 2
+    inverse = tuple(1 / number(distance) for distance in distances)
+    return KernelBank(inverse, half_sides, kernels, choices, averaged)
 
 
 def _choices(
@@ -201,15 +169,3 @@ def _grid(across: int, resolution: tuple[int, int]) -> tuple[int, int]:
         return 1 if receptors == 1 else 1 + (finest >> halvings)
 
     return along(height), along(width)
-
-
-def _distances(z: Any) -> np.ndarray:
-    z = full_precision("z", without_derivative("z", z))
-    try:
-        distances = np.atleast_1d(np.asarray(z, dtype=np.float64))
-    except (TypeError, ValueError, OverflowError):
-        raise ValueError(f"z = {shown(z)}: must be a distance [m], or an array of them") from None
-    if distances.size == 0 or np.isnan(distances).any():
-        raise ValueError("z is empty or holds NaN: must be distances greater than 0, in m, or infinite")
-    positive("z", float(distances.min()), infinite=True)
-    return distances

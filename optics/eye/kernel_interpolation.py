@@ -19,11 +19,15 @@ from optics.numerics.accuracy import AccuracyError
 from optics.numerics.autodiff import Array, plain
 from optics.numerics.interpolation import linear_weights
 
-__all__ = ["Choice", "NodeChoice", "nodes", "worst_difference"]
+__all__ = ["Choice", "NodeChoice", "NodeError", "nodes", "worst_difference"]
 
 MOST_CHECKS = 8  # choice: largest number of kernels between nodes that are computed to measure the interpolation error
 CAUTION = 1.3  # choice: safety factor on this error, which may be larger at positions that are not measured
 Place = tuple[float, ...]
+
+
+class NodeError(AccuracyError):
+    """The largest number of nodes leaves an interpolation error above the tolerance."""
 
 
 @dataclass(frozen=True)
@@ -90,7 +94,7 @@ class NodeChoice:
         most: part of the tolerance that is available for this stage (None: all).
 
         Raises:
-            AccuracyError: the error of the last candidate exceeds the tolerance.
+            NodeError: the error of the last candidate exceeds the tolerance.
         """
         error = math.inf
         for counts in self.candidates:
@@ -99,9 +103,9 @@ class NodeChoice:
                 share = "" if most is None else f", of which {most:.2g} is available here"
                 return Choice(self.stage, counts, error, f"fewest within the tolerance of {tolerance:g}{share}")
         share = "" if most is None else f", of which {self.stage} may use {most:.2g}"
-        raise AccuracyError(
-            f"tolerance = {tolerance:g}{share}: "
-            f"{' x '.join(map(str, self.candidates[-1]))} {self.stage} nodes leave {error:.1e} of white's signal; "
+        nodes_leave = f"{' x '.join(map(str, self.candidates[-1]))} {self.stage} nodes leave"
+        raise NodeError(
+            f"tolerance = {tolerance:g}{share}: {nodes_leave} {error:.1e} of white's signal; "
             "increase the tolerance or specify a number of nodes"
         )
 

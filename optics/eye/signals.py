@@ -7,10 +7,12 @@ from typing import Any
 
 import numpy as np
 
+from optics.eye.depth_range import inverse_distances_in
 from optics.eye.eye_spec import EyeSpec
 from optics.eye.kernel_bank import KernelBank
+from optics.eye.layered_image import retinal_image
 from optics.eye.photoreceptor import noise_on, own_type, quantum_catch
-from optics.eye.retinal_image import at_receptors, blur, receptor_average
+from optics.eye.retinal_image import at_receptors, receptor_average
 from optics.numerics.autodiff import Array, plain
 from optics.numerics.precision import Precision, precision
 
@@ -25,19 +27,18 @@ def signals(eye: EyeSpec, parts: Sequence[tuple[np.ndarray, Any]], bank: KernelB
     s: samples_per_receptor.
     z: see `Eye.see`.
     """
-    types = precision(eye.dtype)
+    types, shape = precision(eye.dtype), (eye.resolution[0] * s, eye.resolution[1] * s)
+    depth = inverse_distances_in(parts[0][0].shape[1:], z)
     total: Any = None
     for light, taken in parts:
-        caught = _quantum_catch(eye, [light * share for share in bank.shares(light.shape[1:], z)], bank, s, types)
+        caught = _quantum_catch(eye, retinal_image(light, depth, bank, shape, types), s, types)
         if np.ndim(taken):
             caught *= types.Tensor(np.broadcast_to(taken, caught.shape).copy())
         total = caught if total is None else total + caught
     return total if eye.mosaic is None else own_type(total, eye.mosaic, types)
 
 
-def _quantum_catch(eye: EyeSpec, scenes: list[np.ndarray], bank: KernelBank, s: int, types: Precision) -> Array:
-    shape = eye.resolution[0] * s, eye.resolution[1] * s
-    image = blur(scenes, list(bank.kernels.values()), shape, types)
+def _quantum_catch(eye: EyeSpec, image: Array, s: int, types: Precision) -> Array:
     irradiance = (receptor_average if eye.waveguide is None else at_receptors)(image, s, types)
     return quantum_catch(irradiance, eye.spectral_bands.weights, eye.aperture_throughput, types)
 

@@ -16,9 +16,8 @@ from optics import animals
 from optics.numerics.arguments import in_range, one_of, reals, shown
 from optics.spectra.bands import SpectralBands
 from optics.spectra.receptors import receptors_of
-from optics.spectra.spectrum import daylight, srgb_basis
+from optics.spectra.srgb import decode_srgb, ink_radiance
 from sim.pictures.receptor_mosaic import ReceptorMosaic
-from sim.scene.color import decode_srgb
 
 __all__ = ["ANIMALS", "read_photograph", "see_photograph"]
 
@@ -27,7 +26,6 @@ ANIMALS = (*sorted(animals.COMPOUND), *CAMERA)
 BANDS = 5  # choice: spectral bands
 TOGETHER = 1_000_000  # choice, limited by memory: rays of ommatidia that are computed at once
 MOST_RECEPTORS = 40_000  # choice, limited by time
-ULTRAVIOLET_NM = 400.0
 CELLS = 2  # choice: cells of the scene per receptor, along each axis
 MARGIN = 16  # choice: cells that continue the photograph beyond its edges
 SMALLEST = 8  # pixels along the shorter side
@@ -105,15 +103,6 @@ def _checked(photograph: Any) -> np.ndarray:
     return pixels
 
 
-def _inks(bands: SpectralBands, receptors: Any, uv: float) -> np.ndarray:
-    """Return the radiance in each band of red, green and blue surfaces in daylight, (band, 3)."""
-
-    def radiance(ink: optics.Spectrum) -> Callable[[np.ndarray], np.ndarray]:
-        return lambda at: ink.at(at) * np.where(at * 1e9 < ULTRAVIOLET_NM, uv, 1.0) * daylight(at)
-
-    return np.stack([bands.band_values(radiance(ink), receptors) for ink in srgb_basis()], axis=-1)
-
-
 def _height_deg(linear: np.ndarray, width_deg: float) -> float:
     ratio = linear.shape[0] / linear.shape[1]
     return 2 * math.degrees(math.atan(ratio * math.tan(math.radians(width_deg) / 2)))
@@ -134,7 +123,7 @@ def _compound(linear: np.ndarray, animal: str, width_deg: float, uv: float, repo
     shifts = np.where(np.arange(rows) % 2 == 1, 0.25, -0.25)[:, None]
     x = apart * (np.arange(columns) - (columns - 1) / 2 + shifts)
     y = -apart * math.sqrt(3) / 2 * (np.arange(rows) - (rows - 1) / 2)[:, None] + np.zeros_like(x)
-    directions, inks = np.column_stack([x.ravel(), y.ravel()]), _inks(bands, receptors, uv)
+    directions, inks = np.column_stack([x.ravel(), y.ravel()]), ink_radiance(bands, receptors, uv)
     found = np.empty((len(inks), len(directions)))
     for band, wavelength in enumerate(bands.wavelengths):
         around_x, around_y, weights = _field(animal, float(wavelength))
@@ -179,7 +168,7 @@ def _camera(linear: np.ndarray, animal: str, width_deg: float, uv: float, report
     rows = max(2, round(columns * linear.shape[0] / linear.shape[1]))
     eye = replace(patch, resolution=(rows, columns), fov_deg=width_deg, sensor_width=sensor_width, bands=BANDS)
     cells = _resized(linear, (rows * CELLS, columns * CELLS))
-    scene = np.einsum("yxc,bc->byx", cells, _inks(eye.spectral_bands, eye.receptors, uv))
+    scene = np.einsum("yxc,bc->byx", cells, ink_radiance(eye.spectral_bands, eye.receptors, uv))
     report(0.1)
     padded = np.pad(scene, ((0, 0), (MARGIN, MARGIN), (MARGIN, MARGIN)), mode="edge")
     signals = np.asarray(eye.see(padded, CELLS)) / float(eye.white_signal)

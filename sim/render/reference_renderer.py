@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Mapping
+from dataclasses import replace
 from fractions import Fraction
 from typing import Any
 
@@ -71,7 +72,8 @@ class ReferenceRenderer:
         self._integrator, self._spp, self._sampler, self.seed = integrator, spp, sampler, seed
         self._has_depth = depths is not None
         z: Any = np.array(depths) if depths else math.inf
-        self.sight = self.eye.sight(self.samples_per_receptor, z, depth_layers, light_from="centres")
+        sight = self.eye.sight(self.samples_per_receptor, z, depth_layers, light_from="centres")
+        self.sight = replace(sight, parallax=0.0)  # rays of renderers pass the middle of the pupil, so edges hide none
         self._data = mujoco.MjData(world.model)
         spectra, off = lights_in_bands(world.model, world.spectra, self.eye.spectral_bands, self.eye.receptors)
         for words in off:

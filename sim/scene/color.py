@@ -4,6 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from optics.spectra.srgb import decode_srgb
+
+__all__ = ["decode_srgb", "encode_srgb", "preview"]
+
 # IEC 61966-2-1
 _XYZ_TO_SRGB = np.array([[3.2406, -1.5372, -0.4986], [-0.9689, 1.8758, 0.0415], [0.0557, -0.2040, 1.0570]])
 
@@ -12,12 +16,6 @@ def encode_srgb(linear: np.ndarray | float) -> np.ndarray:
     """Convert linear values in [0, 1] to sRGB display values in [0, 1]."""
     x = np.asarray(linear, dtype=float)
     return np.where(x <= 0.0031308, 12.92 * x, 1.055 * np.maximum(x, 0.0031308) ** (1 / 2.4) - 0.055)
-
-
-def decode_srgb(display: np.ndarray | float) -> np.ndarray:
-    """Convert sRGB display values in [0, 1] to linear values."""
-    x = np.asarray(display, dtype=float)
-    return np.where(x <= 0.04045, x / 12.92, ((np.maximum(x, 0.04045) + 0.055) / 1.055) ** 2.4)
 
 
 def preview(radiance: np.ndarray, wavelengths_nm: np.ndarray) -> np.ndarray:

@@ -90,7 +90,28 @@ SPECTRA = {
     "receptors_of": {"receptors": "rgb"},
     "reflectance": {"name": "foliage"},
 }
+SENSOR = {
+    "pixels": (2, 2),
+    "pitch": 4e-6,
+    "filters": "bayer",
+    "photon_budget": optics.PhotonBudget(),
+    "full_well": 1e4,
+    "read_noise": 2.0,
+    "bits": 12,
+    "bands": 2,
+}
+CAMERA = {"lens": LENS, "sensor": optics.Sensor(**SENSOR), "sensor_distance": 240e-6, "tolerance": 0.1}
 EYES = {
+    "Sensor": SENSOR,
+    "camera_eye": CAMERA,
+    "camera_image": {
+        **CAMERA,
+        "scene": np.ones((2, 2, 3)),
+        "depth": 1.0,
+        "samples_per_pixel": 1,
+        "field_zones": 1,
+        "rng": None,
+    },
     "acceptance_function": {
         "ommatidium": optics.Ommatidium(optics.FacetLens(25e-6, 30e-6), optics.Waveguide(2e-6)),
         "wavelengths": [500e-9, 550e-9],

@@ -10,6 +10,8 @@ from tests.walked_arguments import NoEffect, Walk, With
 LENS = {"aperture_radius": 10e-6, "thin_lens_focal_length": 80e-6}
 EYE = Eye(Pupil(**LENS), (2, 2), 60.0, bands=1)
 SCENE = np.linspace(0, 1, 64).reshape(1, 8, 8)
+CAMERA_LENS = Pupil(0.1e-3, thin_lens_focal_length=2e-3)
+COLOURS = np.linspace(0, 1, 4 * 8 * 3).reshape(4, 8, 3)
 FACET = optics.FacetLens(12e-6, 14e-6)
 EYELET = optics.Ommatidium(FACET, Waveguide(2e-6))
 COMPOUND = optics.AppositionEye(EYELET, 1, 2.0)
@@ -24,6 +26,14 @@ def looked(**given):
     scene = np.linspace(0, 1, layers * 64).reshape(layers, 8, 8)
     noisy = eye.see(scene, 2, rng=np.random.default_rng(0), polarization=(0.5, 20.0) if eye.microvilli else None)
     return eye.kernel(2), noisy, eye.tolerance
+
+
+def photographed(**given):
+    """Return the image of a camera, and the spectral bands of its eye."""
+    sensor = optics.Sensor((2, 4), 4e-6, **given)
+    scene = np.linspace(0, 1, 8 * 10 * 3).reshape(8, 10, 3)[:, :8]
+    found = optics.camera_image(scene, CAMERA_LENS, sensor, rng=np.random.default_rng(0))
+    return found, optics.camera_eye(CAMERA_LENS, sensor).spectral_bands.wavelengths
 
 
 def in_time(**given):
@@ -73,6 +83,33 @@ OF_EYES = {
             "pupil_turned": With(True, {"pupil": Pupil(**LENS, wavefront=Zernike({(3, 1): 0.2}))}),
             "vertical_fov_deg": 30.0,
             "dynamics": NoEffect("it needs time, which environments have: tests/sim/envs/test_receptors_in_time.py"),
+        },
+    ),
+    "Sensor": Walk(
+        photographed,
+        {
+            "filters": "rgb",
+            "photon_budget": optics.PhotonBudget(3e3, 1e-3),
+            "full_well": 3e3,
+            "read_noise": 50.0,
+            "bits": None,
+            "bands": 4,
+        },
+    ),
+    "camera_eye": Walk(
+        lambda **asked: optics.camera_eye(CAMERA_LENS, optics.Sensor((2, 4), 4e-6), **asked).kernel(1),
+        {"sensor_distance": 2.1e-3, "tolerance": 0.1},
+    ),
+    "camera_image": Walk(
+        lambda **asked: optics.camera_image(COLOURS, **{"lens": CAMERA_LENS, **asked}),
+        {
+            "sensor": With(optics.Sensor((2, 4), 5e-6), {"sensor": optics.Sensor((2, 4), 4e-6)}),
+            "depth": With(0.02, {"sensor": optics.Sensor((2, 4), 4e-6)}),
+            "field_zones": With(3, {"sensor": optics.Sensor((2, 4), 4e-4, full_well=1e9, bits=None)}),
+            "samples_per_pixel": With(2, {"sensor": optics.Sensor((2, 4), 4e-6)}),
+            "rng": With(np.random.default_rng(0), {"sensor": optics.Sensor((2, 4), 4e-6)}),
+            "sensor_distance": With(2.1e-3, {"sensor": optics.Sensor((2, 4), 4e-6)}),
+            "tolerance": With(0.2, {"sensor": optics.Sensor((2, 4), 4e-6, bits=None)}),
         },
     ),
     "ReceptorDynamics": Walk(

@@ -3,6 +3,7 @@
 scene_against_mujoco      mirrored models compared with MuJoCo's renderer
 receptive_field_sampling  ray sampling of receptive fields compared with a convolution
 eyes_against_ray_caster   eyes on models compared with MuJoCo's ray caster
+occlusion_against_thin_lens  occlusion at edges compared with Mitsuba's thin lens
 speed_accuracy            error against speed of all rendering methods
 automatic_choice          cost of the automatic choice of samples
 equal_brightness          equal brightness of goal and adversary to one receptor

@@ -7,8 +7,11 @@ eye: test_eye.py, test_kept_kernels.py, test_axes.py, test_eye_derivatives.py, t
 eye_spec: test_eye.py, test_patches.py, test_axes.py, test_vertical_field.py
 geometry: test_patches.py, test_vertical_field.py
 immersion: elements/test_turbid_medium.py
+depth_range: test_occlusion.py, test_kernel_bank.py
 kernel_bank: test_kernel_bank.py, test_layer_counts.py, test_sight_tolerance.py, test_eye_robustness.py
 kernel_interpolation: test_kernel_interpolation.py, test_kernel_bank.py, test_sight_tolerance.py
+layered_image: test_occlusion.py
+occlusion: test_occlusion.py
 photoreceptor: test_photoreceptor.py
 polarization: test_polarization.py
 signals: test_eye.py, test_polarization.py
@@ -18,5 +21,6 @@ receptor_kernel: test_guided_field.py, test_eye.py
 retina: test_kept_kernels.py, test_receptive_field.py
 retinal_image: test_retinal_image.py
 sensor_pixels: test_torch.py
+camera: test_camera.py
 summary: test_summary.py
 """

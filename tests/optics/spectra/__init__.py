@@ -7,4 +7,5 @@ pigment: test_pigment.py
 receptor_dynamics: sim/render/test_receptors_in_time.py
 receptors: test_receptors.py
 spectrum: test_spectrum.py
+srgb: eye/test_camera.py, sim/pictures/test_photograph.py
 """

@@ -1,0 +1,97 @@
+"""Image on the retina of a scene with many distances: layers, composited over one another."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from optics.eye.kernel_bank import KernelBank
+from optics.eye.occlusion import Layer, visible_layers
+from optics.eye.retinal_image import blur
+from optics.numerics.autodiff import Array
+from optics.numerics.precision import Precision
+
+__all__ = ["retinal_image"]
+
+SMALLEST = 1e-6  # avoids 0/0
+
+
+def retinal_image(
+    light: np.ndarray, inverse_distance: np.ndarray, bank: KernelBank, shape: tuple[int, int], types: Precision
+) -> Array:
+    """Return the image, Dr.Jit (band, *shape), of a scene whose near surfaces hide far ones, see `occlusion`.
+
+    light: radiance (band, Y, X).
+    inverse_distance: 1/z [1/m] of the cells, (Y, X).
+    """
+    scene = _Scene(light, inverse_distance, bank, shape, types)
+    if bank.parallax == 0 or np.ptp(inverse_distance) == 0:
+        return scene.image(np.arange(light[0].size).reshape(light[0].shape), np.ones(light[0].shape, bool))
+    total: Any = 0
+    passing: Any = 1
+    cells = np.zeros(inverse_distance.shape, bool)
+    source = np.zeros(inverse_distance.shape, int)
+    for layer in visible_layers(inverse_distance, bank.parallax):
+        source, cells = np.where(layer.cells, layer.source, source), cells | layer.cells
+        if layer.hiding.any():
+            total += passing * scene.image(source, cells)
+            passing *= scene.passing(layer)
+            cells = np.zeros_like(cells)
+    return total + passing * scene.image(source, cells) if cells.any() else total
+
+
+@dataclass(frozen=True)
+class _Scene:
+    """A scene with the kernels that blur it. Cells (Y, X) have the light and the distance of the cell `source`."""
+
+    light: np.ndarray
+    inverse_distance: np.ndarray
+    bank: KernelBank
+    shape: tuple[int, int]
+    types: Precision
+
+    def image(self, source: np.ndarray, cells: np.ndarray) -> Array:
+        """Return the image (band, *shape) of the selected cells."""
+        seen = self.light.reshape(len(self.light), -1)[:, source]
+        return self._blurred([seen * share for share in self._shares(source, cells)], self.kernels)
+
+    def passing(self, layer: Layer) -> Array:
+        """Return the fraction of the light from behind that passes a layer, (band, *shape).
+
+        Cells that hide nothing continue in a farther layer, which is dark behind them. The fraction therefore refers to
+        the part of the pupil that these cells leave.
+        """
+        import drjit as dr
+
+        hidden = self._coverage(layer.source, layer.hiding)
+        continued = layer.cells & ~layer.hiding
+        if continued.any():
+            hidden /= dr.maximum(1 - self._coverage(layer.source, continued), SMALLEST)
+        return dr.clip(1 - hidden, 0, 1)
+
+    def _coverage(self, source: np.ndarray, cells: np.ndarray) -> Array:
+        """Return the fraction of the pupil that selected cells cover, (band, *shape)."""
+        ones = np.ones_like(self.light)
+        return self._blurred([ones * share for share in self._shares(source, cells)], self._whole)
+
+    @property
+    def kernels(self) -> list[Array]:
+        return list(self.bank.kernels.values())
+
+    @cached_property
+    def _whole(self) -> list[Array]:
+        """Kernels with a sum of 1 in each band."""
+        import drjit as dr
+
+        sums = [dr.maximum(dr.sum(kernel, axis=(1, 2)), SMALLEST) for kernel in self.kernels]
+        return [kernel / dr.reshape(one, (-1, 1, 1)) for kernel, one in zip(self.kernels, sums, strict=True)]
+
+    def _shares(self, source: np.ndarray, cells: np.ndarray) -> list[np.ndarray]:
+        return [share * cells for share in self.bank.shares(self.inverse_distance.ravel()[source])]
+
+    def _blurred(self, scenes: list[np.ndarray], kernels: list[Array]) -> Array:
+        lit = [i for i, scene in enumerate(scenes) if scene.any()] or [0]
+        return blur([scenes[i] for i in lit], [kernels[i] for i in lit], self.shape, self.types)

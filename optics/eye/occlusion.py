@@ -1,0 +1,91 @@
+"""Layers of a scene with a depth map: near surfaces hide far ones, and light passes beside their edges.
+
+A pupil of diameter D sees a far point beside a near edge from different places, so the edge hides a part of the pupil.
+The part is the near surface's coverage, blurred by the kernel of its own distance. With T as the light that passes all
+nearer layers,
+
+    image = Σ_l T_l · (kernel_l ⊗ radiance_l),   T_(l-1) = T_l (1 - kernel_l ⊗ coverage_l),
+
+which composites the layers over one another. Kernels of different layers are blurred independently, so the
+formula is exact if the far surface is locally uniform, or if either surface is in focus.
+
+A depth map contains no radiance behind a near surface. There, far surfaces continue with their nearest visible cell.
+Surfaces whose depth changes gradually hide nothing of themselves, so only jumps of depth hide light.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+__all__ = ["Layer", "visible_layers"]
+
+# Choice: a jump of depth hides light if the far surface shifts behind its edge by at least this number of cells, seen
+# from all over the pupil. All surfaces within a layer differ by less.
+LEAST_SHIFT = 0.5
+MOST_LAYERS = 64  # choice, limited by time: largest number of layers
+
+
+@dataclass(frozen=True)
+class Layer:
+    """Cells of a scene in one range of distances.
+
+    source: (Y, X) int, flat index of the cell whose radiance and distance each cell has.
+    cells: (Y, X) bool, the cells of the layer, including cells behind nearer layers.
+    hiding: (Y, X) bool, those cells that hide farther layers.
+    """
+
+    source: np.ndarray
+    cells: np.ndarray
+    hiding: np.ndarray
+
+
+def visible_layers(inverse_distance: np.ndarray, parallax: float) -> Iterator[Layer]:
+    """Yield the layers of a depth map from the nearest to the farthest.
+
+    inverse_distance: 1/z [1/m] of the cells, (Y, X).
+    parallax: see `KernelBank`.
+    """
+    from scipy.ndimage import distance_transform_edt
+
+    least = _least_jump(inverse_distance, parallax)
+    level = ((inverse_distance - inverse_distance.min()) / least).astype(int)  # 0 is the farthest layer
+    itself = np.arange(level.size).reshape(level.shape)
+    source = itself
+    remaining = np.ones(level.shape, bool)
+    for number in np.unique(level)[::-1]:
+        near = inverse_distance.ravel()[source]
+        cells = remaining & (level.ravel()[source] == number)
+        behind = remaining & ~cells
+        # Cells that continue a surface behind another one have an edge only where the visible surface has one.
+        visible = source == itself
+        edge = behind & visible & (_highest_neighbour(near, cells & visible) - near >= least)
+        edge = edge.ravel()[source] & behind & (_highest_neighbour(near, cells) - near >= least)
+        if not edge.any():
+            yield Layer(source, cells, np.zeros_like(cells))
+            remaining = behind
+            continue
+        places = distance_transform_edt(~behind, return_distances=False, return_indices=True)
+        nearest = np.ravel_multi_index(tuple(places), level.shape)  # of the cells behind
+        hiding = cells & edge.ravel()[nearest]
+        yield Layer(source, cells, hiding)
+        source = np.where(hiding, source.ravel()[nearest], source)
+        remaining = behind | hiding
+
+
+def _least_jump(inverse_distance: np.ndarray, parallax: float) -> float:
+    """Return the least difference of 1/z [1/m] with which a surface hides another one."""
+    if parallax == 0:
+        return math.inf
+    return max(LEAST_SHIFT / parallax, float(np.ptp(inverse_distance)) / MOST_LAYERS)
+
+
+def _highest_neighbour(values: np.ndarray, cells: np.ndarray) -> np.ndarray:
+    """Return the highest value of the selected cells among the neighbours of each cell; -inf without such cells."""
+    from scipy.ndimage import maximum_filter
+
+    selected = np.where(cells, values, -math.inf)
+    return np.asarray(maximum_filter(selected, size=3, mode="nearest"))
