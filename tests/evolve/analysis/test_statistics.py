@@ -15,23 +15,8 @@ from evolve.analysis.statistics import (
     trajectory,
 )
 from evolve.config.run_config import EyeConfig
-from evolve.genome.phenotype import Phenotype
 from evolve.store.candidate import Candidate
-
-
-def phenotype(**changes):
-    values = {
-        "n_eyes": 3,
-        "placement_range_deg": 90.0,
-        "fov_deg": 45.0,
-        "resolution": (2, 15),
-        "relative_aperture": 0.5,
-        "relief": tuple(np.linspace(0, 1, 16)),
-        "refractive_index": 1.5,
-        "memory_frames": 4,
-        "neurons": 64,
-    }
-    return Phenotype(**{**values, **changes})
+from tests.evolve.analysis.animals import phenotype
 
 
 def candidate(id, generation, index, fitness, failure=None, **changes):

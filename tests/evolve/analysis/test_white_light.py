@@ -8,23 +8,7 @@ import pytest
 import optics
 from evolve.analysis.white_light import WhiteLight, eye_image_quality, polychromatic, white_strehl
 from evolve.config.run_config import EyeConfig
-from evolve.genome.phenotype import Phenotype
-
-
-def phenotype(**changes):
-    values = {
-        "n_eyes": 3,
-        "placement_range_deg": 90.0,
-        "fov_deg": 45.0,
-        "resolution": (2, 15),
-        "relative_aperture": 0.5,
-        "relief": tuple(np.linspace(0, 1, 16)),
-        "refractive_index": 1.5,
-        "memory_frames": 4,
-        "neurons": 64,
-    }
-    return Phenotype(**{**values, **changes})
-
+from tests.evolve.analysis.animals import phenotype
 
 LENS = (0.2, 0.5, 0.5, 0.2, 0.5, 0.8, 0.8, 0.5, 0.5, 0.8, 0.8, 0.5, 0.2, 0.5, 0.5, 0.2)
 
