@@ -68,6 +68,8 @@ class Eye(EyeSpec):
     vertical_fov_deg: vertical field of view [degrees], 0.001 to 170, which determines the height of the receptors.
         None: receptors are square, and the height of the retina follows from the number of rows.
     most_seconds: largest predicted time [s] of the PSF of a band. Pupils that need more are refused.
+    dynamics: responses of the receptors over time, which environments compute. The methods of `Eye` return signals of
+        constant light (None: an observation is the signal at one time).
     tolerance: relative L2 error of the PSF. It is also the largest error that each automatic choice may cause in a
         receptor's signal, relative to the signal that a white surface gives.
     dtype: "float32" or "float64", the type of PSF, kernel and signals.
