@@ -161,7 +161,7 @@ def test_a_plan_counts_every_field_that_is_propagated(monkeypatch):
 
     monkeypatch.setattr(converging, "smythe", counted)
     again = found.towards.onto(found.grid)
-    scalar = found.towards._scalar(found.grid, again.plan.dtype)
+    scalar = found.towards._scalar(found.grid, again.plan.dtype, found.towards.tolerance)
     assert again.plan.seconds == pytest.approx((len(beams) + 1) * scalar.plan.seconds)
     np.testing.assert_array_equal(again.psf, found.psf)
 
