@@ -213,11 +213,11 @@ class PSFResult(ReadOnlyArrays, OnWindow):
             field_parts=None if self.field_parts is None else tuple(part[one] for part in self.field_parts),
         )
 
-    def recompute_on(self, window: Grid, what: str, all_light: bool = False) -> PSFResult:
+    def recompute_on(self, window: Grid, what: str, all_light: bool = True) -> PSFResult:
         """Return the PSF of the same light over another window, to the same tolerance.
 
         what: name of the measure, for the error message.
-        all_light: True if the samples of the pupil must resolve all light, even where the window needs fewer. Errors
+        all_light: True if the samples of the pupil resolve all light, even where the window needs fewer. Errors
             are then usually far below the tolerance, and vary less from window to window.
 
         Raises:

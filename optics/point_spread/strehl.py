@@ -120,8 +120,7 @@ def _peak(result: PSFResult) -> Peak:
     centre, pitch = _brightest(seen), min(seen.dx, fine)
     for _ in range(CLIMBS):
         _check_inside(result, centre)
-        # Maxima of a blurred PSF are flat, so that larger errors would hide them.
-        seen = result.recompute_on(Grid.square(NEIGHBOURHOOD, pitch).moved(centre), wanted, all_light=True)
+        seen = result.recompute_on(Grid.square(NEIGHBOURHOOD, pitch).moved(centre), wanted)
         if not _at_rim(seen.psf[0]):
             return _vertex(seen)
         row, column = np.unravel_index(seen.psf[0].argmax(), seen.psf[0].shape)
@@ -182,7 +181,7 @@ def _refuse_brighter_outside(result: PSFResult, peak: float) -> None:
         if max(beyond) <= result.dx:
             continue
         window = Grid.square(NEIGHBOURHOOD, pitch).moved(at)
-        there = result.recompute_on(window, "the Strehl ratio", all_light=True)
+        there = result.recompute_on(window, "the Strehl ratio")
         if float(there.psf.max()) > peak * (1 + there.plan.predicted_error):
             raise AccuracyError(
                 f"rays land around ({at[0]:.3g}, {at[1]:.3g}) m, outside the window, where the PSF is brighter: the "
