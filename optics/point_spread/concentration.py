@@ -94,7 +94,7 @@ def _around(
     if result.dx <= FINE / cutoff:
         kernel = _kernel(result.dx, cutoff, edge - radius)
         if radius + kernel.reach / cutoff <= edge:
-            return result, kernel
+            return result.of_all_light, kernel
     pitch = min(result.dx, FINE / cutoff)
     kernel = _kernel(pitch, cutoff, math.inf)
     half = math.ceil((radius + kernel.reach / cutoff) / pitch)

@@ -17,6 +17,7 @@ import numpy as np
 
 from optics.elements.pupil import Pupil
 from optics.methods.problem import Problem
+from optics.methods.window_sampling import WindowSampling
 from optics.numerics.accuracy import AccuracyError, Plan
 from optics.numerics.arguments import reals, shown, whole
 from optics.numerics.autodiff import Array, Scalar, number, to_user
@@ -36,7 +37,7 @@ MANY = 8  # choice: smallest number of wavelengths for which planning each separ
 MOST_SECONDS = 20.0  # choice: time limit for a recomputed window [s]
 # Choice: relative error of sums over a PSF, of values at points or of means over cells, divided by that of the PSF. See
 # test_measure_bounds.py.
-SUM_ERROR, CELL_SUM_ERROR = 2.0, 3.0
+SUM_ERROR, CELL_SUM_ERROR = 1.0, 3.0
 OF_CELLS = ("pinhole", "geometric", "perfect_lens")  # methods whose samples are means over cells
 
 
@@ -53,6 +54,8 @@ class PSFResult(ReadOnlyArrays, OnWindow):
     field_parts: real and imaginary part of the complex amplitude, as Dr.Jit tensors (wavelength, y, x) with
         derivatives; None unless `psf` was called with field=True. The amplitude includes the carrier exp(ikz), and its
         squared modulus is the PSF. `field` is the same as one complex NumPy array.
+    for_window: True if the samples of the pupil suffice only for the light in the window. Sums over dark parts may then
+        exceed their error bound, so measures compute the PSF again, from samples that resolve all light.
     """
 
     tensor: Array
@@ -65,6 +68,7 @@ class PSFResult(ReadOnlyArrays, OnWindow):
     requests: tuple[Request, ...] = ()
     shares: np.ndarray | None = None
     field_parts: tuple[Array, Array] | None = None
+    for_window: bool = False
 
     @cached_property
     def field(self) -> np.ndarray | None:
@@ -132,7 +136,7 @@ class PSFResult(ReadOnlyArrays, OnWindow):
 
     @property
     def window_sums(self) -> np.ndarray | Array:
-        """Return the sum over the samples, times their area, (wavelength,), without checking the pitch."""
+        """Sum over the samples, times their area, (wavelength,), without checking the pitch."""
         import drjit as dr
 
         waves, flat = self.tensor.shape[0], self.psf.reshape(len(self.psf), -1)
@@ -213,12 +217,10 @@ class PSFResult(ReadOnlyArrays, OnWindow):
             field_parts=None if self.field_parts is None else tuple(part[one] for part in self.field_parts),
         )
 
-    def recompute_on(self, window: Grid, what: str, all_light: bool = True) -> PSFResult:
+    def recompute_on(self, window: Grid, what: str) -> PSFResult:
         """Return the PSF of the same light over another window, to the same tolerance.
 
         what: name of the measure, for the error message.
-        all_light: True if the samples of the pupil resolve all light, even where the window needs fewer. Errors
-            are then usually far below the tolerance, and vary less from window to window.
 
         Raises:
             AccuracyError: the requests of the PSF are not known, or the window is too large.
@@ -226,26 +228,34 @@ class PSFResult(ReadOnlyArrays, OnWindow):
         height, width = window.shape
         here = f"{self.tensor.shape[1]} x {self.tensor.shape[2]} samples {self.dx:.3g} m apart"
         needs = f"{what} needs {height} x {width} samples {window.dx:.3g} m apart, and this PSF has {here}"
-        if not self.can_recompute or max(window.shape) > MOST_AGAIN:
+        if not self.can_recompute or (max(window.shape) > MOST_AGAIN and window != self.window):
             raise AccuracyError(needs, f"set dx={window.dx:.3g}, shape=({height}, {width})")
         try:
             if self.shares is not None:
-                return spread([_through(request, window, all_light) for request in self.requests]).mean(self.shares)
-            return spread([_through(request, window, all_light) for request in self.requests])
+                return spread([_through(request, window) for request in self.requests]).mean(self.shares)
+            return spread([_through(request, window) for request in self.requests])
         except AccuracyError as error:
             raise AccuracyError(f"{needs}, which fails: {error}") from None
 
-    def with_pitch(self, coarsest: float, what: str) -> PSFResult:
-        """Return a PSF whose samples are at most `coarsest` [m] apart.
+    @cached_property
+    def of_all_light(self) -> PSFResult:
+        """The PSF over the same window, from samples of the pupil that resolve all light.
 
-        If the samples of this PSF are fine enough, it is this PSF. Otherwise several samples along each axis fill the
-        cell of each sample.
+        Raises:
+            AccuracyError: see `recompute_on`.
+        """
+        return self.recompute_on(self.window, "a sum") if self.for_window and self.can_recompute else self
+
+    def with_pitch(self, coarsest: float, what: str) -> PSFResult:
+        """Return a PSF for sums, whose samples are at most `coarsest` [m] apart.
+
+        It is `of_all_light` if these samples are fine enough. Otherwise several samples fill the cell of each one.
 
         Raises:
             AccuracyError: see `recompute_on`.
         """
         if self.dx <= coarsest or self.holds_cells:
-            return self
+            return self.of_all_light
         parts = math.ceil(self.dx / coarsest * (1 - 1e-9))
         pitch, (height, width) = self.dx / parts, self.tensor.shape[1:]
         # Sample n//2 of a grid lies in the middle of its cell, and both grids begin with the same rim of a cell.
@@ -259,9 +269,9 @@ class PSFResult(ReadOnlyArrays, OnWindow):
         return self.with_pitch(0.5 / self.highest_cutoff, "power")
 
 
-def _through(request: Request, window: Grid, all_light: bool) -> Request:
+def _through(request: Request, window: Grid) -> Request:
     asked = request.problem
-    problem = replace(Problem.from_beam(request.beam, window, asked.tolerance, asked.dtype), all_light=all_light)
+    problem = replace(Problem.from_beam(request.beam, window, asked.tolerance, asked.dtype), all_light=True)
     method = request.method if request.method in APPROXIMATE else "auto"
     return replace(request, problem=problem, method=method, most_seconds=MOST_SECONDS, keeps_field=False)
 
@@ -277,7 +287,7 @@ def spread(requests: Sequence[Request]) -> PSFResult:
     """
     import drjit as dr
 
-    flat, plans, fields, *_ = zip(*pictures(requests, alike=len(requests) >= MANY), strict=True)
+    flat, plans, fields, samplings, _ = zip(*pictures(requests, alike=len(requests) >= MANY), strict=True)
     beam, window, types = requests[0].beam, requests[0].problem.window, precision(requests[0].problem.dtype)
     tensor = types.Tensor(flat[0] if len(flat) == 1 else dr.concat(flat), (len(flat), *window.shape))
     wavelengths = np.array([request.beam.wavelength for request in requests])
@@ -286,4 +296,5 @@ def spread(requests: Sequence[Request]) -> PSFResult:
     if requests[0].keeps_field:
         re, im = ([getattr(field, part) for field in fields] for part in ("re", "im"))
         parts = tuple(types.Tensor(row[0] if len(row) == 1 else dr.concat(row), tensor.shape) for row in (re, im))
-    return PSFResult(tensor, *where, tuple(plans), window.centre, tuple(requests), field_parts=parts)
+    few, known = any(isinstance(each, WindowSampling) for each in samplings), (window.centre, tuple(requests))
+    return PSFResult(tensor, *where, tuple(plans), *known, field_parts=parts, for_window=few)

@@ -256,4 +256,5 @@ def _with_middles(result: PSFResult, between: PSFResult) -> PSFResult:
         plans=tuple(braided(result.plans, between.plans)),
         requests=tuple(braided(result.requests, between.requests)),
         field_parts=None,
+        for_window=result.for_window or between.for_window,
     )

@@ -269,12 +269,6 @@ OF_PSFS = {
 }
 
 
-def seen_again(**asked):
-    """Return a PSF over the same window, computed again."""
-    found = optics.psf(Pupil(**LENS, height=optics.BSplineRelief(RAMP)), **SMALL)
-    return found.recompute_on(found.window, "a test", **asked).psf
-
-
 ERROR = {"with_error": True}
 OF_MEASURES = {
     "mtf": Walk(
@@ -298,7 +292,6 @@ OF_MEASURES = {
     "Microvilli.polarization_sensitivity": Walk(
         lambda **asked: MICRO.polarization_sensitivity(FOCUS, 3e-6, **asked), {"centre": (5e-6, 1e-6)}
     ),
-    "PSFResult.recompute_on": Walk(seen_again, {"all_light": False}),
     "PSFBatch.result": Walk(
         lambda **asked: optics.psf_batch([Pupil(**LENS)], source_distances=(1.0, 1e-3), **SMALL).result(0, **asked).psf,
         {"depth": 1},
@@ -311,7 +304,7 @@ OF_PARTS = {
         for name in ("Annulus", "Circle", "Combined", "Polygon", "Rings", "Slit")
     },
     **{f"{name}.detail": Walk(bright, {"part": INTERNAL}) for name in ("HeightMap", "WavefrontMap", "Zernike")},
-    "PSFResult": Walk(bright, dict.fromkeys(("centre", "requests", "shares", "field_parts"), SAME)),
+    "PSFResult": Walk(bright, dict.fromkeys(("centre", "requests", "shares", "field_parts", "for_window"), SAME)),
     "MTF": Walk(bright, dict.fromkeys(("centre", "causes"), SAME)),
     "Plan": Walk(bright, dict.fromkeys(("seconds", "options", "padding", "scalar_error", "derivative_error"), SAME)),
     "VectorFocus": Walk(bright, {"towards": SAME}),

@@ -144,7 +144,7 @@ def test_errors_of_a_profile_bound_those_of_airys_contrasts():
     (values,), (errors,) = found.profile(f, with_error=True)
     off = np.abs(values - circular_mtf(f, WAVELENGTH, 50e-6, 1.6e-3))
     assert (off < errors + 2e-4).all()
-    assert np.median(errors) < 0.12 * found.predicted_error[0]
+    assert np.median(errors) < 0.1 * found.predicted_error[0]
     assert found.profile(np.zeros(1), with_error=True)[1] == 0
 
 
@@ -159,6 +159,26 @@ def test_bounds_of_strehl_ratios_are_measured_at_the_peak():
         exact = optics.psf(pupil, [WAVELENGTH], dx=0.004 * unit, shape=(41, 41), tolerance=1e-9, dtype="float64")
         (value,), (bound,) = optics.strehl_ratio(seen, with_error=True)
         off = abs(value - optics.strehl_ratio(exact)[0])
-        assert off < bound + 1e-6 < 2e-3
+        assert off < bound < 1e-4
         ratios.append(bound / max(off, 1e-7))
     assert np.median(ratios) < 5
+
+
+@pytest.mark.fast_cases(1)
+@pytest.mark.parametrize("seed", [0, 1, 2, 4, 5, 6])
+def test_sums_over_coarse_psfs_keep_their_bounds(seed):
+    """A coarse PSF is accurate where it is bright. For these pupils, the sum over its own samples exceeds its bound."""
+    rng = np.random.default_rng(seed)
+    radius, f_number = 10 ** rng.uniform(-4.3, -3), rng.uniform(3, 8)
+    focal = 2 * radius * f_number
+    aperture = (optics.Circle(), optics.Annulus(0.5))[seed % 2]
+    pupil = optics.Pupil(radius, thin_lens_focal_length=focal, aperture=aperture)
+    unit = WAVELENGTH * focal / (2 * radius)
+    window = {"dx": 0.3 * unit, "shape": (65, 65)}
+    coarse = optics.psf(pupil, [WAVELENGTH], **window, tolerance=float(rng.choice([1e-2, 1e-3])))
+    assert coarse.for_window
+    exact = optics.psf(pupil, [WAVELENGTH], **window, tolerance=1e-6, dtype="float64")
+    assert abs(coarse.power - exact.power) < coarse.of_all_light.sum_error
+    value, error = optics.encircled_energy(coarse, 3 * unit, with_error=True)
+    assert abs(value - optics.encircled_energy(exact, 3 * unit)) < error
+    assert abs(coarse.window_sums - exact.window_sums) > coarse.sum_error

@@ -110,8 +110,8 @@ def test_encircled_energy_follows_airy_at_any_pitch():
         found.append(value[0])
         assert error.max() < 3e-3
         assert np.abs(value[0] - expected).max() < 2e-3 + error.max()
-    np.testing.assert_allclose(found[0], found[2], atol=3e-4)
-    np.testing.assert_allclose(found[1], found[2], atol=3e-4)
+    np.testing.assert_allclose(found[0], found[2], atol=3e-5)
+    np.testing.assert_allclose(found[1], found[2], atol=3e-5)
 
 
 def test_encircled_energy_follows_its_centre():
