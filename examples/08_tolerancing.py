@@ -3,7 +3,7 @@
 Each trial draws the errors of all elements from normal distributions. The criterion is the brightest point of the
 image, relative to that of the nominal lens: the Strehl ratio at the best position in a fixed image plane.
 
-python examples/08_tolerancing.py [--trials 100] [--out yield.png]
+python examples/08_tolerancing.py [--trials 10] [--out yield.png]
 """
 
 from __future__ import annotations
@@ -41,8 +41,11 @@ def system(decentres: np.ndarray, tilts: np.ndarray, spacings: np.ndarray) -> li
     return elements
 
 
-def peak(elements: list, tolerance: float = 1e-2) -> float:
-    """Largest intensity of the image, for light of unit amplitude from a distant point on the axis."""
+def peak(elements: list, tolerance: float = 2e-2) -> float:
+    """Largest intensity of the image, for light of unit amplitude from a distant point on the axis.
+
+    The largest tilts at scale 2 cause an error of 1 %, so that a smaller tolerance would be refused.
+    """
     image = optics.propagate_through(
         elements, wavelength=WAVELENGTH, out_dx=PITCH, out_shape=(SIDE, SIDE), tolerance=tolerance
     )
@@ -68,7 +71,7 @@ def ratios(scale: float, trials: int) -> np.ndarray:
 
 def main() -> None:
     parser = argparse.ArgumentParser()
-    parser.add_argument("--trials", type=int, default=100, help="random lenses for each scale of the tolerances")
+    parser.add_argument("--trials", type=int, default=10, help="random lenses for each scale of the tolerances")
     parser.add_argument("--out", help="save the yield curves to this file")
     arguments = parser.parse_args()
     start, curves = time.process_time(), {}

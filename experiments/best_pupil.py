@@ -17,9 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 import optics
-from evolve.analysis.white_light import polychromatic
 from experiments.page import Figure, Page, exit_code, markdown_table, new_figure, parser, save
 from experiments.store import DATA, Origin, read_rows, write_rows
+from optics.eye.summary import daylight_psf
 from sim.worlds import materials
 
 __all__ = ["Row", "best", "computed", "measures"]
@@ -102,7 +102,7 @@ def stripes(contrasts: Floats, throughput: float, width: int) -> float:
 
 def contrast_of(seen: optics.Eye) -> Floats:
     """Return the MTF in white daylight at 257 frequencies up to the retina's Nyquist frequency."""
-    white = polychromatic(seen, seen.psf())
+    white = daylight_psf(seen, seen.psf())
     frequencies = np.linspace(0, 1 / (2 * seen.receptor_pitch), 257)
     return np.asarray(optics.mtf(white).profile(frequencies)[0], np.float64)
 

@@ -33,8 +33,8 @@ def probability_of_finer(
 ) -> tuple[float, float]:
     """Return two bootstrap probabilities that compare the fittest animals of two tasks.
 
-    The animals are compared by the ratio of receptors across each eye to the number of eyes. The probabilities are
-    those that the ratio is higher in the first task, and that it is lower.
+    The animals are compared by the ratio of receptors across each eye to the number of eyes. The first probability is
+    that of a higher ratio in the first task, and the second is that of a lower one.
 
     The training runs of each animal are resampled with replacement.
     """

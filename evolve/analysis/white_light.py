@@ -7,15 +7,13 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 import optics
 from evolve.config.run_config import EyeConfig
 from evolve.genome.phenotype import Phenotype
-from optics.eye.summary import noise_of
-from optics.spectra.bands import daylight
+from optics.eye.summary import daylight_psf, noise_of
 
-__all__ = ["WhiteLight", "eye_image_quality", "polychromatic", "white_strehl"]
+__all__ = ["WhiteLight", "eye_image_quality", "white_strehl"]
 
 
 @dataclass(frozen=True)
@@ -32,7 +30,7 @@ class WhiteLight:
     @classmethod
     def from_eye(cls, eye: optics.Eye) -> WhiteLight:
         psf = eye.psf()
-        return cls(eye, psf, polychromatic(eye, psf))
+        return cls(eye, psf, daylight_psf(eye, psf))
 
     @property
     def per_degree(self) -> float:
@@ -60,11 +58,6 @@ class WhiteLight:
         return float(self.mtf.profile(np.array([self.nyquist / 2]))[0, 0])
 
 
-def polychromatic(eye: optics.Eye, psf: optics.PSFResult) -> optics.PSFResult:
-    """Return the PSF in white daylight, (1, y, x). Bands are weighted by the mean sensitivity of the channels."""
-    return psf.mean(_of_daylight(eye))
-
-
 def white_strehl(eye: optics.Eye, psf: optics.PSFResult) -> float:
     """Return the Strehl ratio in white daylight; NaN if the PSF's window does not contain the maximum.
 
@@ -72,7 +65,7 @@ def white_strehl(eye: optics.Eye, psf: optics.PSFResult) -> float:
     is higher than that at the mean wavelength, because maxima are proportional to 1/λ².
     """
     try:
-        return float(optics.strehl_ratio(polychromatic(eye, psf))[0])
+        return float(optics.strehl_ratio(daylight_psf(eye, psf))[0])
     except optics.AccuracyError:
         return math.nan
 
@@ -92,10 +85,3 @@ def eye_image_quality(phenotype: Phenotype, config: EyeConfig, medium: str = "ai
     if eye.pupil is None:
         return max(1 - noise_of(eye, eye.white_signal), 0.0)
     return WhiteLight.from_eye(eye).image_quality
-
-
-def _of_daylight(eye: optics.Eye) -> NDArray[np.float64]:
-    """Return the fraction of each band in the receptors' mean response to white daylight. Fractions sum to 1."""
-    weights = eye.spectral_bands.weights.mean(axis=0) * daylight(eye.spectral_bands.wavelengths)
-    share: NDArray[np.float64] = weights / weights.sum()
-    return share

@@ -17,7 +17,7 @@ def on_both_sides(heights: np.ndarray) -> bool:
 
 
 def square_samples(samples: Any, name: str = "height", what: str = "heights [m]") -> np.ndarray:
-    """Return as many rows as columns of samples without derivatives, as a read-only array.
+    """Return samples with equal numbers of rows and columns, without derivatives, as a read-only array.
 
     Raises:
         ValueError: not square, empty, or not finite.

@@ -1,8 +1,7 @@
-"""Layers of a scene with a depth map: near surfaces hide far ones, and light passes beside their edges.
+"""Layers of a scene with a depth map: near surfaces hide far ones, and light passes their edges.
 
-A pupil of diameter D sees a far point beside a near edge from different places, so the edge hides a part of the pupil.
-The part is the near surface's coverage, blurred by the kernel of its own distance. With T as the light that passes all
-nearer layers,
+Seen from a far point, a near edge hides a part of the pupil. This part is the near surface's coverage, blurred by the
+kernel of the near surface's distance. With T as the light that passes all nearer layers,
 
     image = Σ_l T_l · (kernel_l ⊗ radiance_l),   T_(l-1) = T_l (1 - kernel_l ⊗ coverage_l),
 

@@ -16,7 +16,7 @@ from optics.point_spread.psf_result import PSFResult
 from optics.point_spread.strehl import strehl_ratio
 from optics.spectra.spectrum import daylight
 
-__all__ = ["Description", "describe", "noise_of"]
+__all__ = ["Description", "daylight_psf", "describe", "noise_of"]
 
 LIMITS = ("diffraction", "sampling", "noise")  # limits of acuity
 FREQUENCIES = 513  # choice: number of frequencies up to the cut-off at which the MTF is compared with the noise
@@ -163,7 +163,8 @@ def describe(eye: EyeSpec, light: float, result: PSFResult, kernel: Kernels) -> 
     kernel: function that returns the kernel for a number of cells per receptor, for the same distance.
     """
     distance = number(eye.sensor_distance)
-    white, wavelength = _white(eye, result)
+    white = daylight_psf(eye, result)
+    wavelength = float(white.wavelengths[0])
     unknown: list[str] = []
     photons, noise = _photons_of(eye), noise_of(eye, light)
     if eye.pupil is None:
@@ -173,7 +174,7 @@ def describe(eye: EyeSpec, light: float, result: PSFResult, kernel: Kernels) -> 
         diffraction = float(white.cutoff[0])
         nearest = int(np.argmin(np.abs(result.wavelengths - wavelength)))
         measures: dict[str, Callable[[], float]] = {
-            "Strehl ratio": lambda: float(plain(strehl_ratio(result))[nearest]),
+            "Strehl ratio": lambda: float(plain(strehl_ratio(result.of_wavelength(nearest)))[0]),
             "image quality": lambda: float(plain(image_quality(white, 1 / (2 * eye.receptor_pitch), light, noise))[0]),
             "limit by noise": lambda: _noise_limit(white, diffraction, noise / light),
         }
@@ -211,11 +212,10 @@ def _known(name: str, measure: Callable[[], float], unknown: list[str]) -> float
         return math.nan
 
 
-def _white(eye: EyeSpec, result: PSFResult) -> tuple[PSFResult, float]:
-    """Return the PSF of white daylight, weighted with the mean of the channels, and its mean wavelength [m]."""
+def daylight_psf(eye: EyeSpec, result: PSFResult) -> PSFResult:
+    """Return the PSF in white daylight, (1, y, x). Bands are weighted by the mean sensitivity of the channels."""
     worth = eye.spectral_bands.weights.mean(axis=0) * daylight(eye.spectral_bands.wavelengths)
-    white = result.mean(worth / worth.sum())
-    return white, float(white.wavelengths[0])
+    return result.mean(worth / worth.sum())
 
 
 def _noise_limit(white: PSFResult, cutoff: float, floor: float) -> float:

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 import optics
-from evolve.analysis.white_light import WhiteLight, eye_image_quality, polychromatic, white_strehl
+from evolve.analysis.white_light import WhiteLight, eye_image_quality, white_strehl
 from evolve.config.run_config import EyeConfig
+from optics.eye.summary import daylight_psf
 from tests.evolve.analysis.animals import phenotype
 
 LENS = (0.2, 0.5, 0.5, 0.2, 0.5, 0.8, 0.8, 0.5, 0.5, 0.8, 0.8, 0.5, 0.2, 0.5, 0.5, 0.2)
@@ -29,10 +30,10 @@ def test_image_quality_knows_focus_light_and_noise():
     assert eye_image_quality(focused, loud) == 0.0  # the noise floor, 0.1 / 0.09, exceeds all contrast
 
 
-def test_polychromatic_weighs_bands_by_daylight_and_receptors():
+def test_bands_are_weighted_by_daylight_and_receptors():
     eye = phenotype(relative_aperture=0.3, relief=LENS).eyes(EyeConfig(bands=2)).eye()
     psf = eye.psf()
-    white = polychromatic(eye, psf)
+    white = daylight_psf(eye, psf)
     assert white.psf.shape == (1, *psf.psf.shape[1:])
     blue, red = (float(band.sum()) for band in psf.psf)
     # Channels see white with weights of sum 1, shared by the bands: the mean weight is the share of the first band.
@@ -49,8 +50,8 @@ def test_lens_in_focus_has_strehl_1_in_white_light(bands):
     eye = optics.Eye(optics.Pupil(30e-6, thin_lens_focal_length=plain.sensor_distance), bands=bands)
     psf = eye.psf()
     assert white_strehl(eye, psf) == pytest.approx(1.0, abs=0.01), "beyond the eye's tolerance"
-    assert optics.strehl_ratio(polychromatic(eye, psf))[0] == white_strehl(eye, psf)
-    white = polychromatic(eye, psf)
+    assert optics.strehl_ratio(daylight_psf(eye, psf))[0] == white_strehl(eye, psf)
+    white = daylight_psf(eye, psf)
     # an eye of a single wavelength
     unmixed = replace(white, shares=None, requests=white.requests if bands == 1 else ())
     by_mean_wavelength = float(optics.strehl_ratio(unmixed)[0])
