@@ -148,7 +148,8 @@ class Eye(EyeSpec):
     def _retina_for(self, wavelengths: np.ndarray, samples_per_receptor: int) -> Retina:
         height, width = self.receptor_size
         cell = height / samples_per_receptor, width / samples_per_receptor
-        settings = self.tolerance, self.dtype, self.pupil_turned, self.most_seconds
+        size = height * self.resolution[0], width * self.resolution[1]
+        settings = self.tolerance, size, self.dtype, self.pupil_turned, self.most_seconds
         return Retina(self.retina_distance, wavelengths, cell, *settings)
 
     def chosen_bands(self) -> SpectralBands:

@@ -20,6 +20,7 @@ class Retina:
     """Properties of the retina that define the PSF: distance [m], wavelengths [m], cells, tolerance, dtype.
 
     cell: height and width of a cell [m].
+    size: height and width of the retina [m].
     pupil_turned: True if the pupil is rotated by 180° about the axis.
     most_seconds: largest predicted time [s] of the PSF of a band.
     """
@@ -28,6 +29,7 @@ class Retina:
     wavelengths: np.ndarray
     cell: tuple[float, float]
     tolerance: float
+    size: tuple[float, float]
     dtype: str = "float32"
     pupil_turned: bool = False
     most_seconds: float = 3.0  # choice

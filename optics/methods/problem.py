@@ -64,6 +64,8 @@ class Problem:
     mask_detail: bandwidth [1/m] of the amplitude of the mask.
     detail_part: phase [rad] of neglected detail, relative to the tolerance.
     all_light: True if the samples must resolve all light behind the pupil, even where the window needs fewer.
+    steep: True if most light of a steep relief misses the window, so that samples of its light convolved with a
+        Gaussian are used (`smooth_spectrum`).
     """
 
     light: Beam
@@ -86,6 +88,7 @@ class Problem:
     mask_detail: float = 0.0
     detail_part: float = DETAIL_PART
     all_light: bool = False
+    steep: bool = False
 
     @classmethod
     def from_beam(

@@ -45,6 +45,7 @@ from optics.methods.method_sampling import Sampling
 from optics.methods.pixelated_spectrum import split_pixel_spectrum, whole_pixel_spectrum
 from optics.methods.problem import Problem
 from optics.methods.rayleigh_sommerfeld import nodes
+from optics.methods.smooth_spectrum import split_smooth_spectrum, whole_smooth_spectrum
 from optics.methods.window_sampling import DERIVATIVE_ERROR, WindowSampling, window_sampling
 from optics.numerics.accuracy import (
     FLOAT_NOISE,
@@ -90,6 +91,11 @@ FOR_PIXELS: dict[str, Callable[[Problem], Sequence[Sampling]]] = {
     "angular_spectrum": whole_pixel_spectrum,
     "split_angular_spectrum": split_pixel_spectrum,
     "rayleigh_sommerfeld": nodes,
+}
+# Methods that need only samples of the light that arrives in the window, however steep the pupil is.
+FOR_STEEP: dict[str, Callable[[Problem], Sequence[Sampling]]] = {
+    "angular_spectrum": whole_smooth_spectrum,
+    "split_angular_spectrum": split_smooth_spectrum,
 }
 
 
@@ -148,7 +154,7 @@ def choose(problem: Problem, method: str = "auto", most_seconds: float = MOST_SE
     _check_dtype(problem)
     check_window(problem.window, problem.dtype)
     allowed, outputs = _model_tolerance(problem) if method == "auto" else math.inf, math.prod(problem.window.shape)
-    known = FOR_PIXELS if problem.divided else METHODS
+    known = FOR_STEEP if problem.steep else FOR_PIXELS if problem.divided else METHODS
     weighed: dict[str, Sampling] = {}
     best: Sampling | None = None
     coarse = window_sampling(problem) if {"low_rank"} <= {*asked} & {*known} else None

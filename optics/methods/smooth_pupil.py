@@ -1,0 +1,190 @@
+"""The light behind a steep pupil, convolved with a Gaussian. Few samples represent it, however steep the relief is.
+
+The convolution multiplies the light of a ray with the frequency ν by e^{-2π²δ²ν²}, where δ is the width of the Gaussian.
+Light that is too steep to arrive in a window disappears from the samples, and a division of the spectrum by this factor
+restores the light of all other rays exactly.
+
+Within the Gaussian, the phase is a quadratic function: the samples contain the slope and the curvature of the wavefront
+in closed form. The edge of the aperture is a straight line there, so that light diffracted by it remains, even where
+the relief is steep. The integral of the Gaussian over one side of this line is a complementary error function of a
+complex argument. At a corner, the factors of both sides are multiplied. The largest neglected term is the third
+derivative of the phase, times δ³.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from typing import NamedTuple
+
+import numpy as np
+
+from optics.apertures.aperture import Aperture
+from optics.elements.beam import Beam
+from optics.elements.wavefront_slopes import derivative
+
+__all__ = ["Side", "SmoothPupil", "sides_of"]
+
+REACH = 5.0  # choice, in δ: distance from the edge within which the edge changes the light
+DARKEST = 18.0  # choice: samples darker than e^-18 are omitted
+INSIDE = 1e-6  # distance from the edge of a point that shows which side is open, in radii
+TRIED = 101  # number of points along an axis at which the sides of an aperture are compared with its opening
+
+
+@dataclass(frozen=True)
+class Side:
+    """A straight line or a circle that bounds an aperture, in radii.
+
+    sign: 1 if the opening lies inside the circle, -1 if it lies outside. The opening lies behind a line.
+    centre, radius: of the circle.
+    normal, offset: normal vector of the line, which points out of the opening, and distance of the line from the axis.
+    """
+
+    sign: int = 1
+    centre: tuple[float, float] = (0.0, 0.0)
+    radius: float = 0.0
+    normal: tuple[float, float] = (0.0, 0.0)
+    offset: float = 0.0
+
+    def depth(self, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return how far points lie inside the opening [radii], and the outward normal (x, y) of the side there."""
+        if self.radius == 0:
+            depth = self.offset - self.normal[0] * x - self.normal[1] * y
+            return depth, np.full_like(depth, self.normal[0]), np.full_like(depth, self.normal[1])
+        across, along = x - self.centre[0], y - self.centre[1]
+        distance = np.maximum(np.hypot(across, along), 1e-300)
+        return self.sign * (self.radius - distance), self.sign * across / distance, self.sign * along / distance
+
+
+@lru_cache(maxsize=64)
+def sides_of(aperture: Aperture) -> tuple[Side, ...] | None:
+    """Return sides whose openings have the aperture as their intersection; None for other apertures.
+
+    Circles, rings of one opening, slits and convex polygons have such sides.
+    """
+    outline, sides = aperture.outline, []
+    for start, end in outline.segments:
+        along = (end - start) / np.hypot(*(end - start))
+        normal, middle = np.array([along[1], -along[0]]), (start + end) / 2
+        outwards = -1 if aperture.contains(*(middle + INSIDE * normal)[:, None])[0] else 1
+        sides.append(Side(normal=tuple(outwards * normal), offset=float(outwards * normal @ middle)))
+    for x, y, radius, begin, end in outline.arcs:
+        if end - begin < 2 * math.pi - 1e-9:
+            return None
+        inside = aperture.contains(np.array([x + radius - INSIDE]), np.array([y]))[0]
+        sides.append(Side(1 if inside else -1, (float(x), float(y)), float(radius)))
+    at = np.linspace(-1, 1, TRIED) * (1 + 1e-4)  # no point lies on an edge
+    x, y = np.meshgrid(at, at)
+    depth = np.min([side.depth(x, y)[0] for side in sides], axis=0)
+    clear = np.abs(depth) > INSIDE
+    return tuple(sides) if np.array_equal(depth[clear] > 0, aperture.contains(x, y)[clear]) else None
+
+
+class _Gaussian(NamedTuple):
+    """The Gaussian times the light within it: logarithm of its integral, complex mean and complex covariance."""
+
+    log: np.ndarray
+    mean: tuple[np.ndarray, np.ndarray]
+    covariance: tuple[np.ndarray, np.ndarray, np.ndarray]
+
+    def along(self, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return mean and variance along directions (x, y)."""
+        xx, xy, yy = self.covariance
+        return x * self.mean[0] + y * self.mean[1], x * x * xx + 2 * x * y * xy + y * y * yy
+
+    def at(self, points: np.ndarray) -> _Gaussian:
+        mean, covariance = ([part[points] for part in each] for each in (self.mean, self.covariance))
+        return _Gaussian(self.log[points], (mean[0], mean[1]), (covariance[0], covariance[1], covariance[2]))
+
+
+@dataclass(frozen=True)
+class SmoothPupil:
+    """A pupil of some radius [m], whose light is convolved with a Gaussian of a width δ [m].
+
+    sides: sides of the aperture.
+    """
+
+    sides: tuple[Side, ...]
+    radius: float
+    width: float
+
+    @property
+    def outermost(self) -> float:
+        """Distance from the axis [m] beyond which the samples are dark."""
+        return self.radius + REACH * self.width
+
+    @cached_property
+    def exponent(self) -> float:
+        """2π²δ² [m²], with which the convolution multiplies light of the frequency ν by e^{-2π²δ²ν²}."""
+        return 2 * (math.pi * self.width) ** 2
+
+    def light(self, beam: Beam, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        """Return the convolved light at evenly spaced positions x and y [m], complex (y, x)."""
+        waves, pitch = beam.waves(x[None, :], y[:, None]), float(x[1] - x[0])
+        slope = derivative(waves.T, pitch).T, derivative(waves, pitch)
+        depth = np.min([side.depth(x[None, :] / self.radius, y[:, None] / self.radius)[0] for side in self.sides], 0)
+        reach = REACH * self.width / self.radius
+        bright = self.exponent * (slope[0] ** 2 + slope[1] ** 2) < DARKEST
+        kept = (depth > -reach) & (bright | (depth < reach))
+        curved = derivative(slope[0].T, pitch).T[kept], derivative(slope[0], pitch)[kept]
+        bends = *curved, derivative(slope[1], pitch)[kept]
+        inner = self._gaussian(waves[kept], (slope[0][kept], slope[1][kept]), bends)
+        down, across = np.nonzero(kept)
+        found = np.zeros(waves.shape, complex)
+        found[kept] = self._within(inner, x[across] / self.radius, y[down] / self.radius)
+        return found
+
+    def _gaussian(
+        self, waves: np.ndarray, slope: tuple[np.ndarray, np.ndarray], bends: tuple[np.ndarray, ...]
+    ) -> _Gaussian:
+        """Return ∫ e^{-u²/2δ²} e^{2πi (W + ∇W·u + uᵀHu/2)} du / 2πδ².
+
+        slope: gradient of the waves W [1/m]. bends: H, the second derivatives xx, xy and yy [1/m²].
+        """
+        square = self.width**2
+        xx, xy, yy = (-2j * math.pi * square * bend for bend in bends)
+        determinant = (1 + xx) * (1 + yy) - xy * xy
+        covariance = square * (1 + yy) / determinant, -square * xy / determinant, square * (1 + xx) / determinant
+        along_x, along_y = (2j * math.pi * part for part in slope)
+        mean_x = covariance[0] * along_x + covariance[1] * along_y
+        mean_y = covariance[1] * along_x + covariance[2] * along_y
+        log = 2j * math.pi * (waves - np.rint(waves)) + (along_x * mean_x + along_y * mean_y) / 2
+        return _Gaussian(log - np.log(determinant) / 2, (mean_x, mean_y), covariance)
+
+    def _within(self, inner: _Gaussian, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        """Return the integral of the Gaussian over the aperture, at points in radii.
+
+        The product at a corner is limited to the smaller of both factors. It would be too large where the relief is
+        steep and the corner is not rectangular.
+        """
+        log, factor = inner.log.copy(), np.ones(len(x), complex)
+        least = np.full(len(x), np.inf)
+        for side in self.sides:
+            depth, *normal = side.depth(x, y)
+            near = np.flatnonzero(depth < REACH * self.width / self.radius)
+            mean, variance = inner.at(near).along(*(part[near] for part in normal))
+            more, share = _behind((depth[near] * self.radius - mean) / np.sqrt(2 * variance))
+            log[near] += more
+            factor[near] *= share
+            alone = (inner.log[near] + more).real + np.log(np.maximum(np.abs(share), 1e-300))
+            least[near] = np.minimum(least[near], alone)
+        size = log.real + np.log(np.maximum(np.abs(factor), 1e-300))
+        found: np.ndarray = np.exp(log - np.maximum(size - least, 0)) * factor
+        return found
+
+
+def _behind(u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return (a, b) with e^a b = erfc(-u)/2, the share of a Gaussian behind a line. Neither overflows.
+
+    The scaled function w(z) = e^{-z²} erfc(-iz) is bounded in the upper half plane (Abramowitz & Stegun, 7.1.3).
+    """
+    from scipy.special import wofz
+
+    outside = u.real < 0
+    rest = wofz(1j * np.where(outside, -u, u)) / 2
+    square = -u * u
+    steep = square.real > 0
+    ratio = np.exp(np.where(steep, -square, square))
+    share = np.where(outside, rest, np.where(steep, ratio - rest, 1 - ratio * rest))
+    return np.where(outside | steep, square, 0), share
