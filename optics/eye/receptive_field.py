@@ -205,8 +205,9 @@ def _spread(beams: list[Beam], spot: Spot, retina: Retina) -> PSFResult:
 def _request(beam: Beam, spot: Spot, need: _WindowNeeds, window: Grid, retina: Retina) -> Request:
     reach = spot.half + math.hypot(*spot.centre)
     problem = Problem.from_beam(beam, window, retina.tolerance, retina.dtype)
-    limits = {"steep": True} if spot.on_retina else {"widest_band": need.band, "reach": reach}
-    return Request(beam, replace(problem, **limits), most_seconds=retina.most_seconds)
+    band = math.inf if spot.on_retina else need.band
+    problem = replace(problem, widest_band=band, reach=reach, steep=spot.on_retina)
+    return Request(beam, problem, most_seconds=retina.most_seconds)
 
 
 def perfect_psf(retina: Retina, radius: float) -> PSFResult:

@@ -38,6 +38,7 @@ DETAIL_PART = 0.1  # choice: phase [rad] of neglected detail, relative to the to
 # can be a small difference to which the detail contributes most, as for the focal length of a lens in focus.
 FINER_DETAIL = 10.0
 BRIGHT_EDGE_RIPPLE_PER_TOLERANCE = 0.3
+FADE_RIPPLE_PER_TOLERANCE = 3.0  # choice: the same for light that fades out where a steep pupil sends little of it
 
 
 @dataclass(frozen=True)
@@ -64,8 +65,8 @@ class Problem:
     mask_detail: bandwidth [1/m] of the amplitude of the mask.
     detail_part: phase [rad] of neglected detail, relative to the tolerance.
     all_light: True if the samples must resolve all light behind the pupil, even where the window needs fewer.
-    steep: True if most light of a steep relief misses the window, so that samples of its light convolved with a
-        Gaussian are used (`smooth_spectrum`).
+    steep: True if much light of a steep relief misses the window. Samples of its light convolved with a Gaussian are
+        then used (`smooth_spectrum`), and light beyond `reach` is removed.
     """
 
     light: Beam
@@ -219,6 +220,8 @@ class Problem:
     @property
     def fade_ripple(self) -> float:
         """Allowed amplitude error of light beyond the band."""
+        if self.steep:
+            return min(FADE_RIPPLE_PER_TOLERANCE * self.tolerance, 0.1)
         return self.ripple if self.reach is None else 0.1  # choice: there is hardly any light beyond it
 
     @property
@@ -259,7 +262,8 @@ class Problem:
 
     def band(self, margin: float = 0.0) -> float:
         """Return the highest frequency [1/m] of light from the disk that can land within `margin` [m] of the window."""
-        reach = (1 + EDGE_REACH) * self.radius + self.outermost + margin
+        edge = 0.0 if self.steep else EDGE_REACH
+        reach = (1 + edge) * self.radius + self.outermost + margin
         return min(self.widest_band, reach / math.hypot(reach, self.distance) / self.wavelength)
 
 

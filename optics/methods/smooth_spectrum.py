@@ -2,7 +2,8 @@
 
 Samples of all light of a rough relief would need the pitch of its steepest slopes, even if nearly all of this light
 misses the window or is evanescent. The convolved light needs the pitch of the light that arrives in the window. Its
-spectrum is divided by that of the Gaussian. All further steps are the same as for other pupils (`angular_spectrum`).
+spectrum is divided by that of the Gaussian, and propagated as in `angular_spectrum`. Light beyond the `reach` of the
+problem is removed.
 """
 
 from __future__ import annotations
@@ -16,25 +17,25 @@ import numpy as np
 from optics.elements.beam import Beam
 from optics.elements.derivative_knots import carries_derivatives
 from optics.elements.wavefront_slopes import derivative
-from optics.methods.angular_spectrum import arrived, split_period, whole_period
+from optics.methods.angular_spectrum import transfer, whole_period
 from optics.methods.problem import Problem
 from optics.methods.smooth_pupil import SmoothPupil, sides_of
 from optics.methods.spectral_taper import Taper, tapers
 from optics.methods.spectrum_sampling import SpectrumSampling
+from optics.methods.window_sums import intensity_of
+from optics.numerics.array_sum_cost import sum_seconds
 from optics.numerics.autodiff import Array
-from optics.numerics.cost import CALL, SMOOTH_SAMPLE, SPECTRUM_SAMPLE
-from optics.numerics.even_fields import whole
-from optics.numerics.field import Field
-from optics.numerics.fourier import fast_length
+from optics.numerics.cost import CALL, SMOOTH_SAMPLE, TRANSFER_SAMPLE
+from optics.numerics.fourier import fast_length, fourier_sum
 from optics.numerics.grid import Grid
-from optics.numerics.precision import Precision, opaque, precision
+from optics.numerics.precision import padded_for_packets, precision
 
-__all__ = ["SmoothSpectrum", "may_be_steep", "split_smooth_spectrum", "whole_smooth_spectrum"]
+__all__ = ["SmoothSpectrum", "may_be_steep", "smooth_spectrum"]
 
 # Choices. Largest error of the amplitude due to the third derivative of the phase, relative to the tolerance; largest
 # exponent by which the Gaussian attenuates light in the window, at a tolerance of 0.01; and light that the samples
 # alias, relative to the tolerance. See test_smooth_spectrum.py.
-CUBIC, ATTENUATED, ALIASED = 0.25, 1.0, 0.01
+CUBIC, ATTENUATED, ALIASED = 0.25, 2.5, 0.01
 SAMPLE_BYTES = 250.0  # arrays of float64 and complex128 per sample of the pupil
 
 
@@ -42,7 +43,6 @@ SAMPLE_BYTES = 250.0  # arrays of float64 and complex128 per sample of the pupil
 class SmoothSpectrum(SpectrumSampling):
     """Spectrum of a pupil whose light is convolved with a Gaussian. pupil_period: number of its samples per period."""
 
-    method: str
     smooth: SmoothPupil
     taper: Taper
     period: float
@@ -51,8 +51,8 @@ class SmoothSpectrum(SpectrumSampling):
     even: bool = False
     seconds: float = 0.0
     bytes: float = 0.0
+    method: str = "angular_spectrum"
     model_error: float = 0.0
-    padding: float = 1.0
 
     @cached_property
     def pupil(self) -> Grid:
@@ -60,33 +60,36 @@ class SmoothSpectrum(SpectrumSampling):
         across = 2 * math.ceil(self.smooth.outermost / pitch) + 1
         return Grid.square(min(self.pupil_period, across), pitch)
 
-    def field(self, beam: Beam, problem: Problem) -> Field:
-        """Return U over the window, without the carrier e^{ikz}."""
-        return self.whole_phase(self._arrived(beam, problem), beam, problem)
-
-    def intensity(self, beam: Beam, problem: Problem) -> Array:
-        """Return |U|² over the window for unit amplitude at the pupil, a flat Dr.Jit array."""
-        return self._arrived(beam, problem).intensity
-
     @property
     def samples(self) -> tuple[int, int]:
         return self.pupil.shape
 
-    def _arrived(self, beam: Beam, problem: Problem) -> Field:
-        spectrum = self._spectrum(beam, precision(problem.dtype))
-        found = arrived(spectrum, beam, problem, self).scaled((self.pupil.dx / self.period) ** 2)
-        return whole(found, problem.window) if self.even else found
+    @property
+    def padding(self) -> float:
+        return self.pupil_period / self.pupil.shape[0]
 
-    def _spectrum(self, beam: Beam, types: Precision) -> Field:
-        """Return the spectrum of the light before the convolution, F{u} / e^{-2π²δ²f²}."""
-        import drjit as dr
+    def intensity(self, beam: Beam, problem: Problem) -> Array:
+        """Return |U|² over the window for unit amplitude at the pupil, a flat Dr.Jit array."""
+        assert problem.reach is not None
+        types, window = precision(problem.dtype), problem.window
+        light = self.smooth.light(beam, self.pupil.x, self.pupil.y).astype(types.complex_dtype)
+        spectrum = fourier_sum(light, self.pupil_period, self.spectrum.shape, -1)
+        spectrum *= self._transfer(beam, problem)
+        if window.centre != (0.0, 0.0):
+            along, up = (np.exp(2j * np.pi * middle * self.spectrum.x) for middle in window.centre)
+            spectrum *= (up[:, None] * along).astype(types.complex_dtype)
+        found = intensity_of(fourier_sum(spectrum, self.output_period, window.shape, +1))
+        found[np.add.outer(np.square(window.y), np.square(window.x)) > problem.reach**2] = 0
+        return types.Float(padded_for_packets(found / float(self.pupil_period) ** 4))
 
-        pupil = self.part(self.pupil)
-        light = Field.from_numpy(self.smooth.light(beam, pupil.x, pupil.y), pupil.dx, types)
-        found = self.sum(replace(light, grid=pupil), self.pupil, self.pupil_period, self.spectrum, -1)
-        fx, fy = self.part(self.spectrum).coordinates(types)
-        gain = types.Float(dr.exp((fx * fx + fy * fy) * opaque(types, self.smooth.exponent)))
-        return Field(found.re * gain, found.im * gain, found.grid, types)
+    def _transfer(self, beam: Beam, problem: Problem) -> np.ndarray:
+        """Return the transfer function to the window, divided by the spectrum e^{-2π²δ²f²} of the Gaussian."""
+        own = transfer(beam, problem, replace(self, even=True), precision(problem.dtype)).numpy()
+        frequency = np.arange(len(own)) / self.period
+        gain = np.exp(self.smooth.exponent * frequency**2).astype(own.real.dtype)
+        own *= gain[:, None] * gain
+        mirrored = np.abs(np.arange(self.spectrum.shape[0]) - self.spectrum.shape[0] // 2)
+        return np.take(np.take(own, mirrored, 0), mirrored, 1)
 
 
 def may_be_steep(beam: Beam) -> bool:
@@ -100,40 +103,31 @@ def may_be_steep(beam: Beam) -> bool:
     return smooth and sides_of(pupil.aperture) is not None
 
 
-def whole_smooth_spectrum(problem: Problem) -> list[SmoothSpectrum]:
-    """Return samplings with which the whole spectrum meets the problem's tolerance."""
-    return _samplings(problem, "angular_spectrum")
+def smooth_spectrum(problem: Problem) -> list[SmoothSpectrum]:
+    """Return samplings with which the spectrum meets the problem's tolerance, for tapers with increasing blur."""
+    third = _third_derivative(problem)
+    return [_sampling(problem, taper, third) for taper in tapers(problem)]
 
 
-def split_smooth_spectrum(problem: Problem) -> list[SmoothSpectrum]:
-    """Return samplings with which the split spectrum meets the problem's tolerance."""
-    return _samplings(problem, "split_angular_spectrum")
-
-
-def _samplings(problem: Problem, method: str) -> list[SmoothSpectrum]:
-    return [_sampling(problem, taper, method) for taper in tapers(problem)]
-
-
-def _sampling(problem: Problem, taper: Taper, method: str) -> SmoothSpectrum:
+def _sampling(problem: Problem, taper: Taper, third: float) -> SmoothSpectrum:
     sides = sides_of(problem.aperture)
     assert sides is not None
-    smooth = SmoothPupil(sides, problem.radius, _width(problem, taper.end))
-    find = whole_period if method == "angular_spectrum" else split_period
-    period, output_period = find(problem, taper, smooth.outermost)
-    # The light at frequencies that the samples alias onto the band is weaker than that in the band by this exponent.
+    smooth = SmoothPupil(sides, problem.radius, _width(problem, taper.end, third))
+    period, output_period = whole_period(problem, taper, smooth.outermost)
+    # The Gaussian attenuates light that the samples alias onto the band by this exponent, relative to light in the band.
     exponent = math.log(1 / (ALIASED * problem.tolerance))
     aliased = math.sqrt(taper.end**2 + exponent / smooth.exponent)
     pupil_period = fast_length(period * (taper.end + aliased))
-    return _timed(SmoothSpectrum(method, smooth, taper, period, pupil_period, output_period, problem.even), problem)
+    return _timed(SmoothSpectrum(smooth, taper, period, pupil_period, output_period), problem)
 
 
-def _width(problem: Problem, band: float) -> float:
+def _width(problem: Problem, band: float, third: float) -> float:
     """Return the width δ [m] of the Gaussian, for light up to the frequency `band` [1/m].
 
-    The error of the amplitude is about the third derivative of the phase, in waves, times δ³.
+    The error of the amplitude is at most about the third derivative of the phase, in waves, times δ³.
     """
     attenuated = math.sqrt(ATTENUATED * min(1.0, problem.tolerance / 0.01) / 2) / (math.pi * band)
-    return min(attenuated, (CUBIC * problem.tolerance / _third_derivative(problem)) ** (1 / 3))
+    return min(attenuated, (CUBIC * problem.tolerance / third) ** (1 / 3))
 
 
 def _third_derivative(problem: Problem) -> float:
@@ -152,14 +146,14 @@ def _gradient(values: np.ndarray, step: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _timed(sampling: SmoothSpectrum, problem: Problem) -> SmoothSpectrum:
-    pupil, spectrum = sampling.part(sampling.pupil), sampling.part(sampling.spectrum)
-    samples = math.prod(pupil.shape)
-    points = samples * SMOOTH_SAMPLE + math.prod(spectrum.shape) * SPECTRUM_SAMPLE
-    sums = sampling.sum_seconds(sampling.pupil, sampling.pupil_period, sampling.spectrum)
-    needed = samples * SAMPLE_BYTES + sampling.sum_bytes(pupil, spectrum, problem.dtype)
+    pupil, spectrum, window = sampling.pupil.shape, sampling.spectrum.shape, problem.window.shape
+    to_spectrum = sum_seconds(pupil, sampling.pupil_period, spectrum, problem.dtype)
+    to_window = sum_seconds(spectrum, sampling.output_period, window, problem.dtype)
+    points = math.prod(pupil) * SMOOTH_SAMPLE + math.prod(spectrum) * TRANSFER_SAMPLE
+    item = np.dtype(precision(problem.dtype).complex_dtype).itemsize
+    arrays = 3 * math.prod(spectrum) + (pupil[0] + spectrum[0]) * sampling.pupil_period
     return replace(
         sampling,
-        seconds=CALL["angular_spectrum"] + points + sums + sampling.seconds_from_spectrum(problem.window),
-        bytes=max(needed, sampling.bytes_from_spectrum(problem.window, problem.dtype)),
-        padding=sampling.pupil_period / sampling.pupil.shape[0],
+        seconds=CALL["angular_spectrum"] + points + to_spectrum + to_window,
+        bytes=math.prod(pupil) * SAMPLE_BYTES + item * arrays,
     )

@@ -45,7 +45,7 @@ from optics.methods.method_sampling import Sampling
 from optics.methods.pixelated_spectrum import split_pixel_spectrum, whole_pixel_spectrum
 from optics.methods.problem import Problem
 from optics.methods.rayleigh_sommerfeld import nodes
-from optics.methods.smooth_spectrum import split_smooth_spectrum, whole_smooth_spectrum
+from optics.methods.smooth_spectrum import smooth_spectrum
 from optics.methods.window_sampling import DERIVATIVE_ERROR, WindowSampling, window_sampling
 from optics.numerics.accuracy import (
     FLOAT_NOISE,
@@ -93,10 +93,7 @@ FOR_PIXELS: dict[str, Callable[[Problem], Sequence[Sampling]]] = {
     "rayleigh_sommerfeld": nodes,
 }
 # Methods that need only samples of the light that arrives in the window, however steep the pupil is.
-FOR_STEEP: dict[str, Callable[[Problem], Sequence[Sampling]]] = {
-    "angular_spectrum": whole_smooth_spectrum,
-    "split_angular_spectrum": split_smooth_spectrum,
-}
+FOR_STEEP: dict[str, Callable[[Problem], Sequence[Sampling]]] = {"angular_spectrum": smooth_spectrum}
 
 
 @dataclass(frozen=True)
