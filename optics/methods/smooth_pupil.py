@@ -16,7 +16,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -28,6 +28,7 @@ __all__ = ["Side", "SmoothPupil", "sides_of"]
 
 REACH = 5.0  # choice, in δ: distance from the edge within which the edge changes the light
 DARKEST = 18.0  # choice: samples darker than e^-18 are omitted
+TINY = 1e-30  # avoids a division by 0 in the middle of a circle
 INSIDE = 1e-6  # distance from the edge of a point that shows which side is open, in radii
 TRIED = 101  # number of points along an axis at which the sides of an aperture are compared with its opening
 
@@ -53,7 +54,7 @@ class Side:
             depth = self.offset - self.normal[0] * x - self.normal[1] * y
             return depth, np.full_like(depth, self.normal[0]), np.full_like(depth, self.normal[1])
         across, along = x - self.centre[0], y - self.centre[1]
-        distance = np.maximum(np.hypot(across, along), 1e-300)
+        distance = np.maximum(np.hypot(across, along), TINY)
         return self.sign * (self.radius - distance), self.sign * across / distance, self.sign * along / distance
 
 
@@ -94,8 +95,9 @@ class _Gaussian(NamedTuple):
         return x * self.mean[0] + y * self.mean[1], x * x * xx + 2 * x * y * xy + y * y * yy
 
     def at(self, points: np.ndarray) -> _Gaussian:
-        mean, covariance = ([part[points] for part in each] for each in (self.mean, self.covariance))
-        return _Gaussian(self.log[points], (mean[0], mean[1]), (covariance[0], covariance[1], covariance[2]))
+        """Return the values at some points in double precision."""
+        log, mean_x, mean_y, *covariance = (part[points].astype(complex) for part in (self.log, *self.mean, *self.covariance))
+        return _Gaussian(log, (mean_x, mean_y), (covariance[0], covariance[1], covariance[2]))
 
 
 @dataclass(frozen=True)
@@ -119,20 +121,26 @@ class SmoothPupil:
         """2π²δ² [m²], with which the convolution multiplies light of the frequency ν by e^{-2π²δ²ν²}."""
         return 2 * (math.pi * self.width) ** 2
 
-    def light(self, beam: Beam, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """Return the convolved light at evenly spaced positions x and y [m], complex (y, x)."""
+    def light(self, beam: Beam, x: np.ndarray, y: np.ndarray, dtype: Any) -> np.ndarray:
+        """Return the convolved light at evenly spaced positions x and y [m], complex (y, x).
+
+        dtype: type of the real and imaginary parts.
+        """
         waves, pitch = beam.waves(x[None, :], y[:, None]), float(x[1] - x[0])
-        slope = derivative(waves.T, pitch).T, derivative(waves, pitch)
-        depth = np.min([side.depth(x[None, :] / self.radius, y[:, None] / self.radius)[0] for side in self.sides], 0)
+        along = derivative(waves.T, pitch).T.astype(dtype), derivative(waves, pitch).astype(dtype)
+        across, down = ((at / self.radius).astype(dtype) for at in (x[None, :], y[:, None]))
+        depth = np.min([side.depth(across, down)[0] for side in self.sides], axis=0)
         reach = REACH * self.width / self.radius
-        bright = self.exponent * (slope[0] ** 2 + slope[1] ** 2) < DARKEST
+        bright = along[0] ** 2 + along[1] ** 2 < DARKEST / self.exponent
         kept = (depth > -reach) & (bright | (depth < reach))
-        curved = derivative(slope[0].T, pitch).T[kept], derivative(slope[0], pitch)[kept]
-        bends = *curved, derivative(slope[1], pitch)[kept]
-        inner = self._gaussian(waves[kept], (slope[0][kept], slope[1][kept]), bends)
-        down, across = np.nonzero(kept)
-        found = np.zeros(waves.shape, complex)
-        found[kept] = self._within(inner, x[across] / self.radius, y[down] / self.radius)
+        bends = derivative(along[0].T, pitch).T[kept], derivative(along[0], pitch)[kept], derivative(along[1], pitch)[kept]
+        waves = waves[kept]
+        inner = self._gaussian((waves - np.rint(waves)).astype(dtype), (along[0][kept], along[1][kept]), bends)
+        values, near = np.exp(inner.log), np.flatnonzero(depth[kept] < reach)
+        row, column = (at[near] for at in np.nonzero(kept))
+        values[near] = self._within(inner.at(near), x[column] / self.radius, y[row] / self.radius)
+        found = np.zeros(kept.shape, values.dtype)
+        found[kept] = values
         return found
 
     def _gaussian(
@@ -140,7 +148,7 @@ class SmoothPupil:
     ) -> _Gaussian:
         """Return ∫ e^{-u²/2δ²} e^{2πi (W + ∇W·u + uᵀHu/2)} du / 2πδ².
 
-        slope: gradient of the waves W [1/m]. bends: H, the second derivatives xx, xy and yy [1/m²].
+        waves: W, without whole waves. slope: its gradient [1/m]. bends: H, its second derivatives xx, xy, yy [1/m²].
         """
         square = self.width**2
         xx, xy, yy = (-2j * math.pi * square * bend for bend in bends)
@@ -149,7 +157,7 @@ class SmoothPupil:
         along_x, along_y = (2j * math.pi * part for part in slope)
         mean_x = covariance[0] * along_x + covariance[1] * along_y
         mean_y = covariance[1] * along_x + covariance[2] * along_y
-        log = 2j * math.pi * (waves - np.rint(waves)) + (along_x * mean_x + along_y * mean_y) / 2
+        log = 2j * math.pi * waves + (along_x * mean_x + along_y * mean_y) / 2
         return _Gaussian(log - np.log(determinant) / 2, (mean_x, mean_y), covariance)
 
     def _within(self, inner: _Gaussian, x: np.ndarray, y: np.ndarray) -> np.ndarray:

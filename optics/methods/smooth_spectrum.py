@@ -23,10 +23,10 @@ from optics.methods.smooth_pupil import SmoothPupil, sides_of
 from optics.methods.spectral_taper import Taper, tapers
 from optics.methods.spectrum_sampling import SpectrumSampling
 from optics.methods.window_sums import intensity_of
-from optics.numerics.array_sum_cost import sum_seconds
+from optics.numerics.array_sum_cost import lines_seconds
 from optics.numerics.autodiff import Array
 from optics.numerics.cost import CALL, SMOOTH_SAMPLE, TRANSFER_SAMPLE
-from optics.numerics.fourier import fast_length, fourier_sum
+from optics.numerics.fourier import fast_length
 from optics.numerics.grid import Grid
 from optics.numerics.precision import padded_for_packets, precision
 
@@ -35,7 +35,8 @@ __all__ = ["SmoothSpectrum", "may_be_steep", "smooth_spectrum"]
 # Choices. Largest error of the amplitude due to the third derivative of the phase, relative to the tolerance; largest
 # exponent by which the Gaussian attenuates light in the window, at a tolerance of 0.01; and light that the samples
 # alias, relative to the tolerance. See test_smooth_spectrum.py.
-CUBIC, ATTENUATED, ALIASED = 0.25, 2.5, 0.01
+CUBIC, ATTENUATED, ALIASED = 0.5, 2.5, 0.02
+AT_ONCE = 2**19  # choice: samples of columns that are transformed at once
 SAMPLE_BYTES = 250.0  # arrays of float64 and complex128 per sample of the pupil
 
 
@@ -72,24 +73,62 @@ class SmoothSpectrum(SpectrumSampling):
         """Return |U|² over the window for unit amplitude at the pupil, a flat Dr.Jit array."""
         assert problem.reach is not None
         types, window = precision(problem.dtype), problem.window
-        light = self.smooth.light(beam, self.pupil.x, self.pupil.y).astype(types.complex_dtype)
-        spectrum = fourier_sum(light, self.pupil_period, self.spectrum.shape, -1)
-        spectrum *= self._transfer(beam, problem)
-        if window.centre != (0.0, 0.0):
-            along, up = (np.exp(2j * np.pi * middle * self.spectrum.x) for middle in window.centre)
-            spectrum *= (up[:, None] * along).astype(types.complex_dtype)
-        found = intensity_of(fourier_sum(spectrum, self.output_period, window.shape, +1))
+        light = self.smooth.light(beam, self.pupil.x, self.pupil.y, types.dtype)
+        found = intensity_of(self._propagated(light, self._transfer(beam, problem), window))
         found[np.add.outer(np.square(window.y), np.square(window.x)) > problem.reach**2] = 0
         return types.Float(padded_for_packets(found / float(self.pupil_period) ** 4))
 
     def _transfer(self, beam: Beam, problem: Problem) -> np.ndarray:
-        """Return the transfer function to the window, divided by the spectrum e^{-2π²δ²f²} of the Gaussian."""
-        own = transfer(beam, problem, replace(self, even=True), precision(problem.dtype)).numpy()
-        frequency = np.arange(len(own)) / self.period
-        gain = np.exp(self.smooth.exponent * frequency**2).astype(own.real.dtype)
-        own *= gain[:, None] * gain
-        mirrored = np.abs(np.arange(self.spectrum.shape[0]) - self.spectrum.shape[0] // 2)
-        return np.take(np.take(own, mirrored, 0), mirrored, 1)
+        """Return the transfer function to the window, divided by the spectrum e^{-2π²δ²f²} of the Gaussian.
+
+        It is even, so the result is the quarter with frequencies of at least 0.
+        """
+        found = transfer(beam, problem, replace(self, even=True), precision(problem.dtype)).numpy()
+        gain = np.exp(self.smooth.exponent * (np.arange(len(found)) / self.period) ** 2).astype(found.real.dtype)
+        found *= gain[:, None] * gain
+        return found
+
+    def _propagated(self, light: np.ndarray, transfer: np.ndarray, window: Grid) -> np.ndarray:
+        """Return the field over the window (y, x), times the squared number of samples per period.
+
+        The sums along y, to the spectrum and back, are computed for some columns at a time, which fit into the cache.
+        The first sample is the origin of all transforms, and phases that are linear in the frequency move it.
+        """
+        from scipy import fft
+
+        top, length, period = len(transfer) - 1, self.pupil_period, self.output_period
+        frequency = np.arange(-top, top + 1) / self.period
+        first = float(self.pupil.x[0])
+        along, up = (
+            np.exp(2j * np.pi * frequency * (at[0] - first)).astype(light.dtype) for at in (window.x, window.y)
+        )
+        columns = np.ascontiguousarray((_centred(fft.fft(light, length, axis=1), top) * along).T)
+        rows = np.empty((len(columns), window.shape[0]), light.dtype)
+        for place in np.array_split(np.arange(len(columns)), -(-len(columns) * length // AT_ONCE)):
+            spectrum = _centred(fft.fft(columns[place], length, axis=1), top) * up
+            own = transfer[np.abs(place - top)]
+            spectrum[:, top:] *= own
+            spectrum[:, :top] *= own[:, :0:-1]
+            rows[place] = _back(spectrum, top, period)[:, : window.shape[0]]
+        return _back(np.ascontiguousarray(rows.T), top, period)[:, : window.shape[1]]
+
+
+def _centred(spectrum: np.ndarray, top: int) -> np.ndarray:
+    """Return the frequencies from -top to top of lines in FFT order."""
+    return np.concatenate([spectrum[:, len(spectrum[0]) - top :], spectrum[:, : top + 1]], axis=1)
+
+
+def _back(spectrum: np.ndarray, top: int, period: int) -> np.ndarray:
+    """Return Σ_k U[k] exp(2πi j k / period) over k from -top to top, for j from 0 to period - 1, along axis 1."""
+    from scipy import fft
+
+    before = -top % period  # frequencies that the samples do not distinguish are added
+    wrapped = np.zeros((len(spectrum), -(-(before + 2 * top + 1) // period) * period), spectrum.dtype)
+    wrapped[:, before : before + 2 * top + 1] = spectrum
+    if wrapped.shape[1] > period:
+        wrapped = wrapped.reshape(len(spectrum), -1, period).sum(axis=1)
+    found: np.ndarray = fft.ifft(wrapped, axis=1, norm="forward", overwrite_x=True)
+    return found
 
 
 def may_be_steep(beam: Beam) -> bool:
@@ -146,14 +185,14 @@ def _gradient(values: np.ndarray, step: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _timed(sampling: SmoothSpectrum, problem: Problem) -> SmoothSpectrum:
-    pupil, spectrum, window = sampling.pupil.shape, sampling.spectrum.shape, problem.window.shape
-    to_spectrum = sum_seconds(pupil, sampling.pupil_period, spectrum, problem.dtype)
-    to_window = sum_seconds(spectrum, sampling.output_period, window, problem.dtype)
-    points = math.prod(pupil) * SMOOTH_SAMPLE + math.prod(spectrum) * TRANSFER_SAMPLE
+    across, columns, rows = sampling.pupil.shape[0], sampling.spectrum.shape[0], problem.window.shape[0]
+    to_spectrum = lines_seconds(across + columns, sampling.pupil_period, problem.dtype)
+    to_window = lines_seconds(columns + rows, sampling.output_period, problem.dtype)
+    points = across**2 * SMOOTH_SAMPLE + columns**2 * TRANSFER_SAMPLE / 4
     item = np.dtype(precision(problem.dtype).complex_dtype).itemsize
-    arrays = 3 * math.prod(spectrum) + (pupil[0] + spectrum[0]) * sampling.pupil_period
+    lines = across * sampling.pupil_period + columns * (columns / 4 + across + 2 * rows)
     return replace(
         sampling,
         seconds=CALL["angular_spectrum"] + points + to_spectrum + to_window,
-        bytes=math.prod(pupil) * SAMPLE_BYTES + item * arrays,
+        bytes=across**2 * SAMPLE_BYTES + item * lines,
     )
