@@ -60,7 +60,7 @@ class Spot:
     half: half the side [m] of the square around it that contains the light.
     pitch: sampling pitch [m] that resolves the PSF.
     needs: window and sampling that each wavelength requires.
-    on_retina: True if the square contains only the light that may land on the retina, see `spot_of`.
+    on_retina: True if the square is limited to the light that may land on the retina, see `spot_of`.
     """
 
     centre: tuple[float, float]
@@ -141,16 +141,20 @@ def retinal_psf(pupil: Pupil, retina: Retina, z: Scalar, direction: tuple[float,
 def _on_spot(compute: Callable[[Spot], Result], beams: list[Beam], retina: Retina) -> Result:
     """Return the result of a function of the area that the light reaches.
 
-    If the light of a steep relief spreads so far that the function is refused, the area is limited to the retina.
+    If the light of a steep relief spreads so far that the function is refused, the area is limited to the longer side
+    of the retina, or else to the shorter side.
     """
-    try:
-        with more_time():
-            return compute(spot_of(beams, retina))
-    except AccuracyError:
-        if not all(map(may_be_steep, beams)):
-            raise
-    with more_time():
-        return compute(spot_of(beams, retina, on_retina=True))
+    refused: AccuracyError | None = None
+    for most in (math.inf, max(retina.size), min(retina.size)):
+        try:
+            with more_time():
+                return compute(spot_of(beams, retina, most))
+        except AccuracyError as error:
+            refused = refused or error
+            if not all(map(may_be_steep, beams)):
+                break
+    assert refused is not None
+    raise refused
 
 
 def beams_to(pupil: Pupil, retina: Retina, z: Scalar, tangents: tuple[float, float]) -> list[Beam]:
@@ -158,18 +162,17 @@ def beams_to(pupil: Pupil, retina: Retina, z: Scalar, tangents: tuple[float, flo
     return [Beam(pupil, source, float(wavelength), retina.distance) for wavelength in retina.wavelengths]
 
 
-def spot_of(beams: list[Beam], retina: Retina, on_retina: bool = False) -> Spot:
+def spot_of(beams: list[Beam], retina: Retina, most: float = math.inf) -> Spot:
     """Return the area that the light reaches.
 
-    on_retina: True to limit its half side to the longer side of the retina. It then contains the light that arrives at
-        any receptor from any point of the visual field. All other light counts as blocked by the rim of the eye.
+    most: largest half side [m]. With the longer side of the retina, the area contains the light that arrives at any
+        receptor from any point of the visual field. All other light counts as blocked by the rim of the eye.
     """
     distance = number(retina.distance)
     centre_x, centre_y = _image(beams[len(beams) // 2], distance)
     needs = tuple(_needs(beam, retina, (centre_x, centre_y)) for beam in beams)
     half, pitch = max(need.half_window for need in needs), min(need.pitch for need in needs)
-    if on_retina:
-        half = min(half, max(retina.size))
+    half = min(half, most)
     narrow = min(retina.cell)
     if _cells_within(half, narrow) > MOST_CELLS:
         raise AccuracyError(
@@ -178,7 +181,7 @@ def spot_of(beams: list[Beam], retina: Retina, on_retina: bool = False) -> Spot:
             + (", or flatten the relief" if beams[0].pupil.height is not None else "")
         )
     half = max(side * (_cells_within(half, side) + 1) / 2 for side in retina.cell)
-    return Spot((centre_x, centre_y), half, pitch, needs, on_retina)
+    return Spot((centre_x, centre_y), half, pitch, needs, math.isfinite(most))
 
 
 def _image(beam: Beam, distance: float) -> tuple[float, float]:

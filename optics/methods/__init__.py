@@ -14,6 +14,8 @@ spectrum_sampling    planes of the angular spectrum, and the sums between them
 row_blocks           blocks of rows of a large pupil, whose spectra are summed
 derivative_cells     nodes between the knots of maps, for derivatives with respect to their samples
 pixelated_spectrum   the angular spectrum of pupils made of pixels
+smooth_pupil         the light behind a steep pupil, convolved with a Gaussian
+smooth_spectrum      the angular spectrum of steep pupils, from samples of this light
 hankel               the angular spectrum of rotationally symmetric pupils, along one radius
 low_rank             one matrix product, with a Fourier kernel times a slow factor
 slow_factor          this factor, and the points of the window that interpolate it

@@ -114,7 +114,8 @@ def whole_period(problem: Problem, taper: Taper, outermost: float) -> tuple[floa
     from the axis.
     """
     beam = outermost + taper.blur + problem.distance * taper.tangent
-    if problem.reach is not None and not problem.steep:  # light beyond `reach` is negligible, so it may wrap around to the rim of the window
+    # Light beyond `reach` is negligible, except behind steep pupils, so it may wrap around to the rim of the window.
+    if problem.reach is not None and not problem.steep:
         beam = min(beam, problem.reach + outermost)
     pitch = problem.window.dx
     samples = fast_length(max(problem.window.half_width + beam, 2 * outermost) / pitch)

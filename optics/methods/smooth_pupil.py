@@ -28,6 +28,7 @@ __all__ = ["Side", "SmoothPupil", "sides_of"]
 
 REACH = 5.0  # choice, in δ: distance from the edge within which the edge changes the light
 DARKEST = 18.0  # choice: samples darker than e^-18 are omitted
+OVERSHOOT = 1.5  # choice: light beside an edge exceeds that far from it by less than this factor
 TINY = 1e-30  # avoids a division by 0 in the middle of a circle
 INSIDE = 1e-6  # distance from the edge of a point that shows which side is open, in radii
 TRIED = 101  # number of points along an axis at which the sides of an aperture are compared with its opening
@@ -163,8 +164,8 @@ class SmoothPupil:
     def _within(self, inner: _Gaussian, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         """Return the integral of the Gaussian over the aperture, at points in radii.
 
-        The product at a corner is limited to the smaller of both factors. It would be too large where the relief is
-        steep and the corner is not rectangular.
+        The product at a corner is limited to about the smaller of both factors. It would be too large where the relief
+        is steep and the corner is not rectangular.
         """
         log, factor = inner.log.copy(), np.ones(len(x), complex)
         least = np.full(len(x), np.inf)
@@ -178,7 +179,7 @@ class SmoothPupil:
             alone = (inner.log[near] + more).real + np.log(np.maximum(np.abs(share), 1e-300))
             least[near] = np.minimum(least[near], alone)
         size = log.real + np.log(np.maximum(np.abs(factor), 1e-300))
-        found: np.ndarray = np.exp(log - np.maximum(size - least, 0)) * factor
+        found: np.ndarray = np.exp(log - np.maximum(size - least - math.log(OVERSHOOT), 0)) * factor
         return found
 
 
