@@ -144,17 +144,16 @@ def _on_spot(compute: Callable[[Spot], Result], beams: list[Beam], retina: Retin
     If the light of a steep relief spreads so far that the function is refused, the area is limited to the longer side
     of the retina, or else to the shorter side.
     """
-    refused: AccuracyError | None = None
+    errors: list[AccuracyError] = []
     for most in (math.inf, max(retina.size), min(retina.size)):
         try:
             with more_time():
                 return compute(spot_of(beams, retina, most))
         except AccuracyError as error:
-            refused = refused or error
+            errors.append(error)
             if not all(map(may_be_steep, beams)):
                 break
-    assert refused is not None
-    raise refused
+    raise errors[0]
 
 
 def beams_to(pupil: Pupil, retina: Retina, z: Scalar, tangents: tuple[float, float]) -> list[Beam]:

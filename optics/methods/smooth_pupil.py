@@ -97,7 +97,9 @@ class _Gaussian(NamedTuple):
 
     def at(self, points: np.ndarray) -> _Gaussian:
         """Return the values at some points in double precision."""
-        log, mean_x, mean_y, *covariance = (part[points].astype(complex) for part in (self.log, *self.mean, *self.covariance))
+        log, mean_x, mean_y, *covariance = (
+            part[points].astype(complex) for part in (self.log, *self.mean, *self.covariance)
+        )
         return _Gaussian(log, (mean_x, mean_y), (covariance[0], covariance[1], covariance[2]))
 
 
@@ -134,7 +136,11 @@ class SmoothPupil:
         reach = REACH * self.width / self.radius
         bright = along[0] ** 2 + along[1] ** 2 < DARKEST / self.exponent
         kept = (depth > -reach) & (bright | (depth < reach))
-        bends = derivative(along[0].T, pitch).T[kept], derivative(along[0], pitch)[kept], derivative(along[1], pitch)[kept]
+        bends = (
+            derivative(along[0].T, pitch).T[kept],
+            derivative(along[0], pitch)[kept],
+            derivative(along[1], pitch)[kept],
+        )
         waves = waves[kept]
         inner = self._gaussian((waves - np.rint(waves)).astype(dtype), (along[0][kept], along[1][kept]), bends)
         values, near = np.exp(inner.log), np.flatnonzero(depth[kept] < reach)

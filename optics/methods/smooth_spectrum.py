@@ -153,7 +153,7 @@ def _sampling(problem: Problem, taper: Taper, third: float) -> SmoothSpectrum:
     assert sides is not None
     smooth = SmoothPupil(sides, problem.radius, _width(problem, taper.end, third))
     period, output_period = whole_period(problem, taper, smooth.outermost)
-    # The Gaussian attenuates light that the samples alias onto the band by this exponent, relative to light in the band.
+    # The Gaussian attenuates light that is aliased onto the band by this exponent more than light in the band.
     exponent = math.log(1 / (ALIASED * problem.tolerance))
     aliased = math.sqrt(taper.end**2 + exponent / smooth.exponent)
     pupil_period = fast_length(period * (taper.end + aliased))
@@ -173,7 +173,7 @@ def _third_derivative(problem: Problem) -> float:
     """Return the largest third derivative of the waves behind the pupil [1/m³], at least one per cubed radius."""
     slopes = problem.slopes
     along = slopes.along_x / problem.light.wavelength, slopes.along_y / problem.light.wavelength
-    (xx, xy), yy = _gradient(along[0], slopes.grid.dx), _gradient(along[1], slopes.grid.dx)[1]
+    xx, yy = _gradient(along[0], slopes.grid.dx)[0], _gradient(along[1], slopes.grid.dx)[1]
     thirds = (*_gradient(xx, slopes.grid.dx), *_gradient(yy, slopes.grid.dx))
     square = thirds[0] ** 2 + 3 * thirds[1] ** 2 + 3 * thirds[2] ** 2 + thirds[3] ** 2
     inside = slopes.distance_from_axis <= problem.radius

@@ -12,8 +12,7 @@ angular spectrum. They differ in where they place samples:
     the kernel's slow factor is interpolated. The method is best for small pupils and wide windows. It computes the
     intensity but not the complex field.
 - "angular_spectrum": two transforms, from the pupil to its spectrum and from there to the sensor's plane, on grids with
-    the same period. It is best at short distances. Behind steep reliefs of eyes, the samples of the pupil represent
-    its light after a convolution with a Gaussian.
+    the same period. It is best at short distances, and the only method for eyes with steep reliefs.
 - "split_angular_spectrum": the same, but the transfer function exp(ikz cos θ) is split into the paraxial part, whose
     Fourier transform is known, and a remainder, which moves light only a short way to the side. Period and number of
     samples then do not grow with the distance.
