@@ -1,6 +1,6 @@
 """The light behind a steep pupil, convolved with a Gaussian. Few samples represent it, however steep the relief is.
 
-The convolution multiplies the light of a ray with the frequency ν by e^{-2π²δ²ν²}, where δ is the width of the Gaussian.
+The convolution multiplies the light of a ray of the frequency ν by e^{-2π²δ²ν²}, where δ is the width of the Gaussian.
 Light that is too steep to arrive in a window disappears from the samples, and a division of the spectrum by this factor
 restores the light of all other rays exactly.
 
@@ -28,7 +28,7 @@ __all__ = ["Side", "SmoothPupil", "sides_of"]
 
 REACH = 5.0  # choice, in δ: distance from the edge within which the edge changes the light
 DARKEST = 18.0  # choice: samples darker than e^-18 are omitted
-OVERSHOOT = 1.5  # choice: light beside an edge exceeds that far from it by less than this factor
+PARALLEL = 1e-6  # choice: smallest variance along a side, relative to that across it; parallel sides have none
 TINY = 1e-30  # avoids a division by 0 in the middle of a circle
 INSIDE = 1e-6  # distance from the edge of a point that shows which side is open, in radii
 TRIED = 101  # number of points along an axis at which the sides of an aperture are compared with its opening
@@ -92,8 +92,12 @@ class _Gaussian(NamedTuple):
 
     def along(self, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return mean and variance along directions (x, y)."""
+        return x * self.mean[0] + y * self.mean[1], self.between((x, y), (x, y))
+
+    def between(self, one: tuple[np.ndarray, np.ndarray], other: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
+        """Return the covariance of the components along two directions (x, y)."""
         xx, xy, yy = self.covariance
-        return x * self.mean[0] + y * self.mean[1], x * x * xx + 2 * x * y * xy + y * y * yy
+        return one[0] * other[0] * xx + (one[0] * other[1] + one[1] * other[0]) * xy + one[1] * other[1] * yy
 
     def at(self, points: np.ndarray) -> _Gaussian:
         """Return the values at some points in double precision."""
@@ -170,22 +174,28 @@ class SmoothPupil:
     def _within(self, inner: _Gaussian, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         """Return the integral of the Gaussian over the aperture, at points in radii.
 
-        The product at a corner is limited to about the smaller of both factors. It would be too large where the relief
-        is steep and the corner is not rectangular.
+        The factors of all near sides are multiplied. If the light of one side is diffracted by a steep slope, it comes
+        from the side itself. The factors of other sides are then those of the Gaussian along this side.
         """
-        log, factor = inner.log.copy(), np.ones(len(x), complex)
-        least = np.full(len(x), np.inf)
-        for side in self.sides:
-            depth, *normal = side.depth(x, y)
-            near = np.flatnonzero(depth < REACH * self.width / self.radius)
-            mean, variance = inner.at(near).along(*(part[near] for part in normal))
-            more, share = _behind((depth[near] * self.radius - mean) / np.sqrt(2 * variance))
-            log[near] += more
-            factor[near] *= share
-            alone = (inner.log[near] + more).real + np.log(np.maximum(np.abs(share), 1e-300))
-            least[near] = np.minimum(least[near], alone)
-        size = log.real + np.log(np.maximum(np.abs(factor), 1e-300))
-        found: np.ndarray = np.exp(log - np.maximum(size - least - math.log(OVERSHOOT), 0)) * factor
+        depth, across, down = np.stack([np.broadcast_arrays(*side.depth(x, y)) for side in self.sides], axis=1)
+        mean, variance = inner.along(across, down)
+        u = (depth * self.radius - mean) / np.sqrt(2 * variance)
+        near = depth < REACH * self.width / self.radius
+        each = np.arange(len(x))
+        first = np.where(near, (-u * u).real, -np.inf).argmax(axis=0), each
+        log, factor = _behind(u[first])
+        steep = (-(u[first] ** 2)).real > 0
+        common = inner.between((across[first], down[first]), (across, down)) * steep
+        mean = mean + common * (depth[first] * self.radius - mean[first]) / variance[first]
+        along = variance - common**2 / variance[first]
+        along = np.where(np.abs(along) > PARALLEL * np.abs(variance), along, variance)
+        u = (depth * self.radius - mean) / np.sqrt(2 * along)
+        near[first] = False
+        for own, mine in zip(u, near, strict=True):
+            more, share = _behind(own[mine])
+            log[mine] += more
+            factor[mine] *= share
+        found: np.ndarray = np.exp(inner.log + log) * factor
         return found
 
 

@@ -47,15 +47,7 @@ from optics.methods.problem import Problem
 from optics.methods.rayleigh_sommerfeld import nodes
 from optics.methods.smooth_spectrum import smooth_spectrum
 from optics.methods.window_sampling import DERIVATIVE_ERROR, WindowSampling, window_sampling
-from optics.numerics.accuracy import (
-    FLOAT_NOISE,
-    MOST_BYTES,
-    MOST_SECONDS,
-    AccuracyError,
-    Option,
-    Plan,
-    size_of,
-)
+from optics.numerics.accuracy import FLOAT_NOISE, MOST_BYTES, MOST_SECONDS, AccuracyError, Option, Plan, size_of
 from optics.numerics.cost import CALL, DFT_CALL, PAIRS_PER_SECOND, WINDOW_SAMPLE
 from optics.point_spread.window_cost import check_seconds, check_window, window_bytes, window_seconds
 
