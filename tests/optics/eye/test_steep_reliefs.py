@@ -12,7 +12,7 @@ from optics import AccuracyError, Eye, GaussianMask, Pupil
 def eye() -> Eye:
     """An eye with a relief whose slopes exceed those of grazing light tenfold."""
     heights = 100e-6 * np.random.default_rng(0).random((8, 8))
-    return Eye(Pupil(12e-6, height=heights), (3, 4), 60.0, bands=1)
+    return Eye(Pupil(8e-6, height=heights), (3, 4), 60.0, sensor_width=60e-6, bands=1)
 
 
 def test_kernel_contains_the_light_within_a_retina_of_the_image(eye):
