@@ -24,7 +24,7 @@ from optics.apertures.aperture import Aperture
 from optics.elements.beam import Beam
 from optics.elements.wavefront_slopes import derivative
 
-__all__ = ["Side", "SmoothPupil", "sides_of"]
+__all__ = ["REACH", "Side", "SmoothPupil", "sides_of"]
 
 REACH = 5.0  # choice, in δ: distance from the edge within which the edge changes the light
 DARKEST = 18.0  # choice: samples darker than e^-18 are omitted

@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -19,7 +20,7 @@ from optics.elements.derivative_knots import carries_derivatives
 from optics.elements.wavefront_slopes import derivative
 from optics.methods.angular_spectrum import transfer, whole_period
 from optics.methods.problem import Problem
-from optics.methods.smooth_pupil import SmoothPupil, sides_of
+from optics.methods.smooth_pupil import REACH, SmoothPupil, sides_of
 from optics.methods.spectral_taper import Taper, tapers
 from optics.methods.spectrum_sampling import SpectrumSampling
 from optics.methods.window_sums import intensity_of
@@ -42,9 +43,14 @@ SAMPLE_BYTES = 250.0  # arrays of float64 and complex128 per sample of the pupil
 
 @dataclass(frozen=True)
 class SmoothSpectrum(SpectrumSampling):
-    """Spectrum of a pupil whose light is convolved with a Gaussian. pupil_period: number of its samples per period."""
+    """Spectrum of a pupil whose light is convolved with a Gaussian. pupil_period: number of its samples per period.
+
+    blur: width [m] of a further Gaussian, with which the light is convolved numerically before it is sampled for the
+        spectrum. The Gaussian of the closed form may be too narrow for the longest possible pitch. 0: none.
+    """
 
     smooth: SmoothPupil
+    blur: float
     taper: Taper
     period: float
     pupil_period: int
@@ -52,18 +58,25 @@ class SmoothSpectrum(SpectrumSampling):
     even: bool = False
     seconds: float = 0.0
     bytes: float = 0.0
+    tolerance: float = 0.01
     method: str = "angular_spectrum"
     model_error: float = 0.0
 
     @cached_property
     def pupil(self) -> Grid:
-        pitch = self.period / self.pupil_period
-        across = 2 * math.ceil(self.smooth.outermost / pitch) + 1
-        return Grid.square(min(self.pupil_period, across), pitch)
+        """Samples from which the spectrum is computed."""
+        return _samples(self.smooth.outermost + REACH * self.blur, self.period / self.pupil_period)
+
+    @cached_property
+    def closed_form(self) -> Grid:
+        """Samples of the closed form."""
+        if self.blur == 0:
+            return self.pupil
+        return _samples(self.smooth.outermost, _pitch(self.taper.end, self.smooth.width, self.tolerance))
 
     @property
     def samples(self) -> tuple[int, int]:
-        return self.pupil.shape
+        return self.closed_form.shape
 
     @property
     def padding(self) -> float:
@@ -73,10 +86,20 @@ class SmoothSpectrum(SpectrumSampling):
         """Return |U|² over the window for unit amplitude at the pupil, a flat Dr.Jit array."""
         assert problem.reach is not None
         types, window = precision(problem.dtype), problem.window
-        light = self.smooth.light(beam, self.pupil.x, self.pupil.y, types.dtype)
-        found = intensity_of(self._propagated(light, self._transfer(beam, problem), window))
+        found = intensity_of(self._propagated(self._light(beam, types.dtype), self._transfer(beam, problem), window))
         found[np.add.outer(np.square(window.y), np.square(window.x)) > problem.reach**2] = 0
         return types.Float(padded_for_packets(found / float(self.pupil_period) ** 4))
+
+    def _light(self, beam: Beam, dtype: Any) -> np.ndarray:
+        """Return the convolved light at the samples from which the spectrum is computed, complex (y, x)."""
+        grid = self.closed_form
+        light = self.smooth.light(beam, grid.x, grid.y, dtype)
+        if self.blur == 0:
+            return light
+        bell = np.exp(-(np.subtract.outer(self.pupil.x, grid.x) ** 2) / (2 * self.blur**2))
+        weight = (bell * (grid.dx / (math.sqrt(2 * math.pi) * self.blur))).astype(light.dtype)
+        found: np.ndarray = weight @ light @ weight.T
+        return found
 
     def _transfer(self, beam: Beam, problem: Problem) -> np.ndarray:
         """Return the transfer function to the window, divided by the spectrum e^{-2π²δ²f²} of the Gaussian.
@@ -84,7 +107,8 @@ class SmoothSpectrum(SpectrumSampling):
         It is even, so the result is the quarter with frequencies of at least 0.
         """
         found = transfer(beam, problem, replace(self, even=True), precision(problem.dtype)).numpy()
-        gain = np.exp(self.smooth.exponent * (np.arange(len(found)) / self.period) ** 2).astype(found.real.dtype)
+        exponent = 2 * math.pi**2 * (self.smooth.width**2 + self.blur**2)
+        gain = np.exp(exponent * (np.arange(len(found)) / self.period) ** 2).astype(found.real.dtype)
         found *= gain[:, None] * gain
         return found
 
@@ -149,24 +173,30 @@ def smooth_spectrum(problem: Problem) -> list[SmoothSpectrum]:
 
 
 def _sampling(problem: Problem, taper: Taper, third: float) -> SmoothSpectrum:
-    sides = sides_of(problem.aperture)
+    sides, tolerance = sides_of(problem.aperture), problem.tolerance
     assert sides is not None
-    smooth = SmoothPupil(sides, problem.radius, _width(problem, taper.end, third))
-    period, output_period = whole_period(problem, taper, smooth.outermost)
-    # The Gaussian attenuates light that is aliased onto the band by this exponent more than light in the band.
-    exponent = math.log(1 / (ALIASED * problem.tolerance))
-    aliased = math.sqrt(taper.end**2 + exponent / smooth.exponent)
-    pupil_period = fast_length(period * (taper.end + aliased))
-    return _timed(SmoothSpectrum(smooth, taper, period, pupil_period, output_period), problem)
+    # The error of the amplitude is at most about the third derivative of the phase, in waves, times δ³.
+    widest = math.sqrt(ATTENUATED * min(1.0, tolerance / 0.01) / 2) / (math.pi * taper.end)
+    smooth = SmoothPupil(sides, problem.radius, min(widest, (CUBIC * tolerance / third) ** (1 / 3)))
+    blur = math.sqrt(widest**2 - smooth.width**2)
+    blur = blur if blur > _pitch(taper.end, smooth.width, tolerance) else 0.0  # the samples must resolve it
+    period, output_period = whole_period(problem, taper, smooth.outermost + REACH * blur)
+    pupil_period = fast_length(period / _pitch(taper.end, math.hypot(smooth.width, blur), tolerance))
+    sampling = SmoothSpectrum(smooth, blur, taper, period, pupil_period, output_period, tolerance=tolerance)
+    return _timed(sampling, problem)
 
 
-def _width(problem: Problem, band: float, third: float) -> float:
-    """Return the width δ [m] of the Gaussian, for light up to the frequency `band` [1/m].
+def _pitch(band: float, width: float, tolerance: float) -> float:
+    """Return the pitch [m] of light that is convolved with a Gaussian of this width [m], for a band [1/m].
 
-    The error of the amplitude is at most about the third derivative of the phase, in waves, times δ³.
+    The Gaussian attenuates light that is aliased onto the band more than light in the band.
     """
-    attenuated = math.sqrt(ATTENUATED * min(1.0, problem.tolerance / 0.01) / 2) / (math.pi * band)
-    return min(attenuated, (CUBIC * problem.tolerance / third) ** (1 / 3))
+    exponent = math.log(1 / (ALIASED * tolerance))
+    return 1 / (band + math.sqrt(band**2 + exponent / (2 * (math.pi * width) ** 2)))
+
+
+def _samples(outermost: float, pitch: float) -> Grid:
+    return Grid.square(2 * math.ceil(outermost / pitch) + 1, pitch)
 
 
 def _third_derivative(problem: Problem) -> float:
@@ -186,13 +216,14 @@ def _gradient(values: np.ndarray, step: float) -> tuple[np.ndarray, np.ndarray]:
 
 def _timed(sampling: SmoothSpectrum, problem: Problem) -> SmoothSpectrum:
     across, columns, rows = sampling.pupil.shape[0], sampling.spectrum.shape[0], problem.window.shape[0]
+    closed = sampling.samples[0]
     to_spectrum = lines_seconds(across + columns, sampling.pupil_period, problem.dtype)
     to_window = lines_seconds(columns + rows, sampling.output_period, problem.dtype)
-    points = across**2 * SMOOTH_SAMPLE + columns**2 * TRANSFER_SAMPLE / 4
+    points = closed**2 * SMOOTH_SAMPLE + columns**2 * TRANSFER_SAMPLE / 4
     item = np.dtype(precision(problem.dtype).complex_dtype).itemsize
     lines = across * sampling.pupil_period + columns * (columns / 4 + across + 2 * rows)
     return replace(
         sampling,
         seconds=CALL["angular_spectrum"] + points + to_spectrum + to_window,
-        bytes=across**2 * SAMPLE_BYTES + item * lines,
+        bytes=closed**2 * SAMPLE_BYTES + item * lines,
     )
