@@ -262,7 +262,7 @@ ON_MODELS = {
     ),
     "see_photograph": Walk(
         lambda progress=None, **given: sim.see_photograph(PHOTO, "mouse", 20.0, progress=progress, **given).signals,
-        {"uv": 0.0, "progress": NoEffect("sim/pictures/test_photograph.py: the calls of this function")},
+        {"uv": 0.0, "depth": 0.01, "progress": NoEffect("sim/pictures/test_photograph.py: the calls of this function")},
     ),
     "ReceptorMosaic.image": Walk(MOSAIC.image, {"photograph": PHOTO, "height": 40}),
     "ReceptorMosaic.write_png": Walk(image_file, {"photograph": PHOTO, "height": 40}),

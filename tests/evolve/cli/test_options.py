@@ -107,6 +107,7 @@ TABLE = {
         "animal": (["--animal", "eagle"], CHANGES),
         "width_deg": (["--width-deg", "30"], CHANGES),
         "uv": (["--uv", "0"], CHANGES),
+        "depth": (["--depth", "0.01"], CHANGES),
         "out": (["--out", "there"], CHANGES),
     },
     "validate": {"proofs": (["aliasing"], CHANGES), "list": (["--list"], CHANGES)},
