@@ -79,7 +79,11 @@ def fewest(signals: Callable[[int, sim.Poses], np.ndarray], few: sim.Poses) -> t
 
 @dataclass(frozen=True)
 class Row:
-    """A row of the table. rays: per ommatidium · times: CPU times [s] of a single world and of all worlds, (2,)"""
+    """A row of the table.
+
+    rays: rays per ommatidium
+    times: CPU times [s] of a single world and of all worlds, (2,)
+    """
 
     rays: int
     times: np.ndarray
