@@ -96,12 +96,12 @@ class PixelatedAperture(Aperture):
         return float(self._widths.max())
 
     def rows(self, across: int) -> np.ndarray:
-        """Positions of the rows (and of the columns) of nodes in units of R, in ascending order, (count x across,)."""
+        """Return the ascending positions of the rows (and of the columns) of nodes in units of R, (count x across,)."""
         u, _ = gauss_legendre(across)
         return (self._centres[:, None] + (u - 0.5) * self._widths[:, None]).ravel()
 
     def weights(self, across: int) -> np.ndarray:
-        """Weights of the nodes [R²], (row, column)."""
+        """Return the weights of the nodes [R²], (row, column)."""
         return _weights(self, across)
 
     @cached_property
