@@ -15,16 +15,17 @@ WORLD = """
 <mujoco>
   <visual><headlight active="0"/></visual>
   <asset>
+    <texture name="sky" type="skybox" builtin="gradient" width="64" height="384" rgb1=".25 .45 .8" rgb2=".8 .85 .9"/>
     <texture name="tiles" type="2d" builtin="checker" width="64" height="64" rgb1=".75 .7 .6" rgb2=".35 .4 .35"/>
     <material name="tiles" texture="tiles" texrepeat="1 1" texuniform="true"/>
   </asset>
   <worldbody>
     <light type="directional" dir=".5 .4 -1" diffuse=".9 .9 .9"/>
     <geom type="plane" size="12 12 .1" material="tiles"/>
-    <geom type="cylinder" size=".25 1" pos="3 1.6 1" rgba=".9 .2 .1 1"/>
-    <geom type="cylinder" size=".25 1" pos="3 -.6 1" rgba=".1 .3 .9 1"/>
-    <geom type="box" size=".6 .3 .4" pos="1 3 .4" rgba=".9 .8 .2 1"/>
-    <geom type="sphere" size=".4" pos=".5 -2 .4" rgba=".2 .7 .3 1"/>
+    <geom type="cylinder" size=".25 1" pos="2 1.2 1" rgba=".9 .2 .1 1"/>
+    <geom type="cylinder" size=".25 1" pos="2 -.8 1" rgba=".1 .3 .9 1"/>
+    <geom type="box" size=".6 .3 .5" pos=".6 2 .5" rgba=".9 .8 .2 1"/>
+    <geom type="sphere" size=".5" pos=".5 -1.8 .5" rgba=".2 .7 .3 1"/>
     <body name="robot" pos="0 0 .15">
       <joint name="turn" axis="0 0 1"/>
       <geom type="ellipsoid" size=".3 .15 .1"/>
@@ -53,7 +54,7 @@ class Fly(sim.Task):
     model = WORLD
     eye = fly_eyes()
     mounts = (sim.Mount("robot", offset=(0.3, 0, 0.1)),)
-    fidelity = sim.Fidelity(16, bands=4)
+    fidelity = sim.Fidelity(16, bands=4, light="bounce")
 
     def rewards(self, data):
         """Return no terms, because this task only shows the eyes."""

@@ -7,10 +7,11 @@ from functools import lru_cache
 import numpy as np
 from scipy.spatial import KDTree
 
-from sim.envs.retina_images import BETWEEN, GAP, SIZE, hues_of, shares_of
+from sim.envs.retina_images import BETWEEN, GAP, hues_of, shares_of
 from sim.eyes.compound_eye import CompoundEye
 from sim.scene.color import encode_srgb
 
+SIZE = 480, 960  # choice: largest height and width of a map in pixels; hexagons of a thousand ommatidia stay visible
 RIM = 0.93  # choice: radius of a drawn hexagon, relative to a hexagon that touches its neighbours
 OUTER = 0.95  # choice: largest radius of a hexagon at the map's edge, relative to its circumscribed circle
 ALONE = 0.05  # choice: radius [rad] of the hexagon of a single ommatidium
