@@ -38,7 +38,7 @@ WORLD = """
 
 
 def fly_eyes(rings: int = 15, interommatidial_deg: float = 5.0) -> sim.CompoundEye:
-    """The left eye and its mirror image, with an acute zone within 30 degrees of straight ahead."""
+    """Return the left eye and its mirror image, with an acute zone within 30 degrees of straight ahead."""
     directions = sim.hexagonal_patch(rings, interommatidial_deg, azimuth_deg=70.0, elevation_deg=0.0)
     rhabdom = optics.Waveguide(1.9e-6)
     normal = optics.Ommatidium(optics.FacetLens(16e-6, radius_front=12e-6), rhabdom)
@@ -57,7 +57,7 @@ class Fly(sim.Task):
     fidelity = sim.Fidelity(16, bands=4, light="bounce")
 
     def rewards(self, data):
-        """No reward: this task only shows the eyes."""
+        """Return no terms, because this task only shows the eyes."""
         return {"none": 0.0}
 
 
