@@ -30,7 +30,7 @@ def random_state(task, seed, n_worlds=WORLDS):
         ("maze", None, 1, 4),
         slow("tracking", LENS, 1, 4),
         slow("navigation", None, 3, 2),
-        ("detection", LENS, 3, 2),
+        slow("detection", LENS, 3, 2),
     ],
 )
 def test_high_receptors_see_the_mean_of_square_ones(task, pupil, rows, ratio):
