@@ -70,7 +70,7 @@ class TurbidMedium:
     refractive_index: refractive index of the medium, such as `optics.medium("water")`; None: air
 
     Raises:
-        ValueError: an argument of another type.
+        ValueError: an argument has the wrong type.
     """
 
     attenuation: Spectrum
@@ -134,7 +134,7 @@ def sea_water(chlorophyll: float) -> TurbidMedium:
     measured in clear ocean water and in coastal water.
 
     Raises:
-        ValueError: a concentration outside the range.
+        ValueError: the concentration is outside its range.
     """
     chlorophyll = in_range("chlorophyll", chlorophyll, 0.0, 30.0)
     nm = np.arange(LIMITS_NM[0], LIMITS_NM[1] + 1, STEP_NM)
@@ -148,12 +148,12 @@ def sea_water(chlorophyll: float) -> TurbidMedium:
 def fog(visibility: float) -> TurbidMedium:
     """Return fog of this meteorological visibility [m], in [1, 1e6].
 
-    Droplets are large compared with wavelengths, so c = ln(50) / visibility is the same at all wavelengths
-    (Koschmieder 1924): a black object at this distance has a contrast of 2 % with the horizon. They absorb almost no
-    light, so the veiling light is as bright as a white surface in daylight.
+    The coefficient c = ln(50) / visibility is the same at all wavelengths, because droplets are large compared with
+    wavelengths. At the distance `visibility`, a black object has a contrast of 2 % with the horizon (Koschmieder 1924).
+    They absorb almost no light, so the veiling light is as bright as a white surface in daylight.
 
     Raises:
-        ValueError: a visibility outside the range.
+        ValueError: the visibility is outside its range.
     """
     c = -math.log(JUST_VISIBLE) / in_range("visibility", visibility, 1.0, 1e6)
     return TurbidMedium(Spectrum(LIMITS_NM, (c, c)), Spectrum(LIMITS_NM, (FROM_EVERYWHERE,) * 2))
@@ -170,7 +170,7 @@ def turbid_medium(name: str) -> TurbidMedium | None:
     name: "air", "clear_ocean" (`sea_water(0.15)`), "coastal_water" (`sea_water(1)`) or "fog" (`fog(50)`)
 
     Raises:
-        ValueError: an unknown name.
+        ValueError: the name is unknown.
     """
     one_of("medium", name, MEDIA_OF_WORLDS)
     made = {"clear_ocean": lambda: sea_water(0.15), "coastal_water": lambda: sea_water(1.0), "fog": lambda: fog(50.0)}

@@ -210,7 +210,8 @@ class _Sum:
     def _slopes(at: Sequence[Array], places: Sequence[Array], back: Sequence[Array], total: Array) -> tuple[Array, ...]:
         """Return the derivatives of the sum by h, by the waves and by the amplitudes of the nodes.
 
-        at: h, waves and amplitudes · places: x, y of the nodes, sx, sy of the frequencies
+        at: h, waves and amplitudes
+        places: x, y of the nodes, and sx, sy of the frequencies
         back: w times the conjugate of the spectrum at each frequency, real and imaginary part
         """
         import drjit as dr
@@ -237,7 +238,8 @@ def _turned(re: Array, im: Array, turns: Array) -> tuple[Array, Array]:
 def _sums(to: tuple[Array, Array, float], of: Sequence[Array]) -> tuple[Array, Array]:
     """Return the real and imaginary part of Σ (a + ib) exp(2πi (c W - fx x - fy y)) at every (fx, fy).
 
-    to: fx, fy (point,), and the factor c · of: x, y, W, a, b (term,)
+    to: fx, fy (point,), and the factor c
+    of: x, y, W, a, b (term,)
     """
     import drjit as dr
 

@@ -1,5 +1,7 @@
-"""Computation of requested PSFs. Each PSF is planned, computed and compared with the direct sum; if it fails, it is
-repeated."""
+"""Computation of requested PSFs.
+
+Each PSF is planned, computed and compared with the direct sum; if it fails, it is repeated.
+"""
 
 from __future__ import annotations
 

@@ -80,7 +80,7 @@ def see_photograph(
     progress: function that is called with the completed fraction. None: no calls.
 
     Raises:
-        ValueError: an argument outside its range, an image with another shape, or a field with more than 40,000
+        ValueError: an argument is outside its range, the image has the wrong shape, or the field has more than 40,000
             ommatidia.
     """
     one_of("animal", animal, ANIMALS)
