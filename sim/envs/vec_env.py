@@ -26,12 +26,12 @@ from sim.tasks.simulation import LEAST_RETURN, Simulation
 class EyesVecEnv(OneEnvironment):
     """Many worlds of one task.
 
-    In a `sim.Encounter`, all animals must be alike and learn a single policy. The rows of the first animal in all worlds
-    come first, followed by the rows of the second animal. Observations, rewards, endings and `info` are documented in
-    docs/tasks.md. When an episode ends, its world starts the next one automatically. The returned observation is then
-    the first observation of the new episode, and info["terminal_observation"] is the last observation of the old
-    episode. `reset_infos` contains the info of each episode's first observation. A world's episodes depend only on the
-    seed and on the world's index, not on the number of worlds.
+    In a `sim.Encounter`, all animals must be alike and learn a single policy. The rows of the first animal in all
+    worlds come first, followed by the rows of the second animal. Observations, rewards, endings and `info` are
+    documented in docs/tasks.md. When an episode ends, its world starts the next one automatically. The returned
+    observation is then the first observation of the new episode, and info["terminal_observation"] is the last
+    observation of the old episode. `reset_infos` contains the info of each episode's first observation. A world's
+    episodes depend only on the seed and on the world's index, not on the number of worlds.
 
     simulation: the worlds
     renderers: renderers of every agent's eyes
@@ -111,6 +111,8 @@ class EyesVecEnv(OneEnvironment):
 
     def seed_worlds(self, seeds: Sequence[int | None]) -> None:
         """Seed each world with its own number at the next reset; None: the world continues its random numbers.
+
+        An episode is then the same as in a single environment with this seed.
 
         Raises:
             ValueError: there is not one seed per world, or a seed is not a whole number above or equal to 0.
