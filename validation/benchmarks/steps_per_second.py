@@ -18,8 +18,9 @@ the times for physics and for rendering.
 
 - Rendering per world is at least twice as fast as with a single world. Measured ratios are 2.7 to 3.7, because the
   worlds of a batch share one kernel launch.
-- A whole step takes at most 1.25 times as long as physics and rendering alone. Measured ratios are at most 1.17. The
-  ratio exceeds 1 because physics and rendering displace each other's data from the processor's caches.
+- A whole step takes at most 1.25 times the sum of the times for physics alone and rendering alone. Measured ratios are
+  at most 1.17. The ratio exceeds 1 because, within a step, physics and rendering displace each other's data from the
+  processor's caches.
 
 **Limits.** Absolute rates depend on the machine and on the code.
 

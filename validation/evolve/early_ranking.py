@@ -1,8 +1,8 @@
 """Early ranking: does fitness after little training predict final fitness?
 
 Does the order of animals after part of a training run predict their order after all of it? After half of the training,
-the rank correlation with the final order is 0.86. The order after less training is a poor predictor: the correlation is
-0.64 after an eighth of the training and -0.33 after a quarter.
+the rank correlation with the final order is 0.86. The order after less training does not predict the final order well:
+the correlation is 0.64 after an eighth of the training and -0.33 after a quarter.
 
 **Method.** Successive halving (`search.rungs`, `evolve.search.successive_halving`) trains the whole generation for a
 short time and continues only with the better animals. The parts of such a training run are called rungs. Successive
@@ -10,16 +10,17 @@ halving saves time only if the early order resembles the final order. For this t
 x 1 to 15 x 15 receptors behind a perfect lens are drawn from the genome. They learn detection over four rungs, as in an
 evolutionary run, but no animal is stopped at a rung.
 
-**First table.** The table compares the order of the animals on each rung with their order on the last rung, with
-fitness from the same number of episodes on both. Cells state Spearman's rank correlation, and its 90 % confidence
-interval from a bootstrap over animals. In the column "32 episodes", animals are ordered by the fitness that a run uses,
-from the evaluation episodes of each rung. In the column "128 episodes", they are ordered by the fitness of the same
-policies in more episodes, in other worlds. The last line compares the two measures of fitness on the last rung.
+**First table.** The table compares the order of the animals after each rung with their order after the last rung. Cells
+state Spearman's rank correlation, and its 90 % confidence interval from a bootstrap over animals. In the column "32
+episodes", the fitness of both rungs comes from the 32 evaluation episodes that a run uses. In the column "128
+episodes", it comes from 128 episodes of the same policies in other worlds. The last line compares the two measures of
+fitness after the last rung.
 
 **Second table.** The table lists possible schedules of successive halving, applied to these animals as one generation.
 "CPU time" is relative to training all animals to the end. The last two columns state the final rank of the animal that
-the schedule selects as the best. The final rank is the rank on the last rung, by 128 episodes. The two columns differ
-in the number of episodes, 32 or 128, from which the schedule decides which animals continue.
+the schedule selects as the best. The final rank is the rank after the last rung by the fitness in 128 episodes. The
+schedule decides which animals continue, from the fitness in 32 episodes (first of these columns) or in 128 episodes
+(second).
 
 **Result.** Two rungs save a fifth of the time if half of the animals continue to the second rung. Schedules that select
 animals earlier save more time but may lose the best animal. Successive halving is off by default. Thirty-two episodes

@@ -1,14 +1,15 @@
 """Fewer epochs late in training: less CPU time at the same return
 
 Do fewer epochs late in training save time without loss of return? Yes: they save 8 % of the CPU time in detection, 8 %
-in tracking and 16 % in navigation. In the same order, the mean returns change by +4.2 ± 1.6, +6.9 ± 3.0 and -0.0 ± 0.2.
+in tracking and 16 % in navigation. The mean returns in these tasks change by +4.2 ± 1.6, +6.9 ± 3.0 and -0.0 ± 0.2,
+respectively.
 
 **Method.** An epoch is one pass over the samples of an update. After `decay_after` training steps, the change of the
 weights per update has to fall in inverse proportion to the number of steps. There are two ways to achieve this: smaller
 optimiser steps in the same number of epochs, or optimiser steps of the same size in fewer epochs. The second way moves
 the weights about as far in less time. Both ways first reduce the optimiser step. After 150,000 training steps, it is
-half as large as at first. Until then both ways are identical to the last bit. From then on, one way reduces the
-optimiser step further. The other way reduces the number of epochs instead, until `least_epochs` (3) of 10 are left.
+half as large as at first. Until then both ways are bit-identical. From then on, the first way reduces the optimiser
+step further. The second way reduces the number of epochs instead, from 10 to 3 (`least_epochs`).
 
 Each row compares the same training runs (task, seed, eyes) with a constant and with a falling number of epochs. All
 runs have 500,000 steps, a receptor noise of σ = 0.01, eyes 45° wide with perfect lenses, and networks of 64 units. In
@@ -24,10 +25,10 @@ the number of epochs.
 
 **Bounds.** No task's mean return falls by more than two standard errors, and CPU time falls by at least a twentieth.
 
-**Limits.** The saving is limited, because over a whole training run of this length only three in ten epochs are
-omitted. Everything else takes as long as before, including the ten evaluations of a training run. Navigation is learnt
-after 150,000 steps and the return cannot rise further, so only the time differs there. In a training run of a million
-steps, updates have five epochs on average.
+**Limits.** The saving is limited, because only three of ten epochs are omitted over a whole training run of this
+length. Everything else takes as long as before, including the ten evaluations of a training run. In navigation, the
+animals have learnt the task after 150,000 steps and the return cannot rise further, so only the time differs. In a
+training run of a million steps, updates have five epochs on average.
 
 Training runs take minutes each, so their results are stored (`docs/validation/data/fewer_epochs.csv`). The page is
 written from the stored results.

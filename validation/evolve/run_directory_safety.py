@@ -8,7 +8,7 @@ command (`validation/evolve/hostile.py`). Such a trial fails in any of these cas
 
 - the command prints a traceback or more than one line;
 - the exit code is not the promised one;
-- where sizes are checked, the command takes more than a second;
+- the damaged part is too large, and the command takes more than a second to refuse it;
 - the command touches a file outside the run.
 
 The other trials kill a run with SIGKILL at a random moment and resume it. They fail if the record or a policy is not

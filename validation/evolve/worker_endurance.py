@@ -14,8 +14,8 @@ loaded and kernels compiled.)
 **Bounds.** Memory in the last quarter is at most 1.25 times that in the second, and the number of open files does not
 grow.
 
-**Limits.** Memory may grow slightly because Dr.Jit caches compiled kernels: one for each shape of eye that has not
-occurred before.
+**Limits.** Memory may grow slightly because Dr.Jit caches compiled kernels. There is one kernel for each shape of eye
+(number of eyes and receptors).
 
 Measurements are stored (`docs/validation/data/worker_endurance.csv`). The page is written from the stored measurements.
 

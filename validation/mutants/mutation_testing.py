@@ -2,7 +2,7 @@
 
 Which fraction of deliberate mistakes do the tests notice? A copy of the code with one such mistake is called a mutant,
 and the tests kill a mutant if they notice the mistake. They kill 185 of 193 mutants, which is 96 %. Six further mutants
-change nothing that a user could see and do not count.
+do not change any result that a user could see. They are not counted.
 
 **Method.** Examples of mistakes are a changed sign or comparison, a bound that is off by one, an omitted check or call,
 swapped axes or arguments, or a maximum instead of a minimum. For each mutant the nearest tests are run. The
@@ -12,8 +12,8 @@ of these tests fails, hangs or crashes.
 
 The first mutants are those in `validation/mutants/named_mutants.py`, which contain mistakes that no test had noticed at
 first. The others are drawn evenly from all places in the three packages where such a mistake can be made. Some mutants
-change nothing that a user could see, because they give the same results slightly sooner or later. The table lists them
-as "alike", with the reason, and does not count them as mistakes.
+do not change results, but only the time of the computation or an invisible detail. The table lists them as "alike",
+with the reason, and does not count them as mistakes.
 
 **Bounds.** At least 90 % of the mutants that are mistakes are killed. Every mutant that survived or is alike has a
 stated reason.

@@ -8,15 +8,13 @@ with the same samples.
 
 **Method.** A circular aperture of R = 50 µm at 550 nm is sampled on N x N points over a period of 4R. The intensity
 within |x|, |y| <= R is compared with the direct Rayleigh-Sommerfeld sum. The textbook's angular spectrum
-(`validation/optics/textbook_propagation.py`) multiplies the spectrum of the samples by the transfer function. Its
-period is that of the samples. Beyond the critical distance, the steepest light that the samples represent leaves the
-period at one edge and re-enters at the other. More samples then do not help, and at larger distances the error reaches
-100 %. In terms of frequencies, the phase of the transfer function changes by more than half a wave between neighbouring
-samples.
+(`validation/optics/textbook_propagation.py`) multiplies the spectrum of the samples by the transfer function. The
+computed field is periodic, and its period is the width of the grid of samples. Beyond the critical distance, light at
+the largest angle that the samples represent leaves the grid at one edge and re-enters it at the opposite edge. More
+samples then do not reduce the error, and at larger distances it reaches 100 %. In terms of frequencies, the phase of
+the transfer function changes by more than half a wave between neighbouring samples.
 
-`optics.propagate` receives the same hard-edged samples. It chooses its own period, and fades out light that would land
-far outside the window. Its error falls with N at any distance. The remaining error comes from the pixelated edge of the
-aperture. In `optics.psf` the user does not choose N: the function low-pass filters the edge and plans its own sampling.
+`optics.propagate` receives the same samples of the aperture, which have a hard edge. It chooses its own period, and removes light that would land far outside the window. Its error falls with N at any distance. The remaining error comes from the pixelated edge of the aperture. In `optics.psf` the user does not choose N: the function low-pass filters the edge and plans its own sampling.
 
 **First table.** Each row is one Fresnel number R²/λz. N* is the number of samples for which this distance is the
 critical one. The last columns show the error of `optics.psf`, its predicted error and the method that it chose.

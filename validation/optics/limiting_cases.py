@@ -12,9 +12,10 @@ argument, value and valid range. No other outcome is allowed: no NaN, no mere wa
 instead. The inputs are:
 
 - pupils far below the wavelength, compared with the cos²θ lobe of Rayleigh-Sommerfeld's integral;
-- a relief with the refractive index of the medium, and a DOE of one pixel (a plate), compared with the bare pupil;
-- a source in the focal plane of a lens. The lens collimates its light, and the result is compared with the shadow of
-  the bare aperture;
+- a relief with the refractive index of the medium, and a relief of a single pixel (a plate), compared with a pupil
+  without glass;
+- a source in the focal plane of a lens. Its light is parallel behind the lens, and the result is compared with the
+  light behind an aperture without a lens;
 - a window of one sample, compared with the closed form; a window far off the axis, compared with quadrature; and a
   source at grazing incidence, compared with a result in float64;
 - `optics.propagate` over a distance of 0, for an evanescent wave, and for a field of zeros.

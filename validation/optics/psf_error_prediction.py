@@ -11,14 +11,16 @@ to predicted error is 0.93. In 92.7 % of the cases the prediction is at most 30 
 - windows of 17 to 257 samples along each side. A quarter of the windows have pitches of 0.3 to 4 times λz/2R;
 - tolerances from 1e-5 (float32) or 1e-8 (float64) to 3e-2.
 
-The actual error is the relative L2 error of intensity against the direct Rayleigh-Sommerfeld sum in float64. The
-tolerance of that sum is a thousandth of the case's tolerance or a thirtieth of the prediction, whichever is smaller. A
-case whose direct sum would take more than 5 s is replaced by another random case. The table counts these replacements.
+The actual error is the relative L2 difference between the intensity of the PSF and that of the direct
+Rayleigh-Sommerfeld sum in float64. This sum has its own tolerance: a thousandth of the tolerance of the PSF or a
+thirtieth of the predicted error, whichever is smaller. If the direct sum would take more than 5 s, another random case
+is drawn instead. The table counts these replacements.
 
 **Bounds.** In 99 % of the cases, the actual error is at most the predicted one. In no case is it above three times the
-prediction. In 80 % of the cases, the predicted error is at most 30 times the actual one. A larger ratio would mean that
-time is spent on unnecessary digits. With `--methods N`, every method runs on the first N cases. In 80 % of these cases,
-the chosen method must take at most twice the time of the fastest method whose actual error is below the tolerance.
+predicted error. In 80 % of the cases, the predicted error is at most 30 times the actual one. A larger ratio would mean
+that PSFs are computed more accurately than necessary, which costs time. With `--methods N`, every method runs on the
+first N cases. In 80 % of these cases, the chosen method must take at most twice the time of the fastest method whose
+actual error is below the tolerance.
 
 **Limits.** If no method can reach the tolerance, an `AccuracyError` states what is possible. The table counts those
 cases by reason.

@@ -26,8 +26,8 @@ from a later article, or was proposed for this page. Rows with "closed form" are
   light-adapted angles approach the half width of the facet's diffraction pattern. The values of the curves could not be
   read. They apply to tapered rhabdomeres, whereas the model has straight ones.
 - *Megalopta*: Greiner, Ribi & Warrant, Cell Tissue Res. 316, 377, 2004, abstract. The inputs are quoted.
-- *Cirolana*: Nilsson & Nilsson, J. Comp. Physiol. A 143, 503, 1981, abstract. The receptor accepts 45° by geometrical
-  optics. The row shows by how much the PSF of the lens widens this angle.
+- *Cirolana*: Nilsson & Nilsson, J. Comp. Physiol. A 143, 503, 1981, abstract. According to geometrical optics, the
+  acceptance angle of the receptor is 45°. The row shows by how much the PSF of the lens increases this angle.
 - Humans: Curcio et al., J. Comp. Neurol. 292, 497, 1990, abstract (199,000 cones per mm², 100,000 to 324,000 in
   individuals); Land, in Neurobiology of Arachnids, p. 53, 1985, abstract (0.42 minutes of arc between cones); Caves,
   Brandley & Johnsen, Trends Ecol. Evol. 33, 358, 2018, press release (60 cycles/degree).
@@ -53,8 +53,9 @@ uses another MTF. Duration, window and criterion are quoted.
   receptors, but only its abstract was accessible.
 - The owlfly's Δρ of 1.8°. Its eye is a superposition eye.
 - Values for tapered rhabdomeres.
-- The acuity of the wedge-tailed eagle, 140 cycles/degree, the 13 minutes of arc of the goldfish and the 0.24° of
-  dragonflies. They were read in abstracts, and are inputs of `optics.animals`, so a comparison would prove nothing.
+- The acuity of the wedge-tailed eagle (140 cycles/degree), and the angles between receptors of the goldfish (13 minutes
+  of arc) and of dragonflies (0.24°). They are inputs of `optics.animals`, so a comparison would show nothing. We read
+  them in abstracts.
 
 The command computes the table:
 

@@ -3,14 +3,15 @@
 Which effects of a real relief does a phase mask omit, and when do they matter? `optics` models every relief as a phase
 mask. The mask is accurate for slopes below 10°, and for lenses below NA = 1.16 (λ/f)^¼, which is 0.25 for f = 240 µm.
 
-**Method.** A relief of height h is modelled as the phase k(n - 1)h in one plane. The `predicted_error` of a PSF covers
-the propagation behind the mask, but not this choice of model. Rays through the real surface show the effects that the
-mask omits. The rays follow Snell's law and come from inside the glass of n = 1.5 (`validation/optics/refraction.py`):
+**Method.** A relief of height h is modelled as the phase k(n - 1)h in one plane. The `predicted_error` of a PSF
+includes errors of the propagation behind the mask, but not the error of this model. Rays through the real surface show
+the effects that the mask omits. The rays follow Snell's law and come from inside the glass of n = 1.5
+(`validation/optics/refraction.py`):
 
-- **Refraction at a slope.** A prism of angle α deviates light that leaves through its slope ("glass first" in the
-  table) by arcsin(n sin α) - α, the mask by arcsin((n - 1) tan α). The deviation by the mask is 1 % too small at α =
-  11° and 10 % too small at 30°. It does not depend on the side from which the light comes, unlike that of the prism
-  ("relief first": light enters through the slope).
+- **Refraction at a slope.** Light that leaves a prism of angle α through its slope ("glass first" in the table) is
+  deviated by arcsin(n sin α) - α. A mask with the same slope deviates it by arcsin((n - 1) tan α). The deviation by the
+  mask is 1 % too small at α = 11° and 10 % too small at 30°. If light enters the prism through its slope ("relief
+  first"), the deviation of the prism is different, but that of the mask is the same.
 - **Total reflection.** Beyond a slope of 41.8° no light leaves the glass, but the mask transmits light up to 63°. The
   slope of a lens that consists of one relief therefore cannot exceed 41.8°, so its NA is at most 0.45. The mask has no
   such limit.
@@ -19,8 +20,8 @@ mask omits. The rays follow Snell's law and come from inside the glass of n = 1.
 - **Thickness.** Real rays bend at the surface of the glass and not in the plane of the mask. A relief whose mask is an
   ideal lens is therefore not an ideal lens itself. Its Strehl ratio falls below 0.8 at NA = 1.16 (λ/f)^¼. Its focus
   spreads along the axis by several depths of field at this NA, and by more at a higher NA.
-- **Neighbouring ridges.** A sinusoidal corrugation starts to reflect totally if its depth is 0.28 of its period. From
-  0.30 of the period on, some rays that have left the surface hit the next ridge.
+- **Neighbouring ridges.** In a sinusoidal corrugation, total reflection begins if the depth is 0.28 of the period. If
+  the depth is 0.30 of the period or more, some rays that have left the surface hit the next ridge.
 
 The command computes the table:
 

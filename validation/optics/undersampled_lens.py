@@ -2,13 +2,13 @@
 
 What does the PSF of a lens look like if the pupil is sampled too coarsely? It is a regular pattern of bright spots with
 a bright centre. At f/2 with 51 samples, the first dark ring of the Airy pattern encloses 6.2e-06 of the light instead
-of 0.8278. This fraction becomes correct only when the pitch is below λ / (2 NA).
+of 0.8278. This fraction becomes correct only when the pitch (the distance between samples) is below λ / (2 NA).
 
 **Method.** The simulation of the [published eyes](../results/paper.md) samples a pupil of a few mm with 51 or 101
 points per side. Here the lenses are f/2, f/8 and f/13.5, with a focal length of 4 mm. The wavelength is 550 nm, and the
 grid is 2 mm wide. At a pitch of λ / (2 NA), the phase at the rim of a lens changes by half a wave between neighbouring
-samples. With 51 samples, the pitch exceeds λ / (2 NA) by factors of 35, 9 and 5, respectively. Through aliasing, the
-samples then represent an array of many small lenses instead of one, and most of the light misses the Airy disk. The
+samples. With 51 samples, the pitch exceeds λ / (2 NA) by factors of 35, 9 and 5, respectively. Because of aliasing,
+such samples represent an array of many small lenses instead of one, and most of the light misses the Airy disk. The
 image does not show the mistake: it is finite and positive, and its power is conserved.
 
 In `optics.psf`, the user does not choose the sampling of the pupil: the function derives it from the slope of the

@@ -15,8 +15,9 @@ The light of one illuminated sphere is computed by tracing rays, without the ren
 
 **Table.** The table states the signal of an adversary minus that of a goal, in units of the receptor noise (a standard
 deviation of 0.01), for one receptor that looks straight at the object. Each cell is a mean or a root mean square over
-24 directions. The first pair of columns is for the built-in adversaries, which have seven bands. Their edges, called
-shipped, are those stored in `sim.worlds.detection`. The second pair is for six bands of 30°.
+24 directions. The first pair of columns is for the built-in adversaries, which have seven bands. The edges of these
+bands ("shipped") are stored in `sim.worlds.detection`. The second pair of columns is for adversaries with six bands of
+30°.
 
 **Bounds.** At distances of 2 m or more, the mean difference is below a fifth of the noise. With the shipped edges, the
 mean difference is at most a tenth of the noise larger than with the fitted edges. (The shipped edges differ from the

@@ -14,10 +14,10 @@ two eyes of 15 x 15 receptors and 4 rays per receptor, without physics.
 
 **Bounds.** In every model, at least 99.5 % of the receptors have the same depth to 1e-3, or both see nothing.
 
-**Limits.** The receptors that differ look at the edge of a curved surface that is approximated by triangles, or at the
-inside of a surface. MuJoCo's rays hit the inside of a surface, but eyes look through it. With planes it is the other
-way round: eyes see the back of a plane, and MuJoCo's rays do not hit it. Only eyes in front of every plane are
-therefore counted.
+**Limits.** The receptors whose depths differ look at the edge of a curved surface that is approximated by triangles, or
+at the inside of a surface. MuJoCo's rays hit the inside of a surface, but eyes see through it. The back of a plane is
+the opposite case: eyes see it, but MuJoCo's rays do not hit it. Only eyes in front of every plane are therefore
+counted.
 
     PYTHONPATH=DIR python -m validation.sim.eyes_against_ray_caster [--only suite] [--out DIR] [--docs DIR]
 """

@@ -18,9 +18,10 @@ that the mirror lacks, as reported by the mirror.
 depth to 1e-3.
 
 **Limits.** The pixels that differ are at the edges of curved surfaces, which the mirror approximates by triangles. The
-models are those in dm_control (suite, locomotion, third-party robots), gymnasium-robotics and gymnasium that compile on
-their own. They are not part of rhabdom. Install them with `pip install 'rhabdom[validation]'`. If pinned versions
-conflict, use `pip install --no-deps --target DIR dm_control gymnasium-robotics` and add DIR to PYTHONPATH.
+models are all files in dm_control (suite, locomotion, third-party robots), gymnasium-robotics and gymnasium that are
+complete models. (The other files are parts of models.) They are not part of rhabdom. Install them with `pip install
+'rhabdom[validation]'`. If pinned versions conflict, use `pip install --no-deps --target DIR dm_control
+gymnasium-robotics` and add DIR to PYTHONPATH.
 
     python -m validation.sim.scene_against_mujoco [--only WORD] [--out DIR] [--docs DIR]
 """

@@ -2,7 +2,7 @@
 
 How much accuracy does each rendering speed allow? The automatic choice of settings promises an error below σ/2, where σ
 is the receptor noise. Does it keep this promise? It does in all six scenes: its largest error is 0.399 σ. Its speed is
-0.95 to 1.00 of that of the fastest setting that is at least as accurate.
+0.95 to 1.00 times the speed of the fastest setting that is at least as accurate.
 
 **Errors.** The error of a setting is the root mean square difference from a reference, over channels, eyes, states and
 receptors. Errors are in units of the receptor noise, σ = 0.01. Errors below σ/2 are small compared with the noise of
@@ -11,14 +11,14 @@ two populations of receptors:
 
 - all receptors, in 4 states that agents reached;
 - the receptors that see an object, in 24 views with an object 0.8 to 4 m ahead. With a perfect lens there are 8 views,
-  because their references are expensive. Mazes have no objects, so this population is empty there.
+  because the path-traced renderings take long. Mazes have no objects, so this population is empty there.
 
 The reference is Mitsuba's path tracer in 8 bands. Behind a lens, its image is convolved with the kernel of the eye
 (`Eye.see`).
 
 **Speed.** The speed is the number of agent-steps per second of one core's CPU time, without physics. In an agent-step,
-all eyes of one agent are rendered once. All settings are measured in turns over several rounds, and the best round of
-each setting counts.
+all eyes of one agent are rendered once. All settings are measured in turn, in several rounds, and the speed of a
+setting is that of its fastest round.
 
 **Settings.** The eyes are those of the published experiments. Each is rendered with a perfect lens, and behind a lens
 in focus with a stated relative aperture a (pupil diameter / retina width). The following settings vary:
