@@ -104,9 +104,10 @@ def _mean_number(result: PSFResult, values: Sequence[Any]) -> np.ndarray:
 def _at_edge(request: Request) -> Array:
     """Return the factor on the evanescent light of an edge that is due to the directions of rays at the edge.
 
-    In units of 1/λ, the light at a point of the edge is spread along the line s + t n, where s is the frequency of the
-    ray, and n the normal of the edge. Its power is proportional to 1/t². The line leaves the unit circle at t = -s·n ±
-    √((s·n)² + 1 - s²), beyond which lies √((s·n)² + 1 - s²) / (1 - s²) times the power for s = 0.
+    The light at a point of the edge is spread along the line s + t n of frequencies, in units of 1/λ. Here s is the
+    frequency of the ray, and n is the normal of the edge. Its power is proportional to 1/t². The line leaves the unit
+    circle at t = -s·n ± √((s·n)² + 1 - s²). The power outside the circle is √((s·n)² + 1 - s²) / (1 - s²) times the
+    power for s = 0.
     """
     import drjit as dr
 

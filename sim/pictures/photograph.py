@@ -106,7 +106,7 @@ def see_photograph(
     progress: function that is called with the completed fraction. None: no calls.
 
     Raises:
-        ValueError: an argument is outside its range, the image or the depth has the wrong shape, the field has more than
+        ValueError: an argument is outside its range, the image or `depth` has the wrong shape, the field has more than
             40,000 ommatidia, or `depth` is given for a compound eye.
         AccuracyError: the depth varies too much for the kernels of one image; see `optics.Eye.see`.
     """
