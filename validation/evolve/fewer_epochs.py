@@ -126,7 +126,7 @@ def write(lives: Sequence[Life], path: Path) -> None:
 
 
 def pairs(lives: Sequence[Life], task: str) -> list[tuple[Life, Life]]:
-    """Pairs of training runs for every seed that was trained in both ways: constant epochs, and fewer epochs."""
+    """Return pairs of training runs for every seed that was trained in both ways: constant epochs, and fewer epochs."""
     found = {(life.seed, life.least_epochs): life for life in lives if life.task == task}
     seeds = sorted({seed for seed, _ in found})
     both = [(found.get((seed, THROUGHOUT)), found.get((seed, FEWER))) for seed in seeds]
@@ -158,7 +158,7 @@ def compared(both: Sequence[tuple[Life, Life]]) -> Comparison:
 
 
 def table(lives: Sequence[Life]) -> str:
-    """A line per task."""
+    """Return a line per task."""
     lines = [f"{'task':12}{'runs':>6}{'return':>16}{'difference':>14}{'goal first':>16}{'CPU s':>14}{'saved':>7}"]
     for task in EYES:
         both = pairs(lives, task)
@@ -178,7 +178,7 @@ def table(lives: Sequence[Life]) -> str:
 
 
 def verdicts(lives: Sequence[Life]) -> list[str]:
-    """Descriptions of the bounds that the stored training runs violate."""
+    """Return the descriptions of the bounds that the stored training runs violate."""
     broken = []
     for task in EYES:
         both = pairs(lives, task)
@@ -194,13 +194,16 @@ def verdicts(lives: Sequence[Life]) -> list[str]:
 
 
 def passes_until(task: str, least_epochs: int, evaluations: int) -> np.ndarray:
-    """Mean number of epochs in the updates before each evaluation, (evaluation,)."""
+    """Return the mean number of epochs in the updates before each evaluation, (evaluation,)."""
     learning = assemble(task, assignments=(*SETTINGS, f"learning.least_epochs={least_epochs}")).learning
     return np.array([mean_passes(learning, n * INTERVAL, (n + 1) * INTERVAL) for n in range(evaluations)])
 
 
 def seconds(task: str, cpu: tuple[float, float], evaluations: int) -> np.ndarray:
-    """CPU time until each evaluation, (way, evaluation), assuming equal times for all epochs and for all other work."""
+    """Return the CPU time until each evaluation, (way, evaluation).
+
+    All epochs are assumed to take the same time, and so is all other work per step.
+    """
     passes = np.array([passes_until(task, least, evaluations) for least in (THROUGHOUT, FEWER)])
     (old, new), saved = passes.mean(axis=1), cpu[0] - cpu[1]
     per_pass = saved / (old - new)
@@ -208,7 +211,7 @@ def seconds(task: str, cpu: tuple[float, float], evaluations: int) -> np.ndarray
 
 
 def draw(lives: Sequence[Life], path: Path) -> None:
-    """A panel per task: return over CPU time, training runs thin and their means thick."""
+    """Draw a panel per task: return over CPU time, training runs thin and their means thick."""
     import matplotlib
 
     matplotlib.use("agg")

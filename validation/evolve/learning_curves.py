@@ -97,7 +97,7 @@ CHANGES: tuple[dict[str, Any], ...] = (
 
 
 def _settings(changes: dict[str, Any]) -> Case:
-    """Detection with two eyes and the default settings except for these changes."""
+    """Return the case of detection with two eyes and the default settings, except for these changes."""
     name = ", ".join(f"{key} {value:g}" for key, value in changes.items()) or "detection, 2 x (15 x 15)"
     return Case(name, PAIR, learning=replace(LearningConfig(), **changes))
 
@@ -131,7 +131,7 @@ def store(case: Case, seed: int, path: Path) -> None:
 
 
 def trainings(rows: Sequence[Row]) -> dict[str, list[list[Row]]]:
-    """Rows by case, in the order of CASES and then FORMER, and by seed."""
+    """Return rows by case, in the order of CASES and then FORMER, and by seed."""
     found: dict[str, list[list[Row]]] = {}
     for name in (*CASES, *FORMER):
         seeds = sorted({row.seed for row in rows if row.case == name})
@@ -141,12 +141,12 @@ def trainings(rows: Sequence[Row]) -> dict[str, list[list[Row]]]:
 
 
 def table(rows: Sequence[Row]) -> str:
-    """Training runs in tasks with a goal, then those in the maze."""
+    """Return the table of training runs: first the tasks with a goal, then the maze."""
     return "\n".join(seeking(rows)) + "\n\n" + "\n".join(travelling(rows))
 
 
 def travelling(rows: Sequence[Row]) -> list[str]:
-    """A line per training run in the maze: final results, with 95 % confidence intervals of the means."""
+    """Return a line per training run in the maze: final results, with 95 % confidence intervals of the means."""
     head = f"{'case':32}{'seed':>5}{'steps':>12}{'CPU s':>7}{'return':>16}{'fitness':>14}{'distance [m]':>14}"
     lines = [head + f"{'contacts':>10}{'goal':>7}{'update':>8}"]
     for name, runs in trainings(rows).items():
@@ -162,7 +162,7 @@ def travelling(rows: Sequence[Row]) -> list[str]:
 
 
 def seeking(rows: Sequence[Row]) -> list[str]:
-    """A line per training run with a goal: steps and CPU seconds to the threshold, and final results."""
+    """Return a line per training run with a goal: steps and CPU seconds to the threshold, and final results."""
     found = {name: runs for name, runs in trainings(rows).items() if not name.startswith("maze")}
     width = max(map(len, ("case", *found))) + 1
     head = f"{'case':{width}}{'seed':>5}{'80 % after':>12}{'CPU s':>7}{'steps':>9}{'goal first':>20}"
@@ -182,7 +182,7 @@ def seeking(rows: Sequence[Row]) -> list[str]:
 
 
 def verdicts(rows: Sequence[Row]) -> list[str]:
-    """Descriptions of the bounds that the stored training runs violate."""
+    """Return the descriptions of the bounds that the stored training runs violate."""
     runs = trainings(rows)
     broken = []
     for task in ("detection", "tracking"):
@@ -205,7 +205,7 @@ def verdicts(rows: Sequence[Row]) -> list[str]:
 
 
 def draw(rows: Sequence[Row], path: Path) -> None:
-    """Share of episodes with the goal first, over steps."""
+    """Draw the share of episodes with the goal first, over steps."""
     import matplotlib
 
     matplotlib.use("agg")

@@ -85,7 +85,7 @@ def measure(fresnel_number: float, samples: tuple[int, ...] = SAMPLES) -> Row:
 
 
 def _sampled(n: int, distance: float, exact: np.ndarray) -> tuple[float, float]:
-    """Errors of the textbook's method and of optics.propagate."""
+    """Return the errors of the textbook's method and of optics.propagate."""
     dx, middle, stride = PERIOD / n, n // 2, n // SAMPLES[0]
     u = sampled_lens(n, dx, WAVELENGTH, RADIUS, np.inf)
     points = slice(middle - 16 * stride, middle + 16 * stride + 1, stride)
@@ -101,7 +101,7 @@ def _sampled(n: int, distance: float, exact: np.ndarray) -> tuple[float, float]:
 
 
 def wrap_around(period: float) -> tuple[float, float]:
-    """Errors of intensity of a spread beam, for the textbook and optics.propagate; period in beam radii."""
+    """Return errors of intensity of a spread beam, for the textbook and optics.propagate; period in beam radii."""
     rayleigh = np.pi * WAIST**2 / WAVELENGTH
     distance, width = rayleigh * np.sqrt(SPREAD**2 - 1), SPREAD * WAIST
     n, dx = round(period * width / (WAIST / 4)), WAIST / 4
@@ -116,7 +116,7 @@ def wrap_around(period: float) -> tuple[float, float]:
 
 
 def broken_bounds(rows: list[Row], wrapped: list[tuple[float, float]]) -> list[str]:
-    """Descriptions of the bounds that do not hold."""
+    """Return the descriptions of the bounds that do not hold."""
     n, broken = np.array(SAMPLES), []
     for row in rows:
         name = f"Fresnel number {row.fresnel_number:g}"
@@ -161,7 +161,7 @@ def table(rows: list[Row], wrapped: list[tuple[float, float]]) -> str:
 
 
 def draw(rows: list[Row], wrapped: list[tuple[float, float]], path: Path) -> None:
-    """Two maps with the critical distance, the planner's choice below, and the wrap-around."""
+    """Draw two maps with the critical distance, the planner's choice below, and the wrap-around."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(13, 6.2), layout="constrained")
@@ -187,7 +187,7 @@ def draw(rows: list[Row], wrapped: list[tuple[float, float]], path: Path) -> Non
 
 
 def _choices(axes: Any, rows: list[Row]) -> None:
-    """Method and error of optics.psf, one column per Fresnel number, below the map."""
+    """Draw method and error of optics.psf below the map, one column per Fresnel number."""
     for column, row in enumerate(rows):
         words = f"{row.plan.method.replace('rayleigh_sommerfeld', 'rayleigh_s.')}\n{row.error:.0e}"
         axes.text(column, 0.5, words, rotation=90, fontsize=8.5, ha="center", va="center", color="#B04A00")

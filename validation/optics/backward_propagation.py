@@ -77,7 +77,7 @@ class Spot:
 
 
 def spot(waist: float, distance: float, dx: float, side: int) -> np.ndarray:
-    """Exact field (side, side), carrier included; all lengths in wavelengths."""
+    """Return the exact field (side, side), carrier included; all lengths in wavelengths."""
     x = (np.arange(side) - side // 2) * dx
     r = np.hypot(x[None, :], x[:, None])
     if distance == 0:
@@ -112,7 +112,7 @@ def recover(waist: float) -> Spot:
 
 
 def broken_bounds(rows: list[Row], spots: list[Spot]) -> list[str]:
-    """Descriptions of the bounds that do not hold."""
+    """Return the descriptions of the bounds that do not hold."""
     broken = []
     for row in rows:
         name = f"{row.distance:g} wavelengths"
@@ -151,7 +151,7 @@ def _shown(error: float) -> str:
 
 
 def draw(rows: list[Row], spots: list[Spot], path: Path) -> None:
-    """Error over distance, and lost light over the evanescent share."""
+    """Draw the error over distance, and lost light over the evanescent share."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(12, 4.8), layout="constrained")

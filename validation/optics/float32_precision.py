@@ -119,13 +119,13 @@ def dark(angle: float) -> Dark:
 
 
 def breaking_distances(rows: list[Distant]) -> list[float]:
-    """Distances at which naive phases exceed each of BREAKS, interpolated by power laws."""
+    """Return distances at which naive phases exceed each of BREAKS, interpolated by power laws."""
     errors = np.maximum.accumulate([row.naive for row in rows])
     return [float(np.exp(np.interp(np.log(b), np.log(errors), np.log(DISTANCES)))) for b in BREAKS]
 
 
 def broken_bounds(rows: list[Distant], windows: list[Dark]) -> list[str]:
-    """Descriptions of the bounds that do not hold."""
+    """Return the descriptions of the bounds that do not hold."""
     broken = []
     for row in rows:
         if not row.naive <= max(row.rounding, 1e-6):
@@ -167,7 +167,7 @@ def table(rows: list[Distant], windows: list[Dark]) -> str:
 
 
 def draw(rows: list[Distant], windows: list[Dark], path: Path) -> None:
-    """Error over distance, and over the darkness of the window."""
+    """Draw the error over distance, and over the darkness of the window."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(12, 4.8), layout="constrained")

@@ -119,7 +119,10 @@ def measure(count: int, seed: int = 0, methods: int = 0) -> tuple[list[Row], int
 
 
 def _row(case: Case, methods: bool) -> Row | None:
-    """Row of a case; None if the direct sum, with a much smaller tolerance than the prediction, would take too long."""
+    """Return the row of a case; None if the direct sum would take too long.
+
+    The tolerance of the direct sum is much smaller than the prediction.
+    """
     try:
         chosen = _timed(case, "auto", 3 if methods else 1)
     except optics.AccuracyError as error:
@@ -160,7 +163,7 @@ def _asked(case: Case, method: str) -> dict[str, Any]:
 
 
 def _timed(case: Case, method: str, calls: int) -> tuple[optics.PSFResult, float]:
-    """The PSF, and the time of a warm call, after a first one that may compile."""
+    """Return the PSF, and the time of a warm call, after a first one that may compile."""
     result, seconds = case.psf(method), []
     for _ in range(calls - 1):
         start = time.perf_counter()
@@ -176,13 +179,13 @@ def _run(timed: tuple[optics.PSFResult, float], exact: optics.PSFResult) -> Run:
 
 
 def reason(refusal: str) -> str:
-    """Kind of refusal; "" for none."""
+    """Return the kind of refusal; "" for none."""
     known = (name for name, words in REASONS.items() if words in refusal)
     return next(known, "other: " + re.sub(r"\d\S*", "#", refusal)) if refusal else ""
 
 
 def shares(rows: Sequence[Row]) -> dict[str, float]:
-    """Quantities on which the bounds are set."""
+    """Return quantities on which the bounds are set."""
     answered = [row for row in rows if row.runs]
     ratios = np.array([row.ratio for row in answered])
     # Refused cases are not timed; a chosen method above the tolerance counts as too slow.
@@ -197,7 +200,7 @@ def shares(rows: Sequence[Row]) -> dict[str, float]:
 
 
 def broken_bounds(rows: Sequence[Row], percentages: bool = True) -> list[str]:
-    """Descriptions of the bounds that do not hold.
+    """Return the descriptions of the bounds that do not hold.
 
     percentages: True if there are enough cases for bounds on percentages.
     """
@@ -244,7 +247,7 @@ def table(rows: Sequence[Row], skipped: int) -> str:
 
 
 def draw(rows: Sequence[Row], path: Path) -> None:
-    """Predicted over actual error, coloured by method."""
+    """Draw the predicted over actual error, coloured by method."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(8.6, 6.4), layout="constrained")

@@ -109,12 +109,12 @@ class Row:
 
 
 def land(facet: Facet) -> float:
-    """Land's sensitivity [µm² sr] in white light."""
+    """Return Land's sensitivity [µm² sr] in white light."""
     return 1e12 * optics.optical_sensitivity(facet.diameter, facet.focal_length, facet.rhabdom, facet.length)
 
 
 def first_mode_angle(eye: optics.Ommatidium, wavelength: float) -> float:
-    """Full width at half maximum [degrees] of the light in the first mode."""
+    """Return the full width at half maximum [degrees] of the light in the first mode."""
     at = np.linspace(0, 4, 801)
     power = eye.mode_power(np.radians(at), np.zeros(len(at)), wavelength)[0]
     return 2 * float(np.interp(-power[0] / 2, -power[: power.argmin()], at[: power.argmin()]))
@@ -209,7 +209,7 @@ def limits() -> list[Row]:
 
 
 def geisler_photons() -> float:
-    """Photons of 1 cd/m² at 555 nm in one second, per mm² of pupil and square minute, from a PhotonBudget.
+    """Return photons of 1 cd/m² at 555 nm in one second, per mm² of pupil and square minute, from a PhotonBudget.
 
     The budget's light is daylight. The ratio of its luminance to that of its light at 555 nm converts it.
     """
@@ -224,7 +224,7 @@ def geisler_photons() -> float:
 
 
 def ideal_sensitivities() -> np.ndarray:
-    """Contrast sensitivities of the ideal observer, (luminance, frequency)."""
+    """Return the contrast sensitivities of the ideal observer, (luminance, frequency)."""
     contrast = optics.mean_human_mtf(FREQUENCIES, 2 * math.sqrt(PUPIL_AREA / math.pi))
     area = (CYCLES / FREQUENCIES) ** 2 / 4  # the squared window has the mean 1/4
     bands = optics.SpectralBands.uniform(16, "lms")
@@ -238,7 +238,7 @@ def ideal_sensitivities() -> np.ndarray:
 
 
 def broken_bounds(rows: list[Row], ideal: np.ndarray) -> list[str]:
-    """Descriptions of the bounds that do not hold."""
+    """Return the descriptions of the bounds that do not hold."""
     broken = [
         f"{row.name}: {row.ratio:.4g} times the published value, must be {row.low:g} to {row.high:g} times"
         for row in rows
@@ -260,7 +260,7 @@ def table(rows: list[Row], ideal: np.ndarray) -> str:
 
 
 def draw(rows: list[Row], ideal: np.ndarray, path: Path) -> None:
-    """Computed over published values, and the ideal observer's contrast sensitivity."""
+    """Draw the computed values over the published ones, and the ideal observer's contrast sensitivity."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(12, 6.5), layout="constrained")

@@ -82,7 +82,10 @@ def prism(angle_deg: float, with_psf: bool = True) -> Prism:
 
 
 def psf_deviation(angle: float) -> float:
-    """Direction of the brightest point behind a prism by optics.psf, from a parabola through the top of a cut."""
+    """Return the direction [rad] of the brightest point behind a prism.
+
+    It is the top of a parabola through a cut of the PSF by optics.psf.
+    """
     heights = np.tan(angle) * PRISM_RADIUS * (2 * np.arange(4) - 3)
     pupil = optics.Pupil(PRISM_RADIUS, optics.BSplineRelief(np.tile(heights, (4, 1))), n=N)
     place = PRISM_DISTANCE * float(np.tan(thin_deviation(angle, N)))
@@ -99,7 +102,7 @@ def _lens(aperture: float, focal_length: float = FOCAL_LENGTH) -> RealLens:
 
 
 def limits() -> dict[str, float]:
-    """Limits of the mask: given errors of its deviation, and effects that it omits."""
+    """Return the limits of the mask: given errors of its deviation, and effects that it omits."""
 
     def off(angle: float, by: float) -> float:
         return 1 - thin_deviation(angle, N) / deviation_glass_first(angle, N) - by
@@ -144,7 +147,7 @@ SAID = {
 
 
 def broken_bounds(prisms: list[Prism], lenses: list[RealLens], found: dict[str, float]) -> list[str]:
-    """Descriptions of the bounds that do not hold."""
+    """Return the descriptions of the bounds that do not hold."""
     broken = [
         f"{name}: {found[name]:.4g}, the page says {said:.4g}"
         for name, (said, within) in SAID.items()
@@ -187,7 +190,7 @@ def table(prisms: list[Prism], lenses: list[RealLens], ridges: list[Corrugation]
 
 
 def draw(lenses: list[RealLens], path: Path) -> None:
-    """Deviation over slope, Strehl ratio over NA, and rays through a real lens."""
+    """Draw the deviation over slope, Strehl ratio over NA, and rays through a real lens."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(13, 4.4), layout="constrained")
@@ -218,7 +221,7 @@ def draw(lenses: list[RealLens], path: Path) -> None:
 
 
 def _rays(axes: Any) -> None:
-    """Rays through the relief whose mask is an ideal lens of NA 0.4."""
+    """Draw rays through the relief whose mask is an ideal lens of NA 0.4."""
     f, aperture = FOCAL_LENGTH * 1e6, 0.4
     radius = f * aperture / np.sqrt(1 - aperture**2)
     x = np.linspace(-radius, radius, 201)

@@ -83,7 +83,7 @@ class Row:
 
 
 def focus(lens: Lens, n: int) -> tuple[np.ndarray, np.ndarray]:
-    """Fields in the pupil and in the focal plane by the textbook's method."""
+    """Return fields in the pupil and in the focal plane by the textbook's method."""
     u = sampled_lens(n, lens.grid / n, WAVELENGTH, lens.radius, lens.focal_length)
     return u, angular_spectrum(u, lens.grid / n, WAVELENGTH, lens.focal_length)
 
@@ -105,7 +105,7 @@ def true_psf(lens: Lens, dx: float, side: int = 65) -> optics.PSFResult:
 
 
 def energy_inside(u: np.ndarray, dx: float, radius: float) -> float:
-    """∫ |u|² over a disk about the centre, of the band-limited function through the samples.
+    """Return ∫ |u|² over a disk about the centre, of the band-limited function through the samples.
 
     Gauss-Legendre in radius, trapezoidal rule in angle. The points lie between the samples, so the Fourier sum is
     evaluated directly.
@@ -130,7 +130,7 @@ def _exact(lens: Lens) -> float:
 
 
 def broken_bounds(published: list[Row], sweep: Row) -> list[str]:
-    """Descriptions of the bounds that do not hold."""
+    """Return the descriptions of the bounds that do not hold."""
     broken = []
     for row in [*published, sweep]:
         name = f"f/{row.lens.f_number:g}, f = {row.lens.focal_length:g} m"
@@ -160,7 +160,7 @@ def table(published: list[Row], sweep: Row) -> str:
 
 
 def draw(published: list[Row], sweep: Row, path: Path) -> None:
-    """Undersampled image, true PSF, and energy over the pitch."""
+    """Draw the undersampled image, true PSF, and energy over the pitch."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(13.5, 3.6), layout="constrained")

@@ -53,7 +53,8 @@ NEXT, FACTOR = 3, 3.0  # resolutions that differ by at most NEXT receptors take 
 class Choice:
     """Chosen samples of one setting.
 
-    sweep: property that differs from the setting before · error: predicted, relative to the tolerance
+    sweep: property that differs from the setting before
+    error: predicted error relative to the tolerance
     time: CPU time of a frame per receptor [s]
     """
 
@@ -108,7 +109,7 @@ def settings() -> list[tuple[str, str, int, float, int]]:
 
 
 def broken_bounds(choices: Sequence[Choice]) -> list[str]:
-    """Descriptions of the bounds that do not hold."""
+    """Return the descriptions of the bounds that do not hold."""
     broken = []
     for c in choices:
         name = f"{c.task}, {c.eyes} eyes of {c.receptors} over {c.fov_deg:g}°"
@@ -146,7 +147,7 @@ COLORS = {"detection": "#0072B2", "maze": "#D55E00", "navigation": "#009E73"}
 
 
 def draw(choices: Sequence[Choice], path: Path) -> None:
-    """One column per sweep: samples and time per receptor above, predicted error below."""
+    """Draw one column per sweep: samples and time per receptor above, predicted error below."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(11, 6.5), layout="constrained")

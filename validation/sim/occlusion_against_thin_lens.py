@@ -133,7 +133,7 @@ def _described(mi: Any, focus: float, samples: int) -> dict[str, Any]:
 
 
 def broken_bounds(cases: list[Case]) -> list[str]:
-    """Descriptions of the bounds that do not hold."""
+    """Return the descriptions of the bounds that do not hold."""
     broken = []
     for case in cases:
         if not (case.error.max() <= LARGEST and case.error.mean() <= MEAN):
@@ -151,7 +151,7 @@ def table(cases: list[Case]) -> str:
 
 
 def draw(cases: list[Case], path: Path) -> None:
-    """Profiles across the edge for each focus."""
+    """Draw profiles across the edge for each focus."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(13, 3.2), layout="constrained")

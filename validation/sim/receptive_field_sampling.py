@@ -98,7 +98,7 @@ def eyes_behind(pupil: str, resolution: tuple[int, int]) -> sim.Eyes:
 
 
 def convolved(world: sim.World, eyes: sim.Eyes, state: WorldState, light: str) -> np.ndarray:
-    """Signals of the eyes by the reference, (state, channel, h, w)."""
+    """Return the signals of the eyes by the reference, (state, channel, h, w)."""
     eye = eyes.eye()
     cells = 1 if eye.pupil is None else CELLS
     reach = eye.kernel(cells).shape[-1] // 2
@@ -118,7 +118,7 @@ def convolved(world: sim.World, eyes: sim.Eyes, state: WorldState, light: str) -
 
 
 def reference_fidelity(eyes: sim.Eyes, light: str) -> sim.Fidelity:
-    """Fidelity of the cells of the reference's image, which are whole receptors with a perfect lens."""
+    """Return the fidelity of the cells of the reference's image, which are whole receptors with a perfect lens."""
     perfect = eyes.optics is None
     if light == "all":
         return sim.Fidelity(PERFECT_AREAS if perfect else CELL_AREAS, eyes.bands, light=light, samples="areas")
@@ -126,7 +126,7 @@ def reference_fidelity(eyes: sim.Eyes, light: str) -> sim.Fidelity:
 
 
 def sampled(world: sim.World, eyes: sim.Eyes, state: WorldState, fidelity: sim.Fidelity) -> tuple[np.ndarray, float]:
-    """Signals of the eyes by rays or areas, and their number per receptor."""
+    """Return the signals of the eyes by rays or areas, and their number per receptor."""
     renderer = sim.BatchedRenderer(world, eyes, 1, fidelity)
     rays = len(renderer.sensor.directions) / math.prod(eyes.resolution)
     return np.concatenate([renderer.signals(state.take(np.array([i]))) for i in range(state.n)])[:, 0], rays
@@ -152,7 +152,7 @@ def measure(pupil: str, resolution: tuple[int, int], world: sim.World, state: Wo
 
 
 def broken_bounds(series: Sequence[Series]) -> list[str]:
-    """Descriptions of the bounds that do not hold."""
+    """Return the descriptions of the bounds that do not hold."""
     broken = []
     for s in series:
         if s.auto_error > HALF:
@@ -176,7 +176,7 @@ COLORS = dict(zip(PUPILS, ("#000000", "#999999", "#0072B2", "#E69F00", "#009E73"
 
 
 def draw(series: Sequence[Series], path: Path) -> None:
-    """One panel per retina: errors over rays, with the choice of auto as a star."""
+    """Draw one panel per retina: errors over rays, with the choice of auto as a star."""
     from matplotlib.figure import Figure
 
     retinas = list(dict.fromkeys(s.retina for s in series))

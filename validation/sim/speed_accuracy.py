@@ -117,14 +117,14 @@ class Population:
         return self.crowd.take(np.arange(self.states))
 
     def signals(self, see: Callable[[WorldState], np.ndarray], at_once: int) -> np.ndarray:
-        """Signals of the counted receptors, (receptor, channel), computed for `at_once` worlds at a time."""
+        """Return the signals of the counted receptors, (receptor, channel), computed for `at_once` worlds at a time."""
         parts = range(0, self.states, at_once)
         found = [see(self.crowd.take(np.arange(at, at + at_once))) for at in parts]
         return np.moveaxis(np.concatenate(found)[: self.states], 2, -1)[self.counted].astype(float)
 
 
 def populations(scene: Scene, world: sim.World, states: Sequence[int]) -> list[Population]:
-    """All receptors in states that agents reached, and receptors that see an object in states with one ahead."""
+    """Return all receptors in states that agents reached, and receptors that see an object in states with one ahead."""
     crowd = lived_through(world, MANY)
     found = [Population(crowd, np.ones((states[0], scene.eyes.n_eyes, *scene.eyes.resolution), bool))]
     if world.objects:
@@ -136,7 +136,7 @@ def populations(scene: Scene, world: sim.World, states: Sequence[int]) -> list[P
 def converged(
     scene: Scene, world: sim.World, judged: Sequence[Population], spp: int
 ) -> tuple[list[np.ndarray], Errors]:
-    """Path-traced signals by the reference renderer, and their standard errors, from two halves."""
+    """Return the path-traced signals by the reference renderer, and their standard errors, from two halves."""
     renderer = sim.ReferenceRenderer(world, scene.eyes_with(BANDS), "path", spp, sampler="multijitter")
     halves = []
     for renderer.seed in (1, 2):
@@ -179,7 +179,7 @@ def runner(setting: Setting, scene: Scene, world: sim.World) -> Runner:
 
 
 def chosen(world: sim.World, eyes: sim.Eyes) -> tuple[sim.Fidelity, str]:
-    """The automatic choice, and its warning, if any."""
+    """Return the automatic choice, and its warning, if any."""
     with warnings.catch_warnings(record=True) as given:
         warnings.simplefilter("always", sim.FidelityWarning)
         fidelity = sim.choose_fidelity(world, eyes)
@@ -215,14 +215,14 @@ def measure(
 
 
 def to_the_end(scene: Scene, world: sim.World, judged: Sequence[Population], light: str) -> list[np.ndarray]:
-    """Signals by the batched renderer with many rays, a few worlds at a time."""
+    """Return signals by the batched renderer with many rays, a few worlds at a time."""
     fidelity, at_once = sim.Fidelity(TO_THE_END[scene.lens], BANDS, light=light), 4
     renderer = sim.BatchedRenderer(world, scene.eyes_with(BANDS), at_once, fidelity)
     return [population.signals(renderer.signals, at_once) for population in judged]
 
 
 def timed(runners: Sequence[Runner], crowd: WorldState, rounds: int) -> list[float]:
-    """CPU seconds of the fastest call of each runner; short calls are repeated for ROUND in every round."""
+    """Return the CPU seconds of the fastest call of each runner; short calls are repeated for ROUND in every round."""
     quickest = [np.inf] * len(runners)
     for _ in range(rounds):
         for i, mine in enumerate(runners):
@@ -236,7 +236,7 @@ def timed(runners: Sequence[Runner], crowd: WorldState, rounds: int) -> list[flo
 
 
 def broken_bounds(charts: Sequence[Chart]) -> list[str]:
-    """Descriptions of the bounds that do not hold."""
+    """Return the descriptions of the bounds that do not hold."""
     broken = []
     for chart in charts:
         auto, rival = chart.auto, chart.rival
