@@ -175,7 +175,7 @@ class SmoothPupil:
         """Return the integral of the Gaussian over the aperture, at points in radii.
 
         The factors of all near sides are multiplied. If the light of one side is diffracted by a steep slope, it comes
-        from the side itself. The factors of other sides are then those of the Gaussian along this side.
+        from the side itself. All other factors then refer to the Gaussian along this side.
         """
         depth, across, down = np.stack([np.broadcast_arrays(*side.depth(x, y)) for side in self.sides], axis=1)
         mean, variance = inner.along(across, down)

@@ -24,6 +24,8 @@ rays: test_geometric.py
 method_sampling: point_spread/test_planner.py
 scalar_theory: test_scalar_theory.py
 sine_samples: test_sine_samples.py
+smooth_pupil: test_smooth_spectrum.py
+smooth_spectrum: test_smooth_spectrum.py, eye/test_steep_reliefs.py
 smythe: point_spread/test_vector_focus.py
 spectral_taper: test_angular_spectrum.py, test_textbook.py
 textbook: test_textbook.py
