@@ -122,9 +122,8 @@ class Eye(EyeSpec):
             cell is its geometric image.
 
         The sum of the kernel is the fraction of the pupil's power that lands inside its window. The window is wide
-        enough to lose less than the tolerance (limits: see `receptive_field`). If the light of a steep relief spreads
-        too far, its part that lands farther from the image than the longer side of the retina counts as blocked. The
-        kernel of the perfect lens is 1 x 1 with the value 1.
+        enough to lose less than the tolerance (limits: see `receptive_field`). Light of a steep relief may count as
+        blocked if it lands farther from the image than the longer side of the retina. A perfect lens has the kernel 1.
 
         The kernel treats the light of each scene cell as coming from its centre. Signals are then a² Σ_b weights[c, b]
         (kernel_b ⊗ radiance_b), averaged over each receptor's cells. By default, `see` assumes light from all over each
