@@ -148,9 +148,8 @@ class Eye(EyeSpec):
     def _retina_for(self, wavelengths: np.ndarray, samples_per_receptor: int) -> Retina:
         height, width = self.receptor_size
         cell = height / samples_per_receptor, width / samples_per_receptor
-        size = height * self.resolution[0], width * self.resolution[1]
-        settings = self.tolerance, size, self.dtype, self.pupil_turned, self.most_seconds
-        return Retina(self.retina_distance, wavelengths, cell, *settings)
+        settings = self.resolution, samples_per_receptor, self.dtype, self.pupil_turned, self.most_seconds
+        return Retina(self.retina_distance, wavelengths, cell, self.tolerance, *settings)
 
     def chosen_bands(self) -> SpectralBands:
         """Return the fewest bands that keep a receptor's predicted error within the tolerance."""

@@ -15,7 +15,7 @@ from optics.elements.pupil import Pupil
 from optics.elements.source import PointSource
 from optics.elements.wavefront_slopes import Slopes
 from optics.eye.cell_integrals import Tiles, cell_integrals, samples_per_cycle
-from optics.eye.retina import Retina, more_time
+from optics.eye.retina import CellsError, Retina, more_time
 from optics.methods.problem import Problem
 from optics.methods.smooth_spectrum import may_be_steep
 from optics.numerics.accuracy import AccuracyError, Plan
@@ -150,7 +150,7 @@ def _on_spot(compute: Callable[[Spot], Result], beams: list[Beam], retina: Retin
                 return compute(spot_of(beams, retina, most))
         except AccuracyError as error:
             errors.append(error)
-            if not all(map(may_be_steep, beams)):
+            if (isinstance(error, CellsError) and retina.samples > 1) or not all(map(may_be_steep, beams)):
                 break
     raise errors[0]
 
@@ -173,7 +173,7 @@ def spot_of(beams: list[Beam], retina: Retina, most: float = math.inf) -> Spot:
     half = min(half, most)
     narrow = min(retina.cell)
     if _cells_within(half, narrow) > MOST_CELLS:
-        raise AccuracyError(
+        raise CellsError(
             f"the light spreads over {2 * half:.3g} m, {2 * half / narrow:.0f} cells of {narrow:.3g} m: "
             f"at most {MOST_CELLS}; increase the field of view or the cells"
             + (", or flatten the relief" if beams[0].pupil.height is not None else "")

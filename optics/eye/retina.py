@@ -12,7 +12,7 @@ import numpy as np
 from optics.numerics.accuracy import AccuracyError
 from optics.numerics.autodiff import Scalar
 
-__all__ = ["Retina", "more_time"]
+__all__ = ["CellsError", "Retina", "more_time"]
 
 
 @dataclass(frozen=True)
@@ -20,7 +20,8 @@ class Retina:
     """Properties of the retina that define the PSF: distance [m], wavelengths [m], cells, tolerance, dtype.
 
     cell: height and width of a cell [m].
-    size: height and width of the retina [m].
+    resolution: number of receptors (height, width).
+    samples: number of cells along a receptor's side.
     pupil_turned: True if the pupil is rotated by 180° about the axis.
     most_seconds: largest predicted time [s] of the PSF of a band.
     """
@@ -29,10 +30,17 @@ class Retina:
     wavelengths: np.ndarray
     cell: tuple[float, float]
     tolerance: float
-    size: tuple[float, float]
+    resolution: tuple[int, int]
+    samples: int
     dtype: str = "float32"
     pupil_turned: bool = False
     most_seconds: float = 3.0  # choice
+
+    @property
+    def size(self) -> tuple[float, float]:
+        """Height and width [m]."""
+        height, width = (n * self.samples * side for n, side in zip(self.resolution, self.cell, strict=True))
+        return height, width
 
     def across_pupil(self, direction: tuple[float, float]) -> tuple[float, float]:
         """Return the tangents (x, y), in the pupil's axes, of the direction in which the light of a source travels.
@@ -43,6 +51,10 @@ class Retina:
         """
         right, down = direction
         return (-right, -down) if self.pupil_turned else (right, down)
+
+
+class CellsError(AccuracyError):
+    """The light covers too many cells. If receptors consist of several cells, coarser cells may be sufficient."""
 
 
 @contextmanager
