@@ -26,14 +26,14 @@ TASKS = ("maze", "detection")
 SIGMA = 0.01  # standard deviation of a receptor's noise
 FOV_DEG = 45.0
 # Settings of the learner, the same in all tasks. The cost of contact rises and the learning rate falls within the
-# 151,552 training steps. Of three settings that were tried with one training run per animal, these gave the highest
-# fitness in the tasks and animals together.
+# 151,552 training steps. Three settings were tried with one training run per animal. These gave the highest fitness
+# over all tasks and animals.
 LEARNER = (
     *("learning.total_steps=150000", "learning.eval_interval=50000", "learning.gamma=0.95", "learning.n_epochs=8"),
     *("learning.first_speed=0.25", "learning.contact_ramp=75000", "learning.decay_after=75000"),
     "learning.least_return=0",
 )
-LAYOUTS = "world.layouts=family world.family_seed={seed}"  # of navigators; each training run has its own family
+LAYOUTS = "world.layouts=family world.family_seed={seed}"  # layouts of navigators; each training run has its own family
 RUNS = 8  # training runs of each animal in each task
 # Factors and their two levels: number of eyes, receptors across, angle over which eyes are spread, height of eyes.
 FACTORS = {
