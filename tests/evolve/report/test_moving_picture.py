@@ -8,9 +8,13 @@ import numpy as np
 import pytest
 from PIL import Image, ImageSequence
 
+from evolve.analysis.episode import Pictures
 from evolve.config.run_config import ConfigError
-from evolve.report.moving_picture import ASIDE, HEIGHT, LONGEST, SPEED, write_gif, write_mp4
-from evolve.report.theme import INK
+from evolve.report.moving_picture import GAP, HEIGHT, INSET, LONGEST, SPEED, _frame, _frames, write_gif, write_mp4
+from evolve.report.picture import display
+from evolve.report.theme import INK, PAPER
+
+BACKGROUND = int(PAPER[1:3], 16)
 
 
 @pytest.fixture(scope="module")
@@ -49,10 +53,47 @@ def test_the_agent_is_where_it_was(short, frames):
 
 
 def test_the_eyes_are_beside_it(short, frames):
-    picture = np.asarray(frames[12][0])[:, -ASIDE:]
-    left, right = picture[: HEIGHT // 2 - 10], picture[HEIGHT // 2 + 10 :]
-    assert np.abs(left.astype(float).mean() - right.astype(float).mean()) > 1 or (left != right[: len(left)]).any()
-    assert picture.std() > 5
+    """Two eyes fill the part on the right, one above the other, without interpolation between receptors."""
+    plan, receptors = short.plan.bounds, display(short.signals, short.gain)[12]
+    width = round((plan[2] - plan[0]) * HEIGHT / (plan[3] - plan[1]))
+    high = (HEIGHT - GAP) // 2
+    wide = round(high * short.eyes.field_aspect)
+    assert frames[12][0].size == (width + GAP + wide, HEIGHT)
+    for number, eye in enumerate(receptors):
+        y, x = 0.5 + np.indices(eye.shape[:2]).reshape(2, -1)
+        pixels = [
+            frames[12][0].getpixel((int(width + GAP + b), int(number * (side + GAP) + a)))
+            for a, b in zip(y * side / len(eye), x * side / len(eye), strict=True)
+        ]
+        assert np.abs(np.subtract(pixels, eye.reshape(-1, 3))).mean() < 8, "the palette's colours"
+
+
+@pytest.mark.parametrize(
+    ("eyes", "aspect", "columns", "rows"), [(1, 1.0, 1, 1), (4, 1.0, 2, 2), (3, 4.0, 1, 3), (12, 1.0, 4, 3)]
+)
+def test_eyes_are_as_large_as_possible(eyes, aspect, columns, rows):
+    """Each eye's colour is its number, so that rows and columns can be counted."""
+    seen = np.broadcast_to(np.arange(1, eyes + 1, dtype=np.uint8)[:, None, None, None], (eyes, 2, 2, 3))
+    picture = np.asarray(_frame(Image.new("RGB", (0, HEIGHT)), seen, aspect))[..., 0]
+    assert len(set(picture[5]) - {BACKGROUND}) == columns
+    assert len(set(picture[:, GAP + 2]) - {BACKGROUND}) == rows
+    assert set(np.unique(picture)) - {BACKGROUND} == set(range(1, eyes + 1))
+
+
+def test_a_rendered_world_has_the_plan_in_its_corner(short, frames):
+    """The latest image is on the left; pixels of its lower left corner are those of the plan."""
+    pixels = np.empty((12, HEIGHT, 400, 3), np.uint8)
+    pixels[:] = np.arange(12, dtype=np.uint8)[:, None, None, None] * 20
+    drawn = list(_frames(dataclasses.replace(short, pictures=Pictures(np.arange(0, 24, 2), pixels)), 1))
+    for time in (0, 13, 23):
+        seen, plain = np.asarray(drawn[time]), np.asarray(frames[time][0])
+        world = seen[:, :400]
+        assert (world[: HEIGHT // 2] == 20 * (time // 2)).all()
+        plan = world[-GAP - round(INSET * HEIGHT) : -GAP, GAP:]
+        width = next(n for n, column in enumerate(plan.transpose(1, 0, 2)) if (column == 20 * (time // 2)).all())
+        whole = Image.fromarray(plain[:, : round(width / INSET)]).resize((width, len(plan)))
+        assert np.abs(plan[:, :width].astype(int) - np.asarray(whole)).mean() < 4
+        assert (seen[:, 400:] == plain[:, plain.shape[1] - seen.shape[1] + 400 :]).mean() > 0.5, "the same eyes"
 
 
 def test_a_film_has_a_frame_for_every_action(short, frames, tmp_path):
