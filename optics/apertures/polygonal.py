@@ -100,7 +100,7 @@ class Slit(Aperture):
     """A centred rectangle of full `width` along x and `height` along y, in units of R.
 
     Raises:
-        ValueError: a side not positive, or a diagonal longer than the unit circle's diameter.
+        ValueError: a side is not positive, or the diagonal is longer than the unit circle's diameter.
     """
 
     width: float

@@ -119,7 +119,7 @@ class HumanEye:
         `optics.MTF.profile` expects the result.
 
         Raises:
-            ValueError: a negative or invalid number.
+            ValueError: a number is negative or invalid.
         """
         return _not_negative(cycles_per_degree) * (180 / math.pi) / self._nodal_distance
 
