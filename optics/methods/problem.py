@@ -60,6 +60,7 @@ class Problem:
         their error.
     spread: spread of the light over the pupil, see `light_spread`.
     differentiated: whether the PSF carries derivatives.
+    moves: whether derivatives with respect to the distance are requested.
     knots: cells that derivatives with respect to samples of maps require; None if no such derivatives are requested.
     mask_detail: bandwidth [1/m] of the amplitude of the mask.
     detail_part: phase [rad] of neglected detail, relative to the tolerance.
@@ -82,6 +83,7 @@ class Problem:
     spread: float = ROUND
     even: bool = False
     differentiated: bool = False
+    moves: bool = False
     knots: DerivativeKnots | None = None
     mask_detail: float = 0.0
     detail_part: float = DETAIL_PART
@@ -107,6 +109,7 @@ class Problem:
             return _problem(plain, window, tolerance, dtype)
         refuse_torch(beam)
         found = _differentiated(plain, window, tolerance, dtype, derivative_knots(beam.pupil, beam.wavelength))
+        found = replace(found, moves=carries_derivative(beam.distance))
         # A small change of the angle breaks the symmetry of light along the axis.
         return replace(found, symmetric=False, even=False) if any(map(carries_derivative, beam.source.angle)) else found
 

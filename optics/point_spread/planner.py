@@ -45,7 +45,8 @@ from optics.methods.method_sampling import Sampling
 from optics.methods.pixelated_spectrum import split_pixel_spectrum, whole_pixel_spectrum
 from optics.methods.problem import Problem
 from optics.methods.rayleigh_sommerfeld import nodes
-from optics.methods.window_sampling import DERIVATIVE_ERROR, WindowSampling, window_sampling
+from optics.methods.window_rank import DERIVATIVE_ERROR
+from optics.methods.window_sampling import WindowSampling, window_sampling
 from optics.numerics.accuracy import (
     FLOAT_NOISE,
     MOST_BYTES,
